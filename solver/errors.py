@@ -1,0 +1,28 @@
+"""The errors a caller may catch. Every one of them is a `RippleError`."""
+
+
+class RippleError(Exception):
+    """Root of all errors that ripple-sim raises on purpose.
+
+    The message says what was wrong, the value, what is valid, and what to do.
+    """
+
+
+class MeshError(RippleError):
+    """The mesh is not a closed, orientable, connected surface of genus 0, or cannot be read."""
+
+
+class SphereMapError(RippleError):
+    """No certified (fold-free, covering) sphere map was found for the mesh."""
+
+
+class AtlasError(RippleError):
+    """An atlas file or an atlas parameter is invalid."""
+
+
+class SolverError(RippleError):
+    """A wave parameter is invalid, or the wave field is no longer finite."""
+
+
+class GLError(RippleError):
+    """No usable OpenGL context, or the driver reported an error."""
