@@ -1,0 +1,102 @@
+"""From a mesh to its atlas: sphere map, rays through the texels, cache."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import platformdirs
+from numpy.typing import NDArray
+
+from .atlas import Atlas
+from .atlas_file import content_digest, load_atlas, save_atlas
+from .cubemap import check_resolution, texel_directions
+from .errors import AtlasError
+from .mesh import Mesh
+from .rays import cast_rays
+from .sphere_map import progressive_sphere_map
+
+SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {"progressive": progressive_sphere_map}
+
+
+def build_atlas(mesh: Mesh, resolution: int = 128, method: str = "progressive", cache: bool = True) -> Atlas:
+    """Build the cube-map atlas of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        From `load_mesh` or `Mesh.from_arrays`.
+    resolution : int
+        Texels along a face's edge, N; 6 N^2 texels in all.
+    method : str
+        Sphere map: "progressive" (fold-free, spreads area evenly).
+    cache : bool
+        Keep the result in the user's cache folder and take it from there the next time.
+
+    Raises
+    ------
+    AtlasError
+        For an invalid resolution or method.
+    SphereMapError
+        If no certified sphere map is found.
+    """
+    resolution = check_resolution(resolution)
+    if method not in SPHERE_MAPS:
+        raise AtlasError(f"sphere map method {method!r} does not exist; valid are {', '.join(map(repr, SPHERE_MAPS))}")
+    start = time.perf_counter()
+    path = _cache_path(mesh, method) if cache else None
+    stored = None if path is None else _read_cache(path, mesh)
+    if stored is not None and stored.resolution == resolution:
+        stored.timings["cache"] = time.perf_counter() - start
+        return stored
+    sphere = SPHERE_MAPS[method](mesh.V, mesh.F) if stored is None else stored.sphere
+    mapped = time.perf_counter()
+    atlas = atlas_from_sphere_map(mesh, sphere, resolution)
+    atlas.timings.update(sphere_map=mapped - start, rays=time.perf_counter() - mapped)
+    if path is not None:
+        # a folder that cannot be written costs the next call its time, nothing else
+        with contextlib.suppress(AtlasError):
+            save_atlas(atlas, path)
+    return atlas
+
+
+def _cache_path(mesh: Mesh, method: str) -> Path:
+    """One file a mesh and method: the sphere map does not depend on the resolution, and rays are quick."""
+    key = hashlib.sha256(f"{method} {content_digest({'V': mesh.V, 'F': mesh.F})}".encode()).hexdigest()[:32]
+    return Path(platformdirs.user_cache_dir("ripple-sim")) / f"{key}.npz"
+
+
+def _read_cache(path: Path, mesh: Mesh) -> Atlas | None:
+    """The atlas of this very mesh, or None where the file is missing, does not verify, or is of another mesh."""
+    try:
+        stored = load_atlas(path)
+    except AtlasError:
+        return None
+    if not (np.array_equal(stored.mesh.V, mesh.V) and np.array_equal(stored.mesh.F, mesh.F)):
+        return None
+    return dataclasses.replace(stored, mesh=mesh, timings={})
+
+
+def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: int) -> Atlas:
+    """Atlas of a mesh for a given fold-free sphere map [vertex_count, 3] (unit vectors)."""
+    directions = texel_directions(check_resolution(resolution))
+    triangles, barycentrics = cast_rays(sphere, mesh.F, directions.reshape(-1, 3))
+    corners = mesh.F[triangles]
+    positions = np.einsum("ij,ijk->ik", barycentrics, mesh.V[corners])
+    normals = np.einsum("ij,ijk->ik", barycentrics, mesh.vertex_normals[corners])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(length > 1e-9, normals / np.maximum(length, 1e-9), mesh.vertex_normals[corners[:, 0]])
+    shape = directions.shape[:3]
+    return Atlas(
+        mesh=mesh,
+        sphere=sphere,
+        positions=positions.reshape(*shape, 3),
+        normals=normals.reshape(*shape, 3),
+        triangles=triangles.reshape(shape),
+        barycentrics=barycentrics.reshape(*shape, 3),
+    )
