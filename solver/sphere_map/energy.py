@@ -1,0 +1,84 @@
+"""What a good sphere map minimises: one number for each triangle, from its Dirichlet energy and its area ratio.
+
+For the map from a reference triangle (real shape, real area A) to the unit sphere, with singular values s1 >= s2,
+
+    D = s1^2 + s2^2  = sum of cotangent times squared chord over 2 A,   J = s1 s2 = (a x b . c) / 2 A.
+
+J takes the triple product of the triangle's three unit vectors in place of its area: it vanishes exactly where the
+triangle folds over on the sphere, so that a finite energy means a bijection.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .corner_table import following, preceding
+from .vectors import Floats, Ints, Vector, cross, dot, kernel, row, subtract
+
+FOLDED = 1e-16  # a triple product must exceed this
+
+
+class Reference(NamedTuple):
+    """The triangles to resemble: area, and cotangent over twice the area of each corner."""
+
+    area: Floats  # [m]
+    cotangent: Floats  # [3 m]
+
+
+@kernel
+def density(dirichlet: float, jacobian: float) -> float:
+    """Energy per reference area, W = (D / 2J)^2 ((J + 1/J) / 2)^4: 1 for an isometry, else more."""
+    balance = 0.5 * (jacobian + 1.0 / jacobian)
+    root = 0.5 * dirichlet / jacobian * balance * balance
+    return root * root
+
+
+@kernel
+def density_derivatives(dirichlet: float, jacobian: float) -> tuple[float, float, float, float, float, float]:
+    """W and its derivatives W_D, W_J, W_DD, W_DJ, W_JJ."""
+    w = density(dirichlet, jacobian)
+    square = jacobian * jacobian
+    slope_d = 2.0 / dirichlet
+    slope_j = -2.0 / jacobian + 4.0 * (square - 1.0) / (jacobian * (square + 1.0))
+    bend = 2.0 / square + 4.0 * (1.0 + 4.0 * square - square * square) / (square * (square + 1.0) ** 2)
+    return w, w * slope_d, w * slope_j, 0.5 * w * slope_d * slope_d, w * slope_d * slope_j, w * (slope_j**2 + bend)
+
+
+@kernel
+def star_energy(p: Vector, star: Ints, degree: int, tail: Ints, S: Floats, reference: Reference) -> float:
+    """Energy of the triangles round a vertex placed at p; infinite if one of them is folded."""
+    cotangent = reference.cotangent
+    total = 0.0
+    for i in range(degree):
+        h = star[i]
+        g, k = following(h), preceding(h)
+        area = reference.area[h // 3]
+        b, c = row(S, tail[g]), row(S, tail[k])
+        pb, pc, bc = subtract(b, p), subtract(c, p), subtract(c, b)
+        triple = dot(p, cross(pb, pc))
+        if not triple > FOLDED:
+            return np.inf
+        dirichlet = cotangent[h] * dot(bc, bc) + cotangent[g] * dot(pc, pc) + cotangent[k] * dot(pb, pb)
+        total += area * density(dirichlet, 0.5 * triple / area)
+    return total
+
+
+@kernel
+def total_energy(tail: Ints, S: Floats, reference: Reference) -> float:
+    """Energy of the whole map S; infinite if a triangle is folded."""
+    cotangent = reference.cotangent
+    total = 0.0
+    for f in range(len(tail) // 3):
+        a, b, c = row(S, tail[3 * f]), row(S, tail[3 * f + 1]), row(S, tail[3 * f + 2])
+        ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
+        triple = dot(a, cross(ab, ac))
+        if not triple > FOLDED:
+            return np.inf
+        area = reference.area[f]
+        dirichlet = (
+            cotangent[3 * f] * dot(bc, bc) + cotangent[3 * f + 1] * dot(ac, ac) + cotangent[3 * f + 2] * dot(ab, ab)
+        )
+        total += area * density(dirichlet, 0.5 * triple / area)
+    return total

@@ -1,0 +1,166 @@
+"""The progressive sphere map: collapse to a tetrahedron, put it on the sphere, bring the vertices back level by level.
+
+In the family of Praun and Hoppe (2003) and of Hu, Fu and Liu (2017). What is new here is the carried area
+(`reference`), and a triple-product barrier with Newton steps on every level (`energy`, `newton`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SphereMapError
+from .certificate import certify
+from .corner_table import CornerTable, corner_table, following, preceding
+from .decimation import decimate
+from .energy import Reference, total_energy
+from .insertion import insert_vertices
+from .level import Level, build_level
+from .newton import newton_step
+from .reference import carry, update_level
+from .relaxation import sweep
+from .vectors import Floats
+
+TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
+EQUAL_UNTIL, REAL_FROM = 12, 100  # vertices of a level: equal equilateral references until, real shapes from
+COARSE_SLIVER, FINE_SLIVER = 0.5, 0.15  # shape quality below which a reference is pulled towards equilateral
+LARGE = 6000  # vertices: larger levels grow faster and stop sooner
+MOST_SWEEPS, MOST_NEWTON_STEPS, RESCUES = 10, 15, 4
+EXPLODED = 1e5 * 4 * np.pi  # energy of a level that is stuck
+TRUST_LADDER = (1.0, 0.6, 0.3, 0.0)  # in the real triangles, each tried when the one before gave no certified map
+
+
+def progressive_sphere_map(V: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Map a closed triangle mesh of genus 0 one-to-one onto the unit sphere, its area spread evenly.
+
+    Parameters
+    ----------
+    V
+        Vertices, shape [n, 3].
+    F
+        Triangles, counterclockwise seen from outside, shape [m, 3].
+
+    Returns
+    -------
+    NDArray[np.float64]
+        A unit vector for each vertex, shape [n, 3]. No triangle is folded (see `certify`).
+
+    Raises
+    ------
+    SphereMapError
+        No such map was found.
+    """
+    V = np.asarray(V, dtype=np.float64)
+    order = _morton_order(V)
+    number = np.empty(len(V), dtype=np.int64)
+    number[order] = np.arange(len(V))
+    triangles = number[F]
+    triangles = triangles[np.argsort(triangles.min(axis=1), kind="stable")]
+    for trust in TRUST_LADDER:
+        S = _map_by_levels(np.ascontiguousarray(V[order]), triangles, trust)[number]
+        certificate = certify(F, S)
+        if certificate.valid:
+            return S
+    raise SphereMapError(
+        f"no fold-free sphere map was found: {certificate.flipped} of {len(F)} triangles are folded, the solid angle "
+        f"is {certificate.solid_angle:.6g} instead of 4 pi; simplify or remesh the mesh, and remove its slivers"
+    )
+
+
+def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
+    n = len(V)
+    area = 0.5 * np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1)
+    scale = 4 * np.pi / np.sum(area)
+    V = (V - V.mean(axis=0)) * np.sqrt(scale)
+    carried = np.bincount(F.ravel(), np.repeat(area * scale / 3, 3), n) + 1e-3 * 4 * np.pi / n
+
+    table = corner_table(F, n)
+    log = decimate(table, V)
+    removed, kept = table.tail[log], table.tail[table.twin[log]]
+    carry(removed, kept, carried)
+    # how many vertices the first level has that shows a vertex or a triangle
+    vertex_since, face_since = np.full(n, 4), np.full(len(F), 4)
+    arrival = n - np.arange(len(log))
+    vertex_since[removed] = face_since[log // 3] = face_since[table.twin[log] // 3] = arrival
+
+    S = np.zeros((n, 3))
+    S[_tetrahedron(table, np.flatnonzero(vertex_since == 4))] = TETRAHEDRON
+    reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)))
+    density = np.ones(n)
+    count = 4
+    for size in _level_sizes(n):
+        shape_trust = trust * min(max(np.log(size / EQUAL_UNTIL) / np.log(REAL_FROM / EQUAL_UNTIL), 0.0), 1.0)
+        sliver = COARSE_SLIVER if size < n / 4 else FINE_SLIVER
+
+        vertices, faces = np.flatnonzero(vertex_since <= count), np.flatnonzero(face_since <= count)
+        update_level(vertices, faces, table, V, carried, density, shape_trust, sliver, reference)
+        mean = 4 * np.pi / (2 * size - 4)
+        insert_vertices(log[n - size : n - count], table, V, S, carried, density, shape_trust, sliver, mean, reference)
+        count = size
+
+        vertices, faces = np.flatnonzero(vertex_since <= count), np.flatnonzero(face_since <= count)
+        update_level(vertices, faces, table, V, carried, density, shape_trust, sliver, reference)
+        corners = (3 * faces[:, None] + np.arange(3)).ravel()
+        local = np.ascontiguousarray(S[vertices])
+        shown = Reference(reference.area[faces], reference.cotangent[corners])
+        _relax(build_level(table, vertices, faces), local, shown)
+        S[vertices] = local
+    return S
+
+
+def _relax(level: Level, S: Floats, reference: Reference) -> None:
+    """Lower the energy of a level in place: sweeps until they tire, then Newton steps with a sweep after each."""
+    for _ in range(RESCUES):
+        _sweep_until_tired(level, S, reference)
+        _newton_until_tired(level, S, reference)
+        if total_energy(level.tail, S, reference) < EXPLODED:
+            return
+
+
+def _sweep_until_tired(level: Level, S: Floats, reference: Reference) -> None:
+    for i in range(MOST_SWEEPS):
+        fall = sweep(level.star_start, level.star, level.tail, S, reference, i % 2 == 0)
+        if fall < 0.1 * total_energy(level.tail, S, reference):
+            return
+
+
+def _newton_until_tired(level: Level, S: Floats, reference: Reference) -> None:
+    tolerance = 5e-3 if len(S) < LARGE else 1e-2
+    slow = 0
+    for i in range(MOST_NEWTON_STEPS):
+        fall = newton_step(level, S, reference)
+        fall += sweep(level.star_start, level.star, level.tail, S, reference, i % 2 == 0)
+        slow = slow + 1 if fall < tolerance * total_energy(level.tail, S, reference) else 0
+        if slow == 2:
+            return
+
+
+def _tetrahedron(table: CornerTable, vertices: NDArray[np.integer]) -> list[int]:
+    """Order the last four vertices so that placing them at TETRAHEDRON leaves no triangle inside out."""
+    a = int(vertices[0])
+    h = int(table.leaving[a])
+    b, c = int(table.tail[following(h)]), int(table.tail[preceding(h)])
+    (d,) = {int(v) for v in vertices} - {a, b, c}
+    return [a, b, c, d]
+
+
+def _level_sizes(n: int) -> list[int]:
+    """Vertex counts of the levels, from just above four to n."""
+    sizes = []
+    size = 4.0
+    while size < n:
+        size = size * (1.25 if size < 30 else 1.5 if size < LARGE else 2.2) + 1
+        sizes.append(min(int(size), n))
+    if len(sizes) > 1 and sizes[-2] > 0.75 * n:
+        del sizes[-2]
+    return sizes
+
+
+def _morton_order(V: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Vertices along a Morton curve: neighbours in space come close together in memory."""
+    cells = ((V - V.min(axis=0)) / max(float(np.ptp(V, axis=0).max()), 1e-300) * 1023.999).astype(np.int64)
+    code = np.zeros(len(V), dtype=np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")

@@ -1,0 +1,99 @@
+"""Reference triangles: the shape and area that each triangle of a coarse level should have on the sphere.
+
+*Carried area.* A collapsed vertex hands its share of the real surface on to the vertex it merges with. So a limb that a
+coarse level no longer shows still gets its share of the sphere there, and finds the room when it comes back.
+
+The reference has the triangle's real shape, pulled towards an equilateral one where it is a sliver (a sliver's
+cotangents would drown its neighbours' energy), and on the coarsest levels, where real shapes mean little.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .corner_table import CornerTable, gather_star
+from .energy import Reference
+from .vectors import Floats, Ints, cross, dot, kernel, row, subtract
+
+SMALLEST_SHARE = 1e-3  # of the mean reference area: no triangle gets less
+
+
+@kernel
+def _real_area(tail: Ints, f: int, V: Floats) -> float:
+    p = row(V, tail[3 * f])
+    normal = cross(subtract(row(V, tail[3 * f + 1]), p), subtract(row(V, tail[3 * f + 2]), p))
+    return 0.5 * np.sqrt(dot(normal, normal))
+
+
+@kernel
+def carry(removed: Ints, kept: Ints, carried: Floats) -> None:
+    """Hand the area of each removed vertex on to the one it merges with, in the order of the collapses."""
+    for i in range(len(removed)):
+        carried[kept[i]] += carried[removed[i]]
+
+
+@kernel
+def update_density(v: int, star: Ints, degree: int, tail: Ints, V: Floats, carried: Floats, density: Floats) -> None:
+    """Area that v carries over the real area of its share of the level's triangles."""
+    real = 0.0
+    for i in range(degree):
+        real += _real_area(tail, star[i] // 3, V)
+    density[v] = min(carried[v] / max(real / 3.0, 1e-12 * carried[v]), 1e6)
+
+
+@kernel
+def update_triangle(
+    f: int, tail: Ints, V: Floats, density: Floats, trust: float, sliver: float, mean: float, reference: Reference
+) -> None:
+    """Set the reference of triangle f.
+
+    `trust` in [0, 1] goes from equal equilateral triangles to the real ones; shapes of a quality below `sliver` (1 is
+    equilateral) are pulled towards equilateral; `mean` is the level's mean reference area.
+    """
+    a, b, c = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
+    e0, e1, e2 = subtract(row(V, c), row(V, b)), subtract(row(V, a), row(V, c)), subtract(row(V, b), row(V, a))
+    q0, q1, q2 = dot(e0, e0), dot(e1, e1), dot(e2, e2)
+    real = _real_area(tail, f, V)
+    third = (q0 + q1 + q2) / 3.0
+    if third > 1e-28:
+        quality = 4.0 / np.sqrt(3.0) * real / third
+        pull = max(1.0 - min(quality / sliver, 1.0), 1.0 - trust)
+        q0, q1, q2 = q0 + pull * (third - q0), q1 + pull * (third - q1), q2 + pull * (third - q2)
+    else:
+        q0 = q1 = q2 = 1.0
+    area = max(real * (density[a] + density[b] + density[c]) / 3.0, SMALLEST_SHARE * mean)
+    area = area**trust * mean ** (1.0 - trust)
+    four_areas = np.sqrt(max(2.0 * (q0 * q1 + q1 * q2 + q2 * q0) - (q0 * q0 + q1 * q1 + q2 * q2), 1e-300))
+    scale = 0.5 / (four_areas * area)
+    reference.area[f] = area
+    reference.cotangent[3 * f] = scale * (q1 + q2 - q0)
+    reference.cotangent[3 * f + 1] = scale * (q2 + q0 - q1)
+    reference.cotangent[3 * f + 2] = scale * (q0 + q1 - q2)
+
+
+@kernel
+def update_level(
+    vertices: Ints,
+    faces: Ints,
+    table: CornerTable,
+    V: Floats,
+    carried: Floats,
+    density: Floats,
+    trust: float,
+    sliver: float,
+    reference: Reference,
+) -> None:
+    """Set the references of a whole level, their areas summing to the sphere's 4 pi."""
+    star = np.empty(len(V), np.int32)
+    for v in vertices:
+        update_density(v, star, gather_star(table, v, star), table.tail, V, carried, density)
+    mean = 4.0 * np.pi / len(faces)
+    total = 0.0
+    for f in faces:
+        update_triangle(f, table.tail, V, density, trust, sliver, mean, reference)
+        total += reference.area[f]
+    scale = 4.0 * np.pi / total
+    for f in faces:
+        reference.area[f] *= scale
+        for h in range(3 * f, 3 * f + 3):
+            reference.cotangent[h] /= scale
