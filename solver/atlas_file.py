@@ -13,7 +13,7 @@ import numpy as np
 from .atlas import Atlas
 from .errors import AtlasError
 from .mesh import Mesh
-from .sphere_atlas import SphereAtlas
+from .analytic import SphereAtlas
 
 # Raise it when the sphere map or the file's layout changes: older files are then rebuilt.
 FORMAT = 1

@@ -7,8 +7,8 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from .cubemap import padded_indices
-from .operator import WaveOperator
+from .operator import WaveOperator, step_coefficients
+from .padding import padded_addresses
 
 
 class CPUBackend:
@@ -26,14 +26,7 @@ class CPUBackend:
         self._h = np.zeros((6, n + 2, n + 2), np.float32)
         self._h_next = np.zeros_like(self._h)
         self._v = np.zeros_like(self._h)
-        index = padded_indices(n)
-        own = np.zeros(index.shape, dtype=bool)
-        own[:, 1:-1, 1:-1] = True
-        flat = np.arange(index.size).reshape(index.shape)
-        ring = ~own & (index >= 0)
-        self._inside = flat[own]
-        self._ring = flat[ring]
-        self._ring_source = self._inside[index[ring]]
+        self._inside, self._ring, self._ring_source = padded_addresses(n)
         self._coefficients: tuple | None = None
         self._coefficients_dt = 0.0
 
@@ -78,25 +71,6 @@ class CPUBackend:
         if self._coefficients is None or self._coefficients_dt != dt:
             self._coefficients, self._coefficients_dt = step_coefficients(self._operator, dt), dt
         return self._coefficients
-
-
-def step_coefficients(operator: WaveOperator, dt: float) -> tuple:
-    """Decay, gain [s/kg] and spring [1/s] of the kick v = decay v + gain force - spring h.
-
-    Gain is float32 [6, N, N]; the others are numbers where damping and stiffness are uniform, else of the same shape.
-    Damping is implicit (centred): decay = (1 - zeta dt/2) / (1 + zeta dt/2).
-    """
-    half = operator.damping * (dt / 2)
-    decay = (1 - half) / (1 + half)
-    spring = dt / (1 + half) * operator.stiffness
-    gain = (dt / (1 + half) / operator.mass).astype(np.float32)
-    return _uniform(decay), gain, _uniform(spring)
-
-
-def _uniform(field: NDArray[np.float64]) -> NDArray[np.float32] | np.float32:
-    """A number where a field has one value, which saves the kernel's reads; else the field as float32."""
-    first = field.flat[0]
-    return np.float32(first) if (field == first).all() else field.astype(np.float32)
 
 
 def _at(x, f, r, c):  # noqa: ANN001, ANN202

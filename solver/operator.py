@@ -57,6 +57,25 @@ class WaveOperator:
         return float(SAFETY * (np.sqrt(viscous**2 + 4 * wave) - viscous) / wave)
 
 
+def step_coefficients(operator: WaveOperator, dt: float) -> tuple:
+    """Decay, gain [s/kg] and spring [1/s] of the kick v = decay v + gain force - spring h.
+
+    Gain is float32 [6, N, N]; the others are numbers where damping and stiffness are uniform, else of the same shape.
+    Damping is implicit (centred): decay = (1 - zeta dt/2) / (1 + zeta dt/2).
+    """
+    half = operator.damping * (dt / 2)
+    decay = (1 - half) / (1 + half)
+    spring = dt / (1 + half) * operator.stiffness
+    gain = (dt / (1 + half) / operator.mass).astype(np.float32)
+    return _uniform(decay), gain, _uniform(spring)
+
+
+def _uniform(field: NDArray[np.float64]) -> NDArray[np.float32] | np.float32:
+    """A number where a field has one value, which saves the kernel's reads; else the field as float32."""
+    first = field.flat[0]
+    return np.float32(first) if (field == first).all() else field.astype(np.float32)
+
+
 def build_operator(atlas: Atlas, material: Material, kind: str) -> WaveOperator:
     """Assemble the operator of a material on an atlas.
 
