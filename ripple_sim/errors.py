@@ -1,0 +1,19 @@
+"""Errors of the application. Like the solver's, every one of them is a `RippleError`."""
+
+from ripple_sim.solver.errors import RippleError
+
+
+class VideoError(RippleError):
+    """A video cannot be written like this: its ending, place, size or frame rate is invalid."""
+
+
+class EncodingError(RippleError):
+    """Encoding or writing a video failed half-way, for instance on a full disk."""
+
+
+class SceneError(RippleError):
+    """A scene file, an MJCF, or a geom named in it is invalid."""
+
+
+class SimulationError(RippleError):
+    """The physics became unstable."""

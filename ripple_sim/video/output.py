@@ -1,0 +1,96 @@
+"""What can be written where: all that can be known of a video before its first frame is rendered."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from pathlib import Path
+
+from ripple_sim.errors import VideoError
+
+MIN_SIZE, MAX_SIZE = 16, 8192
+MAX_FPS = 240
+# Browsers slow a GIF down to 10 frames a second where a frame lasts less than two hundredths of a second.
+MAX_GIF_FPS = 50
+
+FRAME_NAME = "frame_{:05d}.png"
+_FRAME_PATTERN = re.compile(r"frame_\d{5,}\.png")
+_SUBSAMPLED = (".mp4", ".webm")
+
+
+def video_format(path: Path) -> str:
+    """Tell the format a path asks for: ".mp4", ".webm", ".gif", or "" for a folder of PNG frames.
+
+    Raises
+    ------
+    VideoError
+        If the path has any other ending and is no folder.
+    """
+    ending = path.suffix.lower()
+    if ending in (*_SUBSAMPLED, ".gif", ""):
+        return ending
+    if path.is_dir():
+        return ""
+    raise VideoError(
+        f"{path} ends in {ending}; valid is .mp4, .webm, .gif, or a name without ending for a folder of PNG frames"
+    )
+
+
+def default_fps(path: Path) -> int:
+    """Frames per second where the user names none: 60, and for a GIF 25."""
+    return 25 if video_format(path) == ".gif" else 60
+
+
+def check_output(path: str | Path, width: int, height: int, fps: int) -> None:
+    """Make sure that a video of this size and rate [1/s] can be written to `path`; leave nothing behind.
+
+    Raises
+    ------
+    VideoError
+        If the ending is unknown, the size or rate is out of range, the size is odd where the format halves its colour
+        resolution, or the place cannot be written to.
+    """
+    path = Path(path)
+    try:
+        ending = video_format(path)
+        _check_size(ending, width, height)
+        _check_fps(ending, fps)
+        _check_place(path, ending)
+    except OSError as error:
+        raise VideoError(f"cannot write {path}: {error.strerror}; name a file in a folder you can write to") from error
+
+
+def _check_size(ending: str, width: int, height: int) -> None:
+    if not all(isinstance(side, int) and MIN_SIZE <= side <= MAX_SIZE for side in (width, height)):
+        raise VideoError(f"frame size is {width}x{height}; valid is {MIN_SIZE} to {MAX_SIZE} pixels along each side")
+    if ending in _SUBSAMPLED and (width % 2 or height % 2):
+        raise VideoError(
+            f"frame size is {width}x{height}; {ending} needs an even width and height, "
+            f"such as {width + width % 2}x{height + height % 2}"
+        )
+
+
+def _check_fps(ending: str, fps: int) -> None:
+    highest = MAX_GIF_FPS if ending == ".gif" else MAX_FPS
+    if not isinstance(fps, int) or not 1 <= fps <= highest:
+        what = "a GIF's frame rate" if ending == ".gif" else "frame rate"
+        raise VideoError(f"{what} is {fps}; valid is a whole number from 1 to {highest} frames per second")
+
+
+def _check_place(path: Path, ending: str) -> None:
+    if path.is_dir():
+        if ending:
+            raise VideoError(f"cannot write {path}: it is a folder; name a file")
+        strangers = [entry.name for entry in path.iterdir() if not _FRAME_PATTERN.fullmatch(entry.name)]
+        if strangers:
+            raise VideoError(
+                f"cannot write frames to {path}: it holds other files ({sorted(strangers)[0]}); name a new folder"
+            )
+    elif path.exists() and (not ending or not path.is_file()):
+        raise VideoError(f"cannot write {path}: it exists and is no {'file' if ending else 'folder'}")
+    folder = path.absolute().parent
+    while not folder.exists():
+        folder = folder.parent
+    # Permission bits do not tell the truth for root or on a read-only disk; a real file does.
+    with tempfile.TemporaryFile(dir=folder):
+        pass

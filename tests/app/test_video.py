@@ -1,0 +1,287 @@
+"""Videos: what goes in comes out, and what cannot be written is refused before anything is rendered."""
+
+import threading
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+from ripple_sim.errors import EncodingError, VideoError
+from ripple_sim.solver.errors import RippleError
+from ripple_sim.video import FrameWriter, check_output, default_fps, open_writer
+
+WIDTH, HEIGHT, FPS = 96, 64, 25
+ENDINGS = [".mp4", ".webm", ".gif", ""]
+
+
+def frames(count: int) -> list[np.ndarray]:
+    """A smooth background in which a bright square moves two pixels a frame."""
+    row, column = np.mgrid[:HEIGHT, :WIDTH]
+    background = np.stack([60 + column, 40 + 2 * row, np.full_like(row, 90)], axis=-1).astype(np.uint8)
+    result = []
+    for number in range(count):
+        frame = background.copy()
+        frame[16:48, 8 + 2 * number : 40 + 2 * number] = (230, 180, 20)
+        result.append(frame)
+    return result
+
+
+def write(path: Path, count: int = 12) -> FrameWriter:
+    with open_writer(path, width=WIDTH, height=HEIGHT, fps=FPS) as writer:
+        for frame in frames(count):
+            writer.write(frame)
+    return writer
+
+
+def read(path: Path) -> list[np.ndarray]:
+    if path.is_dir():
+        return [np.asarray(Image.open(name)) for name in sorted(path.iterdir())]
+    with av.open(str(path)) as container:
+        return [image.to_ndarray(format="rgb24") for image in container.decode(video=0)]
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_frames_come_back_in_order_and_in_their_colours(tmp_path, ending):
+    path = tmp_path / f"clip{ending}"
+    write(path)
+    back = read(path)
+    assert len(back) == 12
+    largest = {".mp4": 3.0, ".webm": 3.0, ".gif": 6.0, "": 0.0}[ending]
+    for sent, got in zip(frames(12), back, strict=True):
+        assert got.shape == (HEIGHT, WIDTH, 3)
+        assert np.abs(sent.astype(float) - got).mean() <= largest
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".webm"])
+@pytest.mark.parametrize("colour", [(200, 40, 40), (40, 200, 40), (40, 40, 200), (255, 255, 255), (0, 0, 0)])
+def test_a_plain_colour_survives_bt709(tmp_path, ending, colour):
+    path = tmp_path / f"plain{ending}"
+    frame = np.full((HEIGHT, WIDTH, 3), colour, dtype=np.uint8)
+    with open_writer(path, width=WIDTH, height=HEIGHT, fps=FPS) as writer:
+        writer.write(frame)
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        image = next(container.decode(video=0))
+        assert (stream.codec_context.colorspace, stream.codec_context.color_range) == (1, 1)
+        # Converted by hand, so that the tags and the pixels are checked against the standard and not each other.
+        y, u, v = (plane.astype(float) for plane in _planes(image))
+    luma, blue, red = (y - 16) / 219, (u - 128) / 224, (v - 128) / 224
+    r, b = luma + 2 * (1 - 0.2126) * red, luma + 2 * (1 - 0.0722) * blue
+    g = (luma - 0.2126 * r - 0.0722 * b) / 0.7152
+    assert np.abs(255 * np.array([r, g, b]) - colour).max() <= 4
+
+
+def _planes(image: av.VideoFrame) -> list[np.ndarray]:
+    middle = []
+    for plane in image.planes:
+        array = np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size)
+        middle.append(array[plane.height // 2, plane.width // 2])
+    return middle
+
+
+def test_mp4_is_what_browsers_play(tmp_path):
+    path = tmp_path / "clip.mp4"
+    write(path)
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        assert stream.codec_context.name == "h264"
+        assert stream.codec_context.pix_fmt == "yuv420p"
+        assert stream.average_rate == FPS
+        assert stream.frames == 12
+    data = path.read_bytes()
+    assert 0 < data.index(b"moov") < data.index(b"mdat")
+
+
+def test_a_gif_repeats_and_keeps_its_rate(tmp_path):
+    path = tmp_path / "clip.gif"
+    write(path)
+    with Image.open(path) as image:
+        assert image.n_frames == 12
+        assert image.info["loop"] == 0
+        assert image.info["duration"] == 1000 / FPS
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_the_same_frames_give_the_same_bytes(tmp_path, ending):
+    # WIDTH is no multiple of 128, where x264's macroblock tree is not deterministic; it takes a few tries to show.
+    contents = set()
+    for name in "abcdef":
+        path = tmp_path / f"{name}{ending}"
+        write(path)
+        files = sorted(path.iterdir()) if path.is_dir() else [path]
+        contents.add(tuple(file.read_bytes() for file in files))
+    assert len(contents) == 1
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_an_error_while_rendering_leaves_nothing_behind(tmp_path, ending):
+    with (
+        pytest.raises(ZeroDivisionError),
+        open_writer(tmp_path / f"clip{ending}", width=WIDTH, height=HEIGHT, fps=FPS) as writer,
+    ):
+        for frame in frames(5):
+            writer.write(frame)
+        raise ZeroDivisionError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_error_while_rendering_keeps_the_video_that_was_there(tmp_path):
+    path = tmp_path / "clip.mp4"
+    path.write_bytes(b"yesterday's")
+    with pytest.raises(ZeroDivisionError), open_writer(path, width=WIDTH, height=HEIGHT, fps=FPS) as writer:
+        writer.write(frames(1)[0])
+        raise ZeroDivisionError
+    assert path.read_bytes() == b"yesterday's"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_parent_folders_are_made_and_old_frames_replaced(tmp_path):
+    path = tmp_path / "new" / "deeper" / "frames"
+    write(path, count=5)
+    write(path, count=3)
+    assert [name.name for name in sorted(path.iterdir())] == [f"frame_{i:05d}.png" for i in range(3)]
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_frame_may_be_overwritten_after_it_was_handed_over(tmp_path):
+    path = tmp_path / "frames"
+    buffer = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
+    with open_writer(path, width=WIDTH, height=HEIGHT, fps=FPS) as writer:
+        for level in range(20):
+            buffer[:] = level
+            writer.write(buffer)
+    assert [int(image.max()) for image in read(path)] == list(range(20))
+
+
+class GatedEncoder:
+    """An encoder that waits to be let through, and fails at one frame."""
+
+    def __init__(self, path: Path, fails_at: int | None = None) -> None:
+        self.path = path
+        self.gate = threading.Event()
+        self.seen = 0
+        self._fails_at = fails_at
+        path.touch()
+
+    def write(self, frame: np.ndarray) -> None:
+        self.gate.wait(timeout=30)
+        if self.seen == self._fails_at:
+            raise OSError("no space left on device")
+        self.seen += 1
+
+    def finish(self) -> None:
+        pass
+
+    def discard(self) -> None:
+        self.path.unlink()
+
+
+def test_rendering_waits_for_a_slow_encoder(tmp_path):
+    encoder = GatedEncoder(tmp_path / "part")
+    writer = FrameWriter(encoder, tmp_path / "clip.mp4", width=WIDTH, height=HEIGHT)
+    frame = frames(1)[0]
+
+    def render() -> None:
+        for _ in range(100):
+            writer.write(frame)
+
+    renderer = threading.Thread(target=render, daemon=True)
+    renderer.start()
+    renderer.join(timeout=0.5)
+    assert renderer.is_alive()
+    assert writer.frames <= 10
+    encoder.gate.set()
+    renderer.join(timeout=30)
+    writer.close()
+    assert encoder.seen == writer.frames == 100
+    assert list(tmp_path.iterdir()) == [tmp_path / "clip.mp4"]
+
+
+def test_an_error_of_the_encoder_reaches_the_caller(tmp_path):
+    encoder = GatedEncoder(tmp_path / "part", fails_at=3)
+    encoder.gate.set()
+    with (
+        pytest.raises(EncodingError, match=r"clip\.mp4: no space left"),
+        FrameWriter(encoder, tmp_path / "clip.mp4", width=WIDTH, height=HEIGHT) as writer,
+    ):
+        for _ in range(50):  # far more than the queue holds: it must not block for ever
+            writer.write(frames(1)[0])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_time_spent_encoding_is_recorded(tmp_path):
+    assert write(tmp_path / "clip.mp4").encode_seconds > 0
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [np.zeros((WIDTH, HEIGHT, 3), np.uint8), np.zeros((HEIGHT, WIDTH, 4), np.uint8), np.zeros((HEIGHT, WIDTH, 3))],
+)
+def test_a_frame_of_another_shape_or_type_is_refused(tmp_path, frame):
+    with (
+        pytest.raises(VideoError, match="uint8"),
+        open_writer(tmp_path / "clip.mp4", width=WIDTH, height=HEIGHT, fps=FPS) as writer,
+    ):
+        writer.write(frame)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_video_without_frames_is_refused(tmp_path):
+    with pytest.raises(VideoError, match="no frame"):
+        open_writer(tmp_path / "clip.mp4", width=WIDTH, height=HEIGHT, fps=FPS).close()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "fps", "message"),
+    [
+        ("clip.avi", (1280, 720), 60, r"\.avi.*valid is \.mp4, \.webm, \.gif"),
+        ("clip.mp4", (1281, 720), 60, "1281x720.*even.*1282x720"),
+        ("clip.webm", (1280, 719), 60, "1280x719.*even.*1280x720"),
+        ("clip.gif", (0, 720), 25, "0x720.*valid is 16"),
+        ("clip.mp4", (1280, 100000), 60, "1280x100000.*to 8192"),
+        ("clip.mp4", (1280, 720), 0, "rate is 0.*1 to 240"),
+        ("clip.mp4", (1280, 720), 1000, "rate is 1000.*1 to 240"),
+        ("clip.gif", (1280, 720), 60, "GIF.*60.*1 to 50"),
+        ("a_file/clip.mp4", (1280, 720), 60, "cannot write"),
+        ("a_file", (1280, 720), 60, "no folder"),
+        ("a_folder.mp4", (1280, 720), 60, "is a folder"),
+        ("photos", (1280, 720), 60, r"other files \(me\.jpg\)"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_beforehand(tmp_path, name, size, fps, message):
+    (tmp_path / "a_file").write_text("mine")
+    (tmp_path / "a_folder.mp4").mkdir()
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "me.jpg").touch()
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(VideoError, match=message) as refusal:
+        check_output(tmp_path / name, *size, fps)
+    assert isinstance(refusal.value, RippleError)
+    assert "\n" not in str(refusal.value)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_an_odd_size_is_fine_where_colour_is_not_subsampled(tmp_path):
+    for name in ("clip.gif", "frames"):
+        path = tmp_path / name
+        with open_writer(path, width=33, height=17, fps=10) as writer:
+            writer.write(np.zeros((17, 33, 3), np.uint8))
+        assert read(path)[0].shape == (17, 33, 3)
+
+
+def test_checking_leaves_nothing_behind(tmp_path):
+    check_output(tmp_path / "new" / "clip.mp4", 1280, 720, 60)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_read_only_file_system_is_refused():
+    with pytest.raises(VideoError, match="cannot write /proc"):
+        check_output("/proc/clip.mp4", 1280, 720, 60)
+
+
+def test_the_usual_rate_depends_on_the_format():
+    assert default_fps(Path("clip.mp4")) == 60
+    assert default_fps(Path("clip.gif")) <= 50
