@@ -1,4 +1,8 @@
-"""CPU backend: the leapfrog update as one pass over the texels, compiled by numba, on all cores."""
+"""CPU backend: the leapfrog update as one pass over the texels, compiled by numba.
+
+One thread: a substep takes 0.1 ms at N = 128, less than it costs to wake a second thread, and far less than it costs to
+wait for one whose core is busy encoding a frame.
+"""
 
 from __future__ import annotations
 
@@ -93,10 +97,10 @@ def _fill(h, ring, source):  # noqa: ANN001, ANN202
         flat[ring[i]] = flat[source[i]]
 
 
-@numba.njit(cache=True, parallel=True)
+@numba.njit(cache=True, nogil=True)
 def _drift(h, v, dt):  # noqa: ANN001, ANN202
     n = h.shape[1] - 2
-    for i in numba.prange(6 * n):
+    for i in range(6 * n):
         f, r = i // n, i % n + 1
         for c in range(1, n + 1):
             h[f, r, c] += dt * v[f, r, c]
@@ -118,20 +122,20 @@ def _force(w, h, f, r, c):  # noqa: ANN001, ANN202
     )
 
 
-@numba.njit(cache=True, parallel=True)
+@numba.njit(cache=True, nogil=True)
 def _apply(w, h, out):  # noqa: ANN001, ANN202
     n = h.shape[1] - 2
-    for i in numba.prange(6 * n):
+    for i in range(6 * n):
         f, r = i // n, i % n + 1
         for c in range(1, n + 1):
             out[f, r - 1, c - 1] = _force(w, h, f, r, c)
 
 
-@numba.njit(cache=True, parallel=True)
+@numba.njit(cache=True, nogil=True)
 def _kick_drift(w, h, v, h_next, decay, gain, spring, extra, dt):  # noqa: ANN001, ANN202
     n = h.shape[1] - 2
     viscous = extra.shape[1] == n
-    for i in numba.prange(6 * n):
+    for i in range(6 * n):
         f, r = i // n, i % n + 1
         for c in range(1, n + 1):
             force = _force(w, h, f, r, c)

@@ -89,10 +89,10 @@ def _gradient_weights(atlas: Atlas) -> NDArray[np.float64]:
     return fit[:, 0, :, None] * tangent[:, None, :] + fit[:, 1, :, None] * bitangent[:, None, :]
 
 
-@numba.njit(cache=True, parallel=True)
+@numba.njit(cache=True, nogil=True)
 def _differentiate(weights, h, relief):  # noqa: ANN001, ANN202
     n = h.shape[1] - 2
-    for i in numba.prange(6 * n):
+    for i in range(6 * n):
         f, r = i // n, i % n + 1
         for c in range(1, n + 1):
             g = weights[i * n + c - 1]

@@ -1,0 +1,160 @@
+"""From contact forces to waves: `Ripples` adds rippling surfaces to anybody's MuJoCo loop."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver import Material, WaveSolver
+
+from .contacts import ContactPair, cluster, contact_pairs
+from .errors import SceneError
+from .target import find_target, geom_name, target_atlas
+
+# Footprint radius over the touching body's smallest half-extent: about the patch of a ball sunk in by a fifth.
+_FOOTPRINT = 0.6
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Impulse:
+    """What one body gave to one target in one physics step.
+
+    Attributes
+    ----------
+    geom, other : str
+        Names of the target and of the touching geom.
+    point : float64 [3]
+        Force-weighted contact point on the target's true surface, in the world [m].
+    impulse : float
+        Sum of normal force times time step [N s], not negative; it presses inwards.
+    texel : tuple of int
+        Face, row and column of the texel nearest to the point.
+    """
+
+    geom: str
+    other: str
+    point: NDArray[np.float64]
+    impulse: float
+    texel: tuple[int, int, int]
+
+
+class Ripples:
+    """Ripples on geoms of a MuJoCo model, driven by its contact forces.
+
+    Call `step(data)` after each `mujoco.mj_step(model, data)`.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    materials : mapping
+        Geom name to its `Material`. Geoms of type mesh, sdf, sphere, ellipsoid, capsule, cylinder and box can ripple.
+        Note that MuJoCo collides a mesh geom as its convex hull; type="sdf" collides as the true surface.
+    resolution : int or mapping
+        Texels along an edge of the atlas's faces, for all targets or by geom name.
+    backend, operator, conserve_volume
+        As for `WaveSolver`.
+
+    Raises
+    ------
+    SceneError
+        For an unknown geom or one that cannot ripple.
+    RippleError
+        If a geom's mesh is not a closed genus-0 surface, or a wave parameter is invalid.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        materials: Mapping[str, Material],
+        *,
+        resolution: int | Mapping[str, int] = 128,
+        backend: str = "auto",
+        operator: str = "fem",
+        conserve_volume: bool = True,
+    ) -> None:
+        self.model = model
+        self._geoms = {name: find_target(model, name) for name in materials}
+        self._waves: dict[int, WaveSolver] = {}
+        for name, material in materials.items():
+            n = resolution[name] if isinstance(resolution, Mapping) else resolution
+            self._waves[self._geoms[name]] = WaveSolver(
+                target_atlas(model, self._geoms[name], n),
+                material,
+                backend=backend,
+                operator=operator,
+                conserve_volume=conserve_volume,
+            )
+        self._time: float | None = None
+        self.last_impulses: list[Impulse] = []
+
+    def __getitem__(self, name: str) -> WaveSolver:
+        """Waves of a geom, by name."""
+        if name not in self._geoms:
+            raise SceneError(f"geom {name!r} does not ripple; the rippling geoms are {', '.join(map(repr, self._geoms))}")
+        return self._waves[self._geoms[name]]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._geoms)
+
+    def __len__(self) -> int:
+        return len(self._geoms)
+
+    @property
+    def geom_ids(self) -> dict[str, int]:
+        """Geom id of every rippling geom, by name."""
+        return dict(self._geoms)
+
+    def step(self, data: mujoco.MjData) -> None:
+        """Turn the contact forces of the physics step just made into impulses, and advance the waves up to `data.time`.
+
+        The forces and poses in `data` after `mj_step` are those at the beginning of that step, over which MuJoCo holds
+        the forces: each contact gives normal force times time step. If time has gone backwards (the simulation was
+        reset) the waves are reset too.
+        """
+        timestep = self.model.opt.timestep
+        elapsed = timestep if self._time is None else data.time - self._time
+        if elapsed < 0:
+            self.reset()
+            elapsed = timestep
+        self._time = data.time
+        self.last_impulses = [
+            self._press(data, pair, timestep) for pair in contact_pairs(self.model, data, set(self._waves))
+        ]
+        for waves in self._waves.values():
+            waves.step(elapsed)
+
+    def reset(self) -> None:
+        """Flatten all surfaces."""
+        self._time = None
+        self.last_impulses = []
+        for waves in self._waves.values():
+            waves.reset()
+
+    def _press(self, data: mujoco.MjData, pair: ContactPair, timestep: float) -> Impulse:
+        waves = self._waves[pair.target]
+        position, rotation = data.geom_xpos[pair.target], data.geom_xmat[pair.target].reshape(3, 3)
+        local = (pair.points - position) @ rotation
+        radius = _FOOTPRINT * self._extent(pair.other)
+        for point, force in cluster(local, pair.forces, max(radius, 1e-9)):
+            waves.add_impulse(point, force * timestep, radius)
+        total = float(pair.forces.sum())
+        surface, _ = waves.atlas.project(pair.forces @ local / total)
+        n = waves.atlas.resolution
+        face, row, column = np.unravel_index(int(waves.atlas.nearest_texel(surface)[0]), (6, n, n))
+        return Impulse(
+            geom=geom_name(self.model, pair.target),
+            other=geom_name(self.model, pair.other),
+            point=position + rotation @ surface[0],
+            impulse=total * timestep,
+            texel=(int(face), int(row), int(column)),
+        )
+
+    def _extent(self, geom: int) -> float:
+        """Smallest half-extent of a geom [m]; 0 for planes and height fields, which have none."""
+        if self.model.geom_type[geom] in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD):
+            return 0.0
+        return float(self.model.geom_aabb[geom, 3:].min())

@@ -1,0 +1,222 @@
+"""The simulation loop: physics, waves, frames, video."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver import Relief
+from ripple_sim.solver.gl import shared_context
+
+from .coupling import Ripples
+from .errors import SceneError, SimulationError
+from .render import Renderer, Surface
+from .scene import Scene
+from .video import check_output, open_writer
+from .view import viewpoint
+
+
+@dataclasses.dataclass(frozen=True)
+class Summary:
+    """What a rendered video took.
+
+    `renderer` is the driver's GL_RENDERER, `backend` the wave solver's; times in seconds.
+    """
+
+    output: Path
+    frames: int
+    renderer: str
+    backend: str
+    substeps_per_frame: float
+    setup_seconds: float
+    physics_seconds: float
+    wave_seconds: float
+    render_seconds: float
+    encode_seconds: float
+    wall_seconds: float
+
+
+class Simulation:
+    """A scene that runs: MuJoCo's state and the ripples on its surfaces, advanced frame by frame.
+
+    The model's time step is shortened a little where needed, so that a whole number of steps makes one frame.
+
+    Parameters
+    ----------
+    scene : Scene
+    fps : int
+        Frames a second.
+    resolution : int, optional
+        Overrides the scene's atlas resolutions.
+    backend, operator : str
+        As for `WaveSolver`.
+    """
+
+    def __init__(
+        self, scene: Scene, *, fps: int = 60, resolution: int | None = None, backend: str = "auto", operator: str = "fem"
+    ) -> None:
+        self.scene = scene
+        self.model = copy.copy(scene.model)
+        self._steps_per_frame = max(1, math.ceil(1 / (fps * self.model.opt.timestep) - 1e-9))
+        self.model.opt.timestep = 1 / (fps * self._steps_per_frame)
+        self.data = mujoco.MjData(self.model)
+        if self.model.nkey:
+            mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
+        mujoco.mj_forward(self.model, self.data)
+        self.ripples = Ripples(
+            self.model,
+            {entry.geom: entry.material.material() for entry in scene.surfaces},
+            resolution={entry.geom: resolution or entry.resolution for entry in scene.surfaces},
+            backend=backend,
+            operator=operator,
+        )
+        self.physics_seconds = self.wave_seconds = 0.0
+
+    @property
+    def backend(self) -> str:
+        """Backend of the wave solvers."""
+        return self.ripples[self.scene.surfaces[0].geom].backend
+
+    @property
+    def substeps_taken(self) -> int:
+        """Wave steps so far, on all surfaces."""
+        return sum(self.ripples[name].substeps_taken for name in self.ripples)
+
+    def advance_frame(self) -> None:
+        """Advance physics and waves by one frame.
+
+        Raises
+        ------
+        SimulationError
+            If MuJoCo's state is no longer finite.
+        """
+        for _ in range(self._steps_per_frame):
+            start = time.perf_counter()
+            mujoco.mj_step(self.model, self.data)
+            stepped = time.perf_counter()
+            self._check_state()
+            self.ripples.step(self.data)
+            self.physics_seconds += stepped - start
+            self.wave_seconds += time.perf_counter() - stepped
+
+    def _check_state(self) -> None:
+        for kind in (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC):
+            if self.data.warning[kind].number:
+                raise SimulationError(
+                    f"the physics became unstable at {self.data.time:.4g} s ({mujoco.mjtWarning(kind).name}); "
+                    "use a shorter time step in the MJCF's <option>, or softer contacts"
+                )
+
+
+class FrameSource:
+    """Frames of a running simulation, by the offscreen renderer."""
+
+    def __init__(self, simulation: Simulation, *, width: int, height: int) -> None:
+        self._simulation = simulation
+        self._gl = shared_context()
+        self._reliefs = {}
+        surfaces = {}
+        for entry in simulation.scene.surfaces:
+            geom = simulation.ripples.geom_ids[entry.geom]
+            atlas = simulation.ripples[entry.geom].atlas
+            self._reliefs[geom] = (simulation.ripples[entry.geom], Relief(atlas))
+            surfaces[geom] = Surface(
+                V=atlas.mesh.V,
+                F=atlas.mesh.F,
+                sphere=atlas.sphere,
+                resolution=atlas.resolution,
+                look=entry.look,
+                color=entry.color,
+            )
+        self._renderer = Renderer(self._gl, simulation.model, surfaces, width=width, height=height)
+
+    @property
+    def gl_renderer(self) -> str:
+        """The driver's GL_RENDERER."""
+        return self._gl.renderer
+
+    def draw(self) -> NDArray[np.uint8]:
+        """Draw the present state, uint8 [height, width, 3]."""
+        sim = self._simulation
+        reliefs = {geom: relief(waves.height) for geom, (waves, relief) in self._reliefs.items()}
+        camera = viewpoint(sim.model, sim.data, sim.scene.camera, sim.data.time)
+        return self._renderer.render(sim.data, reliefs, camera)
+
+
+def render_video(
+    scene: Scene,
+    output: str | Path,
+    *,
+    size: tuple[int, int] = (1280, 720),
+    fps: int = 60,
+    duration: float | None = None,
+    resolution: int | None = None,
+    backend: str = "auto",
+    progress: Callable[[int, int], None] | None = None,
+) -> Summary:
+    """Simulate a scene and write its video.
+
+    Parameters
+    ----------
+    scene : Scene
+    output : path
+        .mp4, .webm, .gif, or a folder for PNG frames. It appears when it is whole.
+    size : (width, height)
+        [pixels].
+    fps : int
+        Frames a second.
+    duration : float, optional
+        [s], instead of the scene's.
+    resolution, backend
+        As for `Simulation`.
+    progress : callable, optional
+        Called with (frames done, frames in all) after each frame.
+
+    Raises
+    ------
+    RippleError
+        Before anything is simulated where the output, size, rate or scene is invalid; later if the physics becomes
+        unstable or the video cannot be written on.
+    """
+    start = time.perf_counter()
+    output, (width, height) = Path(output), size
+    check_output(output, width, height, fps)
+    length = scene.duration if duration is None else duration
+    if not 0 < length < math.inf:
+        raise SceneError(f"duration is {length!r} s; valid is a positive number")
+    count = max(1, round(length * fps))
+    simulation = Simulation(scene, fps=fps, resolution=resolution, backend=backend)
+    frames = FrameSource(simulation, width=width, height=height)
+    ready = time.perf_counter()
+    render_seconds = 0.0
+    with open_writer(output, width=width, height=height, fps=fps) as writer:
+        for number in range(count):
+            if number:
+                simulation.advance_frame()
+            before = time.perf_counter()
+            frame = frames.draw()
+            render_seconds += time.perf_counter() - before
+            writer.write(frame)
+            if progress is not None:
+                progress(number + 1, count)
+    return Summary(
+        output=output,
+        frames=count,
+        renderer=frames.gl_renderer,
+        backend=simulation.backend,
+        substeps_per_frame=simulation.substeps_taken / max(count - 1, 1),
+        setup_seconds=ready - start,
+        physics_seconds=simulation.physics_seconds,
+        wave_seconds=simulation.wave_seconds,
+        render_seconds=render_seconds,
+        encode_seconds=writer.encode_seconds,
+        wall_seconds=time.perf_counter() - start,
+    )
