@@ -82,7 +82,7 @@ def _duck_solid() -> Sdf:
     neck = rounded_cone((0.14, 0.0, 0.40), (0.19, 0.0, 0.58), 0.18, 0.16)
     head = sphere((0.19, 0.0, 0.68), 0.222)
     bill = smooth_union(
-        0.012,
+        0.025,
         pebble((0.415, 0.0, 0.663), 0.085, 0.034, _turned(pitch=-0.20)),
         pebble((0.40, 0.0, 0.605), 0.060, 0.030, _turned(pitch=0.12)),
     )
@@ -90,7 +90,7 @@ def _duck_solid() -> Sdf:
     solid = smooth_union(0.08, body, smooth_union(0.05, neck, head))
     solid = smooth_union(0.035, solid, bill)
     solid = smooth_union(0.02, solid, mirrored(eye))
-    return smooth_intersection(0.06, solid, half_space((0.0, 0.0, -1.0), -0.03))
+    return smooth_intersection(0.04, solid, half_space((0.0, 0.0, -1.0), -0.035))
 
 
 def _turned(pitch: float = 0.0, yaw: float = 0.0) -> Array:
