@@ -1,0 +1,178 @@
+"""The commands, one class each: the fields are the arguments, the docstrings the help, `run` does the work.
+
+What is heavy is imported where it is used, so that `--help` and mistakes are answered at once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json as json_format
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from tyro.conf import Positional, arg
+
+from .arguments import Count, Duration, FrameRate, Resolution, Seed, Size
+
+if TYPE_CHECKING:
+    from .scene import Scene
+    from .simulation import Summary
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class _Video:
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
+    """Where the video goes: a name ending in .mp4, .webm or .gif, or one without ending for a folder of PNG frames."""
+    size: Size = (1280, 720)
+    """Frame size in pixels."""
+    fps: FrameRate = None
+    """Frames per second."""
+    duration: Duration = None
+    """Length of the video in seconds."""
+    resolution: Resolution = None
+    """Texels along an edge of a cube face; more carry finer waves and take longer."""
+    backend: Literal["auto", "gl", "cpu"] = "auto"
+    """Where the waves are computed: in OpenGL, on the CPU, or wherever it is faster."""
+
+    def load(self) -> Scene:
+        """Make the scene that is rendered."""
+        raise NotImplementedError
+
+    def run(self) -> None:
+        """Render the scene and print a summary."""
+        from .video import check_output, default_fps
+
+        # Before anything that takes time.
+        fps = self.fps or default_fps(self.output)
+        check_output(self.output, *self.size, fps)
+
+        from .progress import frame_progress
+        from .simulation import render_video
+        from .solver.gl import shared_context
+        from .solver.waves import auto_backend
+
+        scene = self.load()
+        backend = auto_backend() if self.backend == "auto" else self.backend
+        with frame_progress(f"renderer {shared_context().renderer}, waves {backend}") as progress:
+            summary = render_video(
+                scene,
+                self.output,
+                size=self.size,
+                fps=fps,
+                duration=self.duration,
+                resolution=self.resolution,
+                backend=backend,
+                progress=progress,
+            )
+        print(_summary_text(summary))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Render(_Video):
+    """Render a scene to a video."""
+
+    scene: Annotated[Positional[str], arg(metavar="SCENE")]
+    """Name of a shipped scene, such as duck, or path of a scene file (TOML)."""
+
+    def load(self) -> Scene:
+        """Load the scene."""
+        from .scene import load_scene
+
+        return load_scene(self.scene)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Drop(_Video):
+    """Put any closed mesh on a floor, let bodies rain on it, and render that."""
+
+    mesh: Annotated[Positional[Path], arg(metavar="MESH")]
+    """Mesh file (OBJ, OFF, PLY, STL, GLB ...): closed, in one part, without handles."""
+    bodies: Count = 12
+    """How many bodies fall."""
+    seed: Seed = 0
+    """Chooses where and what falls; the same seed gives the same video."""
+
+    def load(self) -> Scene:
+        """Build a scene round the mesh."""
+        from .drop import drop_scene
+
+        return drop_scene(self.mesh, bodies=self.bodies, seed=self.seed)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Atlas:
+    """Map a mesh to a cube-map atlas, and say how good it is."""
+
+    mesh: Annotated[Positional[Path], arg(metavar="MESH")]
+    """Mesh file (OBJ, OFF, PLY, STL, GLB ...): closed, in one part, without handles."""
+    output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Save the atlas to this file (NPZ)."""
+    resolution: Count = 128
+    """Texels along an edge of a cube face."""
+    method: Annotated[str, arg(metavar="METHOD")] = "progressive"
+    """Sphere map: progressive (fold-free, spreads the area evenly)."""
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Build the atlas, save it where that is asked for, and print its figures."""
+        from .solver import build_atlas, load_mesh
+
+        start = time.perf_counter()
+        mesh = load_mesh(self.mesh)
+        loaded = time.perf_counter()
+        atlas = build_atlas(mesh, resolution=self.resolution, method=self.method)
+        if self.output is not None:
+            atlas.save(self.output)
+        report = {
+            "mesh": str(self.mesh),
+            "vertices": len(mesh.V),
+            "triangles": len(mesh.F),
+            "resolution": self.resolution,
+            "method": self.method,
+            "quality": atlas.quality(),
+            "seconds": {"load": loaded - start, **atlas.timings},
+        }
+        print(json_format.dumps(report, indent=2) if self.json else _atlas_text(report))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Info:
+    """Show versions, the OpenGL driver and the wave solver, and what to install if rendering cannot work."""
+
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Print the report."""
+        from .info import as_text, collect
+
+        info = collect()
+        print(json_format.dumps(dataclasses.asdict(info), indent=2) if self.json else as_text(info))
+
+
+COMMANDS = {"render": Render, "drop": Drop, "atlas": Atlas, "info": Info}
+
+
+def _summary_text(summary: Summary) -> str:
+    return (
+        f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s\n"
+        f"renderer  {summary.renderer}\n"
+        f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps a frame\n"
+        f"time      set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
+        f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
+        f"encoding {summary.encode_seconds:.1f} s"
+    )
+
+
+def _atlas_text(report: dict[str, Any]) -> str:
+    n = report["resolution"]
+    rows = {
+        "mesh": f"{report['vertices']} vertices, {report['triangles']} triangles",
+        "atlas": f"6 x {n} x {n} texels, {report['method']} sphere map",
+        **{name: f"{value:.6g}" for name, value in report["quality"].items()},
+        **{f"{stage} time": f"{seconds:.3f} s" for stage, seconds in report["seconds"].items()},
+    }
+    width = max(map(len, rows))
+    return "\n".join([report["mesh"], *(f"{name:<{width}}  {value}" for name, value in rows.items())])

@@ -1,0 +1,185 @@
+"""The program's manners: quick help, one line for a mistake, exit statuses, nothing left behind."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from ripple_sim import cli, commands
+from ripple_sim.errors import EncodingError, SceneError
+from ripple_sim.solver.errors import GLError
+
+
+@pytest.fixture(autouse=True)
+def _left_as_found(tmp_path_factory, monkeypatch):
+    """Keep the program's signal handler and its cache to these tests."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+    handler = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, handler)
+
+
+@pytest.fixture
+def tetrahedron(tmp_path):
+    path = tmp_path / "tetrahedron.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    return path
+
+
+def complaint(capsys, *argv: str) -> str:
+    """Run what must be refused; return its one line on stderr."""
+    assert cli.main(argv) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("ripple-sim: ")
+    assert err.count("\n") == 1
+    assert err.endswith("\n")
+    return err
+
+
+@pytest.mark.parametrize("command", [[], ["render"], ["drop"], ["atlas"], ["info"]])
+def test_help_is_given(capsys, command):
+    assert cli.main([*command, "--help"]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith(" ".join(["usage: ripple-sim", *command]))
+    assert err == ""
+
+
+@pytest.mark.parametrize(
+    ("argv", "named"),
+    [
+        ([], "render, drop, atlas, info"),
+        (["fly"], "fly"),
+        (["render", "duck"], "--output"),
+        (["render", "-o", "x.mp4"], "SCENE"),
+        (["render", "duck", "-o", "x.mp4", "--colour", "red"], "--colour"),
+        (["render", "duck", "-o", "x.mp4", "--size", "big"], "--size.*'big'.*1280x720"),
+        (["render", "duck", "-o", "x.mp4", "--fps", "-5"], "--fps.*'-5'"),
+        (["render", "duck", "-o", "x.mp4", "--duration", "nan"], "--duration.*'nan'.*positive"),
+        (["render", "duck", "-o", "x.mp4", "--resolution", "1.5"], "--resolution.*'1.5'"),
+        (["render", "duck", "-o", "x.mp4", "--backend", "vulkan"], "vulkan.*--backend.*auto"),
+        (["drop", "mesh.obj", "-o", "x.mp4", "--bodies", "0"], "--bodies.*'0'"),
+        (["drop", "mesh.obj", "-o", "x.mp4", "--seed", "luck"], "--seed.*'luck'"),
+        (["info", "--yaml"], "--yaml"),
+    ],
+)
+def test_a_usage_error_names_the_argument_and_the_help(capsys, argv, named):
+    line = complaint(capsys, *argv)
+    assert re.search(named, line)
+    assert re.search(r"; see ripple-sim( [a-z]+)? --help$", line)
+    assert line.isascii()
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_a_usage_error_reads_the_same_in_every_locale(encoding):
+    result = subprocess.run(
+        [sys.executable, "-m", "ripple_sim.cli", "render", "duck", "-o", "x.mp4", "--backend", "vulkan"],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONIOENCODING": encoding, "FORCE_COLOR": "1"},
+        check=False,
+    )
+    assert result.returncode == 2
+    assert result.stderr == (
+        "ripple-sim: invalid choice 'vulkan' for argument '--backend'. Expected one of ('auto', 'gl', 'cpu'); "
+        "see ripple-sim render --help\n"
+    )
+
+
+@pytest.mark.parametrize("command", ["render", "drop"])
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["-o", "clip.avi"], r"clip\.avi.*valid is \.mp4"),
+        (["-o", "clip.mp4", "--size", "641x360"], "641x360.*even"),
+        (["-o", "clip.gif", "--fps", "60"], "60.*1 to 50"),
+        (["-o", "/proc/clip.mp4"], "cannot write /proc/clip.mp4"),
+    ],
+)
+def test_a_bad_output_is_refused_before_the_scene_is_looked_at(tmp_path, monkeypatch, capsys, command, options, said):
+    monkeypatch.chdir(tmp_path)
+    assert re.search(said, complaint(capsys, command, "missing", *options))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["render", "missing.toml", "-o", "clip.mp4"],
+        ["render", "no such scene", "-o", "clip.mp4"],
+        ["drop", "missing.obj", "-o", "clip.mp4"],
+        ["atlas", "missing.obj", "-o", "atlas.npz"],
+    ],
+)
+def test_a_missing_input_is_named_and_nothing_written(tmp_path, monkeypatch, capsys, argv):
+    monkeypatch.chdir(tmp_path)
+    assert argv[1] in complaint(capsys, *argv)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_atlas_prints_its_figures_as_json_and_saves(tmp_path, capsys, tetrahedron):
+    saved = tmp_path / "atlas.npz"
+    assert cli.main(["atlas", str(tetrahedron), "--resolution", "8", "--json", "-o", str(saved)]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert (report["vertices"], report["triangles"], report["resolution"]) == (4, 4, 8)
+    assert report["quality"]["flipped"] == 0
+    assert all(seconds >= 0 for seconds in report["seconds"].values())
+    assert saved.stat().st_size > 0
+
+
+def test_atlas_prints_its_figures_for_reading(capsys, tetrahedron):
+    assert cli.main(["atlas", str(tetrahedron), "--resolution", "8"]) == 0
+    out = capsys.readouterr().out
+    assert "4 vertices, 4 triangles" in out
+    assert re.search(r"^flipped +0$", out, re.MULTILINE)
+
+
+def test_atlas_refuses_an_unwritable_file_and_an_unknown_method(capsys, tetrahedron):
+    assert "/proc/atlas.npz" in complaint(
+        capsys, "atlas", str(tetrahedron), "--resolution", "8", "-o", "/proc/atlas.npz"
+    )
+    assert "'mercator'" in complaint(capsys, "atlas", str(tetrahedron), "--method", "mercator")
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (SceneError("geom 'x' is missing;\nadd it"), 2),
+        (GLError("no OpenGL"), 1),
+        (EncodingError("disk full"), 1),
+        (KeyboardInterrupt(), 130),
+    ],
+)
+def test_the_exit_status_tells_what_kind_of_error_it_was(monkeypatch, capsys, error, status):
+    def run(self):
+        raise error
+
+    monkeypatch.setattr(commands.Info, "run", run)
+    assert cli.main(["info"]) == status
+    line = capsys.readouterr().err
+    assert line.startswith("ripple-sim: ")
+    assert line.count("\n") == 1
+
+
+def test_an_unexpected_error_is_not_hidden(monkeypatch):
+    def run(self):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(commands.Info, "run", run)
+    with pytest.raises(ZeroDivisionError):
+        cli.main(["info"])
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys, ripple_sim\n"
+        "from ripple_sim.cli import main\n"
+        "main(['--help'])\n"
+        "print(sorted({'vtkmodules', 'pyvista', 'numba', 'mujoco', 'moderngl', 'av', 'scipy'} & set(sys.modules)))\n"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.splitlines()[-1] == "[]"
