@@ -15,8 +15,8 @@ from .contacts import ContactPair, cluster, contact_pairs
 from .errors import SceneError
 from .target import find_target, geom_name, target_atlas
 
-# Footprint radius over the touching body's smallest half-extent: about the patch of a ball sunk in by a fifth.
-_FOOTPRINT = 0.6
+# Footprint radius over the touching body's smallest half-extent: about the patch of a ball sunk in by an eighth.
+_FOOTPRINT = 0.5
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

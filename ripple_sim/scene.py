@@ -13,6 +13,7 @@ import mujoco
 
 from ripple_sim.solver import Material
 
+from .drops import DropEntry, Drops
 from .errors import SceneError
 from .target import find_target
 
@@ -65,6 +66,7 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
     ripple: list[RippleEntry]
     duration: float = 5.0
     camera: CameraEntry = msgspec.field(default_factory=CameraEntry)
+    drop: list[DropEntry] = []
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -79,6 +81,8 @@ class Scene:
     camera : CameraEntry
     duration : float
         [s].
+    drops : tuple of DropEntry
+        Bodies that are let go at given times.
     """
 
     name: str
@@ -86,6 +90,7 @@ class Scene:
     surfaces: tuple[RippleEntry, ...]
     camera: CameraEntry
     duration: float
+    drops: tuple[DropEntry, ...] = ()
 
 
 def shipped_scenes() -> list[str]:
@@ -117,6 +122,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
         surfaces=tuple(content.ripple),
         camera=content.camera,
         duration=content.duration,
+        drops=tuple(content.drop),
     )
     check_scene(scene)
     return scene
@@ -158,7 +164,7 @@ def _check_keys(table: Any, schema: type[msgspec.Struct], place: str, origin: st
         if key not in fields:
             where = f" in [{place}]" if place else ""
             raise SceneError(f"scene file {origin!r}: unknown key {key!r}{where}; valid are {', '.join(fields)}")
-        inner = {"ripple": RippleEntry, "camera": CameraEntry, "material": MaterialEntry}.get(key)
+        inner = {"ripple": RippleEntry, "camera": CameraEntry, "material": MaterialEntry, "drop": DropEntry}.get(key)
         if inner is not None:
             for item in value if isinstance(value, list) else [value]:
                 _check_keys(item, inner, f"{place}.{key}" if place else key, origin)
@@ -206,6 +212,7 @@ def check_scene(scene: Scene) -> None:
         if entry.look not in LOOKS:
             raise SceneError(f"look {entry.look!r} does not exist; valid are {', '.join(LOOKS)}")
         entry.material.material()
+    Drops(scene.model, scene.drops)
     name = scene.camera.name
     if name is not None and mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_CAMERA, name) < 0:
         names = [scene.model.camera(i).name for i in range(scene.model.ncam)]

@@ -17,6 +17,7 @@ from ripple_sim.solver import Relief
 from ripple_sim.solver.gl import shared_context
 
 from .coupling import Ripples
+from .drops import Drops
 from .errors import SceneError, SimulationError
 from .render import Renderer, Surface
 from .scene import Scene
@@ -78,6 +79,7 @@ class Simulation:
             backend=backend,
             operator=operator,
         )
+        self._drops = Drops(self.model, scene.drops)
         self.physics_seconds = self.wave_seconds = 0.0
 
     @property
@@ -100,6 +102,7 @@ class Simulation:
         """
         for _ in range(self._steps_per_frame):
             start = time.perf_counter()
+            self._drops.apply(self.data)
             mujoco.mj_step(self.model, self.data)
             stepped = time.perf_counter()
             self._check_state()
