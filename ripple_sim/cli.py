@@ -12,11 +12,10 @@ import re
 import signal
 import sys
 from collections.abc import Sequence
-from functools import reduce
-from operator import or_
-from typing import Annotated, Any
+from typing import Any
 
-import tyro
+import tyro.conf
+import tyro.extras
 
 from .commands import COMMANDS
 
@@ -56,12 +55,11 @@ def _fail(message: object, status: int) -> int:
 
 def _parse(argv: list[str]) -> Any:
     """Return the command to run, or the exit status if there is nothing to run."""
-    types = [Annotated[kind, tyro.conf.subcommand(name)] for name, kind in COMMANDS.items()]  # type: ignore[valid-type]
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
-            return tyro.cli(
-                reduce(or_, types),  # type: ignore[arg-type]
+            return tyro.extras.subcommand_cli_from_dict(
+                COMMANDS,
                 prog="ripple-sim",
                 description=_DESCRIPTION,
                 args=argv,

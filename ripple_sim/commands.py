@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import json as json_format
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -152,7 +153,7 @@ class Info:
         print(json_format.dumps(dataclasses.asdict(info), indent=2) if self.json else as_text(info))
 
 
-COMMANDS = {"render": Render, "drop": Drop, "atlas": Atlas, "info": Info}
+COMMANDS: dict[str, Callable[..., Any]] = {"render": Render, "drop": Drop, "atlas": Atlas, "info": Info}
 
 
 def _summary_text(summary: Summary) -> str:
