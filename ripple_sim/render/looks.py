@@ -1,0 +1,54 @@
+"""Named looks of a target's surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ripple_sim.solver.errors import RippleError
+
+
+@dataclass(frozen=True)
+class Look:
+    """Parameters of the surface shader.
+
+    Attributes
+    ----------
+    color : tuple
+        sRGB, 0 to 1; used where the surface brings no colour of its own.
+    roughness : float
+        Of the microfacet distribution, 0 (mirror) to 1.
+    metallic : float
+        0 dielectric, 1 metal.
+    sheen : float
+        Strength of the soft glow towards the silhouette.
+    coat : float
+        Strength of a clear, smooth coat above the base layer, 0 to 1.
+    translucency : float
+        Share of the light that goes into the body and comes out elsewhere, 0 to 1.
+    transparency : float
+        Share of the base layer through which the surroundings are seen, refracted, 0 to 1.
+    """
+
+    color: tuple[float, float, float]
+    roughness: float
+    metallic: float = 0.0
+    sheen: float = 0.0
+    coat: float = 0.0
+    translucency: float = 0.0
+    transparency: float = 0.0
+
+
+LOOKS: dict[str, Look] = {
+    "rubber": Look(color=(1.0, 0.77, 0.09), roughness=0.38, sheen=0.35, coat=0.25, translucency=0.12),
+    "jelly": Look(color=(0.88, 0.13, 0.27), roughness=0.16, coat=0.8, translucency=0.75),
+    "clay": Look(color=(0.80, 0.52, 0.40), roughness=0.75, sheen=0.25),
+    "metal": Look(color=(0.80, 0.81, 0.84), roughness=0.22, metallic=1.0),
+    "water": Look(color=(0.30, 0.66, 0.82), roughness=0.08, coat=0.6, translucency=0.3, transparency=0.75),
+}
+
+
+def find_look(name: str) -> Look:
+    """Return the look called `name`, or raise `RippleError` with the valid names."""
+    if name not in LOOKS:
+        raise RippleError(f"look is {name!r}; valid are {', '.join(map(repr, LOOKS))}")
+    return LOOKS[name]

@@ -1,0 +1,143 @@
+"""Tessellated primitives, and vertex normals.
+
+Every MuJoCo primitive is the Minkowski sum of a box-like core and a ball-like shell: a point of it is
+`core * core_size + shell * shell_size`, component by component. A sphere has no core, a capsule's
+core is a segment, a box's is a box; boxes and cylinders get a small round shell, so that their edges catch the light.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.cubemap import FACE_NORMALS, FACE_U, FACE_V
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A closed triangle mesh whose vertices scale with two sizes.
+
+    `core`, `shell` and `normals` have shape [n, 3], `faces` shape [m, 3].
+    """
+
+    core: NDArray[np.float64]
+    shell: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+    def positions(self, core_size: NDArray[np.float64], shell_size: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Vertices [n, 3] for the two sizes [m], shape [3] each."""
+        return self.core * core_size + self.shell * shell_size
+
+
+def ball(divisions: int) -> Shape:
+    """Make a unit sphere: a cube of `divisions` squares an edge, blown up with equal angles. Also ellipsoids."""
+    points, faces = _cube_grid(np.linspace(-1.0, 1.0, divisions + 1))
+    directions = _normalized(np.tan(np.pi / 4 * points))
+    return Shape(np.zeros_like(directions), directions, directions, faces)
+
+
+def box(divisions: int) -> Shape:
+    """Box with half sizes core + shell and round edges of `divisions` segments."""
+    # a face's grid line is flat between -1 and 1 and bends round the edges outside; the edge's middle is at 1.5
+    bend = np.linspace(0.0, 0.5, divisions + 1)[1:]
+    points, faces = _cube_grid(np.concatenate([-1 - bend[::-1], [-1.0, 1.0], 1 + bend]))
+    core = np.clip(points, -1.0, 1.0)
+    directions = _normalized(np.tan(np.pi / 2 * (points - core)))
+    return Shape(core, directions, directions, faces)
+
+
+def capsule(sides: int, rings: int) -> Shape:
+    """Capsule along z: the core is a segment of half length core_size[2], the shell a ball."""
+    angle = np.concatenate([np.linspace(-np.pi / 2, 0, rings + 1), np.linspace(0, np.pi / 2, rings + 1)])
+    core_z = np.repeat([-1.0, 1.0], rings + 1)
+    return _revolved(np.zeros_like(angle), core_z, np.cos(angle), np.sin(angle), sides)
+
+
+def cylinder(sides: int, rings: int) -> Shape:
+    """Cylinder along z with round rims: radius and half height are core + shell."""
+    lower, upper = np.linspace(-np.pi / 2, 0, rings + 1), np.linspace(0, np.pi / 2, rings + 1)
+    angle = np.concatenate([[-np.pi / 2], lower, upper, [np.pi / 2]])
+    core_r = np.concatenate([[0.0], np.ones(2 * rings + 2), [0.0]])
+    core_z = np.repeat([-1.0, 1.0], rings + 2)
+    return _revolved(core_r, core_z, np.cos(angle), np.sin(angle), sides)
+
+
+def corner_normals(V: NDArray, F: NDArray, crease: float = 45.0) -> NDArray[np.float64]:
+    """Angle-weighted unit normals of every triangle's corners, shape [m, 3, 3].
+
+    Triangles that meet a corner's triangle under more than `crease` degrees do not count, so sharp edges stay sharp;
+    180 gives one smooth normal a vertex.
+    """
+    triangle = triangle_normals(V, F)
+    weighted = (_corner_angles(V, F)[:, :, None] * triangle[:, None, :]).reshape(-1, 3)
+    # every ordered pair of corners that share a vertex
+    corners = np.argsort(F.ravel(), kind="stable")
+    degree = np.bincount(F.ravel(), minlength=len(V))
+    count = degree[F.ravel()[corners]]
+    one = np.repeat(np.arange(len(corners)), count)
+    start = np.repeat((np.cumsum(degree) - degree)[F.ravel()[corners]], count)
+    other = start + np.arange(len(one)) - np.repeat(np.cumsum(count) - count, count)
+    one, other = corners[one], corners[other]
+    close = np.einsum("ij,ij->i", triangle[one // 3], triangle[other // 3]) >= np.cos(np.radians(crease)) - 1e-9
+    normals = np.zeros_like(weighted)
+    np.add.at(normals, one[close], weighted[other[close]])
+    return _normalized(normals).reshape(len(F), 3, 3)
+
+
+def triangle_normals(V: NDArray, F: NDArray) -> NDArray[np.float64]:
+    """Return unit normals of the triangles, shape [m, 3]; zero where a triangle has no area."""
+    return _normalized(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]))
+
+
+def _corner_angles(V: NDArray, F: NDArray) -> NDArray[np.float64]:
+    sides = _normalized(V[np.roll(F, -1, axis=1)] - V[F])
+    return np.arccos(np.clip(np.einsum("fkj,fkj->fk", sides, -np.roll(sides, 1, axis=1)), -1.0, 1.0))
+
+
+def _normalized(vectors: NDArray) -> NDArray[np.float64]:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0, length, 1.0)
+
+
+def _cube_grid(line: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices and outward triangles of a cube whose faces carry the grid line x line; edges are welded."""
+    count = len(line)
+    row, column = np.divmod(np.arange(count * count), count)
+    points = np.concatenate(
+        [
+            line[-1] * normal + line[column][:, None] * u + line[row][:, None] * v
+            for normal, u, v in zip(FACE_NORMALS, FACE_U, FACE_V, strict=True)
+        ]
+    )
+    corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
+    quad = np.stack([corner, corner + 1, corner + count + 1, corner + count], axis=1)
+    quads = np.concatenate([quad + face * count * count for face in range(6)])
+    welded, index = np.unique(points, axis=0, return_inverse=True)
+    return welded, index.ravel()[np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])]
+
+
+def _revolved(core_r: NDArray, core_z: NDArray, shell_r: NDArray, shell_z: NDArray, sides: int) -> Shape:
+    """Revolve a profile that runs from the lower pole to the upper one about z; the poles are single vertices."""
+    turn = 2 * np.pi * np.arange(sides) / sides
+    circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(sides)], axis=1)
+    axis = np.array([0.0, 0.0, 1.0])
+    inner = slice(1, -1)
+
+    def rings(radius: NDArray, height: NDArray) -> NDArray[np.float64]:
+        body = radius[inner, None, None] * circle + height[inner, None, None] * axis
+        return np.concatenate([[height[0] * axis], body.reshape(-1, 3), [height[-1] * axis]])
+
+    count = len(core_r) - 2
+    index = 1 + np.arange(count * sides).reshape(count, sides)
+    after = np.roll(index, -1, axis=1)
+    top = 1 + count * sides
+    faces = [np.stack([np.zeros(sides, dtype=np.int64), after[0], index[0]], axis=1)]
+    for lower in range(count - 1):
+        a, b, c, d = index[lower], after[lower], after[lower + 1], index[lower + 1]
+        faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    faces.append(np.stack([index[-1], after[-1], np.full(sides, top)], axis=1))
+    shell = _normalized(rings(shell_r, shell_z))
+    return Shape(rings(core_r, core_z), shell, shell, np.concatenate(faces))

@@ -1,0 +1,64 @@
+"""How open a mesh's surface is to its surroundings, and how thick it is: baked once with rays."""
+
+from __future__ import annotations
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+from numpy.typing import NDArray
+
+_RAYS = 1_000_000
+
+
+def bake(V: NDArray, F: NDArray, normals: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Cast cosine-distributed rays from every vertex, outwards and inwards.
+
+    Returns
+    -------
+    openness : array, shape [n]
+        Share of the outer hemisphere from which light arrives, 0 to 1.
+    thickness : array, shape [n]
+        Mean length of the inner rays over the mesh's bounding radius.
+    """
+    count = int(np.clip(_RAYS // (2 * len(V)), 16, 64))
+    radius = np.linalg.norm(V - V.mean(axis=0), axis=1).max()
+    scene = EmbreeScene()
+    TriangleMesh(scene, np.ascontiguousarray(V[F], dtype=np.float32))
+
+    def distances(side: float) -> NDArray[np.float64]:
+        directions = side * _hemisphere(normals, count)
+        origins = np.repeat(V + side * 1e-3 * radius * normals, count, axis=0)
+        hits = scene.run(origins.astype(np.float32), directions.reshape(-1, 3).astype(np.float32), query="DISTANCE")
+        return np.minimum(hits / radius, 4.0).reshape(len(V), count)
+
+    # nearby walls hide the light, those further than a radius away reflect some themselves
+    openness = np.minimum(distances(1.0), 1.0).mean(axis=1)
+    return _smoothed(openness, F), _smoothed(distances(-1.0).mean(axis=1), F)
+
+
+def _hemisphere(normals: NDArray, count: int) -> NDArray[np.float64]:
+    """Spiral of cosine-distributed directions about every normal, turned differently at every vertex."""
+    index = np.arange(count) + 0.5
+    golden = np.pi * (3 - np.sqrt(5))
+    turn = index * golden + (np.arange(len(normals)) * golden)[:, None]
+    r, z = np.sqrt(index / count), np.sqrt(1 - index / count)
+    helper = np.where(np.abs(normals[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    tangent = np.cross(helper, normals)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    bitangent = np.cross(normals, tangent)
+    return (
+        (r * np.cos(turn))[..., None] * tangent[:, None]
+        + (r * np.sin(turn))[..., None] * bitangent[:, None]
+        + z[:, None] * normals[:, None]
+    )
+
+
+def _smoothed(values: NDArray, F: NDArray, rounds: int = 2) -> NDArray[np.float64]:
+    """Average over neighbours, against the noise of few rays."""
+    edges = np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    both = np.concatenate([edges, edges[:, ::-1]])
+    degree = np.bincount(both[:, 0], minlength=len(values))
+    for _ in range(rounds):
+        mean = np.bincount(both[:, 0], weights=values[both[:, 1]], minlength=len(values)) / np.maximum(degree, 1)
+        values = (values + mean) / 2
+    return values

@@ -1,0 +1,28 @@
+#version 430
+// Share of the sky that a point of the floor sees, from the height of what hangs above it: the form factor of
+// horizontal patches at height h and horizontal distance d, h^2 / (pi (h^2 + d^2)^2) per unit area.
+layout(binding = 2) uniform sampler2D ceiling;  // 0 at the floor, 1 at the top
+
+uniform vec3 extent;  // width of the map [m], height of its top [m], radius of influence [m]
+
+in vec2 screen;
+out vec4 fragment;
+
+const int TAPS = 48;
+
+void main()
+{
+    vec2 uv = 0.5 * screen + 0.5;
+    float texel = extent.x / float(textureSize(ceiling, 0).x);
+    float covered = 0.0;
+    for (int i = 0; i < TAPS; ++i) {
+        // radii grow with the square of the index: contacts want dense samples, and their area goes with it
+        float s = (float(i) + 0.5) / float(TAPS);
+        float distance = extent.z * s * s, area = 6.2831853 * distance * 2.0 * extent.z * s / float(TAPS);
+        float angle = 2.39996323 * float(i);
+        float height = textureLod(ceiling, uv + distance * vec2(cos(angle), sin(angle)) / extent.x, 0.0).r;
+        float h = max(height * extent.y, 0.6 * texel), r2 = h * h + distance * distance;
+        covered += height < 1.0 ? h * h * area / (3.14159265 * r2 * r2) : 0.0;
+    }
+    fragment = vec4(1.0 - min(covered, 1.0));
+}

@@ -1,0 +1,88 @@
+// How a solid surface answers the studio's light.
+layout(binding = 3) uniform sampler2D floor_openness;
+layout(std430, binding = 4) readonly buffer Occluders { vec4 occluders[]; };  // pairs: end a, radius; end b, geom
+
+struct Material {
+    vec3 albedo;
+    float roughness, metallic, sheen, coat, translucency, transparency;
+    float thickness;  // of the body under the surface, 0 to about 1
+    float openness;   // share of the sky that the body itself leaves free
+};
+
+// Share of the hemisphere about the normal that other bodies, taken as capsules, cover.
+float openness_to_bodies(vec3 position, vec3 normal, float own_geom)
+{
+    float open = 1.0;
+    for (int i = 0; i < int(counts.x); ++i) {
+        vec4 a = occluders[2 * i], b = occluders[2 * i + 1];
+        vec3 axis = b.xyz - a.xyz, to = a.xyz - position;
+        vec3 nearest = to + axis * clamp(-dot(axis, to) / max(dot(axis, axis), 1e-12), 0.0, 1.0);
+        float away = length(nearest), ratio = min(a.w / max(away, 1e-9), 1.0);
+        float above = clamp((dot(normal, nearest) / max(away, 1e-9) + ratio) / (1.0 + ratio), 0.0, 1.0);
+        open *= 1.0 - (b.w == own_geom ? 0.0 : 0.9 * ratio * ratio * above * above);
+    }
+    return open;
+}
+
+// Light that the floor sends up to a point; bodies close above it shade it.
+vec3 floor_bounce(vec3 position)
+{
+    vec3 local = position - floor_origin.xyz;
+    vec2 uv = (vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)) - floor_map.xy) / (2.0 * floor_map.z) + 0.5;
+    float open = textureLod(floor_openness, uv, 0.0).r;
+    vec3 lit = floor_albedo.rgb * (key_radiance.rgb * 0.5 * open * open + horizon.rgb * 0.4 * open);
+    return mix(horizon.rgb * 0.45, lit, floor_origin.w);
+}
+
+float ggx(float n_h, float roughness)
+{
+    float a2 = roughness * roughness * roughness * roughness;
+    float d = n_h * n_h * (a2 - 1.0) + 1.0;
+    return a2 / (d * d);
+}
+
+vec3 fresnel(vec3 f0, float cosine)
+{
+    return f0 + (1.0 - f0) * pow(1.0 - cosine, 5.0);
+}
+
+vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_geom)
+{
+    vec3 view = normalize(eye.xyz - position), light = key_direction.xyz;
+    vec3 reflected = reflect(-view, normal), halfway = normalize(view + light);
+    float n_v = clamp(dot(normal, view), 0.02, 1.0), n_l = dot(normal, light), n_h = max(dot(normal, halfway), 0.0);
+
+    float shadow = key_visibility(position, flat_normal);
+    float open = m.openness * openness_to_bodies(position, flat_normal, own_geom);
+    vec3 bounce = floor_bounce(position);
+    // narrow highlights of distant ripples would flicker
+    vec3 dx = dFdx(normal), dy = dFdy(normal);
+    float rough = sqrt(clamp(m.roughness * m.roughness + min(0.5 * (dot(dx, dx) + dot(dy, dy)), 0.2), 0.004, 1.0));
+
+    // translucent bodies let light wrap round their edges
+    float wrap = 0.6 * m.translucency;
+    float diffuse = max(n_l + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
+    float soft_shadow = mix(shadow, 1.0, 0.35 * m.translucency);
+    vec3 key = key_radiance.rgb * diffuse * soft_shadow;
+    vec3 sky = ambient(normal, bounce) * open;
+    // light bounces between walls of a coloured body: occlusion is less deep and more saturated
+    vec3 base = m.albedo * (key + sky * mix(m.albedo * (1.0 - open) + open, vec3(1.0), open)) * (1.0 - m.metallic);
+
+    float glow = exp(-3.0 * m.thickness) * (0.5 + 0.5 * pow(clamp(dot(-view, light), 0.0, 1.0), 2.0));
+    base = mix(base, m.albedo * (key * 0.55 + sky * 0.8) + m.albedo * m.albedo * key_radiance.rgb * glow,
+               m.translucency * 0.7);
+    vec3 bent = refract(-view, normal, 0.75);
+    vec3 through = environment(bent, 0.3, bounce) * m.albedo * (0.25 + 0.75 * open);
+    base = mix(base, through, m.transparency);
+    base += m.sheen * m.albedo * sky * pow(1.0 - n_v, 3.0);
+
+    vec3 f0 = mix(vec3(0.04), m.albedo, m.metallic);
+    float visible = shadow * clamp(n_l * 4.0, 0.0, 1.0);
+    float hidden = clamp(open * open + 0.15, 0.0, 1.0);
+    vec3 at_edge = f0 + (max(vec3(1.0 - rough), f0) - f0) * pow(1.0 - n_v, 5.0);
+    vec3 gloss = environment(reflected, rough, bounce) * at_edge * hidden;
+    gloss += key_radiance.rgb * visible * fresnel(f0, max(dot(view, halfway), 0.0)) * ggx(n_h, rough) * 0.25;
+    float coat = m.coat * fresnel(vec3(0.04), n_v).x;
+    vec3 film = environment(reflected, 0.06, bounce) * hidden;
+    return (base + gloss) * (1.0 - coat) + coat * film;
+}

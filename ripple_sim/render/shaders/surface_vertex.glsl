@@ -1,0 +1,24 @@
+#version 430
+#include "frame.glsl"
+
+in vec3 in_world;
+in vec3 in_normal;
+in vec3 in_sphere;
+in vec2 in_baked;
+in vec2 in_uv;
+
+out vec3 world;
+out vec3 normal;
+out vec3 sphere;
+out vec2 baked;
+out vec2 uv;
+
+void main()
+{
+    world = in_world;
+    normal = in_normal;
+    sphere = in_sphere;
+    baked = in_baked;
+    uv = in_uv;
+    gl_Position = view_projection * vec4(in_world, 1.0);
+}
