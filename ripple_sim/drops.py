@@ -15,7 +15,7 @@ Vector = tuple[float, float, float]
 
 
 class DropEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[drop]]`: let a free body go at a time [s], from a position [m] (by default where it is) with a velocity [m/s]."""
+    """`[[drop]]`: let a free body go at a time [s], from a position [m] (default: where it is) at a velocity [m/s]."""
 
     body: str
     time: float
@@ -61,7 +61,9 @@ def free_joint(model: mujoco.MjModel, entry: DropEntry) -> tuple[int, int]:
         raise SceneError(f"[[drop]] names the body {entry.body!r}; the model's bodies are {', '.join(names) or 'none'}")
     joint = int(model.body_jntadr[body])
     if joint < 0 or model.jnt_type[joint] != int(mujoco.mjtJoint.mjJNT_FREE):
-        raise SceneError(f"[[drop]] names the body {entry.body!r}, which has no <freejoint/>; only free bodies can drop")
+        raise SceneError(
+            f"[[drop]] names the body {entry.body!r}, which has no <freejoint/>; only free bodies can drop"
+        )
     if not 0 <= entry.time < float("inf"):
         raise SceneError(f"[[drop]] of body {entry.body!r} has time {entry.time!r} s; valid is 0 or greater")
     return int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])

@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .analytic import SphereAtlas, sphere_atlas
     from .atlas import Atlas
     from .atlas_file import load_atlas
     from .build import build_atlas
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from .material import Material
     from .mesh import Mesh, load_mesh
     from .relief import Relief
-    from .analytic import SphereAtlas, sphere_atlas
     from .waves import WaveSolver
 
 _HOME = {

@@ -55,7 +55,7 @@ def sphere_atlas(radius: float = 1.0, resolution: int = 128) -> SphereAtlas:
 
 
 def _texel_triangulation(n: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Triangles of the texel mesh; and for each texel one triangle [6, N, N] and corner [6, N, N, 3] where it stands."""
+    """Triangles of the texel mesh; for each texel, one triangle [6, N, N] and the corner of it [6, N, N, 3] it is."""
     index = padded_indices(n)
     sw, se, nw, ne = index[:, :-1, :-1], index[:, :-1, 1:], index[:, 1:, :-1], index[:, 1:, 1:]
     # a cell across a cube edge appears on two faces, one at a cube corner on three: it belongs to its lowest texel

@@ -17,6 +17,7 @@ from .mesh import Mesh
 from .quality import atlas_quality
 from .stencil import lumped_areas
 
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Atlas:
     """Cube-map atlas of a closed genus-0 surface.

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from .analytic import SphereAtlas
 from .atlas import Atlas
 from .errors import AtlasError
 from .mesh import Mesh
-from .analytic import SphereAtlas
 
 # Raise it when the sphere map or the file's layout changes: older files are then rebuilt.
 FORMAT = 1

@@ -66,9 +66,7 @@ class CPUBackend:
                 _fill(self._v, self._ring, self._ring_source)
                 _apply(self._viscous_stencil, self._v, self._viscous_force)
             drift = np.float32(dt if step < substeps - 1 else dt / 2)
-            _kick_drift(
-                self._stencil, self._h, self._v, self._h_next, decay, gain, spring, self._viscous_force, drift
-            )
+            _kick_drift(self._stencil, self._h, self._v, self._h_next, decay, gain, spring, self._viscous_force, drift)
             self._h, self._h_next = self._h_next, self._h
 
     def _step_coefficients(self, dt: float) -> tuple:
@@ -77,20 +75,20 @@ class CPUBackend:
         return self._coefficients
 
 
-def _at(x, f, r, c):  # noqa: ANN001, ANN202
+def _at(x, f, r, c):
     """x[f, r, c] of an array, or the number x itself."""
     raise NotImplementedError("for compiled code only")
 
 
 @overload(_at, inline="always")
-def _at_overload(x, f, r, c):  # noqa: ANN001, ANN202
+def _at_overload(x, f, r, c):
     if isinstance(x, numba.types.Array):
         return lambda x, f, r, c: x[f, r, c]
     return lambda x, f, r, c: x
 
 
 @numba.njit(cache=True)
-def _fill(h, ring, source):  # noqa: ANN001, ANN202
+def _fill(h, ring, source):
     """Copy the neighbours' border texels into the ring."""
     flat = h.reshape(-1)
     for i in range(len(ring)):
@@ -98,7 +96,7 @@ def _fill(h, ring, source):  # noqa: ANN001, ANN202
 
 
 @numba.njit(cache=True, nogil=True)
-def _drift(h, v, dt):  # noqa: ANN001, ANN202
+def _drift(h, v, dt):
     n = h.shape[1] - 2
     for i in range(6 * n):
         f, r = i // n, i % n + 1
@@ -107,7 +105,7 @@ def _drift(h, v, dt):  # noqa: ANN001, ANN202
 
 
 @numba.njit(inline="always")
-def _force(w, h, f, r, c):  # noqa: ANN001, ANN202
+def _force(w, h, f, r, c):
     """Sum over the eight links of weight (h_j - h_i) at padded texel (f, r, c)."""
     x = h[f, r, c]
     return (
@@ -123,7 +121,7 @@ def _force(w, h, f, r, c):  # noqa: ANN001, ANN202
 
 
 @numba.njit(cache=True, nogil=True)
-def _apply(w, h, out):  # noqa: ANN001, ANN202
+def _apply(w, h, out):
     n = h.shape[1] - 2
     for i in range(6 * n):
         f, r = i // n, i % n + 1
@@ -132,7 +130,7 @@ def _apply(w, h, out):  # noqa: ANN001, ANN202
 
 
 @numba.njit(cache=True, nogil=True)
-def _kick_drift(w, h, v, h_next, decay, gain, spring, extra, dt):  # noqa: ANN001, ANN202
+def _kick_drift(w, h, v, h_next, decay, gain, spring, extra, dt):
     n = h.shape[1] - 2
     viscous = extra.shape[1] == n
     for i in range(6 * n):

@@ -41,9 +41,7 @@ def texel_directions(resolution: int) -> NDArray[np.float64]:
     tangent = np.sign(offset) * np.tan(np.pi / 4 * np.abs(offset) / half_width)
     a = tangent[None, None, :, None]
     b = tangent[None, :, None, None]
-    directions = (
-        FACE_NORMALS[:, None, None, :] + a * FACE_U[:, None, None, :] + b * FACE_V[:, None, None, :]
-    )
+    directions = FACE_NORMALS[:, None, None, :] + a * FACE_U[:, None, None, :] + b * FACE_V[:, None, None, :]
     # the sum of squares in one order for all faces, for the same reason
     return directions / np.sqrt(1.0 + np.minimum(a * a, b * b) + np.maximum(a * a, b * b))
 

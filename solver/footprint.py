@@ -16,7 +16,7 @@ from .errors import SolverError
 # Fewer texels across than this and the source would excite waves that the grid cannot carry.
 MIN_TEXELS = 2.0
 
-# Distance along the surface over straight distance: up to the first value the surface counts as flat, from the second on
+# Distance along the surface over straight distance: up to the first value the surface is flat, from the second on
 # only the way along the surface counts. In between the two are blended, so that no texel jumps in or out.
 _FLAT, _BENT = 1.05, 1.5
 
@@ -76,9 +76,7 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
     block = atlas.padded_positions[face, row : row + 3, column : column + 3]
     spacing = np.nanmax(np.linalg.norm(block[[0, 1, 1, 2], [1, 0, 2, 1]] - block[1, 1], axis=1))
     radius = max(float(radius), MIN_TEXELS * float(spacing))
-    texels, along = _distances(
-        padded_indices(n), atlas.positions.reshape(-1, 3), center, closest[0], 1.1 * radius
-    )
+    texels, along = _distances(padded_indices(n), atlas.positions.reshape(-1, 3), center, closest[0], 1.1 * radius)
     straight = np.linalg.norm(atlas.positions.reshape(-1, 3)[texels] - closest[0], axis=1)
     bend = np.clip((along / np.maximum(straight, 1e-300) - _FLAT) / (_BENT - _FLAT), 0, 1)
     bend = np.where(straight > 0, bend * bend * (3 - 2 * bend), 0)
@@ -101,7 +99,7 @@ def _distances(
 
 
 @numba.njit(cache=True)
-def _through(p, q, s, dp, dq):  # noqa: ANN001, ANN202
+def _through(p, q, s, dp, dq):
     """Distance at s of a point source that is dp from p and dq from q, unfolded into the plane of the triangle.
 
     Infinite if the straight way does not cross the edge pq (Novotni and Klein 2002).
@@ -127,7 +125,7 @@ def _through(p, q, s, dp, dq):  # noqa: ANN001, ANN202
 
 
 @numba.njit(cache=True)
-def _march(index, positions, center, point, limit, distance):  # noqa: ANN001, ANN202
+def _march(index, positions, center, point, limit, distance):
     """Fast marching with point-source updates over the triangles of both triangulations of every quad."""
     n = index.shape[1] - 2
     # the eight neighbours in order round a texel

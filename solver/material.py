@@ -52,7 +52,9 @@ class Material:
                 worst = value.flat[np.argmax(~np.isfinite(value) | below)]
                 bound = f"greater than {low:g}" if strict else f"{low:g} or greater"
                 raise SolverError(f"material {name} is {worst:g} {unit}; valid is a finite number, {bound}")
-            if value.ndim not in (0, 3) or (value.ndim == 3 and not (value.shape[0] == 6 and value.shape[1] == value.shape[2])):
+            if value.ndim not in (0, 3) or (
+                value.ndim == 3 and not (value.shape[0] == 6 and value.shape[1] == value.shape[2])
+            ):
                 raise SolverError(f"material {name} has shape {value.shape}; valid is a number or [6, N, N]")
 
     def texels(self, name: str, resolution: int) -> NDArray[np.float64]:

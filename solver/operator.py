@@ -174,7 +174,7 @@ def stencil_sum(stencil: NDArray[np.float64], padded: NDArray[np.float64]) -> ND
 
 
 @numba.njit(cache=True)
-def _gather(w, h, out, difference):  # noqa: ANN001, ANN202
+def _gather(w, h, out, difference):
     """Sum of weight (h_j - h_i) (difference 1) or of the weights alone (difference 0)."""
     n = out.shape[1]
     neighbours = ((0, 0, 0, 0, 1), (0, 0, -1, 0, -1), (1, 0, 0, 1, 0), (1, -1, 0, -1, 0))

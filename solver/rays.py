@@ -1,4 +1,4 @@
-"""Rays from the cube's centre through every texel onto the sphere-mapped mesh: one triangle and barycentrics a texel."""
+"""Rays from the cube's centre through every texel onto the sphere-mapped mesh: triangle and barycentrics of each."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def cast_rays(
 
 
 @numba.njit(cache=True)
-def _edge_products(sphere, corners, d, out):  # noqa: ANN001, ANN202
+def _edge_products(sphere, corners, d, out):
     """Triple products det(d, b, c) of the ray with the three edges: all >= 0 if and only if it passes inside."""
     for k in range(3):
         b, c = sphere[corners[(k + 1) % 3]], sphere[corners[(k + 2) % 3]]
@@ -63,7 +63,7 @@ def _edge_products(sphere, corners, d, out):  # noqa: ANN001, ANN202
 
 
 @numba.njit(cache=True)
-def _settle(sphere, F, neighbours, directions, hits, barycentrics):  # noqa: ANN001, ANN202
+def _settle(sphere, F, neighbours, directions, hits, barycentrics):
     """Walk each ray's hit to the triangle that truly contains it; fill barycentrics; return how many rays are lost."""
     product = np.empty(3)
     lost = 0

@@ -90,7 +90,7 @@ def _gradient_weights(atlas: Atlas) -> NDArray[np.float64]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _differentiate(weights, h, relief):  # noqa: ANN001, ANN202
+def _differentiate(weights, h, relief):
     n = h.shape[1] - 2
     for i in range(6 * n):
         f, r = i // n, i % n + 1

@@ -6,8 +6,8 @@ stencil. Only real-space coordinates enter.
 
 Layout. Fields are padded faces [6, N + 2, N + 2] (`cubemap.padded_indices`). A stencil is [6, 4, N + 1, N + 1]: the
 weights of the links of padded cell (r, c) to the east (r, c)-(r, c + 1), north (r, c)-(r + 1, c), north-east
-(r, c)-(r + 1, c + 1), and its other diagonal (r, c + 1)-(r + 1, c). A link that crosses a cube edge stands on both faces,
-with the same value to the last bit.
+(r, c)-(r + 1, c + 1), and its other diagonal (r, c + 1)-(r + 1, c). A link that crosses a cube edge stands on both
+faces, with the same value to the last bit.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def agree_across_edges(weights: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @numba.njit(cache=True)
-def _add_triangle(p, q, s, kp, kq, ks, share, out):  # noqa: ANN001, ANN202
+def _add_triangle(p, q, s, kp, kq, ks, share, out):
     """Weights of the links opposite p, q, s, and a third of the area, of one triangle counted `share` times."""
     a2 = (q[0] - s[0]) ** 2 + (q[1] - s[1]) ** 2 + (q[2] - s[2]) ** 2
     b2 = (s[0] - p[0]) ** 2 + (s[1] - p[1]) ** 2 + (s[2] - p[2]) ** 2
@@ -131,7 +131,7 @@ def _add_triangle(p, q, s, kp, kq, ks, share, out):  # noqa: ANN001, ANN202
 
 
 @numba.njit(cache=True)
-def _assemble(x, k, weights, areas):  # noqa: ANN001, ANN202
+def _assemble(x, k, weights, areas):
     """Add up the triangles of all cells of the padded positions x with padded coefficients k."""
     n = x.shape[1] - 2
     w = np.empty(3)

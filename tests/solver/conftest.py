@@ -1,0 +1,53 @@
+"""Surfaces that several tests share. Everything is made here; nothing is read from files."""
+
+import igl
+import numpy as np
+import pytest
+import trimesh
+
+from ripple_sim.scenes.shapes import limbed
+from ripple_sim.solver import Atlas, Mesh, RippleError, build_atlas
+from ripple_sim.solver.gl import shared_context
+
+
+@pytest.fixture(scope="session")
+def ball_mesh() -> Mesh:
+    """A unit sphere as a fine mesh."""
+    solid = trimesh.creation.icosphere(subdivisions=5)
+    return Mesh.from_arrays(solid.vertices, solid.faces)
+
+
+@pytest.fixture(scope="session")
+def animal() -> Atlas:
+    """Atlas of a concave body with four limbs and a head."""
+    return build_atlas(Mesh.from_arrays(*limbed()), 64, cache=False)
+
+
+@pytest.fixture(scope="session")
+def animal_geodesics(animal: Atlas):
+    """Exact geodesic distance from one vertex to all vertices of the animal."""
+
+    def distances(vertex: int) -> np.ndarray:
+        mesh = animal.mesh
+        empty = np.empty(0, dtype=np.int64)
+        return igl.exact_geodesic(
+            mesh.V, mesh.F, np.array([vertex]), empty, np.arange(len(mesh.V), dtype=np.int64), empty
+        )
+
+    return distances
+
+
+@pytest.fixture
+def gl_backend() -> str:
+    """The GL backend; skipped where no context can be made."""
+    try:
+        shared_context()
+    except RippleError as error:
+        pytest.skip(str(error))
+    return "gl"
+
+
+@pytest.fixture(params=["cpu", "gl"])
+def backend(request: pytest.FixtureRequest) -> str:
+    """Each wave backend in turn."""
+    return request.getfixturevalue("gl_backend") if request.param == "gl" else request.param
