@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -14,10 +15,7 @@ __all__ = ["Impulse", "Material", "RippleError", "Ripples"]
 
 def __getattr__(name: str) -> Any:
     # loaded when first used: importing ripple_sim must stay quick
-    if name in ("Impulse", "Ripples"):
-        from . import coupling as home
-    elif name in ("Material", "RippleError"):
-        from . import solver as home
-    else:
+    home = {"Impulse": ".coupling", "Ripples": ".coupling", "Material": ".solver", "RippleError": ".solver"}.get(name)
+    if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}; valid are {', '.join(__all__)}")
-    return getattr(home, name)
+    return getattr(importlib.import_module(home, __name__), name)

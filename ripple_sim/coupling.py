@@ -94,7 +94,9 @@ class Ripples:
     def __getitem__(self, name: str) -> WaveSolver:
         """Waves of a geom, by name."""
         if name not in self._geoms:
-            raise SceneError(f"geom {name!r} does not ripple; the rippling geoms are {', '.join(map(repr, self._geoms))}")
+            raise SceneError(
+                f"geom {name!r} does not ripple; the rippling geoms are {', '.join(map(repr, self._geoms))}"
+            )
         return self._waves[self._geoms[name]]
 
     def __iter__(self) -> Iterator[str]:

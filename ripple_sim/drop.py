@@ -141,7 +141,9 @@ def _build(
         )
         height = rng.uniform(0.8, 1.2)
         x, y, z = landing[i]
-        drops.append(DropEntry(body=f"body_{i}", time=float(times[i]), position=(float(x), float(y), float(z + height))))
+        drops.append(
+            DropEntry(body=f"body_{i}", time=float(times[i]), position=(float(x), float(y), float(z + height)))
+        )
     return spec, drops
 
 

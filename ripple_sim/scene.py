@@ -155,6 +155,14 @@ def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
         raise SceneError(f"scene file {origin!r}: {str(error).replace('`$.', '`')}") from error
 
 
+_TABLES: dict[str, type[msgspec.Struct]] = {
+    "ripple": RippleEntry,
+    "camera": CameraEntry,
+    "material": MaterialEntry,
+    "drop": DropEntry,
+}
+
+
 def _check_keys(table: Any, schema: type[msgspec.Struct], place: str, origin: str) -> None:
     """Refuse unknown keys before msgspec does, with the list of valid ones."""
     if not isinstance(table, dict):
@@ -164,7 +172,7 @@ def _check_keys(table: Any, schema: type[msgspec.Struct], place: str, origin: st
         if key not in fields:
             where = f" in [{place}]" if place else ""
             raise SceneError(f"scene file {origin!r}: unknown key {key!r}{where}; valid are {', '.join(fields)}")
-        inner = {"ripple": RippleEntry, "camera": CameraEntry, "material": MaterialEntry, "drop": DropEntry}.get(key)
+        inner = _TABLES.get(key)
         if inner is not None:
             for item in value if isinstance(value, list) else [value]:
                 _check_keys(item, inner, f"{place}.{key}" if place else key, origin)

@@ -62,7 +62,13 @@ class Simulation:
     """
 
     def __init__(
-        self, scene: Scene, *, fps: int = 60, resolution: int | None = None, backend: str = "auto", operator: str = "fem"
+        self,
+        scene: Scene,
+        *,
+        fps: int = 60,
+        resolution: int | None = None,
+        backend: str = "auto",
+        operator: str = "fem",
     ) -> None:
         self.scene = scene
         self.model = copy.copy(scene.model)
@@ -111,7 +117,11 @@ class Simulation:
             self.wave_seconds += time.perf_counter() - stepped
 
     def _check_state(self) -> None:
-        for kind in (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC):
+        for kind in (
+            mujoco.mjtWarning.mjWARN_BADQPOS,
+            mujoco.mjtWarning.mjWARN_BADQVEL,
+            mujoco.mjtWarning.mjWARN_BADQACC,
+        ):
             if self.data.warning[kind].number:
                 raise SimulationError(
                     f"the physics became unstable at {self.data.time:.4g} s ({mujoco.mjtWarning(kind).name}); "

@@ -40,7 +40,9 @@ def find_target(model: mujoco.MjModel, name: str) -> int:
         raise SceneError(f"the model has no geom {name!r}; its named geoms are {known}")
     if int(model.geom_type[geom]) not in TARGET_TYPES:
         kind = _GEOM(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
-        raise SceneError(f"geom {name!r} is a {kind}, which cannot ripple; valid are {', '.join(TARGET_TYPES.values())}")
+        raise SceneError(
+            f"geom {name!r} is a {kind}, which cannot ripple; valid are {', '.join(TARGET_TYPES.values())}"
+        )
     return geom
 
 

@@ -18,9 +18,9 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, ti
     if entry.name is not None:
         fixed = Camera.from_mjcf(model, data, entry.name)
         return fixed if not entry.orbit else _turned(fixed, np.radians(entry.orbit) * time)
-    lookat = entry.lookat if entry.lookat is not None else tuple(float(x) for x in model.stat.center)
+    x, y, z = entry.lookat if entry.lookat is not None else (float(value) for value in model.stat.center)
     return Camera(
-        lookat=lookat,
+        lookat=(x, y, z),
         distance=entry.distance if entry.distance is not None else 1.5 * float(model.stat.extent),
         azimuth=entry.azimuth + entry.orbit * time,
         elevation=entry.elevation,

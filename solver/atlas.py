@@ -95,8 +95,8 @@ class Atlas:
         """Flat index (face N + row) N + column of the texel nearest in the atlas to each point, shape [k]."""
         face, row, column = self.locate(points)
         n = self.resolution
-        row, column = (np.clip(np.rint(x).astype(np.int64), 0, n - 1) for x in (row, column))
-        return (face * n + row) * n + column
+        i, j = (np.clip(np.rint(x).astype(np.int64), 0, n - 1) for x in (row, column))
+        return (face * n + i) * n + j
 
     def quality(self) -> dict[str, float]:
         """Figures of merit of the atlas.

@@ -46,7 +46,9 @@ def texel_directions(resolution: int) -> NDArray[np.float64]:
     return directions / np.sqrt(1.0 + np.minimum(a * a, b * b) + np.maximum(a * a, b * b))
 
 
-def face_coordinates(directions: NDArray[np.float64], resolution: int) -> tuple[NDArray[np.int64], ...]:
+def face_coordinates(
+    directions: NDArray[np.float64], resolution: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Face, row and column of directions from the cube's centre (they need not be unit vectors).
 
     Row and column are float64 in texel units; 0.0 is the centre of the first texel. Each result has shape [k].

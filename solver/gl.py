@@ -70,12 +70,13 @@ class GLContext:
 
     def program(self, package: str, vertex: str, fragment: str, **defines: object) -> moderngl.Program:
         """Compile and link a vertex and a fragment shader from `shaders/` of `package`."""
-        sources = {
-            "vertex_shader": load_shader(package, vertex, **defines),
-            "fragment_shader": load_shader(package, fragment, **defines),
-        }
+        vertex_source = load_shader(package, vertex, **defines)
+        fragment_source = load_shader(package, fragment, **defines)
         with self as ctx:
-            return _compiled(f"{vertex} + {fragment}", lambda: ctx.program(**sources))
+            return _compiled(
+                f"{vertex} + {fragment}",
+                lambda: ctx.program(vertex_shader=vertex_source, fragment_shader=fragment_source),
+            )
 
 
 def load_shader(package: str, name: str, **defines: object) -> str:
@@ -112,9 +113,9 @@ def _create_context(device: int | None) -> moderngl.Context:
     for libraries in _LIBRARIES:
         for index in devices:
             try:
-                return moderngl.create_context(
-                    standalone=True, backend="egl", require=430, device_index=index, **libraries
-                )
+                # moderngl's hints know nothing of the keywords that its backends take
+                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}
+                return moderngl.create_context(require=430, standalone=True, **settings)
             except Exception as error:  # moderngl raises bare Exception here
                 reasons.append(str(error))
                 if "not loaded" in str(error):

@@ -48,12 +48,12 @@ class Relief:
         n = self._n
         padded = np.zeros((6, n + 2, n + 2), np.float32)
         padded[:, 1:-1, 1:-1] = height
-        flat = padded.reshape(-1)
-        flat[self._ring] = flat[self._source]
+        heights = padded.reshape(-1)
+        heights[self._ring] = heights[self._source]
         relief = np.empty((6, n + 2, n + 2, 4), np.float32)
         _differentiate(self._weights, padded, relief)
-        flat = relief.reshape(-1, 4)
-        flat[self._ring] = flat[self._source]
+        texels = relief.reshape(-1, 4)
+        texels[self._ring] = texels[self._source]
         for r, r_in, r_out in ((0, 1, 0), (n + 1, n, n + 1)):
             for c, c_in, c_out in ((0, 1, 0), (n + 1, n, n + 1)):
                 relief[:, r, c] = (relief[:, r_in, c_in] + relief[:, r_in, c_out] + relief[:, r_out, c_in]) / 3
