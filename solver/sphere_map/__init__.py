@@ -1,6 +1,6 @@
 """The sphere map: a closed mesh of genus 0 mapped one-to-one onto the unit sphere, its area spread evenly."""
 
-from .certificate import Certificate, certify, stretch, stretch_quantiles
+from .certificate import Certificate, certify, solid_angles, stretch, stretch_quantiles
 from .progressive import progressive_sphere_map
 
-__all__ = ["Certificate", "certify", "progressive_sphere_map", "stretch", "stretch_quantiles"]
+__all__ = ["Certificate", "certify", "progressive_sphere_map", "solid_angles", "stretch", "stretch_quantiles"]

@@ -24,28 +24,30 @@ class Certificate:
 
 
 def certify(F: NDArray[np.integer], S: NDArray[np.float64]) -> Certificate:
-    """Check a sphere map S (unit vectors, shape [n, 3]) of the triangles F, shape [m, 3].
-
-    Solid angles after van Oosterom and Strackee (1983).
-    """
+    """Check a sphere map S (unit vectors, shape [n, 3]) of the triangles F, shape [m, 3]."""
     a, b, c = (S[F[:, j]] for j in range(3))
     ab, ac = b - a, c - a
-    triple = _dot(a, np.cross(ab, ac))
     round_off = 4 * np.finfo(np.float64).eps * np.sqrt(_dot(ab, ab) * _dot(ac, ac))
-    flipped = int(np.count_nonzero(~(triple > round_off)))
-    solid_angle = float(np.sum(2 * np.arctan2(triple, 1 + _dot(a, b) + _dot(b, c) + _dot(c, a))))
+    flipped = int(np.count_nonzero(~(_dot(a, np.cross(ab, ac)) > round_off)))
+    solid_angle = float(np.sum(solid_angles(F, S)))
     on_sphere = bool(np.all(np.abs(_dot(S, S) - 1) < 1e-9))
     valid = flipped == 0 and on_sphere and abs(solid_angle - 4 * np.pi) < 1e-6
     return Certificate(flipped, solid_angle, valid)
 
 
+def solid_angles(F: NDArray[np.integer], S: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signed solid angle of each spherical triangle [sr], shape [m] (van Oosterom and Strackee 1983)."""
+    a, b, c = (S[F[:, j]] for j in range(3))
+    return 2 * np.arctan2(_dot(a, np.cross(b - a, c - a)), 1 + _dot(a, b) + _dot(b, c) + _dot(c, a))
+
+
 def stretch(V: NDArray[np.float64], F: NDArray[np.integer], S: NDArray[np.float64]) -> NDArray[np.float64]:
     """Per triangle sqrt(real area / sphere area), real area scaled to 4 pi, shape [m].
 
-    How many times wider than in an ideal even grid the texels are there. The sphere area is the flat triangle's.
+    How many times wider than in an ideal even grid the texels are there.
     """
-    real, sphere = _areas(V, F), _areas(S, F)
-    return np.sqrt(4 * np.pi / np.sum(real) * real / np.maximum(sphere, np.finfo(np.float64).tiny))
+    real = _areas(V, F)
+    return np.sqrt(4 * np.pi / np.sum(real) * real / np.maximum(solid_angles(F, S), np.finfo(np.float64).tiny))
 
 
 def stretch_quantiles(

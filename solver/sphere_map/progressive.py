@@ -22,10 +22,11 @@ from .relaxation import sweep
 from .vectors import Floats
 
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
+GRID = 2.0**32  # the normalised mesh is rounded to multiples of 1 / GRID
 EQUAL_UNTIL, REAL_FROM = 12, 100  # vertices of a level: equal equilateral references until, real shapes from
 COARSE_SLIVER, FINE_SLIVER = 0.5, 0.15  # shape quality below which a reference is pulled towards equilateral
 LARGE = 6000  # vertices: larger levels grow faster and stop sooner
-MOST_SWEEPS, MOST_NEWTON_STEPS, RESCUES = 10, 15, 4
+MOST_SWEEPS, MOST_NEWTON_STEPS, RESCUES = 10, 30, 4
 EXPLODED = 1e5 * 4 * np.pi  # energy of a level that is stuck
 TRUST_LADDER = (1.0, 0.6, 0.3, 0.0)  # in the real triangles, each tried when the one before gave no certified map
 
@@ -50,14 +51,14 @@ def progressive_sphere_map(V: NDArray[np.float64], F: NDArray[np.integer]) -> ND
     SphereMapError
         No such map was found.
     """
-    V = np.asarray(V, dtype=np.float64)
-    order = _morton_order(V)
+    normal_V = _normalise(np.asarray(V, dtype=np.float64), F)
+    order = _morton_order(normal_V)
     number = np.empty(len(V), dtype=np.int64)
     number[order] = np.arange(len(V))
     triangles = number[F]
     triangles = triangles[np.argsort(triangles.min(axis=1), kind="stable")]
     for trust in TRUST_LADDER:
-        S = _map_by_levels(np.ascontiguousarray(V[order]), triangles, trust)[number]
+        S = _map_by_levels(normal_V[order], triangles, trust)[number]
         certificate = certify(F, S)
         if certificate.valid:
             return S
@@ -67,13 +68,23 @@ def progressive_sphere_map(V: NDArray[np.float64], F: NDArray[np.integer]) -> ND
     )
 
 
+def _normalise(V: Floats, F: NDArray[np.integer]) -> Floats:
+    """Centre the mesh, scale its area to 4 pi, and round it, so that its place and size do not change the map.
+
+    Without rounding, the last bits would decide between the many equivalent ways out of a symmetric coarse level.
+    """
+    V = V - V.mean(axis=0)
+    return np.rint(V * np.sqrt(4 * np.pi / np.sum(_areas(V, F))) * GRID) / GRID
+
+
+def _areas(V: Floats, F: NDArray[np.integer]) -> Floats:
+    return 0.5 * np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1)
+
+
 def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     n = len(V)
-    area = 0.5 * np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1)
-    scale = 4 * np.pi / np.sum(area)
-    V = (V - V.mean(axis=0)) * np.sqrt(scale)
-    carried = np.bincount(F.ravel(), np.repeat(area * scale / 3, 3), n) + 1e-3 * 4 * np.pi / n
-
+    # every vertex gets some room on the sphere, even if its triangles have no area
+    carried = np.bincount(F.ravel(), np.repeat(_areas(V, F) / 3, 3), n) + 1e-3 * 4 * np.pi / n
     table = corner_table(F, n)
     log = decimate(table, V)
     removed, kept = table.tail[log], table.tail[table.twin[log]]
@@ -125,7 +136,7 @@ def _sweep_until_tired(level: Level, S: Floats, reference: Reference) -> None:
 
 
 def _newton_until_tired(level: Level, S: Floats, reference: Reference) -> None:
-    tolerance = 5e-3 if len(S) < LARGE else 1e-2
+    tolerance = 1e-3 if len(S) < LARGE else 3e-3
     slow = 0
     for i in range(MOST_NEWTON_STEPS):
         fall = newton_step(level, S, reference)
