@@ -19,7 +19,7 @@ from .meshes import Shape
 
 _PACKAGE = "ripple_sim.render"
 _VISIBLE_GROUPS = 3
-_MAX_OCCLUDERS = 32
+_MAX_OCCLUDERS = 16
 _BEVEL = 0.06
 _SHEET = 1e-3  # thickness of planes other than the floor [m]
 
@@ -141,11 +141,16 @@ class Bodies:
         rotation = data.geom_xmat[self._drawn].reshape(-1, 3, 3)
         middle = data.geom_xpos[self._drawn] + np.einsum("gij,gj->gi", rotation, centre)
         axis = np.einsum("gij,gj->gi", rotation, half_axis)
-        nearest = np.argsort(np.linalg.norm(middle - focus, axis=1), kind="stable")[:_MAX_OCCLUDERS]
+        away = np.linalg.norm(middle - focus, axis=1)
+        nearest = np.argsort(away, kind="stable")
+        # whichever leaves the list next has faded away before
+        limit = away[nearest[_MAX_OCCLUDERS]] if len(nearest) > _MAX_OCCLUDERS else np.inf
+        nearest = nearest[:_MAX_OCCLUDERS]
+        fade = np.clip(4 * (1 - away[nearest] / limit), 0.0, 1.0)
         packed = np.zeros((len(nearest), 2, 4), dtype=np.float32)
         packed[:, 0, :3] = (middle - axis)[nearest]
         packed[:, 1, :3] = (middle + axis)[nearest]
-        packed[:, 0, 3] = radius[nearest]
+        packed[:, 0, 3] = radius[nearest] * fade
         packed[:, 1, 3] = self._drawn[nearest]
         self._occluders.write(packed.tobytes())
         self._occluders.bind_to_storage_buffer(4)

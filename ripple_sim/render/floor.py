@@ -18,7 +18,7 @@ from .color import linear, srgb_texture
 from .frame import FrameUniforms
 
 _PACKAGE = "ripple_sim.render"
-_MAP_SIZE = 192
+_MAP_SIZE = 256
 _REACH = 40.0  # half size of the drawn quad, in camera distances
 
 
@@ -45,6 +45,7 @@ class Floor:
             self._ceiling_target = ctx.framebuffer(depth_attachment=self._ceiling)
             self._openness = ctx.texture((_MAP_SIZE, _MAP_SIZE), 1, dtype="f2")
             self._openness.repeat_x = self._openness.repeat_y = False
+            self._openness.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
             self._openness_target = ctx.framebuffer([self._openness])
             self._image, self._tiling = self._load_texture(ctx, model)
 
@@ -53,7 +54,7 @@ class Floor:
         rotation = data.geom_xmat[self.geom].reshape(3, 3)
         self._origin, self._rotation = np.array(data.geom_xpos[self.geom]), rotation
         local = rotation.T @ (centre - self._origin)
-        self._centre, self._half_width = local, 1.5 * radius
+        self._centre, self._half_width = local, 1.2 * radius
         frame.set_vector("floor_origin", self._origin, 1.0)
         frame.set_vector("floor_u", rotation[:, 0])
         frame.set_vector("floor_v", rotation[:, 1])
@@ -79,6 +80,7 @@ class Floor:
         self._ceiling.use(2)
         self._occlude.program["extent"] = (2 * self._half_width, top, 0.35 * self._half_width)
         self._occlude.render(moderngl.TRIANGLES, vertices=3)
+        self._openness.build_mipmaps()
         self._openness.use(3)
 
     def draw(self, distance: float) -> None:

@@ -16,6 +16,7 @@ _FRAME = np.dtype(
         ("view_projection", "f4", (4, 4)),
         ("shadow_matrix", "f4", (4, 4)),
         ("eye", "f4", 4),
+        ("focus", "f4", 4),
         ("key_direction", "f4", 4),
         ("key_radiance", "f4", 4),
         ("shadow_scale", "f4", 4),
@@ -34,17 +35,17 @@ _FRAME = np.dtype(
     ]
 )
 
-_KEY_RADIANCE = np.array([1.02, 0.98, 0.91])
+_KEY_RADIANCE = np.array([1.34, 1.28, 1.19])
 _KEY_TANGENT = 0.10
 
 # soft boxes: azimuth from the camera's forward axis (left is positive) and elevation [degrees], half width and half
 # height over distance, radiance
 _LAMPS = (
-    (118.0, 48.0, 0.55, 0.40, (2.6, 2.5, 2.3)),
-    (-62.0, 24.0, 0.28, 0.75, (1.5, 1.7, 2.0)),
-    (20.0, 78.0, 0.60, 0.35, (1.4, 1.45, 1.5)),
+    (100.0, 44.0, 0.42, 0.42, (7.5, 7.2, 6.8)),
+    (-68.0, 28.0, 0.16, 0.75, (4.2, 4.7, 5.4)),
+    (10.0, 66.0, 0.65, 0.20, (3.6, 3.7, 3.8)),
 )
-_KEY_AZIMUTH, _KEY_ELEVATION = 104.0, 50.0
+_KEY_AZIMUTH, _KEY_ELEVATION = 92.0, 44.0
 
 
 class FrameUniforms:
@@ -84,9 +85,9 @@ def light_studio(frame: FrameUniforms, pose: Pose, floor_albedo: NDArray | None)
         frame.values["lamp_tangent"][index] = [*tangent / np.linalg.norm(tangent), half_height]
         frame.values["lamp_radiance"][index][:3] = radiance
     # the backdrop takes the floor's colour, so that one fades into the other
-    tint = np.array([0.56, 0.58, 0.61]) if floor_albedo is None else 0.97 * floor_albedo
+    tint = np.array([0.36, 0.38, 0.42]) if floor_albedo is None else 0.60 * floor_albedo
     frame.set_vector("horizon", tint)
-    frame.set_vector("zenith", tint * np.array([0.50, 0.54, 0.60]))
+    frame.set_vector("zenith", tint * np.array([0.46, 0.50, 0.58]))
     return key
 
 

@@ -39,7 +39,7 @@ class Look:
 
 
 LOOKS: dict[str, Look] = {
-    "rubber": Look(color=(1.0, 0.77, 0.09), roughness=0.38, sheen=0.35, coat=0.25, translucency=0.12),
+    "rubber": Look(color=(1.0, 0.80, 0.10), roughness=0.32, sheen=0.3, coat=0.5, translucency=0.12),
     "jelly": Look(color=(0.88, 0.13, 0.27), roughness=0.16, coat=0.8, translucency=0.75),
     "clay": Look(color=(0.80, 0.52, 0.40), roughness=0.75, sheen=0.25),
     "metal": Look(color=(0.80, 0.81, 0.84), roughness=0.22, metallic=1.0),

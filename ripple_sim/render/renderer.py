@@ -109,6 +109,7 @@ class Renderer:
         self._view_projection = projection @ view_matrix(pose)
         frame.set_matrix("view_projection", self._view_projection)
         frame.set_vector("eye", pose.position, pose.distance)
+        frame.set_vector("focus", pose.focus)
         if self._floor is not None:
             self._floor.place(frame, data, centre, radius)
         key = light_studio(frame, pose, None if self._floor is None else self._floor.albedo)

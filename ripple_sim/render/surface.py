@@ -19,7 +19,7 @@ from .looks import find_look
 from .meshes import corner_normals
 from .subdivision import subdivide
 
-_MAX_FACES = 60_000
+_MAX_FACES = 30_000
 _PACKAGE = "ripple_sim.render"
 # columns of the vertex attributes while the mesh is refined
 _POSITION, _DIRECTION, _SPHERE, _NORMAL, _BAKED, _UV = (
@@ -94,7 +94,7 @@ class SurfaceMesh:
         look = self.look
         self._color = (*linear(surface.color or look.color), float(self._image is not None))
         self._base = (look.roughness, look.metallic, look.sheen, look.coat)
-        self._volume = (look.translucency, look.transparency, float(geom), 0.0)
+        self._volume = (look.translucency, look.transparency, float(geom))
 
     def update(
         self,
@@ -112,7 +112,7 @@ class SurfaceMesh:
                 f"the relief of geom {self.geom} has shape {list(relief.shape)}; resolution {self.resolution} needs "
                 f"{list(shape)}: six faces padded by one texel, gradient and height"
             )
-        self._origin, self._highest = np.array(origin), float(relief[..., 3].max(initial=0.0))
+        self._origin, self._highest = np.array(origin), float(np.abs(relief[..., 3]).max())
         self._relief.write(np.ascontiguousarray(relief, dtype=np.float32))
         self._relief.use(0)
         self._rest.bind_to_storage_buffer(0)
@@ -137,7 +137,8 @@ class SurfaceMesh:
         program["rotation"] = self._rotation
         program["color"] = self._color
         program["base"] = self._base
-        program["volume"] = self._volume
+        program["volume"] = (*self._volume, min(self._highest, 0.05 * self.radius))
+        program["size"] = self.radius
         self._solid.render()
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:

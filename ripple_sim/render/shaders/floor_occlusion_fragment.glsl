@@ -15,12 +15,14 @@ void main()
     vec2 uv = 0.5 * screen + 0.5;
     float texel = extent.x / float(textureSize(ceiling, 0).x);
     float covered = 0.0;
+    float turn = 6.2831853 * fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
+    vec2 direction = vec2(cos(turn), sin(turn));
     for (int i = 0; i < TAPS; ++i) {
         // radii grow with the square of the index: contacts want dense samples, and their area goes with it
         float s = (float(i) + 0.5) / float(TAPS);
         float distance = extent.z * s * s, area = 6.2831853 * distance * 2.0 * extent.z * s / float(TAPS);
-        float angle = 2.39996323 * float(i);
-        float height = textureLod(ceiling, uv + distance * vec2(cos(angle), sin(angle)) / extent.x, 0.0).r;
+        direction = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888) * direction;  // by the golden angle
+        float height = textureLod(ceiling, uv + distance * direction / extent.x, 0.0).r;
         float h = max(height * extent.y, 0.6 * texel), r2 = h * h + distance * distance;
         covered += height < 1.0 ? h * h * area / (3.14159265 * r2 * r2) : 0.0;
     }

@@ -3,6 +3,7 @@ layout(std140, binding = 0) uniform Frame {
     mat4 view_projection;
     mat4 shadow_matrix;    // world -> shadow map, all three coordinates 0 to 1
     vec4 eye;              // xyz [m]; w: distance to the focus [m]
+    vec4 focus;            // what the camera is about [m]
     vec4 key_direction;    // towards the lamp; w: tangent of its angular radius
     vec4 key_radiance;     // of a white surface that faces the lamp
     vec4 shadow_scale;     // x: width [m], y: depth [m], z: texel [m]

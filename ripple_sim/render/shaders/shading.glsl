@@ -6,6 +6,7 @@ struct Material {
     vec3 albedo;
     float roughness, metallic, sheen, coat, translucency, transparency;
     float thickness;  // of the body under the surface, 0 to about 1
+    float lift;       // height of bumps that the shading normal accounts for [m]
     float openness;   // share of the sky that the body itself leaves free
 };
 
@@ -29,7 +30,7 @@ vec3 floor_bounce(vec3 position)
 {
     vec3 local = position - floor_origin.xyz;
     vec2 uv = (vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)) - floor_map.xy) / (2.0 * floor_map.z) + 0.5;
-    float open = textureLod(floor_openness, uv, 0.0).r;
+    float open = textureLod(floor_openness, uv, 4.0).r;
     vec3 lit = floor_albedo.rgb * (key_radiance.rgb * 0.5 * open * open + horizon.rgb * 0.4 * open);
     return mix(horizon.rgb * 0.45, lit, floor_origin.w);
 }
@@ -52,7 +53,7 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     vec3 reflected = reflect(-view, normal), halfway = normalize(view + light);
     float n_v = clamp(dot(normal, view), 0.02, 1.0), n_l = dot(normal, light), n_h = max(dot(normal, halfway), 0.0);
 
-    float shadow = key_visibility(position, flat_normal);
+    float shadow = key_visibility(position, flat_normal, m.lift);
     float open = m.openness * openness_to_bodies(position, flat_normal, own_geom);
     vec3 bounce = floor_bounce(position);
     // narrow highlights of distant ripples would flicker

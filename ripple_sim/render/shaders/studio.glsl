@@ -1,7 +1,7 @@
 // The photo studio: a backdrop, and three soft boxes that only reflections and ambient light see.
 vec3 backdrop(vec3 direction)
 {
-    return mix(horizon.rgb, zenith.rgb, smoothstep(-0.05, 0.75, direction.z));
+    return mix(horizon.rgb, zenith.rgb, smoothstep(-0.1, 0.8, direction.z));
 }
 
 // Share of a soft box that a lobe of the given blur about the direction meets.
@@ -28,10 +28,10 @@ vec3 environment(vec3 direction, float roughness, vec3 bounce)
 // Ambient light on a diffuse surface, over pi.
 vec3 ambient(vec3 normal, vec3 bounce)
 {
-    vec3 radiance = mix(bounce, mix(horizon.rgb, zenith.rgb, 0.35), 0.5 + 0.5 * normal.z);
+    vec3 radiance = mix(bounce, mix(horizon.rgb, zenith.rgb, 0.3), 0.5 + 0.5 * normal.z) * 0.6;
     for (int i = 0; i < 3; ++i) {
         float wrapped = max(0.35 + 0.65 * dot(normal, lamp_normal[i].xyz), 0.0);
-        radiance += lamp_radiance[i].rgb * (lamp_normal[i].w * lamp_tangent[i].w * 0.45) * wrapped * wrapped;
+        radiance += lamp_radiance[i].rgb * (lamp_normal[i].w * lamp_tangent[i].w * 0.13) * wrapped * wrapped;
     }
     return radiance;
 }
