@@ -41,7 +41,7 @@ _KEY_TANGENT = 0.10
 # soft boxes: azimuth from the camera's forward axis (left is positive) and elevation [degrees], half width and half
 # height over distance, radiance
 _LAMPS = (
-    (100.0, 44.0, 0.42, 0.42, (7.5, 7.2, 6.8)),
+    (100.0, 46.0, 0.26, 0.34, (7.5, 7.2, 6.8)),
     (-68.0, 28.0, 0.16, 0.75, (4.2, 4.7, 5.4)),
     (10.0, 66.0, 0.65, 0.20, (3.6, 3.7, 3.8)),
 )
@@ -87,7 +87,7 @@ def light_studio(frame: FrameUniforms, pose: Pose, floor_albedo: NDArray | None)
     # the backdrop takes the floor's colour, so that one fades into the other
     tint = np.array([0.36, 0.38, 0.42]) if floor_albedo is None else 0.60 * floor_albedo
     frame.set_vector("horizon", tint)
-    frame.set_vector("zenith", tint * np.array([0.46, 0.50, 0.58]))
+    frame.set_vector("zenith", tint * np.array([0.36, 0.40, 0.48]))
     return key
 
 

@@ -39,11 +39,11 @@ class Look:
 
 
 LOOKS: dict[str, Look] = {
-    "rubber": Look(color=(1.0, 0.80, 0.10), roughness=0.32, sheen=0.3, coat=0.5, translucency=0.12),
-    "jelly": Look(color=(0.88, 0.13, 0.27), roughness=0.16, coat=0.8, translucency=0.75),
+    "rubber": Look(color=(1.0, 0.78, 0.07), roughness=0.34, sheen=0.3, coat=0.5, translucency=0.25),
+    "jelly": Look(color=(0.93, 0.16, 0.30), roughness=0.14, coat=0.9, translucency=0.8, transparency=0.4),
     "clay": Look(color=(0.80, 0.52, 0.40), roughness=0.75, sheen=0.25),
     "metal": Look(color=(0.80, 0.81, 0.84), roughness=0.22, metallic=1.0),
-    "water": Look(color=(0.30, 0.66, 0.82), roughness=0.08, coat=0.6, translucency=0.3, transparency=0.75),
+    "water": Look(color=(0.42, 0.76, 0.90), roughness=0.06, coat=1.0, translucency=0.15, transparency=0.9),
 }
 
 

@@ -60,20 +60,21 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     vec3 dx = dFdx(normal), dy = dFdy(normal);
     float rough = sqrt(clamp(m.roughness * m.roughness + min(0.5 * (dot(dx, dx) + dot(dy, dy)), 0.2), 0.004, 1.0));
 
-    // translucent bodies let light wrap round their edges
-    float wrap = 0.6 * m.translucency;
-    float diffuse = max(n_l + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
+    // translucent bodies let light of their own colour wrap round their edges
+    vec3 wrap = 0.6 * m.translucency * m.albedo;
+    vec3 diffuse = max(n_l + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
     float soft_shadow = mix(shadow, 1.0, 0.35 * m.translucency);
     vec3 key = key_radiance.rgb * diffuse * soft_shadow;
     vec3 sky = ambient(normal, bounce) * open;
     // light bounces between walls of a coloured body: occlusion is less deep and more saturated
     vec3 base = m.albedo * (key + sky * mix(m.albedo * (1.0 - open) + open, vec3(1.0), open)) * (1.0 - m.metallic);
 
-    float glow = exp(-3.0 * m.thickness) * (0.5 + 0.5 * pow(clamp(dot(-view, light), 0.0, 1.0), 2.0));
-    base = mix(base, m.albedo * (key * 0.55 + sky * 0.8) + m.albedo * m.albedo * key_radiance.rgb * glow,
-               m.translucency * 0.7);
-    vec3 bent = refract(-view, normal, 0.75);
-    vec3 through = environment(bent, 0.3, bounce) * m.albedo * (0.25 + 0.75 * open);
+    // what enters elsewhere and leaves here: more of it where the body is thin, and the deeper its colour the further
+    float glow = exp(-4.0 * m.thickness) * (0.35 + 0.65 * pow(clamp(0.5 - 0.5 * dot(normal, light), 0.0, 1.0), 2.0));
+    base += m.translucency * m.albedo * key_radiance.rgb * glow;
+    // clear bodies show the studio through them, bent as water bends and tinted by the way through
+    vec3 tint = pow(m.albedo, vec3(0.2 + 1.6 * m.thickness));
+    vec3 through = environment(refract(-view, normal, 0.75), 0.12 + 0.5 * m.translucency, 1.7 * bounce) * tint;
     base = mix(base, through, m.transparency);
     base += m.sheen * m.albedo * sky * pow(1.0 - n_v, 3.0);
 
@@ -81,9 +82,9 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     float visible = shadow * clamp(n_l * 4.0, 0.0, 1.0);
     float hidden = clamp(open * open + 0.15, 0.0, 1.0);
     vec3 at_edge = f0 + (max(vec3(1.0 - rough), f0) - f0) * pow(1.0 - n_v, 5.0);
-    vec3 gloss = environment(reflected, rough, bounce) * at_edge * hidden;
+    vec3 gloss = environment(reflected, rough, 1.7 * bounce) * at_edge * hidden;
     gloss += key_radiance.rgb * visible * fresnel(f0, max(dot(view, halfway), 0.0)) * ggx(n_h, rough) * 0.25;
     float coat = m.coat * fresnel(vec3(0.04), n_v).x;
-    vec3 film = environment(reflected, 0.06, bounce) * hidden;
+    vec3 film = environment(reflected, 0.06, 1.7 * bounce) * hidden;
     return (base + gloss) * (1.0 - coat) + coat * film;
 }

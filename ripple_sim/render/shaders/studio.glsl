@@ -28,7 +28,7 @@ vec3 environment(vec3 direction, float roughness, vec3 bounce)
 // Ambient light on a diffuse surface, over pi.
 vec3 ambient(vec3 normal, vec3 bounce)
 {
-    vec3 radiance = mix(bounce, mix(horizon.rgb, zenith.rgb, 0.3), 0.5 + 0.5 * normal.z) * 0.6;
+    vec3 radiance = mix(bounce, mix(horizon.rgb, zenith.rgb, 0.3), 0.5 + 0.5 * normal.z) * 0.75;
     for (int i = 0; i < 3; ++i) {
         float wrapped = max(0.35 + 0.65 * dot(normal, lamp_normal[i].xyz), 0.0);
         radiance += lamp_radiance[i].rgb * (lamp_normal[i].w * lamp_tangent[i].w * 0.13) * wrapped * wrapped;
