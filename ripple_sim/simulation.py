@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver import Relief
 from ripple_sim.solver.gl import shared_context
 
-from .coupling import Ripples
+from .coupling import Impulse, Ripples
 from .drops import Drops
 from .errors import SceneError, SimulationError
 from .render import Renderer, Surface
@@ -87,6 +87,7 @@ class Simulation:
         )
         self._drops = Drops(self.model, scene.drops)
         self.physics_seconds = self.wave_seconds = 0.0
+        self.impulses: list[Impulse] = []
 
     @property
     def backend(self) -> str:
@@ -99,13 +100,14 @@ class Simulation:
         return sum(self.ripples[name].substeps_taken for name in self.ripples)
 
     def advance_frame(self) -> None:
-        """Advance physics and waves by one frame.
+        """Advance physics and waves by one frame; `impulses` then holds all impulses of the frame.
 
         Raises
         ------
         SimulationError
             If MuJoCo's state is no longer finite.
         """
+        self.impulses = []
         for _ in range(self._steps_per_frame):
             start = time.perf_counter()
             self._drops.apply(self.data)
@@ -113,6 +115,7 @@ class Simulation:
             stepped = time.perf_counter()
             self._check_state()
             self.ripples.step(self.data)
+            self.impulses += self.ripples.last_impulses
             self.physics_seconds += stepped - start
             self.wave_seconds += time.perf_counter() - stepped
 

@@ -1,0 +1,125 @@
+"""From a scene to a video: frames, determinism, nothing left behind."""
+
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+from ripple_sim.errors import SceneError, SimulationError, VideoError
+from ripple_sim.scene import Scene, load_scene
+from ripple_sim.simulation import FrameSource, Simulation, render_video
+from ripple_sim.solver import RippleError
+from ripple_sim.solver.gl import shared_context
+
+MJCF = """<mujoco><option timestep="0.002"/><default><geom solref="0.01 0.3"/></default><worldbody>
+<geom name="floor" type="plane" size="2 2 1" pos="0 0 -0.3"/>
+<geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
+<body name="stone" pos="0.05 0 0.3"><freejoint/><geom name="stone" size="0.05"/></body></worldbody></mujoco>"""
+TOML = """model = "scene.xml"
+duration = 0.5
+[camera]
+lookat = [0, 0, 0]
+distance = 2.0
+elevation = -30
+[[ripple]]
+geom = "egg"
+resolution = 24
+material = {speed = 0.5, density = 20.0}
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _context() -> None:
+    try:
+        shared_context()
+    except RippleError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Scene:
+    (tmp_path / "scene.xml").write_text(MJCF)
+    (tmp_path / "scene.toml").write_text(TOML)
+    return load_scene(tmp_path / "scene.toml")
+
+
+@pytest.mark.parametrize("backend", ["cpu", "gl"])
+def test_same_scene_twice_gives_the_same_fields_and_frames(scene: Scene, backend: str) -> None:
+    def run() -> tuple[bytes, bytes]:
+        simulation = Simulation(scene, fps=30, backend=backend)
+        frames = FrameSource(simulation, width=160, height=90)
+        for _ in range(10):
+            simulation.advance_frame()
+        return simulation.ripples["egg"].height.tobytes(), frames.draw().tobytes()
+
+    first, second = run(), run()
+    assert first == second
+    assert np.frombuffer(first[0], np.float32).any()
+
+
+def test_ripples_change_the_picture(scene: Scene) -> None:
+    simulation = Simulation(scene, fps=30, backend="cpu")
+    frames = FrameSource(simulation, width=160, height=90)
+    for _ in range(10):
+        simulation.advance_frame()
+    rippled = frames.draw().astype(int)
+    simulation.ripples["egg"].reset()
+    flat = frames.draw().astype(int)
+    changed = (np.abs(rippled - flat).max(axis=-1) > 8).mean()
+    assert 0.01 < changed < 0.5
+
+
+def test_video_has_the_frames_that_were_asked_for(scene: Scene, tmp_path: Path) -> None:
+    calls = []
+    summary = render_video(
+        scene,
+        tmp_path / "out" / "a.mp4",
+        size=(160, 90),
+        fps=20,
+        progress=lambda done, total: calls.append((done, total)),
+    )
+    assert summary.frames == 10
+    assert calls == [(i + 1, 10) for i in range(10)]
+    with av.open(summary.output) as container:
+        stream = container.streams.video[0]
+        assert (stream.width, stream.height, float(stream.average_rate)) == (160, 90, 20)
+        assert sum(1 for _ in container.decode(video=0)) == 10
+    assert summary.backend in ("cpu", "gl")
+    assert summary.renderer == shared_context().renderer
+    assert summary.substeps_per_frame > 0
+    assert min(summary.physics_seconds, summary.wave_seconds, summary.render_seconds, summary.encode_seconds) > 0
+
+
+def test_folder_of_frames_is_identical_twice(scene: Scene, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        render_video(scene, tmp_path / name, size=(96, 54), fps=10)
+    files = sorted(path.name for path in (tmp_path / "a").iterdir())
+    assert len(files) == 5
+    for file in files:
+        first, second = (np.asarray(Image.open(tmp_path / name / file)) for name in ("a", "b"))
+        np.testing.assert_array_equal(first, second)
+        assert first.shape == (54, 96, 3)
+
+
+def test_bad_requests_leave_nothing_behind(scene: Scene, tmp_path: Path) -> None:
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(VideoError):
+        render_video(scene, tmp_path / "odd.mp4", size=(161, 90))
+    with pytest.raises(SceneError, match="duration"):
+        render_video(scene, tmp_path / "none.mp4", duration=-1)
+    with pytest.raises(RippleError, match="resolution"):
+        render_video(scene, tmp_path / "res.mp4", resolution=2)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_unstable_physics_is_reported_and_no_file_is_left(tmp_path: Path) -> None:
+    (tmp_path / "scene.xml").write_text(
+        MJCF.replace('<option timestep="0.002"/>', '<option timestep="0.01" gravity="0 0 -1e9"/>')
+    )
+    (tmp_path / "scene.toml").write_text(TOML)
+    with pytest.raises(SimulationError, match="became unstable at"):
+        render_video(load_scene(tmp_path / "scene.toml"), tmp_path / "x.mp4", size=(64, 48), fps=20)
+    assert not (tmp_path / "x.mp4").exists()
+    assert len(list(tmp_path.iterdir())) == 2
