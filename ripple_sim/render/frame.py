@@ -53,6 +53,7 @@ class FrameUniforms:
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self.values = np.zeros((), dtype=_FRAME)
+        self.set_vector("floor_map", [0.0, 0.0, 1.0])
         self._buffer = ctx.buffer(reserve=_FRAME.itemsize, dynamic=True)
 
     def set_vector(self, name: str, xyz: Any, w: float = 0.0) -> None:

@@ -103,20 +103,24 @@ def _normalized(vectors: NDArray) -> NDArray[np.float64]:
 
 
 def _cube_grid(line: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices and outward triangles of a cube whose faces carry the grid line x line; edges are welded."""
-    count = len(line)
-    row, column = np.divmod(np.arange(count * count), count)
-    points = np.concatenate(
+    """Vertices and outward triangles of a cube whose faces carry the grid line x line; edges are welded.
+
+    Vertices are welded by whole numbers: a coordinate is the entry of `line` at (lattice + last) / 2.
+    """
+    last = len(line) - 1
+    row, column = np.divmod(np.arange(len(line) ** 2), len(line))
+    a, b = 2 * column - last, 2 * row - last
+    lattice = np.concatenate(
         [
-            line[-1] * normal + line[column][:, None] * u + line[row][:, None] * v
+            last * normal + a[:, None] * u + b[:, None] * v
             for normal, u, v in zip(FACE_NORMALS, FACE_U, FACE_V, strict=True)
         ]
     )
-    corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
-    quad = np.stack([corner, corner + 1, corner + count + 1, corner + count], axis=1)
-    quads = np.concatenate([quad + face * count * count for face in range(6)])
-    welded, index = np.unique(points, axis=0, return_inverse=True)
-    return welded, index.ravel()[np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])]
+    corner = (np.arange(last)[:, None] * len(line) + np.arange(last)).ravel()
+    quad = np.stack([corner, corner + 1, corner + len(line) + 1, corner + len(line)], axis=1)
+    quads = np.concatenate([quad + face * len(line) ** 2 for face in range(6)])
+    welded, index = np.unique(lattice, axis=0, return_inverse=True)
+    return line[(welded + last) // 2], index.ravel()[np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])]
 
 
 def _revolved(core_r: NDArray, core_z: NDArray, shell_r: NDArray, shell_z: NDArray, sides: int) -> Shape:

@@ -32,7 +32,7 @@ vec3 floor_bounce(vec3 position)
     vec2 uv = (vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)) - floor_map.xy) / (2.0 * floor_map.z) + 0.5;
     float open = textureLod(floor_openness, uv, 4.0).r;
     vec3 lit = floor_albedo.rgb * (key_radiance.rgb * 0.5 * open * open + horizon.rgb * 0.4 * open);
-    return mix(horizon.rgb * 0.45, lit, floor_origin.w);
+    return floor_origin.w > 0.0 ? lit : horizon.rgb * 0.6;
 }
 
 float ggx(float n_h, float roughness)
