@@ -203,6 +203,8 @@ def render_video(
         unstable or the video cannot be written on.
     """
     start = time.perf_counter()
+    # MuJoCo would write its warnings to a file in the current folder; `Simulation` reports those that matter
+    mujoco.set_mju_user_warning(lambda message: None)
     output, (width, height) = Path(output), size
     check_output(output, width, height, fps)
     length = scene.duration if duration is None else duration
