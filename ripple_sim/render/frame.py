@@ -86,7 +86,7 @@ def light_studio(frame: FrameUniforms, pose: Pose, floor_albedo: NDArray | None)
         frame.values["lamp_tangent"][index] = [*tangent / np.linalg.norm(tangent), half_height]
         frame.values["lamp_radiance"][index][:3] = radiance
     # the backdrop takes the floor's colour, so that one fades into the other
-    tint = np.array([0.36, 0.38, 0.42]) if floor_albedo is None else 0.60 * floor_albedo
+    tint = np.array([0.40, 0.42, 0.46]) if floor_albedo is None else 0.60 * floor_albedo
     frame.set_vector("horizon", tint)
     frame.set_vector("zenith", tint * np.array([0.36, 0.40, 0.48]))
     return key

@@ -39,7 +39,7 @@ class Look:
 
 
 LOOKS: dict[str, Look] = {
-    "rubber": Look(color=(1.0, 0.78, 0.07), roughness=0.34, sheen=0.3, coat=0.5, translucency=0.25),
+    "rubber": Look(color=(1.0, 0.80, 0.05), roughness=0.36, sheen=0.15, coat=0.6, translucency=0.3),
     "jelly": Look(color=(0.93, 0.16, 0.30), roughness=0.14, coat=0.9, translucency=0.8, transparency=0.4),
     "clay": Look(color=(0.80, 0.52, 0.40), roughness=0.75, sheen=0.25),
     "metal": Look(color=(0.80, 0.81, 0.84), roughness=0.22, metallic=1.0),

@@ -44,7 +44,8 @@ def _hemisphere(normals: NDArray, count: int) -> NDArray[np.float64]:
     r, z = np.sqrt(index / count), np.sqrt(1 - index / count)
     helper = np.where(np.abs(normals[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     tangent = np.cross(helper, normals)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    length = np.linalg.norm(tangent, axis=1, keepdims=True)
+    tangent /= np.where(length > 0, length, 1.0)  # a vertex without triangles has no normal
     bitangent = np.cross(normals, tangent)
     return (
         (r * np.cos(turn))[..., None] * tangent[:, None]

@@ -19,7 +19,7 @@ from .looks import find_look
 from .meshes import corner_normals
 from .subdivision import subdivide
 
-_MAX_FACES = 30_000
+_MAX_FACES = 40_000
 _PACKAGE = "ripple_sim.render"
 # columns of the vertex attributes while the mesh is refined
 _POSITION, _DIRECTION, _SPHERE, _NORMAL, _BAKED, _UV = (
@@ -137,7 +137,7 @@ class SurfaceMesh:
         program["rotation"] = self._rotation
         program["color"] = self._color
         program["base"] = self._base
-        program["volume"] = (*self._volume, min(self._highest, 0.05 * self.radius))
+        program["volume"] = (*self._volume, min(1.5 * self._highest, 0.05 * self.radius))
         program["size"] = self.radius
         self._solid.render()
 

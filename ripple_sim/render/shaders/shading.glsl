@@ -32,6 +32,7 @@ vec3 floor_bounce(vec3 position)
     vec2 uv = (vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)) - floor_map.xy) / (2.0 * floor_map.z) + 0.5;
     float open = textureLod(floor_openness, uv, 4.0).r;
     vec3 lit = floor_albedo.rgb * (key_radiance.rgb * 0.5 * open * open + horizon.rgb * 0.4 * open);
+    lit = mix(lit, vec3(dot(lit, vec3(0.2126, 0.7152, 0.0722))), 0.5);  // a coloured floor shall not stain all that is on it
     return floor_origin.w > 0.0 ? lit : horizon.rgb * 0.6;
 }
 
@@ -66,6 +67,7 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     float soft_shadow = mix(shadow, 1.0, 0.35 * m.translucency);
     vec3 key = key_radiance.rgb * diffuse * soft_shadow;
     vec3 sky = ambient(normal, bounce) * open;
+    sky *= mix(vec3(1.0), m.albedo / max(max(m.albedo.r, m.albedo.g), max(m.albedo.b, 1e-3)), 0.8 * m.translucency);
     // light bounces between walls of a coloured body: occlusion is less deep and more saturated
     vec3 base = m.albedo * (key + sky * mix(m.albedo * (1.0 - open) + open, vec3(1.0), open)) * (1.0 - m.metallic);
 

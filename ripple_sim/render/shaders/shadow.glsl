@@ -2,15 +2,11 @@
 layout(binding = 1) uniform sampler2DShadow shadow_test;
 layout(binding = 2) uniform sampler2D shadow_depth;
 
-const int SEARCH_TAPS = 10;
-const int FILTER_TAPS = 28;
+const int SEARCH_TAPS = 12;
+const int FILTER_TAPS = 32;
 
-// Points spread evenly over the unit disc: `direction` turns by the golden angle from one to the next.
-vec2 disc_point(int i, int count, inout vec2 direction)
-{
-    direction = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888) * direction;
-    return sqrt((float(i) + 0.5) / float(count)) * direction;
-}
+// By the golden angle: points at growing radii spread evenly.
+const mat2 TURN = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);
 
 // The normal is that of the surface at large; `lift` [m] raises the position above bumps that shall not shade each other.
 float key_visibility(vec3 position, vec3 normal, float lift)
@@ -25,14 +21,16 @@ float key_visibility(vec3 position, vec3 normal, float lift)
     float turn = 6.2831853 * gradient_noise(gl_FragCoord.xy);
     vec2 direction = vec2(cos(turn), sin(turn));
     float bias = 0.5 * shadow_scale.z / shadow_scale.y;
-    float widest = 0.09 * shadow_scale.y * key_direction.w / shadow_scale.x;
+    float widest = 0.11 * shadow_scale.y * key_direction.w / shadow_scale.x;
 
     // loops that run zero times instead of branches: the software rasteriser executes both sides of a branch
     bool inside = facing > -0.5 && all(lessThan(abs(p.xy - 0.5), vec2(0.5)));
     float depth = 0.0, blockers = 0.0;
     int taps = inside ? SEARCH_TAPS : 0;
     for (int i = 0; i < taps; ++i) {
-        vec2 offset = widest * disc_point(i, SEARCH_TAPS, direction);
+        // denser in the middle, where a near blocker must not be missed
+        vec2 offset = widest * (float(i) + 0.1) / float(SEARCH_TAPS) * direction;
+        direction = TURN * direction;
         float d = textureLod(shadow_depth, p.xy + offset, 0.0).r;
         float blocks = step(d, p.z + dot(slope, offset) - 2.0 * bias);
         depth += blocks * d;
@@ -44,7 +42,8 @@ float key_visibility(vec3 position, vec3 normal, float lift)
     float lit = 0.0;
     taps = blockers > 0.0 && blockers < float(SEARCH_TAPS) ? FILTER_TAPS : 0;
     for (int i = 0; i < taps; ++i) {
-        vec2 offset = penumbra * disc_point(i, FILTER_TAPS, direction);
+        vec2 offset = penumbra * sqrt((float(i) + 0.5) / float(FILTER_TAPS)) * direction;
+        direction = TURN * direction;
         lit += textureLod(shadow_test, vec3(p.xy + offset, p.z + dot(slope, offset) - bias), 0.0);
     }
     lit = taps > 0 ? lit / float(FILTER_TAPS) : 1.0 - blockers / float(SEARCH_TAPS);

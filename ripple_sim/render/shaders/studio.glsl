@@ -17,11 +17,12 @@ float soft_box(vec3 direction, vec4 normal, vec4 tangent, float blur)
 // Radiance that a lobe of the given roughness about the direction collects. `bounce` comes from below.
 vec3 environment(vec3 direction, float roughness, vec3 bounce)
 {
-    float width = 0.04 + 0.9 * roughness;
+    // wide lobes get most of the lamps' light from the key light itself
+    float width = 0.04 + 0.9 * roughness, lamps = mix(1.0, 0.3, smoothstep(0.08, 0.4, roughness));
     vec3 above = mix(horizon.rgb, zenith.rgb, smoothstep(-0.2, 0.9, direction.z)) * 0.75;
     vec3 radiance = mix(bounce, above, smoothstep(-width, width, direction.z));
     for (int i = 0; i < 3; ++i)
-        radiance += lamp_radiance[i].rgb * soft_box(direction, lamp_normal[i], lamp_tangent[i], width);
+        radiance += lamps * lamp_radiance[i].rgb * soft_box(direction, lamp_normal[i], lamp_tangent[i], width);
     return radiance;
 }
 
