@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from .errors import AtlasError, GLError, MeshError, RippleError, SolverError, SphereMapError
     from .footprint import Footprint
     from .material import Material
-    from .mesh import Mesh, load_mesh
+    from .mesh import Mesh
+    from .mesh_file import load_mesh
     from .relief import Relief
     from .waves import WaveSolver
 
@@ -36,7 +37,7 @@ _HOME = {
     "WaveSolver": "waves",
     "build_atlas": "build",
     "load_atlas": "atlas_file",
-    "load_mesh": "mesh",
+    "load_mesh": "mesh_file",
     "sphere_atlas": "analytic",
 }
 

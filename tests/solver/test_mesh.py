@@ -80,7 +80,11 @@ def test_uv_seams_survive_the_merge() -> None:
         (lambda V, F: (np.where(np.arange(8)[:, None] == 2, np.nan, V), F), "NaN"),
         (lambda V, F: (V * [1, 1, 0], F), "."),
         (lambda V, F: (V, F + 1), "indices run from"),
-        (lambda V, F: (V, F[:2]), "at least 4"),
+        (lambda V, F: (V, F[:2]), "open: 4 boundary edges round 1 hole"),
+        (lambda V, F: (V, F[:1]), "open: 3 boundary edges"),
+        (lambda V, F: (V, F[:1, [0, 1, 1]]), "three different corners"),
+        (lambda V, F: (V * 1e15, F), "size is 1e"),
+        (lambda V, F: (V, F * 1.5), "integers"),
     ],
 )
 def test_defects_are_refused_by_name(damage, name: str) -> None:
