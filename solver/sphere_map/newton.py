@@ -27,7 +27,7 @@ def newton_step(level: Level, S: Floats, reference: Reference) -> float:
     gradient = np.empty((len(S), 2))
     diagonal = np.empty((len(S), 3))
     blocks = np.empty((len(level.ends), 4))
-    energy = _assemble(level.tail, level.edge, S, reference, frames, gradient, diagonal, blocks)
+    energy = _assemble(level.tail, level.edge, level.ends, S, reference, frames, gradient, diagonal, blocks)
     step = solve(level.ends, diagonal, blocks, gradient, CG_STEPS, CG_TOLERANCE)
     descent = -float(np.sum(gradient * step))
     if not descent > 0.0:
@@ -81,6 +81,7 @@ def _projected_hessian(dirichlet: float, jacobian: float) -> tuple[float, float,
 def _assemble(
     tail: Ints,
     edge: Ints,
+    ends: Ints,
     S: Floats,
     reference: Reference,
     frames: Floats,
@@ -149,7 +150,7 @@ def _assemble(
                         + dj * (slope_d[i, s] * slope_j[j, t] + slope_j[i, s] * slope_d[j, t])
                         + jj * slope_j[i, s] * slope_j[j, t]
                     )
-                    blocks[e, 2 * s + t if u < v else 2 * t + s] += value
+                    blocks[e, 2 * s + t if u == ends[e, 0] else 2 * t + s] += value
     for v in range(len(S)):
         # on the sphere a tangent step also falls towards the centre: the Hessian gains minus the radial slope
         shift = max(-radial[v], 0.0) + 1e-8 * (diagonal[v, 0] + diagonal[v, 2])

@@ -136,7 +136,7 @@ def _sweep_until_tired(level: Level, S: Floats, reference: Reference) -> None:
 
 
 def _newton_until_tired(level: Level, S: Floats, reference: Reference) -> None:
-    tolerance = 1e-3 if len(S) < LARGE else 3e-3
+    tolerance = 5e-3
     slow = 0
     for i in range(MOST_NEWTON_STEPS):
         fall = newton_step(level, S, reference)
