@@ -10,7 +10,7 @@ import numpy as np
 
 from .corner_table import CornerTable, following, gather_star, preceding, undo_collapse
 from .energy import Reference, star_energy
-from .reference import update_density, update_triangle
+from .reference import Source, update_load, update_triangle
 from .relaxation import relax_vertex
 from .vectors import Floats, Ints, combine, cross, kernel, row, set_row, unit
 
@@ -18,8 +18,8 @@ CROWDED = 64  # neighbours of a new vertex with more triangles than this wait fo
 
 
 @kernel
-def _place(h: int, table: CornerTable, star: Ints, degree: int, S: Floats, reference: Reference) -> bool:
-    """Put the tail of h where its star's energy is least among trial points; False if every one folds a triangle."""
+def _place(h: int, table: CornerTable, star: Ints, degree: int, S: Floats, reference: Reference) -> None:
+    """Put the tail of h where its star's energy is least among trial points."""
     tail = table.tail
     u, v = tail[h], tail[table.twin[h]]
     left, right = tail[preceding(h)], tail[preceding(table.twin[h])]
@@ -44,39 +44,27 @@ def _place(h: int, table: CornerTable, star: Ints, degree: int, S: Floats, refer
         if least < np.inf:
             break
     set_row(S, u, best)
-    return least < np.inf
 
 
 @kernel
-def insert_vertices(
-    log: Ints,
-    table: CornerTable,
-    V: Floats,
-    S: Floats,
-    carried: Floats,
-    density: Floats,
-    trust: float,
-    sliver: float,
-    mean: float,
-    reference: Reference,
-) -> int:
-    """Undo the collapses in `log`, latest first, relaxing round every new vertex; return how many found no place."""
+def insert_vertices(log: Ints, table: CornerTable, source: Source, S: Floats, reference: Reference) -> None:
+    """Undo the collapses in `log`, latest first, and relax round every new vertex.
+
+    A vertex that finds no place leaves a fold behind, which the certificate will find.
+    """
     tail = table.tail
-    star, other = np.empty(len(V), np.int32), np.empty(len(V), np.int32)
-    lost = 0
+    star, other = np.empty(len(S), np.int32), np.empty(len(S), np.int32)
     for h in log[::-1]:
         u, v = tail[h], tail[table.twin[h]]
         undo_collapse(table, h)
-        carried[v] -= carried[u]
+        source.carried[v] -= source.carried[u]
         for w in (v, u):
-            degree = gather_star(table, w, star)
-            update_density(w, star, degree, tail, V, carried, density)
+            update_load(w, star, gather_star(table, w, star), tail, source)
         for w in (v, u):
             degree = gather_star(table, w, star)
             for i in range(degree):
-                update_triangle(star[i] // 3, tail, V, density, trust, sliver, mean, reference)
-        if not _place(h, table, star, degree, S, reference):
-            lost += 1
+                update_triangle(star[i] // 3, tail, source, reference)
+        _place(h, table, star, degree, S, reference)
         for _ in range(2):
             relax_vertex(u, star, degree, tail, S, reference)
             for i in range(degree):
@@ -85,4 +73,3 @@ def insert_vertices(
                 if other_degree <= CROWDED:
                     relax_vertex(w, other, other_degree, tail, S, reference)
         relax_vertex(u, star, degree, tail, S, reference)
-    return lost

@@ -13,21 +13,18 @@ from ..errors import SphereMapError
 from .certificate import certify
 from .corner_table import CornerTable, corner_table, following, preceding
 from .decimation import decimate
-from .energy import Reference, total_energy
+from .energy import Reference
 from .insertion import insert_vertices
-from .level import Level, build_level
-from .newton import newton_step
-from .reference import carry, update_level
-from .relaxation import sweep
+from .level import build_level
+from .reference import Source, carry, update_level
+from .relax_level import relax_level
 from .vectors import Floats
 
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 GRID = 2.0**32  # the normalised mesh is rounded to multiples of 1 / GRID
 EQUAL_UNTIL, REAL_FROM = 12, 100  # vertices of a level: equal equilateral references until, real shapes from
 COARSE_SLIVER, FINE_SLIVER = 0.5, 0.15  # shape quality below which a reference is pulled towards equilateral
-LARGE = 6000  # vertices: larger levels grow faster and stop sooner
-MOST_SWEEPS, MOST_NEWTON_STEPS, RESCUES = 10, 30, 4
-EXPLODED = 1e5 * 4 * np.pi  # energy of a level that is stuck
+LARGE = 6000  # vertices: larger levels grow faster
 TRUST_LADDER = (1.0, 0.6, 0.3, 0.0)  # in the real triangles, each tried when the one before gave no certified map
 
 
@@ -83,8 +80,8 @@ def _areas(V: Floats, F: NDArray[np.integer]) -> Floats:
 
 def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     n = len(V)
-    # every vertex gets some room on the sphere, even if its triangles have no area
-    carried = np.bincount(F.ravel(), np.repeat(_areas(V, F) / 3, 3), n) + 1e-3 * 4 * np.pi / n
+    carried = np.full(n, 1e-3 * 4 * np.pi / n)  # every vertex gets some room, even if its triangles have no area
+    carried += np.bincount(F.ravel(), np.repeat(_areas(V, F) / 3, 3), n)
     table = corner_table(F, n)
     log = decimate(table, V)
     removed, kept = table.tail[log], table.tail[table.twin[log]]
@@ -97,53 +94,26 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     S = np.zeros((n, 3))
     S[_tetrahedron(table, np.flatnonzero(vertex_since == 4))] = TETRAHEDRON
     reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)))
-    density = np.ones(n)
+    load = np.ones(n)
     count = 4
     for size in _level_sizes(n):
         shape_trust = trust * min(max(np.log(size / EQUAL_UNTIL) / np.log(REAL_FROM / EQUAL_UNTIL), 0.0), 1.0)
         sliver = COARSE_SLIVER if size < n / 4 else FINE_SLIVER
+        source = Source(V, carried, load, shape_trust, sliver, 4 * np.pi / (2 * size - 4))
 
         vertices, faces = np.flatnonzero(vertex_since <= count), np.flatnonzero(face_since <= count)
-        update_level(vertices, faces, table, V, carried, density, shape_trust, sliver, reference)
-        mean = 4 * np.pi / (2 * size - 4)
-        insert_vertices(log[n - size : n - count], table, V, S, carried, density, shape_trust, sliver, mean, reference)
+        update_level(vertices, faces, table, source, reference)
+        insert_vertices(log[n - size : n - count], table, source, S, reference)
         count = size
 
         vertices, faces = np.flatnonzero(vertex_since <= count), np.flatnonzero(face_since <= count)
-        update_level(vertices, faces, table, V, carried, density, shape_trust, sliver, reference)
+        update_level(vertices, faces, table, source, reference)
         corners = (3 * faces[:, None] + np.arange(3)).ravel()
-        local = np.ascontiguousarray(S[vertices])
+        level_S = S[vertices]
         shown = Reference(reference.area[faces], reference.cotangent[corners])
-        _relax(build_level(table, vertices, faces), local, shown)
-        S[vertices] = local
+        relax_level(build_level(table, vertices, faces), level_S, shown)
+        S[vertices] = level_S
     return S
-
-
-def _relax(level: Level, S: Floats, reference: Reference) -> None:
-    """Lower the energy of a level in place: sweeps until they tire, then Newton steps with a sweep after each."""
-    for _ in range(RESCUES):
-        _sweep_until_tired(level, S, reference)
-        _newton_until_tired(level, S, reference)
-        if total_energy(level.tail, S, reference) < EXPLODED:
-            return
-
-
-def _sweep_until_tired(level: Level, S: Floats, reference: Reference) -> None:
-    for i in range(MOST_SWEEPS):
-        fall = sweep(level.star_start, level.star, level.tail, S, reference, i % 2 == 0)
-        if fall < 0.1 * total_energy(level.tail, S, reference):
-            return
-
-
-def _newton_until_tired(level: Level, S: Floats, reference: Reference) -> None:
-    tolerance = 5e-3
-    slow = 0
-    for i in range(MOST_NEWTON_STEPS):
-        fall = newton_step(level, S, reference)
-        fall += sweep(level.star_start, level.star, level.tail, S, reference, i % 2 == 0)
-        slow = slow + 1 if fall < tolerance * total_energy(level.tail, S, reference) else 0
-        if slow == 2:
-            return
 
 
 def _tetrahedron(table: CornerTable, vertices: NDArray[np.integer]) -> list[int]:

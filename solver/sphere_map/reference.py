@@ -9,6 +9,8 @@ cotangents would drown its neighbours' energy), and on the coarsest levels, wher
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from .corner_table import CornerTable, gather_star
@@ -16,6 +18,17 @@ from .energy import Reference
 from .vectors import Floats, Ints, cross, dot, kernel, row, subtract
 
 SMALLEST_SHARE = 1e-3  # of the mean reference area: no triangle gets less
+
+
+class Source(NamedTuple):
+    """The real surface as a level should resemble it."""
+
+    V: Floats  # [n, 3] vertices; the total area is 4 pi
+    carried: Floats  # [n] real area that each vertex stands for
+    load: Floats  # [n] carried area over the area that the level shows
+    trust: float  # in [0, 1], from equal equilateral triangles to the real ones
+    sliver: float  # shape quality (1 is equilateral) below which a reference is pulled towards equilateral
+    mean: float  # reference area of an average triangle
 
 
 @kernel
@@ -33,23 +46,19 @@ def carry(removed: Ints, kept: Ints, carried: Floats) -> None:
 
 
 @kernel
-def update_density(v: int, star: Ints, degree: int, tail: Ints, V: Floats, carried: Floats, density: Floats) -> None:
-    """Area that v carries over the real area of its share of the level's triangles."""
-    real = 0.0
+def update_load(v: int, star: Ints, degree: int, tail: Ints, source: Source) -> None:
+    """Find the load of v: the area it carries over its share of the real area that the level still shows."""
+    shown = 0.0
     for i in range(degree):
-        real += _real_area(tail, star[i] // 3, V)
-    density[v] = min(carried[v] / max(real / 3.0, 1e-12 * carried[v]), 1e6)
+        shown += _real_area(tail, star[i] // 3, source.V)
+    carried = source.carried[v]
+    source.load[v] = min(carried / max(shown / 3.0, 1e-12 * carried), 1e6)
 
 
 @kernel
-def update_triangle(
-    f: int, tail: Ints, V: Floats, density: Floats, trust: float, sliver: float, mean: float, reference: Reference
-) -> None:
-    """Set the reference of triangle f.
-
-    `trust` in [0, 1] goes from equal equilateral triangles to the real ones; shapes of a quality below `sliver` (1 is
-    equilateral) are pulled towards equilateral; `mean` is the level's mean reference area.
-    """
+def update_triangle(f: int, tail: Ints, source: Source, reference: Reference) -> None:
+    """Set the reference of triangle f from its real shape and the loads of its corners."""
+    V = source.V
     a, b, c = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
     e0, e1, e2 = subtract(row(V, c), row(V, b)), subtract(row(V, a), row(V, c)), subtract(row(V, b), row(V, a))
     q0, q1, q2 = dot(e0, e0), dot(e1, e1), dot(e2, e2)
@@ -57,12 +66,12 @@ def update_triangle(
     third = (q0 + q1 + q2) / 3.0
     if third > 1e-28:
         quality = 4.0 / np.sqrt(3.0) * real / third
-        pull = max(1.0 - min(quality / sliver, 1.0), 1.0 - trust)
+        pull = max(1.0 - min(quality / source.sliver, 1.0), 1.0 - source.trust)
         q0, q1, q2 = q0 + pull * (third - q0), q1 + pull * (third - q1), q2 + pull * (third - q2)
     else:
         q0 = q1 = q2 = 1.0
-    area = max(real * (density[a] + density[b] + density[c]) / 3.0, SMALLEST_SHARE * mean)
-    area = area**trust * mean ** (1.0 - trust)
+    area = max(real * (source.load[a] + source.load[b] + source.load[c]) / 3.0, SMALLEST_SHARE * source.mean)
+    area = area**source.trust * source.mean ** (1.0 - source.trust)
     four_areas = np.sqrt(max(2.0 * (q0 * q1 + q1 * q2 + q2 * q0) - (q0 * q0 + q1 * q1 + q2 * q2), 1e-300))
     scale = 0.5 / (four_areas * area)
     reference.area[f] = area
@@ -72,25 +81,14 @@ def update_triangle(
 
 
 @kernel
-def update_level(
-    vertices: Ints,
-    faces: Ints,
-    table: CornerTable,
-    V: Floats,
-    carried: Floats,
-    density: Floats,
-    trust: float,
-    sliver: float,
-    reference: Reference,
-) -> None:
+def update_level(vertices: Ints, faces: Ints, table: CornerTable, source: Source, reference: Reference) -> None:
     """Set the references of a whole level, their areas summing to the sphere's 4 pi."""
-    star = np.empty(len(V), np.int32)
+    star = np.empty(len(source.V), np.int32)
     for v in vertices:
-        update_density(v, star, gather_star(table, v, star), table.tail, V, carried, density)
-    mean = 4.0 * np.pi / len(faces)
+        update_load(v, star, gather_star(table, v, star), table.tail, source)
     total = 0.0
     for f in faces:
-        update_triangle(f, table.tail, V, density, trust, sliver, mean, reference)
+        update_triangle(f, table.tail, source, reference)
         total += reference.area[f]
     scale = 4.0 * np.pi / total
     for f in faces:
