@@ -16,6 +16,7 @@ from .errors import AtlasError
 from .mesh import Mesh
 from .quality import atlas_quality
 from .stencil import lumped_areas
+from .texcoords import TextureCoordinates, texture_coordinates
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -97,6 +98,13 @@ class Atlas:
         n = self.resolution
         i, j = (np.clip(np.rint(x).astype(np.int64), 0, n - 1) for x in (row, column))
         return (face * n + i) * n + j
+
+    def texture_coordinates(self) -> TextureCoordinates:
+        """Face and place in the atlas at every corner of every triangle, those cut that cross an edge of the cube.
+
+        The object's own texture coordinates, `mesh.uv` and `mesh.corner_uv`, stay as they are.
+        """
+        return texture_coordinates(self)
 
     def quality(self) -> dict[str, float]:
         """Figures of merit of the atlas.
