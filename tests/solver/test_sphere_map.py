@@ -155,6 +155,26 @@ def test_no_map_without_a_certificate(monkeypatch):
         progressive_sphere_map(V, F)
 
 
+@pytest.mark.parametrize("trust", progressive.TRUST_LADDER)
+def test_every_rung_of_the_ladder_can_hold_a_limbed_mesh(trust):
+    V, F = jack(points=30, limb_radius=0.2)
+    assert certify(F, progressive._map_by_levels(progressive._normalise(V, F), F, trust)).valid
+
+
+def test_next_rung_is_tried_where_one_folds(monkeypatch):
+    V, F = icosphere(1)
+    tried = []
+
+    def fold_at_first(V, F, trust):
+        tried.append(trust)
+        S = V / np.linalg.norm(V, axis=1, keepdims=True)
+        return S if len(tried) == 3 else -S
+
+    monkeypatch.setattr(progressive, "_map_by_levels", fold_at_first)
+    np.testing.assert_allclose(progressive_sphere_map(V, F), V, atol=1e-8)
+    assert tried == list(progressive.TRUST_LADDER[:3])
+
+
 def test_same_mesh_gives_same_bits():
     V, F = jack(points=30, limb_radius=0.3)
     np.testing.assert_array_equal(progressive_sphere_map(V, F), progressive_sphere_map(V, F))
