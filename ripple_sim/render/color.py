@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-_SRGB8_ALPHA8 = 0x8C43
+SRGB8_ALPHA8 = 0x8C43
 
 
 def linear(srgb: Any) -> NDArray[np.float64]:
@@ -21,7 +21,7 @@ def srgb_texture(ctx: moderngl.Context, pixels: NDArray[np.uint8]) -> moderngl.T
     """Repeating, mip-mapped texture of sRGB pixels [height, width, 3], bottom row first; it reads as linear light."""
     height, width, _ = pixels.shape
     opaque = np.concatenate([pixels, np.full((height, width, 1), 255, dtype=np.uint8)], axis=2)
-    texture = ctx.texture((width, height), 4, opaque.tobytes(), internal_format=_SRGB8_ALPHA8)
+    texture = ctx.texture((width, height), 4, opaque.tobytes(), internal_format=SRGB8_ALPHA8)
     texture.build_mipmaps()
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     return texture

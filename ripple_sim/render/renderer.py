@@ -14,6 +14,7 @@ from ripple_sim.solver.gl import GLContext
 
 from .bodies import Bodies, visible_geoms
 from .camera import Pose, Viewpoint, perspective, view_matrix
+from .color import SRGB8_ALPHA8
 from .floor import Floor, find_floor
 from .frame import FrameUniforms, light_studio
 from .shadow import ShadowMap, to_unit
@@ -60,6 +61,10 @@ class Renderer:
             self._frame = FrameUniforms(ctx)
             self._shadow = ShadowMap(ctx)
             self._backdrop = ctx.vertex_array(gl.program("ripple_sim.render", "screen_vertex", "backdrop_fragment"), [])
+            self._behind = ctx.texture((width, height), 4, internal_format=SRGB8_ALPHA8)
+            self._behind.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+            self._behind.repeat_x = self._behind.repeat_y = False
+            self._behind_target = ctx.framebuffer([self._behind])
             self._open_floor = ctx.texture((1, 1), 1, np.ones(1, dtype=np.float16).tobytes(), dtype="f2")
         self._targets = [SurfaceMesh(gl, geom, surface) for geom, surface in sorted(targets.items())]
         geoms = [geom for geom in visible_geoms(model) if geom not in targets]
@@ -154,16 +159,30 @@ class Renderer:
         self._target.clear(depth=1.0)
         self._shadow.bind()
         for target in self._targets:
-            target.draw()
+            if not target.clear:
+                target.draw()
         self._bodies.draw()
         ctx.disable(moderngl.CULL_FACE)
         if self._floor is not None:
             self._floor.draw(pose.distance)
         self._backdrop.program["screen_to_world"] = tuple(np.linalg.inv(self._view_projection).T.ravel())
         self._backdrop.render(moderngl.TRIANGLES, vertices=3)
-        ctx.enable(moderngl.BLEND | moderngl.CULL_FACE)
+        ctx.enable(moderngl.CULL_FACE)
+        self._draw_clear(ctx)
+        ctx.enable(moderngl.BLEND)
         self._bodies.draw_transparent()
         ctx.disable(moderngl.BLEND)
+
+    def _draw_clear(self, ctx: moderngl.Context) -> None:
+        """Draw the targets through which the rest of the frame is seen."""
+        clear = [target for target in self._targets if target.clear]
+        if clear:
+            ctx.copy_framebuffer(self._behind_target, self._target)
+            self._behind.build_mipmaps()
+            self._behind.use(6)
+            self._target.use()
+        for target in clear:
+            target.draw()
 
 
 def _framebuffers(

@@ -66,12 +66,13 @@ class SurfaceMesh:
         self.geom = geom
         self.resolution = surface.resolution
         self.look = find_look(surface.look)
+        self.clear = self.look.transparency > 0.0
         self.radius = float(np.linalg.norm(surface.V, axis=1).max())
         faces, vertices = _refined(surface)
         self.count = len(vertices)
         with gl as ctx:
             self._displace = gl.compute_shader(_PACKAGE, "displace")
-            program = gl.program(_PACKAGE, "surface_vertex", "surface_fragment")
+            program = gl.program(_PACKAGE, "surface_vertex", "surface_fragment", CLEAR=int(self.clear))
             depth = gl.program(_PACKAGE, "surface_depth_vertex", "depth_fragment")
             texels = surface.resolution + 2
             self._relief = ctx.texture_array((texels, texels, 6), 4, dtype="f4")

@@ -296,3 +296,16 @@ def test_a_relief_of_another_resolution_is_refused(gl):
     renderer, data, target = make(gl)
     with pytest.raises(RippleError, match="relief"):
         renderer.render(data, {target: np.zeros((6, 8, 8, 4), dtype=np.float32)}, FRONT)
+
+
+def test_water_shows_what_is_behind_it_and_clay_does_not(gl):
+    """A wall behind the ball tints the middle of the frame through a clear body alone."""
+
+    def middle(look: str, rgba: str) -> np.ndarray:
+        wall = f'<geom type="box" size="4 .1 4" pos="0 3 0" rgba="{rgba}"/></worldbody>'
+        renderer, data, _ = make(gl, LONE_BALL.replace("</worldbody>", wall), ball_surface(look=look))
+        return renderer.render(data, {}, FRONT)[80:100, 110:130].mean(axis=(0, 1))
+
+    for look, seen in (("water", True), ("clay", False)):
+        change = middle(look, "0 0 1 1") - middle(look, "1 0 0 1")
+        assert (change[2] > 30) is seen, (look, change)

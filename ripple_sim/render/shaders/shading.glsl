@@ -6,6 +6,7 @@ struct Material {
     vec3 albedo;
     float roughness, metallic, sheen, coat, translucency, transparency;
     float thickness;  // of the body under the surface, 0 to about 1
+    vec3 behind;      // radiance of what is seen through the body
     float lift;       // height of bumps that the shading normal accounts for [m]
     float openness;   // share of the sky that the body itself leaves free
 };
@@ -75,9 +76,7 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     float glow = exp(-4.0 * m.thickness) * (0.35 + 0.65 * pow(clamp(0.5 - 0.5 * dot(normal, light), 0.0, 1.0), 2.0));
     base += m.translucency * m.albedo * key_radiance.rgb * glow;
     // clear bodies show the studio through them, bent as water bends and tinted by the way through
-    vec3 tint = pow(m.albedo, vec3(0.2 + 1.6 * m.thickness));
-    vec3 through = environment(refract(-view, normal, 0.75), 0.12 + 0.5 * m.translucency, 1.7 * bounce) * tint;
-    base = mix(base, through, m.transparency);
+    base = mix(base, m.behind * pow(m.albedo, vec3(0.15 + 0.8 * m.thickness)), m.transparency);
     base += m.sheen * m.albedo * sky * pow(1.0 - n_v, 3.0);
 
     vec3 f0 = mix(vec3(0.04), m.albedo, m.metallic);
