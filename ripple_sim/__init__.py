@@ -6,16 +6,27 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .collidable import make_collidable
     from .coupling import Impulse, Ripples
+    from .errors import RippleWarning
     from .solver import Material, RippleError
 
 __version__ = "0.1.0"
-__all__ = ["Impulse", "Material", "RippleError", "Ripples"]
+__all__ = ["Impulse", "Material", "RippleError", "RippleWarning", "Ripples", "make_collidable"]
+
+_HOMES = {
+    "Impulse": ".coupling",
+    "Material": ".solver",
+    "RippleError": ".solver",
+    "RippleWarning": ".errors",
+    "Ripples": ".coupling",
+    "make_collidable": ".collidable",
+}
 
 
 def __getattr__(name: str) -> Any:
     # loaded when first used: importing ripple_sim must stay quick
-    home = {"Impulse": ".coupling", "Ripples": ".coupling", "Material": ".solver", "RippleError": ".solver"}.get(name)
+    home = _HOMES.get(name)
     if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}; valid are {', '.join(__all__)}")
     return getattr(importlib.import_module(home, __name__), name)

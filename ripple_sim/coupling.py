@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Iterator, Mapping
 
 import mujoco
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Material, WaveSolver
 
+from .collidable import collides_as_hull, hull_warning
 from .contacts import ContactPair, cluster, contact_pairs
-from .errors import SceneError
+from .errors import RippleWarning, SceneError
 from .target import find_target, geom_name, target_atlas
 
 # Footprint radius over the touching body's smallest half-extent: about the patch of a ball sunk in by an eighth.
@@ -88,6 +90,7 @@ class Ripples:
                 operator=operator,
                 conserve_volume=conserve_volume,
             )
+            self._warn_of_hull(name)
         self._time: float | None = None
         self.last_impulses: list[Impulse] = []
 
@@ -135,6 +138,12 @@ class Ripples:
         self.last_impulses = []
         for waves in self._waves.values():
             waves.reset()
+
+    def _warn_of_hull(self, name: str) -> None:
+        if collides_as_hull(self.model, self._geoms[name]):
+            message = hull_warning(name, self[name].atlas)
+            if message is not None:
+                warnings.warn(message, RippleWarning, stacklevel=3)
 
     def _press(self, data: mujoco.MjData, pair: ContactPair, timestep: float) -> Impulse:
         waves = self._waves[pair.target]

@@ -17,3 +17,7 @@ class SceneError(RippleError):
 
 class SimulationError(RippleError):
     """The physics became unstable."""
+
+
+class RippleWarning(UserWarning):
+    """Something that runs, but not as one would expect: a hull off its surface, a body too fast for the time step."""

@@ -1,0 +1,101 @@
+"""The way to the true surface, and the warning where a hull is in the way."""
+
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim import Material, Ripples, make_collidable
+from ripple_sim.collidable import hull_gap
+from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.scenes.shapes import limbed, peanut
+from ripple_sim.solver import Mesh, build_atlas
+
+
+def spec_of(V: np.ndarray, F: np.ndarray) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec()
+    spec.add_mesh(name="shape", uservert=V.ravel(), userface=F.ravel())
+    spec.worldbody.add_geom(name="target", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="shape")
+    spec.worldbody.add_geom(name="knob", size=[0.01, 0, 0], pos=[0, 0, 9])
+    return spec
+
+
+def rest_height(model: mujoco.MjModel) -> float:
+    """Height at which the ball of radius 0.02 m first touches something."""
+    data = mujoco.MjData(model)
+    while data.time < 2 and not any(contact.dist < 0 for contact in data.contact):
+        mujoco.mj_step(model, data)
+    return float(data.body("ball").xpos[2]) - 0.02
+
+
+def test_body_comes_down_on_the_surface_that_the_route_promises() -> None:
+    # the waist of the peanut, 0.045 m below its hull
+    V, F = peanut(0.04)
+    waist = V[np.abs(V[:, 0]) < 0.03][:, 2].max()
+    heights = {}
+    for route in ("sdf", "hull"):
+        spec = spec_of(V, F)
+        make_collidable(spec, "target", route)
+        ball = spec.worldbody.add_body(name="ball", pos=[0, 0, 0.35])
+        ball.add_freejoint()
+        ball.add_geom(size=[0.02, 0, 0], mass=0.1)
+        heights[route] = rest_height(spec.compile())
+    assert heights["sdf"] == pytest.approx(waist, abs=0.012)
+    assert heights["hull"] == pytest.approx(V[:, 2].max(), abs=0.012)
+    assert heights["hull"] - heights["sdf"] > 0.03
+
+
+def test_starting_points_are_lowered_but_never_raised() -> None:
+    spec = spec_of(*peanut(0.05))
+    make_collidable(spec, "target")
+    assert spec.option.sdf_initpoints == 10
+    spec.option.sdf_initpoints = 6
+    make_collidable(spec, "target")
+    assert spec.option.sdf_initpoints == 6
+
+
+def test_primitives_are_left_alone() -> None:
+    spec = spec_of(*peanut(0.05))
+    assert make_collidable(spec, "knob").type == mujoco.mjtGeom.mjGEOM_SPHERE
+
+
+@pytest.mark.parametrize(
+    ("geom", "route", "message"),
+    [
+        ("nose", "sdf", "geoms are 'target', 'knob'"),
+        ("target", "flex", "thin shell.*valid are 'sdf', 'hull'"),
+        ("target", "ghost", "valid are 'sdf', 'hull'"),
+    ],
+)
+def test_unknown_names_are_refused(geom: str, route: str, message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        make_collidable(spec_of(*peanut(0.05)), geom, route)
+
+
+def test_hull_over_a_waist_is_as_far_off_as_the_waist_is_deep() -> None:
+    V, F = peanut(0.03)
+    widest = np.hypot(V[:, 1], V[:, 2]).max()
+    waist = np.hypot(V[:, 1], V[:, 2])[np.abs(V[:, 0]) < 0.01].min()
+    atlas = build_atlas(Mesh.from_arrays(V, F), 16, cache=False)
+    assert hull_gap(atlas) == pytest.approx(widest - waist, rel=0.1)
+
+
+def test_hull_that_matters_is_warned_of_by_name_and_distance() -> None:
+    model = spec_of(*limbed(0.05)).compile()
+    with pytest.warns(RippleWarning, match=r"geom 'target'.*hull, up to 0\.\d+ m.*make_collidable"):
+        Ripples(model, {"target": Material()}, resolution=8, backend="cpu")
+
+
+def test_no_warning_without_a_gap_or_without_collisions() -> None:
+    convex = spec_of(*peanut(0.05))
+    V = peanut(0.05)[0]
+    convex = spec_of(0.3 * V / np.linalg.norm(V, axis=1, keepdims=True), peanut(0.05)[1])
+    ghost = spec_of(*limbed(0.05))
+    ghost.geom("target").contype = ghost.geom("target").conaffinity = 0
+    true = spec_of(*limbed(0.05))
+    make_collidable(true, "target")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for spec in (convex, ghost, true):
+            Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")
