@@ -12,8 +12,8 @@ Vector: TypeAlias = tuple[float, float, float]
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int32]
 
-# One thread and no fast-math: the same mesh gives the same map, bit for bit. The compiled kernels are kept on disk; numba
-# notices a change of a kernel's own file only, so delete the *.nbi files after editing one that others call.
+# One thread and no fast-math: the same mesh gives the same map, bit for bit. The compiled kernels are kept on disk;
+# numba notices a change of a kernel's own file only, so delete the *.nbi files after editing one that others call.
 kernel = numba.njit(cache=True, error_model="numpy")
 
 
