@@ -16,7 +16,7 @@ from .errors import AtlasError
 from .mesh import Mesh
 
 # Raise it when the sphere map or the file's layout changes: older files are then rebuilt.
-FORMAT = 1
+FORMAT = 2
 _FIELDS = ("sphere", "positions", "normals", "triangles", "barycentrics")
 
 

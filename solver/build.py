@@ -19,9 +19,12 @@ from .cubemap import check_resolution, texel_directions
 from .errors import AtlasError
 from .mesh import Mesh
 from .rays import cast_rays
-from .sphere_map import progressive_sphere_map
+from .sphere_map import conformal_sphere_map, progressive_sphere_map
 
-SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {"progressive": progressive_sphere_map}
+SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {
+    "progressive": progressive_sphere_map,
+    "conformal": conformal_sphere_map,
+}
 
 
 def build_atlas(mesh: Mesh, resolution: int = 128, method: str = "progressive", cache: bool = True) -> Atlas:
@@ -34,7 +37,8 @@ def build_atlas(mesh: Mesh, resolution: int = 128, method: str = "progressive", 
     resolution : int
         Texels along a face's edge, N; 6 N^2 texels in all.
     method : str
-        Sphere map: "progressive" (fold-free, spreads area evenly).
+        Sphere map: "progressive" (fold-free, spreads area evenly) or "conformal" (keeps angles but starves limbs; the
+        choice of the paper).
     cache : bool
         Keep the result in the user's cache folder and take it from there the next time.
 
