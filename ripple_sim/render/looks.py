@@ -40,7 +40,7 @@ class Look:
 
 LOOKS: dict[str, Look] = {
     "rubber": Look(color=(1.0, 0.80, 0.05), roughness=0.36, sheen=0.15, coat=0.6, translucency=0.3),
-    "jelly": Look(color=(0.93, 0.16, 0.30), roughness=0.14, coat=0.9, translucency=0.8, transparency=0.4),
+    "jelly": Look(color=(0.90, 0.07, 0.20), roughness=0.14, coat=0.8, translucency=0.7, transparency=0.5),
     "clay": Look(color=(0.80, 0.52, 0.40), roughness=0.75, sheen=0.25),
     "metal": Look(color=(0.80, 0.81, 0.84), roughness=0.22, metallic=1.0),
     "water": Look(color=(0.42, 0.76, 0.90), roughness=0.06, coat=1.0, translucency=0.15, transparency=0.9),

@@ -308,4 +308,4 @@ def test_water_shows_what_is_behind_it_and_clay_does_not(gl):
 
     for look, seen in (("water", True), ("clay", False)):
         change = middle(look, "0 0 1 1") - middle(look, "1 0 0 1")
-        assert (change[2] > 30) is seen, (look, change)
+        assert bool(change[2] > 30) is seen, (look, change)

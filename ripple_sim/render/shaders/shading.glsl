@@ -52,12 +52,16 @@ vec3 fresnel(vec3 f0, float cosine)
 vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_geom)
 {
     vec3 view = normalize(eye.xyz - position), light = key_direction.xyz;
+    // interpolated normals of bumpy silhouettes may look away from the camera
+    normal = normalize(normal + max(0.1 - dot(normal, view), 0.0) * view);
     vec3 reflected = reflect(-view, normal), halfway = normalize(view + light);
-    float n_v = clamp(dot(normal, view), 0.02, 1.0), n_l = dot(normal, light), n_h = max(dot(normal, halfway), 0.0);
+    float n_v = clamp(dot(normal, view), 0.1, 1.0), n_l = dot(normal, light), n_h = max(dot(normal, halfway), 0.0);
 
     float shadow = key_visibility(position, flat_normal, m.lift);
     float open = m.openness * openness_to_bodies(position, flat_normal, own_geom);
     vec3 bounce = floor_bounce(position);
+    float height = max(dot(position - floor_origin.xyz, floor_normal.xyz), 0.0);
+    vec3 mirrored = 1.7 * floor_bounce(position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2));
     // narrow highlights of distant ripples would flicker
     vec3 dx = dFdx(normal), dy = dFdy(normal);
     float rough = sqrt(clamp(m.roughness * m.roughness + min(0.5 * (dot(dx, dx) + dot(dy, dy)), 0.2), 0.004, 1.0));
@@ -83,9 +87,9 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     float visible = shadow * clamp(n_l * 4.0, 0.0, 1.0);
     float hidden = clamp(open * open + 0.15, 0.0, 1.0);
     vec3 at_edge = f0 + (max(vec3(1.0 - rough), f0) - f0) * pow(1.0 - n_v, 5.0);
-    vec3 gloss = environment(reflected, rough, 1.7 * bounce) * at_edge * hidden;
+    vec3 gloss = environment(reflected, rough, mirrored) * at_edge * hidden;
     gloss += key_radiance.rgb * visible * fresnel(f0, max(dot(view, halfway), 0.0)) * ggx(n_h, rough) * 0.25;
     float coat = m.coat * fresnel(vec3(0.04), n_v).x;
-    vec3 film = environment(reflected, 0.06, 1.7 * bounce) * hidden;
+    vec3 film = environment(reflected, 0.06, mirrored) * hidden;
     return (base + gloss) * (1.0 - coat) + coat * film;
 }
