@@ -15,6 +15,7 @@ from ripple_sim.solver import Material, WaveSolver
 from .collidable import collides_as_hull, hull_warning
 from .contacts import ContactPair, cluster, contact_pairs
 from .errors import RippleWarning, SceneError
+from .speeds import SpeedCheck
 from .target import find_target, geom_name, target_atlas
 
 # Footprint radius over the touching body's smallest half-extent: about the patch of a ball sunk in by an eighth.
@@ -91,6 +92,7 @@ class Ripples:
                 conserve_volume=conserve_volume,
             )
             self._warn_of_hull(name)
+        self._check_speeds = SpeedCheck(model, list(self._waves))
         self._time: float | None = None
         self.last_impulses: list[Impulse] = []
 
@@ -126,6 +128,7 @@ class Ripples:
             self.reset()
             elapsed = timestep
         self._time = data.time
+        self._check_speeds(data)
         self.last_impulses = [
             self._press(data, pair, timestep) for pair in contact_pairs(self.model, data, set(self._waves))
         ]

@@ -1,0 +1,70 @@
+"""Bodies that are too fast for the time step are reported before they get through, and others are not."""
+
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim.errors import RippleWarning
+from ripple_sim.speeds import SpeedCheck
+
+PLATE = '<geom name="plate" type="box" size="0.3 0.3 0.02"/>'
+
+
+def shoot(speed: float, solref: str, timestep: float, worldbody: str = PLATE) -> tuple[bool, list[str]]:
+    """Whether a ball is thrown back by a plate, and the warnings on its way."""
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="{timestep}" gravity="0 0 0"/><default><geom solref="{solref}"/></default>
+        <worldbody>{worldbody}<body name="ball" pos="0 0 0.6"><freejoint/><geom size="0.03"/></body></worldbody>
+        </mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    check = SpeedCheck(model, [0])
+    data.qvel[2] = -speed
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for _ in range(int(1.2 / speed / timestep) + 200):
+            mujoco.mj_step(model, data)
+            check(data)
+            if data.qvel[2] > 0:
+                break
+    return bool(data.qvel[2] > 0), [str(w.message) for w in caught if w.category is RippleWarning]
+
+
+@pytest.mark.parametrize("solref", ["0.02 1", "0.01 0.2", "0.004 1"])
+def test_what_gets_through_was_warned_of_and_what_is_slow_was_not(solref: str) -> None:
+    outcomes = [shoot(speed, solref, 0.002) for speed in np.geomspace(0.5, 120, 14)]
+    assert all(warned for back, warned in outcomes if not back)
+    first_warned = next(i for i, (_, warned) in enumerate(outcomes) if warned)
+    first_through = next(i for i, (back, _) in enumerate(outcomes) if not back)
+    # neither too late nor so early that nobody heeds it: within a factor of three in speed
+    assert 0 <= first_through - first_warned <= 2 + np.log(3) / np.log(120 / 0.5) * 13
+    assert all(len(warned) <= 1 for _, warned in outcomes)
+
+
+def test_warning_names_body_speed_and_a_time_step_that_does() -> None:
+    back, [message] = shoot(10.0, "0.02 1", 0.002)
+    assert not back
+    assert "body 'ball' meets geom 'plate' at 10 m/s" in message
+    timestep = float(message.split("time step of ")[-1].split()[0])
+    assert "a solref of twice that" in message
+    assert shoot(10.0, f"{2 * timestep} 1", timestep) == (True, [])
+
+
+def test_moving_target_counts_with_its_own_speed() -> None:
+    body = '<body name="plate" pos="0 0 {}"><freejoint/><geom name="plate" type="box" size="0.3 0.3 0.02"/></body>'
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option gravity="0 0 0"/><worldbody>{body.format(0)}
+        <body name="ball" pos="0 0 0.2"><freejoint/><geom size="0.03"/></body></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    data.qvel[:6] = data.qvel[6:] = [0, 0, -30, 0, 0, 0]
+    mujoco.mj_forward(model, data)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        SpeedCheck(model, [0])(data)  # both fly along together
+    data.qvel[2], data.qvel[8] = 15, -15
+    mujoco.mj_forward(model, data)
+    with pytest.warns(RippleWarning, match="at 30 m/s"):
+        SpeedCheck(model, [0])(data)
