@@ -12,6 +12,11 @@ from ripple_sim.solver.stencil import cotangent_stencil, link_lengths, lumped_ar
 
 def brute_force_laplacian(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness matrix and lumped areas, triangle by triangle, from every cell's two triangulations."""
+
+    def quality(triangle: list[int]) -> float:
+        p, q, s = x[triangle]
+        return np.linalg.norm(np.cross(q - p, s - p)) / sum(e @ e for e in (q - p, s - q, p - s))
+
     n = positions.shape[1]
     x = positions.reshape(-1, 3)
     index = padded_indices(n)
@@ -25,11 +30,12 @@ def brute_force_laplacian(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray
     stiffness = np.zeros((len(x), len(x)))
     areas = np.zeros(len(x))
     for ring in cells.values():
-        triangles = (
-            [(ring, 1.0)]
-            if len(ring) == 3
-            else [([ring[i] for i in t], 0.5) for t in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))]
-        )
+        if len(ring) == 3:
+            triangles = [(ring, 1.0)]
+        else:
+            pairs = [[[ring[i] for i in t] for t in pair] for pair in (((0, 1, 2), (0, 2, 3)), ((0, 1, 3), (1, 2, 3)))]
+            worth = [min(quality(t) for t in pair) ** 6 for pair in pairs]
+            triangles = [(t, w / sum(worth)) for pair, w in zip(pairs, worth, strict=True) for t in pair]
         for triangle, share in triangles:
             for k in range(3):
                 i, j, o = triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]

@@ -25,9 +25,9 @@ def test_second_order_convergence_against_a_spherical_harmonic() -> None:
     resolutions = np.array([16, 32, 64, 128])
     errors = np.array([mode_error(n) for n in resolutions])
     order = -np.polyfit(np.log(resolutions), np.log(errors), 1)[0]
-    assert order > 1.85
+    assert order > 1.95
     assert np.log2(errors[-2] / errors[-1]) > 1.95
-    assert errors[-1] < 1.5e-4
+    assert errors[-1] < 3e-5
 
 
 def test_baselines_do_not_converge() -> None:
@@ -133,12 +133,12 @@ def test_stable_timestep_is_stable_and_close_to_the_limit(animal: Atlas) -> None
     noise = np.random.default_rng(0).standard_normal(waves.height.shape)
     waves.height = noise
     waves._backend.advance(3000, waves.stable_timestep)
-    assert np.abs(waves.height).max() < 1e3
+    assert np.abs(waves._backend.height()).max() < 1e3
     waves.reset()
     waves.height = noise
     with np.errstate(over="ignore", invalid="ignore"):
         waves._backend.advance(3000, 1.05 * waves.stable_timestep)
-    assert not np.abs(waves.height).max() < 1e3
+    assert not np.abs(waves._backend.height()).max() < 1e3
 
 
 def test_result_does_not_depend_on_how_time_is_cut() -> None:
