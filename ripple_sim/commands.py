@@ -51,7 +51,7 @@ class _Video:
         from .progress import frame_progress
         from .simulation import render_video
         from .solver.gl import shared_context
-        from .solver.waves import auto_backend
+        from .solver.backend import auto_backend
 
         scene = self.load()
         backend = auto_backend() if self.backend == "auto" else self.backend

@@ -9,12 +9,14 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .absorber import absorbing_damping
     from .analytic import SphereAtlas, sphere_atlas
     from .atlas import Atlas
     from .atlas_file import load_atlas
     from .build import build_atlas
     from .errors import AtlasError, GLError, MeshError, RippleError, SolverError, SphereMapError
     from .footprint import Footprint
+    from .maps import texture_map, vertex_map
     from .material import Material
     from .mesh import Mesh
     from .mesh_file import load_mesh
@@ -35,10 +37,13 @@ _HOME = {
     "SphereAtlas": "analytic",
     "SphereMapError": "errors",
     "WaveSolver": "waves",
+    "absorbing_damping": "absorber",
     "build_atlas": "build",
     "load_atlas": "atlas_file",
     "load_mesh": "mesh_file",
     "sphere_atlas": "analytic",
+    "texture_map": "maps",
+    "vertex_map": "maps",
 }
 
 __all__ = [
@@ -55,10 +60,13 @@ __all__ = [
     "SphereAtlas",
     "SphereMapError",
     "WaveSolver",
+    "absorbing_damping",
     "build_atlas",
     "load_atlas",
     "load_mesh",
     "sphere_atlas",
+    "texture_map",
+    "vertex_map",
 ]
 
 

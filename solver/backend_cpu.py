@@ -11,7 +11,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from .operator import WaveOperator, step_coefficients
+from .operator import StepCoefficients, WaveOperator, number_or_field, step_coefficients
 from .padding import padded_addresses
 
 
@@ -23,56 +23,116 @@ class CPUBackend:
     def __init__(self, operator: WaveOperator) -> None:
         n = operator.mass.shape[1]
         self._operator = operator
-        self._stencil = operator.stencil.astype(np.float32)
-        viscous = operator.viscous_stencil
-        self._viscous_stencil = None if viscous is None else viscous.astype(np.float32)
-        self._viscous_force = np.zeros((1, 1, 1), np.float32) if viscous is None else np.zeros((6, n, n), np.float32)
-        self._h = np.zeros((6, n + 2, n + 2), np.float32)
-        self._h_next = np.zeros_like(self._h)
-        self._v = np.zeros_like(self._h)
         self._inside, self._ring, self._ring_source = padded_addresses(n)
-        self._coefficients: tuple | None = None
-        self._coefficients_dt = 0.0
+        shape = (6, n + 2, n + 2)
+        self._h, self._h_next, self._v = (np.zeros(shape, np.float32) for _ in range(3))
+        self._stencil = operator.stencil.astype(np.float32)
+        self._viscous = _single(operator.viscous_stencil)
+        self._laplace, self._rigidity = _single(operator.laplace_stencil), _single(operator.rigidity)
+        self._yield = None if operator.yield_height is None else number_or_field(operator.yield_height)
+        self._dent = np.zeros(shape if self._yield is not None else (1, 1, 1), np.float32)
+        self._moment = np.zeros(shape if self._laplace is not None else (1, 1, 1), np.float32)
+        extra = self._viscous is not None or self._laplace is not None
+        self._extra = np.zeros(shape if extra else (1, 1, 1), np.float32)
+        self._carries = number_or_field(operator.carries)
+        self._shift = 0.0
+        self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
     def height(self) -> NDArray[np.float32]:
         """Copy of the height [m], [6, N, N]."""
-        return self._h[:, 1:-1, 1:-1].copy()
+        elastic = self._h[:, 1:-1, 1:-1]
+        return elastic.copy() if self._yield is None else elastic + self.dent()
+
+    def dent(self) -> NDArray[np.float32]:
+        """The part of the height that stays [m], [6, N, N]."""
+        if self._yield is None:
+            return np.zeros(self._operator.mass.shape, np.float32)
+        return self._dent[:, 1:-1, 1:-1].copy()
 
     def velocity(self) -> NDArray[np.float32]:
         """Copy of the velocity [m/s], [6, N, N]."""
+        self._drift(0.0)
         return self._v[:, 1:-1, 1:-1].copy()
 
-    def set_height(self, height: NDArray[np.float32]) -> None:
-        """Replace the height."""
+    def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
+        """Replace the elastic height, and what stays of it: nothing, unless given."""
         self._h[:, 1:-1, 1:-1] = height
+        if self._yield is not None:
+            self._dent[:, 1:-1, 1:-1] = 0 if dent is None else dent
 
     def set_velocity(self, velocity: NDArray[np.float32]) -> None:
         """Replace the velocity."""
         self._v[:, 1:-1, 1:-1] = velocity
+        self._shift = 0.0
 
-    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float64], everywhere: float) -> None:
-        """Add velocities [m/s] to some texels (each named once), and one velocity to all."""
-        if everywhere:
-            self._v += np.float32(everywhere)
-        self._v.reshape(-1)[self._inside[texels]] += velocities.astype(np.float32)
+    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: float) -> None:
+        """Add velocities [m/s] to some texels (each named once), and one to all that carry waves.
+
+        The latter is only noted: the next drift, which touches every texel anyway, hands it out.
+        """
+        self._v.reshape(-1)[self._inside[texels]] += velocities
+        self._shift += everywhere
+
+    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: float) -> None:
+        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all that carry waves, until the next call."""
+        self._loaded, self._forces, self._acceleration = self._inside[texels], forces, everywhere
+        self._prepared_dt = 0.0
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
-        decay, gain, spring = self._step_coefficients(dt)
-        _drift(self._h, self._v, np.float32(dt / 2))
+        k = self._prepare(dt)
+        self._drift(dt / 2)
+        self._flow()
         for step in range(substeps):
             _fill(self._h, self._ring, self._ring_source)
-            if self._viscous_stencil is not None:
-                _fill(self._v, self._ring, self._ring_source)
-                _apply(self._viscous_stencil, self._v, self._viscous_force)
+            self._gather_extra_forces()
             drift = np.float32(dt if step < substeps - 1 else dt / 2)
-            _kick_drift(self._stencil, self._h, self._v, self._h_next, decay, gain, spring, self._viscous_force, drift)
+            _kick_drift(
+                self._stencil, self._h, self._v, self._h_next, self._extra, k.gain, k.decay, k.spring, self._push, drift
+            )
             self._h, self._h_next = self._h_next, self._h
+            if len(self._kicks):
+                _kick(self._h, self._v, self._loaded, self._kicks, drift)
+            self._flow()
 
-    def _step_coefficients(self, dt: float) -> tuple:
-        if self._coefficients is None or self._coefficients_dt != dt:
-            self._coefficients, self._coefficients_dt = step_coefficients(self._operator, dt), dt
+    def finite(self) -> bool:
+        """Whether all heights are finite."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return bool(np.isfinite(self._h.sum()))
+
+    def _drift(self, dt: float) -> None:
+        if dt or self._shift:
+            _drift(self._h, self._v, self._carries, np.float32(self._shift), np.float32(dt))
+        self._shift = 0.0
+
+    def _flow(self) -> None:
+        if self._yield is not None:
+            _flow(self._h, self._dent, self._yield)
+
+    def _gather_extra_forces(self) -> None:
+        """Forces beside tension and stiffness: viscous, and of bending."""
+        if self._viscous is not None:
+            _fill(self._v, self._ring, self._ring_source)
+            _apply(self._viscous, self._v, np.float32(1), False, self._extra)
+        if self._laplace is not None:
+            _apply(self._laplace, self._h, self._rigidity, False, self._moment)
+            _fill(self._moment, self._ring, self._ring_source)
+            _apply(self._laplace, self._moment, np.float32(-1), self._viscous is not None, self._extra)
+
+    def _prepare(self, dt: float) -> StepCoefficients:
+        """Coefficients of the kick, computed once a step length and load."""
+        if self._prepared_dt != dt:
+            self._coefficients = k = step_coefficients(self._operator, dt)
+            gain = np.zeros(self._h.shape, np.float32)
+            gain[:, 1:-1, 1:-1] = k.gain
+            self._kicks = gain.reshape(-1)[self._loaded] * self._forces.astype(np.float32)
+            self._push = np.float32(self._acceleration) * k.span if self._acceleration else np.float32(0)
+            self._prepared_dt = dt
         return self._coefficients
+
+
+def _single(field: NDArray[np.float64] | None) -> NDArray[np.float32] | None:
+    return None if field is None else field.astype(np.float32)
 
 
 def _at(x, f, r, c):
@@ -95,13 +155,36 @@ def _fill(h, ring, source):
         flat[ring[i]] = flat[source[i]]
 
 
+@numba.njit(cache=True)
+def _kick(h, v, texels, kicks, dt):
+    """Kick some texels, and drift them by that."""
+    heights, velocities = h.reshape(-1), v.reshape(-1)
+    for i in range(len(texels)):
+        velocities[texels[i]] += kicks[i]
+        heights[texels[i]] += dt * kicks[i]
+
+
 @numba.njit(cache=True, nogil=True)
-def _drift(h, v, dt):
+def _drift(h, v, carries, shift, dt):
     n = h.shape[1] - 2
     for i in range(6 * n):
         f, r = i // n, i % n + 1
         for c in range(1, n + 1):
+            v[f, r, c] += shift * _at(carries, f, r - 1, c - 1)
             h[f, r, c] += dt * v[f, r, c]
+
+
+@numba.njit(cache=True, nogil=True)
+def _flow(h, dent, limit):
+    """Hand the part of the elastic height that is beyond the yield height over to the permanent one."""
+    n = h.shape[1] - 2
+    for i in range(6 * n):
+        f, r = i // n, i % n + 1
+        for c in range(1, n + 1):
+            most = _at(limit, f, r - 1, c - 1)
+            kept = min(max(h[f, r, c], -most), most)
+            dent[f, r, c] += h[f, r, c] - kept
+            h[f, r, c] = kept
 
 
 @numba.njit(inline="always")
@@ -121,28 +204,32 @@ def _force(w, h, f, r, c):
 
 
 @numba.njit(cache=True, nogil=True)
-def _apply(w, h, out):
+def _apply(w, h, factor, add, out):
+    """The stencil on a field times a factor, written into `out` or added to it."""
     n = h.shape[1] - 2
     for i in range(6 * n):
         f, r = i // n, i % n + 1
         for c in range(1, n + 1):
-            out[f, r - 1, c - 1] = _force(w, h, f, r, c)
+            force = _at(factor, f, r - 1, c - 1) * _force(w, h, f, r, c)
+            out[f, r, c] = out[f, r, c] + force if add else force
 
 
 @numba.njit(cache=True, nogil=True)
-def _kick_drift(w, h, v, h_next, decay, gain, spring, extra, dt):
+def _kick_drift(w, h, v, h_next, extra, gain, decay, spring, push, dt):
+    """One substep: v = decay v + gain force - spring h + push, then h_next = h + dt v."""
     n = h.shape[1] - 2
-    viscous = extra.shape[1] == n
+    more = extra.shape[1] == n + 2
     for i in range(6 * n):
         f, r = i // n, i % n + 1
         for c in range(1, n + 1):
             force = _force(w, h, f, r, c)
-            if viscous:
-                force += extra[f, r - 1, c - 1]
+            if more:
+                force += extra[f, r, c]
             kicked = (
                 _at(decay, f, r - 1, c - 1) * v[f, r, c]
                 + gain[f, r - 1, c - 1] * force
                 - _at(spring, f, r - 1, c - 1) * h[f, r, c]
+                + _at(push, f, r - 1, c - 1)
             )
             v[f, r, c] = kicked
             h_next[f, r, c] = h[f, r, c] + dt * kicked

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import heapq
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .atlas import Atlas, check_points
-from .cubemap import padded_indices
+from .cubemap import face_coordinates
+from .distance import distance_from_point
 from .errors import SolverError
 
 # Fewer texels across than this and the source would excite waves that the grid cannot carry.
@@ -70,13 +69,14 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
     if not (np.isfinite(radius) and radius >= 0):
         raise SolverError(f"impulse radius is {radius!r} m; valid is a finite number, 0 or greater")
     n = atlas.resolution
-    closest, _ = atlas.project(check_points(point)[:1])
-    center = int(atlas.nearest_texel(closest)[0])
-    face, row, column = np.unravel_index(center, (6, n, n))
+    closest, direction = atlas.project(check_points(point)[:1])
+    face, row, column = (int(np.rint(x[0])) for x in face_coordinates(direction, n))
+    row, column = min(max(row, 0), n - 1), min(max(column, 0), n - 1)
+    center = (face * n + row) * n + column
     block = atlas.padded_positions[face, row : row + 3, column : column + 3]
     spacing = np.nanmax(np.linalg.norm(block[[0, 1, 1, 2], [1, 0, 2, 1]] - block[1, 1], axis=1))
     radius = max(float(radius), MIN_TEXELS * float(spacing))
-    texels, along = _distances(padded_indices(n), atlas.positions.reshape(-1, 3), center, closest[0], 1.1 * radius)
+    texels, along = distance_from_point(atlas, center, closest[0], 1.1 * radius)
     straight = np.linalg.norm(atlas.positions.reshape(-1, 3)[texels] - closest[0], axis=1)
     bend = np.clip((along / np.maximum(straight, 1e-300) - _FLAT) / (_BENT - _FLAT), 0, 1)
     bend = np.where(straight > 0, bend * bend * (3 - 2 * bend), 0)
@@ -86,98 +86,3 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
     texels, weights = texels[inside], weights[inside]
     weights /= (weights * atlas.areas.reshape(-1)[texels]).sum()
     return Footprint(texels, weights, center, closest[0], radius)
-
-
-def _distances(
-    index: NDArray[np.int64], positions: NDArray[np.float64], center: int, point: NDArray[np.float64], limit: float
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Texels within `limit` of the point along the surface, ascending, and their distances [m]."""
-    distance = np.full(len(positions), np.inf)
-    texels = _march(index, positions, center, point, limit, distance)
-    texels.sort()
-    return texels, distance[texels]
-
-
-@numba.njit(cache=True)
-def _through(p, q, s, dp, dq):
-    """Distance at s of a point source that is dp from p and dq from q, unfolded into the plane of the triangle.
-
-    Infinite if the straight way does not cross the edge pq (Novotni and Klein 2002).
-    """
-    length2 = (q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2 + (q[2] - p[2]) ** 2
-    length = np.sqrt(length2)
-    if length == 0:
-        return np.inf
-    along = ((s[0] - p[0]) * (q[0] - p[0]) + (s[1] - p[1]) * (q[1] - p[1]) + (s[2] - p[2]) * (q[2] - p[2])) / length
-    ps2 = (s[0] - p[0]) ** 2 + (s[1] - p[1]) ** 2 + (s[2] - p[2]) ** 2
-    above = np.sqrt(max(ps2 - along * along, 0.0))
-    source_along = (dp * dp - dq * dq + length2) / (2 * length)
-    below2 = dp * dp - source_along * source_along
-    if below2 < 0:
-        return np.inf
-    below = np.sqrt(below2)
-    if above + below == 0:
-        return np.inf
-    crossing = source_along + (along - source_along) * below / (above + below)
-    if crossing < 0 or crossing > length:
-        return np.inf
-    return np.sqrt((along - source_along) ** 2 + (above + below) ** 2)
-
-
-@numba.njit(cache=True)
-def _march(index, positions, center, point, limit, distance):
-    """Fast marching with point-source updates over the triangles of both triangulations of every quad."""
-    n = index.shape[1] - 2
-    # the eight neighbours in order round a texel
-    ring_row = (0, 1, 1, 1, 0, -1, -1, -1)
-    ring_column = (1, 1, 0, -1, -1, -1, 0, 1)
-    around = np.empty(8, np.int64)
-    done = set()
-    front = [(0.0, center)]
-    front.pop()
-    face, row, column = center // (n * n), center // n % n, center % n
-    for dr in range(3):
-        for dc in range(3):
-            t = index[face, row + dr, column + dc]
-            if t >= 0:
-                d = np.sqrt(
-                    (positions[t, 0] - point[0]) ** 2
-                    + (positions[t, 1] - point[1]) ** 2
-                    + (positions[t, 2] - point[2]) ** 2
-                )
-                distance[t] = d
-                heapq.heappush(front, (d, t))
-    order = [center]
-    order.pop()
-    while len(front) > 0:
-        d, t = heapq.heappop(front)
-        if d > limit:
-            break
-        if t in done:
-            continue
-        done.add(t)
-        order.append(t)
-        face, row, column = t // (n * n), t // n % n, t % n
-        for k in range(8):
-            around[k] = index[face, row + 1 + ring_row[k], column + 1 + ring_column[k]]
-        for k in range(8):
-            a = around[k]
-            if a < 0 or a in done:
-                continue
-            dx, dy, dz = (
-                positions[a, 0] - positions[t, 0],
-                positions[a, 1] - positions[t, 1],
-                positions[a, 2] - positions[t, 2],
-            )
-            best = d + np.sqrt(dx * dx + dy * dy + dz * dz)
-            # triangles (t, b, a): b one step round the ring, or two where a is straight ahead (the other diagonal)
-            for turn in (-2, -1, 1, 2):
-                if (turn == 2 or turn == -2) and k % 2 == 1:
-                    continue
-                b = around[(k + turn) % 8]
-                if b >= 0 and distance[b] < np.inf:
-                    best = min(best, _through(positions[t], positions[b], positions[a], d, distance[b]))
-            if best < distance[a]:
-                distance[a] = best
-                heapq.heappush(front, (best, a))
-    return np.array(order)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable
 
 import numba
 import numpy as np
@@ -23,25 +24,56 @@ SAFETY = 0.98
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class WaveOperator:
-    """M h_tt = -K h - M zeta h_t - M k h - D h_t on the texels, K and D given by stencils.
+    """M h_tt = -(K + L B L) h - M zeta h_t - M k h - D h_t on the texels; stencils give K, L and D.
 
     Attributes
     ----------
     stencil : float64 [6, 4, N + 1, N + 1]
         Link weights of K [kg/s^2], see `stencil`.
-    viscous_stencil : float64 [6, 4, N + 1, N + 1] or None
-        Link weights of D [kg/s]; None without viscosity.
     mass : float64 [6, N, N]
         sigma A [kg].
     damping, stiffness : float64 [6, N, N]
         zeta [1/s] and k [1/s^2].
+    viscous_stencil : float64 [6, 4, N + 1, N + 1] or None
+        Link weights of D [kg/s]; None without viscosity.
+    laplace_stencil : float64 [6, 4, N + 1, N + 1] or None
+        Link weights of L, which gives the area integral of the Laplacian; None without bending.
+    rigidity : float64 [6, N, N] or None
+        B = sigma b / A [kg/s^2]: L B L is the bi-Laplacian's symmetric form, B L h a plate's moments.
+    yield_height : float64 [6, N, N] or None
+        [m]; None where everything is elastic.
+    fixed : bool [6, N, N]
+        Texels that are clamped.
     """
 
     stencil: NDArray[np.float64]
-    viscous_stencil: NDArray[np.float64] | None
     mass: NDArray[np.float64]
     damping: NDArray[np.float64]
     stiffness: NDArray[np.float64]
+    viscous_stencil: NDArray[np.float64] | None = None
+    laplace_stencil: NDArray[np.float64] | None = None
+    rigidity: NDArray[np.float64] | None = None
+    yield_height: NDArray[np.float64] | None = None
+    fixed: NDArray[np.bool_] | None = None
+
+    @functools.cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Texels that are not clamped, [6, N, N]."""
+        return np.ones(self.mass.shape, bool) if self.fixed is None else ~self.fixed
+
+    @functools.cached_property
+    def carries(self) -> NDArray[np.bool_]:
+        """Texels that sources may move: free, and with something that pulls back. All, where nothing pulls anywhere."""
+        n = self.mass.shape[1]
+        pulled = (_row_sums(np.abs(self.stencil), n) > 0) | (self.stiffness > 0)
+        if self.rigidity is not None:
+            pulled |= self.rigidity > 0
+        carries = pulled & self.free
+        return carries if carries.any() else self.free
+
+    def elastic_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
+        """-(K + L B L + M k) h [N], float64 [6, N, N]; what holds the clamped texels is left out."""
+        return self._tension_force(height) - self.mass * self.stiffness * height
 
     @functools.cached_property
     def stable_timestep(self) -> float:
@@ -50,28 +82,83 @@ class WaveOperator:
         A mode with omega^2 = lambda + k and viscous rate mu is stable if dt^2 omega^2 + 2 dt mu <= 4. Infinite if
         nothing moves.
         """
-        wave = largest_eigenvalue(self.stencil, self.mass) + self.stiffness.max()
-        viscous = 0.0 if self.viscous_stencil is None else largest_eigenvalue(self.viscous_stencil, self.mass)
+        bound = self._rate_bound(self.stencil)
+        if self.laplace_stencil is not None and self.rigidity is not None:
+            bending = self._rate_bound(self.laplace_stencil)
+            bound += bending * float((self.rigidity * self.mass).max()) * bending
+        wave = self._largest_eigenvalue(self._tension_force, bound) + self.stiffness.max()
+        viscous = 0.0
+        if self.viscous_stencil is not None:
+            force = functools.partial(_force, self.viscous_stencil)
+            viscous = self._largest_eigenvalue(force, self._rate_bound(self.viscous_stencil))
         if wave == 0:
             return np.inf if viscous == 0 else float(SAFETY * 2 / viscous)
         return float(SAFETY * (np.sqrt(viscous**2 + 4 * wave) - viscous) / wave)
 
+    def _tension_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
+        force = _force(self.stencil, height)
+        if self.laplace_stencil is not None and self.rigidity is not None:
+            force -= _force(self.laplace_stencil, self.rigidity * _force(self.laplace_stencil, height))
+        return force
 
-def step_coefficients(operator: WaveOperator, dt: float) -> tuple:
-    """Decay, gain [s/kg] and spring [1/s] of the kick v = decay v + gain force - spring h.
+    def _rate_bound(self, stencil: NDArray[np.float64]) -> float:
+        """Gershgorin's bound of the largest eigenvalue of M^-1 K."""
+        return float((_row_sums(np.abs(stencil), self.mass.shape[1]) * 2 / self.mass).max())
 
-    Gain is float32 [6, N, N]; the others are numbers where damping and stiffness are uniform, else of the same shape.
+    def _largest_eigenvalue(self, force: Callable[[NDArray[np.float64]], NDArray[np.float64]], bound: float) -> float:
+        """Upper bound, within about 1 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
+
+        A bound that is always safe caps the estimate.
+        """
+        if bound == 0 or self.mass.shape[1] < 6:
+            return bound
+        weight = self.free / np.sqrt(self.mass)
+
+        def multiply(x: NDArray) -> NDArray:
+            return -(force(x.reshape(weight.shape) * weight) * weight).ravel()
+
+        size = self.mass.size
+        start = np.random.default_rng(0).standard_normal(size)
+        matrix = LinearOperator((size, size), matvec=multiply, dtype=np.float64)
+        value = eigsh(matrix, k=1, which="LA", v0=start, tol=2e-3, return_eigenvectors=False, maxiter=size)
+        return float(np.clip(1.01 * value[0], 0, bound))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StepCoefficients:
+    """The kick of a step dt: v = decay v + gain force - spring h.
+
     Damping is implicit (centred): decay = (1 - zeta dt/2) / (1 + zeta dt/2).
+
+    Attributes
+    ----------
+    gain : float32 [6, N, N]
+        [s/kg]; 0 where the surface is clamped.
+    decay, spring, span : float32 or float32 [6, N, N]
+        One number where a coefficient is uniform, which saves the kernel's reads. The spring is in 1/s; the span [s] is
+        how long an acceleration that acts everywhere counts: 0 where sources move nothing.
     """
+
+    gain: NDArray[np.float32]
+    decay: NDArray[np.float32] | np.float32
+    spring: NDArray[np.float32] | np.float32
+    span: NDArray[np.float32] | np.float32
+
+
+def step_coefficients(operator: WaveOperator, dt: float) -> StepCoefficients:
+    """Coefficients of the kick of one substep of dt [s]."""
     half = operator.damping * (dt / 2)
-    decay = (1 - half) / (1 + half)
-    spring = dt / (1 + half) * operator.stiffness
-    gain = (dt / (1 + half) / operator.mass).astype(np.float32)
-    return _uniform(decay), gain, _uniform(spring)
+    span = dt / (1 + half)
+    return StepCoefficients(
+        gain=np.where(operator.free, span / operator.mass, 0).astype(np.float32),
+        decay=number_or_field((1 - half) / (1 + half)),
+        spring=number_or_field(span * operator.stiffness),
+        span=number_or_field(span * operator.carries),
+    )
 
 
-def _uniform(field: NDArray[np.float64]) -> NDArray[np.float32] | np.float32:
-    """A number where a field has one value, which saves the kernel's reads; else the field as float32."""
+def number_or_field(field: NDArray) -> NDArray[np.float32] | np.float32:
+    """One float32 number where a field has one value, else the field as float32."""
     first = field.flat[0]
     return np.float32(first) if (field == first).all() else field.astype(np.float32)
 
@@ -96,24 +183,30 @@ def build_operator(atlas: Atlas, material: Material, kind: str) -> WaveOperator:
     """
     if kind not in OPERATORS:
         raise SolverError(f"operator {kind!r} does not exist; valid are {', '.join(map(repr, OPERATORS))}")
-    n = atlas.resolution
-    speed, damping, stiffness, viscosity, density = (
-        material.texels(name, n) for name in ("speed", "damping", "stiffness", "viscosity", "density")
-    )
-    mass = density * atlas.areas
+    field = {each.name: material.texels(each.name, atlas.resolution) for each in dataclasses.fields(material)}
+    density, area = field["density"], atlas.areas
     if kind == "fem":
-        stencil = cotangent_stencil(atlas.positions, density * speed**2)
-        viscous = cotangent_stencil(atlas.positions, density * viscosity) if viscosity.any() else None
+        assemble = functools.partial(cotangent_stencil, atlas.positions)
     else:
-        # these formulas give accelerations without masses: one mass for all keeps the units
-        mass = np.full_like(mass, mass.mean())
-        stencil = _difference_stencil(atlas, mass[0, 0, 0] * speed**2, kind)
-        viscous = _difference_stencil(atlas, mass[0, 0, 0] * viscosity, kind) if viscosity.any() else None
-    return WaveOperator(stencil, viscous, mass, damping, stiffness)
+        # these formulas give accelerations without masses: one area for all keeps the units, one density as well
+        area, density = np.full_like(area, area.mean()), np.full_like(density, density.mean())
+        assemble = functools.partial(_difference_stencil, atlas, kind, area[0, 0, 0])
+    viscous, bends, yields = field["viscosity"].any(), field["bending"].any(), np.isfinite(field["yield_height"]).any()
+    return WaveOperator(
+        stencil=assemble(density * field["speed"] ** 2),
+        mass=density * area,
+        damping=field["damping"],
+        stiffness=field["stiffness"],
+        viscous_stencil=assemble(density * field["viscosity"]) if viscous else None,
+        laplace_stencil=assemble(np.ones_like(area)) if bends else None,
+        rigidity=density * field["bending"] / area if bends else None,
+        yield_height=field["yield_height"] if yields else None,
+        fixed=field["fixed"] if field["fixed"].any() else None,
+    )
 
 
-def _difference_stencil(atlas: Atlas, coefficient: NDArray[np.float64], kind: str) -> NDArray[np.float64]:
-    """Link weights coefficient / distance^2 of the baselines."""
+def _difference_stencil(atlas: Atlas, kind: str, area: float, coefficient: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Link weights area coefficient / distance^2 of the baselines."""
     lengths = link_lengths(atlas.positions)
     if kind != "dynamic-paint":
         lengths[:, [link for link in range(4) if link not in (EAST, NORTH)]] = np.inf
@@ -132,28 +225,7 @@ def _difference_stencil(atlas: Atlas, coefficient: NDArray[np.float64], kind: st
         ],
         axis=1,
     )
-    return agree_across_edges(means / lengths**2)
-
-
-def largest_eigenvalue(stencil: NDArray[np.float64], mass: NDArray[np.float64]) -> float:
-    """Upper bound, within about 1 %, of the largest eigenvalue of M^-1 K, by Lanczos iteration.
-
-    Gershgorin's bound, which is always safe, caps the estimate.
-    """
-    n = mass.shape[1]
-    bound = float((_row_sums(np.abs(stencil), n) * 2 / mass).max())
-    if bound == 0 or n < 6:
-        return bound
-    root = np.sqrt(mass)
-
-    def multiply(x: NDArray) -> NDArray:
-        return -stencil_sum(stencil, pad(x.reshape(mass.shape) / root)).ravel() / root.ravel()
-
-    size = mass.size
-    start = np.random.default_rng(0).standard_normal(size)
-    operator = LinearOperator((size, size), matvec=multiply, dtype=np.float64)
-    value = eigsh(operator, k=1, which="LA", v0=start, tol=2e-3, return_eigenvectors=False, maxiter=size)
-    return min(bound, 1.01 * float(value[0]))
+    return agree_across_edges(area * means / lengths**2)
 
 
 def _row_sums(stencil: NDArray[np.float64], n: int) -> NDArray[np.float64]:
@@ -163,6 +235,10 @@ def _row_sums(stencil: NDArray[np.float64], n: int) -> NDArray[np.float64]:
     sums = np.zeros((6, n, n))
     _gather(stencil, padded, sums, 0.0)
     return sums
+
+
+def _force(stencil: NDArray[np.float64], field: NDArray[np.float64]) -> NDArray[np.float64]:
+    return stencil_sum(stencil, pad(field))
 
 
 def stencil_sum(stencil: NDArray[np.float64], padded: NDArray[np.float64]) -> NDArray[np.float64]:
