@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver import Material, WaveSolver
+from ripple_sim.solver.footprint import footprint
 
 from .collidable import collides_as_hull, hull_warning
 from .contacts import ContactPair, cluster, contact_pairs
@@ -81,16 +83,17 @@ class Ripples:
     ) -> None:
         self.model = model
         self._geoms = {name: find_target(model, name) for name in materials}
+        self._materials = dict(materials)
+        self._rigid: dict[str, NDArray[np.bool_]] = {}
+        self._options: dict[str, Any] = {
+            "backend": backend,
+            "operator": operator,
+            "conserve_volume": conserve_volume,
+        }
         self._waves: dict[int, WaveSolver] = {}
-        for name, material in materials.items():
+        for name, geom in self._geoms.items():
             n = resolution[name] if isinstance(resolution, Mapping) else resolution
-            self._waves[self._geoms[name]] = WaveSolver(
-                target_atlas(model, self._geoms[name], n),
-                material,
-                backend=backend,
-                operator=operator,
-                conserve_volume=conserve_volume,
-            )
+            self._waves[geom] = WaveSolver(target_atlas(model, geom, n), materials[name], **self._options)
             self._warn_of_hull(name)
         self._check_speeds = SpeedCheck(model, list(self._waves))
         self._time: float | None = None
@@ -141,6 +144,60 @@ class Ripples:
         self.last_impulses = []
         for waves in self._waves.values():
             waves.reset()
+
+    def change_material(self, name: str, **coefficients: Any) -> None:
+        """Change coefficients of a geom's material, by their names in `Material`; height and velocity stay.
+
+        Raises
+        ------
+        SceneError
+            For an unknown geom.
+        SolverError
+            For an invalid coefficient.
+        """
+        self[name]  # refuses unknown names
+        self._materials[name] = dataclasses.replace(self._materials[name], **coefficients)
+        self._rebuild(name)
+
+    def make_rigid(self, name: str, point: ArrayLike, radius: float) -> None:
+        """Let a disc of a geom's surface carry no waves: they go round it, and what hits it moves nothing.
+
+        Parameters
+        ----------
+        name : str
+            Geom.
+        point : [3]
+            In the frame of the geom [m]; the nearest surface point is taken.
+        radius : float
+            Along the surface [m].
+        """
+        atlas = self[name].atlas
+        rigid = self._rigid.setdefault(name, np.zeros(atlas.areas.shape, bool))
+        rigid.reshape(-1)[footprint(atlas, point, radius).texels] = True
+        self._rebuild(name)
+
+    def to_geom(self, name: str, point: ArrayLike) -> NDArray[np.float64]:
+        """Carry a point [m] from the frame of a geom's body to that of the geom, which MuJoCo chooses for meshes."""
+        geom = find_target(self.model, name)
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, self.model.geom_quat[geom])
+        return (np.asarray(point, dtype=np.float64) - self.model.geom_pos[geom]) @ rotation.reshape(3, 3)
+
+    def _rebuild(self, name: str) -> None:
+        """Make a geom's solver anew for its changed material, in the state of the old one."""
+        old, material = self[name], self._materials[name]
+        if name in self._rigid:
+            n, moves = old.atlas.resolution, ~self._rigid[name]
+            # a region without tension and stiffness takes up nothing
+            material = dataclasses.replace(
+                material,
+                speed=material.texels("speed", n) * moves,
+                stiffness=material.texels("stiffness", n) * moves,
+            )
+        new = WaveSolver(old.atlas, material, **self._options)
+        new.height, new.velocity, new.pressure = old.height, old.velocity, old.pressure
+        new.time, new.substeps_taken = old.time, old.substeps_taken
+        self._waves[self._geoms[name]] = new
 
     def _warn_of_hull(self, name: str) -> None:
         if collides_as_hull(self.model, self._geoms[name]):

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from ripple_sim.solver import Mesh, load_mesh
 from ripple_sim.solver.rays import downward_hits
 
-from .drops import DropEntry
 from .errors import SceneError
-from .scene import CameraEntry, MaterialEntry, RippleEntry, Scene
+from .events import Events
+from .motion import DropEntry
+from .scene import Scene
+from .scene_file import CameraEntry, MaterialEntry, RippleEntry
 
 SIZE = 1.0  # the target's longest edge of its bounding box [m]
 DURATION = 5.0
@@ -93,7 +95,7 @@ def drop_scene(
             lookat=(0.0, 0.0, 0.95 * middle), distance=3.6, azimuth=125.0, elevation=-17.0, fovy=28.0, orbit=5.0
         ),
         duration=DURATION,
-        drops=tuple(drops),
+        events=Events(drop=tuple(drops)),
     )
 
 

@@ -1,72 +1,26 @@
-"""Scenes: one MJCF and one TOML file that names its rippling surfaces, the camera and the duration."""
+"""Scenes: one MJCF and one TOML file that names its rippling surfaces, the camera, the duration and the script."""
 
 from __future__ import annotations
 
 import dataclasses
 import importlib.resources
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import msgspec
 import mujoco
+import numpy as np
 
-from ripple_sim.solver import Material
-
-from .drops import DropEntry, Drops
 from .errors import SceneError
+from .events import Events, Script
+from .motion import DropEntry, ThrowEntry
+from .randomize import RandomEntry, randomize
+from .scene_file import CameraEntry, RippleEntry, parse_scene
 from .target import find_target
 
-Color = tuple[float, float, float]
-
-
-class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[ripple.material]`: the wave equation's coefficients, see `Material`.
-
-    Units: speed [m/s], damping [1/s], stiffness [1/s^2], viscosity [m^2/s], density [kg/m^2].
-    """
-
-    speed: float = 1.0
-    damping: float = 0.0
-    stiffness: float = 0.0
-    viscosity: float = 0.0
-    density: float = 1.0
-
-    def material(self) -> Material:
-        """The solver's material."""
-        return Material(**msgspec.structs.asdict(self))
-
-
-class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[ripple]]`: one surface that carries waves, and how it looks."""
-
-    geom: str
-    resolution: int = 128
-    look: str = "rubber"
-    color: Color | None = None
-    material: MaterialEntry = msgspec.field(default_factory=MaterialEntry)
-
-
-class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[camera]`: a camera of the MJCF by name, or MuJoCo's free camera (metres, degrees), orbiting if wished."""
-
-    name: str | None = None
-    lookat: tuple[float, float, float] | None = None
-    distance: float | None = None
-    azimuth: float = 90.0
-    elevation: float = -20.0
-    fovy: float = 45.0
-    orbit: float = 0.0
-
-
-class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
-    """The whole TOML file."""
-
-    model: str
-    ripple: list[RippleEntry]
-    duration: float = 5.0
-    camera: CameraEntry = msgspec.field(default_factory=CameraEntry)
-    drop: list[DropEntry] = []
+Moved = TypeVar("Moved", DropEntry, ThrowEntry)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -81,8 +35,10 @@ class Scene:
     camera : CameraEntry
     duration : float
         [s].
-    drops : tuple of DropEntry
-        Bodies that are let go at given times.
+    events : Events
+        What happens to bodies and surfaces at given times.
+    two_way : bool
+        Whether moving surfaces push back on the bodies that touch them.
     """
 
     name: str
@@ -90,7 +46,8 @@ class Scene:
     surfaces: tuple[RippleEntry, ...]
     camera: CameraEntry
     duration: float
-    drops: tuple[DropEntry, ...] = ()
+    events: Events = dataclasses.field(default_factory=Events)
+    two_way: bool = False
 
 
 def shipped_scenes() -> list[str]:
@@ -116,13 +73,21 @@ def load_scene(name_or_path: str | Path) -> Scene:
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from error
     content = parse_scene(table, str(path))
+    model, shifts = load_model(path.parent / content.model, content.random)
     scene = Scene(
         name=path.stem,
-        model=load_model(path.parent / content.model),
+        model=model,
         surfaces=tuple(content.ripple),
         camera=content.camera,
         duration=content.duration,
-        drops=tuple(content.drop),
+        events=Events(
+            drop=_shifted(content.drop, shifts),
+            throw=_shifted(content.throw, shifts),
+            place=tuple(content.place),
+            poke=tuple(content.poke),
+            change=tuple(content.change),
+        ),
+        two_way=content.two_way,
     )
     check_scene(scene)
     return scene
@@ -140,56 +105,32 @@ def _scene_path(name_or_path: str) -> Path:
     )
 
 
-def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
-    """Check a scene's table against the schema.
+def _shifted(entries: Sequence[Moved], shifts: dict[str, np.ndarray]) -> tuple[Moved, ...]:
+    """The entries, with their positions moved as far as their bodies were."""
+    return tuple(
+        msgspec.structs.replace(entry, position=tuple(float(x) for x in np.add(entry.position, shifts[entry.body])))
+        if entry.position is not None and entry.body in shifts
+        else entry
+        for entry in entries
+    )
+
+
+def load_model(path: Path, random: RandomEntry | None = None) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
+    """Compile an MJCF file, and tell how far each of its bodies was shifted at random [m].
 
     Raises
     ------
     SceneError
-        Naming the place, the value and what is valid.
-    """
-    _check_keys(table, SceneFile, "", origin)
-    try:
-        return msgspec.convert(table, SceneFile)
-    except msgspec.ValidationError as error:
-        raise SceneError(f"scene file {origin!r}: {str(error).replace('`$.', '`')}") from error
-
-
-_TABLES: dict[str, type[msgspec.Struct]] = {
-    "ripple": RippleEntry,
-    "camera": CameraEntry,
-    "material": MaterialEntry,
-    "drop": DropEntry,
-}
-
-
-def _check_keys(table: Any, schema: type[msgspec.Struct], place: str, origin: str) -> None:
-    """Refuse unknown keys before msgspec does, with the list of valid ones."""
-    if not isinstance(table, dict):
-        return
-    fields = {field.name: field.type for field in msgspec.structs.fields(schema)}
-    for key, value in table.items():
-        if key not in fields:
-            where = f" in [{place}]" if place else ""
-            raise SceneError(f"scene file {origin!r}: unknown key {key!r}{where}; valid are {', '.join(fields)}")
-        inner = _TABLES.get(key)
-        if inner is not None:
-            for item in value if isinstance(value, list) else [value]:
-                _check_keys(item, inner, f"{place}.{key}" if place else key, origin)
-
-
-def load_model(path: Path) -> mujoco.MjModel:
-    """Compile an MJCF file.
-
-    Raises
-    ------
-    SceneError
-        If the file is missing or MuJoCo refuses it, with MuJoCo's reason.
+        If the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the randomisation is invalid.
     """
     if not path.is_file():
         raise SceneError(f"MJCF file {str(path)!r} does not exist")
     try:
-        return mujoco.MjModel.from_xml_path(str(path))
+        if random is None:
+            return mujoco.MjModel.from_xml_path(str(path)), {}
+        spec = mujoco.MjSpec.from_file(str(path))
+        shifts = randomize(spec, random)
+        return spec.compile(), shifts
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise SceneError(f"MuJoCo refuses {str(path)!r}: {reason}") from error
@@ -220,7 +161,10 @@ def check_scene(scene: Scene) -> None:
         if entry.look not in LOOKS:
             raise SceneError(f"look {entry.look!r} does not exist; valid are {', '.join(LOOKS)}")
         entry.material.material()
-    Drops(scene.model, scene.drops)
+        for disc in entry.still:
+            if not 0 < disc.radius < float("inf"):
+                raise SceneError(f"a still disc of geom {entry.geom!r} has radius {disc.radius!r} m; valid is above 0")
+    Script(scene.model, scene.events, [entry.geom for entry in scene.surfaces])
     name = scene.camera.name
     if name is not None and mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_CAMERA, name) < 0:
         names = [scene.model.camera(i).name for i in range(scene.model.ncam)]

@@ -17,8 +17,8 @@ from ripple_sim.solver import Relief
 from ripple_sim.solver.gl import shared_context
 
 from .coupling import Impulse, Ripples
-from .drops import Drops
 from .errors import SceneError, SimulationError
+from .events import Script
 from .render import Renderer, Surface
 from .scene import Scene
 from .video import check_output, open_writer
@@ -59,6 +59,8 @@ class Simulation:
         Overrides the scene's atlas resolutions.
     backend, operator : str
         As for `WaveSolver`.
+    on_step : callable, optional
+        Called with the simulation before each physics step: to steer actuators, move mocap bodies, press on surfaces.
     """
 
     def __init__(
@@ -69,8 +71,10 @@ class Simulation:
         resolution: int | None = None,
         backend: str = "auto",
         operator: str = "fem",
+        on_step: Callable[[Simulation], None] | None = None,
     ) -> None:
         self.scene = scene
+        self._on_step = on_step
         self.model = copy.copy(scene.model)
         self._steps_per_frame = max(1, math.ceil(1 / (fps * self.model.opt.timestep) - 1e-9))
         self.model.opt.timestep = 1 / (fps * self._steps_per_frame)
@@ -85,7 +89,10 @@ class Simulation:
             backend=backend,
             operator=operator,
         )
-        self._drops = Drops(self.model, scene.drops)
+        for entry in scene.surfaces:
+            for disc in entry.still:
+                self.ripples.make_rigid(entry.geom, self.ripples.to_geom(entry.geom, disc.point), disc.radius)
+        self._script = Script(self.model, scene.events, list(self.ripples))
         self.physics_seconds = self.wave_seconds = 0.0
         self.impulses: list[Impulse] = []
 
@@ -110,7 +117,9 @@ class Simulation:
         self.impulses = []
         for _ in range(self._steps_per_frame):
             start = time.perf_counter()
-            self._drops.apply(self.data)
+            if self._on_step is not None:
+                self._on_step(self)
+            self._script.apply(self.data, self.ripples)
             mujoco.mj_step(self.model, self.data)
             stepped = time.perf_counter()
             self._check_state()
@@ -143,7 +152,7 @@ class FrameSource:
         for entry in simulation.scene.surfaces:
             geom = simulation.ripples.geom_ids[entry.geom]
             atlas = simulation.ripples[entry.geom].atlas
-            self._reliefs[geom] = (simulation.ripples[entry.geom], Relief(atlas))
+            self._reliefs[geom] = (entry.geom, Relief(atlas))
             surfaces[geom] = Surface(
                 V=atlas.mesh.V,
                 F=atlas.mesh.F,
@@ -162,7 +171,7 @@ class FrameSource:
     def draw(self) -> NDArray[np.uint8]:
         """Draw the present state, uint8 [height, width, 3]."""
         sim = self._simulation
-        reliefs = {geom: relief(waves.height) for geom, (waves, relief) in self._reliefs.items()}
+        reliefs = {geom: relief(sim.ripples[name].height) for geom, (name, relief) in self._reliefs.items()}
         camera = viewpoint(sim.model, sim.data, sim.scene.camera, sim.data.time)
         return self._renderer.render(sim.data, reliefs, camera)
 
@@ -177,6 +186,7 @@ def render_video(
     resolution: int | None = None,
     backend: str = "auto",
     progress: Callable[[int, int], None] | None = None,
+    on_step: Callable[[Simulation], None] | None = None,
 ) -> Summary:
     """Simulate a scene and write its video.
 
@@ -191,7 +201,7 @@ def render_video(
         Frames a second.
     duration : float, optional
         [s], instead of the scene's.
-    resolution, backend
+    resolution, backend, on_step
         As for `Simulation`.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
@@ -211,7 +221,7 @@ def render_video(
     if not 0 < length < math.inf:
         raise SceneError(f"duration is {length!r} s; valid is a positive number")
     count = max(1, round(length * fps))
-    simulation = Simulation(scene, fps=fps, resolution=resolution, backend=backend)
+    simulation = Simulation(scene, fps=fps, resolution=resolution, backend=backend, on_step=on_step)
     frames = FrameSource(simulation, width=width, height=height)
     ready = time.perf_counter()
     render_seconds = 0.0

@@ -66,7 +66,7 @@ class SpeedCheck:
         )
         for i in np.flatnonzero(meeting & (speed * time > self._limit) & ~self._warned):
             self._warned[i] = True
-            warnings.warn(self._message(i, float(speed[i])), RippleWarning, stacklevel=4)
+            warnings.warn(self._message(int(i), float(speed[i])), RippleWarning, stacklevel=4)
 
     def _message(self, i: int, speed: float) -> str:
         model, limit = self._model, float(self._limit[i])

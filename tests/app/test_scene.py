@@ -126,7 +126,7 @@ def test_drop_scene_stands_any_mesh_on_the_floor(tmp_path: Path) -> None:
     world = mesh.V @ data.geom("target").xmat.reshape(3, 3).T + data.geom("target").xpos
     assert np.ptp(world, axis=0).max() == pytest.approx(1.0, rel=1e-5)
     assert world[:, 2].min() == pytest.approx(0.0, abs=1e-5)
-    assert len(scene.drops) == 3
+    assert len(scene.events.drop) == 3
     hit = set()
     for _ in range(180):
         simulation.advance_frame()
@@ -137,8 +137,8 @@ def test_drop_scene_stands_any_mesh_on_the_floor(tmp_path: Path) -> None:
 def test_drop_scene_is_the_same_for_the_same_seed(tmp_path: Path) -> None:
     write_obj(tmp_path / "peanut.obj", *peanut())
     first, second, other = (drop_scene(tmp_path / "peanut.obj", seed=seed) for seed in (3, 3, 4))
-    assert [d.position for d in first.drops] == [d.position for d in second.drops]
-    assert [d.position for d in first.drops] != [d.position for d in other.drops]
+    assert [d.position for d in first.events.drop] == [d.position for d in second.events.drop]
+    assert [d.position for d in first.events.drop] != [d.position for d in other.events.drop]
 
 
 def test_drop_scene_refuses_open_meshes_and_wrong_numbers(tmp_path: Path) -> None:

@@ -1,0 +1,106 @@
+"""A scene's script: what happens to bodies and surfaces at given times."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+import mujoco
+import numpy as np
+
+from .coupling import Ripples
+from .errors import SceneError
+from .motion import DropEntry, Motions, PlaceEntry, ThrowEntry, Vector, check_time
+
+
+class PokeEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[[poke]]`: press on a rippling geom for an instant.
+
+    At a point [m] in the frame of the geom's body (the world, for a fixed target), with an impulse [N s], positive
+    inwards, spread over a radius [m], at a time [s].
+    """
+
+    geom: str
+    time: float
+    point: Vector
+    impulse: float
+    radius: float = 0.0
+
+
+class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
+    """`[change.material]`: the coefficients that change; the others stay as they are."""
+
+    speed: float | None = None
+    damping: float | None = None
+    stiffness: float | None = None
+    viscosity: float | None = None
+    density: float | None = None
+
+    def changes(self) -> dict[str, Any]:
+        """The coefficients that were given."""
+        return {name: value for name, value in msgspec.structs.asdict(self).items() if value is not None}
+
+
+class ChangeEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[[change]]`: another material for a rippling geom, from a time [s] on."""
+
+    geom: str
+    time: float
+    material: MaterialChange
+
+
+@dataclasses.dataclass(frozen=True)
+class Events:
+    """All that is to happen."""
+
+    drop: Sequence[DropEntry] = ()
+    throw: Sequence[ThrowEntry] = ()
+    place: Sequence[PlaceEntry] = ()
+    poke: Sequence[PokeEntry] = ()
+    change: Sequence[ChangeEntry] = ()
+
+
+class Script:
+    """Carries out the events. Call `apply` before each physics step.
+
+    Raises
+    ------
+    SceneError
+        If an event names a body or a geom that is not there, or has an invalid time, impulse or radius.
+    """
+
+    def __init__(self, model: mujoco.MjModel, events: Events, targets: Sequence[str]) -> None:
+        self._motions = Motions(model, [*events.drop, *events.throw, *events.place])
+        for poke in events.poke:
+            _check_target("poke", poke.geom, poke.time, targets)
+            if not (np.isfinite([poke.impulse, *poke.point]).all() and 0 <= poke.radius < np.inf):
+                raise SceneError(
+                    f"[[poke]] of {poke.geom!r} has point {poke.point} m, impulse {poke.impulse!r} N s, radius "
+                    f"{poke.radius!r} m; valid are finite numbers, the radius 0 or greater"
+                )
+        for change in events.change:
+            _check_target("change", change.geom, change.time, targets)
+        surface_events: list[PokeEntry | ChangeEntry] = [*events.poke, *events.change]
+        self._surface_events = sorted(surface_events, key=lambda event: event.time)
+
+    def apply(self, data: mujoco.MjData, ripples: Ripples) -> None:
+        """Do what is due."""
+        self._motions.apply(data)
+        while self._surface_events and self._surface_events[0].time <= data.time + 1e-9:
+            event = self._surface_events.pop(0)
+            if isinstance(event, PokeEntry):
+                point = ripples.to_geom(event.geom, event.point)
+                ripples[event.geom].add_impulse(point, event.impulse, event.radius)
+            else:
+                ripples.change_material(event.geom, **event.material.changes())
+
+
+def _check_target(verb: str, geom: str, time: float, targets: Sequence[str]) -> None:
+    check_time(verb, geom, time)
+    if geom not in targets:
+        raise SceneError(
+            f"[[{verb}]] names the geom {geom!r}, which does not ripple; the rippling geoms are "
+            f"{', '.join(map(repr, targets))}"
+        )

@@ -1,0 +1,125 @@
+"""The TOML file of a scene: its tables, and strict reading of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from ripple_sim.solver import Material
+
+from .errors import SceneError
+from .events import ChangeEntry, MaterialChange, PokeEntry
+from .motion import DropEntry, PlaceEntry, ThrowEntry, Vector
+from .randomize import RandomEntry
+
+Color = tuple[float, float, float]
+
+
+class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[ripple.material]`: the wave equation's coefficients, see `Material`.
+
+    Units: speed [m/s], damping [1/s], stiffness [1/s^2], viscosity [m^2/s], density [kg/m^2].
+    """
+
+    speed: float = 1.0
+    damping: float = 0.0
+    stiffness: float = 0.0
+    viscosity: float = 0.0
+    density: float = 1.0
+
+    def material(self) -> Material:
+        """The solver's material."""
+        return Material(**msgspec.structs.asdict(self))
+
+
+class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[[ripple.still]]`: a disc of the surface that carries no waves, round a point [m] of the geom's body's frame."""
+
+    point: Vector
+    radius: float
+
+
+class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[[ripple]]`: one surface that carries waves, and how it looks."""
+
+    geom: str
+    resolution: int = 128
+    look: str = "rubber"
+    color: Color | None = None
+    material: MaterialEntry = msgspec.field(default_factory=MaterialEntry)
+    still: list[StillEntry] = []
+
+
+class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[camera]`: a camera of the MJCF by name, or MuJoCo's free camera (metres, degrees), orbiting if wished."""
+
+    name: str | None = None
+    lookat: Vector | None = None
+    distance: float | None = None
+    azimuth: float = 90.0
+    elevation: float = -20.0
+    fovy: float = 45.0
+    orbit: float = 0.0
+
+
+class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
+    """The whole TOML file."""
+
+    model: str
+    ripple: list[RippleEntry]
+    duration: float = 5.0
+    two_way: bool = False
+    camera: CameraEntry = msgspec.field(default_factory=CameraEntry)
+    drop: list[DropEntry] = []
+    throw: list[ThrowEntry] = []
+    place: list[PlaceEntry] = []
+    poke: list[PokeEntry] = []
+    change: list[ChangeEntry] = []
+    random: RandomEntry | None = None
+
+
+def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
+    """Check a scene's table against the schema.
+
+    Raises
+    ------
+    SceneError
+        Naming the place, the value and what is valid.
+    """
+    _check_keys(table, SceneFile, "", origin)
+    try:
+        return msgspec.convert(table, SceneFile)
+    except msgspec.ValidationError as error:
+        raise SceneError(f"scene file {origin!r}: {str(error).replace('`$.', '`')}") from error
+
+
+_TABLES: dict[str, type[msgspec.Struct]] = {
+    "ripple": RippleEntry,
+    "ripple.material": MaterialEntry,
+    "ripple.still": StillEntry,
+    "camera": CameraEntry,
+    "drop": DropEntry,
+    "throw": ThrowEntry,
+    "place": PlaceEntry,
+    "poke": PokeEntry,
+    "change": ChangeEntry,
+    "change.material": MaterialChange,
+    "random": RandomEntry,
+}
+
+
+def _check_keys(table: Any, schema: type[msgspec.Struct], place: str, origin: str) -> None:
+    """Refuse unknown keys before msgspec does, with the list of valid ones."""
+    if not isinstance(table, dict):
+        return
+    fields = {field.name: field.type for field in msgspec.structs.fields(schema)}
+    for key, value in table.items():
+        if key not in fields:
+            where = f" in [{place}]" if place else ""
+            raise SceneError(f"scene file {origin!r}: unknown key {key!r}{where}; valid are {', '.join(fields)}")
+        inner_place = f"{place}.{key}" if place else key
+        inner = _TABLES.get(inner_place)
+        if inner is not None:
+            for item in value if isinstance(value, list) else [value]:
+                _check_keys(item, inner, inner_place, origin)
