@@ -10,6 +10,8 @@ from typing import Annotated, Any
 from tyro.conf import arg
 from tyro.constructors import PrimitiveConstructorSpec
 
+from .orientation import UP_AXES
+
 
 def parse_size(word: str) -> tuple[int, int]:
     """Read width and height [pixels] from a word such as "1280x720"."""
@@ -44,6 +46,13 @@ def parse_seconds(word: str) -> float:
     return seconds
 
 
+def parse_axis(word: str) -> str:
+    """Read the axis that points up."""
+    if word not in UP_AXES:
+        raise ValueError(f"{word!r} is not valid; it must be {' or '.join(UP_AXES)}")
+    return word
+
+
 def _one_word(
     parse: Callable[[str], Any], metavar: str, show: Callable[[Any], str] = str
 ) -> PrimitiveConstructorSpec[Any]:
@@ -62,3 +71,4 @@ Seed = Annotated[int, _one_word(parse_seed, "N")]
 FrameRate = Annotated[int | None, _one_word(parse_count, "FPS"), arg(help_behavior_hint="(default: 60, for a GIF 25)")]
 Duration = Annotated[float | None, _one_word(parse_seconds, "S"), arg(help_behavior_hint="(default: the scene's)")]
 Resolution = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's)")]
+UpAxis = Annotated[str | None, _one_word(parse_axis, "{y,z}"), arg(help_behavior_hint="(default: z for STL, else y)")]

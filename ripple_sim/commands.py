@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
-from .arguments import Count, Duration, FrameRate, Resolution, Seed, Size
+from .arguments import Count, Duration, FrameRate, Resolution, Seed, Size, UpAxis
 
 if TYPE_CHECKING:
     from .scene import Scene
     from .simulation import Summary
+    from .solver import Mesh
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -50,8 +51,8 @@ class _Video:
 
         from .progress import frame_progress
         from .simulation import render_video
-        from .solver.gl import shared_context
         from .solver.backend import auto_backend
+        from .solver.gl import shared_context
 
         scene = self.load()
         backend = auto_backend() if self.backend == "auto" else self.backend
@@ -93,12 +94,16 @@ class Drop(_Video):
     """How many bodies fall."""
     seed: Seed = 0
     """Chooses where and what falls; the same seed gives the same video."""
+    up: UpAxis = None
+    """Axis of the mesh that points up."""
+    repair: bool = False
+    """Mend a mesh that is open or not manifold (needs the package pymeshfix)."""
 
     def load(self) -> Scene:
         """Build a scene round the mesh."""
         from .drop import drop_scene
 
-        return drop_scene(self.mesh, bodies=self.bodies, seed=self.seed)
+        return drop_scene(self.mesh, bodies=self.bodies, seed=self.seed, up=self.up, repair=self.repair)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -112,30 +117,47 @@ class Atlas:
     resolution: Count = 128
     """Texels along an edge of a cube face."""
     method: Annotated[str, arg(metavar="METHOD")] = "progressive"
-    """Sphere map: progressive (fold-free, spreads the area evenly)."""
+    """Sphere map: progressive (fold-free, spreads the area evenly) or conformal (keeps angles; starves limbs)."""
+    plot: Annotated[Path | None, arg(metavar="PNG", help_behavior_hint="(optional)")] = None
+    """Write a picture of the mesh, the sphere and the six faces, coloured by stretch."""
+    up: UpAxis = None
+    """Axis of the mesh that points up in the picture."""
+    repair: bool = False
+    """Mend a mesh that is open or not manifold (needs the package pymeshfix)."""
     json: bool = False
     """Print JSON."""
 
     def run(self) -> None:
-        """Build the atlas, save it where that is asked for, and print its figures."""
+        """Build the atlas, save and draw it where that is asked for, and print its figures."""
+        from .atlas_report import atlas_report, report_text
+        from .orientation import usual_up
         from .solver import build_atlas, load_mesh
 
+        if self.plot is not None:
+            from .atlas_plot import check_plot_path
+
+            check_plot_path(self.plot)  # before anything that takes time
         start = time.perf_counter()
-        mesh = load_mesh(self.mesh)
+        mesh = load_mesh(self.mesh, repair=self.repair)
         loaded = time.perf_counter()
         atlas = build_atlas(mesh, resolution=self.resolution, method=self.method)
+        seconds = {"load": loaded - start, **atlas.timings}
         if self.output is not None:
             atlas.save(self.output)
-        report = {
-            "mesh": str(self.mesh),
-            "vertices": len(mesh.V),
-            "triangles": len(mesh.F),
-            "resolution": self.resolution,
-            "method": self.method,
-            "quality": atlas.quality(),
-            "seconds": {"load": loaded - start, **atlas.timings},
-        }
-        print(json_format.dumps(report, indent=2) if self.json else _atlas_text(report))
+        if self.plot is not None:
+            from .atlas_plot import plot_atlas
+
+            begun = time.perf_counter()
+            plot_atlas(
+                atlas, self.plot, title=self.mesh.stem, subtitle=self._subtitle(mesh), up=self.up or usual_up(self.mesh)
+            )
+            seconds["plot"] = time.perf_counter() - begun
+        report = atlas_report(self.mesh, atlas, self.method, seconds)
+        print(json_format.dumps(report, indent=2) if self.json else report_text(report))
+
+    def _subtitle(self, mesh: Mesh) -> str:
+        n = self.resolution
+        return f"{len(mesh.V):,} vertices, {len(mesh.F):,} triangles; 6 x {n} x {n} texels, {self.method} sphere map"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -165,15 +187,3 @@ def _summary_text(summary: Summary) -> str:
         f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
         f"encoding {summary.encode_seconds:.1f} s"
     )
-
-
-def _atlas_text(report: dict[str, Any]) -> str:
-    n = report["resolution"]
-    rows = {
-        "mesh": f"{report['vertices']} vertices, {report['triangles']} triangles",
-        "atlas": f"6 x {n} x {n} texels, {report['method']} sphere map",
-        **{name: f"{value:.6g}" for name, value in report["quality"].items()},
-        **{f"{stage} time": f"{seconds:.3f} s" for stage, seconds in report["seconds"].items()},
-    }
-    width = max(map(len, rows))
-    return "\n".join([report["mesh"], *(f"{name:<{width}}  {value}" for name, value in rows.items())])

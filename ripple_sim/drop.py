@@ -15,6 +15,7 @@ from ripple_sim.solver.rays import downward_hits
 from .errors import SceneError
 from .events import Events
 from .motion import DropEntry
+from .orientation import UP_AXES, usual_up
 from .scene import Scene
 from .scene_file import CameraEntry, MaterialEntry, RippleEntry
 
@@ -40,6 +41,7 @@ def drop_scene(
     seed: int = 0,
     up: str | None = None,
     look: str = "rubber",
+    repair: bool = False,
 ) -> Scene:
     """Scene in which bodies of several shapes fall on a mesh.
 
@@ -57,6 +59,8 @@ def drop_scene(
         Axis of the file that points up, "y" or "z". By default "z" for STL, else "y", as is usual for each.
     look : str
         Of the target.
+    repair : bool
+        Mend a mesh that is open or not manifold (needs the package pymeshfix).
 
     Raises
     ------
@@ -67,11 +71,10 @@ def drop_scene(
     """
     if not 1 <= bodies <= 100:
         raise SceneError(f"the number of bodies is {bodies}; valid is 1 to 100")
-    if up is None:
-        up = "z" if Path(mesh_path).suffix.lower() == ".stl" else "y"
-    if up not in ("y", "z"):
-        raise SceneError(f"the up axis is {up!r}; valid are 'y' and 'z'")
-    mesh = load_mesh(mesh_path)
+    up = up or usual_up(mesh_path)
+    if up not in UP_AXES:
+        raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
+    mesh = load_mesh(mesh_path, repair=repair)
     V = _standing(mesh, up)
     rng = np.random.default_rng(seed)
     spec, drops = _build(V, mesh.F, bodies, rng)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .errors import MeshError
 from .mesh import Mesh
 
-_INSTALL = "pip install 'ripple-sim[repair]', which adds the package pymeshfix (GPL)"
+_INSTALL = "pip install 'ripple-sim[repair]' (it adds the package pymeshfix, which is under the GPL)"
 
 
 def repaired(V: NDArray[np.float64], F: NDArray[np.int64], name: str, defect: MeshError) -> Mesh:
@@ -33,7 +33,7 @@ def repaired(V: NDArray[np.float64], F: NDArray[np.int64], name: str, defect: Me
     try:
         from pymeshfix import PyTMesh
     except ImportError as error:
-        raise MeshError(f"{defect}; to repair it, install {_INSTALL}") from error
+        raise MeshError(f"{defect}; for --repair, run {_INSTALL}") from error
     F = F[np.isfinite(V[F]).all(axis=(1, 2))]
     if len(F) == 0:
         raise MeshError(f"{defect}; nothing is left to repair")

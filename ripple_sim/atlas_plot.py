@@ -1,0 +1,121 @@
+"""One picture of an atlas: the mesh and the sphere with the texel grid, the six faces unfolded, and how good it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure  # without pyplot, which would look for a display
+from numpy.typing import NDArray
+
+from ripple_sim.solver import Atlas, AtlasError
+
+from .atlas_views import AtlasPainter, View, texel_stretch
+
+# Finer than an even spread is blue, coarser is red; the ends are twice as fine and twice as coarse.
+_COLORS = LinearSegmentedColormap.from_list(
+    "stretch", ["#1f4e8c", "#3f8fc0", "#8fd0d4", "#f6f1df", "#f4b46f", "#dd6247", "#8c1d40"], N=512
+)
+_RANGE = 2.0
+_ENDINGS = (".png", ".jpg", ".pdf", ".svg")
+_TEXT, _FAINT = "#1b2432", "#6b7685"
+_DPI = 120
+
+
+def check_plot_path(path: str | Path) -> None:
+    """Raise `AtlasError` if pictures of this ending are not written."""
+    if Path(path).suffix.lower() not in _ENDINGS:
+        raise AtlasError(f"plot file {str(path)!r} has an unknown ending; valid are {', '.join(_ENDINGS)}")
+
+
+def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = "", up: str = "y") -> None:
+    """Write a picture of an atlas and its quality.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    path : path
+        Ends in .png, .jpg, .pdf or .svg.
+    title, subtitle : str
+    up : str
+        Axis of the mesh that points up in the picture, "y" or "z".
+
+    Raises
+    ------
+    AtlasError
+        If the ending is unknown or the file cannot be written.
+    """
+    check_plot_path(path)
+    stretch = texel_stretch(atlas)
+    painter = AtlasPainter(atlas, _COLORS(_shade(stretch))[..., :3])
+    figure = Figure(figsize=(16, 9), dpi=_DPI, facecolor="white")
+    figure.text(0.03, 0.945, title, fontsize=25, fontweight="bold", color=_TEXT, va="center")
+    figure.text(0.03, 0.903, subtitle, fontsize=12.5, color=_FAINT, va="center")
+    front, back = View(up=up), View(azimuth=View.azimuth + 180, up=up)
+    _show(figure, (0.015, 0.05, 0.40, 0.82), painter.mesh(front, 800))
+    _show(figure, (0.405, 0.50, 0.215, 0.40), painter.mesh(back, 400), "the other side")
+    _show(figure, (0.415, 0.06, 0.195, 0.36), painter.sphere(front, 380), "on the sphere")
+    _show(figure, (0.635, 0.455, 0.35, 0.47), painter.cross(160), "the six faces, unfolded")
+    _histogram(figure.add_axes((0.655, 0.300, 0.31, 0.105)), stretch, atlas.areas)
+    _figures(figure, atlas)
+    try:
+        figure.savefig(path, dpi=_DPI, metadata={"Date": None} if Path(path).suffix.lower() == ".svg" else None)
+    except OSError as error:
+        raise AtlasError(f"plot file {str(path)!r} cannot be written: {error.strerror or error}") from error
+
+
+def _shade(stretch: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Place on the colour scale, 0 to 1."""
+    return np.clip(0.5 + 0.5 * np.log(stretch) / np.log(_RANGE), 0, 1)
+
+
+def _show(figure: Figure, place: tuple[float, float, float, float], picture: NDArray, caption: str = "") -> None:
+    axes = figure.add_axes(place)
+    axes.imshow(picture, interpolation="antialiased")
+    axes.set_axis_off()
+    if caption:
+        axes.text(0.5, -0.03, caption, transform=axes.transAxes, ha="center", va="top", fontsize=11, color=_FAINT)
+
+
+def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
+    """Share of the surface over stretch, in the colours of the pictures: their legend too."""
+    bins = np.geomspace(1 / _RANGE, _RANGE, 121)
+    share, _ = np.histogram(stretch.clip(bins[0], bins[-1]), bins, weights=areas)
+    middles = np.sqrt(bins[1:] * bins[:-1])
+    colors = _COLORS(_shade(middles))
+    axes.bar(bins[:-1], share / share.max(), np.diff(bins), align="edge", color=colors, edgecolor="none")
+    axes.bar(bins[:-1], -0.14, np.diff(bins), bottom=-0.03, align="edge", color=colors, edgecolor="none")
+    axes.set_xscale("log")
+    axes.set_xlim(bins[0], bins[-1])
+    axes.set_ylim(-0.17, 1.02)
+    ticks = [0.5, 0.6, 0.7, 0.8, 1.0, 1.25, 1.5, 2.0]
+    axes.set_xticks(ticks, ["≤ ½", *(f"{t:g}" for t in ticks[1:-1]), "≥ 2"], fontsize=10, color=_TEXT)
+    axes.set_xticks([], minor=True)
+    axes.set_yticks([])
+    axes.tick_params(length=0, pad=3)
+    axes.set_xlabel("stretch: texel width relative to an even spread", fontsize=11, color=_FAINT)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+
+
+def _figures(figure: Figure, atlas: Atlas) -> None:
+    quality = atlas.quality()
+    even = np.sqrt(atlas.mesh.area / atlas.areas.size)
+    columns = [
+        [
+            ("folded triangles", f"{quality['flipped']}"),
+            ("area starved (stretch over 4)", f"{quality['starved']:.2%}"),
+            ("texel area / mesh area", f"{quality['coverage']:.4f}"),
+        ],
+        [
+            ("stretch, median", f"{quality['q50']:.2f}"),
+            ("stretch, 0.1 % to 99.9 %", f"{quality['q001']:.2f} to {quality['q999']:.2f}"),
+            ("texel edges / even grid", f"{quality['edge_min'] / even:.2f} to {quality['edge_max'] / even:.2f}"),
+        ],
+    ]
+    for left, rows in zip((0.655, 0.815), columns, strict=True):
+        for k, (name, value) in enumerate(rows):
+            figure.text(left, 0.196 - 0.062 * k, value, fontsize=16, fontweight="bold", color=_TEXT, va="center")
+            figure.text(left, 0.170 - 0.062 * k, name, fontsize=9.5, color=_FAINT, va="center")

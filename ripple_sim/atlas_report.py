@@ -1,0 +1,62 @@
+"""What `ripple-sim atlas` says: the mesh, what was mended, how good the atlas is, how long each stage took."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ripple_sim.solver import Atlas
+
+
+def atlas_report(path: Path, atlas: Atlas, method: str, seconds: dict[str, float]) -> dict[str, Any]:
+    """Figures of an atlas, as JSON can hold them.
+
+    Parameters
+    ----------
+    path : path
+        The mesh's file.
+    atlas : Atlas
+    method : str
+        Its sphere map.
+    seconds : dict
+        Wall time of each stage [s].
+
+    Returns
+    -------
+    dict
+        `mesh`, `vertices`, `triangles`, `size` of the bounding box [m], `area` [m^2], `volume` [m^3], `fixes` (what was
+        mended, one phrase each), `resolution`, `method`, `quality` (see `Atlas.quality`) and `seconds`.
+    """
+    mesh = atlas.mesh
+    return {
+        "mesh": str(path),
+        "vertices": len(mesh.V),
+        "triangles": len(mesh.F),
+        "size": np.ptp(mesh.V, axis=0).tolist(),
+        "area": mesh.area,
+        "volume": mesh.volume,
+        "fixes": list(mesh.fixes),
+        "resolution": atlas.resolution,
+        "method": method,
+        "quality": atlas.quality(),
+        "seconds": seconds,
+    }
+
+
+def report_text(report: dict[str, Any]) -> str:
+    """Lay a report out for reading."""
+    n = report["resolution"]
+    rows = [
+        ("mesh", f"{report['vertices']} vertices, {report['triangles']} triangles"),
+        ("size", f"{' x '.join(f'{x:.4g}' for x in report['size'])} m"),
+        ("area", f"{report['area']:.6g} m^2"),
+        ("volume", f"{report['volume']:.6g} m^3"),
+        *(("mended", fix) for fix in report["fixes"]),
+        ("atlas", f"6 x {n} x {n} texels, {report['method']} sphere map"),
+        *((name, f"{value:.6g}") for name, value in report["quality"].items()),
+        *((f"{stage.replace('_', ' ')} time", f"{seconds:.3f} s") for stage, seconds in report["seconds"].items()),
+    ]
+    width = max(len(name) for name, _ in rows)
+    return "\n".join([report["mesh"], *(f"{name:<{width}}  {value}" for name, value in rows)])

@@ -1,0 +1,10 @@
+"""Which way is up in a mesh file."""
+
+from pathlib import Path
+
+UP_AXES = ("y", "z")
+
+
+def usual_up(path: str | Path) -> str:
+    """Axis that points up in files of this format as they are usually made: "z" for STL, else "y"."""
+    return "z" if Path(path).suffix.lower() == ".stl" else "y"
