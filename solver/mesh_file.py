@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from pathlib import Path
 
@@ -10,10 +11,15 @@ import trimesh
 
 from .errors import MeshError
 from .mesh import Mesh
-from .mesh_text import Soup, read_obj, read_off
+from .mesh_ply import read_ply
+from .mesh_text import read_obj, read_off
+from .polygons import Soup
 from .repair import repaired
 
-_TEXT = {".obj": read_obj, ".off": read_off}
+# trimesh logs whole tracebacks, which Python prints to stderr where nobody has set up logging
+logging.getLogger("trimesh").addHandler(logging.NullHandler())
+
+_READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
 
 
 def load_mesh(path: str | Path, repair: bool = False) -> Mesh:
@@ -55,8 +61,8 @@ def _read(path: Path) -> Soup:
             )
         if path.stat().st_size == 0:
             raise MeshError(f"mesh file {str(path)!r} is empty")
-        if path.suffix.lower() in _TEXT:
-            return _TEXT[path.suffix.lower()](path.read_bytes().decode("utf-8", errors="replace"))
+        if path.suffix.lower() in _READERS:
+            return _READERS[path.suffix.lower()](path.read_bytes())
         if kind.lower() not in trimesh.available_formats():
             raise MeshError(f"mesh file {str(path)!r} has an unknown ending; valid are .obj, .off, .ply, .stl and .glb")
         with path.open("rb"), warnings.catch_warnings():

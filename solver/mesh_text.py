@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import re
 from collections.abc import Sequence
@@ -11,30 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import MeshError
-from .polygons import triangulate
+from .polygons import Soup, triangulate
 
 _CORNER = re.compile(r"(-?\d{1,15})(?:/(-?\d{1,15})?(?:/(?:-?\d+)?)?)?", flags=re.ASCII)
 _WHOLE = re.compile(r"-?\d{1,15}", flags=re.ASCII)
 
 
-@dataclasses.dataclass(frozen=True)
-class Soup:
-    """Triangles as a file gives them, not validated.
-
-    Attributes
-    ----------
-    V : float64 [vertex_count, 3]
-    F : int64 [face_count, 3]
-    corner_uv : float64 [face_count, 3, 2] or None
-        Texture coordinates of the corners; 0 where the file has none for some of them.
-    """
-
-    V: NDArray[np.float64]
-    F: NDArray[np.int64]
-    corner_uv: NDArray[np.float64] | None = None
-
-
-def read_obj(text: str) -> Soup:
+def read_obj(content: bytes) -> Soup:
     """Triangles of a Wavefront OBJ file: all its objects, groups and materials together.
 
     Raises
@@ -48,7 +30,8 @@ def read_obj(text: str) -> Soup:
     sizes: list[int] = []
     lines: list[int] = []
     known: dict[str, tuple[int, int]] = {}
-    for number, line in enumerate(text.replace("\\\r\n", " ").replace("\\\n", " ").splitlines(), 1):
+    text = _decoded(content).replace("\\\r\n", " ").replace("\\\n", " ")
+    for number, line in enumerate(text.splitlines(), 1):
         words = line.partition("#")[0].split()
         if not words:
             continue
@@ -82,7 +65,7 @@ def read_obj(text: str) -> Soup:
     return Soup(V, vertex[triangles], corner_uv)
 
 
-def read_off(text: str) -> Soup:
+def read_off(content: bytes) -> Soup:
     """Triangles of an OFF file in text form, with or without colours and normals.
 
     Raises
@@ -90,7 +73,7 @@ def read_off(text: str) -> Soup:
     MeshError
         For a file that is no OFF file in text form, ends early, or has an index that no vertex has.
     """
-    rows = [words for line in text.splitlines() if (words := line.partition("#")[0].split())]
+    rows = [words for line in _decoded(content).splitlines() if (words := line.partition("#")[0].split())]
     if not rows or not re.fullmatch(r"(ST)?C?N?OFF", rows[0][0].upper()) or "BINARY" in rows[0]:
         raise MeshError("it does not start with OFF, as an OFF file in text form does")
     counts = rows[0][1:] or (rows[1] if len(rows) > 1 else [])
@@ -115,6 +98,11 @@ def read_off(text: str) -> Soup:
     vertex = np.array(list(itertools.chain.from_iterable(polygons)), dtype=np.int64)
     sizes = np.array([len(corners) for corners in polygons], dtype=np.int64)
     return Soup(V, vertex[triangulate(V[vertex], sizes)])
+
+
+def _decoded(content: bytes) -> str:
+    # what is not UTF-8 can only be a name or a comment
+    return content.decode("utf-8", errors="replace")
 
 
 def _corner(word: str, places: int, pairs: int, line: int) -> tuple[int, int]:

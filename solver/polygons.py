@@ -1,9 +1,28 @@
-"""Polygons cut into triangles: by a fan from the first corner, or by clipping ears where a fan would fold."""
+"""Triangles as a file gives them, and its polygons cut into such: by a fan, or by clipping ears where a fan folds."""
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 from numpy.typing import NDArray
+
+
+@dataclasses.dataclass(frozen=True)
+class Soup:
+    """Triangles as a file gives them, not validated.
+
+    Attributes
+    ----------
+    V : float64 [vertex_count, 3]
+    F : int64 [face_count, 3]
+    corner_uv : float64 [face_count, 3, 2] or None
+        Texture coordinates of the corners; 0 where the file has none for some of them.
+    """
+
+    V: NDArray[np.float64]
+    F: NDArray[np.int64]
+    corner_uv: NDArray[np.float64] | None = None
 
 
 def triangulate(points: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -38,7 +57,8 @@ def _folded(
     """Polygons of which a triangle of the fan faces against the sum of all of them: they are not convex."""
     many = np.flatnonzero(sizes[owner] > 3)
     a, b, c = (points[triangles[many, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later, by name
+        normals = np.cross(b - a, c - a)
     polygon = owner[many]
     total = np.stack([np.bincount(polygon, normals[:, k], minlength=len(sizes)) for k in range(3)], axis=1)
     against = np.einsum("ij,ij->i", normals, total[polygon]) < 0
