@@ -14,7 +14,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from .atlas import Atlas
 from .errors import SolverError
 from .material import Material
-from .stencil import EAST, NORTH, agree_across_edges, cotangent_stencil, link_lengths, pad
+from .stencil import EAST, NORTH, agree_across_edges, link_lengths, pad, stiffness_stencil
 
 OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
 
@@ -186,7 +186,7 @@ def build_operator(atlas: Atlas, material: Material, kind: str) -> WaveOperator:
     field = {each.name: material.texels(each.name, atlas.resolution) for each in dataclasses.fields(material)}
     density, area = field["density"], atlas.areas
     if kind == "fem":
-        assemble = functools.partial(cotangent_stencil, atlas.positions)
+        assemble = functools.partial(stiffness_stencil, atlas.positions)
     else:
         # these formulas give accelerations without masses: one area for all keeps the units, one density as well
         area, density = np.full_like(area, area.mean()), np.full_like(density, density.mean())

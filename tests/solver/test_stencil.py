@@ -1,4 +1,4 @@
-"""The finite-element stencil: symmetry, conservation, and the triangles it is made of."""
+"""The finite-element stencil: symmetry, conservation, and the cells it is made of."""
 
 import numpy as np
 import pytest
@@ -7,16 +7,30 @@ from scipy.sparse import coo_array
 from ripple_sim.solver import sphere_atlas
 from ripple_sim.solver.cubemap import padded_indices, texel_directions
 from ripple_sim.solver.operator import stencil_sum
-from ripple_sim.solver.stencil import cotangent_stencil, link_lengths, lumped_areas, pad
+from ripple_sim.solver.stencil import link_lengths, lumped_areas, pad, stiffness_stencil
+
+
+def element(corners: np.ndarray) -> tuple[np.ndarray, float]:
+    """Stiffness matrix and area of a cell with 3 or 4 corners [k, 3], in order round it."""
+    if len(corners) == 4:
+        frame = np.array([corners[2] - corners[0], corners[3] - corners[1]])
+        differences = np.array([[-1.0, 0, 1, 0], [0, -1, 0, 1]])
+        area = np.linalg.norm(np.cross(*frame)) / 2
+    else:
+        frame = corners[1:] - corners[0]
+        differences = np.array([[-1.0, 1, 0], [-1, 0, 1]])
+        area = np.linalg.norm(np.cross(*frame)) / 2
+    # the gradient in space whose components along the frame are the differences
+    gradient = np.linalg.pinv(frame) @ differences
+    stiffness = area * gradient.T @ gradient
+    if len(corners) == 4:
+        hourglass = np.array([1.0, -1, 1, -1])
+        stiffness += 0.4 * 4 * area / (frame**2).sum() * np.outer(hourglass, hourglass)
+    return stiffness, area
 
 
 def brute_force_laplacian(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Stiffness matrix and lumped areas, triangle by triangle, from every cell's two triangulations."""
-
-    def quality(triangle: list[int]) -> float:
-        p, q, s = x[triangle]
-        return np.linalg.norm(np.cross(q - p, s - p)) / sum(e @ e for e in (q - p, s - q, p - s))
-
+    """Stiffness matrix and lumped areas, cell by cell."""
     n = positions.shape[1]
     x = positions.reshape(-1, 3)
     index = padded_indices(n)
@@ -30,21 +44,9 @@ def brute_force_laplacian(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray
     stiffness = np.zeros((len(x), len(x)))
     areas = np.zeros(len(x))
     for ring in cells.values():
-        if len(ring) == 3:
-            triangles = [(ring, 1.0)]
-        else:
-            pairs = [[[ring[i] for i in t] for t in pair] for pair in (((0, 1, 2), (0, 2, 3)), ((0, 1, 3), (1, 2, 3)))]
-            worth = [min(quality(t) for t in pair) ** 6 for pair in pairs]
-            triangles = [(t, w / sum(worth)) for pair, w in zip(pairs, worth, strict=True) for t in pair]
-        for triangle, share in triangles:
-            for k in range(3):
-                i, j, o = triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]
-                a, b = x[i] - x[o], x[j] - x[o]
-                double_area = np.linalg.norm(np.cross(a, b))
-                weight = share * (a @ b) / double_area / 2
-                stiffness[[i, j], [j, i]] += weight
-                stiffness[[i, j], [i, j]] -= weight
-                areas[o] += share * double_area / 6
+        part, area = element(x[ring])
+        stiffness[np.ix_(ring, ring)] -= part
+        areas[ring] += area / len(ring)
     return stiffness, areas
 
 
@@ -59,7 +61,7 @@ def bumpy() -> np.ndarray:
 def test_stencil_equals_brute_force_assembly(bumpy: np.ndarray) -> None:
     stiffness, areas = brute_force_laplacian(bumpy)
     h = np.random.default_rng(0).standard_normal((6, 6, 6))
-    stencil = cotangent_stencil(bumpy, np.ones((6, 6, 6)))
+    stencil = stiffness_stencil(bumpy, np.ones((6, 6, 6)))
     np.testing.assert_allclose(stencil_sum(stencil, pad(h)).ravel(), stiffness @ h.ravel(), atol=1e-12)
     np.testing.assert_allclose(lumped_areas(bumpy).ravel(), areas, rtol=1e-12)
 
@@ -67,7 +69,7 @@ def test_stencil_equals_brute_force_assembly(bumpy: np.ndarray) -> None:
 def test_operator_is_symmetric_to_the_last_bit(bumpy: np.ndarray) -> None:
     n = bumpy.shape[1]
     rng = np.random.default_rng(1)
-    stencil = cotangent_stencil(bumpy, rng.uniform(0.1, 2, (6, n, n))).astype(np.float32)
+    stencil = stiffness_stencil(bumpy, rng.uniform(0.1, 2, (6, n, n))).astype(np.float32)
     index = padded_indices(n)
     rows, columns, values = [], [], []
     for link, (a, b) in enumerate(
@@ -94,8 +96,20 @@ def test_operator_is_symmetric_to_the_last_bit(bumpy: np.ndarray) -> None:
     assert valence.max() == 8
 
 
+def test_stiffness_is_positive_but_for_the_constant(bumpy: np.ndarray) -> None:
+    n = bumpy.shape[1]
+    rng = np.random.default_rng(7)
+    # far from smooth: texels that lie anywhere
+    stencil = stiffness_stencil(bumpy + 0.2 * rng.standard_normal(bumpy.shape), np.ones((6, n, n)))
+    basis = np.eye(6 * n * n).reshape(-1, 6, n, n)
+    matrix = -np.array([stencil_sum(stencil, pad(field)).ravel() for field in basis])
+    values = np.linalg.eigvalsh(matrix)
+    assert abs(values[0]) < 1e-10
+    assert values[1] > 1e-3
+
+
 def test_constant_field_feels_no_force(bumpy: np.ndarray) -> None:
-    stencil = cotangent_stencil(bumpy, np.full((6, 6, 6), 2.0))
+    stencil = stiffness_stencil(bumpy, np.full((6, 6, 6), 2.0))
     force = stencil_sum(stencil, pad(np.full((6, 6, 6), 5.0)))
     assert np.abs(force).max() == 0
 
