@@ -18,15 +18,18 @@ class ContactPair:
     target, other : int
         Geom ids.
     points : float64 [k, 3]
-        Contact points in the world [m], half-way between the two surfaces.
+        Contact points in the world [m], just outside the target's surface.
     forces : float64 [k]
         Normal forces [N], all positive.
+    normals : float64 [k, 3]
+        Unit normals in the world, from the target to the other geom.
     """
 
     target: int
     other: int
     points: NDArray[np.float64]
     forces: NDArray[np.float64]
+    normals: NDArray[np.float64]
 
 
 def contact_pairs(model: mujoco.MjModel, data: mujoco.MjData, targets: set[int]) -> list[ContactPair]:
@@ -34,39 +37,26 @@ def contact_pairs(model: mujoco.MjModel, data: mujoco.MjData, targets: set[int])
 
     Where two targets touch, the pair is reported for each of them.
     """
-    found: dict[tuple[int, int], list[tuple[NDArray, float]]] = {}
+    found: dict[tuple[int, int], list[tuple[NDArray, float, NDArray]]] = {}
     wrench = np.zeros(6)
-    for i in range(data.ncon):
-        contact = data.contact[i]
-        first, second = int(contact.geom[0]), int(contact.geom[1])
+    contacts = data.contact
+    geoms, address = contacts.geom.tolist(), contacts.efc_address.tolist()
+    for i, (first, second) in enumerate(geoms):
         # without a row in the constraint solver (excluded, or in the margin only) a contact carries no force
-        if contact.efc_address < 0 or not (first in targets or second in targets):
+        if address[i] < 0 or not (first in targets or second in targets):
             continue
         mujoco.mj_contactForce(model, data, i, wrench)
         if wrench[0] <= 0:
             continue
-        entry = (contact.pos.copy(), float(wrench[0]))
-        if first in targets:
-            found.setdefault((first, second), []).append(entry)
-        if second in targets:
-            found.setdefault((second, first), []).append(entry)
+        contact = contacts[i]
+        # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's surface is dist/2
+        # away. Somewhat outside of it the nearest surface point is on this side, even of a thin part.
+        middle, normal, away = contact.pos, contact.frame[:3], 1.5 * abs(contact.dist)
+        for target, other, outward in ((first, second, normal), (second, first, -normal)):
+            if target in targets:
+                entry = (middle + away * outward, float(wrench[0]), outward.copy())
+                found.setdefault((target, other), []).append(entry)
     return [
-        ContactPair(target, other, np.array([p for p, _ in entries]), np.array([f for _, f in entries]))
+        ContactPair(target, other, *(np.array(column) for column in zip(*entries, strict=True)))
         for (target, other), entries in sorted(found.items())
     ]
-
-
-def cluster(points: NDArray[np.float64], forces: NDArray[np.float64], radius: float) -> list[tuple[NDArray, float]]:
-    """Join contacts that lie within a radius [m] of the strongest one: force-weighted points and summed forces.
-
-    What lies farther apart (the two ends of a capsule) stays apart. The forces of the clusters add up to the total.
-    """
-    clusters = []
-    left = np.ones(len(forces), dtype=bool)
-    while left.any():
-        strongest = np.flatnonzero(left)[np.argmax(forces[left])]
-        near = left & (np.linalg.norm(points - points[strongest], axis=1) <= radius)
-        force = float(forces[near].sum())
-        clusters.append((forces[near] @ points[near] / force, force))
-        left &= ~near
-    return clusters

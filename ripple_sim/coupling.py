@@ -12,16 +12,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver import Material, WaveSolver
+from ripple_sim.solver.cubemap import face_coordinates
 from ripple_sim.solver.footprint import footprint
 
 from .collidable import collides_as_hull, hull_warning
-from .contacts import ContactPair, cluster, contact_pairs
+from .contacts import ContactPair, contact_pairs
 from .errors import RippleWarning, SceneError
+from .patch import pressed_patch
+from .press import Press
 from .speeds import SpeedCheck
 from .target import find_target, geom_name, target_atlas
 
 # Footprint radius over the touching body's smallest half-extent: about the patch of a ball sunk in by an eighth.
 _FOOTPRINT = 0.5
+
+_NOT_CONVEX = (int(mujoco.mjtGeom.mjGEOM_SDF), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -96,6 +101,7 @@ class Ripples:
             self._waves[geom] = WaveSolver(target_atlas(model, geom, n), materials[name], **self._options)
             self._warn_of_hull(name)
         self._check_speeds = SpeedCheck(model, list(self._waves))
+        self._presses: dict[tuple[int, int], Press] = {}
         self._time: float | None = None
         self.last_impulses: list[Impulse] = []
 
@@ -119,11 +125,11 @@ class Ripples:
         return dict(self._geoms)
 
     def step(self, data: mujoco.MjData) -> None:
-        """Turn the contact forces of the physics step just made into impulses, and advance the waves up to `data.time`.
+        """Let the contact forces of the physics step just made press on the surfaces; advance the waves to `data.time`.
 
         The forces and poses in `data` after `mj_step` are those at the beginning of that step, over which MuJoCo holds
         the forces: each contact gives normal force times time step. If time has gone backwards (the simulation was
-        reset) the waves are reset too.
+        reset) the waves are reset too; if it stands still, nothing happens.
         """
         timestep = self.model.opt.timestep
         elapsed = timestep if self._time is None else data.time - self._time
@@ -131,17 +137,28 @@ class Ripples:
             self.reset()
             elapsed = timestep
         self._time = data.time
+        self.last_impulses = []
+        if elapsed == 0:
+            return
         self._check_speeds(data)
-        self.last_impulses = [
-            self._press(data, pair, timestep) for pair in contact_pairs(self.model, data, set(self._waves))
-        ]
-        for waves in self._waves.values():
-            waves.step(elapsed)
+        loads: dict[int, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {geom: [] for geom in self._waves}
+        touching = set()
+        for pair in contact_pairs(self.model, data, set(self._waves)):
+            touching.add((pair.target, pair.other))
+            loads[pair.target].append(self._press(data, pair, timestep, elapsed))
+        for key, press in list(self._presses.items()):
+            if key not in touching:
+                loads[key[0]].append(press.release(elapsed))
+                if press.over:
+                    del self._presses[key]
+        for geom, waves in self._waves.items():
+            _advance(waves, loads[geom], elapsed)
 
     def reset(self) -> None:
         """Flatten all surfaces."""
         self._time = None
         self.last_impulses = []
+        self._presses.clear()
         for waves in self._waves.values():
             waves.reset()
 
@@ -198,6 +215,7 @@ class Ripples:
         new.height, new.velocity, new.pressure = old.height, old.velocity, old.pressure
         new.time, new.substeps_taken = old.time, old.substeps_taken
         self._waves[self._geoms[name]] = new
+        self._presses = {key: press for key, press in self._presses.items() if key[0] != self._geoms[name]}
 
     def _warn_of_hull(self, name: str) -> None:
         if collides_as_hull(self.model, self._geoms[name]):
@@ -205,27 +223,48 @@ class Ripples:
             if message is not None:
                 warnings.warn(message, RippleWarning, stacklevel=3)
 
-    def _press(self, data: mujoco.MjData, pair: ContactPair, timestep: float) -> Impulse:
+    def _press(
+        self, data: mujoco.MjData, pair: ContactPair, timestep: float, elapsed: float
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Forces [N] of a pair on the texels of its target, over the time that has elapsed."""
         waves = self._waves[pair.target]
         position, rotation = data.geom_xpos[pair.target], data.geom_xmat[pair.target].reshape(3, 3)
-        local = (pair.points - position) @ rotation
-        radius = _FOOTPRINT * self._extent(pair.other)
-        for point, force in cluster(local, pair.forces, max(radius, 1e-9)):
-            waves.add_impulse(point, force * timestep, radius)
-        total = float(pair.forces.sum())
-        surface, _ = waves.atlas.project(pair.forces @ local / total)
+        local, total = (pair.points - position) @ rotation, float(pair.forces.sum())
+        surface, direction = waves.atlas.project(pair.forces @ local / total)
         n = waves.atlas.resolution
-        face, row, column = np.unravel_index(int(waves.atlas.nearest_texel(surface)[0]), (6, n, n))
-        return Impulse(
-            geom=geom_name(self.model, pair.target),
-            other=geom_name(self.model, pair.other),
-            point=position + rotation @ surface[0],
-            impulse=total * timestep,
-            texel=(int(face), int(row), int(column)),
+        face, *inside = (float(x[0]) for x in face_coordinates(direction, n))
+        row, column = (int(np.clip(np.rint(x), 0, n - 1)) for x in inside)
+        self.last_impulses.append(
+            Impulse(
+                geom=geom_name(self.model, pair.target),
+                other=geom_name(self.model, pair.other),
+                point=position + rotation @ surface[0],
+                impulse=total * timestep,
+                texel=(int(face), row, column),
+            )
         )
+        radius = _FOOTPRINT * min(self._extent(pair.target), self._extent(pair.other))
+        convex = self.model.geom_type[pair.other] not in _NOT_CONVEX
+        points, forces, radius = pressed_patch(waves.atlas, local, pair.forces, radius, convex)
+        key = pair.target, pair.other
+        press = self._presses.get(key) or self._presses.setdefault(key, Press(waves))
+        return press.press(points, forces * (timestep / elapsed), radius, elapsed)
 
     def _extent(self, geom: int) -> float:
-        """Smallest half-extent of a geom [m]; 0 for planes and height fields, which have none."""
+        """Smallest half-extent of a geom [m]; planes and height fields have none, and count as endless."""
         if self.model.geom_type[geom] in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD):
-            return 0.0
+            return np.inf
         return float(self.model.geom_aabb[geom, 3:].min())
+
+
+def _advance(waves: WaveSolver, loads: list[tuple[NDArray[np.int64], NDArray[np.float64]]], dt: float) -> None:
+    """Take a step under forces [N, positive inwards] beside those that the surface holds of its own."""
+    held = waves._load
+    if loads:
+        texels, forces = (np.concatenate(column) for column in zip(*loads, strict=True))
+        waves._load = held.plus(texels, -forces)
+    try:
+        waves.step(dt)
+    finally:
+        if loads:
+            waves._load, held.uploaded = held, False

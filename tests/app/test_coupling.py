@@ -1,11 +1,12 @@
 """From contacts to impulses: the right place, the right amount, on still and moving targets of every kind."""
 
+import igl
 import mujoco
 import numpy as np
 import pytest
 
 from ripple_sim import Material, RippleError, Ripples
-from ripple_sim.contacts import cluster
+from ripple_sim.patch import cluster
 from ripple_sim.scenes.shapes import limbed
 
 GRAVITY = 9.81
@@ -124,6 +125,43 @@ def test_impulse_follows_a_moving_target() -> None:
     assert found == 3
 
 
+def test_sources_lie_where_mujocos_contacts_do_on_tumbling_concave_targets() -> None:
+    """Independent of the atlas: the contacts' force-weighted point, and the nearest point of the mesh in the world."""
+    target = '<body name="target"><freejoint/><geom name="target" type="sdf" mesh="limbed" mass="20"/></body>'
+    model = model_of(target + BALL.format("3 0 0"), limbed_asset(), 'gravity="0 0 0"')
+    data, rng, wrench = mujoco.MjData(model), np.random.default_rng(7), np.zeros(6)
+    ripples = Ripples(model, {"target": Material()}, resolution=128, backend="cpu")
+    atlas = ripples["target"].atlas
+    off = []
+    for _ in range(14):
+        mujoco.mj_resetData(model, data)
+        data.qpos[3:7] = (quat := rng.standard_normal(4)) / np.linalg.norm(quat)
+        data.qvel[:6] = rng.uniform(-1, 1, 6) * [0.3, 0.3, 0.3, 2, 2, 2]
+        mujoco.mj_kinematics(model, data)
+        pose = data.geom("target").xmat.reshape(3, 3), data.geom("target").xpos
+        aim, way = pose[0] @ rng.choice(atlas.mesh.V) + pose[1], rng.standard_normal(3)
+        way /= np.linalg.norm(way)
+        data.qpos[7:10], data.qvel[6:9] = aim - 0.9 * way, 3.0 * way
+        hits = 0
+        while data.time < 0.5 and hits < 4:
+            mujoco.mj_step(model, data)
+            ripples.step(data)
+            for impulse in ripples.last_impulses:
+                hits += 1
+                points, forces = [], []
+                for i, contact in enumerate(data.contact):
+                    mujoco.mj_contactForce(model, data, i, wrench)
+                    points.append(contact.pos.copy())
+                    forces.append(max(wrench[0], 0.0))
+                world = atlas.mesh.V @ data.geom("target").xmat.reshape(3, 3).T + data.geom("target").xpos
+                weighted = np.array(forces) @ np.array(points) / sum(forces)
+                _, _, nearest = igl.point_mesh_squared_distance(weighted[None], world, atlas.mesh.F)
+                texel = np.sqrt(atlas.areas[impulse.texel])
+                off.append(np.linalg.norm(nearest[0] - impulse.point) / texel)
+    assert len(off) > 30
+    assert np.quantile(off, 0.99) < 0.5
+
+
 @pytest.mark.parametrize("kind", ["sphere", "mesh"])
 def test_sum_of_impulses_is_the_bodys_change_of_momentum(kind: str) -> None:
     if kind == "sphere":
@@ -186,9 +224,9 @@ def test_two_targets_that_touch_both_ripple() -> None:
 def test_far_contacts_of_one_pair_stay_apart_and_add_up() -> None:
     points = np.array([[0, 0, 0], [0.01, 0, 0], [1.0, 0, 0]])
     forces = np.array([1.0, 3.0, 2.0])
-    clusters = cluster(points, forces, 0.05)
-    assert [force for _, force in clusters] == [4.0, 2.0]
-    np.testing.assert_allclose(clusters[0][0], [0.0075, 0, 0])
+    middles, totals = cluster(points, forces, 0.05)
+    np.testing.assert_allclose(totals, [4.0, 2.0])
+    np.testing.assert_allclose(middles, [[0.0075, 0, 0], [1, 0, 0]])
 
 
 def test_reset_of_the_simulation_resets_the_waves() -> None:
