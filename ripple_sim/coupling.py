@@ -20,6 +20,7 @@ from .contacts import ContactPair, contact_pairs
 from .errors import RippleWarning, SceneError
 from .patch import pressed_patch
 from .press import Press
+from .pushback import PushBack
 from .speeds import SpeedCheck
 from .target import find_target, geom_name, target_atlas
 
@@ -67,6 +68,9 @@ class Ripples:
         Texels along an edge of the atlas's faces, for all targets or by geom name.
     backend, operator, conserve_volume
         As for `WaveSolver`.
+    two_way : bool
+        Let the moving surfaces push back on the bodies that touch them, through `data.xfrc_applied`. What others have
+        put there stays, as long as they add to it or set it before `step`.
 
     Raises
     ------
@@ -85,6 +89,7 @@ class Ripples:
         backend: str = "auto",
         operator: str = "fem",
         conserve_volume: bool = True,
+        two_way: bool = False,
     ) -> None:
         self.model = model
         self._geoms = {name: find_target(model, name) for name in materials}
@@ -102,6 +107,7 @@ class Ripples:
             self._warn_of_hull(name)
         self._check_speeds = SpeedCheck(model, list(self._waves))
         self._presses: dict[tuple[int, int], Press] = {}
+        self._push_back = PushBack(model) if two_way else None
         self._time: float | None = None
         self.last_impulses: list[Impulse] = []
 
@@ -142,9 +148,11 @@ class Ripples:
             return
         self._check_speeds(data)
         loads: dict[int, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {geom: [] for geom in self._waves}
-        touching = set()
-        for pair in contact_pairs(self.model, data, set(self._waves)):
-            touching.add((pair.target, pair.other))
+        if self._push_back is not None:
+            for geom, held in self._push_back.withdraw(data).items():
+                loads[geom] += held
+        touching = {(pair.target, pair.other): pair for pair in contact_pairs(self.model, data, set(self._waves))}
+        for pair in touching.values():
             loads[pair.target].append(self._press(data, pair, timestep, elapsed))
         for key, press in list(self._presses.items()):
             if key not in touching:
@@ -153,12 +161,19 @@ class Ripples:
                     del self._presses[key]
         for geom, waves in self._waves.items():
             _advance(waves, loads[geom], elapsed)
+        if self._push_back is not None:
+            self._push_back.apply(
+                data,
+                [(pair, self._waves[pair.target], self._presses[key].spread) for key, pair in touching.items()],
+            )
 
     def reset(self) -> None:
         """Flatten all surfaces."""
         self._time = None
         self.last_impulses = []
         self._presses.clear()
+        if self._push_back is not None:
+            self._push_back.forget()
         for waves in self._waves.values():
             waves.reset()
 

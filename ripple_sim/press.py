@@ -33,11 +33,17 @@ class Press:
     ----------
     waves : WaveSolver
         Of the target.
+
+    Attributes
+    ----------
+    spread : (int64 [n], float64 [n])
+        Texels of the latest contact, and each one's share of its force.
     """
 
     def __init__(self, waves: WaveSolver) -> None:
         self._atlas = waves.atlas
         self._carried = (waves.atlas.areas * waves.operator.carries).reshape(-1)
+        self.spread = np.zeros(0, np.int64), np.zeros(0)
         self._sources: list[_Source] = []
         self._texels = np.zeros(0, np.int64)
         self._rate = self._debt = np.zeros(0)
@@ -71,6 +77,8 @@ class Press:
         self._sources = [self._footprint(point, radius) for point in points]
         texels, where = np.unique(np.concatenate([source.texels for source in self._sources]), return_inverse=True)
         loads = np.concatenate([force * source.shares for force, source in zip(forces, self._sources, strict=True)])
+        pressed = np.bincount(where, loads, len(texels)).astype(np.float64)
+        self.spread = texels, pressed / forces.sum()
         middle = forces @ points / forces.sum()
         if self._middle is None:
             self._middle = self._anchor = middle
@@ -78,7 +86,7 @@ class Press:
         if np.linalg.norm(self._middle - self._anchor) > radius / 2:
             self._anchor, self._age = self._middle, 0.0
         self._absent = 0.0
-        return self._follow(texels, np.bincount(where, loads, len(texels)).astype(np.float64), dt)
+        return self._follow(texels, pressed, dt)
 
     def release(self, dt: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Forces on the texels over a step in which the body does not touch."""

@@ -88,6 +88,7 @@ class Simulation:
             resolution={entry.geom: resolution or entry.resolution for entry in scene.surfaces},
             backend=backend,
             operator=operator,
+            two_way=scene.two_way,
         )
         for entry in scene.surfaces:
             for disc in entry.still:

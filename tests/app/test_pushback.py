@@ -1,0 +1,85 @@
+"""Two-way coupling: a passing ripple kicks a resting ball, and what one gains the other loses."""
+
+import mujoco
+import numpy as np
+
+from ripple_sim import Material, Ripples
+
+GRAVITY = 9.81
+
+
+def run(two_way: bool, speed: float = 2.0, target: str = "", mass: float = 0.2):
+    """A ball at rest on a block under which the surface starts to move outwards; heights, and momenta over time."""
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="0.001"/><worldbody><body name="block" pos="0 0 -0.2">{target}
+        <geom name="block" type="box" size="0.5 0.5 0.2" mass="5"/></body>
+        <body name="ball" pos="0 0 0.0499"><freejoint/><geom name="ball" size="0.05" mass="{mass}"/></body>
+        </worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    material = Material(speed=1.0, density=20.0)
+    ripples = Ripples(model, {"block": material}, resolution=48, backend="cpu", conserve_volume=False, two_way=two_way)
+    waves = ripples["block"]
+    # a ring on its way to the ball
+    place = waves.atlas.positions
+    away = np.hypot(place[..., 0], place[..., 1])
+    waves.velocity = speed * np.exp(-(((away - 0.12) / 0.03) ** 2)) * (place[..., 2] > 0.19)
+    heights, total = [], []
+    while data.time < 0.3:
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+        joints = data.qvel[2::6] if target else data.qvel[2:3]
+        masses = [5.0, mass] if target else [mass]
+        heights.append(float(data.body("ball").xpos[2]) - 0.05)
+        total.append((data.time, float(np.dot(masses, joints)), waves.momentum()))
+    return np.array(heights), np.array(total), waves
+
+
+def test_passing_ripple_kicks_a_resting_ball_only_if_it_may() -> None:
+    still, _, _ = run(two_way=False, speed=4.0, mass=0.05)
+    kicked, _, _ = run(two_way=True, speed=4.0, mass=0.05)
+    assert np.abs(still).max() < 1e-3
+    assert kicked.max() > 0.01
+    # not before the ring is there, 0.1 m away at 1 m/s less its width
+    assert kicked[:25].max() < 1e-3
+
+
+def test_ball_and_surface_exchange_momentum_and_keep_the_sum() -> None:
+    _, total, _ = run(two_way=True)
+    time, ball, surface = total.T
+    # gravity is all that acts from outside: no springs, no damping. Until 0.1 s nothing is owed from a long contact.
+    early = time < 0.1
+    start = surface[0] + ball[0] + 0.2 * GRAVITY * time[0]
+    sums = surface + ball + 0.2 * GRAVITY * time
+    assert np.abs(sums[early] - start).max() < 1e-4 * abs(surface[0])
+    assert ball.max() > 0.02
+    late = time > 0.28
+    assert np.abs(sums[late] - start).max() < 0.02 * abs(surface[0])
+
+
+def test_free_target_recoils() -> None:
+    """The rigid bodies alone keep their momentum: what the ball gains, the block under it loses."""
+    _, total, _ = run(two_way=True, target="<freejoint/>")
+    time, bodies, _ = total.T
+    np.testing.assert_allclose(bodies, -5.2 * GRAVITY * time, atol=2e-3)
+
+
+def test_ball_is_never_thrown_faster_than_the_surface_moves() -> None:
+    _, total, _ = run(two_way=True, speed=3.0, mass=0.001)
+    assert 0.3 < total[:, 1].max() / 0.001 < 3.0
+
+
+def test_forces_of_others_stay() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><worldbody><geom name="block" type="box" size="0.5 0.5 0.2"/>
+        <body name="ball" pos="0 0 0.2499"><freejoint/><geom size="0.05" mass="0.2"/></body></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    ripples = Ripples(model, {"block": Material(density=20.0)}, resolution=16, backend="cpu", two_way=True)
+    ripples["block"].velocity = np.ones((6, 16, 16))
+    data.xfrc_applied[1, 0] = 0.25
+    for _ in range(100):
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+    assert data.qpos[2] > 0.2503
+    np.testing.assert_allclose(data.xfrc_applied[1], [0.25, 0, 0, 0, 0, 0], atol=1e-12)
