@@ -25,9 +25,12 @@ _DPI = 120
 
 
 def check_plot_path(path: str | Path) -> None:
-    """Raise `AtlasError` if pictures of this ending are not written."""
-    if Path(path).suffix.lower() not in _ENDINGS:
+    """Raise `AtlasError` if pictures of this ending are not written, or there is no such folder."""
+    path = Path(path)
+    if path.suffix.lower() not in _ENDINGS:
         raise AtlasError(f"plot file {str(path)!r} has an unknown ending; valid are {', '.join(_ENDINGS)}")
+    if not path.absolute().parent.is_dir() or path.is_dir():
+        raise AtlasError(f"plot file {str(path)!r} cannot be written: name a file in a folder that exists")
 
 
 def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = "", up: str = "y") -> None:

@@ -1,0 +1,30 @@
+"""Runs pymeshfix on the arrays of one file and leaves the result in another.
+
+A program of its own, which `repair` starts: on some surfaces pymeshfix ends the process that it runs in.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+
+def main(source: str, target: str) -> None:
+    """Fill the holes, keep the largest part, cut away what overlaps. The files hold V [n, 3] and F [m, 3]."""
+    from pymeshfix import PyTMesh
+
+    with np.load(source) as arrays:
+        V, F = arrays["V"], arrays["F"]
+    surface = PyTMesh()
+    surface.set_quiet(True)
+    surface.load_array(V, F.astype(np.int32))
+    surface.fill_small_boundaries(nbe=0, refine=True)
+    surface.remove_smallest_components()
+    surface.clean(max_iters=10, inner_loops=3)
+    V, F = surface.return_arrays()
+    np.savez(target, V=V, F=F)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
