@@ -94,13 +94,13 @@ def _parts(scene: trimesh.Scene) -> Soup:
         vertices = np.asarray(part.vertices, dtype=np.float64)
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise MeshError(f"a triangle refers to vertex {faces.max()}; valid is 0 to {len(vertices) - 1}")
-        uv = getattr(getattr(part, "visual", None), "uv", None)
-        if np.shape(uv) == (len(vertices), 2):
+        uv = np.asarray(getattr(part.visual, "uv", None), dtype=np.float64)
+        if uv.shape == (len(vertices), 2):
             textured = True
         else:
             uv = np.zeros((len(vertices), 2))
         F.append(faces + sum(map(len, V)))
-        corner_uv.append(np.asarray(uv, dtype=np.float64)[faces])
+        corner_uv.append(uv[faces])
         # an identity would still round
         moved = vertices if np.array_equal(transform, np.eye(4)) else trimesh.transform_points(vertices, transform)
         V.append(moved)

@@ -52,9 +52,9 @@ def read_obj(content: bytes) -> Soup:
     vertex, pair = np.array(corners, dtype=np.int64).reshape(-1, 2).T
     wrong = (vertex < 0) | (vertex >= len(V))
     if wrong.any():
-        line = int(np.repeat(lines, sizes)[np.argmax(wrong)])
+        number = int(np.repeat(lines, sizes)[np.argmax(wrong)])
         raise MeshError(
-            f"line {line} refers to vertex {vertex[np.argmax(wrong)] + 1}; valid is 1 to {len(V)}, the vertices given"
+            f"line {number} refers to vertex {vertex[np.argmax(wrong)] + 1}; valid is 1 to {len(V)}, the vertices given"
         )
     triangles = triangulate(V[vertex], np.array(sizes, dtype=np.int64))
     uv = _numbers(pairs).reshape(-1, 2)
