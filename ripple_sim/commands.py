@@ -175,7 +175,26 @@ class Info:
         print(json_format.dumps(dataclasses.asdict(info), indent=2) if self.json else as_text(info))
 
 
-COMMANDS: dict[str, Callable[..., Any]] = {"render": Render, "drop": Drop, "atlas": Atlas, "info": Info}
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Bench:
+    """Measure the wave solver: speed against a memory copy and others, accuracy against theory and exact geodesics."""
+
+    meshes: Annotated[Positional[tuple[Path, ...]], arg(metavar="MESH", help_behavior_hint="(optional)")] = ()
+    """Meshes on which to measure times of arrival, besides one of our own."""
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Measure and print; what is being measured is told on stderr."""
+        import sys
+
+        from .bench.report import as_text, measure
+
+        report = measure(list(self.meshes), lambda stage: print(f"measuring {stage} ...", file=sys.stderr))
+        print(json_format.dumps(report, indent=2) if self.json else as_text(report))
+
+
+COMMANDS: dict[str, Callable[..., Any]] = {"render": Render, "drop": Drop, "atlas": Atlas, "info": Info, "bench": Bench}
 
 
 def _summary_text(summary: Summary) -> str:

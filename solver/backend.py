@@ -26,6 +26,7 @@ class Backend(Protocol):
     def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: float) -> None: ...  # noqa: D102
     def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: float) -> None: ...  # noqa: D102
     def advance(self, substeps: int, dt: float) -> None: ...  # noqa: D102
+    def wait(self) -> None: ...  # noqa: D102
     def finite(self) -> bool: ...  # noqa: D102
 
 

@@ -95,6 +95,9 @@ class CPUBackend:
                 _kick(self._h, self._v, self._loaded, self._kicks, drift)
             self._flow()
 
+    def wait(self) -> None:
+        """Return when all steps are done: at once, they are."""
+
     def finite(self) -> bool:
         """Whether all heights are finite."""
         with np.errstate(over="ignore", invalid="ignore"):

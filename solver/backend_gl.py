@@ -101,6 +101,11 @@ class GLBackend:
                 self._kick_texels(self._forces, drift)
                 self._flow()
 
+    def wait(self) -> None:
+        """Return when all steps are done."""
+        with self._gl as ctx:
+            ctx.finish()
+
     def finite(self) -> bool:
         """Whether all heights are finite, as far as it is known without waiting for the GPU: it is not."""
         return True

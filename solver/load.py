@@ -34,4 +34,6 @@ class Load:
     def plus(self, texels: NDArray[np.int64], forces: NDArray[np.float64]) -> Load:
         """Add forces to it."""
         merged, where = np.unique(np.concatenate([self.texels, texels]), return_inverse=True)
-        return Load(merged, np.bincount(where, np.concatenate([self.forces, forces]), minlength=len(merged)))
+        total = np.zeros(len(merged))
+        np.add.at(total, where, np.concatenate([self.forces, forces]))
+        return Load(merged, total)

@@ -1,0 +1,1 @@
+"""Measurements of the wave solver: how fast, how exact, and against what."""

@@ -1,0 +1,78 @@
+"""How fast the backends are, against rivals that take turns with them, so that a busy machine slows all alike."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+import numpy as np
+
+from ripple_sim.solver import GLError, Material, sphere_atlas
+from ripple_sim.solver.backend import Backend, make_backend
+from ripple_sim.solver.operator import WaveOperator, build_operator
+
+from .rivals import Copy, PlainShader, SparseLeapfrog
+
+_ROUNDS = 7
+_SECONDS_A_TURN = 0.04
+
+
+class Advances(Protocol):
+    """Anything that takes substeps."""
+
+    def advance(self, substeps: int, dt: float) -> None: ...  # noqa: D102
+
+
+class Waited:
+    """A GPU backend that is waited for, by reading one number back."""
+
+    def __init__(self, backend: Backend) -> None:
+        self._backend = backend
+
+    def advance(self, substeps: int, dt: float) -> None:
+        """Advance, and wait."""
+        self._backend.advance(substeps, dt)
+        self._backend.wait()
+
+
+def updates_per_second(contestants: dict[str, Advances], texels: int) -> dict[str, float]:
+    """Texel updates a second of each, the best of several turns taken in rotation."""
+    dt = 1e-6
+    counts = {}
+    for name, contestant in contestants.items():
+        contestant.advance(2, dt)
+        start = time.perf_counter()
+        contestant.advance(2, dt)
+        counts[name] = max(2, int(_SECONDS_A_TURN / (time.perf_counter() - start) * 2))
+    best = dict.fromkeys(contestants, np.inf)
+    for _ in range(_ROUNDS):
+        for name, contestant in contestants.items():
+            start = time.perf_counter()
+            contestant.advance(counts[name], dt)
+            best[name] = min(best[name], (time.perf_counter() - start) / counts[name])
+    return {name: texels / seconds for name, seconds in best.items()}
+
+
+def cpu_speed(resolution: int) -> dict[str, float]:
+    """CPU backend against a memory copy and a sparse matrix."""
+    operator = _operator(resolution)
+    texels = operator.mass.size
+    rates = updates_per_second(
+        {"cpu": make_backend("cpu", operator), "copy": Copy(texels), "scipy": SparseLeapfrog(operator)}, texels
+    )
+    return rates | {"of copy": rates["cpu"] / rates["copy"], "over scipy": rates["cpu"] / rates["scipy"]}
+
+
+def gl_speed(resolution: int) -> dict[str, float] | None:
+    """GL backend against the plain shader; None without OpenGL."""
+    operator = _operator(resolution)
+    try:
+        contestants: dict[str, Advances] = {"gl": Waited(make_backend("gl", operator)), "plain": PlainShader(operator)}
+    except GLError:
+        return None
+    rates = updates_per_second(contestants, operator.mass.size)
+    return rates | {"over plain": rates["gl"] / rates["plain"]}
+
+
+def _operator(resolution: int) -> WaveOperator:
+    return build_operator(sphere_atlas(1.0, resolution), Material(), "fem")
