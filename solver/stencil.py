@@ -140,6 +140,18 @@ def _between(a, b):
 
 
 @numba.njit(cache=True)
+def _quad_area(sw, se, nw, ne):
+    """Area of a quad that need not be flat: the mean of its two triangulations, which misses nothing of a fold."""
+    south, west, north, east = _between(sw, se), _between(sw, nw), _between(ne, nw), _between(ne, se)
+    return (
+        _cross_length(south, west)
+        + _cross_length(north, east)
+        + _cross_length(south, east)
+        + _cross_length(north, west)
+    ) / 4
+
+
+@numba.njit(cache=True)
 def _quad(sw, se, nw, ne):
     """Weights of a quad's links: south and north side, west and east side, diagonal sw-ne, diagonal se-nw; its area.
 
@@ -154,7 +166,13 @@ def _quad(sw, se, nw, ne):
     squareness = 2 * cross / (pp + qq)
     twice = 2 * max(cross, _LEAST_AREA / 2 * (pp + qq))
     hourglass = _HOURGLASS * squareness
-    return pq / twice + hourglass, hourglass - pq / twice, qq / twice - hourglass, pp / twice - hourglass, cross / 2
+    return (
+        pq / twice + hourglass,
+        hourglass - pq / twice,
+        qq / twice - hourglass,
+        pp / twice - hourglass,
+        _quad_area(sw, se, nw, ne),
+    )
 
 
 @numba.njit(cache=True)

@@ -26,6 +26,9 @@ def element(corners: np.ndarray) -> tuple[np.ndarray, float]:
     if len(corners) == 4:
         hourglass = np.array([1.0, -1, 1, -1])
         stiffness += 0.4 * 4 * area / (frame**2).sum() * np.outer(hourglass, hourglass)
+        triangles = corners[[[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]]
+        edges = triangles[:, 1:] - triangles[:, :1]
+        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum() / 4
     return stiffness, area
 
 
