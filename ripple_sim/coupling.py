@@ -220,11 +220,11 @@ class Ripples:
         old, material = self[name], self._materials[name]
         if name in self._rigid:
             n, moves = old.atlas.resolution, ~self._rigid[name]
-            # a region without tension and stiffness takes up nothing
+            # a region that nothing pulls on takes up nothing, and without viscosity nothing drags it along either
+            coefficients = ("speed", "stiffness", "bending", "viscosity")
             material = dataclasses.replace(
                 material,
-                speed=material.texels("speed", n) * moves,
-                stiffness=material.texels("stiffness", n) * moves,
+                **{name: material.texels(name, n) * moves for name in coefficients if np.any(getattr(material, name))},
             )
         new = WaveSolver(old.atlas, material, **self._options)
         new.height, new.velocity, new.pressure = old.height, old.velocity, old.pressure

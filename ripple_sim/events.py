@@ -51,6 +51,14 @@ class ChangeEntry(msgspec.Struct, forbid_unknown_fields=True):
     material: MaterialChange
 
 
+class ControlEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[[control]]`: set an actuator's control from a time [s] on, in the actuator's own unit."""
+
+    actuator: str
+    time: float
+    value: float
+
+
 @dataclasses.dataclass(frozen=True)
 class Events:
     """All that is to happen."""
@@ -60,6 +68,7 @@ class Events:
     place: Sequence[PlaceEntry] = ()
     poke: Sequence[PokeEntry] = ()
     change: Sequence[ChangeEntry] = ()
+    control: Sequence[ControlEntry] = ()
 
 
 class Script:
@@ -82,12 +91,16 @@ class Script:
                 )
         for change in events.change:
             _check_target("change", change.geom, change.time, targets)
+        self._controls = [(entry, _actuator(model, entry)) for entry in sorted(events.control, key=lambda e: e.time)]
         surface_events: list[PokeEntry | ChangeEntry] = [*events.poke, *events.change]
         self._surface_events = sorted(surface_events, key=lambda event: event.time)
 
     def apply(self, data: mujoco.MjData, ripples: Ripples) -> None:
         """Do what is due."""
         self._motions.apply(data)
+        while self._controls and self._controls[0][0].time <= data.time + 1e-9:
+            entry, actuator = self._controls.pop(0)
+            data.ctrl[actuator] = entry.value
         while self._surface_events and self._surface_events[0].time <= data.time + 1e-9:
             event = self._surface_events.pop(0)
             if isinstance(event, PokeEntry):
@@ -104,3 +117,16 @@ def _check_target(verb: str, geom: str, time: float, targets: Sequence[str]) -> 
             f"[[{verb}]] names the geom {geom!r}, which does not ripple; the rippling geoms are "
             f"{', '.join(map(repr, targets))}"
         )
+
+
+def _actuator(model: mujoco.MjModel, entry: ControlEntry) -> int:
+    check_time("control", entry.actuator, entry.time)
+    actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, entry.actuator)
+    if actuator < 0:
+        names = [model.actuator(i).name for i in range(model.nu)]
+        raise SceneError(
+            f"[[control]] names the actuator {entry.actuator!r}; the model's actuators are {', '.join(names) or 'none'}"
+        )
+    if not np.isfinite(entry.value):
+        raise SceneError(f"[[control]] of {entry.actuator!r} has value {entry.value!r}; valid is a finite number")
+    return int(actuator)

@@ -86,6 +86,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
             place=tuple(content.place),
             poke=tuple(content.poke),
             change=tuple(content.change),
+            control=tuple(content.control),
         ),
         two_way=content.two_way,
     )

@@ -9,7 +9,7 @@ import msgspec
 from ripple_sim.solver import Material
 
 from .errors import SceneError
-from .events import ChangeEntry, MaterialChange, PokeEntry
+from .events import ChangeEntry, ControlEntry, MaterialChange, PokeEntry
 from .motion import DropEntry, PlaceEntry, ThrowEntry, Vector
 from .randomize import RandomEntry
 
@@ -76,6 +76,7 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
     place: list[PlaceEntry] = []
     poke: list[PokeEntry] = []
     change: list[ChangeEntry] = []
+    control: list[ControlEntry] = []
     random: RandomEntry | None = None
 
 
@@ -105,6 +106,7 @@ _TABLES: dict[str, type[msgspec.Struct]] = {
     "poke": PokeEntry,
     "change": ChangeEntry,
     "change.material": MaterialChange,
+    "control": ControlEntry,
     "random": RandomEntry,
 }
 

@@ -1,6 +1,6 @@
 """The shipped target meshes, each a closed surface of genus 0 modelled with smoothly blended implicit solids.
 
-`python -m ripple_sim.scenes.shapes` writes `meshes/duck.obj` again.
+`python -m ripple_sim.scenes.shapes` writes `meshes/duck.obj` and `meshes/limbed.obj` again.
 """
 
 from __future__ import annotations
@@ -25,9 +25,10 @@ from .implicit import (
     sphere,
 )
 
-__all__ = ["DUCK_FILE", "duck", "limbed", "peanut", "polygonise", "write_obj"]
+__all__ = ["DUCK_FILE", "LIMBED_FILE", "duck", "limbed", "peanut", "polygonise", "write_obj"]
 
 DUCK_FILE = Path(__file__).parent / "meshes" / "duck.obj"
+LIMBED_FILE = DUCK_FILE.with_name("limbed.obj")
 
 Triangles = NDArray[np.int64]
 
@@ -114,3 +115,4 @@ def write_obj(path: Path, V: Array, F: Triangles) -> None:
 
 if __name__ == "__main__":
     write_obj(DUCK_FILE, *duck())
+    write_obj(LIMBED_FILE, *limbed())

@@ -16,7 +16,9 @@ MJCF = """<mujoco><compiler angle="degree"/><option timestep="0.002" gravity="0 
 <geom name="egg" type="ellipsoid" size="0.3 0.2 0.2" pos="0.1 0 0" euler="0 90 0"/></body>
 <body name="stone" pos="0 0 3"><freejoint/><geom name="stone" size="0.05" mass="0.2"/></body>
 <body name="brick" pos="2 0 3"><freejoint/><geom name="brick" type="box" size="0.1 0.1 0.1"/></body>
-<body name="post" pos="0 3 0"><geom name="post" size="0.05"/></body></worldbody></mujoco>"""
+<body name="post" pos="0 3 0"><joint name="post" type="slide" axis="0 0 1"/><geom name="post" size="0.05"/></body>
+</worldbody>
+<actuator><position name="lift" joint="post" kp="100" kv="20"/></actuator></mujoco>"""
 TOML = """model = "scene.xml"
 [[ripple]]
 geom = "egg"
@@ -92,6 +94,16 @@ def test_changed_material_keeps_the_waves_and_changes_what_follows(tmp_path: Pat
     assert damped.ripples["egg"].material.speed == 0.5
     assert damped.ripples["egg"].time == pytest.approx(0.3)
     assert damped.ripples["egg"].energy() < 0.05 * plain.ripples["egg"].energy()
+
+
+def test_control_moves_an_actuator_from_its_time_on(tmp_path: Path) -> None:
+    sim = simulation(tmp_path, '[[control]]\nactuator = "lift"\ntime = 0.1\nvalue = 0.2\n')
+    for _ in range(10):
+        sim.advance_frame()
+    assert sim.data.body("post").xpos[2] == 0
+    for _ in range(150):
+        sim.advance_frame()
+    assert sim.data.body("post").xpos[2] == pytest.approx(0.2, abs=0.01)
 
 
 def test_still_disc_carries_no_waves(tmp_path: Path) -> None:
