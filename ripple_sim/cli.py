@@ -39,6 +39,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     try:
         command.run()
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # whoever read the output has stopped; nothing is left to tell them, not even at exit
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+        return FAILED
     except (GLError, EncodingError) as error:  # nothing that other input would cure
         return _fail(error, FAILED)
     except RippleError as error:

@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver.whole_file import whole_file
+
 from .implicit import (
     Array,
     Sdf,
@@ -105,12 +107,8 @@ def write_obj(path: Path, V: Array, F: Triangles) -> None:
     lines = ["# made by python -m ripple_sim.scenes.shapes"]
     lines += [f"v {x:.5g} {y:.5g} {z:.5g}" for x, y, z in V]
     lines += [f"f {a} {b} {c}" for a, b, c in F + 1]
-    unfinished = path.with_suffix(".part")
-    try:
+    with whole_file(path) as unfinished:
         unfinished.write_text("\n".join(lines) + "\n")
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,10 @@ from .stencil import lumped_areas
 from .texcoords import TextureCoordinates, texture_coordinates
 
 
+# [m]. Squares of what is farther away overflow on the way to the nearest surface point.
+_FARTHEST = 1e100
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Atlas:
     """Cube-map atlas of a closed genus-0 surface.
@@ -136,6 +140,6 @@ def check_points(points: ArrayLike) -> NDArray[np.float64]:
     array = np.asarray(points, dtype=np.float64)
     if array.ndim == 0 or array.shape[-1] != 3 or array.ndim > 2:
         raise AtlasError(f"points have shape {array.shape}; valid is [3] or [k, 3], in metres")
-    if not np.isfinite(array).all():
-        raise AtlasError("points hold NaN or infinity; valid are finite coordinates in metres")
+    if not (np.abs(array) < _FARTHEST).all():
+        raise AtlasError(f"points hold NaN or numbers beyond {_FARTHEST:g}; valid are finite coordinates in metres")
     return np.ascontiguousarray(array.reshape(-1, 3))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
 import zipfile
 from pathlib import Path
 
@@ -14,6 +12,7 @@ from .analytic import SphereAtlas
 from .atlas import Atlas
 from .errors import AtlasError
 from .mesh import Mesh
+from .whole_file import whole_file
 
 # Raise it when the sphere map or the file's layout changes: older files are then rebuilt.
 FORMAT = 2
@@ -36,15 +35,8 @@ def save_atlas(atlas: Atlas, path: str | Path) -> None:
     arrays["kind"] = np.array([type(atlas).__name__])
     arrays["digest"] = np.array([content_digest(arrays)])
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                np.savez(file, **arrays)
-            Path(temporary).replace(path)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+        with whole_file(path) as unfinished, unfinished.open("wb") as file:
+            np.savez(file, **arrays)
     except OSError as error:
         raise AtlasError(f"atlas file {str(path)!r} cannot be written: {error.strerror or error}") from error
 
@@ -59,7 +51,8 @@ def load_atlas(path: str | Path) -> Atlas:
     """
     path = Path(path)
     if not path.is_file():
-        raise AtlasError(f"atlas file {str(path)!r} does not exist; make one with `ripple-sim atlas MESH -o FILE`")
+        problem = "is no file" if path.exists() else "does not exist"
+        raise AtlasError(f"atlas file {str(path)!r} {problem}; make one with `ripple-sim atlas MESH -o FILE`")
     advice = "make it again with `ripple-sim atlas MESH -o FILE`"
     try:
         with np.load(path, allow_pickle=False) as file:

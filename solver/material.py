@@ -20,6 +20,9 @@ _LIMITS = {
     "yield_height": ("m", 0.0, True, True),
 }
 
+# Beyond any physical value, and small enough that nothing overflows on the way to the time step.
+_HIGHEST = 1e12
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Material:
@@ -157,13 +160,16 @@ class Material:
 
     def __post_init__(self) -> None:
         for name, (unit, low, strict, endless) in _LIMITS.items():
-            value = np.asarray(getattr(self, name), dtype=np.float64)
-            wrong = (value <= low if strict else value < low) | np.isnan(value) | (np.isinf(value) & (not endless))
+            value = _numbers(name, getattr(self, name))
+            small = (value <= low) | (value < 1 / _HIGHEST) if strict else value < low
+            wrong = small | np.isnan(value) | ((value > _HIGHEST) & ~(np.isinf(value) & endless))
             if wrong.any():
                 worst = value.flat[np.argmax(wrong)]
                 bound = f"greater than {low:g}" if strict else f"{low:g} or greater"
-                kind = "a number" if endless else "a finite number"
-                raise SolverError(f"material {name} is {worst:g} {unit}; valid is {kind}, {bound}")
+                raise SolverError(
+                    f"material {name} is {worst:g} {unit}; valid is a finite number, {bound}, up to {_HIGHEST:g}"
+                    f"{', or infinity' if endless else ''}"
+                )
             _check_shape(name, value)
         fixed = np.asarray(self.fixed)
         if fixed.dtype != bool:
@@ -183,6 +189,13 @@ class Material:
         if value.ndim and value.shape != shape:
             raise SolverError(f"material {name} has shape {value.shape}, the atlas needs a number or {shape}")
         return np.array(np.broadcast_to(value, shape))
+
+
+def _numbers(name: str, value: object) -> NDArray[np.float64]:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise SolverError(f"material {name} is {value!r}; valid is a number or an array of numbers") from error
 
 
 def _check_shape(name: str, value: NDArray) -> None:

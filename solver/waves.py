@@ -14,6 +14,9 @@ from .load import Load
 from .material import Material
 from .operator import build_operator
 
+# A step that needs more is a mistake in a unit, and would seem to hang.
+_MOST_SUBSTEPS = 1_000_000
+
 
 class WaveSolver:
     """Waves on the surface of an atlas.
@@ -69,13 +72,16 @@ class WaveSolver:
 
     @property
     def height(self) -> NDArray[np.float32]:
-        """Displacement along the outward normal [m], float32 [6, N, N]: a read-only copy; assign to change it.
+        """Displacement along the outward normal [m], float32 [6, N, N]: a copy; assign to change it.
+
+        `waves.height = field` and `waves.height += field` work, also with one number; `waves.height[0] = x` changes the
+        copy only.
 
         Reading raises `SolverError` if the GPU has met a value that is not finite.
         """
         height = self._backend.height()
         self._check_finite(height)
-        return _frozen(height)
+        return height
 
     @height.setter
     def height(self, value: ArrayLike) -> None:
@@ -84,12 +90,12 @@ class WaveSolver:
     @property
     def dent(self) -> NDArray[np.float32]:
         """The part of the height that stays [m], float32 [6, N, N]; 0 unless the material yields."""
-        return _frozen(self._backend.dent())
+        return self._backend.dent()
 
     @property
     def velocity(self) -> NDArray[np.float32]:
-        """Rate of the height [m/s], float32 [6, N, N]: a read-only copy; assign to change it."""
-        return _frozen(self._backend.velocity())
+        """Rate of the height [m/s], float32 [6, N, N]: a copy; assign to change it, as with `height`."""
+        return self._backend.velocity()
 
     @velocity.setter
     def velocity(self, value: ArrayLike) -> None:
@@ -202,7 +208,13 @@ class WaveSolver:
             raise SolverError(f"time step is {dt!r} s; valid is a finite number, 0 or greater")
         if dt == 0:
             return
-        needed = max(1, int(np.ceil(dt / self.stable_timestep * (1 - 1e-12))))
+        ratio = dt / self.stable_timestep * (1 - 1e-12)
+        if not ratio < _MOST_SUBSTEPS:
+            raise SolverError(
+                f"a step of {dt:.4g} s would take {ratio:.3g} substeps of the stable {self.stable_timestep:.4g} s; valid "
+                f"are {_MOST_SUBSTEPS} at most: take shorter steps, or a material with slower waves"
+            )
+        needed = max(1, int(np.ceil(ratio)))
         if substeps is None:
             substeps = needed
         elif substeps < needed:
@@ -270,8 +282,9 @@ class WaveSolver:
     def _field(self, value: ArrayLike, name: str) -> NDArray[np.float32]:
         array = np.asarray(value, dtype=np.float32)
         shape = self.operator.mass.shape
-        if array.shape != shape:
-            raise SolverError(f"{name} has shape {array.shape}; valid is {shape}")
+        if array.shape not in ((), shape):
+            raise SolverError(f"{name} has shape {array.shape}; valid is {shape}, or one number")
+        array = np.broadcast_to(array, shape)
         if not np.isfinite(array).all():
             raise SolverError(f"{name} holds {(~np.isfinite(array)).sum()} values that are NaN or infinite")
         return array
@@ -287,8 +300,3 @@ class WaveSolver:
                 f"height is no longer finite {where}, at time {self.time:.6g} s; a source was too large for float32: "
                 "make it smaller and `reset()` the waves"
             )
-
-
-def _frozen(array: NDArray[np.float32]) -> NDArray[np.float32]:
-    array.flags.writeable = False
-    return array

@@ -51,6 +51,10 @@ def check_output(path: str | Path, width: int, height: int, fps: int) -> None:
         resolution, or the place cannot be written to.
     """
     path = Path(path)
+    if not path.name:
+        raise VideoError(
+            f"output is {str(path)!r}, which names no file; give one ending in .mp4, .webm or .gif, or a folder"
+        )
     try:
         ending = video_format(path)
         _check_size(ending, width, height)
