@@ -40,10 +40,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         command.run()
         sys.stdout.flush()
-    except BrokenPipeError:
-        # whoever read the output has stopped; nothing is left to tell them, not even at exit
+    except OSError as error:
+        # standard output has failed (a full disk, a reader that has stopped): nothing more goes there, not even at exit
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115
-        return FAILED
+        return FAILED if isinstance(error, BrokenPipeError) else _fail(error.strerror or error, FAILED)
     except (GLError, EncodingError) as error:  # nothing that other input would cure
         return _fail(error, FAILED)
     except RippleError as error:

@@ -23,6 +23,9 @@ from .target import find_target
 Moved = TypeVar("Moved", DropEntry, ThrowEntry)
 
 
+MAX_DURATION = 86_400  # [s], a day
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Scene:
     """A MuJoCo model and what ripples in it.
@@ -151,8 +154,8 @@ def check_scene(scene: Scene) -> None:
 
     if not scene.surfaces:
         raise SceneError(f"scene {scene.name!r} has no [[ripple]] surface; name at least one geom")
-    if not 0 < scene.duration < float("inf"):
-        raise SceneError(f"duration is {scene.duration!r} s; valid is a positive number")
+    if not 0 < scene.duration < MAX_DURATION:
+        raise SceneError(f"duration is {scene.duration!r} s; valid is a positive number, less than {MAX_DURATION}")
     seen = set()
     for entry in scene.surfaces:
         find_target(scene.model, entry.geom)

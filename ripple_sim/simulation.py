@@ -20,9 +20,13 @@ from .coupling import Impulse, Ripples
 from .errors import SceneError, SimulationError
 from .events import Script
 from .render import Renderer, Surface
-from .scene import Scene
+from .scene import MAX_DURATION, Scene
 from .video import check_output, open_writer
 from .view import viewpoint
+
+
+# More than this is a mistake in a unit, and would seem to hang.
+_MOST_STEPS_PER_FRAME = 100_000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,7 +80,7 @@ class Simulation:
         self.scene = scene
         self._on_step = on_step
         self.model = copy.copy(scene.model)
-        self._steps_per_frame = max(1, math.ceil(1 / (fps * self.model.opt.timestep) - 1e-9))
+        self._steps_per_frame = _steps_per_frame(fps, self.model.opt.timestep)
         self.model.opt.timestep = 1 / (fps * self._steps_per_frame)
         self.data = mujoco.MjData(self.model)
         if self.model.nkey:
@@ -140,6 +144,17 @@ class Simulation:
                     f"the physics became unstable at {self.data.time:.4g} s ({mujoco.mjtWarning(kind).name}); "
                     "use a shorter time step in the MJCF's <option>, or softer contacts"
                 )
+
+
+def _steps_per_frame(fps: int, timestep: float) -> int:
+    """Fewest equal physics steps a frame that are no longer than the model's [s]."""
+    steps = 1 / (fps * timestep)
+    if not steps < _MOST_STEPS_PER_FRAME:
+        raise SceneError(
+            f"the model's timestep is {timestep:g} s, {steps:.3g} steps a frame; valid are {_MOST_STEPS_PER_FRAME} at "
+            "most: use a longer timestep in the MJCF's <option>"
+        )
+    return max(1, math.ceil(steps - 1e-9))
 
 
 class FrameSource:
@@ -219,8 +234,8 @@ def render_video(
     output, (width, height) = Path(output), size
     check_output(output, width, height, fps)
     length = scene.duration if duration is None else duration
-    if not 0 < length < math.inf:
-        raise SceneError(f"duration is {length!r} s; valid is a positive number")
+    if not 0 < length < MAX_DURATION:
+        raise SceneError(f"duration is {length!r} s; valid is a positive number, less than {MAX_DURATION}")
     count = max(1, round(length * fps))
     simulation = Simulation(scene, fps=fps, resolution=resolution, backend=backend, on_step=on_step)
     frames = FrameSource(simulation, width=width, height=height)

@@ -91,9 +91,9 @@ class WaveOperator:
         if self.viscous_stencil is not None:
             force = functools.partial(_force, self.viscous_stencil)
             viscous = self._largest_eigenvalue(force, self._rate_bound(self.viscous_stencil))
-        if wave == 0:
-            return np.inf if viscous == 0 else float(SAFETY * 2 / viscous)
-        return float(SAFETY * (np.sqrt(viscous**2 + 4 * wave) - viscous) / wave)
+        # the positive root, written so that nothing cancels
+        rate = viscous + np.sqrt(viscous**2 + 4 * wave)
+        return np.inf if rate == 0 else float(SAFETY * 4 / rate)
 
     def _tension_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
         force = _force(self.stencil, height)

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from ripple_sim import cli, info
-from ripple_sim.solver import gl, waves
+from ripple_sim.solver import backend, gl
 from ripple_sim.solver.errors import GLError
 
 
@@ -32,7 +32,7 @@ def test_info_names_versions_and_driver(capsys):
 
 def test_info_names_the_backend_that_auto_takes(capsys):
     got = report(capsys)
-    assert got["backend"] == ("cpu" if got["opengl"]["software"] else "gl") == waves.auto_backend()
+    assert got["backend"] == ("cpu" if got["opengl"]["software"] else "gl") == backend.auto_backend()
 
 
 def test_without_egl_info_says_what_to_install(capsys, no_egl):
