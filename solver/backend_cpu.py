@@ -194,15 +194,12 @@ def _flow(h, dent, limit):
 def _force(w, h, f, r, c):
     """Sum over the eight links of weight (h_j - h_i) at padded texel (f, r, c)."""
     x = h[f, r, c]
+    # in pairs, as block.glsl adds them up: so both backends round alike
     return (
-        w[f, 0, r, c] * (h[f, r, c + 1] - x)
-        + w[f, 0, r, c - 1] * (h[f, r, c - 1] - x)
-        + w[f, 1, r, c] * (h[f, r + 1, c] - x)
-        + w[f, 1, r - 1, c] * (h[f, r - 1, c] - x)
-        + w[f, 2, r, c] * (h[f, r + 1, c + 1] - x)
-        + w[f, 2, r - 1, c - 1] * (h[f, r - 1, c - 1] - x)
-        + w[f, 3, r - 1, c] * (h[f, r - 1, c + 1] - x)
-        + w[f, 3, r, c - 1] * (h[f, r + 1, c - 1] - x)
+        (w[f, 0, r, c] * (h[f, r, c + 1] - x) + w[f, 0, r, c - 1] * (h[f, r, c - 1] - x))
+        + (w[f, 1, r, c] * (h[f, r + 1, c] - x) + w[f, 1, r - 1, c] * (h[f, r - 1, c] - x))
+        + (w[f, 2, r, c] * (h[f, r + 1, c + 1] - x) + w[f, 2, r - 1, c - 1] * (h[f, r - 1, c - 1] - x))
+        + (w[f, 3, r, c - 1] * (h[f, r + 1, c - 1] - x) + w[f, 3, r - 1, c] * (h[f, r - 1, c + 1] - x))
     )
 
 
