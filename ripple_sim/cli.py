@@ -12,6 +12,7 @@ import re
 import signal
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import tyro.conf
@@ -42,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except OSError as error:
         # standard output has failed (a full disk, a reader that has stopped): nothing more goes there, not even at exit
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+        sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115
         return FAILED if isinstance(error, BrokenPipeError) else _fail(error.strerror or error, FAILED)
     except (GLError, EncodingError) as error:  # nothing that other input would cure
         return _fail(error, FAILED)

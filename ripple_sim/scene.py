@@ -128,7 +128,8 @@ def load_model(path: Path, random: RandomEntry | None = None) -> tuple[mujoco.Mj
         If the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the randomisation is invalid.
     """
     if not path.is_file():
-        raise SceneError(f"MJCF file {str(path)!r} does not exist")
+        problem = "is no file" if path.exists() else "does not exist"
+        raise SceneError(f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file")
     try:
         if random is None:
             return mujoco.MjModel.from_xml_path(str(path)), {}
@@ -164,6 +165,10 @@ def check_scene(scene: Scene) -> None:
         seen.add(entry.geom)
         if entry.look not in LOOKS:
             raise SceneError(f"look {entry.look!r} does not exist; valid are {', '.join(LOOKS)}")
+        if entry.color is not None and not all(0 <= part <= 1 for part in entry.color):
+            raise SceneError(
+                f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 (sRGB)"
+            )
         entry.material.material()
         for disc in entry.still:
             if not 0 < disc.radius < float("inf"):

@@ -89,10 +89,27 @@ def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
         Naming the place, the value and what is valid.
     """
     _check_keys(table, SceneFile, "", origin)
+    _check_numbers(table, "", origin)
     try:
         return msgspec.convert(table, SceneFile)
     except msgspec.ValidationError as error:
         raise SceneError(f"scene file {origin!r}: {str(error).replace('`$.', '`')}") from error
+
+
+# Metres, seconds, newtons, degrees: nothing that a scene means is larger, and squares of it do not overflow.
+_LARGEST = 1e12
+
+
+def _check_numbers(value: Any, place: str, origin: str) -> None:
+    """Refuse NaN, infinity and absurdly large numbers wherever they stand."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _check_numbers(inner, f"{place}.{key}" if place else key, origin)
+    elif isinstance(value, list):
+        for inner in value:
+            _check_numbers(inner, place, origin)
+    elif isinstance(value, (int, float)) and not abs(value) <= _LARGEST:
+        raise SceneError(f"scene file {origin!r}: {place} is {value}; valid are numbers up to {_LARGEST:g}")
 
 
 _TABLES: dict[str, type[msgspec.Struct]] = {

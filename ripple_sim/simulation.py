@@ -24,7 +24,6 @@ from .scene import MAX_DURATION, Scene
 from .video import check_output, open_writer
 from .view import viewpoint
 
-
 # More than this is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000
 

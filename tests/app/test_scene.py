@@ -70,6 +70,10 @@ def test_values_arrive_where_they_belong(tmp_path: Path) -> None:
         ('model = "scene.xml"', 'model = "other.xml"', "other.xml' does not exist"),
         ('body = "stone"', 'body = "rock"', "bodies are stone"),
         ("time = 0.25", "time = -1", "time -1"),
+        ("time = 0.25", "time = nan", r"drop.time is nan; valid are numbers"),
+        ("velocity = [0.5, 0.0, 0.0]", "velocity = [inf, 0.0, 0.0]", r"drop.velocity is inf"),
+        ("speed = 0.5", "speed = 1e300", r"ripple.material.speed is 1e\+300"),
+        ('geom = "egg"', 'geom = "egg"\ncolor = [0, 0, 300]', "three numbers from 0 to 1"),
         ('model = "scene.xml"', 'model = "scene.xml"\nduration = 0', "duration is 0"),
     ],
 )
