@@ -211,8 +211,8 @@ class WaveSolver:
         ratio = dt / self.stable_timestep * (1 - 1e-12)
         if not ratio < _MOST_SUBSTEPS:
             raise SolverError(
-                f"a step of {dt:.4g} s would take {ratio:.3g} substeps of the stable {self.stable_timestep:.4g} s; valid "
-                f"are {_MOST_SUBSTEPS} at most: take shorter steps, or a material with slower waves"
+                f"a step of {dt:.4g} s would take {ratio:.3g} substeps of the stable {self.stable_timestep:.4g} s; "
+                f"valid are {_MOST_SUBSTEPS} at most: take shorter steps, or a material with slower waves"
             )
         needed = max(1, int(np.ceil(ratio)))
         if substeps is None:
