@@ -15,7 +15,7 @@ from .mesh import Mesh
 from .whole_file import whole_file
 
 # Raise it when the sphere map or the file's layout changes: older files are then rebuilt.
-FORMAT = 2
+FORMAT = 3
 _FIELDS = ("sphere", "positions", "normals", "triangles", "barycentrics")
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from .conjugate_gradients import solve
-from .energy import Reference, density_derivatives, total_energy
+from .energy import Reference, density, density_derivatives, total_energy
 from .level import Level
 from .vectors import Floats, Ints, combine, cross, dot, kernel, row, set_row, subtract, tangent_frame
 
@@ -111,7 +111,7 @@ def _assemble(
         ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
         dirichlet = cotangent[0] * dot(bc, bc) + cotangent[1] * dot(ac, ac) + cotangent[2] * dot(ab, ab)
         jacobian = half * dot(a, cross(ab, ac))
-        energy += area * density_derivatives(dirichlet, jacobian)[0]
+        energy += area * density(dirichlet, jacobian)
         wd, wj, bend_d, bend_j, dd, dj, jj = _projected_hessian(dirichlet, jacobian)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3

@@ -16,6 +16,7 @@ from .decimation import decimate
 from .energy import Reference
 from .insertion import insert_vertices
 from .level import build_level
+from .orientation import orient
 from .reference import Source, carry, update_level
 from .relax_level import relax_level
 from .vectors import Floats
@@ -58,7 +59,8 @@ def progressive_sphere_map(V: NDArray[np.float64], F: NDArray[np.integer]) -> ND
         S = _map_by_levels(normal_V[order], triangles, trust)[number]
         certificate = certify(F, S)
         if certificate.valid:
-            return S
+            turned = orient(normal_V, F, S)
+            return turned if certify(F, turned).valid else S  # round-off can fold the tiniest triangles
     raise SphereMapError(
         f"no fold-free sphere map was found: {certificate.flipped} of {len(F)} triangles are folded, the solid angle "
         f"is {certificate.solid_angle:.6g} instead of 4 pi; simplify or remesh the mesh, and remove its slivers"

@@ -10,8 +10,8 @@ from .newton import newton_step
 from .relaxation import sweep
 from .vectors import Floats
 
-MOST_SWEEPS, TIRED_SWEEP = 10, 0.1  # stop when a sweep lowers the energy by less than this share
-MOST_NEWTON_STEPS, TIRED_NEWTON = 30, 5e-3  # stop when two steps in a row do
+MOST_SWEEPS, TIRED_SWEEP = 5, 0.1  # stop when a sweep lowers the energy by less than this share
+MOST_NEWTON_STEPS, TIRED_NEWTON = 20, 1e-2  # stop when two steps in a row do
 EXPLODED = 1e5 * 4 * np.pi  # energy of a level that is stuck: start over from the sweeps
 MOST_ROUNDS = 4
 

@@ -76,6 +76,14 @@ def relax_vertex(v: int, star: Ints, degree: int, tail: Ints, S: Floats, referen
         q = unit(combine(1.0, p, step, direction))
         lower = star_energy(q, star, degree, tail, S, reference)
         if lower < energy - ARMIJO * step * descent:
+            further = 2.0 * lower < energy  # high up a wall a Newton step is far too short
+            while further:
+                step *= 2.0
+                ahead = unit(combine(1.0, p, step, direction))
+                least = star_energy(ahead, star, degree, tail, S, reference)
+                further = 2.0 * least < lower
+                if least < lower:
+                    q, lower = ahead, least
             set_row(S, v, q)
             return energy - lower
         step *= 0.35

@@ -171,6 +171,7 @@ def test_next_rung_is_tried_where_one_folds(monkeypatch):
         return S if len(tried) == 3 else -S
 
     monkeypatch.setattr(progressive, "_map_by_levels", fold_at_first)
+    monkeypatch.setattr(progressive, "orient", lambda V, F, S: S)
     np.testing.assert_allclose(progressive_sphere_map(V, F), V, atol=1e-8)
     assert tried == list(progressive.TRUST_LADDER[:3])
 
@@ -214,7 +215,7 @@ def test_round_sphere_is_spread_evenly():
 def test_limbs_get_their_share_of_the_sphere():
     V, F = jack()
     quantiles = stretch_quantiles(V, F, progressive_sphere_map(V, F), [0.5, 0.99, 0.999])
-    assert np.all(quantiles < [1.3, 2.8, 3.0])
+    assert np.all(quantiles < [1.5, 2.2, 2.3])
 
 
 @pytest.mark.parametrize(("name", "bound"), [("spot.obj", 1.7), ("bunny.off", 2.0), ("elephant.obj", 2.0)])
