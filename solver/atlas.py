@@ -18,7 +18,6 @@ from .quality import atlas_quality
 from .stencil import lumped_areas
 from .texcoords import TextureCoordinates, texture_coordinates
 
-
 # [m]. Squares of what is farther away overflow on the way to the nearest surface point.
 _FARTHEST = 1e100
 
