@@ -6,11 +6,10 @@ wait for one whose core is busy encoding a frame.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
+from . import kernels
 from .operator import StepCoefficients, WaveOperator, number_or_field, step_coefficients
 from .padding import padded_addresses
 
@@ -33,7 +32,7 @@ class CPUBackend:
         self._dent = np.zeros(shape if self._yield is not None else (1, 1, 1), np.float32)
         self._moment = np.zeros(shape if self._laplace is not None else (1, 1, 1), np.float32)
         extra = self._viscous is not None or self._laplace is not None
-        self._extra = np.zeros(shape if extra else (1, 1, 1), np.float32)
+        self._extra = np.zeros(shape, np.float32) if extra else np.float32(0)
         self._carries = number_or_field(operator.carries)
         self._shift = 0.0
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
@@ -84,15 +83,15 @@ class CPUBackend:
         self._drift(dt / 2)
         self._flow()
         for step in range(substeps):
-            _fill(self._h, self._ring, self._ring_source)
+            kernels.fill(self._h, self._ring, self._ring_source)
             self._gather_extra_forces()
             drift = np.float32(dt if step < substeps - 1 else dt / 2)
-            _kick_drift(
+            kernels.kick_drift(
                 self._stencil, self._h, self._v, self._h_next, self._extra, k.gain, k.decay, k.spring, self._push, drift
             )
             self._h, self._h_next = self._h_next, self._h
             if len(self._kicks):
-                _kick(self._h, self._v, self._loaded, self._kicks, drift)
+                kernels.kick(self._h, self._v, self._loaded, self._kicks, drift)
             self._flow()
 
     def wait(self) -> None:
@@ -105,22 +104,22 @@ class CPUBackend:
 
     def _drift(self, dt: float) -> None:
         if dt or self._shift:
-            _drift(self._h, self._v, self._carries, np.float32(self._shift), np.float32(dt))
+            kernels.drift(self._h, self._v, self._carries, np.float32(self._shift), np.float32(dt))
         self._shift = 0.0
 
     def _flow(self) -> None:
         if self._yield is not None:
-            _flow(self._h, self._dent, self._yield)
+            kernels.flow(self._h, self._dent, self._yield)
 
     def _gather_extra_forces(self) -> None:
         """Forces beside tension and stiffness: viscous, and of bending."""
         if self._viscous is not None:
-            _fill(self._v, self._ring, self._ring_source)
-            _apply(self._viscous, self._v, np.float32(1), False, self._extra)
+            kernels.fill(self._v, self._ring, self._ring_source)
+            kernels.apply(self._viscous, self._v, np.float32(1), False, self._extra)
         if self._laplace is not None:
-            _apply(self._laplace, self._h, self._rigidity, False, self._moment)
-            _fill(self._moment, self._ring, self._ring_source)
-            _apply(self._laplace, self._moment, np.float32(-1), self._viscous is not None, self._extra)
+            kernels.apply(self._laplace, self._h, self._rigidity, False, self._moment)
+            kernels.fill(self._moment, self._ring, self._ring_source)
+            kernels.apply(self._laplace, self._moment, np.float32(-1), self._viscous is not None, self._extra)
 
     def _prepare(self, dt: float) -> StepCoefficients:
         """Coefficients of the kick, computed once a step length and load."""
@@ -136,100 +135,3 @@ class CPUBackend:
 
 def _single(field: NDArray[np.float64] | None) -> NDArray[np.float32] | None:
     return None if field is None else field.astype(np.float32)
-
-
-def _at(x, f, r, c):
-    """x[f, r, c] of an array, or the number x itself."""
-    raise NotImplementedError("for compiled code only")
-
-
-@overload(_at, inline="always")
-def _at_overload(x, f, r, c):
-    if isinstance(x, numba.types.Array):
-        return lambda x, f, r, c: x[f, r, c]
-    return lambda x, f, r, c: x
-
-
-@numba.njit(cache=True)
-def _fill(h, ring, source):
-    """Copy the neighbours' border texels into the ring."""
-    flat = h.reshape(-1)
-    for i in range(len(ring)):
-        flat[ring[i]] = flat[source[i]]
-
-
-@numba.njit(cache=True)
-def _kick(h, v, texels, kicks, dt):
-    """Kick some texels, and drift them by that."""
-    heights, velocities = h.reshape(-1), v.reshape(-1)
-    for i in range(len(texels)):
-        velocities[texels[i]] += kicks[i]
-        heights[texels[i]] += dt * kicks[i]
-
-
-@numba.njit(cache=True, nogil=True)
-def _drift(h, v, carries, shift, dt):
-    n = h.shape[1] - 2
-    for i in range(6 * n):
-        f, r = i // n, i % n + 1
-        for c in range(1, n + 1):
-            v[f, r, c] += shift * _at(carries, f, r - 1, c - 1)
-            h[f, r, c] += dt * v[f, r, c]
-
-
-@numba.njit(cache=True, nogil=True)
-def _flow(h, dent, limit):
-    """Hand the part of the elastic height that is beyond the yield height over to the permanent one."""
-    n = h.shape[1] - 2
-    for i in range(6 * n):
-        f, r = i // n, i % n + 1
-        for c in range(1, n + 1):
-            most = _at(limit, f, r - 1, c - 1)
-            kept = min(max(h[f, r, c], -most), most)
-            dent[f, r, c] += h[f, r, c] - kept
-            h[f, r, c] = kept
-
-
-@numba.njit(inline="always")
-def _force(w, h, f, r, c):
-    """Sum over the eight links of weight (h_j - h_i) at padded texel (f, r, c)."""
-    x = h[f, r, c]
-    # in pairs, as block.glsl adds them up: so both backends round alike
-    return (
-        (w[f, 0, r, c] * (h[f, r, c + 1] - x) + w[f, 0, r, c - 1] * (h[f, r, c - 1] - x))
-        + (w[f, 1, r, c] * (h[f, r + 1, c] - x) + w[f, 1, r - 1, c] * (h[f, r - 1, c] - x))
-        + (w[f, 2, r, c] * (h[f, r + 1, c + 1] - x) + w[f, 2, r - 1, c - 1] * (h[f, r - 1, c - 1] - x))
-        + (w[f, 3, r, c - 1] * (h[f, r + 1, c - 1] - x) + w[f, 3, r - 1, c] * (h[f, r - 1, c + 1] - x))
-    )
-
-
-@numba.njit(cache=True, nogil=True)
-def _apply(w, h, factor, add, out):
-    """The stencil on a field times a factor, written into `out` or added to it."""
-    n = h.shape[1] - 2
-    for i in range(6 * n):
-        f, r = i // n, i % n + 1
-        for c in range(1, n + 1):
-            force = _at(factor, f, r - 1, c - 1) * _force(w, h, f, r, c)
-            out[f, r, c] = out[f, r, c] + force if add else force
-
-
-@numba.njit(cache=True, nogil=True)
-def _kick_drift(w, h, v, h_next, extra, gain, decay, spring, push, dt):
-    """One substep: v = decay v + gain force - spring h + push, then h_next = h + dt v."""
-    n = h.shape[1] - 2
-    more = extra.shape[1] == n + 2
-    for i in range(6 * n):
-        f, r = i // n, i % n + 1
-        for c in range(1, n + 1):
-            force = _force(w, h, f, r, c)
-            if more:
-                force += extra[f, r, c]
-            kicked = (
-                _at(decay, f, r - 1, c - 1) * v[f, r, c]
-                + gain[f, r - 1, c - 1] * force
-                - _at(spring, f, r - 1, c - 1) * h[f, r, c]
-                + _at(push, f, r - 1, c - 1)
-            )
-            v[f, r, c] = kicked
-            h_next[f, r, c] = h[f, r, c] + dt * kicked
