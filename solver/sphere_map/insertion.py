@@ -65,11 +65,10 @@ def insert_vertices(log: Ints, table: CornerTable, source: Source, S: Floats, re
             for i in range(degree):
                 update_triangle(star[i] // 3, tail, source, reference)
         _place(h, table, star, degree, S, reference)
-        for _ in range(2):
-            relax_vertex(u, star, degree, tail, S, reference)
-            for i in range(degree):
-                w = tail[following(star[i])]
-                other_degree = gather_star(table, w, other)
-                if other_degree <= CROWDED:
-                    relax_vertex(w, other, other_degree, tail, S, reference)
+        relax_vertex(u, star, degree, tail, S, reference)
+        for i in range(degree):
+            w = tail[following(star[i])]
+            other_degree = gather_star(table, w, other)
+            if other_degree <= CROWDED:
+                relax_vertex(w, other, other_degree, tail, S, reference)
         relax_vertex(u, star, degree, tail, S, reference)

@@ -18,16 +18,16 @@ NEGLIGIBLE = 1e-2  # share of the narrowness that no rotation need look at
 
 
 def orient(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
-    """Rotate a sphere map S [n, 3] of the mesh V [n, 3], F [m, 3], whose area is 4 pi, so that texels are not narrow."""
+    """Rotate a sphere map S [n, 3] of the mesh V [n, 3], F [m, 3], of area 4 pi, so that texels are not narrow."""
     metric, area = _vertex_metrics(F.astype(np.int32), V, S)
     trace = metric[:, 0] + metric[:, 1] + metric[:, 2]
     squares = np.sum(metric[:, :3] ** 2, axis=1) + 2 * np.sum(metric[:, 3:] ** 2, axis=1)
     narrowest = area * _inverse_square(trace, (trace * trace - squares) / 2) ** SHARPNESS
     order = np.argsort(-narrowest, kind="stable")
     count = int(np.searchsorted(np.cumsum(narrowest[order]), (1 - NEGLIGIBLE) * np.sum(narrowest))) + 1
-    kept = order[:count]
+    narrow = S[order[:count]], metric[order[:count]], area[order[:count]]
     rotations = spread_rotations(CANDIDATES)
-    narrowness = [_narrowness(rotation, S[kept], metric[kept], area[kept]) for rotation in rotations]
+    narrowness = [_narrowness(rotation, *narrow) for rotation in rotations]
     return S @ rotations[int(np.argmin(narrowness))].T
 
 
