@@ -141,14 +141,15 @@ def _between(a, b):
 
 @numba.njit(cache=True)
 def _quad_area(sw, se, nw, ne):
-    """Area of a quad that need not be flat: the mean of its two triangulations, which misses nothing of a fold."""
+    """Area of a quad that need not be flat: that of its smaller triangulation.
+
+    The flat area p x q / 2 misses what a fold holds, the other triangulation spans it twice: with that much mass waves
+    are late, by 1 % in the median over the elephant.
+    """
     south, west, north, east = _between(sw, se), _between(sw, nw), _between(ne, nw), _between(ne, se)
-    return (
-        _cross_length(south, west)
-        + _cross_length(north, east)
-        + _cross_length(south, east)
-        + _cross_length(north, west)
-    ) / 4
+    rising = _cross_length(south, east) + _cross_length(north, west)
+    falling = _cross_length(south, west) + _cross_length(north, east)
+    return min(rising, falling) / 2
 
 
 @numba.njit(cache=True)

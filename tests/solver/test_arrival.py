@@ -43,9 +43,9 @@ def test_waves_arrive_in_time_on_known_meshes(name: str) -> None:
     if not (MESHES / name).is_file():
         pytest.skip("the mesh is not here")
     atlas = build_atlas(load_mesh(MESHES / name), 96, cache=False)
-    error = arrival_error(atlas, spread_sources(atlas, 3)[1])
-    assert error.front_median < 0.01
-    assert error.front_under_3_percent > 0.9
+    errors = [arrival_error(atlas, source) for source in spread_sources(atlas, 2)]
+    assert np.mean([error.front_median for error in errors]) < 0.01
+    assert np.mean([error.front_under_3_percent for error in errors]) > 0.9
 
 
 def test_same_object_otherwise_presented_has_the_same_times() -> None:

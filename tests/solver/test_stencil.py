@@ -28,7 +28,8 @@ def element(corners: np.ndarray) -> tuple[np.ndarray, float]:
         stiffness += 0.4 * 4 * area / (frame**2).sum() * np.outer(hourglass, hourglass)
         triangles = corners[[[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]]
         edges = triangles[:, 1:] - triangles[:, :1]
-        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum() / 4
+        twice = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        area = min(twice[:2].sum(), twice[2:].sum()) / 2
     return stiffness, area
 
 
