@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numba
 import numpy as np
 import platformdirs
 from numpy.typing import NDArray
@@ -90,11 +91,8 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
     """Atlas of a mesh for a given fold-free sphere map [vertex_count, 3] (unit vectors)."""
     directions = texel_directions(check_resolution(resolution))
     triangles, barycentrics = cast_rays(sphere, mesh.F, directions.reshape(-1, 3))
-    corners = mesh.F[triangles]
-    positions = np.einsum("ij,ijk->ik", barycentrics, mesh.V[corners])
-    normals = np.einsum("ij,ijk->ik", barycentrics, mesh.vertex_normals[corners])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.where(length > 1e-9, normals / np.maximum(length, 1e-9), mesh.vertex_normals[corners[:, 0]])
+    positions, normals = np.empty((len(triangles), 3)), np.empty((len(triangles), 3))
+    _interpolate(mesh.V, mesh.vertex_normals, mesh.F, triangles, barycentrics, positions, normals)
     shape = directions.shape[:3]
     return Atlas(
         mesh=mesh,
@@ -104,3 +102,22 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
         triangles=triangles.reshape(shape),
         barycentrics=barycentrics.reshape(*shape, 3),
     )
+
+
+@numba.njit(cache=True)
+def _interpolate(V, vertex_normals, F, triangles, barycentrics, positions, normals):
+    """Surface points and unit normals at barycentric coordinates in triangles."""
+    for i in range(len(triangles)):
+        corners, weights = F[triangles[i]], barycentrics[i]
+        square = 0.0
+        for k in range(3):
+            position = normal = 0.0
+            for j in range(3):
+                position += weights[j] * V[corners[j], k]
+                normal += weights[j] * vertex_normals[corners[j], k]
+            positions[i, k], normals[i, k] = position, normal
+            square += normal * normal
+        length = np.sqrt(square)
+        for k in range(3):
+            # opposite normals may cancel: any corner's will do
+            normals[i, k] = normals[i, k] / length if length > 1e-9 else vertex_normals[corners[0], k]
