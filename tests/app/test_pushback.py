@@ -78,8 +78,10 @@ def test_forces_of_others_stay() -> None:
     ripples = Ripples(model, {"block": Material(density=20.0)}, resolution=16, backend="cpu", two_way=True)
     ripples["block"].velocity = np.ones((6, 16, 16))
     data.xfrc_applied[1, 0] = 0.25
+    highest = 0.0
     for _ in range(100):
         mujoco.mj_step(model, data)
         ripples.step(data)
-    assert data.qpos[2] > 0.2503
+        highest = max(highest, data.qpos[2])
+    assert highest > 0.2505  # it was pushed
     np.testing.assert_allclose(data.xfrc_applied[1], [0.25, 0, 0, 0, 0, 0], atol=1e-12)
