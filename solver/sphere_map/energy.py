@@ -34,8 +34,8 @@ def density(dirichlet: float, jacobian: float) -> float:
     """Energy per reference area, W = (D / 2)^4 (1 + (0.53 / J)^8 + (0.48 / J)^16).
 
     The first term punishes a large singular value, hence short texel edges on the real surface, which set the wave
-    solver's time step. D / J^2 is D of the inverse map: the second term punishes long texel edges, less than a hundredth as much.
-    The third is a wall for areas that get too small on the sphere. Down to half their even share they are almost free:
+    solver's time step. D / J^2 is D of the inverse map: the second term punishes long texel edges, but far less. The
+    third is a wall for areas that get too small on the sphere. Down to half their even share they are almost free:
     what limbs leave spares their roots from being stretched round. The wall is so steep that 99.9 % of a surface has
     texels less than twice too wide.
     """
