@@ -80,7 +80,9 @@ def load_scene(name_or_path: str | Path) -> Scene:
     scene = Scene(
         name=path.stem,
         model=model,
-        surfaces=tuple(content.ripple),
+        surfaces=tuple(
+            msgspec.structs.replace(entry, material=entry.material.located(path.parent)) for entry in content.ripple
+        ),
         camera=content.camera,
         duration=content.duration,
         events=Events(
@@ -170,6 +172,12 @@ def check_scene(scene: Scene) -> None:
                 f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 (sRGB)"
             )
         entry.material.material()
+        for name, each in entry.material.maps().items():
+            if not Path(each.map).is_file():
+                raise SceneError(
+                    f"ripple.material.{name} names the picture {each.map!r}, which does not exist; valid is a number, or "
+                    "the path of a picture relative to the scene file"
+                )
         for disc in entry.still:
             if not 0 < disc.radius < float("inf"):
                 raise SceneError(f"a still disc of geom {entry.geom!r} has radius {disc.radius!r} m; valid is above 0")

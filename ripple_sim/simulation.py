@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver import Relief
+from ripple_sim.solver import Relief, texture_map
 from ripple_sim.solver.gl import shared_context
 
 from .coupling import Impulse, Ripples
@@ -94,6 +94,13 @@ class Simulation:
             two_way=scene.two_way,
         )
         for entry in scene.surfaces:
+            atlas = self.ripples[entry.geom].atlas
+            maps = {
+                name: texture_map(atlas, each.map, each.low, each.high, each.channel)
+                for name, each in entry.material.maps().items()
+            }
+            if maps:
+                self.ripples.change_material(entry.geom, **maps)
             for disc in entry.still:
                 self.ripples.make_rigid(entry.geom, self.ripples.to_geom(entry.geom, disc.point), disc.radius)
         self._script = Script(self.model, scene.events, list(self.ripples))

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
 
@@ -67,7 +70,7 @@ def _target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
         first_vertex, first_face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
         V = model.mesh_vert[first_vertex : first_vertex + model.mesh_vertnum[mesh]]
         F = model.mesh_face[first_face : first_face + model.mesh_facenum[mesh]]
-        return Mesh.from_arrays(V, F, name=name)
+        return _textured(Mesh.from_arrays(V, F, name=name), F, _texture_coordinates(model, mesh))
     if kind == "ellipsoid":
         solid = trimesh.creation.icosphere(subdivisions=4)
         solid.apply_scale(size)
@@ -81,3 +84,25 @@ def _target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
     longest = float(np.max(solid.extents)) * _FINENESS
     V, F = trimesh.remesh.subdivide_to_size(solid.vertices, solid.faces, max_edge=longest)
     return Mesh.from_arrays(V, F, name=name)
+
+
+def _texture_coordinates(model: mujoco.MjModel, mesh: int) -> NDArray[np.float64] | None:
+    """A mesh's own texture coordinates at the corners of its triangles, [face_count, 3, 2], or None.
+
+    MuJoCo counts v from the picture's upper edge.
+    """
+    first, first_face = model.mesh_texcoordadr[mesh], model.mesh_faceadr[mesh]
+    if first < 0:
+        return None
+    pairs = model.mesh_texcoord[first : first + model.mesh_texcoordnum[mesh]]
+    corners = pairs[model.mesh_facetexcoord[first_face : first_face + model.mesh_facenum[mesh]]].astype(np.float64)
+    return np.stack([corners[..., 0], 1 - corners[..., 1]], axis=-1)
+
+
+def _textured(mesh: Mesh, F: NDArray[np.int32], corner_uv: NDArray[np.float64] | None) -> Mesh:
+    """The mesh with texture coordinates, unless its triangles had to be mended."""
+    if corner_uv is None or not np.array_equal(mesh.F, F):
+        return mesh
+    uv = np.zeros((len(mesh.V), 2))
+    uv[F] = corner_uv
+    return dataclasses.replace(mesh, uv=uv, corner_uv=corner_uv)

@@ -1,0 +1,61 @@
+"""Material maps in scene files: from a picture, through the mesh's own texture coordinates, to the waves."""
+
+import dataclasses
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from ripple_sim.errors import SceneError
+from ripple_sim.scene import load_scene
+from ripple_sim.scene_file import MapEntry, MaterialEntry, parse_scene
+from ripple_sim.simulation import Simulation
+from ripple_sim.solver import SolverError
+
+
+def test_eyes_and_mouth_of_the_face_stay_still() -> None:
+    simulation = Simulation(load_scene("face"), fps=30, resolution=64, backend="cpu")
+    waves = simulation.ripples["face"]
+    for _ in range(18):
+        simulation.advance_frame()
+    still = waves.material.texels("speed", 64) == 0
+    assert 0.01 < still.mean() < 0.06
+    # the face looks along +x, its mouth is below its eyes
+    assert (waves.atlas.positions[still][:, 0] > 0.2).all()
+    assert not waves.height[still].any()
+    assert np.abs(waves.height).max() > 1e-3
+
+
+def test_coefficients_are_numbers_paths_or_tables() -> None:
+    content = parse_scene(
+        {
+            "model": "a.xml",
+            "ripple": [
+                {
+                    "geom": "a",
+                    "material": {"speed": "s.png", "damping": {"map": "d.png", "high": 5.0}, "bending": 0.2},
+                }
+            ],
+        },
+        "scene.toml",
+    )
+    maps = content.ripple[0].material.located(Path("folder")).maps()
+    assert set(maps) == {"speed", "damping"}
+    assert maps["damping"].map == str(Path("folder") / "d.png")
+    assert (maps["damping"].low, maps["damping"].high) == (0.0, 5.0)
+    material = content.ripple[0].material.material()
+    assert (material.speed, material.damping, material.bending) == (1.0, 5.0, 0.2)
+
+
+def test_unknown_keys_of_a_map_are_refused() -> None:
+    table = {"model": "a.xml", "ripple": [{"geom": "a", "material": {"speed": {"map": "s.png", "hight": 2.0}}}]}
+    with pytest.raises(SceneError, match="unknown key 'hight'"):
+        parse_scene(table, "scene.toml")
+
+
+def test_missing_picture_is_named() -> None:
+    scene = load_scene("face")
+    entry = msgspec.structs.replace(scene.surfaces[0], material=MaterialEntry(speed=MapEntry("nowhere.png")))
+    with pytest.raises(SolverError, match=r"nowhere\.png.* cannot be read"):
+        Simulation(dataclasses.replace(scene, surfaces=(entry,)), resolution=16, backend="cpu")
