@@ -172,10 +172,10 @@ def check_scene(scene: Scene) -> None:
                 f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 (sRGB)"
             )
         entry.material.material()
-        for name, each in entry.material.maps().items():
+        for coefficient, each in entry.material.maps().items():
             if not Path(each.map).is_file():
                 raise SceneError(
-                    f"ripple.material.{name} names the picture {each.map!r}, which does not exist; valid is a number, "
+                    f"ripple.material.{coefficient} names the picture {each.map!r}, which does not exist; valid is a number, "
                     "or the path of a picture relative to the scene file"
                 )
         for disc in entry.still:
