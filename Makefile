@@ -5,6 +5,7 @@
 
 BIN := .venv/bin
 STAMP := .venv/.installed
+KERNELS := .venv/.kernels
 TYPES := build/types
 
 .PHONY: setup demo test lint clean
@@ -15,10 +16,15 @@ $(STAMP): requirements.txt pyproject.toml .ci/setup .ci/egl.py
 	.ci/setup
 	@touch $@
 
-demo: setup
+# numba notices a changed kernel only by its own file, not by the files of the kernels that it calls.
+$(KERNELS): $(STAMP) $(wildcard solver/*.py solver/*/*.py)
+	@find solver -name '*.nb[ic]' -delete
+	@touch $@
+
+demo: setup $(KERNELS)
 	$(BIN)/ripple-sim render duck -o out/demo.mp4
 
-test: setup
+test: setup $(KERNELS)
 	$(BIN)/python -m pytest
 
 # mypy knows nothing of setuptools' package-dir, so it is shown the package as it is installed, made of links.
