@@ -175,8 +175,8 @@ def check_scene(scene: Scene) -> None:
         for coefficient, each in entry.material.maps().items():
             if not Path(each.map).is_file():
                 raise SceneError(
-                    f"ripple.material.{coefficient} names the picture {each.map!r}, which does not exist; valid is a number, "
-                    "or the path of a picture relative to the scene file"
+                    f"ripple.material.{coefficient} names the picture {each.map!r}, which does not exist; "
+                    "valid is a number, or the path of a picture relative to the scene file"
                 )
         for disc in entry.still:
             if not 0 < disc.radius < float("inf"):
