@@ -84,4 +84,7 @@ def test_forces_of_others_stay() -> None:
         ripples.step(data)
         highest = max(highest, data.qpos[2])
     assert highest > 0.2505  # it was pushed
+    data.qpos[2] = 1.0  # out of reach, where nothing pushes any more
+    mujoco.mj_step(model, data)
+    ripples.step(data)
     np.testing.assert_allclose(data.xfrc_applied[1], [0.25, 0, 0, 0, 0, 0], atol=1e-12)
