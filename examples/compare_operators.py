@@ -12,8 +12,8 @@ from PIL import Image, ImageDraw
 
 from ripple_sim.bench.accuracy import arrivals, sphere_modes
 from ripple_sim.solver import WaveSolver, sphere_atlas
-from ripple_sim.solver.operator import OPERATORS
-from ripple_sim.solver.sampling import sampling_matrix
+from ripple_sim.solver.atlas.sampling import sampling_matrix
+from ripple_sim.solver.waves.operator import OPERATORS
 
 SIZE, TIME, SOURCE = 360, 0.8, np.array([0.45, 0.25, 0.86])
 CALM, HIGH, LOW = np.array([244, 242, 236]), np.array([200, 60, 40]), np.array([30, 90, 170])

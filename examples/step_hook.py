@@ -6,7 +6,7 @@ mocap bodies, and the ripples, to press on surfaces.
 
 import numpy as np
 
-from ripple_sim.scene import load_scene
+from ripple_sim.scene.scene import load_scene
 from ripple_sim.simulation import Simulation, render_video
 
 FORCE = 12.0  # N

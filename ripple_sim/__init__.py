@@ -6,8 +6,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .collidable import make_collidable
-    from .coupling import Impulse, Ripples
+    from .coupling.collidable import make_collidable
+    from .coupling.ripples import Impulse, Ripples
     from .errors import RippleWarning
     from .solver import Material, RippleError
 
@@ -15,12 +15,12 @@ __version__ = "0.1.0"
 __all__ = ["Impulse", "Material", "RippleError", "RippleWarning", "Ripples", "make_collidable"]
 
 _HOMES = {
-    "Impulse": ".coupling",
+    "Impulse": ".coupling.ripples",
     "Material": ".solver",
     "RippleError": ".solver",
     "RippleWarning": ".errors",
-    "Ripples": ".coupling",
-    "make_collidable": ".collidable",
+    "Ripples": ".coupling.ripples",
+    "make_collidable": ".coupling.collidable",
 }
 
 

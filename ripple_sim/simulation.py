@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from ripple_sim.solver import Relief, texture_map
 from ripple_sim.solver.gl import shared_context
 
-from .coupling import Impulse, Ripples
+from .coupling.ripples import Impulse, Ripples
 from .errors import SceneError, SimulationError
-from .events import Script
 from .render import Renderer, Surface
-from .scene import MAX_DURATION, Scene
+from .scene.events import Script
+from .scene.scene import MAX_DURATION, Scene
 from .video import check_output, open_writer
 from .view import viewpoint
 

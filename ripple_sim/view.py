@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from .render import Camera, FixedCamera
-from .scene_file import CameraEntry
+from .scene.scene_file import CameraEntry
 
 
 def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, time: float) -> Camera | FixedCamera:

@@ -9,41 +9,41 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .absorber import absorbing_damping
-    from .analytic import SphereAtlas, sphere_atlas
-    from .atlas import Atlas
-    from .atlas_file import load_atlas
-    from .build import build_atlas
+    from .atlas.analytic import SphereAtlas, sphere_atlas
+    from .atlas.atlas import Atlas
+    from .atlas.atlas_file import load_atlas
+    from .atlas.build import build_atlas
+    from .atlas.maps import texture_map, vertex_map
     from .errors import AtlasError, GLError, MeshError, RippleError, SolverError, SphereMapError
-    from .footprint import Footprint
-    from .maps import texture_map, vertex_map
-    from .material import Material
-    from .mesh import Mesh
-    from .mesh_file import load_mesh
-    from .relief import Relief
-    from .waves import WaveSolver
+    from .mesh.mesh import Mesh
+    from .mesh.mesh_file import load_mesh
+    from .waves.absorber import absorbing_damping
+    from .waves.footprint import Footprint
+    from .waves.material import Material
+    from .waves.relief import Relief
+    from .waves.wave_solver import WaveSolver
 
 _HOME = {
-    "Atlas": "atlas",
+    "Atlas": "atlas.atlas",
     "AtlasError": "errors",
-    "Footprint": "footprint",
+    "Footprint": "waves.footprint",
     "GLError": "errors",
-    "Material": "material",
-    "Mesh": "mesh",
+    "Material": "waves.material",
+    "Mesh": "mesh.mesh",
     "MeshError": "errors",
-    "Relief": "relief",
+    "Relief": "waves.relief",
     "RippleError": "errors",
     "SolverError": "errors",
-    "SphereAtlas": "analytic",
+    "SphereAtlas": "atlas.analytic",
     "SphereMapError": "errors",
-    "WaveSolver": "waves",
-    "absorbing_damping": "absorber",
-    "build_atlas": "build",
-    "load_atlas": "atlas_file",
-    "load_mesh": "mesh_file",
-    "sphere_atlas": "analytic",
-    "texture_map": "maps",
-    "vertex_map": "maps",
+    "WaveSolver": "waves.wave_solver",
+    "absorbing_damping": "waves.absorber",
+    "build_atlas": "atlas.build",
+    "load_atlas": "atlas.atlas_file",
+    "load_mesh": "mesh.mesh_file",
+    "sphere_atlas": "atlas.analytic",
+    "texture_map": "atlas.maps",
+    "vertex_map": "atlas.maps",
 }
 
 __all__ = [

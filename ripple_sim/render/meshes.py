@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.cubemap import FACE_NORMALS, FACE_U, FACE_V
+from ripple_sim.solver.atlas.cubemap import FACE_NORMALS, FACE_U, FACE_V
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import sys
 
 import pytest
 
-from ripple_sim import cli, commands
+from ripple_sim.cli import commands
+from ripple_sim.cli import main as cli
 from ripple_sim.errors import EncodingError, SceneError
 from ripple_sim.solver.errors import GLError
 
@@ -77,7 +78,7 @@ def test_a_usage_error_names_the_argument_and_the_help(capsys, argv, named):
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
 def test_a_usage_error_reads_the_same_in_every_locale(encoding):
     result = subprocess.run(
-        [sys.executable, "-m", "ripple_sim.cli", "render", "duck", "-o", "x.mp4", "--backend", "vulkan"],
+        [sys.executable, "-m", "ripple_sim", "render", "duck", "-o", "x.mp4", "--backend", "vulkan"],
         capture_output=True,
         text=True,
         env={**os.environ, "PYTHONIOENCODING": encoding, "FORCE_COLOR": "1"},
@@ -177,7 +178,7 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
 def test_help_loads_nothing_heavy():
     code = (
         "import sys, ripple_sim\n"
-        "from ripple_sim.cli import main\n"
+        "from ripple_sim.cli.main import main\n"
         "main(['--help'])\n"
         "print(sorted({'vtkmodules', 'pyvista', 'numba', 'mujoco', 'moderngl', 'av', 'scipy'} & set(sys.modules)))\n"
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, RippleError, Ripples
-from ripple_sim.patch import cluster
+from ripple_sim.coupling.patch import cluster
 from ripple_sim.scenes.shapes import limbed
 
 GRAVITY = 9.81

@@ -4,9 +4,11 @@ import json
 
 import pytest
 
-from ripple_sim import cli, info
-from ripple_sim.solver import backend, gl
+from ripple_sim.cli import info
+from ripple_sim.cli import main as cli
+from ripple_sim.solver import gl
 from ripple_sim.solver.errors import GLError
+from ripple_sim.solver.waves import backend
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene import load_scene
-from ripple_sim.scene_file import MapEntry, MaterialEntry, parse_scene
+from ripple_sim.scene.scene import load_scene
+from ripple_sim.scene.scene_file import MapEntry, MaterialEntry, parse_scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import SolverError
 

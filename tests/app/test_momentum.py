@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, Ripples
-from ripple_sim.scene import load_scene
+from ripple_sim.scene.scene import load_scene
 from ripple_sim.scenes.shapes import limbed, peanut
 from ripple_sim.simulation import Simulation
 

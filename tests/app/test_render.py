@@ -8,7 +8,7 @@ from ripple_sim.render import LOOKS, Camera, Renderer, Surface, meshes
 from ripple_sim.render.camera import perspective, view_matrix
 from ripple_sim.render.subdivision import subdivide
 from ripple_sim.solver import RippleError
-from ripple_sim.solver.cubemap import padded_indices, texel_directions
+from ripple_sim.solver.atlas.cubemap import padded_indices, texel_directions
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, Ripples
-from ripple_sim.press import ONSET, Press
+from ripple_sim.coupling.press import ONSET, Press
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import WaveSolver, sphere_atlas
 

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.drop import drop_scene
 from ripple_sim.errors import SceneError
-from ripple_sim.scene import load_scene, shipped_scenes
+from ripple_sim.scene.drop import drop_scene
+from ripple_sim.scene.scene import load_scene, shipped_scenes
 from ripple_sim.scenes.shapes import peanut, write_obj
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import MeshError, RippleError

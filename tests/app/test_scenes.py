@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from ripple_sim.scene import load_scene, shipped_scenes
+from ripple_sim.scene.scene import load_scene, shipped_scenes
 from ripple_sim.scenes import shapes
 from ripple_sim.simulation import Simulation
 

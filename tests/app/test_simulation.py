@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from ripple_sim.errors import SceneError, SimulationError, VideoError
-from ripple_sim.scene import Scene, load_scene
+from ripple_sim.scene.scene import Scene, load_scene
 from ripple_sim.simulation import FrameSource, Simulation, render_video
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import shared_context

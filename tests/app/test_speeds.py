@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from ripple_sim.coupling.speeds import SpeedCheck
 from ripple_sim.errors import RippleWarning
-from ripple_sim.speeds import SpeedCheck
 
 PLATE = '<geom name="plate" type="box" size="0.3 0.3 0.02"/>'
 

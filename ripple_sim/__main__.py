@@ -1,0 +1,7 @@
+"""`python -m ripple_sim`, the same as the `ripple-sim` command."""
+
+import sys
+
+from .cli.main import main
+
+sys.exit(main())

@@ -1,0 +1,74 @@
+"""Types of command line arguments: how a word becomes a value, and what is said if it cannot."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from tyro.conf import arg
+from tyro.constructors import PrimitiveConstructorSpec
+
+from ..orientation import UP_AXES
+
+
+def parse_size(word: str) -> tuple[int, int]:
+    """Read width and height [pixels] from a word such as "1280x720"."""
+    match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", word)
+    if match is None:
+        raise ValueError(f"{word!r} is no frame size; valid is WIDTHxHEIGHT in pixels, such as 1280x720")
+    return int(match[1]), int(match[2])
+
+
+def parse_count(word: str) -> int:
+    """Read a whole number from 1 on."""
+    if not re.fullmatch(r"[0-9]{1,9}", word) or int(word) == 0:
+        raise ValueError(f"{word!r} is not valid; it must be a whole number from 1 on")
+    return int(word)
+
+
+def parse_seed(word: str) -> int:
+    """Read a whole number from 0 on."""
+    if not re.fullmatch(r"[0-9]{1,9}", word):
+        raise ValueError(f"{word!r} is not valid; it must be a whole number from 0 on")
+    return int(word)
+
+
+def parse_seconds(word: str) -> float:
+    """Read a positive, finite time [s]."""
+    try:
+        seconds = float(word)
+    except ValueError:
+        seconds = math.nan
+    if not (seconds > 0 and math.isfinite(seconds)):
+        raise ValueError(f"{word!r} is not valid; it must be a positive number of seconds")
+    return seconds
+
+
+def parse_axis(word: str) -> str:
+    """Read the axis that points up."""
+    if word not in UP_AXES:
+        raise ValueError(f"{word!r} is not valid; it must be {' or '.join(UP_AXES)}")
+    return word
+
+
+def _one_word(
+    parse: Callable[[str], Any], metavar: str, show: Callable[[Any], str] = str
+) -> PrimitiveConstructorSpec[Any]:
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar=metavar,
+        instance_from_str=lambda words: parse(words[0]),
+        is_instance=lambda value: True,
+        str_from_instance=lambda value: [show(value)],
+    )
+
+
+Size = Annotated[tuple[int, int], _one_word(parse_size, "WIDTHxHEIGHT", lambda size: f"{size[0]}x{size[1]}")]
+Count = Annotated[int, _one_word(parse_count, "N")]
+Seed = Annotated[int, _one_word(parse_seed, "N")]
+FrameRate = Annotated[int | None, _one_word(parse_count, "FPS"), arg(help_behavior_hint="(default: 60, for a GIF 25)")]
+Duration = Annotated[float | None, _one_word(parse_seconds, "S"), arg(help_behavior_hint="(default: the scene's)")]
+Resolution = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's)")]
+UpAxis = Annotated[str | None, _one_word(parse_axis, "{y,z}"), arg(help_behavior_hint="(default: z for STL, else y)")]

@@ -1,0 +1,208 @@
+"""The commands, one class each: the fields are the arguments, the docstrings the help, `run` does the work.
+
+What is heavy is imported where it is used, so that `--help` and mistakes are answered at once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json as json_format
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from tyro.conf import Positional, arg
+
+from .arguments import Count, Duration, FrameRate, Resolution, Seed, Size, UpAxis
+
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
+    from ..simulation import Summary
+    from ..solver import Mesh
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class _Video:
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
+    """Where the video goes: a name ending in .mp4, .webm or .gif, or one without ending for a folder of PNG frames."""
+    size: Size = (1280, 720)
+    """Frame size in pixels."""
+    fps: FrameRate = None
+    """Frames per second."""
+    duration: Duration = None
+    """Length of the video in seconds."""
+    resolution: Resolution = None
+    """Texels along an edge of a cube face; more carry finer waves and take longer."""
+    backend: Literal["auto", "gl", "cpu"] = "auto"
+    """Where the waves are computed: in OpenGL, on the CPU, or wherever it is faster."""
+
+    def load(self) -> Scene:
+        """Make the scene that is rendered."""
+        raise NotImplementedError
+
+    def run(self) -> None:
+        """Render the scene and print a summary."""
+        from ..video import check_output, default_fps
+
+        # Before anything that takes time.
+        fps = self.fps or default_fps(self.output)
+        check_output(self.output, *self.size, fps)
+
+        from ..simulation import render_video
+        from ..solver.gl import shared_context
+        from ..solver.waves.backend import auto_backend
+        from .progress import frame_progress
+
+        scene = self.load()
+        backend = auto_backend() if self.backend == "auto" else self.backend
+        with frame_progress(f"renderer {shared_context().renderer}, waves {backend}") as progress:
+            summary = render_video(
+                scene,
+                self.output,
+                size=self.size,
+                fps=fps,
+                duration=self.duration,
+                resolution=self.resolution,
+                backend=backend,
+                progress=progress,
+            )
+        print(_summary_text(summary))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Render(_Video):
+    """Render a scene to a video."""
+
+    scene: Annotated[Positional[str], arg(metavar="SCENE")]
+    """Name of a shipped scene, such as duck, or path of a scene file (TOML)."""
+
+    def load(self) -> Scene:
+        """Load the scene."""
+        from ..scene.scene import load_scene
+
+        return load_scene(self.scene)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Drop(_Video):
+    """Put any closed mesh on a floor, let bodies rain on it, and render that."""
+
+    mesh: Annotated[Positional[Path], arg(metavar="MESH")]
+    """Mesh file (OBJ, OFF, PLY, STL, GLB ...): closed, in one part, without handles."""
+    bodies: Count = 12
+    """How many bodies fall."""
+    seed: Seed = 0
+    """Chooses where and what falls; the same seed gives the same video."""
+    up: UpAxis = None
+    """Axis of the mesh that points up."""
+    repair: bool = False
+    """Mend a mesh that is open or not manifold (needs the package pymeshfix)."""
+
+    def load(self) -> Scene:
+        """Build a scene round the mesh."""
+        from ..scene.drop import drop_scene
+
+        return drop_scene(self.mesh, bodies=self.bodies, seed=self.seed, up=self.up, repair=self.repair)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Atlas:
+    """Map a mesh to a cube-map atlas, and say how good it is."""
+
+    mesh: Annotated[Positional[Path], arg(metavar="MESH")]
+    """Mesh file (OBJ, OFF, PLY, STL, GLB ...): closed, in one part, without handles."""
+    output: Annotated[Path | None, arg(aliases=["-o"], metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Save the atlas to this file (NPZ)."""
+    resolution: Count = 128
+    """Texels along an edge of a cube face."""
+    method: Annotated[str, arg(metavar="METHOD")] = "progressive"
+    """Sphere map: progressive (fold-free, spreads the area evenly) or conformal (keeps angles; starves limbs)."""
+    plot: Annotated[Path | None, arg(metavar="PNG", help_behavior_hint="(optional)")] = None
+    """Write a picture of the mesh, the sphere and the six faces, coloured by stretch."""
+    up: UpAxis = None
+    """Axis of the mesh that points up in the picture."""
+    repair: bool = False
+    """Mend a mesh that is open or not manifold (needs the package pymeshfix)."""
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Build the atlas, save and draw it where that is asked for, and print its figures."""
+        from ..orientation import usual_up
+        from ..solver import build_atlas, load_mesh
+        from .atlas_report import atlas_report, report_text
+
+        if self.plot is not None:
+            from .atlas_plot import check_plot_path
+
+            check_plot_path(self.plot)  # before anything that takes time
+        start = time.perf_counter()
+        mesh = load_mesh(self.mesh, repair=self.repair)
+        loaded = time.perf_counter()
+        atlas = build_atlas(mesh, resolution=self.resolution, method=self.method)
+        seconds = {"load": loaded - start, **atlas.timings}
+        if self.output is not None:
+            atlas.save(self.output)
+        if self.plot is not None:
+            from .atlas_plot import plot_atlas
+
+            begun = time.perf_counter()
+            plot_atlas(
+                atlas, self.plot, title=self.mesh.stem, subtitle=self._subtitle(mesh), up=self.up or usual_up(self.mesh)
+            )
+            seconds["plot"] = time.perf_counter() - begun
+        report = atlas_report(self.mesh, atlas, self.method, seconds)
+        print(json_format.dumps(report, indent=2) if self.json else report_text(report))
+
+    def _subtitle(self, mesh: Mesh) -> str:
+        n = self.resolution
+        return f"{len(mesh.V):,} vertices, {len(mesh.F):,} triangles; 6 x {n} x {n} texels, {self.method} sphere map"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Info:
+    """Show versions, the OpenGL driver and the wave solver, and what to install if rendering cannot work."""
+
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Print the report."""
+        from .info import as_text, collect
+
+        info = collect()
+        print(json_format.dumps(dataclasses.asdict(info), indent=2) if self.json else as_text(info))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Bench:
+    """Measure the wave solver: speed against a memory copy and others, accuracy against theory and exact geodesics."""
+
+    meshes: Annotated[Positional[tuple[Path, ...]], arg(metavar="MESH", help_behavior_hint="(optional)")] = ()
+    """Meshes on which to measure times of arrival, besides one of our own."""
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Measure and print; what is being measured is told on stderr."""
+        import sys
+
+        from ..bench.report import as_text, measure
+
+        report = measure(list(self.meshes), lambda stage: print(f"measuring {stage} ...", file=sys.stderr))
+        print(json_format.dumps(report, indent=2) if self.json else as_text(report))
+
+
+COMMANDS: dict[str, Callable[..., Any]] = {"render": Render, "drop": Drop, "atlas": Atlas, "info": Info, "bench": Bench}
+
+
+def _summary_text(summary: Summary) -> str:
+    return (
+        f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s\n"
+        f"renderer  {summary.renderer}\n"
+        f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps a frame\n"
+        f"time      set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
+        f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
+        f"encoding {summary.encode_seconds:.1f} s"
+    )

@@ -1,0 +1,90 @@
+"""The `ripple-sim` program: reads the command line, runs a command, turns errors into one line and an exit status.
+
+Exit status: 0 done, 1 something failed, 2 bad input, 130 interrupted, 143 terminated.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import tyro.conf
+import tyro.extras
+
+from .commands import COMMANDS
+
+DONE, FAILED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
+
+_DESCRIPTION = "Surface ripples on any genus-0 mesh, driven by the contact forces of a MuJoCo simulation."
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program with the arguments `argv` (by default the process's own) and return its exit status."""
+    command = _parse(list(sys.argv[1:] if argv is None else argv))
+    if isinstance(command, int):
+        return command
+    os.environ.setdefault("MUJOCO_GL", "disable")  # MuJoCo's own renderer would take the OpenGL context away
+
+    # As an exception, so that an unfinished video is removed on the way out.
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(TERMINATED))
+
+    from ..errors import EncodingError
+    from ..solver.errors import GLError, RippleError
+
+    try:
+        command.run()
+        sys.stdout.flush()
+    except OSError as error:
+        # standard output has failed (a full disk, a reader that has stopped): nothing more goes there, not even at exit
+        sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115
+        return FAILED if isinstance(error, BrokenPipeError) else _fail(error.strerror or error, FAILED)
+    except (GLError, EncodingError) as error:  # nothing that other input would cure
+        return _fail(error, FAILED)
+    except RippleError as error:
+        return _fail(error, BAD_INPUT)
+    except KeyboardInterrupt:
+        return _fail("interrupted", INTERRUPTED)
+    return DONE
+
+
+def _fail(message: object, status: int) -> int:
+    print(f"ripple-sim: {' '.join(str(message).split())}", file=sys.stderr)
+    return status
+
+
+def _parse(argv: list[str]) -> Any:
+    """Return the command to run, or the exit status if there is nothing to run."""
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return tyro.extras.subcommand_cli_from_dict(
+                COMMANDS,
+                prog="ripple-sim",
+                description=_DESCRIPTION,
+                args=argv,
+                config=(tyro.conf.FlagCreatePairsOff,),
+            )
+    except SystemExit as ending:
+        if not ending.code:
+            return DONE
+        return _fail(_first_part(complaint.getvalue()), BAD_INPUT)
+
+
+def _first_part(box: str) -> str:
+    """Reduce tyro's complaint to what stands between its first two rules, without the help texts (indented by 8).
+
+    It is a title, a rule, what is wrong, a rule, and hints; framed where stdout is UTF-8.
+    """
+    text = re.sub(r"\x1b\[[0-9;]*m", "", box)
+    parts = re.split(r"^[│╭╰ ]*(?:─ .* ─+|─{3,}|-{3,})[│╮╯ ]*$", text, flags=re.MULTILINE)
+    part = parts[1] if len(parts) > 1 else text
+    said = [line.strip("│ ") for line in part.splitlines() if not re.match(r"│? {9}", line)]
+    program = re.search(r"ripple-sim(?: [a-z]+)? --help", text)
+    return f"{' '.join(said).strip().rstrip('.')}; see {program[0] if program else 'ripple-sim --help'}"

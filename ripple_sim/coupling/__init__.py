@@ -1,0 +1,1 @@
+"""From MuJoCo contacts to waves on the touched surfaces, and back."""

@@ -1,0 +1,108 @@
+"""The targets of a MuJoCo model: which geom, which surface, and its atlas in the geom's own frame."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
+
+from ..errors import SceneError
+
+_GEOM = mujoco.mjtGeom
+TARGET_TYPES = {
+    int(getattr(_GEOM, f"mjGEOM_{name.upper()}")): name
+    for name in ("mesh", "sdf", "sphere", "ellipsoid", "capsule", "cylinder", "box")
+}
+
+# Primitives are cut into triangles of about this share of their size before they are mapped.
+_FINENESS = 1 / 24
+
+
+def geom_name(model: mujoco.MjModel, geom: int) -> str:
+    """Name of a geom, or "geom <id>" where it has none."""
+    return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom) or f"geom {geom}"
+
+
+def find_target(model: mujoco.MjModel, name: str) -> int:
+    """Id of the geom that shall ripple.
+
+    Raises
+    ------
+    SceneError
+        If there is no such geom, or its type has no closed surface.
+    """
+    geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
+    if geom < 0:
+        names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, i) for i in range(model.ngeom)]
+        known = ", ".join(repr(n) for n in names if n) or "none (give the geom a name in the MJCF)"
+        raise SceneError(f"the model has no geom {name!r}; its named geoms are {known}")
+    if int(model.geom_type[geom]) not in TARGET_TYPES:
+        kind = _GEOM(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
+        raise SceneError(
+            f"geom {name!r} is a {kind}, which cannot ripple; valid are {', '.join(TARGET_TYPES.values())}"
+        )
+    return geom
+
+
+def target_atlas(model: mujoco.MjModel, geom: int, resolution: int) -> Atlas:
+    """Atlas of a geom's surface in the geom's frame [m].
+
+    Raises
+    ------
+    MeshError
+        If the geom's mesh is not a closed genus-0 surface.
+    """
+    if TARGET_TYPES[int(model.geom_type[geom])] == "sphere":
+        return sphere_atlas(float(model.geom_size[geom, 0]), resolution)
+    return build_atlas(_target_mesh(model, geom), resolution)
+
+
+def _target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
+    kind, size = TARGET_TYPES[int(model.geom_type[geom])], model.geom_size[geom]
+    name = f"mesh of geom {geom_name(model, geom)!r}"
+    if kind in ("mesh", "sdf"):
+        mesh = model.geom_dataid[geom]
+        first_vertex, first_face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+        V = model.mesh_vert[first_vertex : first_vertex + model.mesh_vertnum[mesh]]
+        F = model.mesh_face[first_face : first_face + model.mesh_facenum[mesh]]
+        return _textured(Mesh.from_arrays(V, F, name=name), F, _texture_coordinates(model, mesh))
+    if kind == "ellipsoid":
+        solid = trimesh.creation.icosphere(subdivisions=4)
+        solid.apply_scale(size)
+    elif kind == "capsule":
+        solid = trimesh.creation.capsule(height=2 * size[1], radius=size[0], count=(48, 48))
+        solid.apply_translation([0, 0, -solid.bounds.mean(axis=0)[2]])
+    elif kind == "cylinder":
+        solid = trimesh.creation.cylinder(radius=size[0], height=2 * size[1], sections=64)
+    else:
+        solid = trimesh.creation.box(extents=2 * size)
+    longest = float(np.max(solid.extents)) * _FINENESS
+    V, F = trimesh.remesh.subdivide_to_size(solid.vertices, solid.faces, max_edge=longest)
+    return Mesh.from_arrays(V, F, name=name)
+
+
+def _texture_coordinates(model: mujoco.MjModel, mesh: int) -> NDArray[np.float64] | None:
+    """A mesh's own texture coordinates at the corners of its triangles, [face_count, 3, 2], or None.
+
+    MuJoCo counts v from the picture's upper edge.
+    """
+    first, first_face = model.mesh_texcoordadr[mesh], model.mesh_faceadr[mesh]
+    if first < 0:
+        return None
+    pairs = model.mesh_texcoord[first : first + model.mesh_texcoordnum[mesh]]
+    corners = pairs[model.mesh_facetexcoord[first_face : first_face + model.mesh_facenum[mesh]]].astype(np.float64)
+    return np.stack([corners[..., 0], 1 - corners[..., 1]], axis=-1)
+
+
+def _textured(mesh: Mesh, F: NDArray[np.int32], corner_uv: NDArray[np.float64] | None) -> Mesh:
+    """The mesh with texture coordinates, unless its triangles had to be mended."""
+    if corner_uv is None or not np.array_equal(mesh.F, F):
+        return mesh
+    uv = np.zeros((len(mesh.V), 2))
+    uv[F] = corner_uv
+    return dataclasses.replace(mesh, uv=uv, corner_uv=corner_uv)

@@ -1,0 +1,132 @@
+"""A scene's script: what happens to bodies and surfaces at given times."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+import mujoco
+import numpy as np
+
+from ..coupling.ripples import Ripples
+from ..errors import SceneError
+from .motion import DropEntry, Motions, PlaceEntry, ThrowEntry, Vector, check_time
+
+
+class PokeEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[[poke]]`: press on a rippling geom for an instant.
+
+    At a point [m] in the frame of the geom's body (the world, for a fixed target), with an impulse [N s], positive
+    inwards, spread over a radius [m], at a time [s].
+    """
+
+    geom: str
+    time: float
+    point: Vector
+    impulse: float
+    radius: float = 0.0
+
+
+class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
+    """`[change.material]`: the coefficients that change; the others stay as they are."""
+
+    speed: float | None = None
+    damping: float | None = None
+    stiffness: float | None = None
+    viscosity: float | None = None
+    density: float | None = None
+
+    def changes(self) -> dict[str, Any]:
+        """The coefficients that were given."""
+        return {name: value for name, value in msgspec.structs.asdict(self).items() if value is not None}
+
+
+class ChangeEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[[change]]`: another material for a rippling geom, from a time [s] on."""
+
+    geom: str
+    time: float
+    material: MaterialChange
+
+
+class ControlEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[[control]]`: set an actuator's control from a time [s] on, in the actuator's own unit."""
+
+    actuator: str
+    time: float
+    value: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Events:
+    """All that is to happen."""
+
+    drop: Sequence[DropEntry] = ()
+    throw: Sequence[ThrowEntry] = ()
+    place: Sequence[PlaceEntry] = ()
+    poke: Sequence[PokeEntry] = ()
+    change: Sequence[ChangeEntry] = ()
+    control: Sequence[ControlEntry] = ()
+
+
+class Script:
+    """Carries out the events. Call `apply` before each physics step.
+
+    Raises
+    ------
+    SceneError
+        If an event names a body or a geom that is not there, or has an invalid time, impulse or radius.
+    """
+
+    def __init__(self, model: mujoco.MjModel, events: Events, targets: Sequence[str]) -> None:
+        self._motions = Motions(model, [*events.drop, *events.throw, *events.place])
+        for poke in events.poke:
+            _check_target("poke", poke.geom, poke.time, targets)
+            if not (np.isfinite([poke.impulse, *poke.point]).all() and 0 <= poke.radius < np.inf):
+                raise SceneError(
+                    f"[[poke]] of {poke.geom!r} has point {poke.point} m, impulse {poke.impulse!r} N s, radius "
+                    f"{poke.radius!r} m; valid are finite numbers, the radius 0 or greater"
+                )
+        for change in events.change:
+            _check_target("change", change.geom, change.time, targets)
+        self._controls = [(entry, _actuator(model, entry)) for entry in sorted(events.control, key=lambda e: e.time)]
+        surface_events: list[PokeEntry | ChangeEntry] = [*events.poke, *events.change]
+        self._surface_events = sorted(surface_events, key=lambda event: event.time)
+
+    def apply(self, data: mujoco.MjData, ripples: Ripples) -> None:
+        """Do what is due."""
+        self._motions.apply(data)
+        while self._controls and self._controls[0][0].time <= data.time + 1e-9:
+            entry, actuator = self._controls.pop(0)
+            data.ctrl[actuator] = entry.value
+        while self._surface_events and self._surface_events[0].time <= data.time + 1e-9:
+            event = self._surface_events.pop(0)
+            if isinstance(event, PokeEntry):
+                point = ripples.to_geom(event.geom, event.point)
+                ripples[event.geom].add_impulse(point, event.impulse, event.radius)
+            else:
+                ripples.change_material(event.geom, **event.material.changes())
+
+
+def _check_target(verb: str, geom: str, time: float, targets: Sequence[str]) -> None:
+    check_time(verb, geom, time)
+    if geom not in targets:
+        raise SceneError(
+            f"[[{verb}]] names the geom {geom!r}, which does not ripple; the rippling geoms are "
+            f"{', '.join(map(repr, targets))}"
+        )
+
+
+def _actuator(model: mujoco.MjModel, entry: ControlEntry) -> int:
+    check_time("control", entry.actuator, entry.time)
+    actuator = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, entry.actuator)
+    if actuator < 0:
+        names = [model.actuator(i).name for i in range(model.nu)]
+        raise SceneError(
+            f"[[control]] names the actuator {entry.actuator!r}; the model's actuators are {', '.join(names) or 'none'}"
+        )
+    if not np.isfinite(entry.value):
+        raise SceneError(f"[[control]] of {entry.actuator!r} has value {entry.value!r}; valid is a finite number")
+    return int(actuator)

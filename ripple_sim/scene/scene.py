@@ -1,0 +1,188 @@
+"""Scenes: one MJCF and one TOML file that names its rippling surfaces, the camera, the duration and the script."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.resources
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+import mujoco
+import numpy as np
+
+from ..coupling.target import find_target
+from ..errors import SceneError
+from .events import Events, Script
+from .motion import DropEntry, ThrowEntry
+from .randomize import RandomEntry, randomize
+from .scene_file import CameraEntry, RippleEntry, parse_scene
+
+Moved = TypeVar("Moved", DropEntry, ThrowEntry)
+
+
+MAX_DURATION = 86_400  # [s], a day
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Scene:
+    """A MuJoCo model and what ripples in it.
+
+    Attributes
+    ----------
+    name : str
+    model : mujoco.MjModel
+    surfaces : tuple of RippleEntry
+    camera : CameraEntry
+    duration : float
+        [s].
+    events : Events
+        What happens to bodies and surfaces at given times.
+    two_way : bool
+        Whether moving surfaces push back on the bodies that touch them.
+    """
+
+    name: str
+    model: mujoco.MjModel
+    surfaces: tuple[RippleEntry, ...]
+    camera: CameraEntry
+    duration: float
+    events: Events = dataclasses.field(default_factory=Events)
+    two_way: bool = False
+
+
+def shipped_scenes() -> list[str]:
+    """Names of the scenes that come with ripple-sim."""
+    folder = importlib.resources.files("ripple_sim.scenes")
+    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+
+
+def load_scene(name_or_path: str | Path) -> Scene:
+    """Load a shipped scene by its name, or any scene by the path of its TOML file.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene or file, the TOML has an unknown key or a wrong value, MuJoCo refuses the MJCF, or a
+        geom or camera is not in it.
+    """
+    path = _scene_path(str(name_or_path))
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(f"scene file {str(path)!r} cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from error
+    content = parse_scene(table, str(path))
+    model, shifts = load_model(path.parent / content.model, content.random)
+    scene = Scene(
+        name=path.stem,
+        model=model,
+        surfaces=tuple(
+            msgspec.structs.replace(entry, material=entry.material.located(path.parent)) for entry in content.ripple
+        ),
+        camera=content.camera,
+        duration=content.duration,
+        events=Events(
+            drop=_shifted(content.drop, shifts),
+            throw=_shifted(content.throw, shifts),
+            place=tuple(content.place),
+            poke=tuple(content.poke),
+            change=tuple(content.change),
+            control=tuple(content.control),
+        ),
+        two_way=content.two_way,
+    )
+    check_scene(scene)
+    return scene
+
+
+def _scene_path(name_or_path: str) -> Path:
+    shipped = shipped_scenes()
+    if name_or_path in shipped:
+        return Path(str(importlib.resources.files("ripple_sim.scenes") / f"{name_or_path}.toml"))
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    raise SceneError(
+        f"there is no scene {name_or_path!r}; shipped scenes are {', '.join(shipped)}, or give the path of a TOML file"
+    )
+
+
+def _shifted(entries: Sequence[Moved], shifts: dict[str, np.ndarray]) -> tuple[Moved, ...]:
+    """The entries, with their positions moved as far as their bodies were."""
+    return tuple(
+        msgspec.structs.replace(entry, position=tuple(float(x) for x in np.add(entry.position, shifts[entry.body])))
+        if entry.position is not None and entry.body in shifts
+        else entry
+        for entry in entries
+    )
+
+
+def load_model(path: Path, random: RandomEntry | None = None) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
+    """Compile an MJCF file, and tell how far each of its bodies was shifted at random [m].
+
+    Raises
+    ------
+    SceneError
+        If the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the randomisation is invalid.
+    """
+    if not path.is_file():
+        problem = "is no file" if path.exists() else "does not exist"
+        raise SceneError(f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file")
+    try:
+        if random is None:
+            return mujoco.MjModel.from_xml_path(str(path)), {}
+        spec = mujoco.MjSpec.from_file(str(path))
+        shifts = randomize(spec, random)
+        return spec.compile(), shifts
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise SceneError(f"MuJoCo refuses {str(path)!r}: {reason}") from error
+
+
+def check_scene(scene: Scene) -> None:
+    """Check a scene's names and numbers against its model.
+
+    Raises
+    ------
+    SceneError
+    SolverError
+        For an invalid material.
+    """
+    # the renderer is not needed for anything but the names of its looks
+    from ..render import LOOKS
+
+    if not scene.surfaces:
+        raise SceneError(f"scene {scene.name!r} has no [[ripple]] surface; name at least one geom")
+    if not 0 < scene.duration < MAX_DURATION:
+        raise SceneError(f"duration is {scene.duration!r} s; valid is a positive number, less than {MAX_DURATION}")
+    seen = set()
+    for entry in scene.surfaces:
+        find_target(scene.model, entry.geom)
+        if entry.geom in seen:
+            raise SceneError(f"geom {entry.geom!r} has two [[ripple]] entries; valid is one")
+        seen.add(entry.geom)
+        if entry.look not in LOOKS:
+            raise SceneError(f"look {entry.look!r} does not exist; valid are {', '.join(LOOKS)}")
+        if entry.color is not None and not all(0 <= part <= 1 for part in entry.color):
+            raise SceneError(
+                f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 (sRGB)"
+            )
+        entry.material.material()
+        for coefficient, each in entry.material.maps().items():
+            if not Path(each.map).is_file():
+                raise SceneError(
+                    f"ripple.material.{coefficient} names the picture {each.map!r}, which does not exist; "
+                    "valid is a number, or the path of a picture relative to the scene file"
+                )
+        for disc in entry.still:
+            if not 0 < disc.radius < float("inf"):
+                raise SceneError(f"a still disc of geom {entry.geom!r} has radius {disc.radius!r} m; valid is above 0")
+    Script(scene.model, scene.events, [entry.geom for entry in scene.surfaces])
+    name = scene.camera.name
+    if name is not None and mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_CAMERA, name) < 0:
+        names = [scene.model.camera(i).name for i in range(scene.model.ncam)]
+        raise SceneError(f"the model has no camera {name!r}; its cameras are {', '.join(names) or 'none'}")

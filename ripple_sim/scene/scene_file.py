@@ -1,0 +1,185 @@
+"""The TOML file of a scene: its tables, and strict reading of them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from ripple_sim.solver import Material
+
+from ..errors import SceneError
+from .events import ChangeEntry, ControlEntry, MaterialChange, PokeEntry
+from .motion import DropEntry, PlaceEntry, ThrowEntry, Vector
+from .randomize import RandomEntry
+
+Color = tuple[float, float, float]
+
+
+class MapEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """A coefficient from a picture in the mesh's own texture coordinates, see `texture_map`.
+
+    `map` is the picture's path, relative to the scene file; black stands for `low`, white for `high`.
+    """
+
+    map: str
+    low: float = 0.0
+    high: float = 1.0
+    channel: str = "luminance"
+
+
+Coefficient = float | str | MapEntry
+
+
+class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[ripple.material]`: the wave equation's coefficients, see `Material`.
+
+    Units: speed [m/s], damping [1/s], stiffness [1/s^2], viscosity [m^2/s], density [kg/m^2], bending [m^4/s^2],
+    yield_height [m]. Each is a number, the path of a picture, or a table {map = ..., low = ..., high = ...}.
+    """
+
+    speed: Coefficient = 1.0
+    damping: Coefficient = 0.0
+    stiffness: Coefficient = 0.0
+    viscosity: Coefficient = 0.0
+    density: Coefficient = 1.0
+    bending: Coefficient = 0.0
+    yield_height: Coefficient = math.inf
+
+    def material(self) -> Material:
+        """The solver's material; where a coefficient is a map, with its value for white."""
+        maps = self.maps()
+        return Material(
+            **{name: maps[name].high if name in maps else value for name, value in msgspec.structs.asdict(self).items()}
+        )
+
+    def maps(self) -> dict[str, MapEntry]:
+        """The coefficients that are maps."""
+        return {
+            name: value if isinstance(value, MapEntry) else MapEntry(value)
+            for name, value in msgspec.structs.asdict(self).items()
+            if isinstance(value, str | MapEntry)
+        }
+
+    def located(self, folder: Path) -> MaterialEntry:
+        """The same with the pictures' paths made relative to a folder."""
+        return msgspec.structs.replace(
+            self,
+            **{
+                name: msgspec.structs.replace(entry, map=str(folder / entry.map)) for name, entry in self.maps().items()
+            },
+        )
+
+
+class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[[ripple.still]]`: a disc of the surface that carries no waves, round a point [m] of the geom's body's frame."""
+
+    point: Vector
+    radius: float
+
+
+class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[[ripple]]`: one surface that carries waves, and how it looks."""
+
+    geom: str
+    resolution: int = 128
+    look: str = "rubber"
+    color: Color | None = None
+    material: MaterialEntry = msgspec.field(default_factory=MaterialEntry)
+    still: list[StillEntry] = []
+
+
+class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[camera]`: a camera of the MJCF by name, or MuJoCo's free camera (metres, degrees), orbiting if wished."""
+
+    name: str | None = None
+    lookat: Vector | None = None
+    distance: float | None = None
+    azimuth: float = 90.0
+    elevation: float = -20.0
+    fovy: float = 45.0
+    orbit: float = 0.0
+
+
+class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
+    """The whole TOML file."""
+
+    model: str
+    ripple: list[RippleEntry]
+    duration: float = 5.0
+    two_way: bool = False
+    camera: CameraEntry = msgspec.field(default_factory=CameraEntry)
+    drop: list[DropEntry] = []
+    throw: list[ThrowEntry] = []
+    place: list[PlaceEntry] = []
+    poke: list[PokeEntry] = []
+    change: list[ChangeEntry] = []
+    control: list[ControlEntry] = []
+    random: RandomEntry | None = None
+
+
+def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
+    """Check a scene's table against the schema.
+
+    Raises
+    ------
+    SceneError
+        Naming the place, the value and what is valid.
+    """
+    _check_keys(table, SceneFile, "", origin)
+    _check_numbers(table, "", origin)
+    try:
+        return msgspec.convert(table, SceneFile)
+    except msgspec.ValidationError as error:
+        raise SceneError(f"scene file {origin!r}: {str(error).replace('`$.', '`')}") from error
+
+
+# Metres, seconds, newtons, degrees: nothing that a scene means is larger, and squares of it do not overflow.
+_LARGEST = 1e12
+
+
+def _check_numbers(value: Any, place: str, origin: str) -> None:
+    """Refuse NaN, infinity and absurdly large numbers wherever they stand."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _check_numbers(inner, f"{place}.{key}" if place else key, origin)
+    elif isinstance(value, list):
+        for inner in value:
+            _check_numbers(inner, place, origin)
+    elif isinstance(value, (int, float)) and not abs(value) <= _LARGEST:
+        raise SceneError(f"scene file {origin!r}: {place} is {value}; valid are numbers up to {_LARGEST:g}")
+
+
+_TABLES: dict[str, type[msgspec.Struct]] = {
+    "ripple": RippleEntry,
+    "ripple.material": MaterialEntry,
+    **{f"ripple.material.{field.name}": MapEntry for field in msgspec.structs.fields(MaterialEntry)},
+    "ripple.still": StillEntry,
+    "camera": CameraEntry,
+    "drop": DropEntry,
+    "throw": ThrowEntry,
+    "place": PlaceEntry,
+    "poke": PokeEntry,
+    "change": ChangeEntry,
+    "change.material": MaterialChange,
+    "control": ControlEntry,
+    "random": RandomEntry,
+}
+
+
+def _check_keys(table: Any, schema: type[msgspec.Struct], place: str, origin: str) -> None:
+    """Refuse unknown keys before msgspec does, with the list of valid ones."""
+    if not isinstance(table, dict):
+        return
+    fields = {field.name: field.type for field in msgspec.structs.fields(schema)}
+    for key, value in table.items():
+        if key not in fields:
+            where = f" in [{place}]" if place else ""
+            raise SceneError(f"scene file {origin!r}: unknown key {key!r}{where}; valid are {', '.join(fields)}")
+        inner_place = f"{place}.{key}" if place else key
+        inner = _TABLES.get(inner_place)
+        if inner is not None:
+            for item in value if isinstance(value, list) else [value]:
+                _check_keys(item, inner, inner_place, origin)

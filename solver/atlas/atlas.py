@@ -1,0 +1,144 @@
+"""The atlas: six faces of texels, each knowing the surface point it stands for."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from pathlib import Path
+from typing import Any
+
+import igl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import AtlasError
+from ..mesh.mesh import Mesh
+from .cubemap import face_coordinates, padded_indices
+from .quality import atlas_quality
+from .stencil import lumped_areas
+from .texcoords import TextureCoordinates, texture_coordinates
+
+# [m]. Squares of what is farther away overflow on the way to the nearest surface point.
+_FARTHEST = 1e100
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Atlas:
+    """Cube-map atlas of a closed genus-0 surface.
+
+    Make one with `build_atlas`, `sphere_atlas` or `load_atlas`.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The surface.
+    sphere : float64 [vertex_count, 3]
+        Sphere map: one unit vector a vertex.
+    positions, normals : float64 [6, N, N, 3]
+        Surface point [m] and outward unit normal of every texel.
+    triangles : int64 [6, N, N]
+        Triangle of the mesh in which the texel lies.
+    barycentrics : float64 [6, N, N, 3]
+        Where in that triangle.
+    timings : dict
+        Seconds per stage of the construction.
+    """
+
+    mesh: Mesh
+    sphere: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    barycentrics: NDArray[np.float64]
+    timings: dict[str, float] = dataclasses.field(default_factory=dict)
+
+    @property
+    def resolution(self) -> int:
+        """Texels along a face's edge, N."""
+        return self.positions.shape[1]
+
+    @functools.cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """Lumped real area of every texel [m^2], shape [6, N, N]."""
+        return lumped_areas(self.positions)
+
+    @functools.cached_property
+    def padded_positions(self) -> NDArray[np.float64]:
+        """Positions [m] with the ring of neighbours, shape [6, N + 2, N + 2, 3]; NaN at the ring's corners."""
+        index = padded_indices(self.resolution)
+        padded = self.positions.reshape(-1, 3)[index]
+        padded[index < 0] = np.nan
+        return padded
+
+    def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Closest surface points [m] and their directions on the unit sphere, each of shape [k, 3].
+
+        Raises
+        ------
+        AtlasError
+            If the points are not finite or not of shape [k, 3] or [3].
+        """
+        points = check_points(points)
+        _, triangle, closest = self._tree.squared_distance(self.mesh.V, self.mesh.F, points)
+        corners = self.mesh.V[self.mesh.F[triangle]]
+        weights = igl.barycentric_coordinates(closest, corners[:, 0].copy(), corners[:, 1].copy(), corners[:, 2].copy())
+        # a triangle without area has no barycentrics: its corners are as good as any point of it
+        weights = np.where(np.isfinite(weights).all(axis=1, keepdims=True), np.clip(weights, 0, 1), 1 / 3)
+        directions = np.einsum("ij,ijk->ik", weights, self.sphere[self.mesh.F[triangle]])
+        return closest, directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+    def locate(self, points: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Face, row and column of the surface points nearest to the given points [m].
+
+        Row and column are in texel units, 0.0 at the centre of the first texel. Each result has shape [k].
+        """
+        _, directions = self.project(points)
+        return face_coordinates(directions, self.resolution)
+
+    def nearest_texel(self, points: ArrayLike) -> NDArray[np.int64]:
+        """Flat index (face N + row) N + column of the texel nearest in the atlas to each point, shape [k]."""
+        face, row, column = self.locate(points)
+        n = self.resolution
+        i, j = (np.clip(np.rint(x).astype(np.int64), 0, n - 1) for x in (row, column))
+        return (face * n + i) * n + j
+
+    def texture_coordinates(self) -> TextureCoordinates:
+        """Face and place in the atlas at every corner of every triangle, those cut that cross an edge of the cube.
+
+        The object's own texture coordinates, `mesh.uv` and `mesh.corner_uv`, stay as they are.
+        """
+        return texture_coordinates(self)
+
+    def quality(self) -> dict[str, float]:
+        """Figures of merit of the atlas.
+
+        Returns
+        -------
+        dict
+            `flipped` triangles, `solid_angle` [sr] (4 pi for a bijection), area-weighted stretch quantiles `q001`,
+            `q01`, `q50`, `q99`, `q999`, `starved` share of the area whose texels are over 4 times too wide, `edge_min`
+            and `edge_max` [m], `coverage` (texel area over mesh area).
+        """
+        return atlas_quality(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the atlas to one file, which `load_atlas` reads. The file appears whole or not at all."""
+        from .atlas_file import save_atlas  # which reads atlases too, and so imports this module
+
+        save_atlas(self, path)
+
+    @functools.cached_property
+    def _tree(self) -> Any:
+        tree = igl.AABB()
+        tree.init(self.mesh.V, self.mesh.F)
+        return tree
+
+
+def check_points(points: ArrayLike) -> NDArray[np.float64]:
+    """Points as float64 [k, 3], or `AtlasError`."""
+    array = np.asarray(points, dtype=np.float64)
+    if array.ndim == 0 or array.shape[-1] != 3 or array.ndim > 2:
+        raise AtlasError(f"points have shape {array.shape}; valid is [3] or [k, 3], in metres")
+    if not (np.abs(array) < _FARTHEST).all():
+        raise AtlasError(f"points hold NaN or numbers beyond {_FARTHEST:g}; valid are finite coordinates in metres")
+    return np.ascontiguousarray(array.reshape(-1, 3))

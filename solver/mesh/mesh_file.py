@@ -1,0 +1,107 @@
+"""Mesh files: found, read in whatever format they have, and put together as one mesh."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from ..errors import MeshError
+from .mesh import Mesh
+from .ply_format import read_ply
+from .polygons import Soup
+from .repair import repaired
+from .text_formats import read_obj, read_off
+
+# trimesh logs whole tracebacks, which Python prints to stderr where nobody has set up logging
+logging.getLogger("trimesh").addHandler(logging.NullHandler())
+
+_READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
+
+
+def load_mesh(path: str | Path, repair: bool = False) -> Mesh:
+    """Read a mesh file: OBJ, OFF, PLY, STL, GLB, or any other format that trimesh reads.
+
+    All parts of the file (objects, materials, nodes, each where its transform puts it) make one mesh.
+
+    Parameters
+    ----------
+    path : path
+    repair : bool
+        Mend a surface that is open, not manifold or in several parts (needs the package pymeshfix).
+
+    Raises
+    ------
+    MeshError
+        If the file is missing, cannot be read, or is not a closed genus-0 surface (see `Mesh.from_arrays`).
+    """
+    path = Path(path)
+    soup = _read(path)
+    if len(soup.F) == 0:
+        raise MeshError(f"mesh file {str(path)!r} holds no triangles")
+    try:
+        return Mesh.from_arrays(soup.V, soup.F, soup.corner_uv, name=path.name)
+    except MeshError as defect:
+        if not repair:
+            raise
+        return repaired(soup.V, soup.F, path.name, defect)
+
+
+def _read(path: Path) -> Soup:
+    kind = path.suffix[1:].upper()
+    try:
+        if path.is_dir():
+            raise MeshError(f"{str(path)!r} is a folder; give the path of an OBJ, PLY, STL, OFF or GLB file")
+        if not path.is_file():
+            raise MeshError(
+                f"mesh file {str(path)!r} does not exist; give the path of an OBJ, PLY, STL, OFF or GLB file"
+            )
+        if path.stat().st_size == 0:
+            raise MeshError(f"mesh file {str(path)!r} is empty")
+        if path.suffix.lower() in _READERS:
+            return _READERS[path.suffix.lower()](path.read_bytes())
+        if kind.lower() not in trimesh.available_formats():
+            raise MeshError(f"mesh file {str(path)!r} has an unknown ending; valid are .obj, .off, .ply, .stl and .glb")
+        with path.open("rb"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return _parts(trimesh.load_scene(path, process=False))
+    except MeshError as error:
+        if repr(str(path)) in str(error):
+            raise
+        raise MeshError(f"mesh file {str(path)!r} cannot be read: {error}") from error
+    except OSError as error:
+        raise MeshError(f"mesh file {str(path)!r} cannot be read: {error.strerror or error}") from error
+    except Exception as error:  # trimesh raises whatever its parsers stumble over
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise MeshError(
+            f"mesh file {str(path)!r} cannot be read: it is damaged or no {kind} file ({reason})"
+        ) from error
+
+
+def _parts(scene: trimesh.Scene) -> Soup:
+    """All triangle meshes of a scene, each where its node puts it. Pictures and materials are left alone."""
+    V, F, corner_uv = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [np.empty((0, 3, 2))]
+    textured = False
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        part = scene.geometry[name]
+        faces = np.asarray(getattr(part, "faces", ()), dtype=np.int64)
+        if len(faces) == 0:
+            continue
+        vertices = np.asarray(part.vertices, dtype=np.float64)
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise MeshError(f"a triangle refers to vertex {faces.max()}; valid is 0 to {len(vertices) - 1}")
+        uv = np.asarray(getattr(part.visual, "uv", None), dtype=np.float64)
+        if uv.shape == (len(vertices), 2):
+            textured = True
+        else:
+            uv = np.zeros((len(vertices), 2))
+        F.append(faces + sum(map(len, V)))
+        corner_uv.append(uv[faces])
+        # an identity would still round
+        moved = vertices if np.array_equal(transform, np.eye(4)) else trimesh.transform_points(vertices, transform)
+        V.append(moved)
+    return Soup(np.concatenate(V), np.concatenate(F), np.concatenate(corner_uv) if textured else None)

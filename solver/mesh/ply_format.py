@@ -1,0 +1,194 @@
+"""PLY files as triangles, text or binary: polygons of any size, texture coordinates of vertices or of corners."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MeshError
+from .polygons import Soup, triangulate
+
+_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+
+
+@dataclasses.dataclass
+class _Element:
+    """A table of the file: so many rows of named values, of which some are lists (of a length type)."""
+
+    name: str
+    rows: int
+    names: list[str] = dataclasses.field(default_factory=list)
+    types: list[str] = dataclasses.field(default_factory=list)
+    lengths: list[str | None] = dataclasses.field(default_factory=list)
+
+
+def read_ply(content: bytes) -> Soup:
+    """Triangles of a PLY file.
+
+    Raises
+    ------
+    MeshError
+        For a file that is no PLY file, ends early, or has an index that no vertex has.
+    """
+    order, elements, body = _header(content)
+    columns: dict[str, dict[str, Any]] = {}
+    for element in elements:
+        read = _read_text if order == "" else _read_binary
+        columns[element.name], body = read(element, body, order)
+        if "face" in columns and "vertex" in columns:
+            break
+    vertex, faces = columns.get("vertex", {}), columns.get("face", {})
+    if any(name not in vertex for name in "xyz"):
+        raise MeshError("it has no vertices with x, y and z")
+    V = np.stack([np.asarray(vertex[name], dtype=np.float64) for name in "xyz"], axis=1)
+    polygons = faces.get("vertex_indices", faces.get("vertex_index", []))
+    sizes = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
+    corners = np.concatenate([np.empty(0), *polygons])
+    if len(corners) and not (corners.min() >= 0 and corners.max() < len(V)):
+        raise MeshError(
+            f"its faces refer to vertices {corners.min():g} to {corners.max():g}; valid is 0 to {len(V) - 1}"
+        )
+    index = corners.astype(np.int64)
+    triangles = triangulate(V[index], sizes)
+    uv = _corner_uv(vertex, faces, index, sizes)
+    return Soup(V, index[triangles], None if uv is None else uv[triangles])
+
+
+def _corner_uv(
+    vertex: dict[str, Any], faces: dict[str, Any], index: NDArray[np.int64], sizes: NDArray[np.int64]
+) -> NDArray[np.float64] | None:
+    pairs = faces.get("texcoord")
+    if pairs is not None and all(len(pair) == 2 * size for pair, size in zip(pairs, sizes, strict=True)):
+        return np.concatenate([np.empty(0), *pairs]).reshape(-1, 2)
+    for u, v in _UV_NAMES:
+        if u in vertex and v in vertex:
+            return np.stack([vertex[u], vertex[v]], axis=1).astype(np.float64)[index]
+    return None
+
+
+def _header(content: bytes) -> tuple[str, list[_Element], bytes]:
+    head, found, body = content.partition(b"end_header")
+    lines = [line.split() for line in head.decode("ascii", errors="replace").splitlines()]
+    if not found or not lines or lines[0] != ["ply"]:
+        raise MeshError("it has no header from ply to end_header, as a PLY file does")
+    order, elements = None, []
+    try:
+        for words in lines[1:]:
+            match words:
+                case ["format", name, *_]:
+                    order = _ORDERS[name]
+                case ["element", name, rows]:
+                    elements.append(_Element(name, int(rows)))
+                case ["property", "list", length, kind, name]:
+                    elements[-1].names.append(name)
+                    elements[-1].types.append(_TYPES[kind])
+                    elements[-1].lengths.append(_TYPES[length])
+                case ["property", kind, name]:
+                    elements[-1].names.append(name)
+                    elements[-1].types.append(_TYPES[kind])
+                    elements[-1].lengths.append(None)
+    except (KeyError, ValueError, IndexError) as error:
+        raise MeshError(f"the line {' '.join(words)[:60]!r} of its header is not understood") from error
+    if order is None or any(element.rows < 0 for element in elements):
+        raise MeshError("its header gives no format or a negative number of rows")
+    return order, elements, body[2:] if body.startswith(b"\r\n") else body[1:]
+
+
+def _read_text(element: _Element, body: bytes, order: str) -> tuple[dict[str, Any], bytes]:
+    parts = body.split(b"\n", element.rows) if element.rows <= len(body) else []
+    if len(parts) < element.rows or (len(parts) == element.rows and element.rows and not parts[-1].strip()):
+        raise _ends_early(element)
+    rest = parts[element.rows] if len(parts) > element.rows else b""
+    rows = [part.split() for part in parts[: element.rows]]
+    columns: dict[str, Any] = {}
+    try:
+        if not any(element.lengths):
+            table = np.array([row[: len(element.names)] for row in rows], dtype=np.float64)
+            table = table.reshape(element.rows, len(element.names))
+            return dict(zip(element.names, table.T, strict=True)), rest
+        at = [0] * len(rows)
+        for name, length in zip(element.names, element.lengths, strict=True):
+            sizes = [1] * len(rows) if length is None else [int(row[i]) for row, i in zip(rows, at, strict=True)]
+            first = [i + (length is not None) for i in at]
+            at = [i + size for i, size in zip(first, sizes, strict=True)]
+            if any(not i <= j <= len(row) for i, j, row in zip(first, at, rows, strict=True)):
+                raise _ends_early(element)
+            columns[name] = [np.array(row[i:j], dtype=np.float64) for row, i, j in zip(rows, first, at, strict=True)]
+    except (ValueError, IndexError) as error:
+        raise MeshError(f"a row of its element {element.name} is not understood") from error
+    return columns, rest
+
+
+def _read_binary(element: _Element, body: bytes, order: str) -> tuple[dict[str, Any], bytes]:
+    columns = _read_table(element, body, order)
+    if columns is not None:
+        return columns
+    return _read_rows(element, body, order)
+
+
+def _read_table(element: _Element, body: bytes, order: str) -> tuple[dict[str, Any], bytes] | None:
+    """Read rows that are all of one length, in one go; None where their lists are not."""
+    if not element.names:
+        return {}, body
+    fields: list[Any] = []
+    sizes: dict[str, int] = {}
+    for name, kind, length in zip(element.names, element.types, element.lengths, strict=True):
+        if length is None:
+            fields.append((name, order + kind))
+            continue
+        first = np.dtype(fields).itemsize if fields else 0
+        kind_of_length = np.dtype(order + length)
+        if len(body) < first + kind_of_length.itemsize:
+            return None
+        sizes[name] = int(np.frombuffer(body, kind_of_length, 1, first)[0])
+        if not 0 <= sizes[name] * np.dtype(kind).itemsize <= len(body):
+            return None
+        fields += [(f"{name} length", kind_of_length), (name, order + kind, (sizes[name],))]
+    row = np.dtype(fields)
+    if element.rows * row.itemsize > len(body):
+        if sizes:
+            return None
+        raise _ends_early(element)
+    table = np.frombuffer(body, row, element.rows)
+    if any((table[f"{name} length"] != size).any() for name, size in sizes.items()):
+        return None
+    return {name: table[name] for name in element.names}, body[element.rows * row.itemsize :]
+
+
+def _read_rows(element: _Element, body: bytes, order: str) -> tuple[dict[str, Any], bytes]:
+    columns: dict[str, list[NDArray]] = {name: [] for name in element.names}
+    kinds = [np.dtype(order + kind) for kind in element.types]
+    lengths = [None if length is None else np.dtype(order + length) for length in element.lengths]
+    at = 0
+    try:
+        for _ in range(element.rows):
+            for name, kind, length in zip(element.names, kinds, lengths, strict=True):
+                size = 1
+                if length is not None:
+                    size = int(np.frombuffer(body, length, 1, at)[0])
+                    at += length.itemsize
+                if not 0 <= size <= len(body):
+                    raise _ends_early(element)
+                columns[name].append(np.frombuffer(body, kind, size, at))
+                at += size * kind.itemsize
+    except ValueError as error:  # what numpy says where the bytes are too few
+        raise _ends_early(element) from error
+    return dict(columns), body[at:]
+
+
+def _ends_early(element: _Element) -> MeshError:
+    return MeshError(f"it ends before the {element.rows} rows of its element {element.name} that it promises")

@@ -1,0 +1,1 @@
+"""Waves on an atlas: the operator, the sources, the materials and the backends that step them."""

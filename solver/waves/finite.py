@@ -1,0 +1,23 @@
+"""Where a field is no longer finite."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..atlas.atlas import Atlas
+
+
+def where_not_finite(atlas: Atlas, field: NDArray) -> str | None:
+    """Name the place from which NaN or infinity spreads in a field [6, N, N], or None where all is finite."""
+    if np.isfinite(field.sum(dtype=np.float64)):
+        return None
+    bad = ~np.isfinite(field)
+    # it spreads by a texel a substep on all sides, so it began in the middle
+    places = atlas.positions[bad]
+    middle = np.argmin(((places - places.mean(axis=0)) ** 2).sum(axis=1))
+    face, row, column = np.argwhere(bad)[middle]
+    x, y, z = places[middle]
+    return (
+        f"at face {face}, row {row}, column {column}, ({x:.4g}, {y:.4g}, {z:.4g}) m ({bad.sum()} of {bad.size} texels)"
+    )

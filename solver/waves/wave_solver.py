@@ -1,0 +1,302 @@
+"""The wave solver: height and velocity on an atlas, impulses in, time steps forward."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..atlas.atlas import Atlas
+from ..errors import SolverError
+from .backend import make_backend
+from .finite import where_not_finite
+from .footprint import Footprint, footprint
+from .load import Load
+from .material import Material
+from .operator import build_operator
+
+# A step that needs more is a mistake in a unit, and would seem to hang.
+_MOST_SUBSTEPS = 1_000_000
+
+
+class WaveSolver:
+    """Waves on the surface of an atlas.
+
+    Time stepping is leapfrog in its drift-kick-drift form with implicit damping: second order, stable up to
+    `stable_timestep`, height and velocity at the same time.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    material : Material
+    backend : str
+        "gl" (compute shaders), "cpu" (numba), or "auto": GL on a hardware driver, else the CPU.
+    operator : str
+        "fem", or a baseline: "paper", "uncorrected", "dynamic-paint" (see `build_operator`).
+    conserve_volume : bool
+        Remove the mean of every source, so that a net push does not move the surface as a whole. On a closed surface
+        without stiffness nothing else would stop it.
+
+    Raises
+    ------
+    SolverError
+        For invalid names or a material of another resolution.
+    GLError
+        If "gl" is asked for and no context can be made.
+    """
+
+    def __init__(
+        self,
+        atlas: Atlas,
+        material: Material | None = None,
+        *,
+        backend: str = "auto",
+        operator: str = "fem",
+        conserve_volume: bool = True,
+    ) -> None:
+        self.atlas = atlas
+        self.material = material if material is not None else Material()
+        self.conserve_volume = conserve_volume
+        self.operator = build_operator(atlas, self.material, operator)
+        self.time = 0.0
+        self.substeps_taken = 0
+        self._backend = make_backend(backend, self.operator)
+        self._carrying_mass = float(self.operator.mass[self.operator.carries].sum())
+        self._substep = 0.0
+        self._load = Load.none()
+        self._reported = False
+
+    @property
+    def backend(self) -> str:
+        """Which backend runs: "gl" or "cpu"."""
+        return self._backend.name
+
+    @property
+    def height(self) -> NDArray[np.float32]:
+        """Displacement along the outward normal [m], float32 [6, N, N]: a copy; assign to change it.
+
+        `waves.height = field` and `waves.height += field` work, also with one number; `waves.height[0] = x` changes the
+        copy only.
+
+        Reading raises `SolverError` if the GPU has met a value that is not finite.
+        """
+        height = self._backend.height()
+        self._check_finite(height)
+        return height
+
+    @height.setter
+    def height(self, value: ArrayLike) -> None:
+        self._backend.set_height(self._field(value, "height") * self.operator.free)
+
+    @property
+    def dent(self) -> NDArray[np.float32]:
+        """The part of the height that stays [m], float32 [6, N, N]; 0 unless the material yields."""
+        return self._backend.dent()
+
+    @property
+    def velocity(self) -> NDArray[np.float32]:
+        """Rate of the height [m/s], float32 [6, N, N]: a copy; assign to change it, as with `height`."""
+        return self._backend.velocity()
+
+    @velocity.setter
+    def velocity(self, value: ArrayLike) -> None:
+        self._backend.set_velocity(self._field(value, "velocity") * self.operator.free)
+
+    @property
+    def pressure(self) -> NDArray[np.float64]:
+        """Pressure held over `step` [Pa], positive inwards, float64 [6, N, N]; assign to change it, 0 to end it.
+
+        A copy; it holds the forces of `add_force` as well.
+        """
+        force = np.zeros(self.operator.mass.size)
+        force[self._load.texels] = self._load.forces
+        return -force.reshape(self.operator.mass.shape) / self.atlas.areas
+
+    @pressure.setter
+    def pressure(self, value: ArrayLike) -> None:
+        self._load = Load.none()
+        self.add_pressure(value)
+
+    @property
+    def stable_timestep(self) -> float:
+        """Longest substep that is stable [s]."""
+        return self.operator.stable_timestep
+
+    def add_impulse(self, point: ArrayLike, impulse: float, radius: float) -> Footprint:
+        """Press on the surface for an instant.
+
+        Parameters
+        ----------
+        point : [3]
+            Where [m], in the frame of the mesh; the nearest surface point is taken.
+        impulse : float
+            J [N s]. Positive presses inwards: the sum of sigma A dv over the texels is -J (before the mean is removed,
+            where volume is conserved). What falls on clamped or rigid texels is lost to whatever holds them.
+        radius : float
+            Footprint radius [m], along the surface; at least two texels are used.
+
+        Returns
+        -------
+        Footprint
+            The texels that were hit.
+
+        Raises
+        ------
+        SolverError
+            If the impulse or the radius is not finite, or the radius is negative.
+        """
+        if not np.isfinite(impulse):
+            raise SolverError(f"impulse is {impulse!r} N s; valid is a finite number")
+        where = footprint(self.atlas, point, radius)
+        momentum = -impulse * self._shares(where)
+        velocities = momentum / self.operator.mass.reshape(-1)[where.texels]
+        # what float32 cannot hold becomes infinite here, and is reported by the next step
+        with np.errstate(over="ignore"):
+            self._backend.kick(where.texels, velocities.astype(np.float32), self._counterpart(momentum.sum()))
+        return where
+
+    def add_force(self, point: ArrayLike, force: float, radius: float) -> Footprint:
+        """Press on the surface from now on, until `pressure` is assigned.
+
+        Parameters
+        ----------
+        point : [3]
+            Where [m], in the frame of the mesh; the nearest surface point is taken.
+        force : float
+            [N], positive inwards.
+        radius : float
+            Footprint radius [m], along the surface; at least two texels are used.
+
+        Raises
+        ------
+        SolverError
+            If the force or the radius is not finite, or the radius is negative.
+        """
+        if not np.isfinite(force):
+            raise SolverError(f"force is {force!r} N; valid is a finite number")
+        where = footprint(self.atlas, point, radius)
+        self._load = self._load.plus(where.texels, -force * self._shares(where))
+        return where
+
+    def add_pressure(self, pressure: ArrayLike) -> None:
+        """Add a pressure field [Pa], a number or [6, N, N], positive inwards, that is held from now on."""
+        field = self._field(np.broadcast_to(pressure, self.operator.mass.shape), "pressure")
+        force = (-field * self.atlas.areas * self.operator.carries).reshape(-1)
+        texels = np.flatnonzero(force)
+        self._load = self._load.plus(texels, force[texels])
+
+    def add_height(self, height: ArrayLike) -> None:
+        """Raise the surface by a field [m], [6, N, N]; where volume is conserved its mean over the area is removed."""
+        field = self._source(height, "height", self.atlas.areas)
+        dent = self._backend.dent()
+        self._backend.set_height(self._backend.height() - dent + field, dent)
+
+    def add_velocity(self, velocity: ArrayLike) -> None:
+        """Add a field [m/s], [6, N, N], to the velocity; where volume is conserved its net momentum is removed."""
+        field = self._source(velocity, "velocity", self.operator.mass)
+        self._backend.set_velocity(self._backend.velocity() + field)
+
+    def step(self, dt: float, substeps: int | None = None) -> None:
+        """Advance by dt [s] in equal substeps, as many as stability asks for.
+
+        Raises
+        ------
+        SolverError
+            If dt is negative or not finite, a given number of substeps is too small to be stable, or the height is no
+            longer finite (on the GPU this is seen when the height is read).
+        """
+        if not (np.isfinite(dt) and dt >= 0):
+            raise SolverError(f"time step is {dt!r} s; valid is a finite number, 0 or greater")
+        if dt == 0:
+            return
+        ratio = dt / self.stable_timestep * (1 - 1e-12)
+        if not ratio < _MOST_SUBSTEPS:
+            raise SolverError(
+                f"a step of {dt:.4g} s would take {ratio:.3g} substeps of the stable {self.stable_timestep:.4g} s; "
+                f"valid are {_MOST_SUBSTEPS} at most: take shorter steps, or a material with slower waves"
+            )
+        needed = max(1, int(np.ceil(ratio)))
+        if substeps is None:
+            substeps = needed
+        elif substeps < needed:
+            raise SolverError(
+                f"{substeps} substeps of {dt / max(substeps, 1):.4g} s are longer than the stable "
+                f"{self.stable_timestep:.4g} s; use {needed} or more substeps, or leave the number out"
+            )
+        self._substep = dt / substeps
+        if not self._load.uploaded:
+            self._backend.load(self._load.texels, self._load.forces, self._counterpart(self._load.forces.sum()))
+            self._load.uploaded = True
+        self._backend.advance(substeps, self._substep)
+        self.time += dt
+        self.substeps_taken += substeps
+        if not self._backend.finite():
+            self._check_finite(self._backend.height())
+
+    def reset(self) -> None:
+        """Flatten the surface, end all pressure, and set the time back to 0."""
+        shape = self.operator.mass.shape
+        self.height = np.zeros(shape, np.float32)
+        self.velocity = np.zeros(shape, np.float32)
+        self.pressure = 0.0
+        self.time, self.substeps_taken, self._reported = 0.0, 0, False
+
+    def energy(self) -> float:
+        """Kinetic plus potential energy [J] of the discrete system.
+
+        Without damping this is what the leapfrog scheme conserves to round-off while the substep stays the same:
+        1/2 v' (M - dt^2/4 K) v + 1/2 h' K h, with dt the latest substep and K all elastic forces. It differs from the
+        continuous energy by O(dt^2). What a dent has swallowed is not in it.
+        """
+        height, velocity = self.height.astype(np.float64) - self.dent, self.velocity.astype(np.float64)
+        kinetic = float((self.operator.mass * velocity**2).sum()) / 2
+        return kinetic + self._elastic_energy(height) - self._substep**2 / 4 * self._elastic_energy(velocity)
+
+    def volume(self) -> float:
+        """Volume that the waves add to the target, to first order: sum of area times height [m^3]."""
+        return float((self.atlas.areas * self.height.astype(np.float64)).sum())
+
+    def momentum(self) -> float:
+        """Sum of sigma A v [kg m/s], positive outwards."""
+        return float((self.operator.mass * self.velocity.astype(np.float64)).sum())
+
+    def _elastic_energy(self, field: NDArray[np.float64]) -> float:
+        return -float((field * self.operator.elastic_force(field)).sum()) / 2
+
+    def _shares(self, where: Footprint) -> NDArray[np.float64]:
+        """Share of a unit source that each texel of a footprint takes up, [k]."""
+        area, carries = self.atlas.areas.reshape(-1), self.operator.carries.reshape(-1)
+        return where.weights * area[where.texels] * carries[where.texels]
+
+    def _counterpart(self, momentum: float) -> float:
+        """What all carrying texels are given so that a source of this momentum has none in the end."""
+        return -float(momentum) / self._carrying_mass if self.conserve_volume and self._carrying_mass else 0.0
+
+    def _source(self, value: ArrayLike, name: str, weight: NDArray[np.float64]) -> NDArray[np.float32]:
+        """A field that is added, without its weighted mean where volume is conserved."""
+        field = self._field(value, name).astype(np.float64) * self.operator.free
+        carries = self.operator.carries
+        if self.conserve_volume and carries.any():
+            field -= carries * ((weight * field).sum() / weight[carries].sum())
+        return field.astype(np.float32)
+
+    def _field(self, value: ArrayLike, name: str) -> NDArray[np.float32]:
+        array = np.asarray(value, dtype=np.float32)
+        shape = self.operator.mass.shape
+        if array.shape not in ((), shape):
+            raise SolverError(f"{name} has shape {array.shape}; valid is {shape}, or one number")
+        array = np.broadcast_to(array, shape)
+        if not np.isfinite(array).all():
+            raise SolverError(f"{name} holds {(~np.isfinite(array)).sum()} values that are NaN or infinite")
+        return array
+
+    def _check_finite(self, height: NDArray[np.float32]) -> None:
+        """Report once, with place and time, that the height is no longer finite."""
+        if self._reported:
+            return
+        where = where_not_finite(self.atlas, height)
+        if where is not None:
+            self._reported = True
+            raise SolverError(
+                f"height is no longer finite {where}, at time {self.time:.6g} s; a source was too large for float32: "
+                "make it smaller and `reset()` the waves"
+            )

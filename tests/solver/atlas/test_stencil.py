@@ -1,0 +1,134 @@
+"""The finite-element stencil: symmetry, conservation, and the cells it is made of."""
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_array
+
+from ripple_sim.solver import sphere_atlas
+from ripple_sim.solver.atlas.cubemap import padded_indices, texel_directions
+from ripple_sim.solver.atlas.stencil import link_lengths, lumped_areas, pad, stiffness_stencil
+from ripple_sim.solver.waves.operator import stencil_sum
+
+
+def element(corners: np.ndarray) -> tuple[np.ndarray, float]:
+    """Stiffness matrix and area of a cell with 3 or 4 corners [k, 3], in order round it."""
+    if len(corners) == 4:
+        frame = np.array([corners[2] - corners[0], corners[3] - corners[1]])
+        differences = np.array([[-1.0, 0, 1, 0], [0, -1, 0, 1]])
+        area = np.linalg.norm(np.cross(*frame)) / 2
+    else:
+        frame = corners[1:] - corners[0]
+        differences = np.array([[-1.0, 1, 0], [-1, 0, 1]])
+        area = np.linalg.norm(np.cross(*frame)) / 2
+    # the gradient in space whose components along the frame are the differences
+    gradient = np.linalg.pinv(frame) @ differences
+    stiffness = area * gradient.T @ gradient
+    if len(corners) == 4:
+        hourglass = np.array([1.0, -1, 1, -1])
+        stiffness += 0.4 * 4 * area / (frame**2).sum() * np.outer(hourglass, hourglass)
+        triangles = corners[[[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]]
+        edges = triangles[:, 1:] - triangles[:, :1]
+        twice = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        area = min(twice[:2].sum(), twice[2:].sum()) / 2
+    return stiffness, area
+
+
+def brute_force_laplacian(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness matrix and lumped areas, cell by cell."""
+    n = positions.shape[1]
+    x = positions.reshape(-1, 3)
+    index = padded_indices(n)
+    cells = {}
+    for face in range(6):
+        for r in range(n + 1):
+            for c in range(n + 1):
+                ring = [index[face, r, c], index[face, r, c + 1], index[face, r + 1, c + 1], index[face, r + 1, c]]
+                ring = [i for i in ring if i >= 0]
+                cells[frozenset(ring)] = ring
+    stiffness = np.zeros((len(x), len(x)))
+    areas = np.zeros(len(x))
+    for ring in cells.values():
+        part, area = element(x[ring])
+        stiffness[np.ix_(ring, ring)] -= part
+        areas[ring] += area / len(ring)
+    return stiffness, areas
+
+
+@pytest.fixture(scope="module")
+def bumpy() -> np.ndarray:
+    """Texel positions of a star-shaped body without any symmetry."""
+    d = texel_directions(6)
+    rng = np.random.default_rng(3)
+    return d * (1 + 0.3 * np.sin(d @ rng.uniform(1, 3, 3))[..., None]) * [1.0, 0.7, 1.3]
+
+
+def test_stencil_equals_brute_force_assembly(bumpy: np.ndarray) -> None:
+    stiffness, areas = brute_force_laplacian(bumpy)
+    h = np.random.default_rng(0).standard_normal((6, 6, 6))
+    stencil = stiffness_stencil(bumpy, np.ones((6, 6, 6)))
+    np.testing.assert_allclose(stencil_sum(stencil, pad(h)).ravel(), stiffness @ h.ravel(), atol=1e-12)
+    np.testing.assert_allclose(lumped_areas(bumpy).ravel(), areas, rtol=1e-12)
+
+
+def test_operator_is_symmetric_to_the_last_bit(bumpy: np.ndarray) -> None:
+    n = bumpy.shape[1]
+    rng = np.random.default_rng(1)
+    stencil = stiffness_stencil(bumpy, rng.uniform(0.1, 2, (6, n, n))).astype(np.float32)
+    index = padded_indices(n)
+    rows, columns, values = [], [], []
+    for link, (a, b) in enumerate(
+        [
+            (index[:, :-1, :-1], index[:, :-1, 1:]),
+            (index[:, :-1, :-1], index[:, 1:, :-1]),
+            (index[:, :-1, :-1], index[:, 1:, 1:]),
+            (index[:, :-1, 1:], index[:, 1:, :-1]),
+        ]
+    ):
+        exists = (a >= 0) & (b >= 0) & (stencil[:, link] != 0)
+        rows.append(a[exists])
+        columns.append(b[exists])
+        values.append(stencil[:, link][exists])
+    i, j, w = np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+    pairs: dict[tuple[int, int], set[float]] = {}
+    for p, q, value in zip(i.tolist(), j.tolist(), w.tolist(), strict=True):
+        pairs.setdefault((min(p, q), max(p, q)), set()).add(value)
+    assert all(len(copies) == 1 for copies in pairs.values())
+    graph = coo_array((np.ones(len(i)), (i, j)), shape=(6 * n * n, 6 * n * n)).toarray()
+    valence = ((graph + graph.T) > 0).sum(axis=1)
+    # nine-point stencil everywhere but at the 24 texels round the cube's corners, which have one diagonal less
+    assert sorted(np.unique(valence, return_counts=True)[1].tolist()) == [24, 6 * n * n - 24]
+    assert valence.max() == 8
+
+
+def test_stiffness_is_positive_but_for_the_constant(bumpy: np.ndarray) -> None:
+    n = bumpy.shape[1]
+    rng = np.random.default_rng(7)
+    # far from smooth: texels that lie anywhere
+    stencil = stiffness_stencil(bumpy + 0.2 * rng.standard_normal(bumpy.shape), np.ones((6, n, n)))
+    basis = np.eye(6 * n * n).reshape(-1, 6, n, n)
+    matrix = -np.array([stencil_sum(stencil, pad(field)).ravel() for field in basis])
+    values = np.linalg.eigvalsh(matrix)
+    assert abs(values[0]) < 1e-10
+    assert values[1] > 1e-3
+
+
+def test_constant_field_feels_no_force(bumpy: np.ndarray) -> None:
+    stencil = stiffness_stencil(bumpy, np.full((6, 6, 6), 2.0))
+    force = stencil_sum(stencil, pad(np.full((6, 6, 6), 5.0)))
+    assert np.abs(force).max() == 0
+
+
+def test_sphere_area_converges_at_second_order() -> None:
+    error = [4 * np.pi - lumped_areas(texel_directions(n)).sum() for n in (8, 16, 32, 64)]
+    orders = np.log2(np.array(error[:-1]) / error[1:])
+    assert (orders > 1.95).all()
+
+
+def test_link_lengths_are_distances_between_neighbours() -> None:
+    atlas = sphere_atlas(2.0, 12)
+    lengths = link_lengths(atlas.positions)[:, :2]
+    ideal = 2.0 * np.pi / 2 / 12
+    finite = lengths[np.isfinite(lengths) & (lengths > 0)] / ideal
+    # equiangular cells are as wide as ideal ones on a face's middle lines and narrowest beside the cube's edges
+    assert 0.7 < finite.min() < 0.8
+    assert 0.99 < finite.max() <= 1.0

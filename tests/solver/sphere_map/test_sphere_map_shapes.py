@@ -1,0 +1,196 @@
+"""Property tests of the sphere map: random shapes, bad triangles, and what must not matter."""
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from ripple_sim.solver import Mesh, WaveSolver, build_atlas
+from ripple_sim.solver.atlas.build import atlas_from_sphere_map
+from ripple_sim.solver.sphere_map import certify, orientation, progressive_sphere_map, stretch_quantiles
+
+SEEDS = st.integers(0, 2**32 - 1)
+EXAMPLES = settings(max_examples=15, deadline=None, derandomize=True)
+
+
+def arrays(mesh):
+    return np.array(mesh.vertices), np.array(mesh.faces)
+
+
+def sphere(subdivisions=3):
+    return arrays(trimesh.creation.icosphere(subdivisions))
+
+
+def smooth_radius(V, rng, roughness, waves=5):
+    """A positive radius in every direction, smooth over about a third of the sphere."""
+    directions, phases = rng.standard_normal((waves, 3)) * 2, rng.uniform(0, 2 * np.pi, waves)
+    return np.exp(roughness * np.mean(np.sin(V @ directions.T + phases), axis=1))
+
+
+def split_edges(V, F, rng, share, slenderness):
+    """Put a vertex into a share of the triangles, a small fraction from one side: two of the three are slivers."""
+    chosen = np.flatnonzero(rng.random(len(F)) < share)
+    weights = np.array([(1 - slenderness) / 2, (1 - slenderness) / 2, slenderness])
+    middle = np.einsum("j,ijk->ik", weights, V[F[chosen]])
+    new = len(V) + np.arange(len(chosen))
+    a, b, c = F[chosen].T
+    kept = np.delete(F, chosen, axis=0)
+    parts = [np.stack(t, axis=1) for t in ((a, b, new), (b, c, new), (c, a, new))]
+    return np.vstack([V, middle]), np.vstack([kept, *parts])
+
+
+def thin_limb(length, radius):
+    """A sphere, one of whose sides is drawn out to a limb."""
+    V, F = sphere(4)
+    up = np.clip((V[:, 2] - 0.8) / 0.2, 0, 1)
+    narrow = 1 - (1 - radius) * np.minimum(4 * up, 1)
+    return np.column_stack([V[:, 0] * narrow, V[:, 1] * narrow, V[:, 2] + length * up]), F
+
+
+def assert_certified(V, F):
+    S = progressive_sphere_map(V, F)
+    assert certify(F, S).valid
+    return S
+
+
+@EXAMPLES
+@given(seed=SEEDS, points=st.integers(4, 400), factors=st.tuples(*[st.floats(0.05, 1)] * 3))
+def test_convex_hulls_of_random_points(seed, points, factors):
+    hull = trimesh.convex.convex_hull(np.random.default_rng(seed).standard_normal((points, 3)) * factors)
+    assert_certified(*arrays(hull))
+
+
+@EXAMPLES
+@given(seed=SEEDS, roughness=st.floats(0, 3))
+def test_smooth_star_shapes_are_never_starved(seed, roughness):
+    V, F = sphere()
+    V = V * smooth_radius(V, np.random.default_rng(seed), roughness)[:, None]
+    S = assert_certified(V, F)
+    assert stretch_quantiles(V, F, S, [0.999])[0] < 2
+
+
+@EXAMPLES
+@given(seed=SEEDS, share=st.floats(0.05, 1), slenderness=st.sampled_from([1e-1, 1e-3, 1e-6]))
+def test_slivers_starve_nothing(seed, share, slenderness):
+    rng = np.random.default_rng(seed)
+    V, F = sphere()
+    V = V * smooth_radius(V, rng, 1)[:, None]
+    V, F = split_edges(V, F, rng, share, slenderness)
+    S = assert_certified(V, F)
+    assert stretch_quantiles(V, F, S, [0.999])[0] < 4
+
+
+@EXAMPLES
+@given(length=st.floats(1, 20), radius=st.floats(0.05, 0.6))
+def test_thin_limbs_keep_their_texels(length, radius):
+    V, F = thin_limb(length, radius)
+    S = assert_certified(V, F)
+    assert stretch_quantiles(V, F, S, [0.999])[0] < 4
+
+
+@EXAMPLES
+@given(seed=SEEDS, power=st.floats(0, 4))
+def test_very_uneven_triangles(seed, power):
+    """Triangles a hundred times smaller on one side of the sphere than on the other give an even map."""
+    V, F = sphere(4)
+    pole = np.random.default_rng(seed).standard_normal(3)
+    pole /= np.linalg.norm(pole)
+    V = V + np.tanh(power / 2) * 0.98 * pole  # a Moebius map of the sphere crowds the vertices round one pole
+    inside = np.sum(V * V, axis=1, keepdims=True)
+    V = V / np.sqrt(inside)
+    S = assert_certified(V, F)
+    low, high = stretch_quantiles(V, F, S, [0.01, 0.99])
+    assert 0.8 < low < high < 1.25
+
+
+def limbed():
+    V, F = thin_limb(3, 0.3)
+    return V * smooth_radius(V, np.random.default_rng(3), 1)[:, None], F
+
+
+def figures(V, F):
+    S = progressive_sphere_map(V, F)
+    assert certify(F, S).valid
+    atlas = atlas_from_sphere_map(Mesh.from_arrays(V, F), S, 32)
+    step = WaveSolver(atlas, backend="cpu").stable_timestep / np.sqrt(atlas.mesh.area)
+    return np.array([*stretch_quantiles(V, F, S, [0.01, 0.5, 0.99, 0.999]), step])
+
+
+@pytest.fixture(scope="module")
+def limbed_figures():
+    return figures(*limbed())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rotated_mesh_has_an_atlas_as_good(seed, limbed_figures):
+    V, F = limbed()
+    turned = figures(V @ Rotation.random(random_state=seed).as_matrix().T, F)
+    np.testing.assert_allclose(turned, limbed_figures, rtol=0.15)
+
+
+@pytest.mark.parametrize("scale", [1e-5, 1e4])
+def test_a_scaled_mesh_has_an_atlas_as_good(scale, limbed_figures):
+    V, F = limbed()
+    np.testing.assert_allclose(figures(scale * V, F), limbed_figures, rtol=0.02)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_renumbered_mesh_has_an_atlas_as_good(seed, limbed_figures):
+    V, F = limbed()
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(V))
+    number = np.empty(len(V), dtype=int)
+    number[order] = np.arange(len(V))
+    F = np.array([np.roll(f, k) for f, k in zip(number[F], rng.integers(0, 3, len(F)), strict=True)])
+    np.testing.assert_allclose(figures(V[order], rng.permutation(F)), limbed_figures, rtol=0.15)
+
+
+def test_candidate_rotations_are_rotations_and_leave_no_gap():
+    rotations = orientation.spread_rotations(2000)
+    np.testing.assert_allclose(
+        rotations @ rotations.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (2000, 3, 3)), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.det(rotations), 1)
+    anywhere = Rotation.random(100, random_state=0).as_matrix()
+    trace = np.einsum("aij,bij->ab", anywhere, rotations).max(axis=1)
+    assert np.degrees(np.arccos(np.clip((trace - 1) / 2, -1, 1))).max() < 25
+
+
+def test_turning_the_cube_lengthens_the_time_step():
+    V, F = thin_limb(3, 0.3)
+    V = V / np.sqrt(trimesh.Trimesh(V, F, process=False).area / (4 * np.pi))
+    mesh, S = Mesh.from_arrays(V, F), progressive_sphere_map(V, F)
+
+    def step(sphere_map):
+        return WaveSolver(atlas_from_sphere_map(mesh, sphere_map, 32), backend="cpu").stable_timestep
+
+    others = [step(S @ rotation.T) for rotation in Rotation.random(12, random_state=1).as_matrix()]
+    assert step(S) > np.median(others)
+    # wherever the map starts from
+    again = orientation.orient(V, F, S @ Rotation.random(random_state=7).as_matrix().T)
+    assert step(again) > np.median(others)
+
+
+def test_narrow_texels_are_found_where_they_are():
+    """On the round sphere the narrowest texel is pi/4 cos(45 deg) of two, in every orientation."""
+    V, F = sphere(5)
+    metric, area = orientation._vertex_metrics(F.astype(np.int32), V, V)
+    np.testing.assert_allclose(area.sum(), 4 * np.pi, rtol=0.01)
+    one = np.array([1.0])
+    for direction, width in (([0, 0, 1], 1), ([0, 1, 1], np.sqrt(0.5)), ([1, 0, 1], np.sqrt(0.5))):
+        p = np.array([direction]) / np.linalg.norm(direction)
+        tangent = np.eye(3) - p.T @ p
+        pure = np.array([[*np.diag(tangent), tangent[0, 1], tangent[0, 2], tangent[1, 2]]])
+        found = orientation._narrowness(np.eye(3), p, pure, one) ** (-1 / (2 * orientation.SHARPNESS))
+        assert found == pytest.approx(width)
+    nearest = np.argmax(V @ [0.6, 0, 0.8])
+    tangent = np.eye(3) - np.outer(V[nearest], V[nearest])
+    np.testing.assert_allclose(metric[nearest, :3], np.diag(tangent), atol=0.02)
+
+
+def test_built_atlas_uses_the_turned_map():
+    V, F = thin_limb(2, 0.4)
+    mesh = Mesh.from_arrays(V, F)
+    np.testing.assert_array_equal(build_atlas(mesh, 8, cache=False).sphere, progressive_sphere_map(mesh.V, mesh.F))

@@ -1,0 +1,123 @@
+"""Waves keep the symmetries of the cube on the analytic sphere, and run equally fast in all directions."""
+
+import numpy as np
+import pytest
+
+from ripple_sim.solver import Atlas, Mesh, WaveSolver, build_atlas, sphere_atlas
+from ripple_sim.solver.atlas.cubemap import cube_rotations, permute_texels
+
+MIRROR = np.diag([1.0, 1.0, -1.0])
+ALL_48 = np.concatenate([cube_rotations(), cube_rotations() @ MIRROR])
+
+
+def ripple(atlas: Atlas, point: np.ndarray, backend: str, seconds: float = 0.9) -> np.ndarray:
+    waves = WaveSolver(atlas, backend=backend)
+    waves.add_impulse(point, 1.0, 0.25)
+    waves.step(seconds)
+    return waves.height
+
+
+def keeps(point: np.ndarray) -> np.ndarray:
+    """The symmetries of the cube that leave a point where it is."""
+    return ALL_48[np.abs(ALL_48 @ point - point).max(axis=1) < 1e-12]
+
+
+@pytest.mark.parametrize("face", range(6))
+def test_impulse_on_a_face_centre_keeps_the_eight_symmetries_of_the_face(face: int, backend: str) -> None:
+    point = np.zeros(3)
+    point[face // 2] = 1 - 2 * (face % 2)
+    h = ripple(sphere_atlas(1.0, 32), point, backend)
+    symmetries = keeps(point)
+    assert len(symmetries) == 8
+    for symmetry in symmetries:
+        assert np.abs(permute_texels(h, symmetry) - h).max() < 1e-5 * np.abs(h).max()
+
+
+def test_impulse_on_a_cube_corner_keeps_its_threefold_symmetry(backend: str) -> None:
+    atlas = sphere_atlas(1.0, 32)
+    for signs in np.stack(np.meshgrid([1, -1], [1, -1], [1, -1]), -1).reshape(-1, 3):
+        point = signs / np.sqrt(3)
+        h = ripple(atlas, point, backend)
+        symmetries = keeps(point)
+        assert len(symmetries) == 6
+        for symmetry in symmetries:
+            assert np.abs(permute_texels(h, symmetry) - h).max() < 1e-5 * np.abs(h).max()
+
+
+def test_rotated_impulse_gives_the_rotated_field(backend: str) -> None:
+    atlas = sphere_atlas(1.0, 32)
+    point = np.array([0.31, -0.52, 0.79])
+    h = ripple(atlas, point, backend)
+    for rotation in cube_rotations():
+        turned = ripple(atlas, rotation @ point, backend)
+        assert np.abs(turned - permute_texels(h, rotation)).max() < 1e-5 * np.abs(h).max()
+
+
+def test_rotated_impulse_on_a_fine_mesh_of_a_sphere(ball_mesh: Mesh) -> None:
+    atlas = build_atlas(ball_mesh, 128, cache=False)
+    point = np.array([0.31, -0.52, 0.79])
+    point /= np.linalg.norm(point)
+    rng = np.random.default_rng(4)
+    probes = rng.standard_normal((300, 3))
+    probes /= np.linalg.norm(probes, axis=1, keepdims=True)
+    fields = []
+    for rotation in cube_rotations()[::4]:
+        h = ripple(atlas, rotation @ point, "cpu")
+        fields.append(sample(atlas, h, probes @ rotation.T))
+    peak = np.abs(fields[0]).max()
+    assert max(np.abs(field - fields[0]).max() for field in fields) < 0.01 * peak
+
+
+def sample(atlas: Atlas, field: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Bilinear samples of a field at surface points."""
+    from ripple_sim.solver.atlas.cubemap import padded_indices
+
+    n = atlas.resolution
+    face, row, column = atlas.locate(points)
+    index = padded_indices(n)
+    padded = field.reshape(-1)[index]
+    for r, c, a, b in ((0, 0, 1, 1), (0, -1, 1, -2), (-1, 0, -2, 1), (-1, -1, -2, -2)):
+        padded[:, r, c] = (padded[:, a, b] + padded[:, r, b] + padded[:, a, c]) / 3
+    r, c = np.floor(row).astype(int), np.floor(column).astype(int)
+    s, t = row - r, column - c
+    return (
+        (1 - s) * (1 - t) * padded[face, r + 1, c + 1]
+        + (1 - s) * t * padded[face, r + 1, c + 2]
+        + s * (1 - t) * padded[face, r + 2, c + 1]
+        + s * t * padded[face, r + 2, c + 2]
+    )
+
+
+def first_crest(times: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    """Time of the first extremum that reaches half of the strongest, by a parabola through three samples."""
+    arrivals = []
+    for trace in signal.T:
+        size = np.abs(trace)
+        crest = (size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:]) & (size[1:-1] > 0.5 * size.max())
+        i = np.flatnonzero(crest)[0] + 1
+        a, b, c = size[i - 1 : i + 2]
+        arrivals.append(times[i] + 0.5 * (a - c) / (a - 2 * b + c) * (times[1] - times[0]))
+    return np.array(arrivals)
+
+
+@pytest.mark.parametrize("point", [[0, 0, 1], [1, 1, 1], [0.3, 0.9, -0.4]])
+def test_first_crest_arrives_at_the_same_time_in_all_directions(point: list[float]) -> None:
+    atlas = sphere_atlas(1.0, 96)
+    p = np.array(point) / np.linalg.norm(point)
+    side = np.cross(p, [0.6, -0.3, 0.7])
+    side /= np.linalg.norm(side)
+    angle = np.linspace(0, 2 * np.pi, 36, endpoint=False)[:, None]
+    around = np.cos(angle) * side + np.sin(angle) * np.cross(p, side)
+    distance = 1.0
+    probes = np.cos(distance) * p + np.sin(distance) * around
+    waves = WaveSolver(atlas, backend="cpu")
+    waves.add_impulse(p, 1.0, 0.3)
+    times, signal = [], []
+    for _ in range(130):
+        waves.step(0.01)
+        times.append(waves.time)
+        signal.append(sample(atlas, waves.height, probes))
+    arrivals = first_crest(np.array(times), np.array(signal))
+    assert np.ptp(arrivals) < 0.01 * arrivals.mean()
+    # and that time is about distance / speed, less the head start of the footprint's rim
+    assert distance - 0.3 < arrivals.mean() < distance + 0.15
