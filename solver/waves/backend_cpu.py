@@ -34,7 +34,7 @@ class CPUBackend:
         extra = self._viscous is not None or self._laplace is not None
         self._extra = np.zeros(shape, np.float32) if extra else np.float32(0)
         self._carries = number_or_field(operator.carries)
-        self._shift = 0.0
+        self._shift = self._prepared_dt = 0.0
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
     def height(self) -> NDArray[np.float32]:
@@ -74,8 +74,8 @@ class CPUBackend:
 
     def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: float) -> None:
         """Hold forces [N] on some texels, and one acceleration [m/s^2] on all that carry waves, until the next call."""
-        self._loaded, self._forces, self._acceleration = self._inside[texels], forces, everywhere
-        self._prepared_dt = 0.0
+        self._loaded, self._forces, self._acceleration = texels, forces, everywhere
+        self._load_is_new = True
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
@@ -91,7 +91,7 @@ class CPUBackend:
             )
             self._h, self._h_next = self._h_next, self._h
             if len(self._kicks):
-                kernels.kick(self._h, self._v, self._loaded, self._kicks, drift)
+                kernels.kick(self._h, self._v, self._kicked, self._kicks, drift)
             self._flow()
 
     def wait(self) -> None:
@@ -122,15 +122,18 @@ class CPUBackend:
             kernels.apply(self._laplace, self._moment, np.float32(-1), self._viscous is not None, self._extra)
 
     def _prepare(self, dt: float) -> StepCoefficients:
-        """Coefficients of the kick, computed once a step length and load."""
-        if self._prepared_dt != dt:
-            self._coefficients = k = step_coefficients(self._operator, dt)
-            gain = np.zeros(self._h.shape, np.float32)
-            gain[:, 1:-1, 1:-1] = k.gain
-            self._kicks = gain.reshape(-1)[self._loaded] * self._forces.astype(np.float32)
-            self._push = np.float32(self._acceleration) * k.span if self._acceleration else np.float32(0)
+        """Coefficients of the kick, computed once a step length, and the load's, once a load as well."""
+        new_length = self._prepared_dt != dt
+        if new_length:
+            self._coefficients = step_coefficients(self._operator, dt)
             self._prepared_dt = dt
-        return self._coefficients
+        k = self._coefficients
+        if new_length or self._load_is_new:
+            self._kicked = self._inside[self._loaded]
+            self._kicks = k.gain.reshape(-1)[self._loaded] * self._forces.astype(np.float32)
+            self._push = np.float32(self._acceleration) * k.span if self._acceleration else np.float32(0)
+            self._load_is_new = False
+        return k
 
 
 def _single(field: NDArray[np.float64] | None) -> NDArray[np.float32] | None:

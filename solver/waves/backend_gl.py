@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..gl import GLContext, shared_context
 from .gl_fields import FieldLayout, TexelList
-from .operator import WaveOperator, step_coefficients
+from .operator import StepCoefficients, WaveOperator, step_coefficients
 
 # Texels that one thread updates: columns by fours, rows. A software driver pays for every load and has few threads; a
 # GPU wants many.
@@ -46,7 +46,7 @@ class GLBackend:
         self._compile()
         self._kick_drift: moderngl.ComputeShader | None = None
         self._coefficients: moderngl.Buffer | None = None
-        self._shift = 0.0
+        self._shift = self._prepared_dt = 0.0
         self._waiting: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = []
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
@@ -87,7 +87,7 @@ class GLBackend:
     def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: float) -> None:
         """Hold forces [N] on some texels, and one acceleration [m/s^2] on all that carry waves, until the next call."""
         self._loaded, self._load_forces, self._acceleration = texels, forces, everywhere
-        self._prepared_dt = 0.0
+        self._load_is_new = True
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
@@ -158,30 +158,37 @@ class GLBackend:
             self._run_blocks(self._subtract_laplace)
 
     def _prepare(self, dt: float) -> moderngl.ComputeShader:
-        """Compile the kick for this material; upload its coefficients and the load, once a step length and load."""
-        if self._kick_drift is not None and self._prepared_dt == dt:
-            return self._kick_drift
-        k = step_coefficients(self._operator, dt)
-        push = np.float32(self._acceleration) * k.span
+        """Compile the kick for this material; upload its coefficients once a step length, the load once a load too."""
+        new_length = self._kick_drift is None or self._prepared_dt != dt
+        if new_length:
+            self._step = step_coefficients(self._operator, dt)
+            self._prepared_dt = dt
+        k = self._step
         maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
         if self._kick_drift is None:
             defines = {"EXTRA": self._extra, "MAPS": maps}
             self._kick_drift = self._block_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
-        if maps:
-            coefficients = self._fields.pack(k.gain, k.decay, k.spring, push)
-        else:
-            coefficients = self._fields.pack(k.gain)
+        if new_length or self._load_is_new:
+            self._upload(k, self._kick_drift, maps, new_length)
+            self._load_is_new = False
+        return self._kick_drift
+
+    def _upload(self, k: StepCoefficients, kick_drift: moderngl.ComputeShader, maps: bool, new_length: bool) -> None:
+        push = np.float32(self._acceleration) * k.span
+        if not maps:
             for name, value in (("decay", k.decay), ("spring", k.spring), ("push", push)):
-                self._kick_drift[name] = float(value)
-        with self._gl as ctx:
-            if self._coefficients is None:
-                self._coefficients = ctx.buffer(coefficients)
-            else:
-                self._coefficients.write(coefficients)
+                kick_drift[name] = float(value)
+        # the push is a map among the others, or a number that leaves the maps as they are
+        if maps or new_length:
+            fields = (k.gain, k.decay, k.spring, push) if maps else (k.gain,)
+            coefficients = self._fields.pack(*fields)
+            with self._gl as ctx:
+                if self._coefficients is None:
+                    self._coefficients = ctx.buffer(coefficients)
+                else:
+                    self._coefficients.write(coefficients)
         kicks = k.gain.reshape(-1)[self._loaded] * self._load_forces.astype(np.float32)
         self._forces.set(self._fields.inside[self._loaded], kicks)
-        self._prepared_dt = dt
-        return self._kick_drift
 
     def _shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         return self._gl.compute_shader("ripple_sim.solver", name, **defines)
