@@ -1,6 +1,7 @@
 # make demo   sets everything up, then renders out/demo.mp4
 # make test   sets everything up, then runs the tests
 # make lint   ruff and mypy
+# make package  builds the distributions and tries them on every Python that is here
 # make clean  removes what was built and rendered, but not .venv
 
 BIN := .venv/bin
@@ -8,7 +9,7 @@ STAMP := .venv/.installed
 KERNELS := .venv/.kernels
 TYPES := build/types
 
-.PHONY: setup demo test lint clean
+.PHONY: setup demo test lint package clean
 
 setup: $(STAMP)
 
@@ -34,6 +35,9 @@ lint: setup
 	@rm -rf $(TYPES) && mkdir -p $(TYPES)/ripple_sim
 	@ln -s $(addprefix $(CURDIR)/,$(wildcard ripple_sim/*) solver scenes) $(TYPES)/ripple_sim
 	MYPYPATH=$(TYPES) $(BIN)/mypy -p ripple_sim
+
+package: setup
+	.ci/package
 
 clean:
 	rm -rf build dist out .mypy_cache .pytest_cache .ruff_cache
