@@ -82,9 +82,7 @@ class Simulation:
         self._steps_per_frame = _steps_per_frame(fps, self.model.opt.timestep)
         self.model.opt.timestep = 1 / (fps * self._steps_per_frame)
         self.data = mujoco.MjData(self.model)
-        if self.model.nkey:
-            mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
-        mujoco.mj_forward(self.model, self.data)
+        self._reset_bodies()
         self.ripples = Ripples(
             self.model,
             {entry.geom: entry.material.material() for entry in scene.surfaces},
@@ -103,6 +101,7 @@ class Simulation:
                 self.ripples.change_material(entry.geom, **maps)
             for disc in entry.still:
                 self.ripples.make_rigid(entry.geom, self.ripples.to_geom(entry.geom, disc.point), disc.radius)
+        self._materials = {name: self.ripples[name].material for name in self.ripples}
         self._script = Script(self.model, scene.events, list(self.ripples))
         self.physics_seconds = self.wave_seconds = 0.0
         self.impulses: list[Impulse] = []
@@ -138,6 +137,24 @@ class Simulation:
             self.impulses += self.ripples.last_impulses
             self.physics_seconds += stepped - start
             self.wave_seconds += time.perf_counter() - stepped
+
+    def reset(self) -> None:
+        """Go back to the beginning: bodies, waves, materials and script."""
+        self._reset_bodies()
+        self.ripples.reset()
+        for name, material in self._materials.items():
+            if self.ripples[name].material is not material:
+                self.ripples.change_material(name, **vars(material))
+                self._materials[name] = self.ripples[name].material
+        self._script = Script(self.model, self.scene.events, list(self.ripples))
+        self.impulses = []
+
+    def _reset_bodies(self) -> None:
+        if self.model.nkey:
+            mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
+        else:
+            mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_forward(self.model, self.data)
 
     def _check_state(self) -> None:
         for kind in (

@@ -16,7 +16,7 @@ from ..errors import SceneError
 from ..orientation import UP_AXES, usual_up
 from .events import Events
 from .motion import DropEntry
-from .scene import Scene
+from .scene import Edit, Scene
 from .scene_file import CameraEntry, MaterialEntry, RippleEntry
 
 SIZE = 1.0  # the target's longest edge of its bounding box [m]
@@ -42,6 +42,7 @@ def drop_scene(
     up: str | None = None,
     look: str = "rubber",
     repair: bool = False,
+    edit: Edit | None = None,
 ) -> Scene:
     """Scene in which bodies of several shapes fall on a mesh.
 
@@ -52,7 +53,7 @@ def drop_scene(
     mesh_path : path
         Any closed genus-0 mesh.
     bodies : int
-        How many fall, 1 to 100, spread over the first three seconds and a half.
+        How many fall, 0 to 100, spread over the first three seconds and a half.
     seed : int
         Of the shapes, sizes and places.
     up : str, optional
@@ -61,6 +62,8 @@ def drop_scene(
         Of the target.
     repair : bool
         Mend a mesh that is open or not manifold (needs the package pymeshfix).
+    edit : callable, optional
+        Called with the model's specification (`mujoco.MjSpec`) before it is compiled, to change it in place.
 
     Raises
     ------
@@ -69,8 +72,8 @@ def drop_scene(
     SceneError
         For an invalid number of bodies or axis, or if MuJoCo refuses the mesh.
     """
-    if not 1 <= bodies <= 100:
-        raise SceneError(f"the number of bodies is {bodies}; valid is 1 to 100")
+    if not 0 <= bodies <= 100:
+        raise SceneError(f"the number of bodies is {bodies}; valid is 0 to 100")
     up = up or usual_up(mesh_path)
     if up not in UP_AXES:
         raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
@@ -78,6 +81,8 @@ def drop_scene(
     V = _standing(mesh, up)
     rng = np.random.default_rng(seed)
     spec, drops = _build(V, mesh.F, bodies, rng)
+    if edit is not None:
+        edit(spec)
     try:
         model = spec.compile()
     except ValueError as error:
@@ -133,7 +138,7 @@ def _build(
     )
     drops = []
     landing = _landing_points(V, F, bodies, rng)
-    times = 0.1 + 3.4 * np.arange(bodies) / bodies
+    times = 0.1 + 3.4 * np.arange(bodies) / max(bodies, 1)
     for i in range(bodies):
         kind, proportions = _SHAPES[i % len(_SHAPES)]
         radius = rng.uniform(0.05, 0.085)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib.resources
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,6 +21,7 @@ from .randomize import RandomEntry, randomize
 from .scene_file import CameraEntry, RippleEntry, parse_scene
 
 Moved = TypeVar("Moved", DropEntry, ThrowEntry)
+Edit = Callable[[mujoco.MjSpec], None]
 
 
 MAX_DURATION = 86_400  # [s], a day
@@ -59,8 +60,14 @@ def shipped_scenes() -> list[str]:
     return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
 
 
-def load_scene(name_or_path: str | Path) -> Scene:
+def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
     """Load a shipped scene by its name, or any scene by the path of its TOML file.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+    edit : callable, optional
+        Called with the model's specification (`mujoco.MjSpec`) before it is compiled, to change it in place.
 
     Raises
     ------
@@ -76,7 +83,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from error
     content = parse_scene(table, str(path))
-    model, shifts = load_model(path.parent / content.model, content.random)
+    model, shifts = load_model(path.parent / content.model, content.random, edit)
     scene = Scene(
         name=path.stem,
         model=model,
@@ -121,7 +128,9 @@ def _shifted(entries: Sequence[Moved], shifts: dict[str, np.ndarray]) -> tuple[M
     )
 
 
-def load_model(path: Path, random: RandomEntry | None = None) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
+def load_model(
+    path: Path, random: RandomEntry | None = None, edit: Edit | None = None
+) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
     """Compile an MJCF file, and tell how far each of its bodies was shifted at random [m].
 
     Raises
@@ -133,10 +142,12 @@ def load_model(path: Path, random: RandomEntry | None = None) -> tuple[mujoco.Mj
         problem = "is no file" if path.exists() else "does not exist"
         raise SceneError(f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file")
     try:
-        if random is None:
+        if random is None and edit is None:
             return mujoco.MjModel.from_xml_path(str(path)), {}
         spec = mujoco.MjSpec.from_file(str(path))
-        shifts = randomize(spec, random)
+        shifts = {} if random is None else randomize(spec, random)
+        if edit is not None:
+            edit(spec)
         return spec.compile(), shifts
     except ValueError as error:
         reason = " ".join(str(error).split())
