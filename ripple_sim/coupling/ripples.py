@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver import Material, WaveSolver
+from ripple_sim.solver import Material, SolverError, WaveSolver
 from ripple_sim.solver.atlas.cubemap import face_coordinates
 from ripple_sim.solver.waves.footprint import footprint
 
@@ -207,6 +207,23 @@ class Ripples:
         rigid = self._rigid.setdefault(name, np.zeros(atlas.areas.shape, bool))
         rigid.reshape(-1)[footprint(atlas, point, radius).texels] = True
         self._rebuild(name)
+
+    def change_operator(self, operator: str) -> None:
+        """Take another wave operator on all surfaces, by its name in `WaveSolver`; height and velocity stay.
+
+        Raises
+        ------
+        SolverError
+            For an unknown operator.
+        """
+        before = self._options
+        self._options = {**before, "operator": operator}
+        try:
+            for name in self:
+                self._rebuild(name)
+        except SolverError:
+            self._options = before
+            raise
 
     def to_geom(self, name: str, point: ArrayLike) -> NDArray[np.float64]:
         """Carry a point [m] from the frame of a geom's body to that of the geom, which MuJoCo chooses for meshes."""
