@@ -1,6 +1,7 @@
 # make demo   sets everything up, then renders out/demo.mp4
 # make test   sets everything up, then runs the tests
 # make lint   ruff and mypy
+# make docs   the documentation, into build/docs
 # make package  builds the distributions and tries them on every Python that is here
 # make clean  removes what was built and rendered, but not .venv
 
@@ -9,7 +10,7 @@ STAMP := .venv/.installed
 KERNELS := .venv/.kernels
 TYPES := build/types
 
-.PHONY: setup demo test lint package clean
+.PHONY: setup demo test lint docs package types clean
 
 setup: $(STAMP)
 
@@ -28,13 +29,19 @@ demo: setup $(KERNELS)
 test: setup $(KERNELS)
 	$(BIN)/python -m pytest
 
-# mypy knows nothing of setuptools' package-dir, so it is shown the package as it is installed, made of links.
-lint: setup
-	$(BIN)/ruff check
-	$(BIN)/ruff format --check
+# mypy and the documentation know nothing of setuptools' package-dir, so they are shown the package as it is installed,
+# made of links.
+types:
 	@rm -rf $(TYPES) && mkdir -p $(TYPES)/ripple_sim
 	@ln -s $(addprefix $(CURDIR)/,$(wildcard ripple_sim/*) solver scenes) $(TYPES)/ripple_sim
+
+lint: setup types
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
 	MYPYPATH=$(TYPES) $(BIN)/mypy -p ripple_sim
+
+docs: setup types
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir build/docs
 
 package: setup
 	.ci/package
