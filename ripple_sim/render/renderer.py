@@ -73,6 +73,21 @@ class Renderer:
         self._bodies = Bodies(gl, model, [geom for geom in geoms if geom != floor])
         self._pixels = bytearray(3 * width * height)
 
+    def set_field(self, geom: int, field: NDArray[np.float32], limit: float) -> None:
+        """Set the scalar field that a target with `field_colors` shows from now on.
+
+        Parameters
+        ----------
+        geom : int
+            Geom id of the target.
+        field : float32 [6, N + 2, N + 2]
+            Padded by a ring of neighbour texels, as a relief.
+        limit : float
+            The colours reach from -limit to limit.
+        """
+        with self._gl:
+            next(target for target in self._targets if target.geom == geom).set_field(field, limit)
+
     def render(self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint) -> NDArray[np.uint8]:
         """Draw one frame.
 

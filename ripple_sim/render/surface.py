@@ -15,6 +15,7 @@ from ripple_sim.solver.gl import GLContext
 
 from . import occlusion
 from .color import linear, srgb_texture
+from .field import UNDER_COLORS, FieldTexture
 from .looks import find_look
 from .meshes import corner_normals
 from .subdivision import subdivide
@@ -47,6 +48,11 @@ class Surface:
         sRGB, 0 to 1. By default the look's own.
     uv, image : optional
         Texture coordinates, shape [n, 2] or per corner [m, 3, 2], and the picture that they index.
+    field_colors : array of uint8, shape [k, 3], optional
+        sRGB, from the least to the greatest value of a scalar field that is drawn in place of the look; see
+        `SurfaceMesh.set_field`.
+    grid : int
+        Texels between the lines of a grid that is drawn on the surface; 0: none.
     """
 
     V: NDArray[np.float64]
@@ -57,6 +63,8 @@ class Surface:
     color: tuple[float, float, float] | None = None
     uv: NDArray[np.float64] | None = None
     image: Path | str | None = None
+    field_colors: NDArray[np.uint8] | None = None
+    grid: int = 0
 
 
 class SurfaceMesh:
@@ -65,14 +73,22 @@ class SurfaceMesh:
     def __init__(self, gl: GLContext, geom: int, surface: Surface) -> None:
         self.geom = geom
         self.resolution = surface.resolution
-        self.look = find_look(surface.look)
+        shows_field = surface.field_colors is not None
+        self.look = UNDER_COLORS if shows_field else find_look(surface.look)
         self.clear = self.look.transparency > 0.0
         self.radius = float(np.linalg.norm(surface.V, axis=1).max())
         faces, vertices = _refined(surface)
         self.count = len(vertices)
         with gl as ctx:
             self._displace = gl.compute_shader(_PACKAGE, "displace")
-            program = gl.program(_PACKAGE, "surface_vertex", "surface_fragment", CLEAR=int(self.clear))
+            program = gl.program(
+                _PACKAGE,
+                "surface_vertex",
+                "surface_fragment",
+                CLEAR=int(self.clear),
+                FIELD=int(shows_field),
+                GRID=int(surface.grid > 0),
+            )
             depth = gl.program(_PACKAGE, "surface_depth_vertex", "depth_fragment")
             texels = surface.resolution + 2
             self._relief = ctx.texture_array((texels, texels, 6), 4, dtype="f4")
@@ -91,9 +107,12 @@ class SurfaceMesh:
                 indices,
             )
             self._depth = ctx.vertex_array(depth, [(self._moved, "3f", "in_world")], indices)
-            self._image = _load_image(ctx, surface)
+            self._image = None if shows_field else _load_image(ctx, surface)
+            self._field = None if surface.field_colors is None else FieldTexture(ctx, texels, surface.field_colors)
+        self._grid = surface.grid
         look = self.look
-        self._color = (*linear(surface.color or look.color), float(self._image is not None))
+        color = None if shows_field else surface.color
+        self._color = (*linear(color or look.color), float(self._image is not None))
         self._base = (look.roughness, look.metallic, look.sheen, look.coat)
         self._volume = (look.translucency, look.transparency, float(geom))
 
@@ -125,6 +144,15 @@ class SurfaceMesh:
         self._displace.run(-(-self.count // 64))
         ctx.memory_barrier()
 
+    def set_field(self, field: NDArray[np.float32], limit: float) -> None:
+        """Take in the scalar field that is shown, [6, N + 2, N + 2], padded like a relief.
+
+        The colours reach from -limit to limit. The surface must have `field_colors`.
+        """
+        if self._field is None:
+            raise RippleError(f"geom {self.geom} shows no field; give its `Surface` field_colors")
+        self._field.set(field, limit)
+
     def ball(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Bounding ball of the displaced mesh in the world: centre [1, 3] and radius [1], in metres."""
         return self._origin[None], np.array([self.radius + self._highest])
@@ -140,6 +168,10 @@ class SurfaceMesh:
         program["base"] = self._base
         program["volume"] = (*self._volume, min(1.5 * self._highest, 0.05 * self.radius))
         program["size"] = self.radius
+        if self._field is not None:
+            self._field.use(program)
+        if self._grid:
+            program["grid_spacing"] = float(self._grid)
         self._solid.render()
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:

@@ -28,9 +28,9 @@ vec3 relief_position(vec3 d, float resolution)
 
 // Quadratic B-spline over 3 x 3 texels, from four bilinear taps: a surface whose normals have no kinks. It needs one
 // ring of neighbours, and where three faces meet all three give the same value.
-vec4 relief_at(vec3 direction)
+vec4 spline_at(sampler2DArray faces, vec3 direction)
 {
-    float padded = float(textureSize(relief, 0).x);
+    float padded = float(textureSize(faces, 0).x);
     vec3 position = relief_position(direction, padded - 2.0);
     vec2 texel = floor(position.xy);
     vec2 t = position.xy - texel - 0.5;
@@ -39,8 +39,13 @@ vec4 relief_at(vec3 direction)
     vec2 high = texel + 0.5 + 0.5 * (0.5 + t) * (0.5 + t) / right;
     low /= padded;
     high /= padded;
-    return left.y * (left.x * textureLod(relief, vec3(low.x, low.y, position.z), 0.0)
-                     + right.x * textureLod(relief, vec3(high.x, low.y, position.z), 0.0))
-         + right.y * (left.x * textureLod(relief, vec3(low.x, high.y, position.z), 0.0)
-                      + right.x * textureLod(relief, vec3(high.x, high.y, position.z), 0.0));
+    return left.y * (left.x * textureLod(faces, vec3(low.x, low.y, position.z), 0.0)
+                     + right.x * textureLod(faces, vec3(high.x, low.y, position.z), 0.0))
+         + right.y * (left.x * textureLod(faces, vec3(low.x, high.y, position.z), 0.0)
+                      + right.x * textureLod(faces, vec3(high.x, high.y, position.z), 0.0));
+}
+
+vec4 relief_at(vec3 direction)
+{
+    return spline_at(relief, direction);
 }

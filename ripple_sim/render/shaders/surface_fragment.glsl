@@ -4,6 +4,7 @@
 #include "shadow.glsl"
 #include "shading.glsl"
 #include "relief.glsl"
+#include "annotation.glsl"
 
 layout(binding = 5) uniform sampler2D image;
 layout(binding = 6) uniform sampler2D scene;  // the frame without the clear bodies
@@ -45,5 +46,12 @@ void main()
     behind = seen_through(world, rotation * rippled, baked.y, volume.x);
 #endif
     Material m = Material(albedo, base.x, base.y, base.z, base.w, volume.x, volume.y, baked.y, behind, volume.w, open);
-    fragment = vec4(developed(shaded(m, world, rotation * rippled, rotation * n, volume.z)), 1.0);
+    vec3 shown = developed(shaded(m, world, rotation * rippled, rotation * n, volume.z));
+#if FIELD
+    shown = field_over(shown, sphere);
+#endif
+#if GRID
+    shown = grid_over(shown, sphere);
+#endif
+    fragment = vec4(shown, 1.0);
 }
