@@ -150,5 +150,5 @@ def test_drop_scene_refuses_open_meshes_and_wrong_numbers(tmp_path: Path) -> Non
     write_obj(tmp_path / "open.obj", V, F[1:])
     with pytest.raises(MeshError, match="3 boundary edges"):
         drop_scene(tmp_path / "open.obj")
-    with pytest.raises(SceneError, match="1 to 100"):
-        drop_scene(tmp_path / "open.obj", bodies=0)
+    with pytest.raises(SceneError, match="0 to 100"):
+        drop_scene(tmp_path / "open.obj", bodies=101)

@@ -1,0 +1,111 @@
+"""What is to be viewed: a scene or a mesh, with balls to throw at it."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from ripple_sim.solver import Material
+
+from ..coupling.target import find_target
+from ..errors import SceneError
+from ..scene.drop import drop_scene
+from ..scene.scene import Scene, load_scene, shipped_scenes
+from .balls import add_balls
+
+BALLS = 6
+
+# Shares of a surface's size: a ball's radius, a poke's radius, and how far a poke presses the surface in.
+_BALL, _POKE, _DEPTH = 0.06, 0.06, 0.03
+# Time of flight of a thrown ball [s], and how far it comes meanwhile, in sizes of the surface.
+FLIGHT = 0.5
+_THROW = 3.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Strength:
+    """Impulses that suit a surface.
+
+    Attributes
+    ----------
+    radius : float
+        Footprint radius of a poke [m].
+    impulse : float
+        That presses the surface in by some per cent of its size [N s].
+    """
+
+    radius: float
+    impulse: float
+
+
+def poke_strength(material: Material, size: float) -> Strength:
+    """Poke that suits a surface of a size [m].
+
+    The footprint (1 - (d / r)^2)^3 has its peak at 4 / (pi r^2), so an impulse J sets its middle moving at
+    4 J / (pi r^2 sigma); it swings back at about omega^2 = (2 c / r)^2 + k.
+    """
+    radius = _POKE * size
+    speed, stiffness, density = (
+        float(np.max(value)) for value in (material.speed, material.stiffness, material.density)
+    )
+    omega = np.hypot(2 * speed / radius, np.sqrt(stiffness))
+    # nothing pulls a rigid surface back; then a second is as good a time as any
+    return Strength(radius, _DEPTH * size * density * np.pi * radius**2 / 4 * max(float(omega), 1.0))
+
+
+def open_scene(
+    target: str | Path,
+    *,
+    bodies: int = 3,
+    seed: int = 0,
+    up: str | None = None,
+    repair: bool = False,
+) -> Scene:
+    """Scene of a name, a TOML file or a mesh file, with balls to throw.
+
+    Parameters
+    ----------
+    target : str or path
+        A shipped scene's name, the path of a scene file (.toml), or that of a mesh.
+    bodies, seed, up, repair
+        For a mesh, as for `drop_scene`.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene or file, or it is invalid.
+    MeshError
+        If a mesh is not a closed genus-0 surface.
+    """
+    path = Path(target)
+    if str(target) in shipped_scenes() or path.suffix.lower() == ".toml":
+        load = functools.partial(load_scene, target)
+    elif path.is_file():
+        load = functools.partial(drop_scene, path, bodies=bodies, seed=seed, up=up, repair=repair)
+    else:
+        raise SceneError(
+            f"there is no scene or mesh {str(target)!r}; shipped scenes are {', '.join(shipped_scenes())}, or give the "
+            "path of a scene file (TOML) or of a mesh"
+        )
+    scene = load()
+    size = surface_size(scene)
+    impulse = poke_strength(scene.surfaces[0].material.material(), size).impulse
+    # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of two pokes
+    mass = 2 * impulse / (1.5 * _THROW * size / FLIGHT)
+
+    def edit(spec: mujoco.MjSpec) -> None:
+        # parked balls are no part of what a camera should see
+        spec.stat.extent, spec.stat.center = scene.model.stat.extent, scene.model.stat.center
+        add_balls(spec, BALLS, _BALL * size, mass)
+
+    return load(edit=edit)
+
+
+def surface_size(scene: Scene) -> float:
+    """Longest extent of the smallest rippling surface [m]."""
+    geoms = [find_target(scene.model, entry.geom) for entry in scene.surfaces]
+    return float(2 * scene.model.geom_aabb[geoms, 3:].max(axis=1).min())

@@ -1,0 +1,108 @@
+"""The skin of a rippling surface: a fine triangle mesh whose points and normals follow the waves, changed in place."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver import Atlas, Relief
+from ripple_sim.solver.atlas.cubemap import face_coordinates
+
+from ..render.meshes import corner_normals
+from ..render.subdivision import subdivide
+
+# Triangles that software OpenGL draws 30 times a second beside the simulation, on two cores.
+MAX_TRIANGLES = 24_000
+
+# columns of the vertex attributes while the mesh is refined
+_POSITION, _DIRECTION, _SPHERE, _NORMAL = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
+
+
+class Skin:
+    """A surface, refined about to its texels and displaced by their heights.
+
+    Parameters
+    ----------
+    atlas : Atlas
+
+    Attributes
+    ----------
+    F : int64 [m, 3]
+        Triangles, counter-clockwise from outside.
+    points : float32 [n, 3]
+        Displaced vertices in the frame of the mesh [m].
+    normals : float32 [n, 3]
+        Unit normals of the displaced surface; creases of the mesh stay sharp.
+    height : float32 [n]
+        [m].
+    """
+
+    def __init__(self, atlas: Atlas) -> None:
+        self.F, vertices = _refined(atlas)
+        self._rest, self._direction, self._rest_normals = (
+            np.ascontiguousarray(vertices[:, columns], dtype=np.float32)
+            for columns in (_POSITION, _DIRECTION, _NORMAL)
+        )
+        self._texels, self._weights = _bilinear(vertices[:, _SPHERE], atlas.resolution)
+        self._relief = Relief(atlas)
+        self.points, self.normals = self._rest.copy(), self._rest_normals.copy()
+        self.height = np.zeros(len(vertices), np.float32)
+
+    def update(self, height: NDArray[np.float32]) -> None:
+        """Follow a height field, float32 [6, N, N], in metres."""
+        relief = self._relief(height).reshape(-1, 4)
+        _displace(
+            relief, self._texels, self._weights, self._rest, self._direction, self._rest_normals,
+            self.points, self.normals, self.height,
+        )  # fmt: skip
+
+
+def _refined(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Triangles and vertex attributes (see the columns above), with vertices split where normals jump."""
+    V, F = atlas.mesh.V, atlas.mesh.F
+    smooth = np.zeros_like(V)
+    smooth[F] = corner_normals(V, F, crease=180.0)
+    corners = np.concatenate([F[:, :, None], corner_normals(V, F)], axis=2).reshape(-1, 4)
+    unique, index = np.unique(corners, axis=0, return_inverse=True)
+    vertex = unique[:, 0].astype(np.int64)
+    attributes = np.concatenate([V[vertex], smooth[vertex], atlas.sphere[vertex], unique[:, 1:]], axis=1)
+    return subdivide(
+        index.reshape(F.shape),
+        attributes,
+        _SPHERE,
+        max_angle=np.pi / 2 / atlas.resolution,
+        max_faces=MAX_TRIANGLES,
+    )
+
+
+def _bilinear(directions: NDArray[np.float64], n: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Addresses in a relief [6 (N + 2)^2] and weights of the four texels round each direction, [k, 4] both."""
+    face, row, column = face_coordinates(directions, n)
+    # the relief has a ring of neighbours round each face
+    row, column = np.clip(row + 1, 0, n + 1), np.clip(column + 1, 0, n + 1)
+    r, c = np.minimum(row.astype(np.int64), n), np.minimum(column.astype(np.int64), n)
+    s, t = row - r, column - c
+    corner = (face * (n + 2) + r) * (n + 2) + c
+    texels = np.stack([corner, corner + 1, corner + n + 2, corner + n + 3], axis=1)
+    weights = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=1)
+    return texels.astype(np.int32), weights.astype(np.float32)
+
+
+@numba.njit(cache=True, nogil=True)
+def _displace(relief, texels, weights, rest, direction, rest_normals, points, normals, height):
+    """Raise points by the height; a normal tips against the gradient, to first order in the height."""
+    for i in range(len(texels)):
+        gx = gy = gz = h = np.float32(0)
+        for k in range(4):
+            weight, texel = weights[i, k], texels[i, k]
+            gx += weight * relief[texel, 0]
+            gy += weight * relief[texel, 1]
+            gz += weight * relief[texel, 2]
+            h += weight * relief[texel, 3]
+        height[i] = h
+        for k in range(3):
+            points[i, k] = rest[i, k] + h * direction[i, k]
+        x, y, z = rest_normals[i, 0] - gx, rest_normals[i, 1] - gy, rest_normals[i, 2] - gz
+        scale = 1 / np.sqrt(x * x + y * y + z * z)
+        normals[i, 0], normals[i, 1], normals[i, 2] = x * scale, y * scale, z * scale
