@@ -6,8 +6,9 @@ mocap bodies, and the ripples, to press on surfaces.
 
 import numpy as np
 
+from ripple_sim.job import render_video
 from ripple_sim.scene.scene import load_scene
-from ripple_sim.simulation import Simulation, render_video
+from ripple_sim.simulation import Simulation
 
 FORCE = 12.0  # N
 TURNS = 0.4  # 1/s

@@ -1,51 +1,23 @@
-"""The simulation loop: physics, waves, frames, video."""
+"""The simulation: physics and waves, frame by frame."""
 
 from __future__ import annotations
 
 import copy
-import dataclasses
 import math
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import mujoco
-import numpy as np
-from numpy.typing import NDArray
 
-from ripple_sim.solver import Relief, texture_map
-from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver import texture_map
 
 from .coupling.ripples import Impulse, Ripples
 from .errors import SceneError, SimulationError
-from .render import Renderer, Surface
 from .scene.events import Script
-from .scene.scene import MAX_DURATION, Scene
-from .video import check_output, open_writer
-from .view import viewpoint
+from .scene.scene import Scene
 
 # More than this is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000
-
-
-@dataclasses.dataclass(frozen=True)
-class Summary:
-    """What a rendered video took.
-
-    `renderer` is the driver's GL_RENDERER, `backend` the wave solver's; times in seconds.
-    """
-
-    output: Path
-    frames: int
-    renderer: str
-    backend: str
-    substeps_per_frame: float
-    setup_seconds: float
-    physics_seconds: float
-    wave_seconds: float
-    render_seconds: float
-    encode_seconds: float
-    wall_seconds: float
 
 
 class Simulation:
@@ -178,112 +150,3 @@ def _steps_per_frame(fps: int, timestep: float) -> int:
             "most: use a longer timestep in the MJCF's <option>"
         )
     return max(1, math.ceil(steps - 1e-9))
-
-
-class FrameSource:
-    """Frames of a running simulation, by the offscreen renderer."""
-
-    def __init__(self, simulation: Simulation, *, width: int, height: int) -> None:
-        self._simulation = simulation
-        self._gl = shared_context()
-        self._reliefs = {}
-        surfaces = {}
-        for entry in simulation.scene.surfaces:
-            geom = simulation.ripples.geom_ids[entry.geom]
-            atlas = simulation.ripples[entry.geom].atlas
-            self._reliefs[geom] = (entry.geom, Relief(atlas))
-            surfaces[geom] = Surface(
-                V=atlas.mesh.V,
-                F=atlas.mesh.F,
-                sphere=atlas.sphere,
-                resolution=atlas.resolution,
-                look=entry.look,
-                color=entry.color,
-            )
-        self._renderer = Renderer(self._gl, simulation.model, surfaces, width=width, height=height)
-
-    @property
-    def gl_renderer(self) -> str:
-        """The driver's GL_RENDERER."""
-        return self._gl.renderer
-
-    def draw(self) -> NDArray[np.uint8]:
-        """Draw the present state, uint8 [height, width, 3]."""
-        sim = self._simulation
-        reliefs = {geom: relief(sim.ripples[name].height) for geom, (name, relief) in self._reliefs.items()}
-        camera = viewpoint(sim.model, sim.data, sim.scene.camera, sim.data.time)
-        return self._renderer.render(sim.data, reliefs, camera)
-
-
-def render_video(
-    scene: Scene,
-    output: str | Path,
-    *,
-    size: tuple[int, int] = (1280, 720),
-    fps: int = 60,
-    duration: float | None = None,
-    resolution: int | None = None,
-    backend: str = "auto",
-    progress: Callable[[int, int], None] | None = None,
-    on_step: Callable[[Simulation], None] | None = None,
-) -> Summary:
-    """Simulate a scene and write its video.
-
-    Parameters
-    ----------
-    scene : Scene
-    output : path
-        .mp4, .webm, .gif, or a folder for PNG frames. It appears when it is whole.
-    size : (width, height)
-        [pixels].
-    fps : int
-        Frames a second.
-    duration : float, optional
-        [s], instead of the scene's.
-    resolution, backend, on_step
-        As for `Simulation`.
-    progress : callable, optional
-        Called with (frames done, frames in all) after each frame.
-
-    Raises
-    ------
-    RippleError
-        Before anything is simulated where the output, size, rate or scene is invalid; later if the physics becomes
-        unstable or the video cannot be written on.
-    """
-    start = time.perf_counter()
-    # MuJoCo would write its warnings to a file in the current folder; `Simulation` reports those that matter
-    mujoco.set_mju_user_warning(lambda message: None)
-    output, (width, height) = Path(output), size
-    check_output(output, width, height, fps)
-    length = scene.duration if duration is None else duration
-    if not 0 < length < MAX_DURATION:
-        raise SceneError(f"duration is {length!r} s; valid is a positive number, less than {MAX_DURATION}")
-    count = max(1, round(length * fps))
-    simulation = Simulation(scene, fps=fps, resolution=resolution, backend=backend, on_step=on_step)
-    frames = FrameSource(simulation, width=width, height=height)
-    ready = time.perf_counter()
-    render_seconds = 0.0
-    with open_writer(output, width=width, height=height, fps=fps) as writer:
-        for number in range(count):
-            if number:
-                simulation.advance_frame()
-            before = time.perf_counter()
-            frame = frames.draw()
-            render_seconds += time.perf_counter() - before
-            writer.write(frame)
-            if progress is not None:
-                progress(number + 1, count)
-    return Summary(
-        output=output,
-        frames=count,
-        renderer=frames.gl_renderer,
-        backend=simulation.backend,
-        substeps_per_frame=simulation.substeps_taken / max(count - 1, 1),
-        setup_seconds=ready - start,
-        physics_seconds=simulation.physics_seconds,
-        wave_seconds=simulation.wave_seconds,
-        render_seconds=render_seconds,
-        encode_seconds=writer.encode_seconds,
-        wall_seconds=time.perf_counter() - start,
-    )

@@ -17,8 +17,8 @@ from tyro.conf import Positional, arg
 from .arguments import Count, Duration, FrameRate, Resolution, Seed, Size, UpAxis
 
 if TYPE_CHECKING:
+    from ..job import Summary
     from ..scene.scene import Scene
-    from ..simulation import Summary
     from ..solver import Mesh
 
 
@@ -49,7 +49,7 @@ class _Video:
         fps = self.fps or default_fps(self.output)
         check_output(self.output, *self.size, fps)
 
-        from ..simulation import render_video
+        from ..job import render_video
         from ..solver.gl import shared_context
         from ..solver.waves.backend import auto_backend
         from .progress import frame_progress

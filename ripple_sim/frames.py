@@ -1,0 +1,123 @@
+"""From a running simulation to pictures: a frozen copy of its state, and a renderer that draws such copies."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import itertools
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver import Relief
+from ripple_sim.solver.gl import GLContext, shared_context
+
+from .coupling.ripples import Impulse
+from .render import Renderer, Surface
+from .simulation import Simulation
+from .viewpoint import viewpoint
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Snapshot:
+    """A simulation's state at one frame, which stays as it is while the simulation goes on.
+
+    Attributes
+    ----------
+    number : int
+        Of the frame, from 0.
+    data : mujoco.MjData
+        Copy of MuJoCo's state.
+    heights, reliefs : dict
+        By the geom's name: height [m], float32 [6, N, N], and what is drawn of it (see `Relief`).
+    impulses : list of Impulse
+        All of the frame.
+    """
+
+    number: int
+    data: mujoco.MjData
+    heights: dict[str, NDArray[np.float32]]
+    reliefs: dict[str, NDArray[np.float32]]
+    impulses: list[Impulse]
+
+    def digest(self) -> str:
+        """Fingerprint of the bodies' and the surfaces' state, the same if and only if every bit of it is."""
+        hasher = hashlib.blake2b(digest_size=16)
+        for array in (self.data.qpos, self.data.qvel, self.data.act, *self.heights.values()):
+            hasher.update(np.ascontiguousarray(array).view(np.uint8))
+        return hasher.hexdigest()
+
+
+def run(simulation: Simulation, frames: int, *, first: int = 0, alive: int = 1) -> Iterator[Snapshot | None]:
+    """Advance a simulation frame by frame.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        At its beginning.
+    frames : int
+        How many, counted from the beginning, where frame 0 stands.
+    first : int
+        Frames before this one are simulated only, and come as None.
+    alive : int
+        How many of the latest snapshots are in use at a time; the state of older ones is written over.
+    """
+    ring = itertools.cycle([mujoco.MjData(simulation.model) for _ in range(alive)])
+    ripples = simulation.ripples
+    reliefs = {name: Relief(ripples[name].atlas) for name in ripples}
+    for number in range(frames):
+        if number:
+            simulation.advance_frame()
+        if number < first:
+            yield None
+            continue
+        data = next(ring)
+        mujoco.mj_copyData(data, simulation.model, simulation.data)
+        heights = {name: ripples[name].height for name in ripples}
+        yield Snapshot(
+            number=number,
+            data=data,
+            heights=heights,
+            reliefs={name: reliefs[name](height) for name, height in heights.items()},
+            impulses=simulation.impulses,
+        )
+
+
+class FrameSource:
+    """Draws snapshots of a simulation with the offscreen renderer.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Whose model, surfaces and camera are drawn.
+    width, height : int
+        [pixels].
+    gl : GLContext, optional
+        By default the process's shared one.
+    """
+
+    def __init__(self, simulation: Simulation, *, width: int, height: int, gl: GLContext | None = None) -> None:
+        self._simulation = simulation
+        self._geoms = simulation.ripples.geom_ids
+        surfaces = {}
+        for entry in simulation.scene.surfaces:
+            atlas = simulation.ripples[entry.geom].atlas
+            surfaces[self._geoms[entry.geom]] = Surface(
+                V=atlas.mesh.V,
+                F=atlas.mesh.F,
+                sphere=atlas.sphere,
+                resolution=atlas.resolution,
+                look=entry.look,
+                color=entry.color,
+            )
+        gl = gl if gl is not None else shared_context()
+        self._renderer = Renderer(gl, simulation.model, surfaces, width=width, height=height)
+
+    def draw(self, state: Snapshot) -> NDArray[np.uint8]:
+        """Draw a snapshot, uint8 [height, width, 3]."""
+        sim = self._simulation
+        reliefs = {self._geoms[name]: relief for name, relief in state.reliefs.items()}
+        camera = viewpoint(sim.model, state.data, sim.scene.camera, state.data.time)
+        return self._renderer.render(state.data, reliefs, camera)
