@@ -1,0 +1,48 @@
+"""The paper, part by part, on one page.
+
+python examples/paper/run.py
+
+Writes out/paper/index.html with its pictures; each part also runs alone. Kira, Nakayama and Fujishiro, "Jacobian-free
+Deformation of Genus-0 Surfaces", The Journal of the Society for Art and Science.
+"""
+
+import importlib
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from page import Part, write_page
+
+FOLDER = Path("out/paper")
+PARTS = ("figure_1", "figure_2", "figure_5", "figure_8", "table_1")
+
+
+def alone(make: Callable[[Path], Part]) -> None:
+    """Make one part and print what it found."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    part = make(FOLDER)
+    print(f"{part.title}\n{part.text}")
+    for row in part.table:
+        print("  ".join(row))
+    for file, _ in part.pictures:
+        print(file)
+
+
+def main() -> None:
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    parts = []
+    for name in PARTS:
+        print(name, file=sys.stderr)
+        parts.append((f"python examples/paper/{name}.py", importlib.import_module(name).make(FOLDER)))
+    page = FOLDER / "index.html"
+    write_page(
+        page,
+        "Jacobian-free Deformation of Genus-0 Surfaces, done again",
+        "The figures of Kira, Nakayama and Fujishiro's paper with objects of our own, drawn and measured here.",
+        parts,
+    )
+    print(page)
+
+
+if __name__ == "__main__":
+    main()
