@@ -19,5 +19,9 @@ class SimulationError(RippleError):
     """The physics became unstable."""
 
 
+class DisplayError(RippleError):
+    """There is no display to open a window on, or what serves the web page in its stead is not installed."""
+
+
 class RippleWarning(UserWarning):
     """Something that runs, but not as one would expect: a hull off its surface, a body too fast for the time step."""

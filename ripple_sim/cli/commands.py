@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import Positional, arg
 
 from .arguments import Count, Duration, FrameRate, Resolution, Seed, Size, UpAxis
+from .view_command import View
 
 if TYPE_CHECKING:
     from ..job import Summary
@@ -194,7 +195,7 @@ class Bench:
         print(json_format.dumps(report, indent=2) if self.json else as_text(report))
 
 
-COMMANDS: dict[str, Callable[..., Any]] = {"render": Render, "drop": Drop, "atlas": Atlas, "info": Info, "bench": Bench}
+COMMANDS: dict[str, Callable[..., Any]] = {"render": Render, "drop": Drop, "atlas": Atlas, "info": Info, "bench": Bench, "view": View}
 
 
 def _summary_text(summary: Summary) -> str:

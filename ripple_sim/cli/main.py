@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     # As an exception, so that an unfinished video is removed on the way out.
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(TERMINATED))
 
-    from ..errors import EncodingError
+    from ..errors import DisplayError, EncodingError
     from ..solver.errors import GLError, RippleError
 
     try:
@@ -45,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # standard output has failed (a full disk, a reader that has stopped): nothing more goes there, not even at exit
         sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115
         return FAILED if isinstance(error, BrokenPipeError) else _fail(error.strerror or error, FAILED)
-    except (GLError, EncodingError) as error:  # nothing that other input would cure
+    except (GLError, DisplayError, EncodingError) as error:  # nothing that other input would cure
         return _fail(error, FAILED)
     except RippleError as error:
         return _fail(error, BAD_INPUT)

@@ -20,7 +20,7 @@ from .balls import add_balls
 BALLS = 6
 
 # Shares of a surface's size: a ball's radius, a poke's radius, and how far a poke presses the surface in.
-_BALL, _POKE, _DEPTH = 0.06, 0.06, 0.03
+_BALL, _POKE, _DEPTH = 0.06, 0.06, 0.025
 # Time of flight of a thrown ball [s], and how far it comes meanwhile, in sizes of the surface.
 FLIGHT = 0.5
 _THROW = 3.0
@@ -94,8 +94,8 @@ def open_scene(
     scene = load()
     size = surface_size(scene)
     impulse = poke_strength(scene.surfaces[0].material.material(), size).impulse
-    # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of two pokes
-    mass = 2 * impulse / (1.5 * _THROW * size / FLIGHT)
+    # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of a poke
+    mass = impulse / (1.5 * _THROW * size / FLIGHT)
 
     def edit(spec: mujoco.MjSpec) -> None:
         # parked balls are no part of what a camera should see

@@ -22,7 +22,9 @@ OPERATORS = ("fem", "uncorrected", "paper")
 SLIDERS = ("speed", "damping", "stiffness")
 
 # The range of the colours follows the waves: at once where they grow, by this factor a frame where they die.
-_FADE = 0.98
+_FADE = 0.96
+# Colours are full at this share of the greatest height: where something hits, the surface is higher than its waves.
+_FULL = 0.4
 # Least range of the colours over the surface's size, so that rounding noise is not shown.
 _FAINT = 1e-4
 
@@ -67,7 +69,7 @@ class Session:
     operator : str
         The wave operator, one of `OPERATORS`.
     color_range : float
-        Height that the colours should reach [m].
+        Height from which on the colours should be full [m].
     """
 
     def __init__(self, scene: Scene, *, fps: int = 30, resolution: int | None = None) -> None:
@@ -127,11 +129,11 @@ class Session:
 
     def refresh(self) -> None:
         """Bring the skins and the range of the colours up to date."""
-        highest = _FAINT * self._size
+        wanted = _FAINT * self._size
         for name, skin in self.skins.items():
             skin.update(self.simulation.ripples[name].height)
-            highest = max(highest, float(np.abs(skin.height).max()))
-        self.color_range = max(highest, _FADE * self.color_range)
+            wanted = max(wanted, _FULL * float(np.abs(skin.height).max()))
+        self.color_range = max(wanted, _FADE * self.color_range)
 
     def reset(self) -> None:
         """Start again from the beginning; material and operator as they were chosen stay."""

@@ -41,8 +41,7 @@ class Skin:
     def __init__(self, atlas: Atlas) -> None:
         self.F, vertices = _refined(atlas)
         self._rest, self._direction, self._rest_normals = (
-            np.ascontiguousarray(vertices[:, columns], dtype=np.float32)
-            for columns in (_POSITION, _DIRECTION, _NORMAL)
+            np.ascontiguousarray(vertices[:, columns], dtype=np.float32) for columns in (_POSITION, _DIRECTION, _NORMAL)
         )
         self._texels, self._weights = _bilinear(vertices[:, _SPHERE], atlas.resolution)
         self._relief = Relief(atlas)

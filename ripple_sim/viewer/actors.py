@@ -1,0 +1,169 @@
+"""Geoms and skins as PyVista actors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+from ..render.bodies import visible_geoms
+from .session import Session
+from .skin import Skin
+
+HEIGHT = "height [m]"
+
+_GEOM = mujoco.mjtGeom
+_COLORMAP = "coolwarm"
+# What is shown of a plane that is larger than the view: a disc that fades into the background.
+BACKGROUND = (0.74, 0.77, 0.81)
+_FADE_RINGS, _FADE_SIDES = 24, 72
+
+
+class BodyActors:
+    """The geoms of a model that do not ripple, moved by MuJoCo's poses.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+    session : Session
+    reach : float
+        Bodies farther than this from the origin are not shown [m]: they wait for their turn.
+    """
+
+    def __init__(self, plotter: pv.Plotter, session: Session, reach: float) -> None:
+        self._session, self._reach = session, reach
+        model = session.simulation.model
+        self._actors = {}
+        for geom in visible_geoms(model):
+            if geom in session.simulation.ripples.geom_ids.values():
+                continue
+            rgba = geom_rgba(model, geom)
+            if _is_floor(model, geom, reach):
+                self._actors[geom] = _add_floor(plotter, reach, rgba)
+            elif (mesh := geom_mesh(model, geom)) is not None:
+                self._actors[geom] = _add(plotter, mesh, rgba)
+        self.update()
+
+    def update(self) -> None:
+        """Take the poses from the session."""
+        data, parked = self._session.simulation.data, self._session.parked
+        for geom, actor in self._actors.items():
+            _place(actor, data.geom_xpos[geom], data.geom_xmat[geom])
+            far = np.linalg.norm(data.geom_xpos[geom]) > self._reach
+            actor.SetVisibility(not (far or geom in parked))
+
+
+class SkinActor:
+    """A rippling surface: its points, normals and heights are written into the arrays that VTK reads.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+    skin : Skin
+    color : tuple
+        sRGB, 0 to 1.
+    """
+
+    def __init__(self, plotter: pv.Plotter, skin: Skin, color: tuple[float, float, float]) -> None:
+        mesh = pv.PolyData.from_regular_faces(skin.points, skin.F)
+        mesh.point_data.active_normals = skin.normals
+        mesh.point_data.set_array(skin.height, HEIGHT)
+        mesh.set_active_scalars(HEIGHT)
+        self._skin, self._mesh = skin, mesh
+        self.actor = plotter.add_mesh(
+            mesh,
+            scalars=HEIGHT,
+            cmap=_COLORMAP,
+            clim=(-1.0, 1.0),
+            color=color,
+            show_scalar_bar=False,
+            copy_mesh=False,
+            interpolation="Phong",
+            **_SHADING,
+        )
+        self.actor.prop.specular_color = "white"
+
+    def update(self, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
+        """Take what the skin holds now; place it in the world."""
+        mesh, skin = self._mesh, self._skin
+        mesh.points[:] = skin.points
+        data = mesh.GetPointData()
+        for array, new in ((data.GetNormals(), skin.normals), (data.GetArray(HEIGHT), skin.height)):
+            pv.convert_array(array)[:] = new
+            array.Modified()
+        mesh.GetPoints().Modified()
+        _place(self.actor, position, rotation)
+
+    def color_by_height(self, on: bool, limit: float) -> None:
+        """Show the height as colours from minus to plus a limit [m], or the surface in its own colour."""
+        mapper = self.actor.mapper
+        mapper.scalar_visibility = on
+        mapper.scalar_range = (-limit, limit)
+
+
+_SHADING: dict[str, Any] = {"ambient": 0.32, "diffuse": 0.75, "specular": 0.3, "specular_power": 30.0}
+
+
+def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
+    """Surface of a geom in its frame [m]; None for types that cannot be drawn."""
+    kind, size = _GEOM(int(model.geom_type[geom])), model.geom_size[geom]
+    along_z = {"center": (0, 0, 0), "direction": (0, 0, 1)}
+    match kind:
+        case _GEOM.mjGEOM_SPHERE:
+            return pv.Sphere(radius=size[0], theta_resolution=32, phi_resolution=24)
+        case _GEOM.mjGEOM_ELLIPSOID:
+            return pv.ParametricEllipsoid(*size, u_res=32, v_res=24, w_res=2)
+        case _GEOM.mjGEOM_CAPSULE:
+            return pv.Capsule(**along_z, radius=size[0], cylinder_length=2 * size[1], resolution=24)
+        case _GEOM.mjGEOM_CYLINDER:
+            return pv.Cylinder(**along_z, radius=size[0], height=2 * size[1], resolution=40)
+        case _GEOM.mjGEOM_BOX:
+            return pv.Box(bounds=(-size[0], size[0], -size[1], size[1], -size[2], size[2]))
+        case _GEOM.mjGEOM_PLANE:
+            return pv.Plane(i_size=2 * size[0], j_size=2 * size[1], i_resolution=1, j_resolution=1)
+        case _GEOM.mjGEOM_MESH | _GEOM.mjGEOM_SDF:
+            mesh = int(model.geom_dataid[geom])
+            if mesh >= 0:
+                vertex, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+                V = model.mesh_vert[vertex : vertex + model.mesh_vertnum[mesh]]
+                return pv.PolyData.from_regular_faces(V, model.mesh_face[face : face + model.mesh_facenum[mesh]])
+    return None
+
+
+def geom_rgba(model: mujoco.MjModel, geom: int) -> NDArray[np.float32]:
+    """Colour and opacity (sRGB, 0 to 1) of a geom: its own, or its material's where it has none of its own."""
+    rgba, material = model.geom_rgba[geom], model.geom_matid[geom]
+    return model.mat_rgba[material] if material >= 0 and np.array_equal(rgba, np.float32([0.5, 0.5, 0.5, 1])) else rgba
+
+
+def _add(plotter: pv.Plotter, mesh: pv.PolyData, rgba: NDArray[np.float32]) -> pv.Actor:
+    mesh = mesh.compute_normals(cell_normals=False, split_vertices=True, feature_angle=40.0)
+    return plotter.add_mesh(
+        mesh, color=rgba[:3].tolist(), opacity=float(rgba[3]), interpolation="Phong", reset_camera=False, **_SHADING
+    )
+
+
+def _is_floor(model: mujoco.MjModel, geom: int, reach: float) -> bool:
+    """Whether a geom is a plane without end, or one that reaches beyond the view."""
+    size = model.geom_size[geom, :2]
+    return model.geom_type[geom] == _GEOM.mjGEOM_PLANE and bool(((size <= 0) | (size > reach / 2)).all())
+
+
+def _add_floor(plotter: pv.Plotter, radius: float, rgba: NDArray[np.float32]) -> pv.Actor:
+    """Unlit, for a lit pixel takes software OpenGL much longer and this one has most of them."""
+    disc = pv.Disc(inner=0.0, outer=radius, normal=(0, 0, 1), r_res=_FADE_RINGS, c_res=_FADE_SIDES)
+    away = np.linalg.norm(disc.points, axis=1) / radius
+    share = np.clip((away - 0.1) / 0.7, 0, 1)[:, None]
+    share = share * share * (3 - 2 * share)
+    colors = (1 - share) * rgba[:3] + share * np.array(BACKGROUND)
+    disc.point_data["color"] = np.rint(255 * colors).astype(np.uint8)
+    return plotter.add_mesh(disc, scalars="color", rgb=True, lighting=False, reset_camera=False)
+
+
+def _place(actor: pv.Actor, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation.reshape(3, 3), position
+    actor.user_matrix = pose

@@ -1,0 +1,71 @@
+"""The viewer on the desktop: the window's loop, and how fast it can go."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+
+from .window import Window
+
+
+def run(window: Window) -> None:
+    """Show a window until the user closes it; simulated time goes no faster than the clock."""
+    window.open()
+    frame = 1 / window.session.fps
+    due = time.perf_counter()
+    try:
+        while not window.closed:
+            window.plotter.iren.process_events()
+            window.tick()
+            due = max(due + frame, time.perf_counter() - frame)
+            time.sleep(max(0.0, due - time.perf_counter()))
+    finally:
+        window.close()
+
+
+@dataclasses.dataclass(frozen=True)
+class Benchmark:
+    """Updates a second of a window at its fastest, and where the time goes.
+
+    Attributes
+    ----------
+    updates_per_second : float
+    simulate, draw : float
+        [ms] for physics, waves and the displaced mesh; for VTK's picture.
+    renderer : str
+        OpenGL driver.
+    """
+
+    updates_per_second: float
+    simulate: float
+    draw: float
+    renderer: str
+
+    def __str__(self) -> str:
+        return (
+            f"{self.updates_per_second:.1f} updates/s: simulation {self.simulate:.1f} ms, drawing {self.draw:.1f} ms "
+            f"({self.renderer})"
+        )
+
+
+def benchmark(window: Window, updates: int = 90, tries: int = 3) -> Benchmark:
+    """Best of several tries to go through some updates without waiting, each begun with a poke and a ball."""
+    window.open()
+    window.plotter.iren.interactor.EnableRenderOff()
+    width, height = window.plotter.render_window.GetSize()
+    best = None
+    for _ in range(tries):
+        window.reset()
+        window.poke_at(width // 2, height // 2)
+        window.throw()
+        start, drawn = time.perf_counter(), window.seconds_drawing
+        for _ in range(updates):
+            window.tick()
+        seconds, drawing = time.perf_counter() - start, window.seconds_drawing - drawn
+        if best is None or seconds < best[0]:
+            best = seconds, drawing
+    assert best is not None
+    seconds, drawing = best
+    renderer = window.gl_renderer
+    window.close()
+    return Benchmark(updates / seconds, 1e3 * (seconds - drawing) / updates, 1e3 * drawing / updates, renderer)

@@ -1,0 +1,105 @@
+"""Pictures and videos of a window, numbered so that none is overwritten."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from ..errors import VideoError
+from ..video import FrameWriter, open_writer
+
+
+class Takes:
+    """Writes screenshots and one video at a time.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+        Files are called name-1.png, name-1.mp4 and so on.
+    fps : int
+        Frames a second of a video.
+    """
+
+    def __init__(self, folder: Path, name: str, fps: int) -> None:
+        self._folder, self._name, self._fps = folder, name, fps
+        self._writer: FrameWriter | None = None
+
+    @property
+    def recording(self) -> bool:
+        """Whether a video is being written."""
+        return self._writer is not None
+
+    def save(self, picture: NDArray[np.uint8]) -> Path:
+        """Write a picture, uint8 [height, width, 3], and return its path.
+
+        Raises
+        ------
+        VideoError
+            If it cannot be written.
+        """
+        path = self._free(".png")
+        try:
+            Image.fromarray(picture).save(path)
+        except OSError as error:
+            raise VideoError(f"cannot write {path}: {error.strerror or error}") from error
+        return path
+
+    def start(self, picture: NDArray[np.uint8]) -> Path:
+        """Begin a video of pictures of this size; an odd row or column is left out. Return its path.
+
+        Raises
+        ------
+        VideoError
+            If it cannot be written.
+        """
+        height, width, _ = _even(picture).shape
+        path = self._free(".mp4")
+        self._writer = open_writer(path, width=width, height=height, fps=self._fps)
+        self._shape = height, width, 3
+        return path
+
+    def add(self, picture: NDArray[np.uint8]) -> bool:
+        """Add a frame; a window that has changed its size ends the video. Return whether it goes on.
+
+        Raises
+        ------
+        EncodingError
+            If it cannot be written on; the video is over then.
+        """
+        frame = _even(picture)
+        if self._writer is None or frame.shape != self._shape:
+            self.stop()
+            return False
+        try:
+            self._writer.write(frame)
+        except BaseException:
+            self._writer.discard()
+            self._writer = None
+            raise
+        return True
+
+    def stop(self) -> Path | None:
+        """End the video; return its path if one was being written."""
+        writer, self._writer = self._writer, None
+        if writer is None:
+            return None
+        if writer.frames:
+            writer.close()
+            return writer.path
+        writer.discard()
+        return None
+
+    def _free(self, ending: str) -> Path:
+        number = 1
+        while (path := self._folder / f"{self._name}-{number}{ending}").exists():
+            number += 1
+        return path
+
+
+def _even(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    height, width, _ = picture.shape
+    return np.ascontiguousarray(picture[: height - height % 2, : width - width % 2])

@@ -1,0 +1,356 @@
+"""The window: shows a session with PyVista, and turns keys, clicks and sliders into calls of it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+
+from ripple_sim.solver import RippleError
+
+from ..render.looks import find_look
+from ..viewpoint import viewpoint
+from .actors import BACKGROUND, HEIGHT, BodyActors, SkinActor
+from .controls import CONTROLS, help_text
+from .session import OPERATORS, SLIDERS, Session
+from .takes import Takes
+
+# A click that moves the pointer by more than this turns the camera and pokes nothing [pixels].
+_STILL = 4
+# Bodies farther away than this many distances of the first camera wait for their turn, and are not shown.
+_REACH = 4.0
+# The status line is written anew this often [s]: text is slow to draw.
+_STATUS_EVERY = 0.25
+_MULTISAMPLES = 8
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast")
+_UNITS = {"speed": "m/s", "damping": "1/s", "stiffness": "1/s²"}
+
+
+class Window:
+    """A session in a PyVista plotter, on screen or off.
+
+    Parameters
+    ----------
+    session : Session
+    size : (width, height)
+        [pixels].
+    off_screen : bool
+        Draw without a window: for the web page and for tests.
+    folder : path
+        Where screenshots and videos go.
+
+    Attributes
+    ----------
+    plotter : pyvista.Plotter
+    closed : bool
+        Whether the user wants to leave.
+    message : str
+        What happened last.
+    seconds_drawing : float
+        Time that drawing has taken so far [s].
+    render : callable
+        Draws the picture; a web page puts in its own, which also sends it.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        *,
+        size: tuple[int, int] = (800, 600),
+        off_screen: bool = False,
+        folder: str | Path = ".",
+    ) -> None:
+        self.session = session
+        self.closed = False
+        self.message = ""
+        self.seconds_drawing = 0.0
+        scene = session.simulation.scene
+        self._takes = Takes(Path(folder), scene.name, session.fps)
+        self._colored = True
+        self._drawn = False
+        self._updates, self._since, self._rate = 0, time.perf_counter(), math.nan
+        self._pressed: tuple[int, int] | None = None
+        self.plotter = pv.Plotter(off_screen=off_screen, window_size=list(size), lighting="none", title=scene.name)
+        # smooth edges cost software OpenGL four fifths of its speed
+        self.plotter.render_window.SetMultiSamples(0)
+        self.plotter.set_background(BACKGROUND)
+        self._light()
+        data = session.simulation.data
+        pose = viewpoint(session.simulation.model, data, scene.camera, 0.0).pose()
+        self._skins = {
+            entry.geom: SkinActor(self.plotter, session.skins[entry.geom], entry.color or find_look(entry.look).color)
+            for entry in scene.surfaces
+        }
+        self._bodies = BodyActors(self.plotter, session, _REACH * pose.distance)
+        self._add_bar()
+        self._sliders = [self._add_slider(i, name) for i, name in enumerate(("poke", *SLIDERS))]
+        self._text = self.plotter.add_text("", position="upper_left", font_size=9, color="black", shadow=False)
+        self._help = self.plotter.add_text(
+            help_text(), position="upper_right", font_size=8, color="black", shadow=False
+        )
+        camera = self.plotter.camera
+        camera.position, camera.focal_point, camera.up = pose.position, pose.focus, (0.0, 0.0, 1.0)
+        camera.view_angle = pose.fovy
+        self.render: Callable[[], object] = self.plotter.render_window.Render
+        self._observe()
+        self._update()
+
+    def open(self) -> None:
+        """Show the window."""
+        self.plotter.show(interactive_update=True, auto_close=False, interactive=False)
+        if not any(word in self.gl_renderer for word in _SOFTWARE):
+            self.plotter.render_window.SetMultiSamples(_MULTISAMPLES)
+        # the loop draws, once a frame; sliders and the camera would draw at every movement of the pointer
+        self.plotter.iren.interactor.EnableRenderOff()
+        self._drawn = False
+
+    def close(self) -> None:
+        """Close the window and finish a video."""
+        self.closed = True
+        try:
+            self._takes.stop()
+        finally:
+            self.plotter.close()
+
+    def tick(self) -> bool:
+        """Go on by one frame and draw it; return whether there was anything new to draw."""
+        try:
+            moved = self.session.advance()
+        except RippleError as error:
+            self._say(f"{error}; r: reset")
+            moved = True
+        if moved:
+            self._update()
+        if not moved and self._drawn:
+            return False
+        self._draw()
+        return True
+
+    @property
+    def gl_renderer(self) -> str:
+        """OpenGL driver of an open window, as it names itself."""
+        lines = self.plotter.render_window.ReportCapabilities().splitlines()
+        return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("OpenGL renderer")), "none")
+
+    def picture(self) -> NDArray[np.uint8]:
+        """What was drawn last, uint8 [height, width, 3]."""
+        window, pixels = self.plotter.render_window, vtkUnsignedCharArray()
+        width, height = window.GetSize()
+        window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
+        return vtk_to_numpy(pixels).reshape(height, width, 3)[::-1]
+
+    def pause(self) -> None:
+        """Pause, or go on."""
+        self.session.paused = not self.session.paused
+        self._say("")
+
+    def step(self) -> None:
+        """Go on by one frame and pause."""
+        self.session.paused = True
+        try:
+            self.session.step()
+        except RippleError as error:
+            self._say(f"{error}; r: reset")
+        self._update()
+
+    def reset(self) -> None:
+        """Start again."""
+        self.session.reset()
+        self._say("")
+        self._update()
+
+    def poke_at(self, x: int, y: int) -> bool:
+        """Press on what is under a pixel, counted from the lower left; return whether that is a rippling surface."""
+        return self.session.poke(*self._ray(x, y)) is not None
+
+    def throw(self) -> None:
+        """Throw a ball from the camera at what is under the pointer."""
+        x, y = self.plotter.iren.get_event_position()
+        if (x, y) == (0, 0):  # it has never been over the window
+            width, height = self.plotter.render_window.GetSize()
+            x, y = width // 2, height // 2
+        if not self.session.throw(*self._ray(x, y)):
+            self._say("this scene has no ball to throw")
+
+    def operator(self) -> None:
+        """Take the next wave operator."""
+        following = OPERATORS[(OPERATORS.index(self.session.operator) + 1) % len(OPERATORS)]
+        self.session.set_operator(following)
+        self._say("")
+
+    def colors(self) -> None:
+        """Show the height as colours, or the surface in its own."""
+        self._colored = not self._colored
+        self._bar.SetVisibility(self._colored)
+        self._update()
+
+    def screenshot(self) -> None:
+        """Write a picture."""
+        self._draw()
+        try:
+            self._say(f"wrote {self._takes.save(self.picture())}")
+        except RippleError as error:
+            self._say(str(error))
+
+    def record(self) -> None:
+        """Begin a video, or end it."""
+        try:
+            if self._takes.recording:
+                self._say(f"wrote {self._takes.stop()}")
+            else:
+                self._say(f"recording {self._takes.start(self.picture())}")
+        except RippleError as error:
+            self._say(str(error))
+
+    def help(self) -> None:
+        """Show or hide the list of keys."""
+        self._help.SetVisibility(not self._help.GetVisibility())
+        self._drawn = False
+
+    def quit(self) -> None:
+        """Leave."""
+        self.closed = True
+
+    def status(self) -> str:
+        """Time, operator, what is going on; and what happened last in a second line."""
+        session = self.session
+        state = "paused" if session.paused else f"{self._rate:.0f} updates/s" if self._rate > 0 else ""
+        recording = "   recording" if self._takes.recording else ""
+        return f"{session.time:.2f} s   operator {session.operator}   {state}{recording}\n{self.message}"
+
+    def hide_texts(self) -> None:
+        """Leave the status line and the list of keys out of the picture."""
+        for text in (self._text, self._help):
+            text.SetVisibility(False)
+
+    def set_slider(self, name: str, value: float) -> None:
+        """Set the impulse of a poke ("poke") or a coefficient of the material."""
+        if name == "poke":
+            self.session.poke_impulse = value
+            return
+        self.session.set_material(**{name: value})
+
+    def _update(self) -> None:
+        """Bring the actors up to date with the session."""
+        session = self.session
+        data, limit = session.simulation.data, _round_up(session.color_range)
+        for name, skin in self._skins.items():
+            geom = session.simulation.ripples.geom_ids[name]
+            skin.update(data.geom_xpos[geom], data.geom_xmat[geom])
+            skin.color_by_height(self._colored, limit)
+        self._bodies.update()
+        self._drawn = False
+
+    def _draw(self) -> None:
+        now = time.perf_counter()
+        self._updates += 1
+        if now - self._since > _STATUS_EVERY:
+            self._rate = self._updates / (now - self._since)
+            self._updates, self._since = 0, now
+            self._show_status()
+        self.plotter.renderer.ResetCameraClippingRange()
+        self.render()
+        self._drawn = True
+        self.seconds_drawing += time.perf_counter() - now
+        if self._takes.recording:
+            try:
+                if not self._takes.add(self.picture()):
+                    self._say("the window has changed its size: the recording has ended")
+            except RippleError as error:
+                self._say(str(error))
+
+    def _say(self, message: str) -> None:
+        self.message = message
+        self._show_status()
+
+    def _show_status(self) -> None:
+        if self._text.GetVisibility():
+            self._text.set_text("upper_left", self.status())
+        self._drawn = False
+
+    def _light(self) -> None:
+        # two lamps that turn with the camera: each one more costs software OpenGL a tenth of its speed
+        for position, intensity in (((-0.7, 1.0, 0.9), 0.85), ((1.0, 0.1, 0.5), 0.25)):
+            self.plotter.add_light(pv.Light(position=position, light_type="camera light", intensity=intensity))
+
+    def _add_bar(self) -> None:
+        first = next(iter(self._skins.values()))
+        self._bar = self.plotter.add_scalar_bar(
+            HEIGHT, mapper=first.actor.mapper, vertical=True, position_x=0.9, position_y=0.2, width=0.06, height=0.4,
+            n_labels=3, fmt="%.3g", title_font_size=13, label_font_size=12, color="black",
+        )  # fmt: skip
+
+    def _add_slider(self, i: int, name: str) -> Any:
+        if name == "poke":
+            value, title = self.session.poke_impulse, "poke [N s]"
+            high = 4 * value
+        else:
+            value, title = self.session.material(name), f"{name} [{_UNITS[name]}]"
+            high = 3 * value if value else 1.0
+        left = 0.03 + 0.24 * i
+        slider = self.plotter.add_slider_widget(
+            None, (0.0, high), value=value, title=title, pointa=(left, 0.07), pointb=(left + 0.2, 0.07),
+            color="black", title_height=0.02, fmt="%.4g", slider_width=0.02, tube_width=0.005,
+        )  # fmt: skip
+        look = slider.GetRepresentation()
+        look.SetLabelHeight(0.02)
+        look.SetSliderLength(0.012)
+        look.SetEndCapLength(0.0)
+        look.GetTubeProperty().SetColor(0.35, 0.37, 0.40)
+        look.GetSliderProperty().SetColor(0.10, 0.35, 0.75)
+        look.GetSelectedProperty().SetColor(0.95, 0.45, 0.10)
+        slider.AddObserver("EndInteractionEvent", lambda *_: self.set_slider(name, slider.GetRepresentation().value))
+        return slider
+
+    def _observe(self) -> None:
+        iren = self.plotter.iren
+        iren.clear_key_event_callbacks()
+        # keys are ours: the style's own ones end the program, draw wire frames and the like
+        self.plotter.iren.style.AddObserver("CharEvent", lambda *_: None)
+        iren.add_observer("KeyPressEvent", lambda *_: self.key(iren.interactor.GetKeySym()))
+        iren.add_observer("LeftButtonPressEvent", lambda *_: self._press())
+        iren.add_observer("LeftButtonReleaseEvent", lambda *_: self._release())
+        iren.add_observer("RenderEvent", lambda *_: self._stale())
+        iren.add_observer("ExitEvent", lambda *_: self.quit())
+
+    def key(self, key: str) -> None:
+        """Do what a key stands for; other keys do nothing."""
+        for control in CONTROLS:
+            if key == control.key:
+                getattr(self, control.action)()
+
+    def _press(self) -> None:
+        self._pressed = self.plotter.iren.get_event_position()
+
+    def _release(self) -> None:
+        pressed, self._pressed = self._pressed, None
+        x, y = self.plotter.iren.get_event_position()
+        if pressed is not None and max(abs(x - pressed[0]), abs(y - pressed[1])) <= _STILL:
+            self.poke_at(x, y)
+
+    def _stale(self) -> None:
+        self._drawn = False
+
+    def _ray(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Ray from the camera through a pixel: origin [m] and direction, in the world."""
+        renderer = self.plotter.renderer
+        renderer.SetDisplayPoint(x, y, 0.5)
+        renderer.DisplayToWorld()
+        point = np.array(renderer.GetWorldPoint())
+        eye = np.array(self.plotter.camera.position)
+        along = point[:3] / point[3] - eye
+        return eye, along / np.linalg.norm(along)
+
+
+def _round_up(value: float) -> float:
+    """Round up to 1, 2 or 5 times a power of ten, so that a scale does not change at every frame."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if value <= step * power * (1 + 1e-12))
