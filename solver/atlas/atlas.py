@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import AtlasError
 from ..mesh.mesh import Mesh
 from .cubemap import face_coordinates, padded_indices
+from .nearest import sphere_directions, texels_at
 from .quality import atlas_quality
 from .stencil import lumped_areas
 from .texcoords import TextureCoordinates, texture_coordinates
@@ -80,12 +81,7 @@ class Atlas:
         """
         points = check_points(points)
         _, triangle, closest = self._tree.squared_distance(self.mesh.V, self.mesh.F, points)
-        corners = self.mesh.V[self.mesh.F[triangle]]
-        weights = igl.barycentric_coordinates(closest, corners[:, 0].copy(), corners[:, 1].copy(), corners[:, 2].copy())
-        # a triangle without area has no barycentrics: its corners are as good as any point of it
-        weights = np.where(np.isfinite(weights).all(axis=1, keepdims=True), np.clip(weights, 0, 1), 1 / 3)
-        directions = np.einsum("ij,ijk->ik", weights, self.sphere[self.mesh.F[triangle]])
-        return closest, directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        return closest, sphere_directions(self.mesh.V, self.mesh.F, self.sphere, triangle, closest)
 
     def locate(self, points: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Face, row and column of the surface points nearest to the given points [m].
@@ -95,12 +91,14 @@ class Atlas:
         _, directions = self.project(points)
         return face_coordinates(directions, self.resolution)
 
+    def nearest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Closest surface points [m], [k, 3], and the flat index of the texel nearest to each in the atlas, [k]."""
+        closest, directions = self.project(points)
+        return closest, texels_at(directions, self.resolution)
+
     def nearest_texel(self, points: ArrayLike) -> NDArray[np.int64]:
         """Flat index (face N + row) N + column of the texel nearest in the atlas to each point, shape [k]."""
-        face, row, column = self.locate(points)
-        n = self.resolution
-        i, j = (np.clip(np.rint(x).astype(np.int64), 0, n - 1) for x in (row, column))
-        return (face * n + i) * n + j
+        return self.nearest(points)[1]
 
     def texture_coordinates(self) -> TextureCoordinates:
         """Face and place in the atlas at every corner of every triangle, those cut that cross an edge of the cube.

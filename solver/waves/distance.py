@@ -26,18 +26,10 @@ def distance_from_point(
     point : [3]
         [m].
     """
-    n = atlas.resolution
-    index, positions = padded_indices(n), atlas.positions.reshape(-1, 3)
-    face, row, column = np.unravel_index(center, (6, n, n))
-    around = index[face, row : row + 3, column : column + 3].reshape(-1)
-    around = around[around >= 0]
-    distance = _everywhere_infinite(len(positions), threading.get_ident())
-    distance[around] = np.linalg.norm(positions[around] - point, axis=1)
-    texels, touched = _march(index, positions, around, limit, distance)
-    texels.sort()
-    result = texels, distance[texels]
-    distance[touched] = np.inf
-    return result
+    index, positions = padded_indices(atlas.resolution), atlas.positions.reshape(-1, 3)
+    texels, distance = march_from_point(index, positions, center, point, limit, everywhere_infinite(len(positions)))
+    order = np.argsort(texels)
+    return texels[order], distance[order]
 
 
 def depth_in_region(atlas: Atlas, region: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -50,13 +42,17 @@ def depth_in_region(atlas: Atlas, region: NDArray[np.bool_]) -> NDArray[np.float
     distance = np.full(len(positions), np.inf)
     distance[outside] = 0.0
     if len(outside):
-        _march(padded_indices(atlas.resolution), positions, outside, np.inf, distance)
+        march(padded_indices(atlas.resolution), positions, outside, np.inf, distance)
     return distance.reshape(region.shape)
+
+
+def everywhere_infinite(size: int) -> NDArray[np.float64]:
+    """Scratch that its users clean up: a footprint must not cost more on a larger grid. One for each thread."""
+    return _everywhere_infinite(size, threading.get_ident())
 
 
 @functools.lru_cache(maxsize=8)
 def _everywhere_infinite(size: int, thread: int) -> NDArray[np.float64]:
-    """Scratch that its users clean up: a footprint must not cost more on a larger grid. One for each thread."""
     return np.full(size, np.inf)
 
 
@@ -87,7 +83,7 @@ def _through(p, q, s, dp, dq):
 
 
 @numba.njit(cache=True)
-def _march(index, positions, seeds, limit, distance):
+def march(index, positions, seeds, limit, distance):
     """Fast marching with point-source updates over the triangles of both triangulations of every quad.
 
     `distance` holds the seeds' distances, and infinity elsewhere. Returns the texels within the limit in the order of
@@ -98,7 +94,7 @@ def _march(index, positions, seeds, limit, distance):
     ring_row = (0, 1, 1, 1, 0, -1, -1, -1)
     ring_column = (1, 1, 0, -1, -1, -1, 0, 1)
     around = np.empty(8, np.int64)
-    done = set()
+    done = np.zeros(len(distance), np.bool_)
     front = [(distance[seeds[0]], seeds[0])]
     for t in seeds[1:]:
         heapq.heappush(front, (distance[t], t))
@@ -109,16 +105,16 @@ def _march(index, positions, seeds, limit, distance):
         d, t = heapq.heappop(front)
         if d > limit:
             break
-        if t in done:
+        if done[t]:
             continue
-        done.add(t)
+        done[t] = True
         order.append(t)
         face, row, column = t // (n * n), t // n % n, t % n
         for k in range(8):
             around[k] = index[face, row + 1 + ring_row[k], column + 1 + ring_column[k]]
         for k in range(8):
             a = around[k]
-            if a < 0 or a in done:
+            if a < 0 or done[a]:
                 continue
             dx, dy, dz = (
                 positions[a, 0] - positions[t, 0],
@@ -139,3 +135,26 @@ def _march(index, positions, seeds, limit, distance):
                 distance[a] = best
                 heapq.heappush(front, (best, a))
     return np.array(order), np.array(touched)
+
+
+@numba.njit(cache=True)
+def march_from_point(index, positions, center, point, limit, scratch):
+    """Texels within a distance along the surface of a point, nearest first, and their distances.
+
+    The nine texels round the point's nearest one are taken straight.
+    """
+    n = index.shape[1] - 2
+    face, row, column = center // (n * n), center // n % n, center % n
+    seeds = np.empty(9, np.int64)
+    count = 0
+    for i in range(3):
+        for j in range(3):
+            t = index[face, row + i, column + j]
+            if t >= 0:
+                seeds[count] = t
+                scratch[t] = np.sqrt(((positions[t] - point) ** 2).sum())
+                count += 1
+    texels, touched = march(index, positions, seeds[:count], limit, scratch)
+    distance = scratch[texels]
+    scratch[touched] = np.inf
+    return texels, distance

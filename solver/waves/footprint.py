@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 
+import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..atlas.atlas import Atlas, check_points
-from ..atlas.cubemap import face_coordinates
+from ..atlas.cubemap import padded_indices
 from ..errors import SolverError
-from .distance import distance_from_point
+from .distance import everywhere_infinite, march_from_point
 
 # Fewer texels across than this and the source would excite waves that the grid cannot carry.
 MIN_TEXELS = 2.0
@@ -27,7 +28,7 @@ class Footprint:
     Attributes
     ----------
     texels : int64 [k]
-        Flat texel indices (face N + row) N + column.
+        Flat texel indices (face N + row) N + column, each once.
     weights : float64 [k]
         Density [1/m^2] with sum(area weight) = 1.
     center : int
@@ -62,27 +63,115 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
     Raises
     ------
     SolverError
-        If the radius is negative or not finite.
+        If the radius is negative or not finite, or there are several points.
     AtlasError
         If the point is not finite.
     """
     if not (np.isfinite(radius) and radius >= 0):
         raise SolverError(f"impulse radius is {radius!r} m; valid is a finite number, 0 or greater")
-    n = atlas.resolution
-    closest, direction = atlas.project(check_points(point)[:1])
-    face, row, column = (int(np.rint(x[0])) for x in face_coordinates(direction, n))
-    row, column = min(max(row, 0), n - 1), min(max(column, 0), n - 1)
-    center = (face * n + row) * n + column
-    block = atlas.padded_positions[face, row : row + 3, column : column + 3]
-    spacing = np.nanmax(np.linalg.norm(block[[0, 1, 1, 2], [1, 0, 2, 1]] - block[1, 1], axis=1))
-    radius = max(float(radius), MIN_TEXELS * float(spacing))
-    texels, along = distance_from_point(atlas, center, closest[0], 1.1 * radius)
-    straight = np.linalg.norm(atlas.positions.reshape(-1, 3)[texels] - closest[0], axis=1)
-    bend = np.clip((along / np.maximum(straight, 1e-300) - _FLAT) / (_BENT - _FLAT), 0, 1)
-    bend = np.where(straight > 0, bend * bend * (3 - 2 * bend), 0)
-    distance = (1 - bend) * straight + bend * along
-    weights = np.maximum(1 - (distance / radius) ** 2, 0) ** 3
-    inside = weights > 0
-    texels, weights = texels[inside], weights[inside]
-    weights /= (weights * atlas.areas.reshape(-1)[texels]).sum()
-    return Footprint(texels, weights, center, closest[0], radius)
+    points = check_points(point)
+    if len(points) != 1:
+        raise SolverError(f"a source has {len(points)} points; valid is one, [3]: call this once for each of them")
+    (closest,), (center,) = atlas.nearest(points)
+    return footprint_at(atlas, closest, int(center), float(radius))
+
+
+def footprint_at(atlas: Atlas, point: NDArray[np.float64], center: int, radius: float) -> Footprint:
+    """The footprint round a point of the surface whose nearest texel is known, see `Atlas.nearest`."""
+    texels, weights, radius = _weigh(
+        padded_indices(atlas.resolution),
+        atlas.positions.reshape(-1, 3),
+        atlas.normals.reshape(-1, 3),
+        atlas.areas.reshape(-1),
+        center,
+        point,
+        radius,
+        everywhere_infinite(atlas.areas.size),
+    )
+    return Footprint(texels, weights, center, point, radius)
+
+
+@numba.njit(cache=True)
+def _weigh(index, positions, normals, areas, center, point, radius, scratch):
+    """Texels, weights and radius of a footprint."""
+    radius = max(radius, MIN_TEXELS * _spacing(index, positions, center))
+    texels, distance, flat = _patch(index, positions, normals, center, point, radius, scratch)
+    if not flat:
+        texels, distance = _blended(index, positions, center, point, radius, scratch)
+    weights = np.empty(len(texels))
+    kept, total = 0, 0.0
+    for i in range(len(texels)):
+        weight = max(1 - (distance[i] / radius) ** 2, 0.0) ** 3
+        if weight > 0:
+            texels[kept], weights[kept] = texels[i], weight
+            total += weight * areas[texels[i]]
+            kept += 1
+    return texels[:kept].copy(), weights[:kept] / total, radius
+
+
+@numba.njit(cache=True)
+def _spacing(index, positions, center):
+    """Greatest distance from a texel to the four beside it."""
+    n = index.shape[1] - 2
+    face, row, column = center // (n * n), center // n % n, center % n
+    greatest = 0.0
+    for down, right in ((0, 1), (1, 0), (1, 2), (2, 1)):
+        t = index[face, row + down, column + right]
+        if t >= 0:
+            greatest = max(greatest, np.sqrt(((positions[t] - positions[center]) ** 2).sum()))
+    return greatest
+
+
+@numba.njit(cache=True)
+def _patch(index, positions, normals, center, point, radius, scratch):
+    """Texels that hang together within a straight distance of a point, their distances, and whether they lie flat.
+
+    Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph over the plane there
+    whose slope makes no way along it longer than 1.05 times the straight one.
+    """
+    n = index.shape[1] - 2
+    room = 256
+    texels = np.empty(room, np.int64)
+    count, done, flat = 1, 0, True
+    texels[0] = center
+    scratch[center] = np.sqrt(((positions[center] - point) ** 2).sum())
+    while done < count and flat:
+        t = texels[done]
+        done += 1
+        if scratch[t] > radius:
+            continue
+        along = 0.0
+        for k in range(3):
+            along += normals[t, k] * normals[center, k]
+        flat = along * _FLAT >= 1
+        if count + 8 > room:
+            room *= 2
+            longer = np.empty(room, np.int64)
+            longer[:count] = texels[:count]
+            texels = longer
+        face, row, column = t // (n * n), t // n % n, t % n
+        for i in range(3):
+            for j in range(3):
+                a = index[face, row + i, column + j]
+                if a >= 0 and scratch[a] == np.inf:
+                    x, y, z = positions[a, 0] - point[0], positions[a, 1] - point[1], positions[a, 2] - point[2]
+                    scratch[a] = np.sqrt(x * x + y * y + z * z)
+                    texels[count] = a
+                    count += 1
+    texels = texels[:count]
+    distance = scratch[texels]
+    scratch[texels] = np.inf
+    return texels, distance, flat
+
+
+@numba.njit(cache=True)
+def _blended(index, positions, center, point, radius, scratch):
+    """Texels within a little more than the radius along the surface, and the distances that count."""
+    texels, distance = march_from_point(index, positions, center, point, 1.1 * radius, scratch)
+    for i in range(len(texels)):
+        straight = np.sqrt(((positions[texels[i]] - point) ** 2).sum())
+        if straight > 0:
+            bend = min(max((distance[i] / straight - _FLAT) / (_BENT - _FLAT), 0.0), 1.0)
+            bend = bend * bend * (3 - 2 * bend)
+            distance[i] = (1 - bend) * straight + bend * distance[i]
+    return texels, distance

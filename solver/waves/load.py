@@ -1,39 +1,97 @@
-"""Forces that are held: where something keeps pressing on the surface."""
+"""Loads: forces on some texels, held over a step."""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
+import threading
+from collections.abc import Sequence
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SolverError
 
-@dataclasses.dataclass(eq=False)
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Load:
     """Constant forces on some texels.
 
     Attributes
     ----------
     texels : int64 [k]
-        Flat texel indices, ascending, each once.
+        Flat texel indices (face N + row) N + column; a texel may stand there more than once.
     forces : float64 [k]
-        [N], positive outwards.
-    uploaded : bool
-        Whether the backend holds this very load.
+        [N], positive inwards.
     """
 
     texels: NDArray[np.int64]
     forces: NDArray[np.float64]
-    uploaded: bool = False
 
     @classmethod
     def none(cls) -> Load:
         """No force anywhere."""
         return cls(np.zeros(0, np.int64), np.zeros(0))
 
-    def plus(self, texels: NDArray[np.int64], forces: NDArray[np.float64]) -> Load:
-        """Add forces to it."""
-        merged, where = np.unique(np.concatenate([self.texels, texels]), return_inverse=True)
-        total = np.zeros(len(merged))
-        np.add.at(total, where, np.concatenate([self.forces, forces]))
-        return Load(merged, total)
+    @classmethod
+    def together(cls, loads: Sequence[Load]) -> Load:
+        """Several loads at once."""
+        loads = [load for load in loads if len(load.texels)]
+        if not loads:
+            return cls.none()
+        if len(loads) == 1:
+            return loads[0]
+        return cls(np.concatenate([each.texels for each in loads]), np.concatenate([each.forces for each in loads]))
+
+    def merged(self, size: int) -> Load:
+        """The same with every texel once, on an atlas of so many texels."""
+        texels, (forces,) = add_up(self.texels, self.forces[None], size)
+        return Load(texels, forces)
+
+
+def add_up(
+    texels: NDArray[np.int64], values: NDArray[np.float64], size: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Add the values [m, k] that stand at the same texel: each texel once, in order of first appearance, and sums.
+
+    Parameters
+    ----------
+    texels : int64 [k]
+    values : float64 [m, k]
+    size : int
+        Texels of the whole atlas, 6 N N.
+
+    Raises
+    ------
+    SolverError
+        If a texel is not one of the atlas.
+    """
+    place = _nowhere(size, threading.get_ident())
+    if len(texels) and not 0 <= texels.min() <= texels.max() < size:
+        raise SolverError(f"texels go from {texels.min()} to {texels.max()}; valid are indices from 0 to {size - 1}")
+    return _add_up(texels, values, place)
+
+
+@functools.lru_cache(maxsize=8)
+def _nowhere(size: int, thread: int) -> NDArray[np.int64]:
+    """Scratch that its users clean up: a sum must not cost more on a larger grid. One for each thread."""
+    return np.full(size, -1)
+
+
+@numba.njit(cache=True)
+def _add_up(texels, values, place):
+    once = np.empty_like(texels)
+    sums = np.zeros_like(values)
+    count = 0
+    for i in range(len(texels)):
+        t = texels[i]
+        if place[t] < 0:
+            place[t] = count
+            once[count] = t
+            count += 1
+        for row in range(len(values)):
+            sums[row, place[t]] += values[row, i]
+    for i in range(count):
+        place[once[i]] = -1
+    return once[:count].copy(), sums[:, :count].copy()

@@ -62,7 +62,8 @@ class WaveSolver:
         self._backend = make_backend(backend, self.operator)
         self._carrying_mass = float(self.operator.mass[self.operator.carries].sum())
         self._substep = 0.0
-        self._load = Load.none()
+        self._held = Load.none()
+        self._uploaded = self._held
         self._reported = False
 
     @property
@@ -107,13 +108,12 @@ class WaveSolver:
 
         A copy; it holds the forces of `add_force` as well.
         """
-        force = np.zeros(self.operator.mass.size)
-        force[self._load.texels] = self._load.forces
-        return -force.reshape(self.operator.mass.shape) / self.atlas.areas
+        force = np.bincount(self._held.texels, self._held.forces, self.operator.mass.size)
+        return force.reshape(self.operator.mass.shape) / self.atlas.areas
 
     @pressure.setter
     def pressure(self, value: ArrayLike) -> None:
-        self._load = Load.none()
+        self._held = Load.none()
         self.add_pressure(value)
 
     @property
@@ -174,15 +174,15 @@ class WaveSolver:
         if not np.isfinite(force):
             raise SolverError(f"force is {force!r} N; valid is a finite number")
         where = footprint(self.atlas, point, radius)
-        self._load = self._load.plus(where.texels, -force * self._shares(where))
+        self._hold(Load(where.texels, force * self._shares(where)))
         return where
 
     def add_pressure(self, pressure: ArrayLike) -> None:
         """Add a pressure field [Pa], a number or [6, N, N], positive inwards, that is held from now on."""
         field = self._field(np.broadcast_to(pressure, self.operator.mass.shape), "pressure")
-        force = (-field * self.atlas.areas * self.operator.carries).reshape(-1)
+        force = (field * self.atlas.areas * self.operator.carries).reshape(-1)
         texels = np.flatnonzero(force)
-        self._load = self._load.plus(texels, force[texels])
+        self._hold(Load(texels, force[texels]))
 
     def add_height(self, height: ArrayLike) -> None:
         """Raise the surface by a field [m], [6, N, N]; where volume is conserved its mean over the area is removed."""
@@ -195,14 +195,23 @@ class WaveSolver:
         field = self._source(velocity, "velocity", self.operator.mass)
         self._backend.set_velocity(self._backend.velocity() + field)
 
-    def step(self, dt: float, substeps: int | None = None) -> None:
+    def step(self, dt: float, substeps: int | None = None, load: Load | None = None) -> None:
         """Advance by dt [s] in equal substeps, as many as stability asks for.
+
+        Parameters
+        ----------
+        dt : float
+            [s].
+        substeps : int, optional
+            How many, instead of the fewest.
+        load : Load, optional
+            Forces that act over this step alone, beside those that are held.
 
         Raises
         ------
         SolverError
-            If dt is negative or not finite, a given number of substeps is too small to be stable, or the height is no
-            longer finite (on the GPU this is seen when the height is read).
+            If dt is negative or not finite, a given number of substeps is too small to be stable, a load is not finite
+            or names no texel, or the height is no longer finite (on the GPU this is seen when the height is read).
         """
         if not (np.isfinite(dt) and dt >= 0):
             raise SolverError(f"time step is {dt!r} s; valid is a finite number, 0 or greater")
@@ -223,9 +232,7 @@ class WaveSolver:
                 f"{self.stable_timestep:.4g} s; use {needed} or more substeps, or leave the number out"
             )
         self._substep = dt / substeps
-        if not self._load.uploaded:
-            self._backend.load(self._load.texels, self._load.forces, self._counterpart(self._load.forces.sum()))
-            self._load.uploaded = True
+        self._upload(self._held if load is None else Load.together([self._held, load]))
         self._backend.advance(substeps, self._substep)
         self.time += dt
         self.substeps_taken += substeps
@@ -261,6 +268,20 @@ class WaveSolver:
 
     def _elastic_energy(self, field: NDArray[np.float64]) -> float:
         return -float((field * self.operator.elastic_force(field)).sum()) / 2
+
+    def _hold(self, load: Load) -> None:
+        self._held = Load.together([self._held, load]).merged(self.operator.mass.size)
+
+    def _upload(self, load: Load) -> None:
+        """Hand the backend what presses in the coming step, unless it has that already."""
+        if load is self._uploaded or not (len(load.texels) or len(self._uploaded.texels)):
+            return
+        once = load.merged(self.operator.mass.size)
+        total = float(once.forces.sum())
+        if not np.isfinite(total):
+            raise SolverError(f"the forces of a load add up to {total!r} N; valid are finite numbers")
+        self._backend.load(once.texels, -once.forces, self._counterpart(-total))
+        self._uploaded = load
 
     def _shares(self, where: Footprint) -> NDArray[np.float64]:
         """Share of a unit source that each texel of a footprint takes up, [k]."""
