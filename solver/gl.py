@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import importlib.resources
 import threading
 from collections.abc import Callable
@@ -41,6 +43,7 @@ class GLContext:
         self.vendor: str = info["GL_VENDOR"]
         self.version: str = info["GL_VERSION"]
         self._depth = 0
+        self._finish = _find_finish()
 
     @property
     def software(self) -> bool:
@@ -61,6 +64,17 @@ class GLContext:
             self._ctx.__exit__(*exc)
         if error != "GL_NO_ERROR" and exc[0] is None:
             raise GLError(f"OpenGL reported {error} on {self.renderer}; see `ripple-sim info`")
+
+    def wait(self) -> None:
+        """Return when the driver has done all that it was told, and let other Python threads run meanwhile.
+
+        moderngl holds the interpreter's lock while it waits, in `finish` as well as in reading back.
+        """
+        with self as ctx:
+            if self._finish is None:
+                ctx.finish()
+            else:
+                self._finish()
 
     def compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
         """Compile `shaders/{name}.glsl` of `package` as a compute shader with `#define`s put in."""
@@ -127,13 +141,32 @@ def _create_context(device: int | None) -> moderngl.Context:
     )
 
 
+def _find_finish() -> Callable[[], None] | None:
+    """OpenGL's glFinish as a function that does not hold the interpreter's lock; None if the library is not found."""
+    for library in ("libGL.so.1", "libOpenGL.so.0"):
+        with contextlib.suppress(OSError, AttributeError):
+            finish = ctypes.CDLL(library).glFinish
+            finish.restype = None
+            return finish
+    return None
+
+
 _shared: dict[int | None, GLContext] = {}
+_selected: int | None = None
 _lock = threading.Lock()
 
 
-def shared_context(device: int | None = None) -> GLContext:
-    """Return the process-wide context of a device, created at the first call."""
+def select_device(device: int | None) -> None:
+    """Let `shared_context` mean this EGL device from now on; None: the first that yields a context."""
+    global _selected
     with _lock:
+        _selected = device
+
+
+def shared_context(device: int | None = None) -> GLContext:
+    """Return the process-wide context of a device (by default the selected one), created at the first call."""
+    with _lock:
+        device = _selected if device is None else device
         if device not in _shared:
             _shared[device] = GLContext(device)
         return _shared[device]
