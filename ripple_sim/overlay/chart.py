@@ -1,0 +1,111 @@
+"""The chart of energy over time, which grows while the video runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .layout import Layout
+from .panels import panel
+from .patch import FAINT, INK, Patch, text_width
+from .scale import number, readable, round_up
+
+Curve = tuple[NDArray[np.float64], NDArray[np.float64]]  # times [s], values
+
+_COLORS = ((38, 92, 160), (196, 88, 52))
+_GRID = (150, 158, 170)
+
+
+class Chart:
+    """Draws curves over the time of the whole video.
+
+    Parameters
+    ----------
+    layout : Layout
+    title, unit : str
+    duration : float
+        [s].
+    names : sequence of str
+        Of the curves where there are several.
+    """
+
+    def __init__(self, layout: Layout, title: str, unit: str, duration: float, names: Sequence[str] = ()) -> None:
+        self._em, self._title, self._unit = layout.em, title, unit
+        self._duration, self._names = duration, names
+        em = layout.em
+        self._width, self._height = layout.panel_width(23), round(min(8.6 * em, 0.38 * layout.height))
+        self._left, self._right = round(3.6 * em), self._width - round(1.1 * em)
+        self._top, self._bottom = round(2.4 * em), self._height - round(1.95 * em)
+        self._axes: tuple[tuple[float, float], Patch] | None = None
+
+    def draw(self, curves: Sequence[Curve], limit: float, goal: float) -> Patch:
+        """Draw curves up to the present; values from 0 to `limit`, with numbers at half and whole of `goal`."""
+        if self._axes is None or self._axes[0] != (limit, goal):
+            self._axes = (limit, goal), self._draw_axes(limit, goal)
+        patch = self._axes[1].copy()
+        for color, (times, values) in zip(_COLORS, curves, strict=False):
+            self._draw_curve(patch, times, values, limit, color)
+        return patch
+
+    def _draw_axes(self, limit: float, goal: float) -> Patch:
+        em, small = self._em, round(0.85 * self._em)
+        factor, prefixed = readable(goal, self._unit) if goal else (1.0, self._unit)
+        patch = panel(self._width, self._height, em)
+        patch.text(round(0.7 * em), 1.4 * em, self._title, em)
+        patch.text(round(0.7 * em) + text_width(self._title, em) + 0.5 * em, 1.4 * em, prefixed, small, FAINT)
+        self._draw_names(patch, small)
+        hair = max(1, round(em / 16))
+        for value in (0.0, goal / 2, goal) if goal else (0.0,):
+            if value <= 1.001 * limit or not value:
+                y = round(self._row(value, limit))
+                patch.box(self._left, y - hair, self._right, y, INK if not value else _GRID, 0.9 if not value else 0.5)
+                patch.text(self._left - 0.4 * em, y + 0.3 * em, number(value * factor), small, INK, "right")
+        step = round_up(self._duration / 4)
+        last = int(self._duration / step + 1e-9)
+        for k in range(last + 1):
+            x = round(self._column(k * step))
+            patch.box(x, self._bottom, x + hair, self._bottom + 0.25 * em, INK)
+            unit = " s" if k == last else ""
+            patch.text(x, self._bottom + 1.25 * em, number(k * step) + unit, small, INK, "middle")
+        return patch
+
+    def _draw_names(self, patch: Patch, size: int) -> None:
+        x = float(self._width - round(0.7 * self._em))
+        for color, name in reversed(list(zip(_COLORS, self._names, strict=False))):
+            patch.text(x, 1.4 * self._em, name, size, color, "right")
+            x -= text_width(name, size) + 0.9 * self._em
+
+    def _draw_curve(
+        self, patch: Patch, times: NDArray, values: NDArray, limit: float, color: tuple[int, int, int]
+    ) -> None:
+        if len(times) == 0 or limit <= 0:
+            return
+        end = self._column(times[-1])
+        edges = np.arange(self._left, int(np.ceil(end)) + 1)
+        rows = np.interp(edges, self._column(times), self._row(values, limit))
+        thick = self._em / 9
+        slope = np.hypot(1.0, np.diff(rows))
+        low, high = np.minimum(rows[1:], rows[:-1]), np.maximum(rows[1:], rows[:-1])
+        line = _columns_between(low - thick / 2 * slope**0.5, high + thick / 2 * slope**0.5, self._height)
+        under = _columns_between((low + high) / 2, np.full(len(low), float(self._bottom)), self._height)
+        coverage = np.zeros((2, self._height, self._width), np.float32)
+        coverage[:, :, edges[:-1]] = under, line
+        if len(self._names) < 2:
+            patch.fill(coverage[0], color, 0.14)
+        patch.fill(coverage[1], color)
+        patch.disc(end, self._row(values[-1], limit), 0.26 * self._em, color)
+
+    def _column(self, time: NDArray | float) -> NDArray:
+        return self._left + (self._right - self._left) * np.asarray(time) / self._duration
+
+    def _row(self, value: NDArray | float, limit: float) -> NDArray:
+        share = np.clip(np.asarray(value) / limit, 0, 1) if limit else 0.0
+        return self._bottom - (self._bottom - self._top) * share
+
+
+def _columns_between(low: NDArray[np.float64], high: NDArray[np.float64], height: int) -> NDArray[np.float32]:
+    """Share of each pixel [height, k] that lies between two rows, column by column."""
+    edge = np.arange(height + 1)[:, None]
+    return np.diff(np.clip(edge, low, high), axis=0).astype(np.float32)

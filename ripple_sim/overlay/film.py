@@ -1,0 +1,155 @@
+"""One simulation, or two side by side, with overlays: the states of a video and their pictures."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.gl import GLContext
+
+from ..frames import FrameSource, Snapshot, run
+from ..render import Surface
+from ..simulation import Simulation
+from .colormap import color_table
+from .field import grid_spacing
+from .layout import Layout
+from .marks import draw_marks
+from .notes import Notebook, Notes
+from .painter import Painter
+from .patch import PAPER
+from .projection import Projection
+from .request import Request
+
+# What the runs of a comparison are called, and a word about each.
+TITLES = {
+    "fem": ("ripple-sim", "finite elements"),
+    "paper": ("paper", "real distances, 4 neighbours"),
+    "uncorrected": ("uncorrected", "one distance everywhere"),
+    "dynamic-paint": ("Dynamic Paint", "real distances, 8 neighbours"),
+}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Shot:
+    """One frame of a film: a snapshot of each run, and what the overlays show."""
+
+    snapshots: tuple[Snapshot, ...]
+    notes: Notes
+
+    @property
+    def number(self) -> int:
+        """Of the frame, from 0."""
+        return self.snapshots[0].number
+
+    def digest(self) -> str:
+        """Fingerprint of all runs, see `Snapshot.digest`."""
+        return "".join(snapshot.digest() for snapshot in self.snapshots)
+
+
+class Film:
+    """Simulations of one scene that run in step, and their frames.
+
+    Parameters
+    ----------
+    simulations : sequence of Simulation
+        One, or two that are shown side by side.
+    request : Request
+        The overlays.
+    width, height : int
+        Of the frames [pixels]; two runs share the width.
+    frames : int
+        How many.
+    rate : float
+        Frames in a second of the scene's time.
+    operators : sequence of str
+        Those of the runs, where there are two: their titles follow from them.
+    supersample : int
+        As for `FrameSource`.
+    gl : GLContext, optional
+        By default the process's shared one.
+    """
+
+    def __init__(
+        self,
+        simulations: Sequence[Simulation],
+        request: Request,
+        *,
+        width: int,
+        height: int,
+        frames: int,
+        rate: float,
+        operators: Sequence[str] = (),
+        supersample: int = 1,
+        gl: GLContext | None = None,
+    ) -> None:
+        self._simulations, self._request, self._frames = simulations, request, frames
+        self._layout = Layout(width, height)
+        self._notebook = Notebook(request, simulations, frames, rate)
+        ends = [round(width * k / len(simulations)) for k in range(len(simulations) + 1)]
+        self._sources = [
+            FrameSource(
+                simulation,
+                width=right - left,
+                height=height,
+                supersample=supersample,
+                annotate=self._annotated,
+                gl=gl,
+            )
+            for simulation, left, right in zip(simulations, ends[:-1], ends[1:], strict=True)
+        ]
+        self._painter = Painter(
+            request,
+            self._layout,
+            duration=frames / rate,
+            spacing=_common_spacing(simulations[0]),
+            titles=[TITLES[operator] for operator in operators],
+        )
+
+    def states(self, alive: int = 1) -> Iterator[Shot]:
+        """Run the simulations; see `ripple_sim.frames.run`."""
+        runs = [run(simulation, self._frames, alive=alive) for simulation in self._simulations]
+        for snapshots in zip(*runs, strict=True):
+            yield Shot(snapshots, self._notebook.follow())
+
+    def draw(self, shot: Shot) -> NDArray[np.uint8]:
+        """Draw a frame, uint8 [height, width, 3]."""
+        pictures = [self._picture(run, shot) for run in range(len(self._sources))]
+        frame = pictures[0]
+        if len(pictures) > 1:
+            frame = np.concatenate(pictures, axis=1)
+            seam, half = pictures[0].shape[1], max(1, round(self._layout.em / 16))
+            frame[:, seam - half : seam + half] = PAPER
+        self._painter.paint(frame, shot.notes)
+        return frame
+
+    def _picture(self, run: int, shot: Shot) -> NDArray[np.uint8]:
+        """What the renderer draws of a run, and the contacts in it."""
+        source, snapshot, notes = self._sources[run], shot.snapshots[run], shot.notes
+        if self._request.field:
+            geoms = self._simulations[run].ripples.geom_ids
+            for name, field in notes.fields[run].items():
+                source.renderer.set_field(geoms[name], field, notes.field_scale.value)
+        picture = source.draw(snapshot)
+        if self._request.contacts and notes.marks[run]:
+            projection = Projection(source.camera(snapshot).pose(), picture.shape[1], picture.shape[0])
+            hiding = self._simulations[run].model, snapshot.data
+            draw_marks(picture, notes.marks[run], notes.mark_scale.value, self._layout, projection, *hiding)
+        return picture
+
+    def _annotated(self, surface: Surface) -> Surface:
+        """A target with what the request asks for."""
+        return dataclasses.replace(
+            surface,
+            field_colors=color_table() if self._request.field else None,
+            grid=grid_spacing(surface.resolution) if self._request.grid else 0,
+        )
+
+
+def _common_spacing(simulation: Simulation) -> int:
+    """Texels between grid lines, 0 where the targets differ in it."""
+    ripples = simulation.ripples
+    spacings = {grid_spacing(ripples[name].atlas.resolution) for name in ripples}
+    return spacings.pop() if len(spacings) == 1 else 0

@@ -1,0 +1,54 @@
+"""Where things stand on a frame of any size."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+
+@dataclasses.dataclass(frozen=True)
+class Layout:
+    """Sizes that follow from a frame's.
+
+    Parameters
+    ----------
+    width, height : int
+        Of the frame [pixels].
+    """
+
+    width: int
+    height: int
+
+    @property
+    def em(self) -> int:
+        """Size of the type [pixels]: 16 on 1280x720, and readable on small frames."""
+        return max(9, round(16 * math.sqrt(self.width * self.height / (1280 * 720))))
+
+    @property
+    def margin(self) -> int:
+        """Between the panels and the frame's border, and between panels [pixels]."""
+        return round(0.9 * self.em)
+
+    @property
+    def arrow_length(self) -> float:
+        """Length [pixels] of an arrow at the end of its scale."""
+        return 0.16 * self.height
+
+    @property
+    def arrow_thickness(self) -> float:
+        """Thickness [pixels] of an arrow's shaft."""
+        return max(0.0036 * self.height, 1.3)
+
+    def panel_width(self, ems: float) -> int:
+        """Width of a panel [pixels] of which two shall fit side by side."""
+        return min(round(ems * self.em), (self.width - 3 * self.margin) // 2)
+
+    def place(self, corner: str, width: int, height: int) -> tuple[int, int]:
+        """Left and top of a panel in a corner of the frame, such as "bottom left", or in the middle of an edge."""
+        left = (self.width - width) // 2
+        if "left" in corner:
+            left = self.margin
+        elif "right" in corner:
+            left = self.width - self.margin - width
+        top = self.margin if "top" in corner else self.height - self.margin - height
+        return left, top

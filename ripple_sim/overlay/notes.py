@@ -1,0 +1,110 @@
+"""What overlays need to know of running simulations, gathered frame by frame."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..simulation import Simulation
+from .contacts import ContactMarks, Mark
+from .field import magnitude, pad_field
+from .history import History
+from .request import Request
+from .scale import Limit
+
+# The colours tell apart all but this share of the texels; what is beyond, mostly dents of contacts, takes their ends.
+_BEYOND = 0.02
+# Until more is seen the colours reach to this share of the targets' size, or to the speed that goes with it.
+_LEAST = 1e-4
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Scale:
+    """Where a scale ends at present, and the round number where it will stand still."""
+
+    value: float
+    goal: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Notes:
+    """What is shown beside the picture of one frame; each sequence has one item for each run.
+
+    Attributes
+    ----------
+    time : float
+        [s].
+    fields : sequence of dict
+        By the geom's name what its colours show, float32 [6, N + 2, N + 2], padded as a relief.
+    field_scale, mark_scale, energy_scale : Scale
+    marks : sequence of list of Mark
+    energies : sequence of (times [s], energies [J])
+        From the beginning.
+    """
+
+    time: float
+    fields: Sequence[dict[str, NDArray[np.float32]]]
+    field_scale: Scale
+    marks: Sequence[list[Mark]]
+    mark_scale: Scale
+    energies: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
+    energy_scale: Scale
+
+
+class Notebook:
+    """Follows simulations that run in step, as the overlays that are asked for need it.
+
+    Parameters
+    ----------
+    request : Request
+    simulations : sequence of Simulation
+        All of one scene; they share their scales.
+    frames : int
+        How many there will be.
+    rate : float
+        Frames in a second of the scene's time.
+    """
+
+    def __init__(self, request: Request, simulations: Sequence[Simulation], frames: int, rate: float) -> None:
+        self._request, self._simulations, self._dt = request, simulations, 1 / rate
+        self._field_limit = Limit(self._least_limit(), request.limit)
+        self._mark_limit, self._energy_limit = Limit(), Limit()
+        self._marks = [ContactMarks(simulation, self._dt) for simulation in simulations]
+        self._energies = [History(frames) for _ in simulations]
+
+    def follow(self) -> Notes:
+        """Take in the frame that the simulations have just made. Call it for every frame, drawn or not."""
+        request = self._request
+        fields = [self._fields(simulation) for simulation in self._simulations] if request.field else []
+        marks = [gatherer.follow() for gatherer in self._marks] if request.contacts else []
+        if request.energy:
+            for history, simulation in zip(self._energies, self._simulations, strict=True):
+                history.add(sum(simulation.ripples[name].energy() for name in simulation.ripples))
+        magnitudes = [magnitude(field, _BEYOND) for run in fields for field in run.values()]
+        curves = [history.curve() for history in self._energies]
+        return Notes(
+            time=float(self._simulations[0].data.time),
+            fields=fields,
+            field_scale=self._scale(self._field_limit, magnitudes),
+            marks=marks,
+            mark_scale=self._scale(self._mark_limit, [mark.impulse for run in marks for mark in run]),
+            energies=[(frames * self._dt, values) for frames, values in curves],
+            energy_scale=self._scale(self._energy_limit, [values[-1] for _, values in curves if len(values)]),
+        )
+
+    def _scale(self, limit: Limit, magnitudes: Sequence[float]) -> Scale:
+        return Scale(limit.follow(max(magnitudes, default=0.0), self._dt), limit.goal)
+
+    def _fields(self, simulation: Simulation) -> dict[str, NDArray[np.float32]]:
+        ripples = simulation.ripples
+        return {name: pad_field(getattr(ripples[name], self._request.field or "")) for name in ripples}
+
+    def _least_limit(self) -> float:
+        ripples = self._simulations[0].ripples
+        sizes = [float(np.ptp(ripples[name].atlas.mesh.V, axis=0).max()) for name in ripples]
+        if self._request.field != "velocity":
+            return _LEAST * max(sizes)
+        return _LEAST * max(float(np.max(ripples[name].material.speed)) for name in ripples)

@@ -1,0 +1,89 @@
+"""Lays panels over finished frames: each has its corner, and those of a corner stand under one another."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .chart import Chart
+from .layout import Layout
+from .notes import Notes
+from .panels import arrow_key, color_bar, label
+from .patch import Patch
+from .request import FIELDS, Request
+
+
+class Painter:
+    """Draws the panels that a request asks for.
+
+    Parameters
+    ----------
+    request : Request
+    layout : Layout
+        Of the frames.
+    duration : float
+        Of the video [s].
+    spacing : int
+        Texels between the lines of the grid, where all targets have the same; 0 where they differ.
+    titles : sequence of (str, str)
+        Names of the runs and a word about each, where there are two side by side.
+    """
+
+    def __init__(
+        self,
+        request: Request,
+        layout: Layout,
+        *,
+        duration: float,
+        spacing: int = 0,
+        titles: Sequence[tuple[str, str]] = (),
+    ) -> None:
+        self._request, self._layout, self._titles = request, layout, titles
+        self._chart = Chart(self._layout, "wave energy", "J", duration, [title for title, _ in titles])
+        self._spacing = spacing
+        self._decimals = 2 if duration < 100 else 1
+        # what stands still is drawn once
+        self._label = functools.lru_cache(maxsize=8)(label)
+        self._bar = functools.lru_cache(maxsize=1)(color_bar)
+        self._key = functools.lru_cache(maxsize=1)(arrow_key)
+
+    def paint(self, frame: NDArray[np.uint8], notes: Notes) -> None:
+        """Draw the panels over a frame, uint8 [height, width, 3], in place."""
+        for corner, panels in self._panels(notes).items():
+            self._stack(frame, corner, panels)
+
+    def _panels(self, notes: Notes) -> dict[str, list[Patch]]:
+        """Panels by corner, those nearest to the frame's border first."""
+        request, layout, em = self._request, self._layout, self._layout.em
+        corners: dict[str, list[Patch]] = {
+            name: [] for name in ("top left", "top", "top right", "bottom left", "bottom right")
+        }
+        for corner, title in zip(("top left", "top right"), self._titles, strict=False):
+            corners[corner].append(self._label(title[0], em, title[1]))
+        if request.time:
+            clock = label(f"t = {notes.time:.{self._decimals}f} s", em)
+            corners["top" if self._titles else "top left"].append(clock)
+        if request.grid and self._spacing:
+            cells = f"{self._spacing} \N{MULTIPLICATION SIGN} {self._spacing} texels"
+            corners["top left"].append(self._label("grid", em, cells))
+        if request.contacts and notes.mark_scale.value > 0:
+            scale = notes.mark_scale
+            corners["top right"].append(self._key(layout, scale.value, scale.goal))
+        if request.field:
+            scale = notes.field_scale
+            bar = self._bar(layout, request.field, FIELDS[request.field], scale.value, scale.goal)
+            corners["bottom left"].append(bar)
+        if request.energy:
+            scale = notes.energy_scale
+            corners["bottom right"].append(self._chart.draw(notes.energies, scale.value, scale.goal))
+        return corners
+
+    def _stack(self, frame: NDArray[np.uint8], corner: str, panels: Sequence[Patch]) -> None:
+        offset = 0
+        for patch in panels:
+            left, top = self._layout.place(corner, patch.width, patch.height)
+            patch.over(frame, left, top + (offset if "top" in corner else -offset))
+            offset += patch.height + self._layout.margin // 2

@@ -1,0 +1,58 @@
+"""Round numbers for axes: limits that hold still, and a unit in which they are easily read."""
+
+from __future__ import annotations
+
+import math
+
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_EASE = 0.12  # time in which a limit covers most of the way to its new value [s]
+
+
+def round_up(value: float) -> float:
+    """Return the least of 1, 2, 5 times a power of ten that is not below a positive value."""
+    power = 10.0 ** math.floor(math.log10(value) + 1e-9)
+    return next((step * power for step in (1.0, 2.0, 5.0) if value <= step * power * (1 + 1e-9)), 10.0 * power)
+
+
+class Limit:
+    """End of a scale that follows what has been seen so far and never shrinks.
+
+    It aims at round numbers, so that it seldom moves, and glides from one to the next, so that nothing jumps. It knows
+    what it was told alone: the same run has the same limits.
+
+    Parameters
+    ----------
+    floor : float
+        The least limit. 0: the first positive magnitude sets it.
+    fixed : float, optional
+        The limit, for good.
+    """
+
+    def __init__(self, floor: float = 0.0, fixed: float | None = None) -> None:
+        self._fixed = fixed is not None
+        self.goal = fixed if fixed is not None else round_up(floor) if floor > 0 else 0.0
+        self.value = self.goal
+
+    def follow(self, magnitude: float, dt: float) -> float:
+        """Take in a magnitude, dt seconds after the last one; return the limit, 0 as long as there is none."""
+        if self._fixed:
+            return self.value
+        if magnitude > self.goal:
+            self.goal = round_up(magnitude)
+        if self.value == 0 or self.value > 0.995 * self.goal:
+            self.value = self.goal
+        else:
+            self.value *= (self.goal / self.value) ** -math.expm1(-dt / _EASE)
+        return self.value
+
+
+def readable(limit: float, unit: str) -> tuple[float, str]:
+    """Factor and unit in which a limit is a number from 1 to 1000, such as (1e3, "mm") for 0.02 and "m"."""
+    power = min(9, max(-9, 3 * math.floor(math.log10(limit * (1 + 1e-9)) / 3)))
+    return 10.0**-power, _PREFIXES[power] + unit
+
+
+def number(value: float) -> str:
+    """Write a number shortly, with a true minus sign."""
+    text = f"{value:.4g}"
+    return "0" if text == "-0" else text.replace("-", "\N{MINUS SIGN}")
