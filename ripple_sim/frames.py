@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import mujoco
 import numpy as np
@@ -15,8 +15,9 @@ from ripple_sim.solver import Relief
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .coupling.ripples import Impulse
-from .render import Renderer, Surface
+from .render import Camera, FixedCamera, Renderer, Surface
 from .simulation import Simulation
+from .supersample import shrink
 from .viewpoint import viewpoint
 
 
@@ -50,17 +51,15 @@ class Snapshot:
         return hasher.hexdigest()
 
 
-def run(simulation: Simulation, frames: int, *, first: int = 0, alive: int = 1) -> Iterator[Snapshot | None]:
+def run(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterator[Snapshot]:
     """Advance a simulation frame by frame.
 
     Parameters
     ----------
     simulation : Simulation
-        At its beginning.
+        At its beginning, where frame 0 stands.
     frames : int
-        How many, counted from the beginning, where frame 0 stands.
-    first : int
-        Frames before this one are simulated only, and come as None.
+        How many.
     alive : int
         How many of the latest snapshots are in use at a time; the state of older ones is written over.
     """
@@ -70,9 +69,6 @@ def run(simulation: Simulation, frames: int, *, first: int = 0, alive: int = 1) 
     for number in range(frames):
         if number:
             simulation.advance_frame()
-        if number < first:
-            yield None
-            continue
         data = next(ring)
         mujoco.mj_copyData(data, simulation.model, simulation.data)
         heights = {name: ripples[name].height for name in ripples}
@@ -94,17 +90,31 @@ class FrameSource:
         Whose model, surfaces and camera are drawn.
     width, height : int
         [pixels].
+    supersample : int
+        The picture is drawn so many times as wide and high, and averaged in linear light.
+    annotate : callable, optional
+        What the surfaces are to be drawn as.
     gl : GLContext, optional
         By default the process's shared one.
     """
 
-    def __init__(self, simulation: Simulation, *, width: int, height: int, gl: GLContext | None = None) -> None:
+    def __init__(
+        self,
+        simulation: Simulation,
+        *,
+        width: int,
+        height: int,
+        supersample: int = 1,
+        annotate: Callable[[Surface], Surface] = lambda surface: surface,
+        gl: GLContext | None = None,
+    ) -> None:
+        self._supersample = supersample
         self._simulation = simulation
         self._geoms = simulation.ripples.geom_ids
         surfaces = {}
         for entry in simulation.scene.surfaces:
             atlas = simulation.ripples[entry.geom].atlas
-            surfaces[self._geoms[entry.geom]] = Surface(
+            surface = Surface(
                 V=atlas.mesh.V,
                 F=atlas.mesh.F,
                 sphere=atlas.sphere,
@@ -112,12 +122,19 @@ class FrameSource:
                 look=entry.look,
                 color=entry.color,
             )
+            surfaces[self._geoms[entry.geom]] = annotate(surface)
         gl = gl if gl is not None else shared_context()
-        self._renderer = Renderer(gl, simulation.model, surfaces, width=width, height=height)
+        self.renderer = Renderer(
+            gl, simulation.model, surfaces, width=supersample * width, height=supersample * height
+        )
 
     def draw(self, state: Snapshot) -> NDArray[np.uint8]:
         """Draw a snapshot, uint8 [height, width, 3]."""
         sim = self._simulation
         reliefs = {self._geoms[name]: relief for name, relief in state.reliefs.items()}
-        camera = viewpoint(sim.model, state.data, sim.scene.camera, state.data.time)
-        return self._renderer.render(state.data, reliefs, camera)
+        return shrink(self.renderer.render(state.data, reliefs, self.camera(state)), self._supersample)
+
+    def camera(self, state: Snapshot) -> Camera | FixedCamera:
+        """Camera of a snapshot."""
+        sim = self._simulation
+        return viewpoint(sim.model, state.data, sim.scene.camera, state.data.time)

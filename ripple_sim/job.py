@@ -11,10 +11,12 @@ from pathlib import Path
 import mujoco
 
 from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.waves.backend import auto_backend
 
 from .errors import SceneError
 from .frames import FrameSource, run
 from .pipeline import Ahead
+from .provenance import provenance
 from .scene.scene import MAX_DURATION, Scene
 from .simulation import Simulation
 from .video import check_output, open_writer
@@ -22,16 +24,24 @@ from .video import check_output, open_writer
 # Snapshots that wait to be drawn. One would do if all frames took the same time.
 _WAITING = 2
 
+# The simulation's state is fingerprinted every so many frames, to be compared when a job is resumed.
+_CHECKED = 16
+
+MAX_SLOW_MOTION = 1000
+
 
 @dataclasses.dataclass(frozen=True)
 class Summary:
     """What a rendered video took.
 
-    `renderer` is the driver's GL_RENDERER, `backend` the wave solver's; times in seconds.
+    `frames` is how many it has, of which those before `resumed_at` were there already. `renderer` is the driver's
+    GL_RENDERER, `backend` the wave solver's. Times in seconds; the stages overlap, so they add up to more than
+    `wall_seconds`.
     """
 
     output: Path
     frames: int
+    resumed_at: int
     renderer: str
     backend: str
     substeps_per_frame: float
@@ -50,64 +60,88 @@ def render_video(
     size: tuple[int, int] = (1280, 720),
     fps: int = 60,
     duration: float | None = None,
+    slow_motion: float = 1.0,
+    supersample: int = 1,
     resolution: int | None = None,
     backend: str = "auto",
+    resume: bool = False,
     progress: Callable[[int, int], None] | None = None,
     on_step: Callable[[Simulation], None] | None = None,
 ) -> Summary:
     """Simulate a scene and write its video.
 
+    The same scene and options give the same video on the same machine, bit for bit. While it is made, what is done is
+    in a folder beside it, `output` with `.part` behind, and stays there if the job is interrupted.
+
     Parameters
     ----------
     scene : Scene
     output : path
-        .mp4, .webm, .gif, or a folder for PNG frames. It appears when it is whole.
+        .mp4, .webm, .gif, .webp, or a folder for PNG frames. It appears when it is whole.
     size : (width, height)
         [pixels].
     fps : int
         Frames a second.
     duration : float, optional
-        [s], instead of the scene's.
+        Of the scene's time [s], instead of the scene's own.
+    slow_motion : float
+        Seconds of video for a second of the scene.
+    supersample : int
+        Frames are drawn so many times as wide and high, and averaged.
     resolution, backend, on_step
-        As for `Simulation`.
+        As for `Simulation`. While waves are computed on the CPU, `on_step` is called in a thread of its own.
+    resume : bool
+        Carry on where an interrupted job of the same scene and options has stopped; from the beginning if there is
+        none. The simulation is run again up to there, and checked to be the same, the frames are not drawn again.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
 
     Raises
     ------
     RippleError
-        Before anything is simulated where the output, size, rate or scene is invalid; later if the physics becomes
-        unstable or the video cannot be written on.
+        Before anything is simulated where the output, size, rate, scene or the job to resume is invalid; later if the
+        physics becomes unstable or the video cannot be written on.
     """
     start = time.perf_counter()
     # MuJoCo would write its warnings to a file in the current folder; `Simulation` reports those that matter
     mujoco.set_mju_user_warning(lambda message: None)
     output, (width, height) = Path(output), size
     check_output(output, width, height, fps)
-    length = scene.duration if duration is None else duration
-    if not 0 < length < MAX_DURATION:
-        raise SceneError(f"duration is {length!r} s; valid is a positive number, less than {MAX_DURATION}")
-    count = max(1, round(length * fps))
-    simulation = Simulation(scene, fps=fps, resolution=resolution, backend=backend, on_step=on_step)
+    count = _frame_count(scene.duration if duration is None else duration, fps, slow_motion)
     gl = shared_context()
-    frames = FrameSource(simulation, width=width, height=height, gl=gl)
-    ready = time.perf_counter()
+    job = {
+        "the size": f"{width}x{height}",
+        "the frame rate": fps,
+        "the number of frames": count,
+        "the slow motion": slow_motion,
+        "the supersampling": supersample,
+        "the resolution": resolution or "the scene's",
+        "the wave solver": auto_backend() if backend == "auto" else backend,
+        **provenance(scene, gl),
+    }
     render_seconds = 0.0
-    states = run(simulation, count, alive=_WAITING + 2)
-    # waves on the GPU share the renderer's OpenGL context, which belongs to one thread at a time
-    ahead = Ahead(states, _WAITING) if simulation.backend == "cpu" else contextlib.nullcontext(states)
-    with open_writer(output, width=width, height=height, fps=fps) as writer, ahead as states:
-        for state in states:
-            if state is not None:
-                before = time.perf_counter()
-                frame = frames.draw(state)
-                render_seconds += time.perf_counter() - before
-                writer.write(frame)
-            if progress is not None:
-                progress(writer.frames, count)
+    with open_writer(output, width=width, height=height, fps=fps, job=job, resume=resume) as writer:
+        resumed_at = writer.frames
+        simulation = Simulation(scene, fps=fps * slow_motion, resolution=resolution, backend=backend, on_step=on_step)
+        frames = FrameSource(simulation, width=width, height=height, supersample=supersample, gl=gl)
+        ready = time.perf_counter()
+        states = run(simulation, count, alive=_WAITING + 2)
+        # waves on the GPU share the renderer's OpenGL context, which belongs to one thread at a time
+        with Ahead(states, _WAITING) if simulation.backend == "cpu" else contextlib.nullcontext(states) as states:
+            for state in states:
+                if state.number % _CHECKED == 0:
+                    writer.check_state(state.number, state.digest())
+                if state.number >= resumed_at:
+                    before = time.perf_counter()
+                    frame = frames.draw(state)
+                    render_seconds += time.perf_counter() - before
+                    writer.write(frame)
+                if progress is not None:
+                    progress(state.number + 1, count)
     return Summary(
         output=output,
         frames=count,
+        resumed_at=resumed_at,
         renderer=gl.renderer,
         backend=simulation.backend,
         substeps_per_frame=simulation.substeps_taken / max(count - 1, 1),
@@ -118,3 +152,12 @@ def render_video(
         encode_seconds=writer.encode_seconds,
         wall_seconds=time.perf_counter() - start,
     )
+
+
+def _frame_count(duration: float, fps: int, slow_motion: float) -> int:
+    """Frames of a scene of a duration [s]."""
+    if not 0 < duration < MAX_DURATION:
+        raise SceneError(f"duration is {duration!r} s; valid is a positive number, less than {MAX_DURATION}")
+    if not 0 < slow_motion <= MAX_SLOW_MOTION:
+        raise SceneError(f"slow motion is {slow_motion!r}; valid is a positive number up to {MAX_SLOW_MOTION}")
+    return max(1, round(duration * fps * slow_motion))

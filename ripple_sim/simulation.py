@@ -28,8 +28,8 @@ class Simulation:
     Parameters
     ----------
     scene : Scene
-    fps : int
-        Frames a second.
+    fps : float
+        Frames a second of the simulation's time.
     resolution : int, optional
         Overrides the scene's atlas resolutions.
     backend, operator : str
@@ -42,7 +42,7 @@ class Simulation:
         self,
         scene: Scene,
         *,
-        fps: int = 60,
+        fps: float = 60,
         resolution: int | None = None,
         backend: str = "auto",
         operator: str = "fem",
@@ -141,7 +141,7 @@ class Simulation:
                 )
 
 
-def _steps_per_frame(fps: int, timestep: float) -> int:
+def _steps_per_frame(fps: float, timestep: float) -> int:
     """Fewest equal physics steps a frame that are no longer than the model's [s]."""
     steps = 1 / (fps * timestep)
     if not steps < _MOST_STEPS_PER_FRAME:

@@ -1,24 +1,67 @@
-"""Where the camera of a scene stands at a given time."""
+"""Where the camera of a scene stands at a given time: free, fixed in the model, orbiting, following a body."""
 
 from __future__ import annotations
 
+import dataclasses
+from typing import TYPE_CHECKING
+
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
+from .errors import SceneError
 from .render import Camera, FixedCamera
 from .scene.scene_file import CameraEntry
+
+if TYPE_CHECKING:
+    from .scene.scene import Scene
+
+
+def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
+    """Make sure that the model has what the camera names.
+
+    Raises
+    ------
+    SceneError
+    """
+    for name, kind, count, missing in (
+        (entry.name, mujoco.mjtObj.mjOBJ_CAMERA, model.ncam, "camera {!r}; its cameras are"),
+        (entry.track, mujoco.mjtObj.mjOBJ_BODY, model.nbody, "body {!r} for the camera to track; its bodies are"),
+    ):
+        if name is not None and mujoco.mj_name2id(model, kind, name) < 0:
+            names = [known for i in range(count) if (known := mujoco.mj_id2name(model, kind, i))]
+            raise SceneError(f"the model has no {missing.format(name)} {', '.join(names) or 'none'}")
+
+
+def through_camera(scene: Scene, name: str) -> Scene:
+    """The scene seen through a camera of its model.
+
+    Raises
+    ------
+    SceneError
+        If the model has no such camera.
+    """
+    camera = CameraEntry(name=name)
+    check_camera(scene.model, camera)
+    return dataclasses.replace(scene, camera=camera)
 
 
 def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, time: float) -> Camera | FixedCamera:
     """Camera of a scene at a time [s].
 
     A camera named in the MJCF is taken as it stands in `data` (it may ride on a body). Otherwise MuJoCo's free camera,
-    aimed at the model's middle where the scene says nothing else, going round by `orbit` degrees a second.
+    aimed at the model's middle where the scene says nothing else. With `orbit` either goes round by so many degrees a
+    second; with `track` the free camera moves along with a body's centre of mass, and the named one turns to it.
     """
+    tracked = None if entry.track is None else data.subtree_com[model.body(entry.track).id]
     if entry.name is not None:
         fixed = Camera.from_mjcf(model, data, entry.name)
+        if tracked is not None:
+            fixed = _aimed(fixed, tracked)
         return fixed if not entry.orbit else _turned(fixed, np.radians(entry.orbit) * time)
-    x, y, z = entry.lookat if entry.lookat is not None else (float(value) for value in model.stat.center)
+    base = np.zeros(3) if tracked is not None else model.stat.center
+    aim = base if entry.lookat is None else entry.lookat
+    x, y, z = (float(value) for value in (aim if tracked is None else tracked + aim))
     return Camera(
         lookat=(x, y, z),
         distance=entry.distance if entry.distance is not None else 1.5 * float(model.stat.extent),
@@ -26,6 +69,18 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, ti
         elevation=entry.elevation,
         fovy=entry.fovy,
     )
+
+
+def _aimed(camera: FixedCamera, target: NDArray[np.float64]) -> FixedCamera:
+    """The camera turned, upright, to a point [m] from where it stands."""
+    back = camera.position - target
+    distance = float(np.linalg.norm(back))
+    right = np.cross([0.0, 0.0, 1.0], back)
+    if distance == 0 or not right.any():  # it stands in the point, or straight above or below
+        return camera
+    right /= np.linalg.norm(right)
+    back = back / distance
+    return FixedCamera(camera.position, np.stack([right, np.cross(back, right), back], axis=1), distance, camera.fovy)
 
 
 def _turned(camera: FixedCamera, angle: float) -> FixedCamera:

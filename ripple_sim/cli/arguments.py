@@ -46,6 +46,24 @@ def parse_seconds(word: str) -> float:
     return seconds
 
 
+def parse_factor(word: str) -> float:
+    """Read a positive, finite factor."""
+    try:
+        factor = float(word)
+    except ValueError:
+        factor = math.nan
+    if not (factor > 0 and math.isfinite(factor)):
+        raise ValueError(f"{word!r} is not valid; it must be a positive number, such as 4")
+    return factor
+
+
+def parse_supersample(word: str) -> int:
+    """Read how many times as wide and high a frame is drawn."""
+    if not re.fullmatch(r"[1-4]", word):
+        raise ValueError(f"{word!r} is not valid; it must be 1, 2, 3 or 4")
+    return int(word)
+
+
 def parse_axis(word: str) -> str:
     """Read the axis that points up."""
     if word not in UP_AXES:
@@ -71,4 +89,7 @@ Seed = Annotated[int, _one_word(parse_seed, "N")]
 FrameRate = Annotated[int | None, _one_word(parse_count, "FPS"), arg(help_behavior_hint="(default: 60, for a GIF 25)")]
 Duration = Annotated[float | None, _one_word(parse_seconds, "S"), arg(help_behavior_hint="(default: the scene's)")]
 Resolution = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's)")]
+Factor = Annotated[float, _one_word(parse_factor, "F")]
+Supersample = Annotated[int, _one_word(parse_supersample, "N")]
+Device = Annotated[int | None, _one_word(parse_seed, "N"), arg(help_behavior_hint="(default: the first that works)")]
 UpAxis = Annotated[str | None, _one_word(parse_axis, "{y,z}"), arg(help_behavior_hint="(default: z for STL, else y)")]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
-from .arguments import Count, Duration, FrameRate, Resolution, Seed, Size, UpAxis
+from .arguments import Count, Device, Duration, Factor, FrameRate, Resolution, Seed, Size, Supersample, UpAxis
 from .view_command import View
 
 if TYPE_CHECKING:
@@ -26,17 +26,28 @@ if TYPE_CHECKING:
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class _Video:
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
-    """Where the video goes: a name ending in .mp4, .webm or .gif, or one without ending for a folder of PNG frames."""
+    """Where the video goes: a name ending in .mp4, .webm, .gif or .webp, or one without ending for a folder of PNG
+    frames."""
     size: Size = (1280, 720)
     """Frame size in pixels."""
     fps: FrameRate = None
     """Frames per second."""
     duration: Duration = None
-    """Length of the video in seconds."""
+    """How many seconds of the scene are shown."""
+    slow_motion: Factor = 1.0
+    """Seconds of video for a second of the scene: 4 is four times slower."""
+    supersample: Supersample = 1
+    """Draw frames so many times as wide and high, and average: finer edges and highlights."""
+    camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
+    """Look through this camera of the MJCF."""
     resolution: Resolution = None
     """Texels along an edge of a cube face; more carry finer waves and take longer."""
     backend: Literal["auto", "gl", "cpu"] = "auto"
     """Where the waves are computed: in OpenGL, on the CPU, or wherever it is faster."""
+    device: Device = None
+    """Number of the EGL device that draws, where there are several."""
+    resume: bool = False
+    """Carry on where the same command was interrupted, if it was."""
 
     def load(self) -> Scene:
         """Make the scene that is rendered."""
@@ -51,11 +62,16 @@ class _Video:
         check_output(self.output, *self.size, fps)
 
         from ..job import render_video
-        from ..solver.gl import shared_context
+        from ..solver.gl import select_device, shared_context
         from ..solver.waves.backend import auto_backend
+        from ..viewpoint import through_camera
         from .progress import frame_progress
 
+        if self.device is not None:
+            select_device(self.device)
         scene = self.load()
+        if self.camera is not None:
+            scene = through_camera(scene, self.camera)
         backend = auto_backend() if self.backend == "auto" else self.backend
         with frame_progress(f"renderer {shared_context().renderer}, waves {backend}") as progress:
             summary = render_video(
@@ -64,8 +80,11 @@ class _Video:
                 size=self.size,
                 fps=fps,
                 duration=self.duration,
+                slow_motion=self.slow_motion,
+                supersample=self.supersample,
                 resolution=self.resolution,
                 backend=backend,
+                resume=self.resume,
                 progress=progress,
             )
         print(_summary_text(summary))
@@ -199,11 +218,12 @@ COMMANDS: dict[str, Callable[..., Any]] = {"render": Render, "drop": Drop, "atla
 
 
 def _summary_text(summary: Summary) -> str:
+    resumed = f", the first {summary.resumed_at} of them before" if summary.resumed_at else ""
     return (
-        f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s\n"
+        f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s{resumed}\n"
         f"renderer  {summary.renderer}\n"
         f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps a frame\n"
-        f"time      set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
+        f"stages    set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
         f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
         f"encoding {summary.encode_seconds:.1f} s"
     )

@@ -9,31 +9,25 @@ import contextlib
 import io
 import os
 import re
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import tyro.conf
-import tyro.extras
+from .signals import INTERRUPTED, TERMINATED, handle_signals
 
-from .commands import COMMANDS
-
-DONE, FAILED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
+DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 _DESCRIPTION = "Surface ripples on any genus-0 mesh, driven by the contact forces of a MuJoCo simulation."
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program with the arguments `argv` (by default the process's own) and return its exit status."""
+    handle_signals()
     command = _parse(list(sys.argv[1:] if argv is None else argv))
     if isinstance(command, int):
         return command
     os.environ.setdefault("MUJOCO_GL", "disable")  # MuJoCo's own renderer would take the OpenGL context away
-
-    # As an exception, so that an unfinished video is removed on the way out.
-    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(TERMINATED))
 
     from ..errors import DisplayError, EncodingError
     from ..solver.errors import GLError, RippleError
@@ -49,18 +43,30 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(error, FAILED)
     except RippleError as error:
         return _fail(error, BAD_INPUT)
-    except KeyboardInterrupt:
-        return _fail("interrupted", INTERRUPTED)
+    except KeyboardInterrupt as ending:
+        return _fail("interrupted", INTERRUPTED, ending)
+    except SystemExit as ending:
+        if ending.code != TERMINATED:
+            raise
+        return _fail("terminated", TERMINATED, ending)
     return DONE
 
 
-def _fail(message: object, status: int) -> int:
-    print(f"ripple-sim: {' '.join(str(message).split())}", file=sys.stderr)
+def _fail(message: object, status: int, ending: BaseException | None = None) -> int:
+    """Print a message, with the notes of the exception that ended the command, in one line; return the status."""
+    notes = getattr(message if ending is None else ending, "__notes__", [])
+    print(f"ripple-sim: {' '.join('; '.join([str(message), *notes]).split())}", file=sys.stderr)
     return status
 
 
 def _parse(argv: list[str]) -> Any:
     """Return the command to run, or the exit status if there is nothing to run."""
+    # here, where the signals are taken care of: it takes a third of a second
+    import tyro.conf
+    import tyro.extras
+
+    from .commands import COMMANDS
+
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):

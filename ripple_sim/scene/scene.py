@@ -163,8 +163,9 @@ def check_scene(scene: Scene) -> None:
     SolverError
         For an invalid material.
     """
-    # the renderer is not needed for anything but the names of its looks
+    # the renderer is not needed for anything but the names of its looks and its cameras
     from ..render import LOOKS
+    from ..viewpoint import check_camera
 
     if not scene.surfaces:
         raise SceneError(f"scene {scene.name!r} has no [[ripple]] surface; name at least one geom")
@@ -193,7 +194,4 @@ def check_scene(scene: Scene) -> None:
             if not 0 < disc.radius < float("inf"):
                 raise SceneError(f"a still disc of geom {entry.geom!r} has radius {disc.radius!r} m; valid is above 0")
     Script(scene.model, scene.events, [entry.geom for entry in scene.surfaces])
-    name = scene.camera.name
-    if name is not None and mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_CAMERA, name) < 0:
-        names = [scene.model.camera(i).name for i in range(scene.model.ncam)]
-        raise SceneError(f"the model has no camera {name!r}; its cameras are {', '.join(names) or 'none'}")
+    check_camera(scene.model, scene.camera)

@@ -92,9 +92,14 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[camera]`: a camera of the MJCF by name, or MuJoCo's free camera (metres, degrees), orbiting if wished."""
+    """`[camera]`: a camera of the MJCF by name, or MuJoCo's free camera (metres, degrees).
+
+    With `orbit` it goes round by so many degrees a second. With `track` it follows a body: the free camera moves along
+    with the body's centre of mass, from which `lookat` then counts; a named one turns to it.
+    """
 
     name: str | None = None
+    track: str | None = None
     lookat: Vector | None = None
     distance: float | None = None
     azimuth: float = 90.0

@@ -13,27 +13,30 @@ MAX_FPS = 240
 # Browsers slow a GIF down to 10 frames a second where a frame lasts less than two hundredths of a second.
 MAX_GIF_FPS = 50
 
-FRAME_NAME = "frame_{:05d}.png"
+ENDINGS = (".mp4", ".webm", ".gif", ".webp")
 _FRAME_PATTERN = re.compile(r"frame_\d{5,}\.png")
 _SUBSAMPLED = (".mp4", ".webm")
+_WITH_OPACITY = (".webp", "")
+_VALID = f"valid is {', '.join(ENDINGS)}, or a name without ending for a folder of PNG frames"
 
 
 def video_format(path: Path) -> str:
-    """Tell the format a path asks for: ".mp4", ".webm", ".gif", or "" for a folder of PNG frames.
+    """Tell the format a path asks for: one of `ENDINGS`, or "" for a folder of PNG frames.
 
     Raises
     ------
     VideoError
-        If the path has any other ending and is no folder.
+        If the path names no file, or has any other ending and is no folder.
     """
-    ending = path.suffix.lower()
-    if ending in (*_SUBSAMPLED, ".gif", ""):
-        return ending
-    if path.is_dir():
+    name = path.name
+    if name in ("", "..") or name.lower() in ENDINGS:
+        raise VideoError(f"output is {str(path)!r}, which names no file; {_VALID}")
+    if path.is_dir() and path.suffix.lower() not in ENDINGS:
         return ""
-    raise VideoError(
-        f"{path} ends in {ending}; valid is .mp4, .webm, .gif, or a name without ending for a folder of PNG frames"
-    )
+    _, dot, ending = name[1:].rpartition(".")  # a name may begin with a dot
+    if dot and f".{ending}".lower() not in ENDINGS:
+        raise VideoError(f"{path} ends in {dot}{ending}; {_VALID}")
+    return f"{dot}{ending}".lower() if dot else ""
 
 
 def default_fps(path: Path) -> int:
@@ -41,22 +44,20 @@ def default_fps(path: Path) -> int:
     return 25 if video_format(path) == ".gif" else 60
 
 
-def check_output(path: str | Path, width: int, height: int, fps: int) -> None:
+def check_output(path: str | Path, width: int, height: int, fps: int, *, transparent: bool = False) -> None:
     """Make sure that a video of this size and rate [1/s] can be written to `path`; leave nothing behind.
 
     Raises
     ------
     VideoError
         If the ending is unknown, the size or rate is out of range, the size is odd where the format halves its colour
-        resolution, or the place cannot be written to.
+        resolution, the format keeps no transparency that is asked for, or the place cannot be written to.
     """
     path = Path(path)
-    if not path.name:
-        raise VideoError(
-            f"output is {str(path)!r}, which names no file; give one ending in .mp4, .webm or .gif, or a folder"
-        )
     try:
         ending = video_format(path)
+        if transparent and ending not in _WITH_OPACITY:
+            raise VideoError(f"{path} cannot be transparent; valid is .webp or a folder of PNG frames")
         _check_size(ending, width, height)
         _check_fps(ending, fps)
         _check_place(path, ending)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
+import contextlib
 import queue
-import shutil
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -15,21 +14,37 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.errors import EncodingError, VideoError
+from ripple_sim.errors import EncodingError, SimulationError, VideoError
+from ripple_sim.solver.errors import SolverError
 
-from .encoders import Encoder, PngEncoder, mp4_encoder, webm_encoder
-from .gif import GifEncoder
+from .clip import Stream
+from .formats import FORMATS, Format, Segment
 from .output import check_output, video_format
+from .part import Part
 
 # Rendering runs ahead of encoding by at most this many frames; 8 frames of 1280x720 are 22 MB.
 QUEUE_FRAMES = 8
 
+# They would come again.
+_HOPELESS = (SimulationError, SolverError)
 
-def open_writer(path: str | Path, *, width: int, height: int, fps: int) -> FrameWriter:
-    """Start a video; the ending of `path` chooses its format.
 
-    `.mp4` is H.264, `.webm` VP9, `.gif` an animated GIF; a name without ending becomes a folder of PNG frames. Missing
-    parent folders are created. Nothing appears at `path` before the video is complete; what was there stays until then.
+def open_writer(
+    path: str | Path,
+    *,
+    width: int,
+    height: int,
+    fps: int,
+    transparent: bool = False,
+    job: Mapping[str, str | int | float] | None = None,
+    resume: bool = False,
+) -> FrameWriter:
+    """Start a video, or go on with one; the ending of `path` chooses its format.
+
+    `.mp4` is H.264, `.webm` VP9, `.gif` and `.webp` are animated pictures; a name without ending becomes a folder of
+    PNG frames. Missing parent folders are created. Nothing appears at `path` before the video is complete; what was
+    there stays until then. Meanwhile the frames are in a folder beside it, `path` with `.part` behind: clips of some
+    frames that play, or pictures. They join to the same video, bit for bit, however often the work was interrupted.
 
     Parameters
     ----------
@@ -39,51 +54,59 @@ def open_writer(path: str | Path, *, width: int, height: int, fps: int) -> Frame
         Size of the frames [pixels].
     fps : int
         Frames per second.
+    transparent : bool
+        Frames have a fourth channel, their opacity (not premultiplied).
+    job : mapping, optional
+        What the video is made of and how. With it, what is finished stays after an interruption, to be gone on with.
+    resume : bool
+        Go on where an interrupted writer of the same job has stopped: the next frame to write is number `frames`.
 
     Raises
     ------
     VideoError
-        If `check_output` refuses the arguments.
+        If `check_output` refuses the arguments, another process is writing this video, or, with `resume`, what is
+        there is of another job.
+    EncodingError
+        If the folder cannot be written.
     """
     path = Path(path)
-    check_output(path, width, height, fps)
-    path.absolute().parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
-    encoder: Encoder
-    match video_format(path):
-        case ".mp4":
-            encoder = mp4_encoder(unfinished, width, height, fps)
-        case ".webm":
-            encoder = webm_encoder(unfinished, width, height, fps)
-        case ".gif":
-            encoder = GifEncoder(unfinished, width, height, fps)
-        case _:
-            encoder = PngEncoder(unfinished)
-    return FrameWriter(encoder, path, width=width, height=height)
+    check_output(path, width, height, fps, transparent=transparent)
+    video = FORMATS[video_format(path)]
+    try:
+        part = Part(path, suffix=video.suffix, length=video.length, job=job or {}, resume=resume)
+    except OSError as error:
+        raise EncodingError(f"cannot write the video {path}: {error.strerror}") from error
+    shape = (height, width, 4 if transparent else 3)
+    return FrameWriter(part, video, Stream(width, height, fps), shape, resumable=job is not None)
 
 
 class FrameWriter:
-    """Takes frames, hands them to an encoder's thread, and moves the finished video to its place.
+    """Takes frames, hands them to a thread that encodes them, and moves the finished video to its place.
 
-    Use it as a context manager: leaving it normally closes it, leaving it by an exception discards the video.
+    Use it as a context manager: leaving it normally closes it, leaving it by an exception ends it. If a job was named,
+    what is finished then stays for later, unless the exception would come again.
 
     Attributes
     ----------
     frames : int
-        Frames written so far.
+        Frames written so far, by interrupted writers before this one too.
     encode_seconds : float
         Time the thread has spent encoding [s]; complete after `close`.
     """
 
-    def __init__(self, encoder: Encoder, path: Path, *, width: int, height: int) -> None:
-        self.path = path
-        self.frames = 0
+    def __init__(
+        self, part: Part, video: Format, stream: Stream, shape: tuple[int, int, int], *, resumable: bool
+    ) -> None:
+        self.path = part.video
+        self.frames = part.frames
         self.encode_seconds = 0.0
-        self._encoder = encoder
-        self._shape = (height, width, 3)
+        self._part, self._format, self._stream, self._shape = part, video, stream, shape
+        self._resumable = resumable
+        self._segment: Segment | None = None
+        self._pending = 0
         self._queue: queue.Queue[NDArray[np.uint8] | None] = queue.Queue(QUEUE_FRAMES)
         self._error: Exception | None = None
-        self._abandoned = False
+        self._abandoned = self._finished = False
         self._thread = threading.Thread(target=self._encode, name="video encoder", daemon=True)
         self._thread.start()
 
@@ -105,6 +128,16 @@ class FrameWriter:
         self._queue.put(frame.copy())
         self.frames += 1
 
+    def check_state(self, frame: int, digest: str) -> None:
+        """Note a fingerprint, 32 hexadecimal digits, of what a frame was made of, or compare it with the one noted.
+
+        Raises
+        ------
+        VideoError
+            If it is another than it was before the interruption.
+        """
+        self._part.check_state(frame, digest)
+
     def close(self) -> None:
         """Finish the video and move it to its place. Doing it again does nothing.
 
@@ -113,7 +146,7 @@ class FrameWriter:
         VideoError
             If there is no frame.
         EncodingError
-            If a frame could not be encoded, or the file not be written; nothing is left of it then.
+            If a frame could not be encoded, or the file not be written.
         """
         if not self._thread.is_alive():
             return
@@ -122,15 +155,16 @@ class FrameWriter:
             raise VideoError(f"the video {self.path} has no frame; write at least one")
         try:
             self._stop()
-        except BaseException:  # the user may lose patience while the last frames are encoded
-            self.discard()
+            self._raise_error()
+        except BaseException as error:  # the user may lose patience while the last frames are encoded
+            self._give_up(error)
             raise
-        self._raise_error()
 
     def discard(self) -> None:
         """Stop, and remove what was written. What was at the video's place before stays."""
-        self._abandoned = True
-        self._stop()
+        self._abandon()
+        if not self._finished:
+            self._part.remove()
 
     def __enter__(self) -> Self:
         return self
@@ -138,10 +172,25 @@ class FrameWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        if kind is None:
+        if error is None:
             self.close()
         else:
+            self._give_up(error)
+
+    def _give_up(self, error: BaseException) -> None:
+        """End the work on an exception, to which is added what is left of it."""
+        if not self._resumable or isinstance(error, _HOPELESS):
             self.discard()
+            return
+        self._abandon()
+        if not self._finished and self._part.keep():
+            error.add_note(
+                f"{self._part.frames} frames are kept in {self._part.folder}: --resume carries on from there"
+            )
+
+    def _abandon(self) -> None:
+        self._abandoned = True
+        self._stop()
 
     def _stop(self) -> None:
         if self._thread.is_alive():
@@ -154,18 +203,33 @@ class FrameWriter:
 
     def _encode(self) -> None:
         while (frame := self._queue.get()) is not None:
-            self._timed(self._encoder.write, frame)
+            self._timed(self._add, frame)
         self._timed(self._finish)
-        if self._abandoned or self._error is not None:
-            self._encoder.discard()
+        if self._segment is not None:
+            with contextlib.suppress(Exception):  # what it could say has been said
+                self._segment.close()
+
+    def _add(self, frame: NDArray[np.uint8]) -> None:
+        if self._segment is None:
+            self._segment = self._format.start(self._part.unfinished, self._stream)
+        self._segment.write(frame)
+        self._pending += 1
+        if self._pending == self._format.length:
+            self._store()
+
+    def _store(self) -> None:
+        if self._segment is not None:
+            self._segment.finish()
+            self._part.store(self._pending)
+            self._segment, self._pending = None, 0
 
     def _finish(self) -> None:
-        self._encoder.finish()
-        if self._abandoned:
-            return
-        if self.path.is_dir():  # of frames and nothing else: `check_output` has looked
-            shutil.rmtree(self.path)
-        self._encoder.path.replace(self.path)
+        self._store()
+        if self._format.join is not None:
+            self._format.join(self._part.segments(), self._part.whole, self._stream)
+        if not self._abandoned:
+            self._part.finish()
+            self._finished = True
 
     def _timed(self, work: Callable[..., None], *arguments: object) -> None:
         """Do the work unless it has become useless, and remember the error instead of ending the thread.

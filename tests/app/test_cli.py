@@ -17,11 +17,12 @@ from ripple_sim.solver.errors import GLError
 
 @pytest.fixture(autouse=True)
 def _left_as_found(tmp_path_factory, monkeypatch):
-    """Keep the program's signal handler and its cache to these tests."""
+    """Keep the program's signal handlers and its cache to these tests."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-    handler = signal.getsignal(signal.SIGTERM)
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     yield
-    signal.signal(signal.SIGTERM, handler)
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture
@@ -62,6 +63,9 @@ def test_help_is_given(capsys, command):
         (["render", "duck", "-o", "x.mp4", "--fps", "-5"], "--fps.*'-5'"),
         (["render", "duck", "-o", "x.mp4", "--duration", "nan"], "--duration.*'nan'.*positive"),
         (["render", "duck", "-o", "x.mp4", "--resolution", "1.5"], "--resolution.*'1.5'"),
+        (["render", "duck", "-o", "x.mp4", "--slow-motion", "0"], "--slow-motion.*'0'.*positive"),
+        (["render", "duck", "-o", "x.mp4", "--supersample", "9"], "--supersample.*'9'.*1, 2, 3 or 4"),
+        (["render", "duck", "-o", "x.mp4", "--device", "gpu"], "--device.*'gpu'"),
         (["render", "duck", "-o", "x.mp4", "--backend", "vulkan"], "vulkan.*--backend.*auto"),
         (["drop", "mesh.obj", "-o", "x.mp4", "--bodies", "0"], "--bodies.*'0'"),
         (["drop", "mesh.obj", "-o", "x.mp4", "--seed", "luck"], "--seed.*'luck'"),
@@ -96,6 +100,8 @@ def test_a_usage_error_reads_the_same_in_every_locale(encoding):
     ("options", "said"),
     [
         (["-o", "clip.avi"], r"clip\.avi.*valid is \.mp4"),
+        (["-o", ".mp4"], r"\.mp4', which names no file"),
+        (["-o", "x."], r"x\. ends in \.; valid is"),
         (["-o", "clip.mp4", "--size", "641x360"], "641x360.*even"),
         (["-o", "clip.gif", "--fps", "60"], "60.*1 to 50"),
         (["-o", "/proc/clip.mp4"], "cannot write /proc/clip.mp4"),
@@ -173,6 +179,36 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
     monkeypatch.setattr(commands.Info, "run", run)
     with pytest.raises(ZeroDivisionError):
         cli.main(["info"])
+
+
+@pytest.mark.parametrize(
+    ("number", "status", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
+)
+def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_path, number, status, word):
+    (tmp_path / "slow.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\nfor _ in range(10**9): pass\n")
+    code = (
+        "import sys\n"
+        "from ripple_sim.cli import main as cli\n"
+        "def parse(argv):\n"
+        "    import slow\n"
+        "cli._parse = parse\n"
+        "sys.exit(cli.main([]))\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False
+    )
+    assert (result.returncode, result.stderr) == (status, f"ripple-sim: {word}\n")
+
+
+def test_an_interrupted_command_says_what_is_left(monkeypatch, capsys):
+    def run(self):
+        ending = KeyboardInterrupt()
+        ending.add_note("48 frames are kept")
+        raise ending
+
+    monkeypatch.setattr(commands.Info, "run", run)
+    assert cli.main(["info"]) == 130
+    assert capsys.readouterr().err == "ripple-sim: interrupted; 48 frames are kept\n"
 
 
 def test_help_loads_nothing_heavy():

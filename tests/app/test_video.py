@@ -1,19 +1,22 @@
 """Videos: what goes in comes out, and what cannot be written is refused before anything is rendered."""
 
+import itertools
 import threading
 from pathlib import Path
 
 import av
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from ripple_sim.errors import EncodingError, VideoError
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.video import FrameWriter, check_output, default_fps, open_writer
+from ripple_sim.video.clip import Stream
+from ripple_sim.video.formats import FORMATS, FRAMES_IN_CLIP, Format
 
 WIDTH, HEIGHT, FPS = 96, 64, 25
-ENDINGS = [".mp4", ".webm", ".gif", ""]
+ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
 
 
 def frames(count: int) -> list[np.ndarray]:
@@ -38,6 +41,9 @@ def write(path: Path, count: int = 12) -> FrameWriter:
 def read(path: Path) -> list[np.ndarray]:
     if path.is_dir():
         return [np.asarray(Image.open(name)) for name in sorted(path.iterdir())]
+    if path.suffix == ".webp":
+        with Image.open(path) as image:
+            return [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(image)]
     with av.open(str(path)) as container:
         return [image.to_ndarray(format="rgb24") for image in container.decode(video=0)]
 
@@ -48,7 +54,7 @@ def test_frames_come_back_in_order_and_in_their_colours(tmp_path, ending):
     write(path)
     back = read(path)
     assert len(back) == 12
-    largest = {".mp4": 3.0, ".webm": 3.0, ".gif": 6.0, "": 0.0}[ending]
+    largest = {".mp4": 3.0, ".webm": 3.0, ".gif": 6.0, ".webp": 3.0, "": 0.0}[ending]
     for sent, got in zip(frames(12), back, strict=True):
         assert got.shape == (HEIGHT, WIDTH, 3)
         assert np.abs(sent.astype(float) - got).mean() <= largest
@@ -92,6 +98,57 @@ def test_mp4_is_what_browsers_play(tmp_path):
         assert stream.frames == 12
     data = path.read_bytes()
     assert 0 < data.index(b"moov") < data.index(b"mdat")
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".webm"])
+def test_clips_join_to_one_stream_of_even_pace(tmp_path, ending):
+    path, count = tmp_path / f"clip{ending}", 2 * FRAMES_IN_CLIP + 5
+    with open_writer(path, width=WIDTH, height=HEIGHT, fps=FPS) as writer:
+        for number in range(count):
+            writer.write(frames(24)[number % 24])
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        packets = [packet for packet in container.demux(stream) if packet.pts is not None]
+        times = sorted(float(packet.pts * packet.time_base) for packet in packets)
+        np.testing.assert_allclose(times, np.arange(count) / FPS, atol=6e-4)
+        decoded = [packet.dts * packet.time_base for packet in packets]
+        assert all(a < b for a, b in itertools.pairwise(decoded))
+        assert all(packet.dts <= packet.pts for packet in packets)
+        starts = [round(float(packet.pts * packet.time_base) * FPS) for packet in packets if packet.is_keyframe]
+        assert starts == [0, FRAMES_IN_CLIP, 2 * FRAMES_IN_CLIP]
+    back = read(path)
+    assert len(back) == count
+    for number in (0, FRAMES_IN_CLIP - 1, FRAMES_IN_CLIP, count - 1):
+        assert np.abs(frames(24)[number % 24].astype(float) - back[number]).mean() <= 3
+
+
+def test_a_webp_repeats_keeps_its_rate_and_its_opacity(tmp_path):
+    path = tmp_path / "clip.webp"
+    sent = np.zeros((7, HEIGHT, WIDTH, 4), np.uint8)
+    for number, frame in enumerate(sent):
+        frame[10:40, 10 * number : 10 * number + 20] = (200, 40, 90, 255)
+    with open_writer(path, width=WIDTH, height=HEIGHT, fps=30, transparent=True) as writer:
+        for frame in sent:
+            writer.write(frame)
+    with Image.open(path) as image:
+        assert (image.n_frames, image.info["loop"]) == (7, 0)
+        times = []
+        for number, frame in enumerate(ImageSequence.Iterator(image)):
+            got = np.asarray(frame.convert("RGBA"))
+            np.testing.assert_array_equal(got[..., 3], sent[number][..., 3])
+            frame.load()
+            times.append(frame.info["duration"])
+    assert sum(times) == round(7 * 1000 / 30)
+    assert max(times) - min(times) <= 1
+
+
+def test_transparent_frames_keep_their_opacity_in_a_folder_and_are_refused_elsewhere(tmp_path):
+    frame = np.arange(4 * HEIGHT * WIDTH, dtype=np.uint32).astype(np.uint8).reshape(HEIGHT, WIDTH, 4)
+    with open_writer(tmp_path / "frames", width=WIDTH, height=HEIGHT, fps=30, transparent=True) as writer:
+        writer.write(frame)
+    np.testing.assert_array_equal(read(tmp_path / "frames")[0], frame)
+    with pytest.raises(VideoError, match=r"clip\.mp4 cannot be transparent; valid is \.webp"):
+        check_output(tmp_path / "clip.mp4", WIDTH, HEIGHT, 30, transparent=True)
 
 
 def test_a_gif_repeats_and_keeps_its_rate(tmp_path):
@@ -155,18 +212,20 @@ def test_a_frame_may_be_overwritten_after_it_was_handed_over(tmp_path):
     assert [int(image.max()) for image in read(path)] == list(range(20))
 
 
-class GatedEncoder:
-    """An encoder that waits to be let through, and fails at one frame."""
+class Gate:
+    """A segment that waits to be let through, and fails at one frame."""
 
-    def __init__(self, path: Path, fails_at: int | None = None) -> None:
-        self.path = path
-        self.gate = threading.Event()
+    def __init__(self, fails_at: int | None = None) -> None:
+        self.open = threading.Event()
         self.seen = 0
         self._fails_at = fails_at
+
+    def start(self, path: Path, stream: Stream) -> "Gate":
         path.touch()
+        return self
 
     def write(self, frame: np.ndarray) -> None:
-        self.gate.wait(timeout=30)
+        self.open.wait(timeout=30)
         if self.seen == self._fails_at:
             raise OSError("no space left on device")
         self.seen += 1
@@ -174,13 +233,20 @@ class GatedEncoder:
     def finish(self) -> None:
         pass
 
-    def discard(self) -> None:
-        self.path.unlink()
+    def close(self) -> None:
+        pass
 
 
-def test_rendering_waits_for_a_slow_encoder(tmp_path):
-    encoder = GatedEncoder(tmp_path / "part")
-    writer = FrameWriter(encoder, tmp_path / "clip.mp4", width=WIDTH, height=HEIGHT)
+@pytest.fixture
+def gate(monkeypatch) -> Gate:
+    gate = Gate()
+    join = lambda segments, path, stream: path.touch()  # noqa: E731
+    monkeypatch.setitem(FORMATS, ".mp4", Format(suffix=".x", length=4, start=gate.start, join=join))
+    return gate
+
+
+def test_rendering_waits_for_a_slow_encoder(tmp_path, gate):
+    writer = open_writer(tmp_path / "clip.mp4", width=WIDTH, height=HEIGHT, fps=FPS)
     frame = frames(1)[0]
 
     def render() -> None:
@@ -192,21 +258,21 @@ def test_rendering_waits_for_a_slow_encoder(tmp_path):
     renderer.join(timeout=0.5)
     assert renderer.is_alive()
     assert writer.frames <= 10
-    encoder.gate.set()
+    gate.open.set()
     renderer.join(timeout=30)
     writer.close()
-    assert encoder.seen == writer.frames == 100
+    assert gate.seen == writer.frames == 100
     assert list(tmp_path.iterdir()) == [tmp_path / "clip.mp4"]
 
 
-def test_an_error_of_the_encoder_reaches_the_caller(tmp_path):
-    encoder = GatedEncoder(tmp_path / "part", fails_at=3)
-    encoder.gate.set()
+def test_an_error_of_the_encoder_reaches_the_caller(tmp_path, gate):
+    gate.open.set()
+    gate._fails_at = 3
     with (
         pytest.raises(EncodingError, match=r"clip\.mp4: no space left"),
-        FrameWriter(encoder, tmp_path / "clip.mp4", width=WIDTH, height=HEIGHT) as writer,
+        open_writer(tmp_path / "clip.mp4", width=WIDTH, height=HEIGHT, fps=FPS) as writer,
     ):
-        for _ in range(50):  # far more than the queue holds: it must not block for ever
+        for _ in range(1000):  # more than the queue holds: it must not block for ever
             writer.write(frames(1)[0])
     assert list(tmp_path.iterdir()) == []
 
@@ -237,7 +303,10 @@ def test_a_video_without_frames_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("name", "size", "fps", "message"),
     [
-        ("clip.avi", (1280, 720), 60, r"\.avi.*valid is \.mp4, \.webm, \.gif"),
+        ("clip.avi", (1280, 720), 60, r"\.avi.*valid is \.mp4, \.webm, \.gif, \.webp"),
+        (".mp4", (1280, 720), 60, r"\.mp4', which names no file"),
+        ("clip.", (1280, 720), 60, r"ends in \.; valid"),
+        ("..", (1280, 720), 60, "valid is .mp4"),
         ("clip.mp4", (1281, 720), 60, "1281x720.*even.*1282x720"),
         ("clip.webm", (1280, 719), 60, "1280x719.*even.*1280x720"),
         ("clip.gif", (0, 720), 25, "0x720.*valid is 16"),

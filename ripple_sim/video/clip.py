@@ -1,0 +1,146 @@
+"""Clips: short runs of frames, each coded on its own into a file of its own, that join without being coded anew."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from av.video.reformatter import ColorPrimaries, ColorRange, Colorspace, ColorTrc
+from numpy.typing import NDArray
+
+# A fixed number, since x264's output depends on it; small, since the renderer needs the processor too.
+THREADS = 2
+
+
+@dataclasses.dataclass(frozen=True)
+class Stream:
+    """Size [pixels] and rate [frames/s] of a video."""
+
+    width: int
+    height: int
+    fps: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Codec:
+    """How frames are coded.
+
+    Attributes
+    ----------
+    container, name, pixel_format : str
+        FFmpeg's names. A YUV pixel format is converted with, and tagged as, ITU-R BT.709 of limited range.
+    options : dict
+        Passed to the codec.
+    """
+
+    container: str
+    name: str
+    pixel_format: str
+    options: dict[str, str] = dataclasses.field(default_factory=dict)
+
+    @property
+    def yuv(self) -> bool:
+        """Whether colours are stored as luma and chroma."""
+        return self.pixel_format.startswith("yuv")
+
+
+# What browsers play. mbtree reads beyond its arrays where a row is no multiple of 8 macroblocks: the same frames then
+# give another file every time.
+H264 = Codec("mp4", "libx264", "yuv420p", {"crf": "18", "preset": "fast", "x264-params": "mbtree=0"})
+VP9 = Codec(
+    "webm", "libvpx-vp9", "yuv420p", {"crf": "24", "b": "0", "deadline": "good", "cpu-used": "5", "row-mt": "1"}
+)
+LOSSLESS = Codec("matroska", "libx264rgb", "rgb24", {"qp": "0", "preset": "ultrafast"})
+GIF = Codec("gif", "gif", "pal8")
+
+
+class Clip:
+    """A file with one video stream that is being written, by PyAV."""
+
+    def __init__(self, path: Path, codec: Codec, stream: Stream) -> None:
+        self._codec = codec
+        self._time_base = Fraction(1, stream.fps)
+        self._frames = 0
+        self._container = open_container(path, codec.container)
+        self._stream = self._container.add_stream(codec.name, rate=stream.fps, options=codec.options)
+        self._stream.width, self._stream.height, self._stream.pix_fmt = stream.width, stream.height, codec.pixel_format
+        context = self._stream.codec_context
+        context.thread_count = THREADS
+        if codec.yuv:
+            context.color_primaries, context.color_trc = ColorPrimaries.BT709, ColorTrc.BT709
+            context.colorspace, context.color_range = Colorspace.ITU709, ColorRange.MPEG
+
+    def write(self, frame: NDArray[np.uint8]) -> None:
+        """Encode one frame, uint8 [height, width, 3]."""
+        self.encode(av.VideoFrame.from_ndarray(frame, format="rgb24"))
+
+    def encode(self, image: av.VideoFrame) -> None:
+        """Encode one frame that FFmpeg holds already."""
+        if self._codec.yuv:
+            image = image.reformat(
+                format=self._codec.pixel_format, dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG
+            )
+        image.pts, image.time_base = self._frames, self._time_base
+        self._frames += 1
+        self._container.mux(self._stream.encode(image))
+
+    def finish(self) -> None:
+        """Flush the codec and close the file."""
+        try:
+            self._container.mux(self._stream.encode(None))
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Close the file, which is then of no use unless it is finished."""
+        self._container.close()
+
+
+def open_container(path: Path, container: str) -> Any:
+    """Open a file for writing, such that the same content gives the same bytes."""
+    # bitexact: Matroska and WebM would otherwise get random identifiers. faststart: an MP4's index goes in front, so
+    # that it starts before it is loaded.
+    options = {"fflags": "+bitexact", **({"movflags": "+faststart"} if container == "mp4" else {})}
+    return av.open(str(path), "w", format=container, options=options)
+
+
+def join_clips(clips: Sequence[tuple[Path, int]], path: Path, container: str, fps: int) -> None:
+    """Put clips one behind the other into one file.
+
+    Parameters
+    ----------
+    clips : sequence of (path, number)
+        Clips of one codec, and the number of each one's first frame in the whole.
+    path : path
+        What is written.
+    container : str
+        FFmpeg's name.
+    fps : int
+        Frames a second.
+    """
+    output = open_container(path, container)
+    try:
+        stream = None
+        for clip, first in clips:
+            with av.open(str(clip)) as source:
+                video = source.streams.video[0]
+                if stream is None:
+                    stream = output.add_stream_from_template(video)
+                    stream.time_base = Fraction(1, fps)
+                for packet in source.demux(video):
+                    if packet.pts is None:  # the end's mark
+                        continue
+                    # as numbers of frames, exactly, whatever clock the container counts by
+                    tick = packet.time_base
+                    decoded = packet.pts if packet.dts is None else packet.dts
+                    packet.pts, packet.dts = (first + round(time * tick * fps) for time in (packet.pts, decoded))
+                    packet.time_base, packet.duration = Fraction(1, fps), 1
+                    packet.stream = stream
+                    output.mux_one(packet)
+    finally:
+        output.close()

@@ -1,0 +1,102 @@
+"""The formats: what each stores its frames in until the video is whole, and how it is joined of that."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from .clip import H264, LOSSLESS, VP9, Clip, Codec, Stream, join_clips
+from .gif import join_gif
+from .webp import join_webp
+
+# What is lost when a job is killed, and how often a video starts anew with a frame that needs no other.
+FRAMES_IN_CLIP = 48
+
+Segments = Sequence[tuple[Path, int]]
+
+
+class Segment(Protocol):
+    """A file of some frames that is being written."""
+
+    def write(self, frame: NDArray[np.uint8]) -> None:
+        """Add one frame, uint8 [height, width, 3 or 4]."""
+
+    def finish(self) -> None:
+        """Complete the file."""
+
+    def close(self) -> None:
+        """Leave the file incomplete."""
+
+
+class Still:
+    """One frame in a picture of its own."""
+
+    def __init__(self, path: Path, **settings: object) -> None:
+        self._path, self._settings = path, settings
+
+    def write(self, frame: NDArray[np.uint8]) -> None:
+        """Write the picture."""
+        Image.fromarray(frame).save(self._path, **self._settings)
+
+    def finish(self) -> None:
+        """Nothing is left to do."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Format:
+    """How the videos of one ending are made.
+
+    Attributes
+    ----------
+    suffix : str
+        Ending of a segment's file.
+    length : int
+        Frames in a segment; the last one may have less.
+    start : callable
+        Begins a segment at a path.
+    join : callable or None
+        Makes the file of all segments, given with the number of each one's first frame. None: their folder is the
+        video.
+    """
+
+    suffix: str
+    length: int
+    start: Callable[[Path, Stream], Segment]
+    join: Callable[[Segments, Path, Stream], None] | None
+
+
+def _of_clips(suffix: str, codec: Codec, join: Callable[[Segments, Path, Stream], None] | None = None) -> Format:
+    return Format(
+        suffix=suffix,
+        length=FRAMES_IN_CLIP,
+        start=lambda path, stream: Clip(path, codec, stream),
+        join=join or (lambda clips, path, stream: join_clips(clips, path, codec.container, stream.fps)),
+    )
+
+
+FORMATS = {
+    ".mp4": _of_clips(".mp4", H264),
+    ".webm": _of_clips(".webm", VP9),
+    ".gif": _of_clips(".mkv", LOSSLESS, join_gif),
+    ".webp": Format(
+        suffix=".webp",
+        length=1,
+        start=lambda path, stream: Still(path, format="WEBP", quality=88, method=3),
+        join=lambda stills, path, stream: join_webp([still for still, _ in stills], path, stream),
+    ),
+    "": Format(
+        suffix=".png",
+        length=1,
+        start=lambda path, stream: Still(path, format="PNG", compress_level=3),
+        join=None,
+    ),
+}
