@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import mujoco
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,31 +33,66 @@ class ContactPair:
     normals: NDArray[np.float64]
 
 
-def contact_pairs(model: mujoco.MjModel, data: mujoco.MjData, targets: set[int]) -> list[ContactPair]:
-    """Collect the pressing contacts of the given geoms, in ascending order of (target, other).
+def contact_pairs(
+    model: mujoco.MjModel, data: mujoco.MjData, is_target: NDArray[np.bool_]
+) -> dict[tuple[int, int], ContactPair]:
+    """Collect the pressing contacts of some geoms, by (target, other) in ascending order.
 
     Where two targets touch, the pair is reported for each of them.
+
+    Parameters
+    ----------
+    model, data
+    is_target : bool [ngeom]
+        By geom id.
     """
-    found: dict[tuple[int, int], list[tuple[NDArray, float, NDArray]]] = {}
-    wrench = np.zeros(6)
+    if not data.ncon:
+        return {}
     contacts = data.contact
-    geoms, address = contacts.geom.tolist(), contacts.efc_address.tolist()
-    for i, (first, second) in enumerate(geoms):
-        # without a row in the constraint solver (excluded, or in the margin only) a contact carries no force
-        if address[i] < 0 or not (first in targets or second in targets):
+    pairs, points, forces, normals = _pressing(
+        contacts.geom,
+        contacts.efc_address,
+        contacts.dim,
+        contacts.dist,
+        contacts.pos,
+        contacts.frame,
+        data.efc_force,
+        model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
+        is_target,
+    )
+    rows: dict[tuple[int, int], list[int]] = {}
+    for row, (target, other) in enumerate(pairs.tolist()):
+        rows.setdefault((target, other), []).append(row)
+    return {key: ContactPair(*key, points[k], forces[k], normals[k]) for key, k in sorted(rows.items())}
+
+
+@numba.njit(cache=True)
+def _pressing(geoms, address, dim, dist, pos, frame, efc_force, pyramidal, is_target):
+    """Rows of (target, other), points, normal forces and normals of all contacts that press on a target."""
+    most = 2 * len(geoms)
+    pairs, forces = np.empty((most, 2), np.int64), np.empty(most)
+    points, normals = np.empty((most, 3)), np.empty((most, 3))
+    count = 0
+    for i in range(len(geoms)):
+        first, second = geoms[i, 0], geoms[i, 1]
+        # without a row in the constraint solver (excluded, or in the margin only) a contact carries no force; a
+        # flex is no geom
+        if address[i] < 0 or first < 0 or second < 0 or not (is_target[first] or is_target[second]):
             continue
-        mujoco.mj_contactForce(model, data, i, wrench)
-        if wrench[0] <= 0:
+        # the edges of a friction pyramid share the normal force among them
+        rows = 2 * (dim[i] - 1) if pyramidal and dim[i] > 1 else 1
+        force = efc_force[address[i] : address[i] + rows].sum()
+        if force <= 0:
             continue
-        contact = contacts[i]
-        # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's surface is dist/2
-        # away. Somewhat outside of it the nearest surface point is on this side, even of a thin part.
-        middle, normal, away = contact.pos, contact.frame[:3], 1.5 * abs(contact.dist)
-        for target, other, outward in ((first, second, normal), (second, first, -normal)):
-            if target in targets:
-                entry = (middle + away * outward, float(wrench[0]), outward.copy())
-                found.setdefault((target, other), []).append(entry)
-    return [
-        ContactPair(target, other, *(np.array(column) for column in zip(*entries, strict=True)))
-        for (target, other), entries in sorted(found.items())
-    ]
+        for target, other, side in ((first, second, 1.0), (second, first, -1.0)):
+            if is_target[target]:
+                pairs[count, 0], pairs[count, 1] = target, other
+                forces[count] = force
+                for k in range(3):
+                    # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's
+                    # surface is dist/2 away. Somewhat outside of it the nearest surface point is on this side, even of
+                    # a thin part.
+                    normals[count, k] = side * frame[i, k]
+                    points[count, k] = pos[i, k] + 1.5 * abs(dist[i]) * normals[count, k]
+                count += 1
+    return pairs[:count], points[:count], forces[:count], normals[:count]

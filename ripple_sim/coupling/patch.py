@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
-
-from ripple_sim.solver import Atlas
 
 Sources = tuple[NDArray[np.float64], NDArray[np.float64], float]
 
@@ -17,9 +16,8 @@ _INSET = 0.75
 _OVERLAP = 0.3
 
 
-def cluster(
-    points: NDArray[np.float64], forces: NDArray[np.float64], radius: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+@numba.njit(cache=True)
+def cluster(points, forces, radius):
     """Join contacts that lie within a radius [m] of the strongest one: force-weighted points and summed forces.
 
     What lies farther apart (the two ends of a capsule) stays apart, up to eight clusters; then the rest goes to the
@@ -27,27 +25,50 @@ def cluster(
 
     Parameters
     ----------
-    points : [k, 3]
-    forces : [k]
+    points : float64 [k, 3]
+    forces : float64 [k]
         Positive.
+    radius : float
     """
     owner = np.full(len(forces), -1)
-    seeds: list[int] = []
-    while (owner < 0).any() and len(seeds) < MAX_CONTACTS:
-        left = np.flatnonzero(owner < 0)
-        seed = int(left[np.argmax(forces[left])])
-        near = left[np.linalg.norm(points[left] - points[seed], axis=1) <= radius]
-        owner[near] = len(seeds)
-        seeds.append(seed)
-    for i in np.flatnonzero(owner < 0):
-        owner[i] = int(np.argmin(np.linalg.norm(points[seeds] - points[i], axis=1)))
-    return _joined(points, forces, owner)
+    seeds = np.empty(MAX_CONTACTS, np.int64)
+    count = 0
+    while count < MAX_CONTACTS:
+        seed = -1
+        for i in range(len(forces)):
+            if owner[i] < 0 and (seed < 0 or forces[i] > forces[seed]):
+                seed = i
+        if seed < 0:
+            break
+        for i in range(len(forces)):
+            if owner[i] < 0 and _squared_distance(points, i, seed) <= radius**2:
+                owner[i] = count
+        seeds[count] = seed
+        count += 1
+    means, totals = np.zeros((count, 3)), np.zeros(count)
+    for i in range(len(forces)):
+        if owner[i] < 0:
+            owner[i] = 0
+            for j in range(1, count):
+                if _squared_distance(points, i, seeds[j]) < _squared_distance(points, i, seeds[owner[i]]):
+                    owner[i] = j
+        totals[owner[i]] += forces[i]
+        means[owner[i]] += forces[i] * points[i]
+    for j in range(count):
+        means[j] /= totals[j]
+    return means, totals
 
 
-def pressed_patch(
-    atlas: Atlas, points: NDArray[np.float64], forces: NDArray[np.float64], radius: float, convex: bool
-) -> Sources:
-    """Spread the forces of a pair's contacts over the patch that they bound.
+@numba.njit(cache=True)
+def _squared_distance(points, i, j):
+    total = 0.0
+    for k in range(3):
+        total += (points[i, k] - points[j, k]) ** 2
+    return total
+
+
+class Patch:
+    """The patch that the contacts of a pair bound.
 
     Contacts mark the corners of the patch. Between two of them a convex body touches as well, provided that the
     target's surface is there. The force is spread as the middle of two contacts drawn at random, each with a chance in
@@ -56,8 +77,6 @@ def pressed_patch(
 
     Parameters
     ----------
-    atlas : Atlas
-        Of the target.
     points : [k, 3]
         Contact points near the surface, in the target's frame [m].
     forces : [k]
@@ -67,42 +86,55 @@ def pressed_patch(
     convex : bool
         Whether the body is convex.
 
-    Returns
-    -------
-    points, forces, radius
-        At most 36 sources, and their footprint radius, which grows with the patch.
+    Attributes
+    ----------
+    probes : float64 [m, 3]
+        Points whose distances from the surface decide over the patch [m]: the corners, and the middles of all pairs.
     """
-    corners, loads = cluster(points, forces, radius)
-    count = len(loads)
-    if count == 1 or not convex:
-        return corners, loads, radius
-    first, second = np.triu_indices(count, 1)
-    between = (corners[first] + corners[second]) / 2
-    surface, _ = atlas.project(np.concatenate([corners, between]))
-    # contact points lie a little outside of the surface, by up to their depth: so may the middles
-    depth = np.linalg.norm(surface[:count] - corners, axis=1).max()
-    touching = np.linalg.norm(surface[count:] - between, axis=1) <= depth + radius / 10
-    share = loads[first] * loads[second] / loads.sum()
-    # where they do not touch between two contacts, the contacts keep their shares
-    kept = share * ~touching
-    own = loads**2 / loads.sum() + np.bincount(first, kept, count) + np.bincount(second, kept, count)
-    nodes = np.concatenate([corners, between[touching]])
-    weights = np.concatenate([own, 2 * share[touching]])
-    if not touching.all():
-        return nodes, weights, radius
-    size = float(np.linalg.norm(corners[first] - corners[second], axis=1).max())
-    middle = loads @ corners / loads.sum()
-    radius = max(radius, _OVERLAP * size)
-    nodes = middle + _INSET * (nodes - middle)
-    near = np.linalg.norm(nodes[:, None] - nodes[None], axis=2) <= size / 8
-    return *_joined(nodes, weights, near.argmax(axis=1)), radius
+
+    def __init__(self, points: NDArray[np.float64], forces: NDArray[np.float64], radius: float, convex: bool) -> None:
+        self._corners, self._loads = cluster(points, forces, radius)
+        self._radius = radius
+        self.probes = self._corners
+        if convex and len(self._loads) > 1:
+            self._first, self._second = np.triu_indices(len(self._loads), 1)
+            middles = (self._corners[self._first] + self._corners[self._second]) / 2
+            self.probes = np.concatenate([self._corners, middles])
+
+    def sources(self, surface: NDArray[np.float64]) -> Sources:
+        """What presses, told from the surface points nearest to `probes`.
+
+        Returns
+        -------
+        points, forces, radius
+            At most 36 sources [m], [N], and their footprint radius [m], which grows with the patch.
+        """
+        corners, loads, radius, count = self._corners, self._loads, self._radius, len(self._loads)
+        if len(self.probes) == count:
+            return corners, loads, radius
+        away = np.linalg.norm(surface - self.probes, axis=1)
+        # contact points lie a little outside of the surface, by up to their depth: so may the middles
+        touching = away[count:] <= away[:count].max() + radius / 10
+        share = loads[self._first] * loads[self._second] / loads.sum()
+        # where they do not touch between two contacts, the contacts keep their shares
+        kept = share * ~touching
+        own = loads**2 / loads.sum() + np.bincount(self._first, kept, count) + np.bincount(self._second, kept, count)
+        nodes = np.concatenate([corners, self.probes[count:][touching]])
+        weights = np.concatenate([own, 2 * share[touching]])
+        if not touching.all():
+            return nodes, weights, radius
+        size = float(np.linalg.norm(corners[self._first] - corners[self._second], axis=1).max())
+        middle = loads @ corners / loads.sum()
+        nodes = middle + _INSET * (nodes - middle)
+        return *_joined(nodes, weights, size / 8), max(radius, _OVERLAP * size)
 
 
 def _joined(
-    points: NDArray[np.float64], forces: NDArray[np.float64], owner: NDArray[np.int64]
+    points: NDArray[np.float64], forces: NDArray[np.float64], near: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Force-weighted means and sums of the points that have the same owner."""
-    _, owner = np.unique(owner, return_inverse=True)
+    """Force-weighted means and sums of the points, each joined with the first one that is near [m]."""
+    close = np.linalg.norm(points[:, None] - points[None], axis=2) <= near
+    _, owner = np.unique(close.argmax(axis=1), return_inverse=True)
     total = np.bincount(owner, forces).astype(np.float64)
     means = [np.bincount(owner, forces * points[:, axis]) / total for axis in range(3)]
     return np.stack(means, axis=1), total

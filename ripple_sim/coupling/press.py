@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver import WaveSolver
-from ripple_sim.solver.waves.footprint import footprint
+from ripple_sim.solver.waves.footprint import footprint_at
+from ripple_sim.solver.waves.load import Load, add_up
 
 # A hit is over within this time [s]; until then the surface feels every force as it is.
 ONSET = 0.1
@@ -36,25 +37,27 @@ class Press:
 
     Attributes
     ----------
-    spread : (int64 [n], float64 [n])
-        Texels of the latest contact, and each one's share of its force.
+    latest : Load
+        How the body pressed in its latest contact, before that is smoothed.
     """
 
     def __init__(self, waves: WaveSolver) -> None:
-        self._atlas = waves.atlas
-        self._carried = (waves.atlas.areas * waves.operator.carries).reshape(-1)
-        self.spread = np.zeros(0, np.int64), np.zeros(0)
-        self._sources: list[_Source] = []
+        self.take(waves)
+        self.latest = Load.none()
         self._texels = np.zeros(0, np.int64)
         self._rate = self._debt = np.zeros(0)
         self._middle: NDArray[np.float64] | None = None
         self._anchor = np.zeros(3)
         self._age = self._absent = 0.0
 
-    def press(
-        self, points: NDArray[np.float64], forces: NDArray[np.float64], radius: float, dt: float
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Forces on the texels over a step in which the body touches.
+    def take(self, waves: WaveSolver) -> None:
+        """Press on other waves of the same atlas from now on: what is owed stays owed."""
+        self._atlas = waves.atlas
+        self._carried = (waves.atlas.areas * waves.operator.carries).reshape(-1)
+        self._sources: list[_Source] = []
+
+    def press(self, points: NDArray[np.float64], forces: NDArray[np.float64], radius: float, dt: float) -> Load:
+        """Load over a step in which the body touches.
 
         Parameters
         ----------
@@ -66,19 +69,11 @@ class Press:
             Footprint radius of every source [m].
         dt : float
             Time step [s].
-
-        Returns
-        -------
-        texels : int64 [n]
-            Flat indices, ascending.
-        forces : float64 [n]
-            [N], positive inwards.
         """
-        self._sources = [self._footprint(point, radius) for point in points]
-        texels, where = np.unique(np.concatenate([source.texels for source in self._sources]), return_inverse=True)
-        loads = np.concatenate([force * source.shares for force, source in zip(forces, self._sources, strict=True)])
-        pressed = np.bincount(where, loads, len(texels)).astype(np.float64)
-        self.spread = texels, pressed / forces.sum()
+        self._sources = self._footprints(points, radius)
+        self.latest = Load.together(
+            [Load(source.texels, force * source.shares) for source, force in zip(self._sources, forces, strict=True)]
+        )
         middle = forces @ points / forces.sum()
         if self._middle is None:
             self._middle = self._anchor = middle
@@ -86,62 +81,71 @@ class Press:
         if np.linalg.norm(self._middle - self._anchor) > radius / 2:
             self._anchor, self._age = self._middle, 0.0
         self._absent = 0.0
-        return self._follow(texels, pressed, dt)
+        return self._follow(self.latest, dt)
 
-    def release(self, dt: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Forces on the texels over a step in which the body does not touch."""
+    def release(self, dt: float) -> Load:
+        """Load over a step in which the body does not touch."""
         self._absent += dt
         if self._absent > _LEFT and self._middle is not None:
             self._age, self._middle = 0.0, None
-        return self._follow(self._texels[:0], self._debt[:0], dt)
+        return self._follow(Load.none(), dt)
 
     @property
     def over(self) -> bool:
         """Whether the body has left and nothing is owed."""
         return self._absent > _LEFT and not self._debt.any()
 
-    def _follow(
-        self, texels: NDArray[np.int64], forces: NDArray[np.float64], dt: float
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        self._cover(texels)
-        present = np.zeros(len(self._texels))
-        present[np.searchsorted(self._texels, texels)] = forces
+    def _follow(self, present: Load, dt: float) -> Load:
         left = ONSET - self._age
         self._age += dt
+        if left > 0 and not self._debt.any():
+            self._texels, self._rate, self._debt = present.texels, present.forces, np.zeros(len(present.texels))
+            return present
+        rate, debt, now = self._at_all_texels(present)
         if left > 0:
             # what is owed from before is paid in even parts until this time is over
-            paid = self._debt * min(1.0, dt / left)
-            self._debt, self._rate = self._debt - paid, present
-            return self._texels, present + paid / dt
+            paid = debt * min(1.0, dt / left)
+            self._rate, self._debt = now, debt - paid
+            return Load(self._texels, now + paid / dt)
         pace = min(max(_FOLLOW / self._age, _SLOWEST), 0.5 / dt)
-        self._rate = self._rate + dt * (pace**2 * self._debt + 2 * pace * (present - self._rate))
-        self._debt = self._debt + dt * (present - self._rate)
-        return self._texels, self._rate
+        self._rate = rate + dt * (pace**2 * debt + 2 * pace * (now - rate))
+        self._debt = debt + dt * (now - self._rate)
+        return Load(self._texels, self._rate)
 
-    def _cover(self, texels: NDArray[np.int64]) -> None:
-        """Keep the texels that something is owed to or that still are pressed upon, and add others."""
-        if len(texels) == len(self._texels) and np.array_equal(texels, self._texels):
-            return
+    def _at_all_texels(self, present: Load) -> NDArray[np.float64]:
+        """Rate, debt and present force, [3, k], on the texels of all three; those that hold nothing any more go."""
         kept = (self._debt != 0) | (self._rate != 0)
-        wanted = np.union1d(self._texels[kept], texels)
-        rate, debt = np.zeros(len(wanted)), np.zeros(len(wanted))
-        place = np.searchsorted(wanted, self._texels[kept])
-        rate[place], debt[place] = self._rate[kept], self._debt[kept]
-        self._texels, self._rate, self._debt = wanted, rate, debt
+        before = self._texels[kept]
+        values = np.zeros((3, len(before) + len(present.texels)))
+        values[0, : len(before)], values[1, : len(before)] = self._rate[kept], self._debt[kept]
+        values[2, len(before) :] = present.forces
+        self._texels, values = add_up(np.concatenate([before, present.texels]), values, self._carried.size)
+        return values
 
-    def _footprint(self, point: NDArray[np.float64], radius: float) -> _Source:
+    def _footprints(self, points: NDArray[np.float64], radius: float) -> list[_Source]:
+        found = [self._used_before(point, radius) for point in points]
+        missing = [i for i, source in enumerate(found) if source is None]
+        if missing:
+            closest, centers = self._atlas.nearest(points[missing])
+            for i, place, center in zip(missing, closest, centers.tolist(), strict=True):
+                where = footprint_at(self._atlas, place, center, radius)
+                found[i] = _Source(
+                    point=points[i],
+                    radius=radius,
+                    tolerance=_SAME_PLACE * float(np.sqrt(self._atlas.areas.flat[center])),
+                    texels=where.texels,
+                    shares=where.weights * self._carried[where.texels],
+                )
+        return [source for source in found if source is not None]
+
+    def _used_before(self, point: NDArray[np.float64], radius: float) -> _Source | None:
         for source in self._sources:
-            moved = np.abs(source.point - point).max()
-            if moved <= source.tolerance and abs(source.radius - radius) <= source.tolerance:
+            if (
+                abs(source.radius - radius) <= source.tolerance
+                and np.abs(source.point - point).max() <= source.tolerance
+            ):
                 return source
-        where = footprint(self._atlas, point, radius)
-        return _Source(
-            point=point,
-            radius=radius,
-            tolerance=_SAME_PLACE * float(np.sqrt(self._atlas.areas.flat[where.center])),
-            texels=where.texels,
-            shares=where.weights * self._carried[where.texels],
-        )
+        return None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver import WaveSolver
+from ripple_sim.solver.waves.load import Load
 
 from .contacts import ContactPair
-
-Load = tuple[NDArray[np.int64], NDArray[np.float64]]
+from .sources import Touch
 
 
 class PushBack:
@@ -30,33 +32,38 @@ class PushBack:
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
         self._applied = np.zeros((model.nbody, 6))
-        self.loads: dict[int, list[Load]] = {}
+        self._loads: list[tuple[int, Load]] = []
 
-    def withdraw(self, data: mujoco.MjData) -> dict[int, list[Load]]:
-        """Take back the forces on the bodies, and give those on the targets' texels over the step just made [N]."""
+    def withdraw(self, data: mujoco.MjData) -> list[tuple[int, Load]]:
+        """Take back the forces on the bodies, and give those on the targets over the step just made, by geom id."""
         data.xfrc_applied -= self._applied
         return self.forget()
 
-    def forget(self) -> dict[int, list[Load]]:
+    def forget(self) -> list[tuple[int, Load]]:
         """As `withdraw`, where MuJoCo has cleared its forces already."""
         self._applied[:] = 0
-        loads, self.loads = self.loads, {}
+        loads, self._loads = self._loads, []
         return loads
 
-    def apply(self, data: mujoco.MjData, contacts: list[tuple[ContactPair, WaveSolver, Load]]) -> None:
-        """Set the forces for the next step, from pairs that touch and the share of each texel in their contact."""
-        velocities = {pair.target: waves.velocity.reshape(-1) for pair, waves, _ in contacts}
-        for pair, waves, (texels, shares) in contacts:
-            mass = waves.operator.mass.reshape(-1)[texels]
-            if not (shares**2).any():
+    def apply(self, data: mujoco.MjData, touches: Sequence[Touch], waves: Mapping[int, WaveSolver]) -> None:
+        """Set the forces for the next step, from what touches and the waves of each target, by geom id."""
+        velocities = {touch.pair.target: waves[touch.pair.target].velocity.reshape(-1) for touch in touches}
+        for touch in touches:
+            mass = waves[touch.pair.target].operator.mass.reshape(-1)
+            load = touch.load.merged(mass.size)
+            pressed = load.forces.sum()
+            if pressed <= 0:
                 continue
-            patch_mass = 1 / float((shares**2 / mass).sum())
-            outward = float(shares @ velocities[pair.target][texels])
+            shares = load.forces / pressed
+            patch_mass = 1 / float((shares**2 / mass[load.texels]).sum())
+            outward = float(shares @ velocities[touch.pair.target][load.texels])
             if outward > 0:
-                self._exchange(data, pair, patch_mass, outward, (texels, shares))
+                self._exchange(data, touch.pair, patch_mass, outward, Load(load.texels, shares))
         data.xfrc_applied += self._applied
 
-    def _exchange(self, data: mujoco.MjData, pair: ContactPair, patch_mass: float, outward: float, where: Load) -> None:
+    def _exchange(
+        self, data: mujoco.MjData, pair: ContactPair, patch_mass: float, outward: float, shares: Load
+    ) -> None:
         model = self._model
         point = pair.forces @ pair.points / pair.forces.sum()
         normal = pair.forces @ pair.normals
@@ -74,8 +81,7 @@ class PushBack:
             if index:
                 self._applied[index, :3] += sign * force * normal
                 self._applied[index, 3:] += sign * force * np.cross(point - data.xipos[index], normal)
-        texels, shares = where
-        self.loads.setdefault(pair.target, []).append((texels, force * shares))
+        self._loads.append((pair.target, Load(shares.texels, force * shares.forces)))
 
 
 def _jacobian(model: mujoco.MjModel, data: mujoco.MjData, body: int, point: NDArray[np.float64]) -> NDArray[np.float64]:

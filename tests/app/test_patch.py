@@ -3,11 +3,16 @@
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.patch import MAX_CONTACTS, cluster, pressed_patch
+from ripple_sim.coupling.patch import MAX_CONTACTS, Patch, Sources, cluster
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas
 
 SQUARE = 0.1 * np.array([[-1, -1, 5], [1, -1, 5], [-1, 1, 5], [1, 1, 5]])
+
+
+def pressed_patch(atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: float, convex: bool) -> Sources:
+    patch = Patch(points, forces, radius, convex)
+    return patch.sources(atlas.project(patch.probes)[0])
 
 
 @pytest.fixture(scope="module")

@@ -92,8 +92,8 @@ def given_over_time(forces: np.ndarray, dt: float) -> np.ndarray:
     given = []
     for force in np.concatenate([forces, np.zeros(round(1.0 / dt))]):
         point, load = np.array([[0.0, 0.0, 1.0]]), np.array([force])
-        _, out = press.press(point, load, 0.3, dt) if force > 0 else press.release(dt)
-        given.append(out.sum())
+        out = press.press(point, load, 0.3, dt) if force > 0 else press.release(dt)
+        given.append(out.forces.sum())
     assert press.over
     return np.array(given)
 
@@ -133,7 +133,7 @@ def test_a_body_that_slides_presses_where_it_is() -> None:
     for step in range(1500):
         angle = 0.5 * step * 0.002
         point = np.array([[np.sin(angle), 0.0, np.cos(angle)]])
-        texels, forces = press.press(point, np.array([2.0]), 0.2, 0.002)
+        load = press.press(point, np.array([2.0]), 0.2, 0.002)
         if step * 0.002 > ONSET:
-            middle = forces @ atlas.positions.reshape(-1, 3)[texels] / forces.sum()
+            middle = load.forces @ atlas.positions.reshape(-1, 3)[load.texels] / load.forces.sum()
             assert np.linalg.norm(middle - point) < 0.1

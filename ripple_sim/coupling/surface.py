@@ -1,0 +1,84 @@
+"""One rippling geom: its waves, and the material that may change while they run."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ripple_sim.solver import Material, WaveSolver
+from ripple_sim.solver.waves.footprint import footprint
+
+from .target import target_atlas
+
+
+class RippleSurface:
+    """The surface of a geom that carries waves.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    geom : int
+        Geom id.
+    material : Material
+    resolution : int
+        Of the atlas.
+    options : mapping
+        Keyword arguments of `WaveSolver`.
+
+    Attributes
+    ----------
+    waves : WaveSolver
+        A new one after each change, in the state of the old one.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, geom: int, material: Material, resolution: int, options: Mapping[str, Any]
+    ) -> None:
+        self._model, self._geom, self._material, self._options = model, geom, material, dict(options)
+        self._rigid: NDArray[np.bool_] | None = None
+        self.waves = WaveSolver(target_atlas(model, geom, resolution), material, **options)
+
+    def change_material(self, **coefficients: Any) -> None:
+        """Change coefficients of the material, by their names in `Material`."""
+        self._renew(dataclasses.replace(self._material, **coefficients), self._rigid, self._options)
+
+    def change_operator(self, operator: str) -> None:
+        """Take another wave operator, by its name in `WaveSolver`."""
+        self._renew(self._material, self._rigid, {**self._options, "operator": operator})
+
+    def make_rigid(self, point: ArrayLike, radius: float) -> None:
+        """Let a disc carry no waves, of a radius [m] round a point [m] in the frame of the geom."""
+        atlas = self.waves.atlas
+        rigid = np.zeros(atlas.areas.shape, bool) if self._rigid is None else self._rigid.copy()
+        rigid.reshape(-1)[footprint(atlas, point, radius).texels] = True
+        self._renew(self._material, rigid, self._options)
+
+    def to_geom(self, point: ArrayLike) -> NDArray[np.float64]:
+        """Carry a point [m] from the frame of the geom's body to that of the geom."""
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, self._model.geom_quat[self._geom])
+        return (np.asarray(point, dtype=np.float64) - self._model.geom_pos[self._geom]) @ rotation.reshape(3, 3)
+
+    def _renew(self, material: Material, rigid: NDArray[np.bool_] | None, options: dict[str, Any]) -> None:
+        """Make the solver anew; nothing has changed if that fails."""
+        old, whole = self.waves, material
+        if rigid is not None:
+            # a region that nothing pulls on takes up nothing, and without viscosity nothing drags it along either
+            coefficients = ("speed", "stiffness", "bending", "viscosity")
+            material = dataclasses.replace(
+                material,
+                **{
+                    name: material.texels(name, old.atlas.resolution) * ~rigid
+                    for name in coefficients
+                    if np.any(getattr(material, name))
+                },
+            )
+        new = WaveSolver(old.atlas, material, **options)
+        new.height, new.velocity, new.pressure = old.height, old.velocity, old.pressure
+        new.time, new.substeps_taken = old.time, old.substeps_taken
+        self.waves, self._material, self._rigid, self._options = new, whole, rigid, options
