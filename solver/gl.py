@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import functools
 import importlib.resources
 import threading
 from collections.abc import Callable
@@ -22,8 +23,9 @@ _LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl":
 class GLContext:
     """One headless OpenGL 4.3 context on EGL, shared by the GPU wave solver and the renderer.
 
-    Use it as a context manager: entering makes the context current and returns the `moderngl.Context`; leaving
-    restores the previous one and raises `GLError` if the driver recorded an error meanwhile.
+    Use it as a context manager: entering makes the context current, frees what Python has let go of, and returns the
+    `moderngl.Context`; leaving the outermost block restores the previous context and raises `GLError` if the driver
+    recorded an error meanwhile.
 
     Parameters
     ----------
@@ -33,17 +35,21 @@ class GLContext:
     Raises
     ------
     GLError
-        If no EGL device gives an OpenGL 4.3 core context.
+        If no EGL device gives an OpenGL 4.3 core context; at entering, if the context was lost.
     """
 
     def __init__(self, device: int | None = None) -> None:
         self._ctx = _create_context(device)
+        # objects may be collected in any thread, at any time; they are freed when the context is next entered
+        self._ctx.gc_mode = "context_gc"
+        self._handle = _current_context()
         info = self._ctx.info
         self.renderer: str = info["GL_RENDERER"]
         self.vendor: str = info["GL_VENDOR"]
         self.version: str = info["GL_VERSION"]
         self._depth = 0
         self._finish = _find_finish()
+        self._shared_shaders: dict[str, moderngl.ComputeShader] = {}
 
     @property
     def software(self) -> bool:
@@ -54,16 +60,34 @@ class GLContext:
     def __enter__(self) -> moderngl.Context:
         if self._depth == 0:
             self._ctx.__enter__()
+            if _current_context() != self._handle:
+                raise GLError(
+                    f"the OpenGL context on {self.renderer} is lost; something else in this process has ended EGL (a "
+                    "pyvista or VTK window does): run one of the two in a process of its own"
+                )
+            self._free()
         self._depth += 1
         return self._ctx
 
-    def __exit__(self, *exc: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, traceback: Any) -> None:
         self._depth -= 1
-        error = self._ctx.error
-        if self._depth == 0:
-            self._ctx.__exit__(*exc)
-        if error != "GL_NO_ERROR" and exc[0] is None:
-            raise GLError(f"OpenGL reported {error} on {self.renderer}; see `ripple-sim info`")
+        if self._depth:
+            return
+        recorded = self._ctx.error
+        self._ctx.__exit__(kind, error, traceback)
+        if recorded == "GL_OUT_OF_MEMORY":
+            raise GLError(
+                f"{self.renderer} is out of memory: take a lower resolution or smaller frames, or backend 'cpu'"
+            ) from error
+        if isinstance(error, moderngl.Error):
+            raise GLError(f"OpenGL failed on {self.renderer}: {error}; see `ripple-sim info`") from error
+        if recorded != "GL_NO_ERROR" and error is None:
+            raise GLError(f"OpenGL reported {recorded} on {self.renderer}; see `ripple-sim info`")
+
+    def barrier(self) -> None:
+        """Let what follows see what compute shaders have written."""
+        with self as ctx:
+            ctx.memory_barrier()
 
     def wait(self) -> None:
         """Return when the driver has done all that it was told, and let other Python threads run meanwhile.
@@ -78,9 +102,14 @@ class GLContext:
 
     def compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
         """Compile `shaders/{name}.glsl` of `package` as a compute shader with `#define`s put in."""
+        return self._compute_shader(name, load_shader(package, name, **defines))
+
+    def shared_compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
+        """Compile a compute shader, or return the one that was compiled before: set all uniforms before each use."""
         source = load_shader(package, name, **defines)
-        with self as ctx:
-            return _compiled(name, lambda: ctx.compute_shader(source))
+        if source not in self._shared_shaders:
+            self._shared_shaders[source] = self._compute_shader(name, source)
+        return self._shared_shaders[source]
 
     def program(self, package: str, vertex: str, fragment: str, **defines: object) -> moderngl.Program:
         """Compile and link a vertex and a fragment shader from `shaders/` of `package`."""
@@ -91,6 +120,17 @@ class GLContext:
                 f"{vertex} + {fragment}",
                 lambda: ctx.program(vertex_shader=vertex_source, fragment_shader=fragment_source),
             )
+
+    def _compute_shader(self, name: str, source: str) -> moderngl.ComputeShader:
+        with self as ctx:
+            return _compiled(name, lambda: ctx.compute_shader(source))
+
+    def _free(self) -> None:
+        """Free what Python has let go of; `moderngl.Context.gc` stumbles over what was released by hand."""
+        while self._ctx.objects:
+            collected = self._ctx.objects.popleft()
+            if hasattr(collected, "release"):
+                collected.release()
 
 
 def load_shader(package: str, name: str, **defines: object) -> str:
@@ -149,6 +189,22 @@ def _find_finish() -> Callable[[], None] | None:
             finish.restype = None
             return finish
     return None
+
+
+def _current_context() -> int | None:
+    """Handle of the EGL context that is current in this thread; None if there is none."""
+    return _egl().eglGetCurrentContext()
+
+
+@functools.cache
+def _egl() -> ctypes.CDLL:
+    """The library that moderngl has loaded already."""
+    for libraries in _LIBRARIES:
+        with contextlib.suppress(OSError):
+            egl = ctypes.CDLL(libraries.get("libegl", "libEGL.so"))
+            egl.eglGetCurrentContext.restype = ctypes.c_void_p
+            return egl
+    raise GLError("the EGL library has vanished since the context was made; see `ripple-sim info`")
 
 
 _shared: dict[int | None, GLContext] = {}

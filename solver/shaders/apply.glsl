@@ -1,23 +1,27 @@
 #version 430
 // The stencil on a field, times a factor, written out or added.
-layout(std430, binding = 0) readonly buffer Field { vec4 x[]; };
-layout(std430, binding = 1) buffer Result { vec4 result[]; };
-layout(std430, binding = 3) readonly buffer Stencil { vec4 w[]; };
+layout(std430, binding = 0) readonly buffer Field { dvec4 x[]; };
+layout(std430, binding = 1) buffer Result { dvec4 result[]; };
+layout(std430, binding = 3) readonly buffer Stencil { dvec4 w[]; };
 #ifdef FACTOR
-layout(std430, binding = 4) readonly buffer Factor { vec4 factor[]; };
+layout(std430, binding = 4) readonly buffer Factor { dvec4 factor[]; };
 #endif
 
-void emit(int quad, vec4 here, vec4 force) {
+#include "eights.glsl"
+
+void emit(int eight, float here[8], float force[8]) {
 #ifdef FACTOR
-    force *= factor[quad];
+    float factors[8] = unpack(factor[eight]);
+    for (int i = 0; i < 8; i++) force[i] *= factors[i];
 #endif
 #ifdef SUBTRACT
-    force = -force;
+    for (int i = 0; i < 8; i++) force[i] = -force[i];
 #endif
 #ifdef ADD
-    force += result[quad];
+    float sum[8] = unpack(result[eight]);
+    for (int i = 0; i < 8; i++) force[i] += sum[i];
 #endif
-    result[quad] = force;
+    result[eight] = pack(force);
 }
 
 #include "block.glsl"

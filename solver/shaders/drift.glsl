@@ -1,16 +1,22 @@
 #version 430
 // v += shift where waves are carried, then h += dt v.
 layout(local_size_x = 64) in;
-layout(std430, binding = 0) buffer Height { vec4 h[]; };
-layout(std430, binding = 1) buffer Velocity { vec4 v[]; };
-layout(std430, binding = 2) readonly buffer Carries { vec4 carries[]; };
+layout(std430, binding = 0) buffer Height { dvec4 h[]; };
+layout(std430, binding = 1) buffer Velocity { dvec4 v[]; };
+layout(std430, binding = 2) readonly buffer Carries { dvec4 carries[]; };
 uniform float shift;
 uniform float dt;
 
+#include "eights.glsl"
+
 void main() {
-    uint quad = gl_GlobalInvocationID.x;
-    if (quad >= h.length()) return;
-    vec4 shifted = v[quad] + shift * carries[quad];
-    v[quad] = shifted;
-    h[quad] += dt * shifted;
+    uint eight = gl_GlobalInvocationID.x;
+    if (eight >= h.length()) return;
+    float height[8] = unpack(h[eight]), velocity[8] = unpack(v[eight]), carried[8] = unpack(carries[eight]);
+    for (int i = 0; i < 8; i++) {
+        velocity[i] += shift * carried[i];
+        height[i] += dt * velocity[i];
+    }
+    v[eight] = pack(velocity);
+    h[eight] = pack(height);
 }

@@ -1,33 +1,41 @@
 #version 430
-// v = decay v + gain force - spring h + push, then h_next = h + dt v.
-layout(std430, binding = 0) readonly buffer Height { vec4 x[]; };
-layout(std430, binding = 1) buffer Velocity { vec4 v[]; };
-layout(std430, binding = 2) writeonly buffer HeightNext { vec4 h_next[]; };
-layout(std430, binding = 3) readonly buffer Stencil { vec4 w[]; };
-layout(std430, binding = 4) readonly buffer Coefficients { vec4 coefficients[]; };  // gain, then decay, spring and push
+// v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v.
+layout(std430, binding = 0) readonly buffer Height { dvec4 x[]; };
+layout(std430, binding = 1) buffer Velocity { dvec4 v[]; };
+layout(std430, binding = 2) writeonly buffer HeightNext { dvec4 h_next[]; };
+layout(std430, binding = 3) readonly buffer Stencil { dvec4 w[]; };
+layout(std430, binding = 4) readonly buffer Coefficients { dvec4 coefficients[]; };  // gain, then decay, spring and span
 #ifdef EXTRA
-layout(std430, binding = 5) readonly buffer ExtraForce { vec4 extra[]; };
+layout(std430, binding = 5) readonly buffer ExtraForce { dvec4 extra[]; };
 #endif
-uniform float dt;
-#ifdef MAPS
-const int FIELD = 6 * (N + 2) * STRIDE / 4;
-#define DECAY coefficients[quad + FIELD]
-#define SPRING coefficients[quad + 2 * FIELD]
-#define PUSH coefficients[quad + 3 * FIELD]
-#else
-uniform float decay, spring, push;
-#define DECAY decay
-#define SPRING spring
-#define PUSH push
+uniform float dt, acceleration;
+#ifndef MAPS
+uniform float decay, spring, span;
 #endif
 
-void emit(int quad, vec4 here, vec4 force) {
+#include "eights.glsl"
+
+void emit(int eight, float here[8], float force[8]) {
+    float velocity[8] = unpack(v[eight]), gain[8] = unpack(coefficients[eight]), drifted[8];
 #ifdef EXTRA
-    force += extra[quad];
+    float more[8] = unpack(extra[eight]);
 #endif
-    vec4 kicked = DECAY * v[quad] + coefficients[quad] * force - SPRING * here + PUSH;
-    v[quad] = kicked;
-    h_next[quad] = here + dt * kicked;
+#ifdef MAPS
+    float decays[8] = unpack(coefficients[eight + FIELD]), springs[8] = unpack(coefficients[eight + 2 * FIELD]);
+    float spans[8] = unpack(coefficients[eight + 3 * FIELD]);
+#endif
+    for (int i = 0; i < 8; i++) {
+#ifdef EXTRA
+        force[i] += more[i];
+#endif
+#ifdef MAPS
+        float decay = decays[i], spring = springs[i], span = spans[i];
+#endif
+        velocity[i] = decay * velocity[i] + gain[i] * force[i] - spring * here[i] + span * acceleration;
+        drifted[i] = here[i] + dt * velocity[i];
+    }
+    v[eight] = pack(velocity);
+    h_next[eight] = pack(drifted);
 }
 
 #include "block.glsl"

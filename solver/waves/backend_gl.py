@@ -7,15 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gl import GLContext, shared_context
-from .gl_fields import FieldLayout, TexelList
-from .operator import StepCoefficients, WaveOperator, step_coefficients
+from .gl_fields import EIGHT, FieldLayout, TexelList
+from .operator import WaveOperator, step_coefficients
 
-# Texels that one thread updates: columns by fours, rows. A software driver pays for every load and has few threads; a
-# GPU wants many.
-_SOFTWARE_BLOCK, _HARDWARE_BLOCK = (4, 64), (1, 8)
+# Rows that one thread walks up, and threads of a group, in eights of columns and in blocks of rows (block.glsl). A
+# software driver has few threads and reads on where the last row ended; a GPU wants many.
+_SOFTWARE_BLOCK, _HARDWARE_BLOCK = (64, (8, 1)), (4, (8, 8))
 
-# Threads of a group, in columns and rows of blocks (block.glsl), and in a list.
-_GROUP = (8, 4)
+# Threads of a group that works through a list.
 _LIST_GROUP = 64
 
 
@@ -28,7 +27,7 @@ class GLBackend:
         self._gl = gl if gl is not None else shared_context()
         self._operator = operator
         self._fields = fields = FieldLayout(self._gl, operator.mass.shape[1])
-        self._quads, self._rows = _SOFTWARE_BLOCK if self._gl.software else _HARDWARE_BLOCK
+        self._rows, self._group = _SOFTWARE_BLOCK if self._gl.software else _HARDWARE_BLOCK
         self._viscous = self._laplace = self._dent = self._extra = None
         self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
         self._stencil = fields.upload_stencil(operator.stencil)
@@ -44,8 +43,6 @@ class GLBackend:
         if operator.yield_height is not None:
             self._dent, self._yield = fields.zeros(), fields.upload(operator.yield_height)
         self._compile()
-        self._kick_drift: moderngl.ComputeShader | None = None
-        self._coefficients: moderngl.Buffer | None = None
         self._shift = self._prepared_dt = 0.0
         self._waiting: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = []
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
@@ -136,13 +133,13 @@ class GLBackend:
         if dt or self._shift:
             self._drift["dt"], self._drift["shift"] = dt, self._shift
             self._bind(self._h, self._v, self._carries)
-            self._run_list(self._drift, self._fields.quads)
+            self._run_list(self._drift, self._fields.eights)
         self._shift = 0.0
 
     def _flow(self) -> None:
         if self._dent is not None:
             self._bind(self._h, self._dent, self._yield)
-            self._run_list(self._yielding, self._fields.quads)
+            self._run_list(self._yielding, self._fields.eights)
 
     def _gather_extra_forces(self) -> None:
         """Forces beside tension and stiffness: viscous, and of bending."""
@@ -158,44 +155,33 @@ class GLBackend:
             self._run_blocks(self._subtract_laplace)
 
     def _prepare(self, dt: float) -> moderngl.ComputeShader:
-        """Compile the kick for this material; upload its coefficients once a step length, the load once a load too."""
-        new_length = self._kick_drift is None or self._prepared_dt != dt
+        """Compile the kick for this material; upload its coefficients once a step length, and the load once."""
+        new_length = self._prepared_dt != dt
         if new_length:
-            self._step = step_coefficients(self._operator, dt)
+            self._step = k = step_coefficients(self._operator, dt)
+            self._maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
+            self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
             self._prepared_dt = dt
         k = self._step
-        maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
-        if self._kick_drift is None:
-            defines = {"EXTRA": self._extra, "MAPS": maps}
-            self._kick_drift = self._block_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
         if new_length or self._load_is_new:
-            self._upload(k, self._kick_drift, maps, new_length)
+            kicks = k.gain.reshape(-1)[self._loaded] * self._load_forces.astype(np.float32)
+            self._forces.set(self._fields.inside[self._loaded], kicks)
             self._load_is_new = False
-        return self._kick_drift
-
-    def _upload(self, k: StepCoefficients, kick_drift: moderngl.ComputeShader, maps: bool, new_length: bool) -> None:
-        push = np.float32(self._acceleration) * k.span
-        if not maps:
-            for name, value in (("decay", k.decay), ("spring", k.spring), ("push", push)):
-                kick_drift[name] = float(value)
-        # the push is a map among the others, or a number that leaves the maps as they are
-        if maps or new_length:
-            fields = (k.gain, k.decay, k.spring, push) if maps else (k.gain,)
-            coefficients = self._fields.pack(*fields)
-            with self._gl as ctx:
-                if self._coefficients is None:
-                    self._coefficients = ctx.buffer(coefficients)
-                else:
-                    self._coefficients.write(coefficients)
-        kicks = k.gain.reshape(-1)[self._loaded] * self._load_forces.astype(np.float32)
-        self._forces.set(self._fields.inside[self._loaded], kicks)
+        defines = {"EXTRA": self._extra, "MAPS": self._maps}
+        kick_drift = self._block_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
+        kick_drift["acceleration"] = self._acceleration
+        if not self._maps:
+            kick_drift["decay"], kick_drift["spring"], kick_drift["span"] = k.decay, k.spring, k.span
+        return kick_drift
 
     def _shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
-        return self._gl.compute_shader("ripple_sim.solver", name, **defines)
+        return self._gl.shared_compute_shader("ripple_sim.solver", name, **defines)
 
     def _block_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
-        fields = self._fields
-        return self._shader(name, N=fields.n, STRIDE=fields.stride, QUADS=self._quads, ROWS=self._rows, **defines)
+        fields, (columns, rows) = self._fields, self._group
+        strips = {"N": fields.n, "WIDTH": fields.width, "STRIDE": fields.stride, "FIELD": fields.eights}
+        block = {"ROWS": self._rows, "GROUP_COLUMNS": columns, "GROUP_ROWS": rows}
+        return self._shader(name, **strips, **block, **defines)
 
     def _kick_texels(self, kicks: TexelList, dt: float) -> None:
         if kicks.count:
@@ -214,14 +200,11 @@ class GLBackend:
                 buffer.bind_to_storage_buffer(binding)
 
     def _run_blocks(self, shader: moderngl.ComputeShader) -> None:
-        columns, rows = 4 * self._quads * _GROUP[0], self._rows * _GROUP[1]
-        shader.run(-(-self._fields.n // columns), -(-self._fields.n // rows), 6)
-        self._barrier()
+        columns, rows = self._group
+        fields = self._fields
+        shader.run(-(-fields.width // (EIGHT * columns)), -(-fields.n // (self._rows * rows)), fields.strips)
+        self._gl.barrier()
 
     def _run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
         shader.run(-(-count // _LIST_GROUP))
-        self._barrier()
-
-    def _barrier(self) -> None:
-        with self._gl as ctx:
-            ctx.memory_barrier()
+        self._gl.barrier()

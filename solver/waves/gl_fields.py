@@ -1,4 +1,4 @@
-"""Fields in storage buffers: faces with a ring round them, laid out to be read by fours."""
+"""Fields in storage buffers: faces cut into strips with a ring round each, laid out to be read by eights."""
 
 from __future__ import annotations
 
@@ -6,34 +6,41 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atlas.padding import padded_addresses
+from ..atlas.cubemap import padded_indices
 from ..gl import GLContext
 
-# A face's texels begin at this column, so that fours of them are aligned; the ring is left of it.
-_FIRST = 4
+# Floats that a thread reads at once. A strip's texels begin at this column, so that their eights are aligned; the ring
+# is left of it.
+EIGHT = 8
+
+# Columns of a strip, at most. A group of threads side by side walks up a strip, so its reads follow one another in
+# memory; on whole faces of 512 columns every row was a jump, and updates were half as many.
+_STRIP = 64
 
 
 class FieldLayout:
-    """Faces of [N + 2, stride] float32, the texels from row 1 and column 4 on.
+    """Strips of [N + 2, stride] float32, the texels from row 1 and column 8 on.
 
     Attributes
     ----------
-    n, stride, quads : int
-        Texels along an edge; floats in a row; fours of floats in a whole field.
+    n, width, stride, strips, eights : int
+        Texels along a face's edge; columns and floats in a strip's row; strips of all faces; eights of floats in a
+        whole field.
     inside : int64 [6 N^2]
         Address of every texel, by flat texel index.
     ring_pairs : moderngl.Buffer
-        (place in the ring, texel it shows), `ring_count` of them.
+        (place in the ring of a strip, texel it shows), `ring_count` of them.
     """
 
     def __init__(self, gl: GLContext, resolution: int) -> None:
         self._gl = gl
         self.n = n = resolution
-        # room for the ring on both sides, and for the fours that hang over where N is no multiple of four
-        self.stride = _FIRST + 4 * (-(-n // 4)) + 4
-        self.quads = 6 * (n + 2) * self.stride // 4
-        inside, ring, source = (self._address(places) for places in padded_addresses(n))
-        self.inside = inside
+        self._face_strips = -(-n // _STRIP)
+        self.strips = 6 * self._face_strips
+        self.width = EIGHT * -(-n // (EIGHT * self._face_strips))
+        self.stride = EIGHT + self.width + EIGHT
+        self.eights = self.strips * (n + 2) * self.stride // EIGHT
+        self.inside, ring, source = self._addresses()
         self.ring_count = len(ring)
         with gl as ctx:
             self.ring_pairs = ctx.buffer(np.stack([ring, source], axis=1).astype(np.int32).tobytes())
@@ -41,45 +48,68 @@ class FieldLayout:
     def zeros(self) -> moderngl.Buffer:
         """A field of zeros."""
         with self._gl as ctx:
-            return ctx.buffer(bytes(16 * self.quads))
+            return ctx.buffer(bytes(4 * EIGHT * self.eights))
 
-    def upload(self, field: NDArray) -> moderngl.Buffer:
-        """A field [6, N, N] with zeros round it."""
+    def upload(self, *fields: NDArray | np.float32) -> moderngl.Buffer:
+        """Fields [6, N, N], or numbers, one after the other, with zeros round them."""
         with self._gl as ctx:
-            return ctx.buffer(self.pack(field))
+            return ctx.buffer(self._pack(*fields))
 
     def upload_stencil(self, stencil: NDArray[np.float64]) -> moderngl.Buffer:
-        """The four links of a stencil that start in each place, side by side."""
-        places = np.zeros((6, self.n + 2, self.stride, 4), np.float32)
-        places[:, : self.n + 1, _FIRST - 1 : _FIRST + self.n] = np.moveaxis(stencil, 1, -1)
+        """The four links of a stencil that start in each place, side by side.
+
+        A column further to the right than the field: what a thread reads begins with the links of its west neighbours.
+        """
+        places = self._empty(4)
+        for strip, first, last in self._columns():
+            cells = stencil[..., first : last + 1]
+            places[:, strip, : self.n + 1, EIGHT : EIGHT + cells.shape[-1]] = np.moveaxis(cells, 1, -1)
         with self._gl as ctx:
             return ctx.buffer(places.tobytes())
-
-    def pack(self, *fields: NDArray | np.float32) -> bytes:
-        """Fields [6, N, N], or numbers, one after the other."""
-        packed = np.zeros((len(fields), 6, self.n + 2, self.stride), np.float32)
-        for place, field in zip(packed, fields, strict=True):
-            self._texels(place)[:] = field
-        return packed.tobytes()
 
     def read(self, buffer: moderngl.Buffer) -> NDArray[np.float32]:
         """A field's texels, [6, N, N]."""
         with self._gl:
-            padded = np.frombuffer(buffer.read(), np.float32).reshape(6, self.n + 2, self.stride)
-        return self._texels(padded).copy()
+            places = np.frombuffer(buffer.read(), np.float32)
+        return places[self.inside].reshape(6, self.n, self.n)
 
     def write(self, buffer: moderngl.Buffer, field: NDArray[np.float32]) -> None:
         """Replace a field's texels; the ring becomes 0."""
         with self._gl:
-            buffer.write(self.pack(field))
+            buffer.write(self._pack(field))
 
-    def _texels(self, padded: NDArray[np.float32]) -> NDArray[np.float32]:
-        return padded[:, 1:-1, _FIRST : _FIRST + self.n]
+    def _pack(self, *fields: NDArray | np.float32) -> bytes:
+        packed = np.stack([self._empty(1)] * len(fields))
+        for places, field in zip(packed, fields, strict=True):
+            for strip, first, last in self._columns():
+                texels = np.broadcast_to(field, (6, self.n, self.n))[:, :, first:last]
+                places[:, strip, 1:-1, EIGHT : EIGHT + last - first, 0] = texels
+        return packed.tobytes()
 
-    def _address(self, padded: NDArray[np.int64]) -> NDArray[np.int64]:
-        """From an address in [6, N + 2, N + 2] to one in this layout."""
-        row, column = np.divmod(padded, self.n + 2)
-        return row * self.stride + column + _FIRST - 1
+    def _empty(self, components: int) -> NDArray[np.float32]:
+        return np.zeros((6, self._face_strips, self.n + 2, self.stride, components), np.float32)
+
+    def _columns(self) -> list[tuple[int, int, int]]:
+        """(strip of a face, its first column, one after its last)."""
+        return [(s, s * self.width, min((s + 1) * self.width, self.n)) for s in range(self._face_strips)]
+
+    def _addresses(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """Where each texel lies, each place of a ring, and the texel that it shows."""
+        n = self.n
+        place = np.arange(EIGHT * self.eights).reshape(6, self._face_strips, n + 2, self.stride)
+        inside = np.empty((6, n, n), np.int64)
+        for strip, first, last in self._columns():
+            inside[:, :, first:last] = place[:, strip, 1:-1, EIGHT : EIGHT + last - first]
+        shown = padded_indices(n)
+        ring, source = [], []
+        for strip, first, last in self._columns():
+            columns = slice(first, last + 2)
+            own = np.zeros((6, n + 2, last + 2 - first), bool)
+            own[:, 1:-1, 1:-1] = True
+            exists = ~own & (shown[:, :, columns] >= 0)
+            ring.append(place[:, strip, :, EIGHT - 1 : EIGHT + last - first + 1][exists])
+            source.append(inside.reshape(-1)[shown[:, :, columns][exists]])
+        return inside.reshape(-1), np.concatenate(ring), np.concatenate(source)
 
 
 class TexelList:
@@ -96,8 +126,6 @@ class TexelList:
         self.count = len(places)
         with self._gl:
             if self.count > self._room:
-                self.places.release()
-                self.values.release()
                 self._room = 2 * self.count
                 self._reserve()
             if self.count:

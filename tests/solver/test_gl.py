@@ -1,0 +1,105 @@
+"""The OpenGL context: what it frees, and how it says that something went wrong."""
+
+import resource
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ripple_sim.solver import GLError, Material, WaveSolver, sphere_atlas
+from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.waves.backend import make_backend
+from ripple_sim.solver.waves.operator import build_operator
+
+
+def resident_bytes() -> int:
+    """Memory of this process, which holds the buffers of a software driver."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs /proc")
+def test_two_hundred_solvers_leave_nothing_on_the_gpu(gl_backend: str) -> None:
+    material = Material(speed=1.0, viscosity=1e-3, bending=1e-4)
+    operator = build_operator(sphere_atlas(1.0, 64), material, "fem")
+    one = 3 * operator.stencil.nbytes // 2  # its three stencils alone
+
+    def use_some(count: int) -> None:
+        for _ in range(count):
+            backend = make_backend(gl_backend, operator)
+            backend.kick(np.arange(5), np.ones(5, np.float32), 0.0)
+            backend.advance(2, 1e-6)
+            assert np.isfinite(backend.height()).all()
+
+    use_some(20)
+    before = resident_bytes()
+    use_some(200)
+    assert resident_bytes() - before < 20 * one
+
+
+def test_a_shared_shader_is_compiled_once(gl_backend: str) -> None:
+    gl = shared_context()
+    shaders = [gl.shared_compute_shader("ripple_sim.solver", name) for name in ("ring", "ring", "kick")]
+    assert shaders[0] is shaders[1] and shaders[0] is not shaders[2]
+    assert gl.compute_shader("ripple_sim.solver", "ring") is not shaders[0]
+
+
+def test_solvers_that_share_shaders_keep_their_own_coefficients(gl_backend: str) -> None:
+    atlas = sphere_atlas(1.0, 8)
+    materials = [Material(speed=1.0, damping=zeta) for zeta in (0.0, 3.0)]
+    height = np.random.default_rng(0).standard_normal((6, 8, 8)).astype(np.float32)
+
+    def run(backend: str) -> list[np.ndarray]:
+        solvers = [WaveSolver(atlas, material, backend=backend) for material in materials]
+        for waves in solvers:
+            waves.height = height
+        for _ in range(3):
+            for waves in solvers:
+                waves.step(0.05)
+        return [waves.height for waves in solvers]
+
+    for gl, cpu in zip(run(gl_backend), run("cpu"), strict=True):
+        np.testing.assert_allclose(gl, cpu, atol=1e-5)
+
+
+def test_running_out_of_memory_is_one_clear_error(gl_backend: str) -> None:
+    with pytest.raises(GLError, match=r"out of memory.*lower resolution"), shared_context() as ctx:
+        ctx.buffer(reserve=2**46)
+    with shared_context():
+        pass  # the error does not linger
+
+
+def test_what_moderngl_raises_becomes_one_error(gl_backend: str) -> None:
+    with pytest.raises(GLError, match="OpenGL failed on"), shared_context() as ctx:
+        ctx.buffer(b"1234").read(size=8)
+
+
+def test_lost_context_is_reported() -> None:
+    script = """
+        import ctypes, sys
+        from ripple_sim.solver import GLError, WaveSolver, sphere_atlas
+        from ripple_sim.solver import gl
+        try:
+            waves = WaveSolver(sphere_atlas(1.0, 8), backend="gl")
+        except GLError:
+            sys.exit(77)
+        egl = gl._egl()
+        for function in (egl.eglGetCurrentDisplay, egl.eglGetPlatformDisplay):
+            function.restype = ctypes.c_void_p
+        with gl.shared_context():
+            display = egl.eglGetCurrentDisplay()
+        none = ctypes.c_void_p(None)
+        egl.eglMakeCurrent(ctypes.c_void_p(display), none, none, none)
+        egl.eglTerminate(ctypes.c_void_p(display))
+        try:
+            waves.height
+        except GLError as error:
+            print(error)
+    """
+    result = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=60)
+    if result.returncode == 77:
+        pytest.skip("no OpenGL")
+    assert result.returncode == 0, result.stderr
+    assert "is lost" in result.stdout
