@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import mujoco
@@ -14,7 +14,9 @@ from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.waves.backend import auto_backend
 
 from .errors import SceneError
-from .frames import FrameSource, run
+from .overlay.comparison import compared_operators
+from .overlay.film import Film
+from .overlay.request import parse_request
 from .pipeline import Ahead
 from .provenance import provenance
 from .scene.scene import MAX_DURATION, Scene
@@ -62,6 +64,8 @@ def render_video(
     duration: float | None = None,
     slow_motion: float = 1.0,
     supersample: int = 1,
+    overlay: Sequence[str] | None = None,
+    compare: str | None = None,
     resolution: int | None = None,
     backend: str = "auto",
     resume: bool = False,
@@ -88,6 +92,10 @@ def render_video(
         Seconds of video for a second of the scene.
     supersample : int
         Frames are drawn so many times as wide and high, and averaged.
+    overlay : sequence of str, optional
+        What is drawn over the picture, instead of what the scene says; see `parse_request`.
+    compare : str, optional
+        Show a second run of the scene beside the first, with this baseline as wave operator; see `WaveSolver`.
     resolution, backend, on_step
         As for `Simulation`. While waves are computed on the CPU, `on_step` is called in a thread of its own.
     resume : bool
@@ -107,6 +115,8 @@ def render_video(
     mujoco.set_mju_user_warning(lambda message: None)
     output, (width, height) = Path(output), size
     check_output(output, width, height, fps)
+    overlay, operators = scene.overlay if overlay is None else overlay, compared_operators(compare)
+    request = parse_request(overlay)
     count = _frame_count(scene.duration if duration is None else duration, fps, slow_motion)
     gl = shared_context()
     job = {
@@ -115,6 +125,8 @@ def render_video(
         "the number of frames": count,
         "the slow motion": slow_motion,
         "the supersampling": supersample,
+        "the overlays": ",".join(overlay),
+        "the operators": ",".join(operators),
         "the resolution": resolution or "the scene's",
         "the wave solver": auto_backend() if backend == "auto" else backend,
         **provenance(scene, gl),
@@ -122,18 +134,32 @@ def render_video(
     render_seconds = 0.0
     with open_writer(output, width=width, height=height, fps=fps, job=job, resume=resume) as writer:
         resumed_at = writer.frames
-        simulation = Simulation(scene, fps=fps * slow_motion, resolution=resolution, backend=backend, on_step=on_step)
-        frames = FrameSource(simulation, width=width, height=height, supersample=supersample, gl=gl)
+        rate = fps * slow_motion
+        simulations = [
+            Simulation(scene, fps=rate, resolution=resolution, backend=backend, operator=operator, on_step=on_step)
+            for operator in operators
+        ]
+        film = Film(
+            simulations,
+            request,
+            width=width,
+            height=height,
+            frames=count,
+            rate=rate,
+            operators=operators,
+            supersample=supersample,
+            gl=gl,
+        )
         ready = time.perf_counter()
-        states = run(simulation, count, alive=_WAITING + 2)
+        states = film.states(alive=_WAITING + 2)
         # waves on the GPU share the renderer's OpenGL context, which belongs to one thread at a time
-        with Ahead(states, _WAITING) if simulation.backend == "cpu" else contextlib.nullcontext(states) as states:
+        with Ahead(states, _WAITING) if simulations[0].backend == "cpu" else contextlib.nullcontext(states) as states:
             for state in states:
                 if state.number % _CHECKED == 0:
                     writer.check_state(state.number, state.digest())
                 if state.number >= resumed_at:
                     before = time.perf_counter()
-                    frame = frames.draw(state)
+                    frame = film.draw(state)
                     render_seconds += time.perf_counter() - before
                     writer.write(frame)
                 if progress is not None:
@@ -143,11 +169,11 @@ def render_video(
         frames=count,
         resumed_at=resumed_at,
         renderer=gl.renderer,
-        backend=simulation.backend,
-        substeps_per_frame=simulation.substeps_taken / max(count - 1, 1),
+        backend=simulations[0].backend,
+        substeps_per_frame=sum(simulation.substeps_taken for simulation in simulations) / max(count - 1, 1),
         setup_seconds=ready - start,
-        physics_seconds=simulation.physics_seconds,
-        wave_seconds=simulation.wave_seconds,
+        physics_seconds=sum(simulation.physics_seconds for simulation in simulations),
+        wave_seconds=sum(simulation.wave_seconds for simulation in simulations),
         render_seconds=render_seconds,
         encode_seconds=writer.encode_seconds,
         wall_seconds=time.perf_counter() - start,

@@ -11,6 +11,7 @@ from tyro.conf import arg
 from tyro.constructors import PrimitiveConstructorSpec
 
 from ..orientation import UP_AXES
+from ..overlay.comparison import BASELINES
 
 
 def parse_size(word: str) -> tuple[int, int]:
@@ -71,6 +72,11 @@ def parse_axis(word: str) -> str:
     return word
 
 
+def parse_overlay(word: str) -> tuple[str, ...]:
+    """Read a list of overlays, at commas; it is checked where it is used."""
+    return tuple(part.strip() for part in word.split(",")) if word.strip() else ()
+
+
 def _one_word(
     parse: Callable[[str], Any], metavar: str, show: Callable[[Any], str] = str
 ) -> PrimitiveConstructorSpec[Any]:
@@ -89,6 +95,16 @@ Seed = Annotated[int, _one_word(parse_seed, "N")]
 FrameRate = Annotated[int | None, _one_word(parse_count, "FPS"), arg(help_behavior_hint="(default: 60, for a GIF 25)")]
 Duration = Annotated[float | None, _one_word(parse_seconds, "S"), arg(help_behavior_hint="(default: the scene's)")]
 Resolution = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's)")]
+Overlay = Annotated[
+    tuple[str, ...] | None,
+    _one_word(parse_overlay, "NAME[,NAME ...]", lambda words: ",".join(words or ())),
+    arg(help_behavior_hint="(default: the scene's, or none)"),
+]
+Baseline = Annotated[
+    str | None,
+    _one_word(str, "{" + ",".join(BASELINES) + "}", lambda name: name or ""),
+    arg(help_behavior_hint="(optional)"),
+]
 Factor = Annotated[float, _one_word(parse_factor, "F")]
 Supersample = Annotated[int, _one_word(parse_supersample, "N")]
 Device = Annotated[int | None, _one_word(parse_seed, "N"), arg(help_behavior_hint="(default: the first that works)")]

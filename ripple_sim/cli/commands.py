@@ -14,7 +14,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
-from .arguments import Count, Device, Duration, Factor, FrameRate, Resolution, Seed, Size, Supersample, UpAxis
+from .arguments import (
+    Baseline,
+    Count,
+    Device,
+    Duration,
+    Factor,
+    FrameRate,
+    Overlay,
+    Resolution,
+    Seed,
+    Size,
+    Supersample,
+    UpAxis,
+)
 from .view_command import View
 
 if TYPE_CHECKING:
@@ -38,6 +51,11 @@ class _Video:
     """Seconds of video for a second of the scene: 4 is four times slower."""
     supersample: Supersample = 1
     """Draw frames so many times as wide and high, and average: finer edges and highlights."""
+    overlay: Overlay = None
+    """Draw over the picture: height or velocity in colours, contacts, grid, time, energy; such as
+    height,contacts,time or velocity=0.5,energy, where 0.5 m/s is the end of the colours."""
+    compare: Baseline = None
+    """Show beside it the same scene with this other wave operator."""
     camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
     """Look through this camera of the MJCF."""
     resolution: Resolution = None
@@ -55,9 +73,14 @@ class _Video:
 
     def run(self) -> None:
         """Render the scene and print a summary."""
+        from ..overlay.comparison import compared_operators
+        from ..overlay.request import parse_request
         from ..video import check_output, default_fps
 
         # Before anything that takes time.
+        if self.overlay is not None:
+            parse_request(self.overlay)
+        compared_operators(self.compare)
         fps = self.fps or default_fps(self.output)
         check_output(self.output, *self.size, fps)
 
@@ -82,6 +105,8 @@ class _Video:
                 duration=self.duration,
                 slow_motion=self.slow_motion,
                 supersample=self.supersample,
+                overlay=self.overlay,
+                compare=self.compare,
                 resolution=self.resolution,
                 backend=backend,
                 resume=self.resume,
@@ -214,7 +239,14 @@ class Bench:
         print(json_format.dumps(report, indent=2) if self.json else as_text(report))
 
 
-COMMANDS: dict[str, Callable[..., Any]] = {"render": Render, "drop": Drop, "atlas": Atlas, "info": Info, "bench": Bench, "view": View}
+COMMANDS: dict[str, Callable[..., Any]] = {
+    "render": Render,
+    "drop": Drop,
+    "atlas": Atlas,
+    "info": Info,
+    "bench": Bench,
+    "view": View,
+}
 
 
 def _summary_text(summary: Summary) -> str:

@@ -14,6 +14,7 @@ from ..frames import FrameSource, Snapshot, run
 from ..render import Surface
 from ..simulation import Simulation
 from .colormap import color_table
+from .comparison import TITLES
 from .field import grid_spacing
 from .layout import Layout
 from .marks import draw_marks
@@ -22,14 +23,6 @@ from .painter import Painter
 from .patch import PAPER
 from .projection import Projection
 from .request import Request
-
-# What the runs of a comparison are called, and a word about each.
-TITLES = {
-    "fem": ("ripple-sim", "finite elements"),
-    "paper": ("paper", "real distances, 4 neighbours"),
-    "uncorrected": ("uncorrected", "one distance everywhere"),
-    "dynamic-paint": ("Dynamic Paint", "real distances, 8 neighbours"),
-}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,7 +58,7 @@ class Film:
     rate : float
         Frames in a second of the scene's time.
     operators : sequence of str
-        Those of the runs, where there are two: their titles follow from them.
+        Those of the runs, for their titles where there are two.
     supersample : int
         As for `FrameSource`.
     gl : GLContext, optional
@@ -105,7 +98,7 @@ class Film:
             self._layout,
             duration=frames / rate,
             spacing=_common_spacing(simulations[0]),
-            titles=[TITLES[operator] for operator in operators],
+            titles=[TITLES[operator] for operator in operators] if len(operators) > 1 else [],
         )
 
     def states(self, alive: int = 1) -> Iterator[Shot]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from collections.abc import Iterable
 
 from ..errors import SceneError
@@ -62,11 +61,6 @@ def parse_request(words: Iterable[str]) -> Request:
         limit=chosen[fields[0]] if fields else None,
         **{name: name in chosen for name in NAMES if name not in FIELDS},
     )
-
-
-def split_words(text: str) -> tuple[str, ...]:
-    """Split a list of overlays at its commas."""
-    return tuple(word.strip() for word in re.split(",", text))
 
 
 def _positive(word: str, value: str, unit: str) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..coupling.target import find_target
 from ..errors import SceneError
+from ..overlay.request import parse_request
 from .events import Events, Script
 from .motion import DropEntry, ThrowEntry
 from .randomize import RandomEntry, randomize
@@ -43,6 +44,8 @@ class Scene:
         What happens to bodies and surfaces at given times.
     two_way : bool
         Whether moving surfaces push back on the bodies that touch them.
+    overlay : tuple of str
+        What is drawn over the pictures, see `parse_request`.
     """
 
     name: str
@@ -52,6 +55,7 @@ class Scene:
     duration: float
     events: Events = dataclasses.field(default_factory=Events)
     two_way: bool = False
+    overlay: tuple[str, ...] = ()
 
 
 def shipped_scenes() -> list[str]:
@@ -101,6 +105,7 @@ def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
             control=tuple(content.control),
         ),
         two_way=content.two_way,
+        overlay=tuple(content.overlay),
     )
     check_scene(scene)
     return scene
@@ -193,5 +198,6 @@ def check_scene(scene: Scene) -> None:
         for disc in entry.still:
             if not 0 < disc.radius < float("inf"):
                 raise SceneError(f"a still disc of geom {entry.geom!r} has radius {disc.radius!r} m; valid is above 0")
+    parse_request(scene.overlay)
     Script(scene.model, scene.events, [entry.geom for entry in scene.surfaces])
     check_camera(scene.model, scene.camera)

@@ -1,0 +1,31 @@
+"""Two runs of one scene side by side: which they are, and what they are called."""
+
+from __future__ import annotations
+
+from ..errors import SceneError
+
+OWN = "fem"
+
+# By the name of the wave operator: a title, and a word about it.
+TITLES = {
+    OWN: ("ripple-sim", "finite elements"),
+    "paper": ("paper", "real distances, 4 neighbours"),
+    "uncorrected": ("uncorrected", "one distance everywhere"),
+    "dynamic-paint": ("Dynamic Paint", "real distances, 8 neighbours"),
+}
+BASELINES = tuple(name for name in TITLES if name != OWN)
+
+
+def compared_operators(baseline: str | None) -> tuple[str, ...]:
+    """Wave operators of the runs of a video: our own, and a baseline where one is asked for.
+
+    Raises
+    ------
+    SceneError
+        For an unknown baseline.
+    """
+    if baseline is None:
+        return (OWN,)
+    if baseline not in BASELINES:
+        raise SceneError(f"there is no operator {baseline!r} to compare with; valid are {', '.join(BASELINES)}")
+    return OWN, baseline
