@@ -29,8 +29,8 @@ class View:
     """Size of the window in pixels."""
     resolution: Count = 64
     """Texels along an edge of a cube face; more carry finer waves and take longer."""
-    bodies: Count = 3
-    """How many bodies fall on a mesh."""
+    bodies: Seed = 3
+    """How many bodies fall on a mesh; 0 for none."""
     seed: Seed = 0
     """Chooses where and what falls."""
     up: UpAxis = None

@@ -13,7 +13,8 @@ from ..render.bodies import visible_geoms
 from .session import Session
 from .skin import Skin
 
-HEIGHT = "height [m]"
+HEIGHT = "height [mm]"
+_PER_METRE = 1000.0
 
 _GEOM = mujoco.mjtGeom
 _COLORMAP = "coolwarm"
@@ -70,7 +71,7 @@ class SkinActor:
     def __init__(self, plotter: pv.Plotter, skin: Skin, color: tuple[float, float, float]) -> None:
         mesh = pv.PolyData.from_regular_faces(skin.points, skin.F)
         mesh.point_data.active_normals = skin.normals
-        mesh.point_data.set_array(skin.height, HEIGHT)
+        mesh.point_data.set_array(_PER_METRE * skin.height, HEIGHT)
         mesh.set_active_scalars(HEIGHT)
         self._skin, self._mesh = skin, mesh
         self.actor = plotter.add_mesh(
@@ -91,17 +92,18 @@ class SkinActor:
         mesh, skin = self._mesh, self._skin
         mesh.points[:] = skin.points
         data = mesh.GetPointData()
-        for array, new in ((data.GetNormals(), skin.normals), (data.GetArray(HEIGHT), skin.height)):
+        for array, new in ((data.GetNormals(), skin.normals), (data.GetArray(HEIGHT), _PER_METRE * skin.height)):
             pv.convert_array(array)[:] = new
             array.Modified()
         mesh.GetPoints().Modified()
         _place(self.actor, position, rotation)
 
-    def color_by_height(self, on: bool, limit: float) -> None:
-        """Show the height as colours from minus to plus a limit [m], or the surface in its own colour."""
+    def color_by_height(self, limit: float | None) -> None:
+        """Show the height as colours from minus to plus a limit [m]; with None, the surface in its own colour."""
         mapper = self.actor.mapper
-        mapper.scalar_visibility = on
-        mapper.scalar_range = (-limit, limit)
+        mapper.scalar_visibility = limit is not None
+        if limit is not None:
+            mapper.scalar_range = (-_PER_METRE * limit, _PER_METRE * limit)
 
 
 _SHADING: dict[str, Any] = {"ambient": 0.32, "diffuse": 0.75, "specular": 0.3, "specular_power": 30.0}

@@ -15,9 +15,13 @@ from .window import Window
 
 HOST = "127.0.0.1"
 
+# Without an answer for so long [s] the browser may have been closed, or opened anew.
+_PATIENCE = 1.0
+_QUALITY = 85  # of the JPEG pictures, per cent
+
 _STYLE = """
 body { margin: 0; font: 14px sans-serif; background: #bdc4cf; color: #111; }
-main { outline: none; width: max-content; margin: 12px auto; }
+main { outline: none; margin: 12px auto; }
 nav { display: flex; flex-wrap: wrap; gap: 6px; margin-bottom: 8px; }
 button { font: inherit; padding: 4px 10px; border: 1px solid #667; border-radius: 4px; background: #eef0f3; }
 button:hover { background: #fff; }
@@ -36,7 +40,8 @@ def check_web(port: int) -> None:
     missing = [name for name in ("trame", "trame_vtk") if importlib.util.find_spec(name) is None]
     if missing:
         raise DisplayError(
-            f"--web needs {' and '.join(missing)}, which is not installed; install it with: pip install 'ripple-sim[web]'"
+            f"--web needs {' and '.join(missing)}, which is not installed; install it with: "
+            "pip install 'ripple-sim[web]'"
         )
     with socket.socket() as trial:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -53,11 +58,11 @@ def serve(window: Window, port: int) -> None:
     from trame.app import get_server
 
     server = get_server("ripple-sim")
-    server.cli.set_defaults()
     window.open()
     page = _Page(server, window)
 
     async def main() -> None:
+        asyncio.get_running_loop().set_exception_handler(_report)
         serving = asyncio.ensure_future(
             server.start(
                 port=port, host=HOST, exec_mode="coroutine", open_browser=False, show_connection_info=False, timeout=0
@@ -71,8 +76,16 @@ def serve(window: Window, port: int) -> None:
 
     try:
         asyncio.run(main())
+    except KeyboardInterrupt:  # the usual way to end it
+        pass
     finally:
         window.close()
+
+
+def _report(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Say nothing of a browser that has left while something was being sent to it."""
+    if not isinstance(context.get("exception"), ConnectionError):
+        loop.default_exception_handler(context)
 
 
 class _Page:
@@ -84,12 +97,16 @@ class _Page:
 
         self._server, self._window = server, window
         window.hide_texts()
-        server.state.status = ""
+        # numbers of the latest pictures that were sent, and that the browser says it has got
+        self._sent = self._received = 0
+        self._heard = 0.0
+        server.state.update({"status": "", "sent": 0})
         width, height = window.plotter.window_size
         with DivLayout(server) as layout:
             layout.root.style = ""
             client.Style(_STYLE)
-            with html.Main(tabindex=0, keydown=(self._key, "[$event.key]")):
+            client.ClientStateChange(value="sent", change=(self._acknowledge, "[sent]"))
+            with html.Main(tabindex=0, style=f"width: {width}px", keydown=(self._key, "[$event.key]")):
                 with html.Nav():
                     for control in CONTROLS:
                         if control.action != "help":
@@ -98,23 +115,37 @@ class _Page:
                                 id=control.action,
                                 click=getattr(window, control.action),
                             )
-                with html.Div(style=f"width: {width}px; height: {height}px"):
-                    self._view = vtk.VtkRemoteView(window.plotter.render_window, interactive_ratio=1, still_quality=85)
+                with html.Div(style=f"height: {height}px"):
+                    self._view = vtk.VtkRemoteView(
+                        window.plotter.render_window, interactive_ratio=1, interactive_quality=_QUALITY
+                    )
                 html.Output("{{ status }}", id="status")
+        # while an animation runs, this only says that the picture has changed
         window.render = self._view.update
 
     async def animate(self) -> None:
-        """Go on with the session frame by frame until the window is closed."""
+        """Go on with the session frame by frame until the window is closed.
+
+        The pictures are drawn and sent by trame's own animation: without one it would draw at every movement of the
+        pointer. None is drawn before the browser has got the one before, or they would queue up, and clicks with them.
+        """
+        await self._server.ready
         window = self._window
+        self._view.start_animation(fps=window.session.fps, quality=_QUALITY)
         frame = 1 / window.session.fps
         due = time.perf_counter()
         while not window.closed:
-            window.tick()
+            now = time.perf_counter()
+            if window.tick(draw=self._received == self._sent or now - self._heard > _PATIENCE):
+                self._sent, self._heard = self._sent + 1, now
             with self._server.state as state:
-                state.status = window.status()
+                state.update({"status": window.status(), "sent": self._sent})
             due = max(due + frame, time.perf_counter() - frame)
             # at least a moment for the server
             await asyncio.sleep(max(0.001, due - time.perf_counter()))
+
+    def _acknowledge(self, number: int) -> None:
+        self._received = number
 
     def _key(self, name: str) -> None:
         self._window.key("space" if name == " " else name)

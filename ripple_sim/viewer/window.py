@@ -12,7 +12,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+from vtkmodules.vtkCommonCore import vtkLogger, vtkUnsignedCharArray
 
 from ripple_sim.solver import RippleError
 
@@ -30,6 +30,8 @@ _REACH = 4.0
 # The status line is written anew this often [s]: text is slow to draw.
 _STATUS_EVERY = 0.25
 _MULTISAMPLES = 8
+# Highest elevation of the camera, up or down [degrees].
+_STEEPEST = 88.0
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast")
 _UNITS = {"speed": "m/s", "damping": "1/s", "stiffness": "1/s²"}
 
@@ -78,6 +80,8 @@ class Window:
         self._drawn = False
         self._updates, self._since, self._rate = 0, time.perf_counter(), math.nan
         self._pressed: tuple[int, int] | None = None
+        # where there is no display VTK warns of that, and then does without one
+        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
         self.plotter = pv.Plotter(off_screen=off_screen, window_size=list(size), lighting="none", title=scene.name)
         # smooth edges cost software OpenGL four fifths of its speed
         self.plotter.render_window.SetMultiSamples(0)
@@ -120,8 +124,8 @@ class Window:
         finally:
             self.plotter.close()
 
-    def tick(self) -> bool:
-        """Go on by one frame and draw it; return whether there was anything new to draw."""
+    def tick(self, draw: bool = True) -> bool:
+        """Go on by one frame, and draw it if asked to; return whether there was anything new and it was drawn."""
         try:
             moved = self.session.advance()
         except RippleError as error:
@@ -129,7 +133,7 @@ class Window:
             moved = True
         if moved:
             self._update()
-        if not moved and self._drawn:
+        if self._drawn or not draw:
             return False
         self._draw()
         return True
@@ -245,7 +249,7 @@ class Window:
         for name, skin in self._skins.items():
             geom = session.simulation.ripples.geom_ids[name]
             skin.update(data.geom_xpos[geom], data.geom_xmat[geom])
-            skin.color_by_height(self._colored, limit)
+            skin.color_by_height(limit if self._colored else None)
         self._bodies.update()
         self._drawn = False
 
@@ -256,6 +260,7 @@ class Window:
             self._rate = self._updates / (now - self._since)
             self._updates, self._since = 0, now
             self._show_status()
+        self._level()
         self.plotter.renderer.ResetCameraClippingRange()
         self.render()
         self._drawn = True
@@ -266,6 +271,22 @@ class Window:
                     self._say("the window has changed its size: the recording has ended")
             except RippleError as error:
                 self._say(str(error))
+
+    def _level(self) -> None:
+        """Keep the horizon level, and the camera off the vertical, where it would have none."""
+        camera = self.plotter.camera
+        focus = np.array(camera.focal_point)
+        x, y, z = np.array(camera.position) - focus
+        across, most = math.hypot(x, y), math.tan(math.radians(_STEEPEST))
+        if across > 0 and abs(z) > most * across:
+            distance, away = math.hypot(across, z), math.hypot(1.0, most)
+            x, y, z = (
+                x / across * distance / away,
+                y / across * distance / away,
+                math.copysign(distance * most / away, z),
+            )
+            camera.position = focus + np.array([x, y, z])
+        camera.up = (0.0, 0.0, 1.0)
 
     def _say(self, message: str) -> None:
         self.message = message
@@ -283,10 +304,12 @@ class Window:
 
     def _add_bar(self) -> None:
         first = next(iter(self._skins.values()))
-        self._bar = self.plotter.add_scalar_bar(
+        bar = self.plotter.add_scalar_bar(
             HEIGHT, mapper=first.actor.mapper, vertical=True, position_x=0.9, position_y=0.2, width=0.06, height=0.4,
             n_labels=3, fmt="%.3g", title_font_size=13, label_font_size=12, color="black",
         )  # fmt: skip
+        bar.SetVerticalTitleSeparation(10)
+        self._bar = bar
 
     def _add_slider(self, i: int, name: str) -> Any:
         if name == "poke":
