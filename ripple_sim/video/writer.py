@@ -185,7 +185,7 @@ class FrameWriter:
         self._abandon()
         if not self._finished and self._part.keep():
             error.add_note(
-                f"{self._part.frames} frames are kept in {self._part.folder}: --resume carries on from there"
+                f"{self._part.frames} frames are kept in {self._part.folder}; --resume carries on from there"
             )
 
     def _abandon(self) -> None:

@@ -1,0 +1,286 @@
+"""Interrupted videos: whatever kills them, what is left is whole, and they go on to the very same bytes."""
+
+import fcntl
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+from ripple_sim.errors import EncodingError, SimulationError, VideoError
+from ripple_sim.job import render_video
+from ripple_sim.scene.scene import Scene, load_scene
+from ripple_sim.solver import RippleError
+from ripple_sim.solver.gl import shared_context
+from ripple_sim.video import FrameWriter, open_writer
+from ripple_sim.video.formats import FRAMES_IN_CLIP
+
+ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
+FRAMES, SIZE, FPS = 2 * FRAMES_IN_CLIP + 10, (64, 48), 25
+JOB = {"the scene": "a moving square"}
+DIGEST = "0123456789abcdef" * 2
+
+# Writes all the videos one behind the other, and goes on with those that are not whole.
+PROGRAM = f"""
+import sys, time
+from pathlib import Path
+import numpy as np
+from ripple_sim.video import open_writer
+print("ready", flush=True)
+for ending in {ENDINGS!r}:
+    path = Path(sys.argv[1]) / f"clip{{ending}}"
+    if path.exists() and not path.with_name(path.name + ".part").exists():
+        continue
+    with open_writer(path, width={SIZE[0]}, height={SIZE[1]}, fps={FPS}, job={JOB!r}, resume=True) as writer:
+        for number in range(writer.frames, {FRAMES}):
+            frame = np.full(({SIZE[1]}, {SIZE[0]}, 3), 60, np.uint8)
+            frame[10:30, number % 40 : number % 40 + 20] = (230, 180, number)
+            writer.write(frame)
+            time.sleep(0.001)
+"""
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def start(folder: Path) -> subprocess.Popen:
+    process = subprocess.Popen([sys.executable, "-c", PROGRAM, folder], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    return process
+
+
+def test_killed_again_and_again_videos_become_the_same_bytes(tmp_path):
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    begun = time.perf_counter()
+    assert start(whole).wait() == 0
+    length = time.perf_counter() - begun
+    chance = random.Random(6)
+    kills = 0
+    for _ in range(20):
+        process = start(broken)
+        time.sleep(chance.uniform(0, length / 6))
+        process.send_signal(signal.SIGKILL)
+        kills += process.wait() == -signal.SIGKILL
+        for clip in broken.glob("*.part/frames/[!.]*"):  # what is left plays
+            if clip.suffix in (".mp4", ".webm", ".mkv"):
+                with av.open(str(clip)) as container:
+                    assert sum(1 for _ in container.decode(video=0)) in (FRAMES_IN_CLIP, FRAMES % FRAMES_IN_CLIP)
+            else:
+                with Image.open(clip) as image:
+                    image.load()
+    assert start(broken).wait() == 0
+    assert kills > 3
+    assert contents(broken) == contents(whole)
+    assert sorted(path.name for path in broken.iterdir()) == sorted(f"clip{ending}" for ending in ENDINGS)
+
+
+def write(path: Path, first: int, last: int, job: dict = JOB, resume: bool = True) -> FrameWriter:
+    with open_writer(path, width=SIZE[0], height=SIZE[1], fps=FPS, job=job, resume=resume) as writer:
+        for number in range(first, last):
+            writer.write(np.full((SIZE[1], SIZE[0], 3), number, np.uint8))
+        if last < FRAMES:
+            raise KeyboardInterrupt
+    return writer
+
+
+@pytest.fixture
+def interrupted(tmp_path) -> Path:
+    path = tmp_path / "clip.mp4"
+    with pytest.raises(KeyboardInterrupt):
+        write(path, 0, 60)
+    return path
+
+
+def test_an_interrupted_video_says_what_is_left(tmp_path):
+    with pytest.raises(KeyboardInterrupt) as ending:
+        write(tmp_path / "clip.mp4", 0, 60)
+    assert ending.value.__notes__ == [
+        f"{FRAMES_IN_CLIP} frames are kept in {tmp_path / 'clip.mp4.part'}; --resume carries on from there"
+    ]
+    assert [path.name for path in (tmp_path / "clip.mp4.part" / "frames").iterdir()] == ["frames_00000-00047.mp4"]
+
+
+def test_a_video_without_a_whole_clip_leaves_nothing(tmp_path):
+    with pytest.raises(KeyboardInterrupt) as ending:
+        write(tmp_path / "clip.mp4", 0, FRAMES_IN_CLIP - 1)
+    assert not hasattr(ending.value, "__notes__")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_would_fail_again_leaves_nothing(tmp_path):
+    with (
+        pytest.raises(SimulationError),
+        open_writer(tmp_path / "frames", width=SIZE[0], height=SIZE[1], fps=FPS, job=JOB) as writer,
+    ):
+        writer.write(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+        raise SimulationError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_resume_a_video_starts_anew(interrupted):
+    assert write(interrupted, 0, FRAMES, resume=False).frames == FRAMES
+    assert list(interrupted.parent.iterdir()) == [interrupted]
+
+
+def test_resuming_another_job_is_refused_and_harms_nothing(interrupted):
+    before = contents(interrupted.parent)
+    with pytest.raises(VideoError, match=r"the scene was a moving square and now is a ball; .* leave --resume out"):
+        write(interrupted, 48, FRAMES, job={"the scene": "a ball"})
+    with pytest.raises(VideoError, match="the length was None and now is 3"):
+        write(interrupted, 48, FRAMES, job={**JOB, "the length": 3})
+    assert contents(interrupted.parent) == before
+
+
+def test_a_simulation_that_comes_out_otherwise_is_refused_and_harms_nothing(tmp_path):
+    path = tmp_path / "clip.mp4"
+
+    def go(digest: str) -> None:
+        with open_writer(path, width=SIZE[0], height=SIZE[1], fps=FPS, job=JOB, resume=True) as writer:
+            writer.check_state(0, DIGEST)
+            writer.check_state(16, digest)
+            for _ in range(writer.frames, 60):
+                writer.write(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        go(DIGEST)
+    with (path.with_name("clip.mp4.part") / "states.txt").open("a") as file:
+        file.write("32 0123")  # cut off by a kill
+    with pytest.raises(VideoError, match="at frame 16 the simulation is not in the state it was in before"):
+        go(DIGEST[::-1])
+    with pytest.raises(KeyboardInterrupt):
+        go(DIGEST)
+    assert (path.with_name("clip.mp4.part") / "frames" / "frames_00000-00047.mp4").exists()
+
+
+def test_two_processes_do_not_write_the_same_video(interrupted):
+    other = os.open(interrupted.with_name("clip.mp4.part"), os.O_RDONLY)
+    fcntl.flock(other, fcntl.LOCK_EX)
+    with pytest.raises(VideoError, match="another process is writing"):
+        write(interrupted, 48, FRAMES)
+    os.close(other)
+    assert write(interrupted, 48, FRAMES).frames == FRAMES
+
+
+def test_a_folder_with_other_files_is_left_alone(tmp_path):
+    (tmp_path / "clip.mp4.part").mkdir()
+    (tmp_path / "clip.mp4.part" / "thesis.tex").write_text("mine")
+    with pytest.raises(VideoError, match=r"clip\.mp4\.part holds other files \(thesis\.tex\)"):
+        write(tmp_path / "clip.mp4", 0, FRAMES, resume=False)
+    assert (tmp_path / "clip.mp4.part" / "thesis.tex").read_text() == "mine"
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_full_disk_is_one_line_and_leaves_nothing_broken(tmp_path, ending):
+    """Files may not grow beyond a few kilobytes: what a full disk does, without filling one."""
+    program = (
+        "import resource, signal, sys\n"
+        "from pathlib import Path\n"
+        "import numpy as np\n"
+        "from ripple_sim.errors import EncodingError\n"
+        "from ripple_sim.video import open_writer\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))\n"
+        "rng = np.random.default_rng(0)\n"
+        "try:\n"
+        f"    with open_writer(sys.argv[1], width=160, height=90, fps=25, job={JOB!r}) as writer:\n"
+        "        for number in range(120):\n"
+        "            writer.write(rng.integers(0, 256, (90, 160, 3), np.uint8))\n"
+        "except EncodingError as error:\n"
+        "    print(error)\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", program, tmp_path / f"clip{ending}"], capture_output=True, text=True, check=True
+    )
+    assert result.stdout.startswith(f"cannot write the video {tmp_path / f'clip{ending}'}: ")
+    assert "File too large" in result.stdout
+    assert result.stdout.count("\n") == 1
+    assert "Traceback" not in result.stderr
+    left = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert all(path.name in ("job.json", "states.txt") or path.name.startswith("frame") for path in left)
+
+
+def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
+    (tmp_path / "clip.mp4.part").write_text("in the way")
+    with pytest.raises(EncodingError, match=r"cannot write the video .*clip\.mp4: "):
+        write(tmp_path / "clip.mp4", 0, FRAMES)
+
+
+MJCF = """<mujoco><option timestep="0.005"/><worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
+<body name="stone" pos="0.05 0 0.3"><freejoint/><geom name="stone" size="0.05"/></body></worldbody></mujoco>"""
+TOML = """model = "scene.xml"
+duration = 2.0
+[[ripple]]
+geom = "egg"
+resolution = 12
+material = {speed = 0.3, density = 20.0}
+"""
+OPTIONS = {"size": (64, 48), "fps": 30}
+
+
+@pytest.fixture
+def scene(tmp_path) -> Scene:
+    try:
+        shared_context()
+    except RippleError as error:
+        pytest.skip(str(error))
+    (tmp_path / "scene.xml").write_text(MJCF)
+    (tmp_path / "scene.toml").write_text(TOML)
+    return load_scene(tmp_path / "scene.toml")
+
+
+class Impatience:
+    """Interrupts at a frame."""
+
+    def __init__(self, frame: int) -> None:
+        self._frame = frame
+
+    def __call__(self, done: int, total: int) -> None:
+        if done == self._frame:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("name", ["clip.mp4", "frames"])
+def test_a_render_goes_on_to_the_same_video(scene, tmp_path, name):
+    whole, broken = tmp_path / "whole" / name, tmp_path / "broken" / name
+    assert render_video(scene, whole, **OPTIONS).resumed_at == 0
+    for frame in (20, 58):
+        with pytest.raises(KeyboardInterrupt):
+            render_video(scene, broken, resume=True, progress=Impatience(frame), **OPTIONS)
+    summary = render_video(scene, broken, resume=True, **OPTIONS)
+    # frames that wait to be encoded are lost
+    assert summary.resumed_at == FRAMES_IN_CLIP if name == "clip.mp4" else 48 <= summary.resumed_at <= 58
+    assert contents(broken.parent) == contents(whole.parent)
+
+
+def test_a_render_of_a_changed_scene_or_with_other_options_is_not_resumed(scene, tmp_path):
+    def resume(scene: Scene, **options: object) -> None:
+        render_video(scene, tmp_path / "frames", resume=True, progress=Impatience(20), **{**OPTIONS, **options})
+
+    with pytest.raises(KeyboardInterrupt):
+        resume(scene)
+    with pytest.raises(VideoError, match="the size was 64x48 and now is 96x48"):
+        resume(scene, size=(96, 48))
+    with pytest.raises(VideoError, match="the number of frames was 60 and now is 30"):
+        resume(scene, duration=1.0)
+    (tmp_path / "scene.xml").write_text(MJCF.replace('size="0.05"', 'size="0.06"'))
+    with pytest.raises(VideoError, match="the scene's fingerprint was"):
+        resume(load_scene(tmp_path / "scene.toml"))
+    (tmp_path / "scene.xml").write_text(MJCF)
+    with pytest.raises(VideoError, match="at frame 16 the simulation is not in the state"):
+        render_video(scene, tmp_path / "frames", resume=True, on_step=_push, **OPTIONS)
+    assert json.loads((tmp_path / "frames.part" / "job.json").read_text())["the size"] == "64x48"
+
+
+def _push(simulation) -> None:
+    simulation.data.qvel[0] += 1e-9
