@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
-
-Sources = tuple[NDArray[np.float64], NDArray[np.float64], float]
 
 MAX_CONTACTS = 8
 
@@ -67,6 +67,28 @@ def _squared_distance(points, i, j):
     return total
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Pressed:
+    """What presses on a target: 36 sources at most.
+
+    Attributes
+    ----------
+    points : float64 [k, 3]
+        Near the surface, in the target's frame [m].
+    forces : float64 [k]
+        [N].
+    radius : float
+        Footprint radius of each [m], which grows with the patch.
+    probes : int64 [k] or None
+        Which of the patch's probes the points are, if they are.
+    """
+
+    points: NDArray[np.float64]
+    forces: NDArray[np.float64]
+    radius: float
+    probes: NDArray[np.int64] | None
+
+
 class Patch:
     """The patch that the contacts of a pair bound.
 
@@ -101,17 +123,11 @@ class Patch:
             middles = (self._corners[self._first] + self._corners[self._second]) / 2
             self.probes = np.concatenate([self._corners, middles])
 
-    def sources(self, surface: NDArray[np.float64]) -> Sources:
-        """What presses, told from the surface points nearest to `probes`.
-
-        Returns
-        -------
-        points, forces, radius
-            At most 36 sources [m], [N], and their footprint radius [m], which grows with the patch.
-        """
+    def pressed(self, surface: NDArray[np.float64]) -> Pressed:
+        """What presses, told from the surface points nearest to `probes`."""
         corners, loads, radius, count = self._corners, self._loads, self._radius, len(self._loads)
         if len(self.probes) == count:
-            return corners, loads, radius
+            return Pressed(corners, loads, radius, np.arange(count))
         away = np.linalg.norm(surface - self.probes, axis=1)
         # contact points lie a little outside of the surface, by up to their depth: so may the middles
         touching = away[count:] <= away[:count].max() + radius / 10
@@ -119,14 +135,14 @@ class Patch:
         # where they do not touch between two contacts, the contacts keep their shares
         kept = share * ~touching
         own = loads**2 / loads.sum() + np.bincount(self._first, kept, count) + np.bincount(self._second, kept, count)
-        nodes = np.concatenate([corners, self.probes[count:][touching]])
+        nodes = np.concatenate([np.arange(count), count + np.flatnonzero(touching)])
         weights = np.concatenate([own, 2 * share[touching]])
         if not touching.all():
-            return nodes, weights, radius
+            return Pressed(self.probes[nodes], weights, radius, nodes)
         size = float(np.linalg.norm(corners[self._first] - corners[self._second], axis=1).max())
         middle = loads @ corners / loads.sum()
-        nodes = middle + _INSET * (nodes - middle)
-        return *_joined(nodes, weights, size / 8), max(radius, _OVERLAP * size)
+        points, forces = _joined(middle + _INSET * (self.probes - middle), weights, size / 8)
+        return Pressed(points, forces, max(radius, _OVERLAP * size), None)
 
 
 def _joined(

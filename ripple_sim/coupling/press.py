@@ -7,9 +7,13 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver import WaveSolver
+from ripple_sim.solver import Atlas
 from ripple_sim.solver.waves.footprint import footprint_at
 from ripple_sim.solver.waves.load import Load, add_up
+
+from .patch import Pressed
+
+Places = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 # A hit is over within this time [s]; until then the surface feels every force as it is.
 ONSET = 0.1
@@ -32,8 +36,10 @@ class Press:
 
     Parameters
     ----------
-    waves : WaveSolver
+    atlas : Atlas
         Of the target.
+    carried : float64 [6 N N]
+        Area of each texel that takes up pressure [m^2], 0 where nothing moves.
 
     Attributes
     ----------
@@ -41,8 +47,9 @@ class Press:
         How the body pressed in its latest contact, before that is smoothed.
     """
 
-    def __init__(self, waves: WaveSolver) -> None:
-        self.take(waves)
+    def __init__(self, atlas: Atlas, carried: NDArray[np.float64]) -> None:
+        self._atlas = atlas
+        self.carry(carried)
         self.latest = Load.none()
         self._texels = np.zeros(0, np.int64)
         self._rate = self._debt = np.zeros(0)
@@ -50,27 +57,25 @@ class Press:
         self._anchor = np.zeros(3)
         self._age = self._absent = 0.0
 
-    def take(self, waves: WaveSolver) -> None:
-        """Press on other waves of the same atlas from now on: what is owed stays owed."""
-        self._atlas = waves.atlas
-        self._carried = (waves.atlas.areas * waves.operator.carries).reshape(-1)
+    def carry(self, carried: NDArray[np.float64]) -> None:
+        """Press on a surface that has changed from now on: what is owed stays owed."""
+        self._carried = carried
         self._sources: list[_Source] = []
 
-    def press(self, points: NDArray[np.float64], forces: NDArray[np.float64], radius: float, dt: float) -> Load:
+    def press(self, pressed: Pressed, places: Places | None, dt: float) -> Load:
         """Load over a step in which the body touches.
 
         Parameters
         ----------
-        points : [k, 3]
-            Where it presses, in the target's frame [m].
-        forces : [k]
-            How hard [N].
-        radius : float
-            Footprint radius of every source [m].
+        pressed : Pressed
+            Where and how hard, over this step.
+        places : (float64 [k, 3], int64 [k]), optional
+            The sources' nearest surface points [m] and texels, where they are known.
         dt : float
             Time step [s].
         """
-        self._sources = self._footprints(points, radius)
+        points, forces, radius = pressed.points, pressed.forces, pressed.radius
+        self._sources = self._footprints(points, radius, places)
         self.latest = Load.together(
             [Load(source.texels, force * source.shares) for source, force in zip(self._sources, forces, strict=True)]
         )
@@ -122,12 +127,12 @@ class Press:
         self._texels, values = add_up(np.concatenate([before, present.texels]), values, self._carried.size)
         return values
 
-    def _footprints(self, points: NDArray[np.float64], radius: float) -> list[_Source]:
+    def _footprints(self, points: NDArray[np.float64], radius: float, places: Places | None) -> list[_Source]:
         found = [self._used_before(point, radius) for point in points]
-        missing = [i for i, source in enumerate(found) if source is None]
-        if missing:
-            closest, centers = self._atlas.nearest(points[missing])
-            for i, place, center in zip(missing, closest, centers.tolist(), strict=True):
+        new = [i for i, source in enumerate(found) if source is None]
+        if new:
+            closest, centers = self._atlas.nearest(points[new]) if places is None else (each[new] for each in places)
+            for i, place, center in zip(new, closest, centers.tolist(), strict=True):
                 where = footprint_at(self._atlas, place, center, radius)
                 found[i] = _Source(
                     point=points[i],

@@ -82,6 +82,7 @@ class Sources:
         )
         self._convex = ~np.isin(model.geom_type, _NOT_CONVEX)
         self._names = [geom_name(model, geom) for geom in range(model.ngeom)]
+        self._carried = {geom: _carried(each) for geom, each in waves.items()}
         self._presses: dict[tuple[int, int], Press] = {}
         self.clear()
 
@@ -93,9 +94,10 @@ class Sources:
 
     def renew(self, geom: int) -> None:
         """Go on with the new waves of a target."""
+        self._carried[geom] = _carried(self._waves[geom])
         for (target, _), press in self._presses.items():
             if target == geom:
-                press.take(self._waves[geom])
+                press.carry(self._carried[geom])
 
     def loads(self, data: mujoco.MjData, elapsed: float) -> dict[int, list[Load]]:
         """Loads on each target over a time [s], from the contact forces that MuJoCo held over its latest time step."""
@@ -125,7 +127,8 @@ class Sources:
             patches.append(Patch(local, pair.forces, radius, bool(self._convex[pair.other])))
         # one search for all points: each costs little beside the call
         closest, texels = waves.atlas.nearest(np.concatenate([means, *(patch.probes for patch in patches)]))
-        surface, n, loads = closest[len(pairs) :], waves.atlas.resolution, []
+        surface, near = closest[len(pairs) :], texels[len(pairs) :]
+        n, loads = waves.atlas.resolution, []
         for pair, patch, point, texel in zip(pairs, patches, closest, texels.tolist(), strict=False):
             self.impulses.append(
                 Impulse(
@@ -136,12 +139,17 @@ class Sources:
                     texel=(texel // (n * n), texel // n % n, texel % n),
                 )
             )
-            points, forces, radius = patch.sources(surface[: len(patch.probes)])
-            surface = surface[len(patch.probes) :]
-            key = geom, pair.other
-            if key not in self._presses:
-                self._presses[key] = Press(waves)
-            press = self._presses[key]
-            loads.append(press.press(points, forces * (timestep / elapsed), radius, elapsed))
+            pressed = patch.pressed(surface[: len(patch.probes)])
+            places = None if pressed.probes is None else (surface[pressed.probes], near[pressed.probes])
+            surface, near = surface[len(patch.probes) :], near[len(patch.probes) :]
+            press = self._presses.get((geom, pair.other))
+            if press is None:
+                press = self._presses[geom, pair.other] = Press(waves.atlas, self._carried[geom])
+            over_time = dataclasses.replace(pressed, forces=pressed.forces * (timestep / elapsed))
+            loads.append(press.press(over_time, places, elapsed))
             self.touches.append(Touch(pair, press.latest))
         return loads
+
+
+def _carried(waves: WaveSolver) -> NDArray[np.float64]:
+    return (waves.atlas.areas * waves.operator.carries).reshape(-1)

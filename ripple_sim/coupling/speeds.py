@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 
 import mujoco
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,16 +57,23 @@ class SpeedCheck:
         self._steps += 1
         if not len(self._limit) or (self._steps - 1) % _EVERY:
             return
-        dt = self._model.opt.timestep
-        offset = data.geom_xpos[self._other] - data.geom_xpos[self._target]
-        relative = _velocities(self._model, data, self._other) - _velocities(self._model, data, self._target)
-        speed = np.linalg.norm(relative, axis=1)
-        meeting = (np.einsum("ij,ij->i", offset, relative) < 0) & (
-            np.linalg.norm(offset, axis=1) < self._reach + (1 + _EVERY) * speed * dt
+        meeting, speed = _meeting(
+            self._target,
+            self._other,
+            self._limit,
+            self._reach,
+            self._soft,
+            self._model.opt.timestep,
+            data.geom_xpos,
+            data.cvel,
+            data.subtree_com,
+            self._model.geom_bodyid,
+            self._model.body_rootid,
         )
-        for i in np.flatnonzero(meeting & (speed * (dt + self._soft) > self._limit) & ~self._warned):
-            self._warned[i] = True
-            warnings.warn(self._message(int(i), float(speed[i])), RippleWarning, stacklevel=4)
+        for i, v in zip(meeting.tolist(), speed.tolist(), strict=True):
+            if not self._warned[i]:
+                self._warned[i] = True
+                warnings.warn(self._message(i, v), RippleWarning, stacklevel=4)
 
     def _message(self, i: int, speed: float) -> str:
         model, limit = self._model, float(self._limit[i])
@@ -100,10 +108,29 @@ def _stopping_time(solref: NDArray[np.float64], timestep: float) -> NDArray[np.f
     return period * np.exp(-np.clip(ratio, 0, 1))
 
 
-def _velocities(model: mujoco.MjModel, data: mujoco.MjData, geoms: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Velocities of geoms' centres in the world [m/s], shape [k, 3]."""
-    bodies = model.geom_bodyid[geoms]
+@numba.njit(cache=True)
+def _meeting(target, other, limit, reach, soft, timestep, place, velocity, mass_centre, body, root):
+    """Indices of the pairs that come near each other too fast within the steps to the next look, and their speeds."""
+    found, speeds = np.empty(len(target), np.int64), np.empty(len(target))
+    count = 0
+    for i in range(len(target)):
+        offset = place[other[i]] - place[target[i]]
+        relative = _at(other[i], place, velocity, mass_centre, body, root) - _at(
+            target[i], place, velocity, mass_centre, body, root
+        )
+        speed = np.sqrt((relative**2).sum())
+        near = np.sqrt((offset**2).sum()) < reach[i] + (1 + _EVERY) * speed * timestep
+        if near and (offset * relative).sum() < 0 and speed * (timestep + soft[i]) > limit[i]:
+            found[count], speeds[count] = i, speed
+            count += 1
+    return found[:count], speeds[:count]
+
+
+@numba.njit(cache=True)
+def _at(geom, place, velocity, mass_centre, body, root):
+    """Velocity of a geom's centre in the world [m/s]."""
+    b = body[geom]
     # MuJoCo gives a body's velocity at the centre of mass of the tree that it belongs to
-    lever = data.geom_xpos[geoms] - data.subtree_com[model.body_rootid[bodies]]
-    (wx, wy, wz), (x, y, z) = data.cvel[bodies, :3].T, lever.T
-    return data.cvel[bodies, 3:] + np.stack([wy * z - wz * y, wz * x - wx * z, wx * y - wy * x], axis=1)
+    x, y, z = place[geom] - mass_centre[root[b]]
+    wx, wy, wz, vx, vy, vz = velocity[b]
+    return np.array([vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x])

@@ -3,16 +3,21 @@
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.patch import MAX_CONTACTS, Patch, Sources, cluster
+from ripple_sim.coupling.patch import MAX_CONTACTS, Patch, cluster
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas
 
 SQUARE = 0.1 * np.array([[-1, -1, 5], [1, -1, 5], [-1, 1, 5], [1, 1, 5]])
 
 
-def pressed_patch(atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: float, convex: bool) -> Sources:
+def pressed_patch(
+    atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: float, convex: bool
+) -> tuple[np.ndarray, np.ndarray, float]:
     patch = Patch(points, forces, radius, convex)
-    return patch.sources(atlas.project(patch.probes)[0])
+    pressed = patch.pressed(atlas.project(patch.probes)[0])
+    if pressed.probes is not None:
+        np.testing.assert_array_equal(patch.probes[pressed.probes], pressed.points)
+    return pressed.points, pressed.forces, pressed.radius
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, Ripples
+from ripple_sim.coupling.patch import Pressed
 from ripple_sim.coupling.press import ONSET, Press
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import WaveSolver, sphere_atlas
@@ -88,11 +89,11 @@ def test_box_that_lies_flat_presses_under_its_middle_too() -> None:
 
 def given_over_time(forces: np.ndarray, dt: float) -> np.ndarray:
     """What a press gives to the surface in each step, while the body touches and for a second after."""
-    press = Press(WaveSolver(sphere_atlas(1.0, 16), Material(), backend="cpu"))
-    given = []
+    atlas, given = sphere_atlas(1.0, 16), []
+    press = Press(atlas, atlas.areas.reshape(-1))
     for force in np.concatenate([forces, np.zeros(round(1.0 / dt))]):
-        point, load = np.array([[0.0, 0.0, 1.0]]), np.array([force])
-        out = press.press(point, load, 0.3, dt) if force > 0 else press.release(dt)
+        pressed = Pressed(np.array([[0.0, 0.0, 1.0]]), np.array([force]), 0.3, None)
+        out = press.press(pressed, None, dt) if force > 0 else press.release(dt)
         given.append(out.forces.sum())
     assert press.over
     return np.array(given)
@@ -129,11 +130,11 @@ def test_steady_weight_comes_through_at_once() -> None:
 
 def test_a_body_that_slides_presses_where_it_is() -> None:
     atlas = sphere_atlas(1.0, 32)
-    press = Press(WaveSolver(atlas, Material(), backend="cpu"))
+    press = Press(atlas, atlas.areas.reshape(-1))
     for step in range(1500):
         angle = 0.5 * step * 0.002
         point = np.array([[np.sin(angle), 0.0, np.cos(angle)]])
-        load = press.press(point, np.array([2.0]), 0.2, 0.002)
+        load = press.press(Pressed(point, np.array([2.0]), 0.2, None), None, 0.002)
         if step * 0.002 > ONSET:
             middle = load.forces @ atlas.positions.reshape(-1, 3)[load.texels] / load.forces.sum()
             assert np.linalg.norm(middle - point) < 0.1
