@@ -15,7 +15,7 @@ from .analytic import SphereAtlas
 from .atlas import Atlas
 
 # Raise it when the sphere map or the file's layout changes: older files are then rebuilt.
-FORMAT = 3
+FORMAT = 4
 _FIELDS = ("sphere", "positions", "normals", "triangles", "barycentrics")
 
 

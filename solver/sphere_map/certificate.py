@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .vectors import Ints, cross, dot, kernel, row, subtract
+
+EPSILON = float(np.finfo(np.float64).eps)
 QUANTILES = (0.001, 0.01, 0.5, 0.99, 0.999)
 
 
@@ -25,14 +28,24 @@ class Certificate:
 
 def certify(F: NDArray[np.integer], S: NDArray[np.float64]) -> Certificate:
     """Check a sphere map S (unit vectors, shape [n, 3]) of the triangles F, shape [m, 3]."""
-    a, b, c = (S[F[:, j]] for j in range(3))
-    ab, ac = b - a, c - a
-    round_off = 4 * np.finfo(np.float64).eps * np.sqrt(_dot(ab, ab) * _dot(ac, ac))
-    flipped = int(np.count_nonzero(~(_dot(a, np.cross(ab, ac)) > round_off)))
-    solid_angle = float(np.sum(solid_angles(F, S)))
+    flipped, solid_angle = _folds_and_angle(np.ascontiguousarray(F, dtype=np.int32), S)
     on_sphere = bool(np.all(np.abs(_dot(S, S) - 1) < 1e-9))
     valid = flipped == 0 and on_sphere and abs(solid_angle - 4 * np.pi) < 1e-6
     return Certificate(flipped, solid_angle, valid)
+
+
+@kernel
+def _folds_and_angle(F: Ints, S: NDArray[np.float64]) -> tuple[int, float]:
+    """Number of triangles whose triple product is not above round-off, and the sum of solid angles."""
+    flipped, angle = 0, 0.0
+    for f in range(len(F)):
+        a, b, c = row(S, F[f, 0]), row(S, F[f, 1]), row(S, F[f, 2])
+        ab, ac = subtract(b, a), subtract(c, a)
+        triple = dot(a, cross(ab, ac))
+        if not triple > 4.0 * EPSILON * np.sqrt(dot(ab, ab) * dot(ac, ac)):
+            flipped += 1
+        angle += 2.0 * np.arctan2(triple, 1.0 + dot(a, b) + dot(b, c) + dot(c, a))
+    return flipped, angle
 
 
 def solid_angles(F: NDArray[np.integer], S: NDArray[np.float64]) -> NDArray[np.float64]:

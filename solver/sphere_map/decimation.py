@@ -69,16 +69,26 @@ def _quadric_error(q: Floats, x: float, y: float, z: float) -> float:
 
 
 @kernel
-def _is_legal(table: CornerTable, u: int, v: int, star: Ints, other: Ints) -> bool:
-    """Tell whether u and v meet the link condition."""
-    degree = gather_star(table, v, other)
+def _mark_neighbours(table: CornerTable, u: int, mark: Ints) -> None:
+    """Write u beside each of its neighbours."""
+    first = h = table.leaving[u]
+    while True:
+        mark[table.tail[following(h)]] = u
+        h = table.twin[preceding(h)]
+        if h == first:
+            return
+
+
+@kernel
+def _is_legal(table: CornerTable, u: int, v: int, mark: Ints) -> bool:
+    """Tell whether v and u, whose neighbours are marked, meet the link condition."""
+    first = h = table.leaving[v]
     common = 0
-    for i in range(gather_star(table, u, star)):
-        w = table.tail[following(star[i])]
-        for j in range(degree):
-            if table.tail[following(other[j])] == w:
-                common += 1
-    return common == 2
+    while True:
+        common += mark[table.tail[following(h)]] == u
+        h = table.twin[preceding(h)]
+        if h == first:
+            return common == 2
 
 
 @kernel
@@ -96,8 +106,7 @@ def _price(
     target: Ints,
 ) -> None:
     """Find the cheapest legal collapse of every stale vertex (`blur`: a squared length below which all are alike)."""
-    star, other = np.empty(len(V), np.int32), np.empty(len(V), np.int32)
-    neighbours = np.empty(len(V), np.int32)
+    neighbours, mark = np.empty(len(V), np.int32), np.full(len(V), -1, np.int32)
     for u in alive:
         if not stale[u]:
             continue
@@ -106,6 +115,7 @@ def _price(
         if degree[u] > limit + 1:
             continue
         gather_star(table, u, neighbours)
+        _mark_neighbours(table, u, mark)
         for i in range(degree[u]):
             h = neighbours[i]
             v = table.tail[following(h)]
@@ -120,7 +130,7 @@ def _price(
             e = subtract(row(V, u), p)
             shape = (span + blur) * (dot(e, e) + blur) * (1.0 + 0.5 * max(merged_degree - COMFORTABLE_DEGREE, 0))
             price = shape + max(_quadric_error(quadrics[u], p[0], p[1], p[2]), 0.0) + blur * blur * merged[u]
-            if price < cost[u] and _is_legal(table, u, v, star, other):
+            if price < cost[u] and _is_legal(table, u, v, mark):
                 cost[u] = price
                 target[u] = h
 
@@ -140,14 +150,18 @@ def _collapse_round(
     log: Ints,
 ) -> int:
     """Collapse up to `quota` vertices in `order`, none beside another; mark removed ones by a negative cost."""
-    star, other = np.empty(len(cost), np.int32), np.empty(len(cost), np.int32)
+    star, mark = np.empty(len(cost), np.int32), np.full(len(cost), -1, np.int32)
     done = 0
     for u in order:
         if done == quota or cost[u] == np.inf:
             break
         h = target[u]
         v = table.tail[following(h)]
-        if stale[u] or degree[u] + degree[v] - 4 > limit or not _is_legal(table, u, v, star, other):
+        if stale[u] or degree[u] + degree[v] - 4 > limit:
+            stale[u] = True
+            continue
+        _mark_neighbours(table, u, mark)
+        if not _is_legal(table, u, v, mark):
             stale[u] = True
             continue
         for i in range(gather_star(table, u, star)):

@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .corner_table import following, preceding
-from .vectors import Floats, Ints, Vector, cross, dot, kernel, row, subtract
+from .vectors import Floats, Ints, cross, dot, kernel, row, subtract
 
 FOLDED = 1e-16  # a triple product must exceed this
 LONG = 0.53**8  # weights of long texel edges ...
@@ -30,8 +29,8 @@ class Reference(NamedTuple):
 
 
 @kernel
-def density(dirichlet: float, jacobian: float) -> float:
-    """Energy per reference area, W = (D / 2)^4 (1 + (0.53 / J)^8 + (0.48 / J)^16).
+def density(dirichlet: float, inverse: float) -> float:
+    """Energy per reference area, W = (D / 2)^4 (1 + (0.53 / J)^8 + (0.48 / J)^16), with `inverse` = 1 / J.
 
     The first term punishes a large singular value, hence short texel edges on the real surface, which set the wave
     solver's time step. D / J^2 is D of the inverse map: the second term punishes long texel edges, but far less. The
@@ -39,48 +38,26 @@ def density(dirichlet: float, jacobian: float) -> float:
     what limbs leave spares their roots from being stretched round. The wall is so steep that 99.9 % of a surface has
     texels less than twice too wide.
     """
-    square = (0.5 * dirichlet) ** 2
-    long, small = _inverse_powers(jacobian)
-    return square * square * (1.0 + long + small)
-
-
-@kernel
-def _inverse_powers(jacobian: float) -> tuple[float, float]:
-    square = 1.0 / (jacobian * jacobian)
-    eighth = (square * square) ** 2
-    return LONG * eighth, SMALL * eighth * eighth
+    square = inverse * inverse
+    eighth = (square * square) * (square * square)
+    square_d = (0.5 * dirichlet) * (0.5 * dirichlet)
+    return square_d * square_d * (1.0 + eighth * (LONG + SMALL * eighth))
 
 
 @kernel
 def density_derivatives(dirichlet: float, jacobian: float) -> tuple[float, float, float, float, float, float]:
     """W and its derivatives W_D, W_J, W_DD, W_DJ, W_JJ."""
-    square = (0.5 * dirichlet) ** 2
-    fourth = square * square
-    long, small = _inverse_powers(jacobian)
+    inverse, inverse_d = 1.0 / jacobian, 1.0 / dirichlet
+    square = inverse * inverse
+    eighth = (square * square) * (square * square)
+    long, small = LONG * eighth, SMALL * eighth * eighth
+    square_d = (0.5 * dirichlet) * (0.5 * dirichlet)
+    fourth = square_d * square_d
     w = fourth * (1.0 + long + small)
-    slope_d, slope_j = 4.0 * w / dirichlet, -fourth * (8.0 * long + 16.0 * small) / jacobian
-    bend_d, bend_mixed = 3.0 * slope_d / dirichlet, 4.0 * slope_j / dirichlet
-    bend_j = fourth * (72.0 * long + 272.0 * small) / (jacobian * jacobian)
+    slope_d, slope_j = 4.0 * w * inverse_d, -fourth * (8.0 * long + 16.0 * small) * inverse
+    bend_d, bend_mixed = 3.0 * slope_d * inverse_d, 4.0 * slope_j * inverse_d
+    bend_j = fourth * (72.0 * long + 272.0 * small) * square
     return w, slope_d, slope_j, bend_d, bend_mixed, bend_j
-
-
-@kernel
-def star_energy(p: Vector, star: Ints, degree: int, tail: Ints, S: Floats, reference: Reference) -> float:
-    """Energy of the triangles round a vertex placed at p; infinite if one of them is folded."""
-    cotangent = reference.cotangent
-    total = 0.0
-    for i in range(degree):
-        h = star[i]
-        g, k = following(h), preceding(h)
-        area = reference.area[h // 3]
-        b, c = row(S, tail[g]), row(S, tail[k])
-        pb, pc, bc = subtract(b, p), subtract(c, p), subtract(c, b)
-        triple = dot(p, cross(pb, pc))
-        if not triple > FOLDED:
-            return np.inf
-        dirichlet = cotangent[h] * dot(bc, bc) + cotangent[g] * dot(pc, pc) + cotangent[k] * dot(pb, pb)
-        total += area * density(dirichlet, 0.5 * triple / area)
-    return total
 
 
 @kernel
@@ -98,5 +75,5 @@ def total_energy(tail: Ints, S: Floats, reference: Reference) -> float:
         dirichlet = (
             cotangent[3 * f] * dot(bc, bc) + cotangent[3 * f + 1] * dot(ac, ac) + cotangent[3 * f + 2] * dot(ab, ab)
         )
-        total += area * density(dirichlet, 0.5 * triple / area)
+        total += area * density(dirichlet, 2.0 * area / triple)
     return total

@@ -9,24 +9,35 @@ from __future__ import annotations
 import numpy as np
 
 from .corner_table import CornerTable, following, gather_star, preceding, undo_collapse
-from .energy import Reference, star_energy
+from .energy import Reference
+from .level import set_shape
 from .reference import Source, update_load, update_triangle
 from .relaxation import relax_vertex
-from .vectors import Floats, Ints, combine, cross, kernel, row, set_row, unit
+from .star import TERMS, energy_after, expand
+from .vectors import Floats, Ints, combine, cross, dot, kernel, row, set_row, subtract, tangent_frame, unit
 
 CROWDED = 64  # neighbours of a new vertex with more triangles than this wait for the sweeps
 
 
 @kernel
-def _place(h: int, table: CornerTable, star: Ints, degree: int, S: Floats, reference: Reference) -> None:
-    """Put the tail of h where its star's energy is least among trial points."""
-    tail = table.tail
-    u, v = tail[h], tail[table.twin[h]]
-    left, right = tail[preceding(h)], tail[preceding(table.twin[h])]
+def _gather(star: Ints, degree: int, tail: Ints, S: Floats, reference: Reference, ring: Floats, shapes: Floats) -> None:
+    """Fill in what `star.expand` asks for."""
+    for i in range(degree):
+        set_row(ring, i, row(S, tail[following(star[i])]))
+        set_shape(shapes, i, star[i], reference)
+
+
+@kernel
+def _place(
+    u: int, v: int, left: int, right: int, S: Floats, ring: Floats, shapes: Floats, degree: int, terms: Floats
+) -> None:
+    """Put u where its star's energy is least among trial points on the ways from v."""
     start = row(S, v)
+    x, y = tangent_frame(start)
+    expand(start, x, y, ring, shapes, degree, terms)
     middle = (0.0, 0.0, 0.0)
     for i in range(degree):
-        middle = combine(1.0, middle, 1.0, row(S, tail[following(star[i])]))
+        middle = combine(1.0, middle, 1.0, row(ring, i))
     inward = combine(1.0, unit(cross(start, row(S, left))), 1.0, unit(cross(row(S, right), start)))
     least = np.inf
     best = start
@@ -34,7 +45,8 @@ def _place(h: int, table: CornerTable, star: Ints, degree: int, S: Floats, refer
         t = 1.0
         for _ in range(trials):
             p = unit(combine(1.0 - t, start, t, goal))
-            energy = star_energy(p, star, degree, tail, S, reference)
+            move = subtract(p, start)
+            energy = energy_after((dot(move, x), dot(move, y), dot(move, start)), terms, degree)
             if energy < least:
                 least = energy
                 best = p
@@ -54,6 +66,8 @@ def insert_vertices(log: Ints, table: CornerTable, source: Source, S: Floats, re
     """
     tail = table.tail
     star, other = np.empty(len(S), np.int32), np.empty(len(S), np.int32)
+    ring, shapes, terms = np.empty((len(S), 3)), np.empty((len(S), 4)), np.empty((len(S), TERMS))
+    other_ring, other_shapes = np.empty((CROWDED, 3)), np.empty((CROWDED, 4))
     for h in log[::-1]:
         u, v = tail[h], tail[table.twin[h]]
         undo_collapse(table, h)
@@ -64,11 +78,13 @@ def insert_vertices(log: Ints, table: CornerTable, source: Source, S: Floats, re
             degree = gather_star(table, w, star)
             for i in range(degree):
                 update_triangle(star[i] // 3, tail, source, reference)
-        _place(h, table, star, degree, S, reference)
-        relax_vertex(u, star, degree, tail, S, reference)
+        _gather(star, degree, tail, S, reference, ring, shapes)
+        _place(u, v, tail[preceding(h)], tail[preceding(table.twin[h])], S, ring, shapes, degree, terms)
+        relax_vertex(u, S, ring, shapes, degree, terms)
         for i in range(degree):
             w = tail[following(star[i])]
             other_degree = gather_star(table, w, other)
             if other_degree <= CROWDED:
-                relax_vertex(w, other, other_degree, tail, S, reference)
-        relax_vertex(u, star, degree, tail, S, reference)
+                _gather(other, other_degree, tail, S, reference, other_ring, other_shapes)
+                relax_vertex(w, S, other_ring, other_shapes, other_degree, terms)
+            set_row(ring, i, row(S, w))

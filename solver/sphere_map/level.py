@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .corner_table import CornerTable
-from .vectors import Ints
+from .corner_table import CornerTable, following, gather_star, preceding
+from .energy import Reference
+from .vectors import Floats, Ints, kernel
 
 
 class Level(NamedTuple):
@@ -17,22 +18,49 @@ class Level(NamedTuple):
     tail: Ints  # [3 m] vertex where a half-edge starts
     edge: Ints  # [3 m] edge that a half-edge lies on
     ends: Ints  # [e, 2] vertices of an edge; the half-edge that starts at the first one is the lower-numbered
-    star_start: Ints  # [n + 1] where a vertex's half-edges begin in `star`
-    star: Ints  # [3 m] half-edges sorted by tail
+    star_start: Ints  # [n + 1] where the neighbours of a vertex begin in `ring`
+    ring: Ints  # [3 m] neighbours of each vertex, counterclockwise
+    star: Ints  # [3 m] the half-edges to them
 
 
 def build_level(table: CornerTable, vertices: NDArray[np.integer], faces: NDArray[np.integer]) -> Level:
     """Level made of the given vertices and triangles of a (partly collapsed) corner table."""
     corners = (3 * faces[:, None] + np.arange(3)).ravel()
-    tail = _renumber(vertices, len(table.leaving))[table.tail[corners]]
-    twin = _renumber(corners, len(table.tail))[table.twin[corners]]
+    vertex_number, corner_number = _renumber(vertices, len(table.leaving)), _renumber(corners, len(table.tail))
+    tail, twin = vertex_number[table.tail[corners]], corner_number[table.twin[corners]]
     lower = np.flatnonzero(np.arange(len(twin)) < twin)
     edge = np.empty(len(twin), dtype=np.int32)
     edge[lower] = edge[twin[lower]] = np.arange(len(lower))
     ends = np.stack([tail[lower], tail[twin[lower]]], axis=1)
-    star = np.argsort(tail, kind="stable").astype(np.int32)
     star_start = np.concatenate([[0], np.cumsum(np.bincount(tail))]).astype(np.int32)
-    return Level(tail, edge, ends, star_start, star)
+    star = np.empty(len(tail), dtype=np.int32)
+    _gather_stars(vertices, table, star_start, star)
+    ring = vertex_number[table.tail[table.twin[star]]]
+    return Level(tail, edge, ends, star_start, ring, corner_number[star])
+
+
+@kernel
+def _gather_stars(vertices: Ints, table: CornerTable, star_start: Ints, star: Ints) -> None:
+    for i in range(len(vertices)):
+        gather_star(table, vertices[i], star[star_start[i] : star_start[i + 1]])
+
+
+@kernel
+def set_shape(shapes: Floats, i: int, h: int, reference: Reference) -> None:
+    """Write the reference of the triangle of half-edge h into row i: area, and cotangents at tail, head and apex."""
+    shapes[i, 0] = reference.area[h // 3]
+    shapes[i, 1] = reference.cotangent[h]
+    shapes[i, 2] = reference.cotangent[following(h)]
+    shapes[i, 3] = reference.cotangent[preceding(h)]
+
+
+@kernel
+def star_shapes(star: Ints, reference: Reference) -> Floats:
+    """References of the triangles left of the half-edges `star`, one after the other in memory, shape [3 m, 4]."""
+    shapes = np.empty((len(star), 4))
+    for i in range(len(star)):
+        set_shape(shapes, i, star[i], reference)
+    return shapes
 
 
 def _renumber(kept: NDArray[np.integer], count: int) -> Ints:

@@ -25,7 +25,8 @@ TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.
 GRID = 2.0**32  # the normalised mesh is rounded to multiples of 1 / GRID
 EQUAL_UNTIL, REAL_FROM = 12, 100  # vertices of a level: equal equilateral references until, real shapes from
 COARSE_SLIVER, FINE_SLIVER = 0.5, 0.15  # shape quality below which a reference is pulled towards equilateral
-LARGE = 6000  # vertices: larger levels grow faster
+SLOW_GROWTH, FAST_GROWTH = 1.25, 2.0  # from one level to the next, below and above CAREFUL_UNTIL vertices
+CAREFUL_UNTIL = 30
 TRUST_LADDER = (1.0, 0.6, 0.3, 0.0)  # in the real triangles, each tried when the one before gave no certified map
 
 
@@ -132,7 +133,7 @@ def _level_sizes(n: int) -> list[int]:
     sizes = []
     size = 4.0
     while size < n:
-        size = size * (1.25 if size < 30 else 1.5 if size < LARGE else 2.2) + 1
+        size = size * (SLOW_GROWTH if size < CAREFUL_UNTIL else FAST_GROWTH) + 1
         sizes.append(min(int(size), n))
     if len(sizes) > 1 and sizes[-2] > 0.75 * n:
         del sizes[-2]

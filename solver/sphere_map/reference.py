@@ -71,7 +71,8 @@ def update_triangle(f: int, tail: Ints, source: Source, reference: Reference) ->
     else:
         q0 = q1 = q2 = 1.0
     area = max(real * (source.load[a] + source.load[b] + source.load[c]) / 3.0, SMALLEST_SHARE * source.mean)
-    area = area**source.trust * source.mean ** (1.0 - source.trust)
+    if source.trust < 1.0:
+        area = area**source.trust * source.mean ** (1.0 - source.trust)
     four_areas = np.sqrt(max(2.0 * (q0 * q1 + q1 * q2 + q2 * q0) - (q0 * q0 + q1 * q1 + q2 * q2), 1e-300))
     scale = 0.5 / (four_areas * area)
     reference.area[f] = area

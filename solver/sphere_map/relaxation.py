@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .corner_table import following, preceding
-from .energy import FOLDED, Reference, density_derivatives, star_energy
-from .vectors import Floats, Ints, combine, cross, dot, kernel, row, set_row, subtract, tangent_frame, unit
+from .level import Level
+from .star import TERMS, energy_after, expand, slopes, tangent_move
+from .vectors import Floats, combine, kernel, row, set_row, tangent_frame, unit
 
 REACH = 0.3  # longest step [rad]
 ARMIJO = 1e-4
@@ -20,6 +20,9 @@ ARMIJO = 1e-4
 def _descent_direction(gx: float, gy: float, hxx: float, hxy: float, hyy: float) -> tuple[float, float]:
     """Newton step -|H|^-1 g of a 2 x 2 Hessian, its eigenvalues taken by their absolute value."""
     mean, half = 0.5 * (hxx + hyy), 0.5 * (hxx - hyy)
+    determinant = hxx * hyy - hxy * hxy
+    if mean > 0.0 and determinant > 1e-3 * mean * mean:
+        return (hxy * gy - hyy * gx) / determinant, (hxy * gx - hxx * gy) / determinant
     radius = np.sqrt(half * half + hxy * hxy)
     if radius > 0.0:
         # eigenvector of mean + radius, from the better conditioned of two formulas
@@ -36,70 +39,56 @@ def _descent_direction(gx: float, gy: float, hxx: float, hxy: float, hyy: float)
 
 
 @kernel
-def relax_vertex(v: int, star: Ints, degree: int, tail: Ints, S: Floats, reference: Reference) -> float:
-    """Move v to lower the energy of its star; return by how much it fell."""
+def relax_vertex(v: int, S: Floats, ring: Floats, shapes: Floats, degree: int, terms: Floats) -> float:
+    """Move v to lower the energy of its star; return by how much it fell.
+
+    `ring` and `shapes` are as in `star.expand`, and `terms` is room for what it fills.
+    """
     p = row(S, v)
     x, y = tangent_frame(p)
-    cotangent = reference.cotangent
-    energy = gx = gy = radial = hxx = hxy = hyy = 0.0
-    for i in range(degree):
-        h = star[i]
-        g, k = following(h), preceding(h)
-        area = reference.area[h // 3]
-        b, c = row(S, tail[g]), row(S, tail[k])
-        pb, pc, bc = subtract(b, p), subtract(c, p), subtract(c, b)
-        triple = dot(p, cross(pb, pc))
-        if not triple > FOLDED:
-            return 0.0
-        jacobian = 0.5 * triple / area
-        dirichlet = cotangent[h] * dot(bc, bc) + cotangent[g] * dot(pc, pc) + cotangent[k] * dot(pb, pb)
-        w, wd, wj, wdd, wdj, wjj = density_derivatives(dirichlet, jacobian)
-        grad_d = combine(-2.0 * cotangent[k], pb, -2.0 * cotangent[g], pc)
-        grad_j = combine(0.5 / area, cross(b, c), 0.0, p)
-        dx, dy, jx, jy = dot(grad_d, x), dot(grad_d, y), dot(grad_j, x), dot(grad_j, y)
-        energy += area * w
-        gx += area * (wd * dx + wj * jx)
-        gy += area * (wd * dy + wj * jy)
-        radial += area * (wd * dot(grad_d, p) + wj * dot(grad_j, p))
-        flat = 2.0 * wd * (cotangent[g] + cotangent[k])
-        hxx += area * (flat + wdd * dx * dx + 2.0 * wdj * dx * jx + wjj * jx * jx)
-        hyy += area * (flat + wdd * dy * dy + 2.0 * wdj * dy * jy + wjj * jy * jy)
-        hxy += area * (wdd * dx * dy + wdj * (dx * jy + dy * jx) + wjj * jx * jy)
-    # on the sphere a tangent step also falls towards the centre: the Hessian loses the radial slope
-    sx, sy = _descent_direction(gx, gy, hxx - radial, hxy, hyy - radial)
+    expand(p, x, y, ring, shapes, degree, terms)
+    energy, gx, gy, hxx, hxy, hyy = slopes(terms, degree)
+    if not energy < np.inf:
+        return 0.0
+    sx, sy = _descent_direction(gx, gy, hxx, hxy, hyy)
     descent = -(gx * sx + gy * sy)
     if not descent > 1e-13 * energy:
         return 0.0
     step = min(1.0, REACH / np.sqrt(sx * sx + sy * sy))
-    direction = combine(sx, x, sy, y)
     for _ in range(14):
-        q = unit(combine(1.0, p, step, direction))
-        lower = star_energy(q, star, degree, tail, S, reference)
+        move = tangent_move(step * sx, step * sy)
+        lower = energy_after(move, terms, degree)
         if lower < energy - ARMIJO * step * descent:
             further = 2.0 * lower < energy  # high up a wall a Newton step is far too short
             while further:
                 step *= 2.0
-                ahead = unit(combine(1.0, p, step, direction))
-                least = star_energy(ahead, star, degree, tail, S, reference)
+                ahead = tangent_move(step * sx, step * sy)
+                least = energy_after(ahead, terms, degree)
                 further = 2.0 * least < lower
                 if least < lower:
-                    q, lower = ahead, least
-            set_row(S, v, q)
+                    move, lower = ahead, least
+            set_row(S, v, unit(combine(1.0, combine(move[0], x, move[1], y), 1.0 + move[2], p)))
             return energy - lower
         step *= 0.35
     return 0.0
 
 
 @kernel
-def sweep(star_start: Ints, star: Ints, tail: Ints, S: Floats, reference: Reference, backwards: bool) -> float:
-    """Relax every vertex once, in order or backwards; return by how much the energy fell.
+def sweep(level: Level, S: Floats, shapes: Floats, backwards: bool) -> float:
+    """Relax every vertex of a level once, in order or backwards; return by how much the energy fell.
 
-    The star of vertex v is `star[star_start[v]:star_start[v + 1]]`.
+    `shapes` [3 m, 4] comes from `level.star_shapes`.
     """
-    count = len(star_start) - 1
+    count = len(level.star_start) - 1
+    largest = 0
+    for v in range(count):
+        largest = max(largest, level.star_start[v + 1] - level.star_start[v])
+    ring, terms = np.empty((largest, 3)), np.empty((largest, TERMS))
     fall = 0.0
     for i in range(count):
         v = count - 1 - i if backwards else i
-        first, last = star_start[v], star_start[v + 1]
-        fall += relax_vertex(v, star[first:last], last - first, tail, S, reference)
+        first, last = level.star_start[v], level.star_start[v + 1]
+        for k in range(last - first):
+            set_row(ring, k, row(S, level.ring[first + k]))
+        fall += relax_vertex(v, S, ring, shapes[first:last], last - first, terms)
     return fall

@@ -123,17 +123,22 @@ def limbed_figures():
     return figures(*limbed())
 
 
+def assert_as_good(found, expected):
+    np.testing.assert_allclose(found[:4], expected[:4], rtol=0.02)
+    # the narrowest of a few thousand texels decides on the time step, and falls now here, now there
+    assert found[4] == pytest.approx(expected[4], rel=0.25)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_rotated_mesh_has_an_atlas_as_good(seed, limbed_figures):
     V, F = limbed()
-    turned = figures(V @ Rotation.random(random_state=seed).as_matrix().T, F)
-    np.testing.assert_allclose(turned, limbed_figures, rtol=0.15)
+    assert_as_good(figures(V @ Rotation.random(random_state=seed).as_matrix().T, F), limbed_figures)
 
 
 @pytest.mark.parametrize("scale", [1e-5, 1e4])
 def test_a_scaled_mesh_has_an_atlas_as_good(scale, limbed_figures):
     V, F = limbed()
-    np.testing.assert_allclose(figures(scale * V, F), limbed_figures, rtol=0.02)
+    assert_as_good(figures(scale * V, F), limbed_figures)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -144,7 +149,7 @@ def test_a_renumbered_mesh_has_an_atlas_as_good(seed, limbed_figures):
     number = np.empty(len(V), dtype=int)
     number[order] = np.arange(len(V))
     F = np.array([np.roll(f, k) for f, k in zip(number[F], rng.integers(0, 3, len(F)), strict=True)])
-    np.testing.assert_allclose(figures(V[order], rng.permutation(F)), limbed_figures, rtol=0.15)
+    assert_as_good(figures(V[order], rng.permutation(F)), limbed_figures)
 
 
 def test_candidate_rotations_are_rotations_and_leave_no_gap():
@@ -183,7 +188,7 @@ def test_narrow_texels_are_found_where_they_are():
         p = np.array([direction]) / np.linalg.norm(direction)
         tangent = np.eye(3) - p.T @ p
         pure = np.array([[*np.diag(tangent), tangent[0, 1], tangent[0, 2], tangent[1, 2]]])
-        found = orientation._narrowness(np.eye(3), p, pure, one) ** (-1 / (2 * orientation.SHARPNESS))
+        found = orientation._narrowness(np.eye(3), p, pure, one, np.inf) ** (-1 / (2 * orientation.SHARPNESS))
         assert found == pytest.approx(width)
     nearest = np.argmax(V @ [0.6, 0, 0.8])
     tangent = np.eye(3) - np.outer(V[nearest], V[nearest])

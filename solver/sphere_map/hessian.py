@@ -1,0 +1,166 @@
+"""The energy's Hessian on the vertices and edges of a level, made positive semidefinite triangle by triangle.
+
+With a = (s1 + s2)/2 and b = (s1 - s2)/2, the energy density is a function of a^2 = D/4 + J/2 and b^2 = D/4 - J/2, and
+its Hessian splits into a twist (slope along a over a), a flip (slope along b over b), and a 2 x 2 block in (a, b)
+(Smith, de Goes, Kim 2019). Each of them loses its negative part in closed form.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+
+from .energy import Reference, density_derivatives
+from .level import Level
+from .vectors import Floats, Vector, combine, cross, dot, kernel, row, subtract
+
+# of D and J along the two tangents of a vertex: D_x, D_y, J_x, J_y
+Slopes: TypeAlias = tuple[float, float, float, float]
+# W_D and W_J; then the Hessian is the second of D, the second of J, and gD gD^T, gD gJ^T + gJ gD^T and gJ gJ^T with the
+# gradients gD and gJ, in these shares
+Shares: TypeAlias = tuple[float, float, float, float, float, float, float]
+
+
+@kernel
+def assemble(
+    level: Level,
+    S: Floats,
+    reference: Reference,
+    x: Floats,
+    y: Floats,
+    gradient: Floats,
+    diagonal: Floats,
+    blocks: Floats,
+) -> float:
+    """Fill gradient [n, 2] and Hessian for the tangents x, y [n, 3] of the map S, and return the energy.
+
+    The Hessian has 2 x 2 blocks: `diagonal` [n, 3] with xx, xy, yy, and `blocks` [e, 4] with xx, xy, yx, yy, the rows
+    belonging to the edge's first vertex.
+    """
+    gradient[:] = 0.0
+    diagonal[:] = 0.0
+    blocks[:] = 0.0
+    radial = np.zeros(len(S))
+    tail, edge, ends = level.tail, level.edge, level.ends
+    total = 0.0
+    for f in range(len(tail) // 3):
+        h = 3 * f
+        area = reference.area[f]
+        half = 0.5 / area
+        u, v, w = tail[h], tail[h + 1], tail[h + 2]
+        cot_a, cot_b, cot_c = reference.cotangent[h], reference.cotangent[h + 1], reference.cotangent[h + 2]
+        a, b, c = row(S, u), row(S, v), row(S, w)
+        ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
+        dirichlet = cot_a * dot(bc, bc) + cot_b * dot(ac, ac) + cot_c * dot(ab, ab)
+        jacobian = half * dot(a, cross(ab, ac))
+        energy, shares = _projected_hessian(area, dirichlet, jacobian)
+        total += energy
+        grad_a = combine(-2.0 * cot_c, ab, -2.0 * cot_b, ac)
+        grad_b = combine(-2.0 * cot_a, bc, 2.0 * cot_c, ab)
+        grad_c = combine(2.0 * cot_b, ac, 2.0 * cot_a, bc)
+        at_a = _slopes(grad_a, cross(b, c), half, row(x, u), row(y, u))
+        at_b = _slopes(grad_b, cross(c, a), half, row(x, v), row(y, v))
+        at_c = _slopes(grad_c, cross(a, b), half, row(x, w), row(y, w))
+        along_d, along_j = shares[0], shares[1] * jacobian
+        radial[u] += along_d * dot(grad_a, a) + along_j
+        radial[v] += along_d * dot(grad_b, b) + along_j
+        radial[w] += along_d * dot(grad_c, c) + along_j
+        _add_vertex(u, at_a, cot_b + cot_c, shares, gradient, diagonal)
+        _add_vertex(v, at_b, cot_c + cot_a, shares, gradient, diagonal)
+        _add_vertex(w, at_c, cot_a + cot_b, shares, gradient, diagonal)
+        i, j, k = edge[h], edge[h + 1], edge[h + 2]
+        _add_edge(i, ends[i, 0] == u, u, v, c, cot_c, half, at_a, at_b, shares, x, y, blocks)
+        _add_edge(j, ends[j, 0] == v, v, w, a, cot_a, half, at_b, at_c, shares, x, y, blocks)
+        _add_edge(k, ends[k, 0] == w, w, u, b, cot_b, half, at_c, at_a, shares, x, y, blocks)
+    for v in range(len(S)):
+        # on the sphere a tangent step also falls towards the centre: the Hessian gains minus the radial slope
+        shift = max(-radial[v], 0.0) + 1e-8 * (diagonal[v, 0] + diagonal[v, 2])
+        diagonal[v, 0] += shift
+        diagonal[v, 2] += shift
+    return total
+
+
+@kernel
+def _projected_hessian(area: float, dirichlet: float, jacobian: float) -> tuple[float, Shares]:
+    """Energy of a triangle of the given area, and the shares that make up its Hessian's positive part."""
+    w, wd, wj, wdd, wdj, wjj = density_derivatives(dirichlet, jacobian)
+    aa, bb = 0.25 * dirichlet + 0.5 * jacobian, max(0.25 * dirichlet - 0.5 * jacobian, 0.0)
+    twist, flip = 4.0 * wd + 2.0 * wj, 4.0 * wd - 2.0 * wj
+    haa = aa * (16.0 * (wdd + wdj) + 4.0 * wjj) + twist
+    hbb = bb * (16.0 * (wdd - wdj) + 4.0 * wjj) + flip
+    root = np.sqrt(aa * bb)
+    hab = root * (16.0 * wdd - 4.0 * wjj)
+    if haa < 0.0 or hbb < 0.0 or haa * hbb < hab * hab:
+        # keep the upper eigenvalue alone: its projector is (1 + (H - mean) / radius) / 2
+        mean, half = 0.5 * (haa + hbb), 0.5 * (haa - hbb)
+        radius = np.sqrt(half * half + hab * hab)
+        upper = max(mean + radius, 0.0)
+        turn = half / radius if radius > 0.0 else 0.0
+        haa, hbb = 0.5 * upper * (1.0 + turn), 0.5 * upper * (1.0 - turn)
+        hab = 0.5 * upper * hab / radius if radius > 0.0 else 0.0
+    twist, flip = max(twist, 0.0), max(flip, 0.0)
+    along_aa = 0.25 * (haa - twist) / aa
+    along_bb = along_ab = 0.0
+    if bb > 1e-10 * aa:  # else b has no direction
+        along_bb, along_ab = 0.25 * (hbb - flip) / bb, 0.25 * hab / root
+    dd = (along_aa + 2.0 * along_ab + along_bb) / 16.0
+    dj = (along_aa - along_bb) / 8.0
+    jj = (along_aa - 2.0 * along_ab + along_bb) / 4.0
+    bend_d, bend_j = 0.125 * (twist + flip), 0.25 * (twist - flip)
+    return area * w, (area * wd, area * wj, area * bend_d, area * bend_j, area * dd, area * dj, area * jj)
+
+
+@kernel
+def _slopes(grad_d: Vector, grad_j: Vector, half: float, x: Vector, y: Vector) -> Slopes:
+    return dot(grad_d, x), dot(grad_d, y), half * dot(grad_j, x), half * dot(grad_j, y)
+
+
+@kernel
+def _combined(slopes: Slopes, shares: Shares) -> Slopes:
+    """What the slopes at another vertex are multiplied with to get the outer products of the gradients."""
+    dx, dy, jx, jy = slopes
+    dd, dj, jj = shares[4], shares[5], shares[6]
+    return dd * dx + dj * jx, dd * dy + dj * jy, dj * dx + jj * jx, dj * dy + jj * jy
+
+
+@kernel
+def _add_vertex(v: int, at_v: Slopes, bend: float, shares: Shares, gradient: Floats, diagonal: Floats) -> None:
+    dx, dy, jx, jy = at_v
+    gradient[v, 0] += shares[0] * dx + shares[1] * jx
+    gradient[v, 1] += shares[0] * dy + shares[1] * jy
+    flat = 2.0 * shares[2] * bend
+    px, py, qx, qy = _combined(at_v, shares)
+    diagonal[v, 0] += flat + px * dx + qx * jx
+    diagonal[v, 1] += px * dy + qx * jy
+    diagonal[v, 2] += flat + py * dy + qy * jy
+
+
+@kernel
+def _add_edge(
+    e: int,
+    forwards: bool,
+    u: int,
+    v: int,
+    apex: Vector,
+    cotangent: float,
+    half: float,
+    at_u: Slopes,
+    at_v: Slopes,
+    shares: Shares,
+    x: Floats,
+    y: Floats,
+    blocks: Floats,
+) -> None:
+    """Add what the triangle u, v, apex says about edge e, which begins at u if `forwards`."""
+    ux, uy, vx, vy = row(x, u), row(y, u), row(x, v), row(y, v)
+    flat, twist = -2.0 * shares[2] * cotangent, shares[3] * half
+    bent_x, bent_y = combine(flat, ux, twist, cross(apex, ux)), combine(flat, uy, twist, cross(apex, uy))
+    px, py, qx, qy = _combined(at_u, shares)
+    dx, dy, jx, jy = at_v
+    xy = dot(bent_x, vy) + px * dy + qx * jy
+    yx = dot(bent_y, vx) + py * dx + qy * jx
+    blocks[e, 0] += dot(bent_x, vx) + px * dx + qx * jx
+    blocks[e, 1] += xy if forwards else yx
+    blocks[e, 2] += yx if forwards else xy
+    blocks[e, 3] += dot(bent_y, vy) + py * dy + qy * jy
