@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 SIZE = 513  # odd: zero has a colour of its own
 
 # lightness, chroma at equal distances from zero; hues of the two arms [degrees]
-_ARM = np.array([(96.0, 1.0), (85.0, 19.0), (70.0, 39.0), (53.0, 49.0), (34.0, 45.0)])
+_ARM = np.array([(96.0, 0.0), (85.0, 19.0), (70.0, 39.0), (53.0, 49.0), (34.0, 45.0)])
 _BLUE, _RED = (245.0, 285.0), (62.0, 30.0)  # near zero, at the end
 
 _WHITE = np.array([0.95047, 1.0, 1.08883])  # D65

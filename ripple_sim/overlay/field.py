@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.atlas.padding import padded_addresses
 
+_NEARLY_ALL = 0.98
+
 
 def pad_field(field: NDArray[np.float32]) -> NDArray[np.float32]:
     """Surround the faces of a field [6, N, N] by their neighbours' texels, and the mean of three at the corners.
@@ -25,11 +27,16 @@ def pad_field(field: NDArray[np.float32]) -> NDArray[np.float32]:
     return padded
 
 
-def magnitude(field: NDArray[np.float32], beyond: float) -> float:
-    """Magnitude that all but a share `beyond` of the texels of a padded field stay below."""
+def magnitude(field: NDArray[np.float32]) -> float:
+    """Magnitude up to which the values of a padded field are worth telling apart.
+
+    Nearly all texels stay below it, and a quarter of the largest value does, so that the first small ring is seen well
+    before it has spread; what is beyond are mostly the dents under contacts.
+    """
     inside = np.abs(field[:, 1:-1, 1:-1]).ravel()
-    place = min(int((1 - beyond) * inside.size), inside.size - 1)
-    return float(np.partition(inside, place)[place])
+    place = min(int(_NEARLY_ALL * inside.size), inside.size - 1)
+    parted = np.partition(inside, place)
+    return float(max(parted[place], parted[place:].max() / 4))
 
 
 def grid_spacing(resolution: int) -> int:

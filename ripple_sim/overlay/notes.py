@@ -15,8 +15,6 @@ from .history import History
 from .request import Request
 from .scale import Limit
 
-# The colours tell apart all but this share of the texels; what is beyond, mostly dents of contacts, takes their ends.
-_BEYOND = 0.02
 # Until more is seen the colours reach to this share of the targets' size, or to the speed that goes with it.
 _LEAST = 1e-4
 
@@ -83,7 +81,7 @@ class Notebook:
         if request.energy:
             for history, simulation in zip(self._energies, self._simulations, strict=True):
                 history.add(sum(simulation.ripples[name].energy() for name in simulation.ripples))
-        magnitudes = [magnitude(field, _BEYOND) for run in fields for field in run.values()]
+        magnitudes = [magnitude(field) for run in fields for field in run.values()]
         curves = [history.curve() for history in self._energies]
         return Notes(
             time=float(self._simulations[0].data.time),

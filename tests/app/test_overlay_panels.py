@@ -1,0 +1,166 @@
+"""The panels: what they show stands where it should, on frames of every size."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ripple_sim.overlay import patch as patch_module
+from ripple_sim.overlay.arrows import draw_arrow
+from ripple_sim.overlay.chart import Chart
+from ripple_sim.overlay.colormap import colors
+from ripple_sim.overlay.layout import Layout
+from ripple_sim.overlay.panels import arrow_key, color_bar, label
+from ripple_sim.overlay.patch import Patch, text_width
+from ripple_sim.overlay.scale import number
+
+SIZES = [(320, 180), (640, 360), (720, 1280), (1280, 720), (3840, 2160)]
+
+
+@pytest.fixture
+def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float, float, Patch]]:
+    """Boxes (left, top, right, bottom) of everything that is written, and the patch that it is written on."""
+    boxes = []
+    plain = Patch.text
+
+    def text(self: Patch, x: float, y: float, text: str, size: int, *style: object) -> None:
+        align = style[1] if len(style) > 1 else "left"
+        width = text_width(text, size)
+        left = x - {"left": 0.0, "middle": 0.5, "right": 1.0}[str(align)] * width
+        boxes.append((left, y - 0.75 * size, left + width, y + 0.24 * size, self))
+        plain(self, x, y, text, size, *style)
+
+    monkeypatch.setattr(Patch, "text", text)
+    return boxes
+
+
+def all_panels(layout: Layout) -> dict[str, Patch]:
+    times = np.linspace(0, 3, 200)
+    chart = Chart(layout, "wave energy", "J", 4.0, ["ripple-sim", "Dynamic Paint"])
+    return {
+        "top left": label("t = 12.34 s", layout.em, "slow"),
+        "top right": arrow_key(layout, 0.05, 0.05),
+        "bottom left": color_bar(layout, "velocity", "m/s", 0.5, 0.5),
+        "bottom right": chart.draw([(times, np.sin(times) ** 2)] * 2, 1.0, 1.0),
+    }
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_panels_and_their_type_stay_inside_and_apart(size: tuple[int, int], written: list) -> None:
+    layout = Layout(*size)
+    taken = np.zeros(size[::-1], int)
+    for corner, panel in all_panels(layout).items():
+        left, top = layout.place(corner, panel.width, panel.height)
+        assert left >= 0
+        assert top >= 0
+        assert left + panel.width <= size[0]
+        assert top + panel.height <= size[1]
+        taken[top : top + panel.height, left : left + panel.width] += 1
+    assert taken.max() == 1
+    assert len(written) > 12
+    for left, top, right, bottom, panel in written:
+        assert left >= 0
+        assert top >= 0
+        assert right <= panel.width
+        assert bottom <= panel.height
+    assert layout.em >= 9
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_numbers_on_an_axis_do_not_touch(size: tuple[int, int], written: list) -> None:
+    color_bar(Layout(*size), "height", "m", 0.0125, 0.0125)
+    rows: dict[float, list[tuple[float, float]]] = {}
+    for left, _, right, bottom, _panel in written:
+        rows.setdefault(bottom, []).append((left, right))
+    assert max(map(len, rows.values())) == 5
+    for row in rows.values():
+        row.sort()
+        for (_, end), (begin, _) in itertools.pairwise(row):
+            assert end < begin
+
+
+def test_bar_has_the_colors_of_its_values() -> None:
+    layout = Layout(1280, 720)
+    bar = color_bar(layout, "height", "m", 0.02, 0.02)
+    frame = np.zeros((bar.height, bar.width, 3), np.uint8)
+    bar.over(frame, 0, 0)
+    row = frame[round(2.25 * layout.em)].astype(int)
+    for value in (-0.02, -0.01, 0.0, 0.005, 0.0199):
+        expected = colors(value, 0.02).astype(int)
+        nearest = np.abs(row - expected).max(axis=1)
+        assert nearest.min() <= 2
+    middle = np.abs(row - colors(0.0, 0.02).astype(int)).sum(axis=1)
+    assert abs(int(np.argmin(middle)) - bar.width / 2) < 3
+
+
+def test_patch_covers_in_proportion() -> None:
+    patch = Patch(10, 6)
+    patch.box(2.25, 1.0, 5.5, 2.5, (255, 255, 255))
+    frame = np.zeros((6, 10, 3), np.uint8)
+    patch.over(frame, 0, 0)
+    np.testing.assert_array_equal(frame[1, :, 0], [0, 0, 191, 255, 255, 128, 0, 0, 0, 0])
+    np.testing.assert_array_equal(frame[2, 3:5, 0], [128, 128])
+    assert frame[3:].max() == 0
+
+
+@pytest.mark.parametrize("place", [(-6, -3), (95, 45), (200, 10), (40, -60)])
+def test_patch_over_the_border_is_cut(place: tuple[int, int]) -> None:
+    patch = Patch(12, 8)
+    patch.box(0, 0, 12, 8, (200, 100, 50))
+    frame = np.zeros((50, 100, 3), np.uint8)
+    patch.over(frame, *place)
+    x, y = place
+    expected = np.zeros_like(frame)
+    expected[max(y, 0) : max(y + 8, 0), max(x, 0) : max(x + 12, 0)] = (200, 100, 50)
+    np.testing.assert_array_equal(frame, expected)
+
+
+def test_chart_draws_values_at_their_height() -> None:
+    layout = Layout(1280, 720)
+    chart = Chart(layout, "energy", "J", 10.0)
+    times = np.linspace(0, 10, 300)
+
+    def row_of(value: float) -> float:
+        frame = np.full((400, 400, 3), 255, np.uint8)
+        chart.draw([(times, np.full(300, value))], 2.0, 2.0).over(frame, 0, 0)
+        blue = (frame[..., 2].astype(int) - frame[..., 0]) > 80
+        return float(np.flatnonzero(blue[:, 200]).mean())
+
+    low, middle, high = row_of(0.5), row_of(1.0), row_of(1.5)
+    assert low > middle > high
+    assert low - middle == pytest.approx(middle - high, abs=1.0)
+
+
+def test_chart_grows_with_time() -> None:
+    layout = Layout(1280, 720)
+    chart = Chart(layout, "energy", "J", 10.0)
+
+    def reach(until: float) -> int:
+        times = np.linspace(0, until, 50)
+        frame = np.full((400, 400, 3), 255, np.uint8)
+        chart.draw([(times, np.ones(50))], 2.0, 2.0).over(frame, 0, 0)
+        blue = (frame[..., 2].astype(int) - frame[..., 0]) > 80
+        return int(np.flatnonzero(blue.any(axis=0)).max())
+
+    quarter, half, whole = reach(2.5), reach(5.0), reach(10.0)
+    assert half - quarter == pytest.approx((whole - quarter) / 3, abs=1.5)
+
+
+def test_arrow_has_its_length_and_fades() -> None:
+    patch = Patch(120, 60)
+    draw_arrow(patch, (100.0, 30.0), (20.0, 30.0), 4.0, [1.0, 1.0, 0.0, 0.0])
+    frame = np.full((60, 120, 3), 255, np.uint8)
+    patch.over(frame, 0, 0)
+    dark = 255 - frame[30, :, 0].astype(int)
+    assert dark[100] > 200  # the tip's dot
+    assert dark[70:95].min() > 200
+    assert dark[20:40].max() == 0  # towards the tail nothing is seen
+    assert dark[110:].max() == 0
+
+
+def test_number_is_written_in_a_font_that_has_its_signs() -> None:
+    assert Path(patch_module._font(20).path).name == "DejaVuSans.ttf"
+    missing = patch_module._font(40).getmask("\U0010ffff").getbbox()
+    for sign in number(-1.0)[0], "µ", "\N{MULTIPLICATION SIGN}":
+        assert patch_module._font(40).getmask(sign).getbbox() != missing
