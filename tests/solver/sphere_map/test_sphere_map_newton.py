@@ -125,7 +125,8 @@ def test_the_expanded_star_knows_the_energy_of_every_place(v):
         moved[v] += move[0] * x + move[1] * y + move[2] * S[v]
         assert np.linalg.norm(moved[v]) == pytest.approx(1, abs=1e-15)
         rise = energy_after(move, terms, len(terms)) - energy_after((0.0, 0.0, 0.0), terms, len(terms))
-        assert rise == pytest.approx(total_energy(level.tail, moved, reference) - at_rest, rel=1e-6, abs=1e-11 * at_rest)
+        expected = total_energy(level.tail, moved, reference) - at_rest
+        assert rise == pytest.approx(expected, rel=1e-6, abs=1e-11 * at_rest)
 
 
 def test_the_expanded_star_sees_folds():
