@@ -110,6 +110,7 @@ class Renderer:
             light_view = self._update(ctx, data, reliefs, pose)
             self._draw_maps(ctx, light_view)
             self._draw_scene(ctx, pose)
+            self._gl.wait()  # reading back would keep all other Python threads waiting for the driver, too
             ctx.copy_framebuffer(self._resolved, self._target)
             self._resolved.read_into(self._pixels, components=3, alignment=1)
         return np.frombuffer(self._pixels, dtype=np.uint8).reshape(self.height, self.width, 3)[::-1].copy()
