@@ -40,6 +40,8 @@ class Skin:
 
     def __init__(self, atlas: Atlas) -> None:
         self.F, vertices = _refined(atlas)
+        for columns in (_DIRECTION, _NORMAL):  # those of midpoints are means
+            vertices[:, columns] /= np.linalg.norm(vertices[:, columns], axis=1, keepdims=True)
         self._rest, self._direction, self._rest_normals = (
             np.ascontiguousarray(vertices[:, columns], dtype=np.float32) for columns in (_POSITION, _DIRECTION, _NORMAL)
         )
