@@ -1,0 +1,277 @@
+"""Checks of the viewer's window. A plotter makes other OpenGL contexts of its process unusable, so that
+`test_viewer_window.py` runs these in processes of their own: off screen, and on a virtual screen where Xvfb is there.
+"""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+from ripple_sim.viewer import desktop
+from ripple_sim.viewer.controls import CONTROLS
+from ripple_sim.viewer.opening import BALLS, open_scene
+from ripple_sim.viewer.session import OPERATORS, SLIDERS, Session
+from ripple_sim.viewer.window import Window
+
+OFF_SCREEN = "DISPLAY" not in os.environ
+MIDDLE = (200, 160)  # of the sphere in the window, from the lower left [pixels]
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return open_scene("sphere")
+
+
+@pytest.fixture
+def closed(scene, tmp_path) -> Iterator[Window]:
+    made = Window(Session(scene, resolution=16), size=(400, 300), off_screen=OFF_SCREEN, folder=tmp_path)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def window(closed) -> Window:
+    closed.open()
+    closed.tick()
+    return closed
+
+
+def press(window: Window, key: str) -> None:
+    interactor = window.plotter.iren.interactor
+    interactor.SetKeySym(key)
+    interactor.KeyPressEvent()
+    interactor.CharEvent()
+
+
+def drag(window: Window, start: tuple[int, int], *places: tuple[int, int]) -> None:
+    iren = window.plotter.iren
+    iren._mouse_left_button_press(*start)
+    for place in places:
+        iren._mouse_move(*place)
+    iren._mouse_left_button_release(*(places[-1] if places else start))
+
+
+def difference(one: np.ndarray, other: np.ndarray, region: tuple[slice, slice] = np.s_[:, :]) -> float:
+    """Share of the pixels that have changed."""
+    return float((np.abs(one[region].astype(int) - other[region]).max(axis=-1) > 12).mean())
+
+
+def test_the_first_picture_shows_the_scene(window: Window) -> None:
+    picture = window.picture()
+    assert picture.shape == (300, 400, 3)
+    # the sphere is grey (no height) before a bright floor, upright
+    ball = picture[300 - MIDDLE[1], MIDDLE[0]].astype(int)
+    assert np.ptp(ball) < 40
+    assert picture[10, 200].min() > 120
+    assert difference(picture, np.full_like(picture, picture[5, 200])) > 0.2
+
+
+def test_a_click_pokes_what_is_under_it(window: Window) -> None:
+    before = window.picture().copy()
+    drag(window, MIDDLE)
+    for _ in range(3):
+        assert window.tick()
+    skin = window.session.skins["sphere"]
+    assert skin.height.min() < -1e-3
+    # blue, in the middle of the picture
+    red, _, blue = window.picture()[300 - MIDDLE[1], MIDDLE[0]].astype(int)
+    assert blue > red + 40
+    assert difference(before, window.picture()) > 0.005
+
+
+def test_a_click_beside_the_surface_and_a_drag_poke_nothing(window: Window) -> None:
+    drag(window, (15, 150))
+    drag(window, MIDDLE, (220, 165), (250, 170))
+    window.tick()
+    assert np.abs(window.session.skins["sphere"].height).max() < 1e-6
+
+
+def test_a_drag_turns_the_camera_and_the_horizon_stays_level(window: Window) -> None:
+    camera = window.plotter.camera
+    before, distance = np.array(camera.position), camera.distance
+    for height in (170, 299, 5, 299):
+        drag(window, MIDDLE, (260, height), (300, height), (340, height))
+        window.tick()
+        assert tuple(camera.up) == (0.0, 0.0, 1.0)
+        assert camera.distance == pytest.approx(distance, rel=1e-6)
+        assert np.isfinite(camera.position).all()
+    assert np.linalg.norm(np.array(camera.position) - before) > 0.3
+
+
+def test_pause_step_and_reset_by_keys(window: Window) -> None:
+    session = window.session
+    press(window, "space")
+    time = session.time
+    window.tick()
+    assert session.paused
+    assert session.time == time
+    assert not window.tick()  # nothing new: nothing drawn
+    press(window, "n")
+    assert session.time == pytest.approx(time + 1 / 30)
+    assert window.tick()
+    press(window, "r")
+    assert session.time == 0
+    press(window, "space")
+    window.tick()
+    assert session.time > 0
+
+
+def test_a_ball_is_thrown_at_the_pointer_and_seen(window: Window) -> None:
+    press(window, "space")
+    window.tick()
+    before = window.picture().copy()
+    window.plotter.iren._mouse_move(*MIDDLE)
+    press(window, "t")
+    assert len(window.session.parked) == BALLS - 1
+    press(window, "space")
+    for _ in range(6):
+        window.tick()
+    assert difference(before, window.picture()) > 0.002
+    hit = []
+    for _ in range(12):
+        window.tick()
+        hit += [impulse for impulse in window.session.simulation.impulses if impulse.other.startswith("thrown")]
+    assert hit
+
+
+def test_keys_change_operator_and_colours_and_hide_the_help(window: Window) -> None:
+    press(window, "space")
+    for operator in (*OPERATORS[1:], OPERATORS[0]):
+        press(window, "o")
+        assert window.session.operator == operator
+        assert f"operator {operator}" in window.status()
+    window.tick()
+    grey = window.picture().copy()
+    press(window, "c")
+    window.tick()
+    own = window.picture().copy()
+    red, _, blue = own[300 - MIDDLE[1], MIDDLE[0]].astype(int)
+    assert blue > red + 60  # the scene's colour is blue
+    assert difference(grey, own) > 0.1
+    press(window, "h")
+    window.tick()
+    assert difference(own, window.picture(), np.s_[:150, 250:]) > 0.01
+
+
+def test_every_control_does_something_and_other_keys_do_nothing(window: Window) -> None:
+    for control in CONTROLS:
+        assert callable(getattr(window, control.action))
+    for key in ("w", "e", "p", "3", "f", "j", "Escape"):
+        press(window, key)
+    assert not window.closed
+    assert window.tick()
+    press(window, "q")
+    assert window.closed
+
+
+def test_sliders_set_the_poke_and_the_material(window: Window) -> None:
+    session = window.session
+    for slider, name in zip(window._sliders, ("poke", *SLIDERS), strict=True):
+        look = slider.GetRepresentation()
+        # what a drag of the knob does, in the end
+        look.SetValue(0.5 * look.GetMaximumValue())
+        slider.InvokeEvent("EndInteractionEvent")
+        wanted = pytest.approx(0.5 * look.GetMaximumValue())
+        assert (session.poke_impulse if name == "poke" else session.material(name)) == wanted
+
+
+def test_a_knob_can_be_dragged_without_poking_or_turning(window: Window) -> None:
+    slider = window._sliders[1]
+    look, camera = slider.GetRepresentation(), tuple(window.plotter.camera.position)
+    share = look.GetValue() / look.GetMaximumValue()
+    left, right = (c.GetValue()[0] for c in (look.GetPoint1Coordinate(), look.GetPoint2Coordinate()))
+    x, y = round(400 * (left + share * (right - left))), round(300 * look.GetPoint1Coordinate().GetValue()[1])
+    drag(window, (x, y), (x + 10, y), (x + 25, y))
+    window.tick()
+    assert window.session.material("speed") > 0.55
+    assert tuple(window.plotter.camera.position) == camera
+    assert np.abs(window.session.skins["sphere"].height).max() < 1e-6
+
+
+def test_screenshots_are_numbered(window: Window, tmp_path: Path) -> None:
+    press(window, "s")
+    press(window, "s")
+    pictures = [np.asarray(Image.open(tmp_path / f"sphere-{number}.png")) for number in (1, 2)]
+    assert pictures[0].shape == (300, 400, 3)
+    assert difference(pictures[0], window.picture()) < 0.05
+    assert "sphere-2.png" in window.message
+
+
+def test_a_recording_is_a_video_of_the_frames(window: Window, tmp_path: Path) -> None:
+    press(window, "v")
+    assert "recording" in window.status()
+    for _ in range(8):
+        window.tick()
+    press(window, "v")
+    with av.open(tmp_path / "sphere-1.mp4") as container:
+        [stream] = container.streams.video
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert (stream.width, stream.height, float(stream.average_rate)) == (400, 300, 30)
+    assert len(frames) == 8
+    assert difference(frames[-1], window.picture()) < 0.05
+
+
+def test_a_recording_ends_with_the_window(closed: Window, tmp_path: Path) -> None:
+    closed.open()
+    closed.tick()
+    closed.record()
+    closed.tick()
+    closed.close()
+    assert (tmp_path / "sphere-1.mp4").stat().st_size > 0
+    assert [path.name for path in tmp_path.iterdir()] == ["sphere-1.mp4"]
+
+
+def test_an_unwritable_folder_is_told_and_the_window_goes_on(window: Window) -> None:
+    window._takes._folder = Path("/proc/nowhere")
+    press(window, "s")
+    assert "cannot write /proc/nowhere/sphere-1.png" in window.message
+    press(window, "v")
+    assert "cannot write" in window.message
+    assert window.tick()
+
+
+def test_what_becomes_unstable_is_told_and_can_be_reset(window: Window) -> None:
+    window.session.simulation.data.qvel[:] = 1e12
+    window.tick()
+    assert "unstable" in window.message
+    assert window.session.paused
+    press(window, "r")
+    press(window, "space")
+    window.tick()
+    assert window.session.time == pytest.approx(1 / 30)
+
+
+def test_arrays_are_changed_in_place(window: Window) -> None:
+    actor = window._skins["sphere"]
+    places = [actor._mesh.GetPoints().GetData().GetVoidPointer(0), actor._mesh.GetPolys().GetMTime()]
+    drag(window, MIDDLE)
+    window.tick()
+    assert places == [actor._mesh.GetPoints().GetData().GetVoidPointer(0), actor._mesh.GetPolys().GetMTime()]
+    np.testing.assert_array_equal(np.asarray(actor._mesh.points), window.session.skins["sphere"].points)
+
+
+def test_the_benchmark_reports_and_closes(closed: Window) -> None:
+    result = desktop.benchmark(closed, updates=3, tries=1)
+    assert result.updates_per_second > 0
+    assert "updates/s" in str(result)
+    assert result.renderer in str(result)
+
+
+@pytest.mark.skipif(OFF_SCREEN, reason="needs a screen")
+def test_the_loop_runs_until_the_user_quits(closed: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+    ticks = []
+
+    def tick() -> bool:
+        ticks.append(Window.tick(closed))
+        if len(ticks) == 4:
+            press(closed, "q")
+        return ticks[-1]
+
+    monkeypatch.setattr(closed, "tick", tick)
+    desktop.run(closed)
+    assert ticks == [True] * 4
+    assert closed.session.time == pytest.approx(4 / 30)
