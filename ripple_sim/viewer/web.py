@@ -115,7 +115,7 @@ class _Page:
                                 id=control.action,
                                 click=getattr(window, control.action),
                             )
-                with html.Div(style=f"height: {height}px"):
+                with html.Div(id="picture", style=f"height: {height}px"):
                     self._view = vtk.VtkRemoteView(
                         window.plotter.render_window, interactive_ratio=1, interactive_quality=_QUALITY
                     )

@@ -1,0 +1,180 @@
+"""The viewer's web page in a headless browser: it loads, the surface moves after a poke, pause and reset work."""
+
+import io
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+for name in ("trame", "trame_vtk"):
+    pytest.importorskip(name)
+playwright = pytest.importorskip("playwright.sync_api")
+
+Page = Any  # playwright's
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (on Debian: apt-get install chromium)")
+
+PATIENCE = 30.0  # [s]
+MIDDLE = (200, 130)  # of the sphere in the picture [pixels]
+
+
+@pytest.fixture(scope="module")
+def port() -> Iterator[int]:
+    """Port of a page that shows the scene "sphere"."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        number = probe.getsockname()[1]
+    server = subprocess.Popen(
+        [sys.executable, *f"-m ripple_sim view sphere --web --port {number} --size 400x300 --resolution 16".split()],
+        env={key: value for key, value in os.environ.items() if key != "DISPLAY"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    try:
+        assert f"http://127.0.0.1:{number}/" in server.stdout.readline()
+        yield number
+    finally:
+        server.terminate()
+        server.wait(10)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as driver:
+        made = driver.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+        )
+        yield made
+        made.close()
+
+
+@pytest.fixture
+def page(browser: Any, port: int) -> Iterator[Page]:
+    page = browser.new_page(viewport={"width": 500, "height": 500})
+    page.goto(f"http://127.0.0.1:{port}/")
+    wait_for(lambda: colors(page) > 50)  # the first picture has come
+    yield page
+    page.close()
+
+
+def wait_for(done: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not done():
+        assert time.monotonic() < end, "nothing happened"
+        time.sleep(0.05)
+
+
+def seconds(page: Page) -> float:
+    """Simulated time that the page shows."""
+    found = re.match(r"([0-9.]+) s", page.inner_text("#status"))
+    return float(found[1]) if found else -1.0
+
+
+def picture(page: Page) -> np.ndarray:
+    box = page.locator("#picture").bounding_box()
+    return np.asarray(Image.open(io.BytesIO(page.screenshot(clip=box))).convert("RGB")).astype(int)
+
+
+def colors(page: Page) -> int:
+    return len(np.unique(picture(page).reshape(-1, 3), axis=0))
+
+
+def blueness(page: Page) -> int:
+    """How much bluer than red the middle of the sphere is: pressed in."""
+    red, _, blue = picture(page)[MIDDLE[1], MIDDLE[0]]
+    return int(blue - red)
+
+
+def click_surface(page: Page) -> None:
+    box = page.locator("#picture").bounding_box()
+    page.mouse.click(box["x"] + MIDDLE[0], box["y"] + MIDDLE[1])
+
+
+def test_the_page_shows_the_scene_and_time_goes_on(page: Page) -> None:
+    first = seconds(page)
+    wait_for(lambda: seconds(page) > first + 0.3)
+    shown = picture(page)
+    assert shown.shape == (300, 400, 3)
+    assert "operator fem" in page.inner_text("#status")
+
+
+def test_pause_holds_the_time_and_reset_sets_it_back(page: Page) -> None:
+    page.click("#pause")
+    wait_for(lambda: "paused" in page.inner_text("#status"))
+    held = seconds(page)
+    time.sleep(0.5)
+    assert seconds(page) == held
+    page.click("#step")
+    wait_for(lambda: seconds(page) > held)
+    page.click("#reset")
+    wait_for(lambda: seconds(page) == 0)
+    page.keyboard.press("Space")  # keys work as well
+    wait_for(lambda: seconds(page) > 0.1)
+
+
+def test_the_surface_moves_after_a_poke(page: Page) -> None:
+    page.click("#reset")
+    page.click("#pause")
+    wait_for(lambda: "paused" in page.inner_text("#status"))
+    assert blueness(page) < 30
+    before = picture(page)
+    click_surface(page)
+    for _ in range(3):
+        held = seconds(page)
+        page.click("#step")
+        wait_for(lambda held=held: seconds(page) > held)
+    wait_for(lambda: blueness(page) > 40)
+    assert (np.abs(picture(page) - before).max(axis=-1) > 30).mean() > 0.003
+    page.click("#pause")
+
+
+def test_operator_and_colours_can_be_changed(page: Page) -> None:
+    page.click("#operator")
+    wait_for(lambda: "operator uncorrected" in page.inner_text("#status"))
+    page.click("#colors")
+    wait_for(lambda: blueness(page) > 60)  # the scene's own colour
+    page.click("#colors")
+    wait_for(lambda: blueness(page) < 60)
+
+
+def test_a_drag_turns_the_camera(page: Page) -> None:
+    page.click("#reset")
+    before = picture(page)
+    box = page.locator("#picture").bounding_box()
+    x, y = box["x"] + 60, box["y"] + 60
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for step in range(8):
+        page.mouse.move(x + 5 * step, y - 12 * step)
+    page.mouse.up()
+    # the horizon comes into view, or goes
+    wait_for(lambda: (np.abs(picture(page) - before).max(axis=-1) > 12).mean() > 0.05)
+
+
+def test_the_page_is_served_on_the_loopback_address_alone(port: int) -> None:
+    connections = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()]
+    addresses = {fields[1] for fields in connections if fields[3] == "0A"}  # those that listen
+    assert f"0100007F:{port:04X}" in addresses
+    assert f"00000000:{port:04X}" not in addresses
+
+
+def test_quit_ends_the_program(page: Page, port: int) -> None:
+    page.click("#quit")
+
+    def closed() -> bool:
+        with socket.socket() as probe:
+            return probe.connect_ex(("127.0.0.1", port)) != 0
+
+    wait_for(closed)
