@@ -1,0 +1,278 @@
+"""Overlays on real frames: colours, contacts, two runs side by side. Needs an OpenGL context; software will do."""
+
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim.errors import SceneError
+from ripple_sim.frames import FrameSource, run
+from ripple_sim.job import render_video
+from ripple_sim.overlay.colormap import color_table, colors
+from ripple_sim.overlay.comparison import compared_operators
+from ripple_sim.overlay.contacts import MEMORY, ContactMarks, Mark
+from ripple_sim.overlay.field import pad_field
+from ripple_sim.overlay.film import Film
+from ripple_sim.overlay.layout import Layout
+from ripple_sim.overlay.marks import draw_marks
+from ripple_sim.overlay.notes import Notebook
+from ripple_sim.overlay.projection import Projection
+from ripple_sim.overlay.request import NAMES, parse_request
+from ripple_sim.render import Camera, Renderer, Surface, meshes
+from ripple_sim.render.camera import perspective, view_matrix
+from ripple_sim.scene.scene import Scene, load_scene
+from ripple_sim.simulation import Simulation
+from ripple_sim.solver import RippleError
+from ripple_sim.solver.atlas.cubemap import texel_directions
+from ripple_sim.solver.gl import shared_context
+
+MJCF = """<mujoco><option timestep="0.002"/><default><geom solref="0.01 0.3"/></default><worldbody>
+<geom name="floor" type="plane" size="2 2 1" pos="0 0 -0.3"/>
+<geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
+<body name="stone" pos="0.05 0 0.28"><freejoint/><geom name="stone" size="0.05"/></body></worldbody></mujoco>"""
+TOML = """model = "scene.xml"
+duration = 0.5
+[camera]
+lookat = [0, 0, 0]
+distance = 1.6
+elevation = -30
+[[ripple]]
+geom = "egg"
+resolution = 24
+material = {speed = 0.5, density = 20.0}
+"""
+N, RATE, FRAMES = 24, 30, 8
+EVERYTHING = ["height", "contacts", "grid", "time", "energy"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _context() -> None:
+    try:
+        shared_context()
+    except RippleError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def make_scene(tmp_path: Path) -> Callable[..., Scene]:
+    def make(toml: str = TOML) -> Scene:
+        (tmp_path / "scene.xml").write_text(MJCF)
+        (tmp_path / "scene.toml").write_text(toml)
+        return load_scene(tmp_path / "scene.toml")
+
+    return make
+
+
+def film_of(scene: Scene, words: list[str], size: tuple[int, int], baseline: str | None = None) -> Film:
+    operators = compared_operators(baseline)
+    simulations = [Simulation(scene, fps=RATE, backend="cpu", operator=operator) for operator in operators]
+    width, height = size
+    return Film(
+        simulations, parse_request(words), width=width, height=height, frames=FRAMES, rate=RATE, operators=operators
+    )
+
+
+def last_frame(film: Film) -> np.ndarray:
+    return film.draw(list(film.states(alive=FRAMES))[-1])
+
+
+def ball_with_field(field: np.ndarray, limit: float) -> np.ndarray:
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom name="target" type="sphere" size="1"/></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    ball = meshes.ball(16)
+    surface = Surface(ball.shell, ball.faces, ball.shell, N, "metal", field_colors=color_table())
+    renderer = Renderer(shared_context(), model, {0: surface}, width=200, height=200)
+    renderer.set_field(0, pad_field(field), limit)
+    return renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0, 40.0))
+
+
+@pytest.mark.parametrize("value", [-0.013, -0.004, 0.0, 0.002, 0.009, 0.5])
+def test_surface_has_the_color_of_its_height(value: float) -> None:
+    picture = ball_with_field(np.full((6, N, N), value, np.float32), 0.01)
+    inside = picture[80:120, 80:120].astype(float)
+    expected = colors(value, 0.01).astype(float)
+    shade = inside.max(axis=-1) / expected.max()
+    assert shade.min() > 0.4
+    assert shade.max() == pytest.approx(1, abs=0.02)  # where the light falls the colour is the bar's own
+    np.testing.assert_allclose(inside, shade[..., None] * expected, atol=2.5)  # and only darker elsewhere
+
+
+def test_field_is_where_it_belongs_and_seamless() -> None:
+
+    atlas_z = np.linspace(-1, 1, 200)[::-1]
+    picture = ball_with_field(texel_directions(N)[..., 2].astype(np.float32), 1.0).astype(int)
+    red = picture[..., 0] - picture[..., 2]
+    radius = np.tan(np.arcsin(1 / 4.0)) / np.tan(np.radians(20.0))
+    column = red[:, 100][np.abs(atlas_z) < 0.9 * radius]
+    assert column[0] > 60
+    assert column[-1] < -60
+    assert (np.diff(column) < 12).all()  # from red at the top to blue at the bottom without a step back
+
+
+def test_projection_is_the_renderers() -> None:
+    rng = np.random.default_rng(1)
+    camera = Camera((0.1, 0.2, 0.3), 3.0, 40.0, -25.0, 50.0)
+    pose, width, height = camera.pose(), 320, 180
+    points = 0.5 * rng.standard_normal((20, 3))
+    matrix = perspective(pose.fovy, width / height, 0.1, 100.0) @ view_matrix(pose)
+    clip = np.column_stack([points, np.ones(20)]) @ matrix.T
+    expected = (0.5 + 0.5 * clip[:, :2] / clip[:, 3:] * [1, -1]) * [width, height]
+    projection = Projection(pose, width, height)
+    np.testing.assert_allclose(projection.pixels(points), expected, atol=1e-9)
+    # a metre measured across the line of sight
+    across = points[0] + projection.metres(points[0]) * pose.rotation[:, 0]
+    ends = projection.pixels(np.stack([points[0], across]))
+    assert ends[1, 0] - ends[0, 0] == pytest.approx(1.0)
+    behind = pose.position + pose.rotation[:, 2]
+    assert np.isnan(projection.pixels(behind[None])).all()
+
+
+def test_mark_lies_at_the_projected_contact(make_scene: Callable[..., Scene]) -> None:
+    scene = make_scene()
+    simulation = Simulation(scene, fps=RATE, backend="cpu")
+    marks = ContactMarks(simulation, 1 / RATE)
+    gathered: list[Mark] = []
+    while not gathered:
+        simulation.advance_frame()
+        gathered = marks.follow()
+    hit = simulation.impulses[-1]
+    waves = simulation.ripples["egg"]
+    height = abs(float(waves.height[hit.texel]))
+    assert np.linalg.norm(gathered[0].point - hit.point) < height + 1e-6
+    assert gathered[0].axis[2] > 0.9  # on top of the egg
+    assert gathered[0].impulse == pytest.approx(sum(each.impulse for each in simulation.impulses))
+
+    camera = Camera((0.0, 0.0, 0.0), 1.6, 90.0, -30.0)
+    width, height_px = 320, 180
+    frame = np.full((height_px, width, 3), 255, np.uint8)
+    projection = Projection(camera.pose(), width, height_px)
+    bare = mujoco.MjModel.from_xml_string("<mujoco/>")
+    data = mujoco.MjData(bare)
+    mujoco.mj_forward(bare, data)
+    draw_marks(frame, gathered, 1e9, Layout(width, height_px), projection, bare, data)  # nothing but its dot
+    dark = (255.0 - frame.min(axis=2)).round()
+    rows, columns = np.indices(dark.shape)
+    centre = np.array([(dark * (columns + 0.5)).sum(), (dark * (rows + 0.5)).sum()]) / dark.sum()
+    expected = projection.pixels(gathered[0].point[None])[0]
+    np.testing.assert_allclose(centre, expected, atol=0.1)
+
+
+def test_mark_fades_and_ends(make_scene: Callable[..., Scene]) -> None:
+    simulation = Simulation(make_scene(), fps=RATE, backend="cpu")
+    gatherer = ContactMarks(simulation, 1 / RATE)
+    while not simulation.impulses:
+        simulation.advance_frame()
+    (first,) = gatherer.follow()
+    simulation.impulses = []
+    (second,) = gatherer.follow()
+    assert second.impulse == pytest.approx(first.impulse * np.exp(-1 / (RATE * MEMORY)))
+    np.testing.assert_array_equal(second.point, first.point)
+    counts = [len(gatherer.follow()) for _ in range(RATE)]
+    assert counts[0] == 1
+    assert counts[-1] == 0
+
+
+def test_hidden_marks_are_faint() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom type="box" size=".5 .02 .5" pos="0 -.5 0"/></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    camera = Camera((0.0, 0.0, 0.0), 2.0, 90.0, 0.0)  # looks along y, at the box
+    projection = Projection(camera.pose(), 160, 120)
+    points = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 0.9]])
+    assert projection.seen(model, data, points).tolist() == [False, True, True]
+
+    def ink(y: float) -> int:
+        frame = np.full((120, 160, 3), 255, np.uint8)
+        mark = Mark(np.array([0.0, y, 0.0]), np.array([0.0, 0.0, 1.0]), 1.0)
+        draw_marks(frame, [mark], 1.0, Layout(160, 120), projection, model, data)
+        return int((255 - frame.astype(int)).max())
+
+    assert ink(-1.0) > 200
+    assert 30 < ink(0.0) < 100
+
+
+@pytest.mark.parametrize("baseline", ["paper", "uncorrected"])
+def test_halves_of_a_comparison_are_the_separate_runs(make_scene: Callable[..., Scene], baseline: str) -> None:
+    scene = make_scene()
+    film = film_of(scene, [], (320, 120), baseline)
+    frame = last_frame(film)
+    halves = []
+    for operator in ("fem", baseline):
+        simulation = Simulation(scene, fps=RATE, backend="cpu", operator=operator)
+        source = FrameSource(simulation, width=160, height=120)
+        halves.append(source.draw(list(run(simulation, FRAMES))[-1]))
+    # below the titles, and without the seam
+    np.testing.assert_array_equal(frame[30:, :158], halves[0][30:, :158])
+    np.testing.assert_array_equal(frame[30:, 162:], halves[1][30:, 2:])
+    assert (frame[30:, 2:158] != frame[30:, 162:318]).any()
+    assert (frame[50, 159:161] == 255).all()
+
+
+def test_runs_share_their_scales(make_scene: Callable[..., Scene]) -> None:
+    film = film_of(make_scene(), ["height", "contacts", "energy"], (64, 48), "uncorrected")
+    notes = [shot.notes for shot in film.states()][-1]
+    largest = max(float(values.max()) for _, values in notes.energies)
+    assert notes.energy_scale.goal >= largest > 0
+    assert len(notes.fields) == len(notes.marks) == len(notes.energies) == 2
+    times, values = notes.energies[0]
+    assert times[-1] == pytest.approx(notes.time)
+    assert values[-1] == pytest.approx(film._simulations[0].ripples["egg"].energy())
+
+
+def test_without_a_request_nothing_is_drawn_over(make_scene: Callable[..., Scene]) -> None:
+    scene = make_scene()
+    simulation = Simulation(scene, fps=RATE, backend="cpu")
+    source = FrameSource(simulation, width=96, height=54)
+    plain = source.draw(list(run(simulation, FRAMES))[-1])
+    np.testing.assert_array_equal(last_frame(film_of(scene, [], (96, 54))), plain)
+
+
+@pytest.mark.parametrize(("size", "baseline"), [((320, 180), None), ((90, 160), "paper")])
+def test_everything_at_once_twice_the_same(
+    make_scene: Callable[..., Scene], size: tuple[int, int], baseline: str | None
+) -> None:
+    first, second = (last_frame(film_of(make_scene(), EVERYTHING, size, baseline)) for _ in range(2))
+    assert first.shape == (size[1], size[0], 3)
+    np.testing.assert_array_equal(first, second)
+
+
+def test_each_alone_changes_the_picture(make_scene: Callable[..., Scene]) -> None:
+    scene = make_scene()
+    pictures = [last_frame(film_of(scene, words, (96, 54))) for words in ([], *([name] for name in NAMES))]
+    for first, second in itertools.combinations(pictures, 2):
+        assert (first != second).any()
+
+
+def test_a_given_range_holds(make_scene: Callable[..., Scene]) -> None:
+    film = film_of(make_scene(), ["velocity=0.25"], (64, 48))
+    assert {shot.notes.field_scale.value for shot in film.states()} == {0.25}
+
+
+def test_notes_do_not_grow(make_scene: Callable[..., Scene]) -> None:
+    simulation = Simulation(make_scene(), fps=RATE, backend="cpu")
+    notebook = Notebook(parse_request(EVERYTHING), [simulation], 1_000_000, RATE)
+    for _ in range(20):
+        notes = notebook.follow()
+    assert len(notes.energies[0][0]) == 1  # a thousand frames share a point
+
+
+def test_scene_file_names_overlays_and_a_video_shows_them(make_scene: Callable[..., Scene], tmp_path: Path) -> None:
+    scene = make_scene('overlay = ["height=0.01", "time"]\n' + TOML)
+    assert scene.overlay == ("height=0.01", "time")
+    pictures = {}
+    for name, overlay in (("own", None), ("same", ["height=0.01", "time"]), ("none", [])):
+        render_video(scene, tmp_path / name, size=(96, 54), fps=10, duration=0.3, overlay=overlay)
+        pictures[name] = sorted(path.read_bytes() for path in (tmp_path / name).iterdir())
+    assert pictures["own"] == pictures["same"] != pictures["none"]
+    with pytest.raises(SceneError, match="no overlay 'hight'"):
+        make_scene('overlay = ["hight"]\n' + TOML)
+    with pytest.raises(SceneError, match="valid are paper"):
+        render_video(scene, tmp_path / "x", size=(96, 54), fps=10, compare="jacobian")
