@@ -78,7 +78,7 @@ class Film:
         supersample: int = 1,
         gl: GLContext | None = None,
     ) -> None:
-        self._simulations, self._request, self._frames = simulations, request, frames
+        self.simulations, self._request, self._frames = simulations, request, frames
         self._layout = Layout(width, height)
         self._notebook = Notebook(request, simulations, frames, rate)
         ends = [round(width * k / len(simulations)) for k in range(len(simulations) + 1)]
@@ -103,7 +103,7 @@ class Film:
 
     def states(self, alive: int = 1) -> Iterator[Shot]:
         """Run the simulations; see `ripple_sim.frames.run`."""
-        runs = [run(simulation, self._frames, alive=alive) for simulation in self._simulations]
+        runs = [run(simulation, self._frames, alive=alive) for simulation in self.simulations]
         for snapshots in zip(*runs, strict=True):
             yield Shot(snapshots, self._notebook.follow())
 
@@ -122,13 +122,13 @@ class Film:
         """What the renderer draws of a run, and the contacts in it."""
         source, snapshot, notes = self._sources[run], shot.snapshots[run], shot.notes
         if self._request.field:
-            geoms = self._simulations[run].ripples.geom_ids
+            geoms = self.simulations[run].ripples.geom_ids
             for name, field in notes.fields[run].items():
                 source.renderer.set_field(geoms[name], field, notes.field_scale.value)
         picture = source.draw(snapshot)
         if self._request.contacts and notes.marks[run]:
             projection = Projection(source.camera(snapshot).pose(), picture.shape[1], picture.shape[0])
-            hiding = self._simulations[run].model, snapshot.data
+            hiding = self.simulations[run].model, snapshot.data
             draw_marks(picture, notes.marks[run], notes.mark_scale.value, self._layout, projection, *hiding)
         return picture
 

@@ -224,7 +224,7 @@ def test_runs_share_their_scales(make_scene: Callable[..., Scene]) -> None:
     assert len(notes.fields) == len(notes.marks) == len(notes.energies) == 2
     times, values = notes.energies[0]
     assert times[-1] == pytest.approx(notes.time)
-    assert values[-1] == pytest.approx(film._simulations[0].ripples["egg"].energy())
+    assert values[-1] == pytest.approx(film.simulations[0].ripples["egg"].energy())
 
 
 def test_without_a_request_nothing_is_drawn_over(make_scene: Callable[..., Scene]) -> None:
