@@ -1,0 +1,68 @@
+"""What do overlays cost? Seconds a frame with and without, in turns on the same states of a scene.
+
+    python examples/overlay_benchmark.py [--scene duck] [--size 1280x720] [--frames 12]
+
+The simulation is not counted, but for what the overlays ask of it (energy, contacts, the field), given by itself.
+"""
+
+import argparse
+import os
+import time
+from collections.abc import Callable
+from itertools import islice
+
+os.environ.setdefault("MUJOCO_GL", "disable")
+
+import numpy as np
+
+from ripple_sim.overlay.film import Film
+from ripple_sim.overlay.notes import Notebook
+from ripple_sim.overlay.request import parse_request
+from ripple_sim.scene.scene import load_scene
+from ripple_sim.simulation import Simulation
+from ripple_sim.solver.gl import shared_context
+
+KINDS = ([], ["height"], ["grid"], ["contacts"], ["time"], ["energy"], ["height", "contacts", "grid", "time", "energy"])
+RATE, START = 30, 1.0
+
+
+def seconds(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Seconds a frame with overlays and without.")
+    parser.add_argument("--scene", default="duck")
+    parser.add_argument("--size", default="1280x720")
+    parser.add_argument("--frames", type=int, default=12)
+    options = parser.parse_args()
+    width, height = (int(n) for n in options.size.split("x"))
+    scene, first = load_scene(options.scene), round(START * RATE)
+
+    # one film shows everything there is to know; each kind draws of it what it needs
+    everything = parse_request(KINDS[-1])
+    total = first + options.frames
+    source = Film([Simulation(scene, fps=RATE)], everything, width=width, height=height, frames=total, rate=RATE)
+    films = [
+        Film(source.simulations, parse_request(words), width=width, height=height, frames=total, rate=RATE)
+        for words in KINDS
+    ]
+    books = [Notebook(parse_request(words), source.simulations, total, RATE) for words in KINDS]
+    drawing, noting = np.zeros((2, len(KINDS), options.frames))
+    for shot in islice(source.states(), first, None):
+        for kind, (film, book) in enumerate(zip(films, books, strict=True)):
+            frame = shot.number - first
+            drawing[kind, frame] = seconds(lambda film=film, shot=shot: film.draw(shot))
+            noting[kind, frame] = seconds(book.follow)
+    print(shared_context().renderer)
+    print(f"{options.scene}, {width}x{height}; least of {options.frames} frames")
+    print(f"{'overlays':36} drawing  ratio   beside the simulation")
+    for words, draw, note in zip(KINDS, drawing.min(axis=1), noting.min(axis=1), strict=True):
+        ratio = draw / drawing[0].min()
+        print(f"{','.join(words) or 'none':36} {draw:.4f} s {ratio:5.2f}   {note:.4f} s")
+
+
+if __name__ == "__main__":
+    main()
