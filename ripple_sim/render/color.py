@@ -17,8 +17,8 @@ def linear(srgb: Any) -> NDArray[np.float64]:
     return np.where(value <= 0.04045, value / 12.92, ((np.maximum(value, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
-def srgb_texture(ctx: moderngl.Context, pixels: NDArray[np.uint8]) -> moderngl.Texture:
-    """Repeating, mip-mapped texture of sRGB pixels [height, width, 3], bottom row first; it reads as linear light."""
+def srgb_texture(ctx: Any, pixels: NDArray[np.uint8]) -> moderngl.Texture:
+    """Repeating, mip-mapped texture of sRGB pixels [height, width, 3], first row at v = 0; it reads as linear light."""
     height, width, _ = pixels.shape
     opaque = np.concatenate([pixels, np.full((height, width, 1), 255, dtype=np.uint8)], axis=2)
     texture = ctx.texture((width, height), 4, opaque.tobytes(), internal_format=SRGB8_ALPHA8)

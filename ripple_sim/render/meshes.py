@@ -8,6 +8,7 @@ core is a segment, a box's is a box; boxes and cylinders get a small round shell
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +18,17 @@ from ripple_sim.solver.atlas.cubemap import FACE_NORMALS, FACE_U, FACE_V
 
 @dataclass(frozen=True)
 class Shape:
-    """A closed triangle mesh whose vertices scale with two sizes.
+    """A triangle mesh whose vertices scale with two sizes.
 
-    `core`, `shell` and `normals` have shape [n, 3], `faces` shape [m, 3].
+    `core`, `shell` and `normals` have shape [n, 3], `faces` shape [m, 3]; `uv`, shape [n, 2], are texture coordinates
+    where the mesh brings any.
     """
 
     core: NDArray[np.float64]
     shell: NDArray[np.float64]
     normals: NDArray[np.float64]
     faces: NDArray[np.int64]
+    uv: NDArray[np.float64] | None = None
 
     def positions(self, core_size: NDArray[np.float64], shell_size: NDArray[np.float64]) -> NDArray[np.float64]:
         """Vertices [n, 3] for the two sizes [m], shape [3] each."""
@@ -63,6 +66,59 @@ def cylinder(sides: int, rings: int) -> Shape:
     core_r = np.concatenate([[0.0], np.ones(2 * rings + 2), [0.0]])
     core_z = np.repeat([-1.0, 1.0], rings + 2)
     return _revolved(core_r, core_z, np.cos(angle), np.sin(angle), sides)
+
+
+def sheet() -> Shape:
+    """Square of half size 1 that faces up and can be seen from there only."""
+    core = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+    up = np.tile([0.0, 0.0, 1.0], (4, 1))
+    return Shape(core, up, up, np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+def creased(V: NDArray, F: NDArray, corner_uv: NDArray | None = None) -> Shape:
+    """Mesh of a fixed size, its vertices split where normals or texture coordinates [m, 3, 2] jump."""
+    uv = np.zeros((*F.shape, 2)) if corner_uv is None else corner_uv
+    corners = np.concatenate([F[:, :, None], corner_normals(V, F), uv], axis=2).reshape(-1, 6)
+    unique, index = np.unique(corners, axis=0, return_inverse=True)
+    positions = V[unique[:, 0].astype(np.int64)]
+    faces = index.reshape(F.shape)
+    return Shape(
+        np.zeros_like(positions), positions, unique[:, 1:4], faces, None if corner_uv is None else unique[:, 4:]
+    )
+
+
+def mesh_asset(model: Any, mesh: int) -> Shape:
+    """Mesh of a MuJoCo model in its geom's frame."""
+    first, first_face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+    faces = slice(first_face, first_face + model.mesh_facenum[mesh])
+    V = np.asarray(model.mesh_vert[first : first + model.mesh_vertnum[mesh]], dtype=np.float64)
+    F = np.asarray(model.mesh_face[faces], dtype=np.int64)
+    start = model.mesh_texcoordadr[mesh]
+    if start < 0:
+        return creased(V, F)
+    uv = np.asarray(model.mesh_texcoord[start : start + model.mesh_texcoordnum[mesh]], dtype=np.float64)
+    return creased(V, F, uv[model.mesh_facetexcoord[faces]])
+
+
+def height_field(model: Any, hfield: int) -> Shape:
+    """Height field of a MuJoCo model with its walls, in its geom's frame."""
+    rows, columns = int(model.hfield_nrow[hfield]), int(model.hfield_ncol[hfield])
+    half_x, half_y, top, bottom = (float(x) for x in model.hfield_size[hfield])
+    start = model.hfield_adr[hfield]
+    height = top * np.asarray(model.hfield_data[start : start + rows * columns], dtype=np.float64).reshape(
+        rows, columns
+    )
+    x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
+    ground = np.stack([x, y, height], axis=2).reshape(-1, 3)
+    index = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
+    F = [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    # round the rim, counter-clockwise from above
+    rim = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
+    foot = len(ground) + np.arange(len(rim))
+    after, foot_after = np.roll(rim, -1), np.roll(foot, -1)
+    F += [np.stack([rim, foot, foot_after], axis=1), np.stack([rim, foot_after, after], axis=1)]
+    return creased(np.concatenate([ground, ground[rim] * [1, 1, 0] - [0, 0, bottom]]), np.concatenate(F))
 
 
 def corner_normals(V: NDArray, F: NDArray, crease: float = 45.0) -> NDArray[np.float64]:

@@ -1,8 +1,9 @@
-"""One frame: shadow map, floor occlusion, the solid scene, the floor, the backdrop, and the way back to memory."""
+"""One frame: shadow map, floor occlusion, the visible surfaces, their light, and the way back to memory."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import TracebackType
 from typing import Any
 
 import moderngl
@@ -13,19 +14,24 @@ from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.gl import GLContext
 
 from .bodies import Bodies, visible_geoms
-from .camera import Pose, Viewpoint, perspective, view_matrix
-from .color import SRGB8_ALPHA8
+from .camera import Pose, Viewpoint
 from .floor import Floor, find_floor
-from .frame import FrameUniforms, light_studio
-from .shadow import ShadowMap, to_unit
+from .frame import FrameUniforms
+from .lights import is_lit, model_lighting, set_lighting, studio_lighting
+from .materials import Textures
+from .objects import ObjectTable
+from .owned import OwnedObjects
+from .picture import Picture
+from .shadow import ShadowMap
 from .surface import Surface, SurfaceMesh
+from .undrawn import warn_of_undrawn
 
-_NEAR, _FAR = 0.02, 200.0  # clip planes, in camera distances
+LIGHTING = ("auto", "model", "studio")
 _SHADOW_REACH = 2.5  # what is further from the focus, in camera distances, casts no shadow
 
 
 class Renderer:
-    """Draws a MuJoCo model and its rippled targets into RGB frames, headless.
+    """Draws a MuJoCo model and its rippled targets into frames, headless.
 
     Parameters
     ----------
@@ -37,11 +43,16 @@ class Renderer:
         Frame size [pixels].
     samples : int
         Samples a pixel for smooth edges; at most what the driver has. 0 or 1: none.
+    lighting : str
+        "model": the lamps and the skybox of the MJCF; "studio": a photo studio in their place; "auto": the studio
+        where the MJCF sets no lamp.
+    alpha : bool
+        Frames have an alpha channel: the background is transparent, and of the floor nothing but the shadows is left.
 
     Raises
     ------
     RippleError
-        If the driver cannot make frames of this size, or a look is unknown.
+        If the driver cannot make frames of this size, or a look or the lighting is unknown.
     """
 
     def __init__(
@@ -53,25 +64,45 @@ class Renderer:
         width: int,
         height: int,
         samples: int = 4,
+        lighting: str = "auto",
+        alpha: bool = False,
     ) -> None:
+        if lighting not in LIGHTING:
+            raise RippleError(f"lighting is {lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
+        warn_of_undrawn(model)
         self.width, self.height = width, height
-        self._gl, self._model = gl, model
-        with gl as ctx:
-            self._target, self._resolved = _framebuffers(ctx, width, height, samples)
+        self._gl, self._model, self._alpha = gl, model, alpha
+        self._studio = lighting == "studio" or (lighting == "auto" and not is_lit(model))
+        self._owned = ctx = OwnedObjects(gl, self)
+        with gl:
             self._frame = FrameUniforms(ctx)
             self._shadow = ShadowMap(ctx)
-            self._backdrop = ctx.vertex_array(gl.program("ripple_sim.render", "screen_vertex", "backdrop_fragment"), [])
-            self._behind = ctx.texture((width, height), 4, internal_format=SRGB8_ALPHA8)
-            self._behind.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-            self._behind.repeat_x = self._behind.repeat_y = False
-            self._behind_target = ctx.framebuffer([self._behind])
+            self._table = ObjectTable(ctx)
             self._open_floor = ctx.texture((1, 1), 1, np.ones(1, dtype=np.float16).tobytes(), dtype="f2")
-        self._targets = [SurfaceMesh(gl, geom, surface) for geom, surface in sorted(targets.items())]
-        geoms = [geom for geom in visible_geoms(model) if geom not in targets]
-        floor = find_floor(model, geoms)
-        self._floor = None if floor is None else Floor(gl, model, floor)
-        self._bodies = Bodies(gl, model, [geom for geom in geoms if geom != floor])
-        self._pixels = bytearray(3 * width * height)
+            textures = Textures(ctx, model)
+            self._sky = None if self._studio else textures.skybox()
+            self._targets = [
+                SurfaceMesh(gl, ctx, model, geom, surface, textures, self._table, (width, height))
+                for geom, surface in sorted(targets.items())
+            ]
+            geoms = [geom for geom in visible_geoms(model) if geom not in targets]
+            floor = find_floor(model, geoms)
+            self._floor = None if floor is None else Floor(gl, ctx, model, floor, textures)
+            self._picture = Picture(gl, ctx, (width, height), samples, alpha, self._floor)
+            self._bodies = Bodies(gl, ctx, model, [geom for geom in geoms if geom != floor], textures, self._table)
+        self._pixels = bytearray((4 if alpha else 3) * width * height)
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release everything on the GPU; the renderer cannot be used afterwards."""
+        self._owned.release()
 
     def set_field(self, geom: int, field: NDArray[np.float32], limit: float) -> None:
         """Set the scalar field that a target with `field_colors` shows from now on.
@@ -102,64 +133,86 @@ class Renderer:
 
         Returns
         -------
-        array of uint8, shape [height, width, 3]
-            sRGB, top row first. A fresh array for every frame.
+        array of uint8, shape [height, width, 3], or [height, width, 4] with alpha
+            sRGB, top row first; alpha is straight. A fresh array for every frame.
+        """
+        channels = 4 if self._alpha else 3
+        with self._gl:
+            picture = self.draw(data, reliefs, camera)
+            self._gl.wait()  # reading back would keep all other Python threads waiting for the driver, too
+            picture.read_into(self._pixels, components=channels, alignment=1)
+        frame = np.frombuffer(self._pixels, dtype=np.uint8).reshape(self.height, self.width, channels)[::-1].copy()
+        return _straight(frame) if self._alpha else frame
+
+    def draw(self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint) -> moderngl.Framebuffer:
+        """Draw one frame as `render` does, and leave it on the GPU.
+
+        Returns
+        -------
+        moderngl.Framebuffer
+            RGBA8, bottom row first, sRGB, multiplied by alpha. The next frame is drawn over it.
         """
         pose = camera.pose()
         with self._gl as ctx:
             light_view = self._update(ctx, data, reliefs, pose)
             self._draw_maps(ctx, light_view)
-            self._draw_scene(ctx, pose)
-            self._gl.wait()  # reading back would keep all other Python threads waiting for the driver, too
-            ctx.copy_framebuffer(self._resolved, self._target)
-            self._resolved.read_into(self._pixels, components=3, alignment=1)
-        return np.frombuffer(self._pixels, dtype=np.uint8).reshape(self.height, self.width, 3)[::-1].copy()
+            self._picture.begin(ctx)
+            for target in self._targets:
+                if not target.clear:
+                    target.draw()
+            self._bodies.draw()
+            self._bind_maps()
+            self._picture.compose(ctx)
+            self._draw_clear(ctx, data, pose)
+        return self._picture.frame
 
     def _update(
         self, ctx: moderngl.Context, data: Any, reliefs: Mapping[int, NDArray[np.float32]], pose: Pose
-    ) -> tuple[float, ...]:
-        """Bring everything on the GPU up to date; return the light's matrix."""
+    ) -> tuple[float, ...] | None:
+        """Bring everything on the GPU up to date; return the matrix of the light that casts shadows."""
         for target in self._targets:
             rotation = data.geom_xmat[target.geom].reshape(3, 3)
             target.update(ctx, rotation, data.geom_xpos[target.geom], reliefs.get(target.geom))
-        self._bodies.update(data)
+        pixels = self.height / (2 * np.tan(np.radians(pose.fovy) / 2))
+        self._bodies.update(data, pose.position, pixels)
+        self._table.bind()
 
         frame = self._frame
+        self._view_projection = frame.set_camera(pose, self.width / self.height)
         centre, radius = self._extent(data, pose)
-        projection = perspective(pose.fovy, self.width / self.height, _NEAR * pose.distance, _FAR * pose.distance)
-        self._view_projection = projection @ view_matrix(pose)
-        frame.set_matrix("view_projection", self._view_projection)
-        frame.set_vector("eye", pose.position, pose.distance)
-        frame.set_vector("focus", pose.focus)
         if self._floor is not None:
             self._floor.place(frame, data, centre, radius)
-        key = light_studio(frame, pose, None if self._floor is None else self._floor.albedo)
-        light_view, width = self._shadow.fit(key, centre, radius)
-        frame.set_matrix("shadow_matrix", to_unit(light_view))
-        frame.set_vector("shadow_scale", self._shadow.scale(width))
-        frame.set_vector("counts", [self._bodies.bind_occluders(data, pose.focus), 0, 0])
+        lighting = studio_lighting(pose) if self._studio else model_lighting(self._model, data, pose)
+        set_lighting(frame, lighting, pose, self._floor, None if self._sky is None else self._sky[1])
+        light_view = None
+        if lighting.lights and lighting.lights[0].shadow:
+            light_view = tuple(self._shadow.fit(frame, lighting.lights[0], centre, radius).T.ravel())
+        occluders = self._bodies.occluders.bind(data, pose.focus)
+        frame.set_vector(
+            "counts", [occluders, len(lighting.lights), self._sky is not None], float(light_view is not None)
+        )
         frame.bind()
-        return tuple(light_view.T.ravel())
+        return light_view
 
     def _extent(self, data: Any, pose: Pose) -> tuple[NDArray[np.float64], float]:
         """Return centre and radius [m] of a ball about all that casts shadows near the camera's focus."""
-        balls = [self._bodies.balls(data), *(target.ball() for target in self._targets)]
+        balls = [self._bodies.occluders.balls(data), *(target.ball() for target in self._targets)]
         centres, radii = np.concatenate([b[0] for b in balls]), np.concatenate([b[1] for b in balls])
-        near = np.linalg.norm(centres - pose.focus, axis=1) < _SHADOW_REACH * pose.distance
+        near = np.linalg.norm(centres - pose.focus, axis=1) - radii < _SHADOW_REACH * pose.distance
         if not near.any():
             return pose.focus, pose.distance
         centres, radii = centres[near], radii[near, None]
         centre = ((centres - radii).min(axis=0) + (centres + radii).max(axis=0)) / 2
         return centre, float((np.linalg.norm(centres - centre, axis=1) + radii[:, 0]).max())
 
-    def _draw_maps(self, ctx: moderngl.Context, light_view: tuple[float, ...]) -> None:
+    def _draw_maps(self, ctx: moderngl.Context, light_view: tuple[float, ...] | None) -> None:
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        self._shadow.target.use()
-        self._shadow.target.clear(depth=1.0)
-        self._draw_depth(light_view)
-        if self._floor is None:
-            self._open_floor.use(3)
-        else:
+        ctx.depth_func = "<="
+        if light_view is not None:
+            self._shadow.target.use()
+            self._shadow.target.clear(depth=1.0)
+            self._draw_depth(light_view)
+        if self._floor is not None:
             self._floor.occlude(ctx, self._draw_depth)
 
     def _draw_depth(self, view_projection: tuple[float, ...]) -> None:
@@ -167,53 +220,47 @@ class Renderer:
             target.draw_depth(view_projection)
         self._bodies.draw_depth(view_projection)
 
-    def _draw_scene(self, ctx: moderngl.Context, pose: Pose) -> None:
-        """Solids first and the floor and the backdrop behind them, so that no hidden pixel is shaded."""
-        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        ctx.depth_func = "<="
-        self._target.use()
-        self._target.clear(depth=1.0)
+    def _bind_maps(self) -> None:
         self._shadow.bind()
+        if self._floor is None:
+            self._open_floor.use(3)
+        else:
+            self._floor.bind()
+        if self._sky is not None:
+            self._sky[0].use(7)
+
+    def _draw_clear(self, ctx: moderngl.Context, data: Any, pose: Pose) -> None:
+        """Lay whatever the scene behind shows through over the picture, the furthest first."""
+        layers = []
         for target in self._targets:
-            if not target.clear:
-                target.draw()
-        self._bodies.draw()
-        ctx.disable(moderngl.CULL_FACE)
-        if self._floor is not None:
-            self._floor.draw(pose.distance)
-        self._backdrop.program["screen_to_world"] = tuple(np.linalg.inv(self._view_projection).T.ravel())
-        self._backdrop.render(moderngl.TRIANGLES, vertices=3)
-        ctx.enable(moderngl.CULL_FACE)
-        self._draw_clear(ctx)
-        ctx.enable(moderngl.BLEND)
-        self._bodies.draw_transparent()
-        ctx.disable(moderngl.BLEND)
+            if target.clear:
+                centre, radius = target.ball()
+                layers.append((centre[0], float(radius[0]), target.number, target.draw))
+        for body in self._bodies.clear:
+            centre, radius = self._bodies.occluders.ball(data, body.geom)
+            layers.append((centre, radius, body.number, body.instances.draw))
+        layers.sort(key=lambda layer: -float(np.linalg.norm(layer[0] - pose.position)))
+        for centre, radius, number, draw in layers:
+            self._picture.add_layer(ctx, number, draw, self._clip(centre, radius, pose))
 
-    def _draw_clear(self, ctx: moderngl.Context) -> None:
-        """Draw the targets through which the rest of the frame is seen."""
-        clear = [target for target in self._targets if target.clear]
-        if clear:
-            ctx.copy_framebuffer(self._behind_target, self._target)
-            self._behind.build_mipmaps()
-            self._behind.use(6)
-            self._target.use()
-        for target in clear:
-            target.draw()
+    def _clip(self, centre: NDArray, radius: float, pose: Pose) -> tuple[int, int, int, int]:
+        """Return x, y, width and height [pixels] of a box about a ball in the picture."""
+        local = pose.rotation.T @ (centre - pose.position)
+        whole = (0, 0, self.width, self.height)
+        away = -local[2] - radius
+        if away <= 0.01 * radius:
+            return whole
+        scale = self.height / (2 * np.tan(np.radians(pose.fovy) / 2))
+        # the nearest point of the ball's box is seen under the widest angle
+        corners = [(local[:2] + side * radius) / depth for side in (-1, 1) for depth in (away, away + 2 * radius)]
+        middle = np.array([self.width, self.height]) / 2
+        low = np.clip(np.floor(middle + scale * np.min(corners, axis=0)), 0, whole[2:]).astype(int)
+        high = np.clip(np.ceil(middle + scale * np.max(corners, axis=0)), 0, whole[2:]).astype(int)
+        return int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])
 
 
-def _framebuffers(
-    ctx: moderngl.Context, width: int, height: int, samples: int
-) -> tuple[moderngl.Framebuffer, moderngl.Framebuffer]:
-    """Make the multisampled target and the one it is resolved into."""
-    limit = int(ctx.info["GL_MAX_RENDERBUFFER_SIZE"])
-    if not (1 <= width <= limit and 1 <= height <= limit):
-        raise RippleError(
-            f"frame size is {width}x{height} pixels; this driver makes 1 to {limit} along each side: "
-            "choose a size within that"
-        )
-    samples = min(samples, ctx.max_samples) if samples > 1 else 0
-    target = ctx.framebuffer(
-        [ctx.renderbuffer((width, height), 4, samples=samples)],
-        ctx.depth_renderbuffer((width, height), samples=samples),
-    )
-    return target, ctx.framebuffer([ctx.renderbuffer((width, height), 4)])
+def _straight(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Divide colours by alpha."""
+    alpha = np.maximum(frame[..., 3:].astype(np.float32), 1.0) / 255.0
+    frame[..., :3] = np.minimum(frame[..., :3] / alpha + 0.5, 255.0).astype(np.uint8)
+    return frame

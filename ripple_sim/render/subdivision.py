@@ -1,4 +1,4 @@
-"""Split long edges of a triangle mesh at their midpoints, without opening gaps."""
+"""Split long edges of a triangle mesh at their midpoints, without opening gaps; what is smooth gets rounder."""
 
 from __future__ import annotations
 
@@ -7,20 +7,35 @@ from numpy.typing import NDArray
 
 
 def subdivide(
-    F: NDArray, attributes: NDArray, directions: slice, *, max_angle: float, max_faces: int
+    F: NDArray,
+    attributes: NDArray,
+    same: NDArray,
+    *,
+    position: slice,
+    normal: slice,
+    max_length: float,
+    max_faces: int,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Split edges until none spans more than `max_angle` or the mesh has about `max_faces` triangles.
+    """Split edges until none is longer than `max_length` or the mesh has about `max_faces` triangles.
+
+    A midpoint carries the mean of what its edge's ends carry. Between two triangles that share the normals at both ends
+    of their edge it also bulges out to where the surface with these normals would be (half the way to the mean of the
+    midpoint's projections onto the ends' tangent planes, after Boubekeur and Alexa, Phong Tessellation, 2008; half is
+    exact on a sphere to second order). Creases and open edges stay straight.
 
     Parameters
     ----------
     F : array, shape [m, 3]
         Triangles.
     attributes : array, shape [n, k]
-        What the vertices carry; a midpoint carries the mean of its edge's ends.
-    directions : slice
-        The three columns of `attributes` between which the angle of an edge is measured.
-    max_angle : float
-        [radians]
+        What the vertices carry.
+    same : array, shape [n]
+        Whole numbers, equal for vertices that differ in nothing but their texture coordinates: a seam of those is no
+        crease.
+    position, normal : slice
+        The three columns of `attributes` that hold the position [m] and the unit normal.
+    max_length : float
+        [m]
     max_faces : int
         The longest edges are split first; a mesh that is finer from the start stays as it is.
 
@@ -30,34 +45,53 @@ def subdivide(
         The finer mesh. The original vertices come first.
     """
     F, attributes = np.asarray(F, dtype=np.int64), np.asarray(attributes, dtype=np.float64)
+    same = np.asarray(same, dtype=np.int64)
     while len(F) < max_faces:
         sides = np.stack([F, np.roll(F, -1, axis=1)], axis=2).reshape(-1, 2)
         edges, edge_of_side = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
-        angle = _angle(attributes[edges[:, 0], directions], attributes[edges[:, 1], directions])
-        marked = _longest(angle, max_angle, max_faces - len(F))
+        edge_of_side = edge_of_side.ravel()
+        length = _length(attributes[edges[:, 0], position] - attributes[edges[:, 1], position])
+        marked = _longest(length, max_length, max_faces - len(F))
         if not marked.any():
             break
+        _, weld_of_side = np.unique(np.sort(same[sides], axis=1), axis=0, return_inverse=True)
+        weld_of_edge = np.empty(len(edges), dtype=np.int64)
+        weld_of_edge[edge_of_side] = weld_of_side.ravel()
+        inner = np.bincount(weld_of_side.ravel())[weld_of_edge] == 2
+        a, b = attributes[edges[marked, 0]], attributes[edges[marked, 1]]
+        middle = (a + b) / 2
+        middle[:, position] += inner[marked, None] * _bulge(a[:, position], b[:, position], a[:, normal], b[:, normal])
+        middle[:, normal] /= np.maximum(_length(middle[:, normal]), 1e-12)[:, None]
         midpoint = np.full(len(edges), -1)
         midpoint[marked] = len(attributes) + np.arange(marked.sum())
-        attributes = np.concatenate([attributes, attributes[edges[marked]].mean(axis=1)])
-        F = _split(F, midpoint[edge_of_side.reshape(-1, 3)], attributes[:, directions])
+        same = np.concatenate([same, same.max() + 1 + weld_of_edge[marked]])
+        attributes = np.concatenate([attributes, middle])
+        F = _split(F, midpoint[edge_of_side.reshape(-1, 3)], attributes[:, position])
     return F, attributes
 
 
-def _angle(a: NDArray, b: NDArray) -> NDArray[np.float64]:
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+def _length(vectors: NDArray) -> NDArray[np.float64]:
+    return np.linalg.norm(vectors, axis=1)
 
 
-def _longest(angle: NDArray, max_angle: float, new_faces: int) -> NDArray[np.bool_]:
+def _bulge(a: NDArray, b: NDArray, normal_a: NDArray, normal_b: NDArray) -> NDArray[np.float64]:
+    """How far a midpoint moves out, [k, 3]."""
+    half = (b - a) / 2
+    above_a = np.einsum("ij,ij->i", half, normal_a)[:, None] * normal_a
+    above_b = -np.einsum("ij,ij->i", half, normal_b)[:, None] * normal_b
+    return -(above_a + above_b) / 4
+
+
+def _longest(length: NDArray, max_length: float, new_faces: int) -> NDArray[np.bool_]:
     """Mark the edges over the limit; a split edge makes two more triangles, so only the longest that fit."""
     budget = max(new_faces // 2, 1)
-    if budget < len(angle):
-        max_angle = max(max_angle, np.partition(angle, len(angle) - budget)[len(angle) - budget])
+    if budget < len(length):
+        max_length = max(max_length, np.partition(length, len(length) - budget)[len(length) - budget])
     # half of the longest edge as a floor keeps the triangles in shape: long edges are split first
-    return angle > max(max_angle, angle.max() / 2)
+    return length > max(max_length, length.max() / 2)
 
 
-def _split(F: NDArray, middle: NDArray, directions: NDArray) -> NDArray[np.int64]:
+def _split(F: NDArray, middle: NDArray, positions: NDArray) -> NDArray[np.int64]:
     """Cut every triangle into 1 to 4 by the midpoints of its sides (side k runs from corner k to k + 1), -1 = none."""
     count = (middle >= 0).sum(axis=1)
     parts = [F[count == 0]]
@@ -72,7 +106,7 @@ def _split(F: NDArray, middle: NDArray, directions: NDArray) -> NDArray[np.int64
     f, m = _turned(F[count == 2], middle[count == 2], np.argmin(middle[count == 2] >= 0, axis=1))
     parts.append(np.stack([m[:, 2], m[:, 1], f[:, 2]], axis=1))
     # the remaining quadrilateral f0 f1 m1 m2 is cut along its shorter diagonal
-    first = _angle(directions[f[:, 0]], directions[m[:, 1]]) <= _angle(directions[f[:, 1]], directions[m[:, 2]])
+    first = _length(positions[f[:, 0]] - positions[m[:, 1]]) <= _length(positions[f[:, 1]] - positions[m[:, 2]])
     a, b = (f[first], m[first]), (f[~first], m[~first])
     parts += [
         np.stack([a[0][:, 0], a[0][:, 1], a[1][:, 1]], axis=1),

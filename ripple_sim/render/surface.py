@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -16,11 +17,15 @@ from ripple_sim.solver.gl import GLContext
 from . import occlusion
 from .color import linear, srgb_texture
 from .field import UNDER_COLORS, FieldTexture
-from .looks import find_look
+from .looks import MODEL_LOOK, Look, find_look
+from .materials import CUBE_IMAGE, FLAT_IMAGE, NO_IMAGE, Mapping, Textures, color, look_of, mapping_of
 from .meshes import corner_normals
+from .objects import ObjectTable
 from .subdivision import subdivide
 
-_MAX_FACES = 40_000
+_PIXELS = 4.0  # length of an edge where the target fills the frame's height
+_PIXELS_PER_FACE = 16  # of the frame
+_LEAST_FACES, _MOST_FACES = 20_000, 400_000
 _PACKAGE = "ripple_sim.render"
 # columns of the vertex attributes while the mesh is refined
 _POSITION, _DIRECTION, _SPHERE, _NORMAL, _BAKED, _UV = (
@@ -43,7 +48,7 @@ class Surface:
     resolution : int
         Texels N per edge of the relief's faces.
     look : str
-        Name of one of `LOOKS`.
+        Name of one of `LOOKS`; "model" takes colour, texture and gloss from the geom's MuJoCo material.
     color : tuple, optional
         sRGB, 0 to 1. By default the look's own.
     uv, image : optional
@@ -68,53 +73,83 @@ class Surface:
 
 
 class SurfaceMesh:
-    """A target on the GPU, refined to the relief's texels so that silhouettes displace smoothly."""
+    """A target on the GPU, cut into triangles of a few pixels so that silhouettes are round and displace smoothly.
 
-    def __init__(self, gl: GLContext, geom: int, surface: Surface) -> None:
+    Parameters
+    ----------
+    gl : GLContext
+    ctx : OwnedObjects
+    model : mujoco.MjModel
+    geom : int
+        The target's geom.
+    surface : Surface
+    textures : Textures
+        Of the model.
+    table : ObjectTable
+        Takes a row for the target.
+    size : (width, height)
+        Of the frame [pixels].
+    """
+
+    def __init__(
+        self,
+        gl: GLContext,
+        ctx: Any,
+        model: Any,
+        geom: int,
+        surface: Surface,
+        textures: Textures,
+        table: ObjectTable,
+        size: tuple[int, int],
+    ) -> None:
         self.geom = geom
         self.resolution = surface.resolution
         shows_field = surface.field_colors is not None
-        self.look = UNDER_COLORS if shows_field else find_look(surface.look)
-        self.clear = self.look.transparency > 0.0
+        look, rgb, mapping = _appearance(model, geom, surface)
+        self.clear = look.transparency > 0.0
         self.radius = float(np.linalg.norm(surface.V, axis=1).max())
-        faces, vertices = _refined(surface)
+        self._table = table
+        self.number = table.add(look, geom, size=self.radius, painted=shows_field)
+        faces, vertices = _refined(surface, 2 * self.radius * _PIXELS / size[1], size[0] * size[1] // _PIXELS_PER_FACE)
         self.count = len(vertices)
-        with gl as ctx:
-            self._displace = gl.compute_shader(_PACKAGE, "displace")
-            program = gl.program(
+        self._displace = ctx.own(gl.compute_shader(_PACKAGE, "displace"))
+        self._program = ctx.own(
+            gl.program(
                 _PACKAGE,
-                "surface_vertex",
-                "surface_fragment",
-                CLEAR=int(self.clear),
+                "surface_geometry_vertex",
+                "surface_geometry_fragment",
+                MAPPING=mapping.kind,
                 FIELD=int(shows_field),
                 GRID=int(surface.grid > 0),
             )
-            depth = gl.program(_PACKAGE, "surface_depth_vertex", "depth_fragment")
-            texels = surface.resolution + 2
-            self._relief = ctx.texture_array((texels, texels, 6), 4, dtype="f4")
-            self._relief.filter = (moderngl.LINEAR, moderngl.LINEAR)
-            self._relief.repeat_x = self._relief.repeat_y = False
-            self._rest = ctx.buffer(_packed(vertices, _POSITION, _DIRECTION, _SPHERE))
-            self._moved = ctx.buffer(reserve=12 * self.count)
-            still = ctx.buffer(_packed(vertices, _NORMAL, _SPHERE, _BAKED, _UV))
-            indices = ctx.buffer(faces.astype("i4").tobytes())
-            self._solid = ctx.vertex_array(
-                program,
-                [
-                    (self._moved, "3f", "in_world"),
-                    (still, "3f 3f 2f 2f", "in_normal", "in_sphere", "in_baked", "in_uv"),
-                ],
-                indices,
-            )
-            self._depth = ctx.vertex_array(depth, [(self._moved, "3f", "in_world")], indices)
-            self._image = None if shows_field else _load_image(ctx, surface)
-            self._field = None if surface.field_colors is None else FieldTexture(ctx, texels, surface.field_colors)
+        )
+        depth = ctx.own(gl.program(_PACKAGE, "surface_depth_vertex", "depth_fragment"))
+        texels = surface.resolution + 2
+        self._relief = ctx.texture_array((texels, texels, 6), 4, dtype="f4")
+        self._relief.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self._relief.repeat_x = self._relief.repeat_y = False
+        self._rest = ctx.buffer(_packed(vertices, _POSITION, _DIRECTION, _SPHERE))
+        self._moved = ctx.buffer(reserve=12 * self.count)
+        still = np.concatenate([vertices[:, _NORMAL], vertices[:, _SPHERE], vertices[:, _BAKED]], axis=1)
+        still = np.concatenate([still, _mapped(vertices, mapping)], axis=1).astype("f4")
+        indices = ctx.buffer(faces.astype("i4").tobytes())
+        self._solid = ctx.vertex_array(
+            self._program,
+            [
+                (self._moved, "3f", "in_world"),
+                (ctx.buffer(still.tobytes()), "3f 3f 2f 3f", "in_normal", "in_sphere", "in_baked", "in_mapped"),
+            ],
+            indices,
+            skip_errors=True,
+        )
+        self._depth = ctx.vertex_array(depth, [(self._moved, "3f", "in_world")], indices)
+        self._mapping = mapping
+        self._image = None
+        if mapping.kind != NO_IMAGE:
+            self._image = textures.get(mapping.texture) if mapping.texture >= 0 else _load_image(ctx, surface)
+        self._field = None if surface.field_colors is None else FieldTexture(ctx, texels, surface.field_colors)
         self._grid = surface.grid
-        look = self.look
-        color = None if shows_field else surface.color
-        self._color = (*linear(color or look.color), float(self._image is not None))
-        self._base = (look.roughness, look.metallic, look.sheen, look.coat)
-        self._volume = (look.translucency, look.transparency, float(geom))
+        self._color = (*rgb, float(self.number))
 
     def update(
         self,
@@ -133,6 +168,7 @@ class SurfaceMesh:
                 f"{list(shape)}: six faces padded by one texel, gradient and height"
             )
         self._origin, self._highest = np.array(origin), float(np.abs(relief[..., 3]).max())
+        self._table.set_lift(self.number, min(1.5 * self._highest, 0.05 * self.radius))
         self._relief.write(np.ascontiguousarray(relief, dtype=np.float32))
         self._relief.use(0)
         self._rest.bind_to_storage_buffer(0)
@@ -158,20 +194,17 @@ class SurfaceMesh:
         return self._origin[None], np.array([self.radius + self._highest])
 
     def draw(self) -> None:
-        """Draw the shaded surface."""
-        program = self._solid.program
+        """Draw into the geometry pass."""
         self._relief.use(0)
         if self._image is not None:
-            self._image.use(5)
-        program["rotation"] = self._rotation
-        program["color"] = self._color
-        program["base"] = self._base
-        program["volume"] = (*self._volume, min(1.5 * self._highest, 0.05 * self.radius))
-        program["size"] = self.radius
+            self._image.use(self._mapping.unit)
+        self._program["rotation"] = self._rotation
+        self._program["color"] = self._color
+        self._program["size"] = self.radius
         if self._field is not None:
-            self._field.use(program)
+            self._field.use(self._program)
         if self._grid:
-            program["grid_spacing"] = float(self._grid)
+            self._program["grid_spacing"] = float(self._grid)
         self._solid.render()
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
@@ -180,7 +213,22 @@ class SurfaceMesh:
         self._depth.render()
 
 
-def _refined(surface: Surface) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[np.float64], Mapping]:
+    """Look, linear colour under the picture, and how the picture lies on the surface."""
+    plain = Mapping(NO_IMAGE, -1, np.zeros(3), False)
+    if surface.field_colors is not None:
+        return UNDER_COLORS, np.ones(3), plain
+    look = find_look(surface.look)
+    if surface.look == MODEL_LOOK:
+        rgb = color(model, geom)[:3] if surface.color is None else linear(surface.color)
+        mapping = mapping_of(model, geom)
+        return look_of(model, geom), rgb, mapping if surface.uv is not None or not mapping.own else plain
+    if surface.image is not None and surface.uv is not None:
+        return look, np.ones(3), Mapping(FLAT_IMAGE, -1, np.zeros(3), True)
+    return look, linear(surface.color or look.color), plain
+
+
+def _refined(surface: Surface, max_length: float, max_faces: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Triangles and vertex attributes (see the columns above), split where normals or texture coordinates jump."""
     V, F = np.asarray(surface.V, dtype=np.float64), np.asarray(surface.F, dtype=np.int64)
     smooth = np.zeros_like(V)
@@ -190,24 +238,43 @@ def _refined(surface: Surface) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     corner_uv = uv[F] if uv.ndim == 2 else uv
     corners = np.concatenate([F[:, :, None], corner_normals(V, F), corner_uv], axis=2).reshape(-1, 6)
     unique, index = np.unique(corners, axis=0, return_inverse=True)
+    _, same = np.unique(unique[:, :4], axis=0, return_inverse=True)
     vertex = unique[:, 0].astype(np.int64)
     attributes = np.concatenate(
         [V[vertex], smooth[vertex], surface.sphere[vertex], unique[:, 1:4], baked[vertex], unique[:, 4:]], axis=1
     )
-    return subdivide(
-        index.reshape(F.shape), attributes, _SPHERE, max_angle=np.pi / 2 / surface.resolution, max_faces=_MAX_FACES
+    faces, attributes = subdivide(
+        index.reshape(F.shape),
+        attributes,
+        same.ravel(),
+        position=_POSITION,
+        normal=_NORMAL,
+        max_length=max_length,
+        max_faces=int(np.clip(max_faces, _LEAST_FACES, _MOST_FACES)),
     )
+    length = np.linalg.norm(attributes[:, _DIRECTION], axis=1, keepdims=True)
+    attributes[:, _DIRECTION] /= np.maximum(length, 1e-12)
+    return faces, attributes
 
 
 def _packed(vertices: NDArray[np.float64], *columns: slice) -> bytes:
     return np.concatenate([vertices[:, c] for c in columns], axis=1).astype(np.float32).tobytes()
 
 
-def _load_image(ctx: moderngl.Context, surface: Surface) -> moderngl.Texture | None:
-    if surface.image is None or surface.uv is None:
-        return None
+def _mapped(vertices: NDArray[np.float64], mapping: Mapping) -> NDArray[np.float64]:
+    """Where the picture is looked up, [n, 3]: texture coordinates, or a direction for a cube."""
+    if mapping.kind == CUBE_IMAGE:
+        return vertices[:, _POSITION] * mapping.scale
+    if not mapping.own:
+        return vertices[:, _POSITION] * mapping.scale - 0.5
+    u, v = vertices[:, _UV].T
+    # a surface counts v from the picture's lower edge, MuJoCo's textures lie with the upper edge at 0
+    return np.stack([u, 1.0 - v, np.zeros_like(u)], axis=1)
+
+
+def _load_image(ctx: Any, surface: Surface) -> moderngl.Texture:
     try:
-        picture = Image.open(surface.image).convert("RGB")
+        picture = Image.open(str(surface.image)).convert("RGB")
     except OSError as error:
         raise RippleError(f"texture image {surface.image} cannot be read: {error}") from error
-    return srgb_texture(ctx, np.asarray(picture)[::-1])
+    return srgb_texture(ctx, np.asarray(picture))

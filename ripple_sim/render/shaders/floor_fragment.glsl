@@ -1,29 +1,50 @@
 #version 430
+// Pixels that show the floor, wholly or beside something.
 #include "frame.glsl"
+#include "samples.glsl"
 #include "studio.glsl"
+#include "lights.glsl"
 #include "shadow.glsl"
+#include "floor_ray.glsl"
 
 layout(binding = 3) uniform sampler2D floor_openness;
-layout(binding = 5) uniform sampler2D image;
+layout(binding = 5) uniform sampler2D floor_image;
 
-uniform vec4 tiling;  // xy: repetitions a metre; z: 1 with an image
+uniform vec2 mapping;  // texture coordinates a metre
+uniform vec3 tint;     // that the image is multiplied by
 
-in vec2 plane;
 out vec4 fragment;
 
 void main()
 {
-    vec3 world = floor_origin.xyz + plane.x * floor_u.xyz + plane.y * floor_v.xyz;
-    vec3 ray = world - eye.xyz;
-    float away = length(ray);
-    // the lamps stand near: a pool of light about the focus, and the backdrop's colour beyond
-    float fade = smoothstep(0.4, 3.4, length(world - focus.xyz) / eye.w);
-
-    vec3 albedo = mix(floor_albedo.rgb, texture(image, plane * tiling.xy + 0.5).rgb, tiling.z);
+    vec3 way = way_of_pixel();
+    float at = floor_distance(way);
+    vec3 direction = normalize(way), world = eye.xyz + min(at, 1e6) * way, local = world - floor_origin.xyz;
+    vec2 plane = vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz));
+    // the lamps stand near: a pool of light about the focus, and the background's colour beyond
+    float fade = at < MISSED ? smoothstep(floor_fade.x, floor_fade.y, length(world - focus.xyz) / eye.w) : 1.0;
+#if IMAGE
+    vec3 albedo = texture(floor_image, plane * mapping - 0.5).rgb * tint;
+#else
+    vec3 albedo = floor_albedo.rgb;
+#endif
     float open = textureLod(floor_openness, (plane - floor_map.xy) / (2.0 * floor_map.z) + 0.5, 1.0).r;
-    float facing = max(dot(floor_normal.xyz, key_direction.xyz), 0.0);
-    float shadow = fade < 1.0 ? key_visibility(world, floor_normal.xyz, 0.0) : 1.0;
-    vec3 light = key_radiance.rgb * facing * shadow + ambient(floor_normal.xyz, vec3(0.0)) * (0.15 + 0.85 * open);
-    vec3 radiance = mix(albedo * light, backdrop(ray / away), fade);
-    fragment = vec4(developed(radiance), 1.0);
+    float shadow = key_visibility(world, floor_normal.xyz, 0.0);
+    vec3 light = vec3(0.0), unshaded = vec3(0.0);
+    for (int i = 0; i < int(counts.y); ++i) {
+        vec3 towards;
+        vec3 arrives = incident(lights[i], world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
+        light += arrives * (i == 0 ? shadow : 1.0);
+        unshaded += arrives;
+    }
+    vec3 around = ambient(floor_normal.xyz, vec3(0.0));
+    light += around * (0.15 + 0.85 * open);
+    float share = 1.0 - float(bitCount(covered(ivec2(gl_FragCoord.xy), at))) / float(SAMPLES);
+#if CUT_OUT
+    // of the floor nothing but the shadows is kept
+    fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g + around.g, 1e-6)));
+#else
+    vec3 far = backdrop(vec3(direction.xy, at < MISSED && counts.z > 0.0 ? max(direction.z, 0.0) : direction.z));
+    fragment = share * vec4(dithered(developed(mix(albedo * light, far, fade))), 1.0);
+#endif
 }

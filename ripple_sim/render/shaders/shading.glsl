@@ -1,10 +1,10 @@
-// How a solid surface answers the studio's light.
+// How a solid surface answers the light.
 layout(binding = 3) uniform sampler2D floor_openness;
 layout(std430, binding = 4) readonly buffer Occluders { vec4 occluders[]; };  // pairs: end a, radius; end b, geom
 
 struct Material {
     vec3 albedo;
-    float roughness, metallic, sheen, coat, translucency, transparency;
+    float roughness, metallic, sheen, coat, translucency, transparency, emission;
     float thickness;  // of the body under the surface, 0 to about 1
     vec3 behind;      // radiance of what is seen through the body
     float lift;       // height of bumps that the shading normal accounts for [m]
@@ -32,9 +32,9 @@ vec3 floor_bounce(vec3 position)
     vec3 local = position - floor_origin.xyz;
     vec2 uv = (vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)) - floor_map.xy) / (2.0 * floor_map.z) + 0.5;
     float open = textureLod(floor_openness, uv, 4.0).r;
-    vec3 lit = floor_albedo.rgb * (key_radiance.rgb * 0.5 * open * open + horizon.rgb * 0.4 * open);
+    vec3 lit = floor_albedo.rgb * (floor_light.rgb * 0.7 * open * open + sky.rgb * 0.5 * open);
     lit = mix(lit, vec3(dot(lit, vec3(0.2126, 0.7152, 0.0722))), 0.5);  // a coloured floor shall not stain all that is on it
-    return floor_origin.w > 0.0 ? lit : horizon.rgb * 0.6;
+    return floor_origin.w > 0.0 ? lit : sky.rgb * 0.8;
 }
 
 float ggx(float n_h, float roughness)
@@ -49,46 +49,53 @@ vec3 fresnel(vec3 f0, float cosine)
     return f0 + (1.0 - f0) * pow(1.0 - cosine, 5.0);
 }
 
-vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_geom)
+vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_geom, float spread)
 {
-    vec3 view = normalize(eye.xyz - position), light = key_direction.xyz;
+    vec3 view = normalize(eye.xyz - position);
     // interpolated normals of bumpy silhouettes may look away from the camera
     normal = normalize(normal + max(0.1 - dot(normal, view), 0.0) * view);
-    vec3 reflected = reflect(-view, normal), halfway = normalize(view + light);
-    float n_v = clamp(dot(normal, view), 0.1, 1.0), n_l = dot(normal, light), n_h = max(dot(normal, halfway), 0.0);
+    vec3 reflected = reflect(-view, normal);
+    float n_v = clamp(dot(normal, view), 0.1, 1.0);
 
-    float shadow = key_visibility(position, flat_normal, m.lift);
     float open = m.openness * openness_to_bodies(position, flat_normal, own_geom);
     vec3 bounce = floor_bounce(position);
     float height = max(dot(position - floor_origin.xyz, floor_normal.xyz), 0.0);
     vec3 mirrored = 1.7 * floor_bounce(position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2));
     // narrow highlights of distant ripples would flicker
-    vec3 dx = dFdx(normal), dy = dFdy(normal);
-    float rough = sqrt(clamp(m.roughness * m.roughness + min(0.5 * (dot(dx, dx) + dot(dy, dy)), 0.2), 0.004, 1.0));
+    float rough = sqrt(clamp(m.roughness * m.roughness + spread, 0.004, 1.0));
+    vec3 f0 = mix(vec3(0.04), m.albedo, m.metallic);
 
     // translucent bodies let light of their own colour wrap round their edges
     vec3 wrap = 0.6 * m.translucency * m.albedo;
-    vec3 diffuse = max(n_l + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
-    float soft_shadow = mix(shadow, 1.0, 0.35 * m.translucency);
-    vec3 key = key_radiance.rgb * diffuse * soft_shadow;
-    vec3 sky = ambient(normal, bounce) * open;
-    sky *= mix(vec3(1.0), m.albedo / max(max(m.albedo.r, m.albedo.g), max(m.albedo.b, 1e-3)), 0.8 * m.translucency);
-    // light bounces between walls of a coloured body: occlusion is less deep and more saturated
-    vec3 base = m.albedo * (key + sky * mix(m.albedo * (1.0 - open) + open, vec3(1.0), open)) * (1.0 - m.metallic);
-
     // what enters elsewhere and leaves here: more of it where the body is thin, and the deeper its colour the further
-    float glow = exp(-4.0 * m.thickness) * (0.35 + 0.65 * pow(clamp(0.5 - 0.5 * dot(normal, light), 0.0, 1.0), 2.0));
-    base += m.translucency * m.albedo * key_radiance.rgb * glow;
-    // clear bodies show the studio through them, bent as water bends and tinted by the way through
+    float thin = exp(-4.0 * m.thickness);
+    float shadow = key_visibility(position, flat_normal, m.lift);
+    vec3 direct = vec3(0.0), highlight = vec3(0.0), glow = vec3(0.0);
+    for (int i = 0; i < int(counts.y); ++i) {
+        vec3 light;
+        vec3 radiance = incident(lights[i], position, light);
+        float n_l = dot(normal, light), visible = i == 0 ? shadow : 1.0;
+        vec3 halfway = normalize(view + light);
+        vec3 diffuse = max(n_l + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
+        direct += radiance * diffuse * mix(visible, 1.0, 0.35 * m.translucency);
+        highlight += radiance * visible * clamp(n_l * 4.0, 0.0, 1.0) * fresnel(f0, max(dot(view, halfway), 0.0))
+                   * ggx(max(dot(normal, halfway), 0.0), rough) * 0.25;
+        float behind = clamp(0.5 - 0.5 * n_l, 0.0, 1.0);
+        glow += radiance * thin * (0.35 + 0.65 * behind * behind);
+    }
+    vec3 around = ambient(normal, bounce) * open;
+    around *= mix(vec3(1.0), m.albedo / max(max(m.albedo.r, m.albedo.g), max(m.albedo.b, 1e-3)), 0.8 * m.translucency);
+    // light bounces between walls of a coloured body: occlusion is less deep and more saturated
+    around *= mix(m.albedo * (1.0 - open) + open, vec3(1.0), open);
+    vec3 base = m.albedo * (direct + around) * (1.0 - m.metallic) + m.translucency * m.albedo * glow;
+    base += m.emission * m.albedo;
+    // clear bodies show what is behind them, bent as water bends and tinted by the way through
     base = mix(base, m.behind * pow(m.albedo, vec3(0.15 + 0.8 * m.thickness)), m.transparency);
-    base += m.sheen * m.albedo * sky * pow(1.0 - n_v, 3.0);
+    base += m.sheen * m.albedo * around * pow(1.0 - n_v, 3.0);
 
-    vec3 f0 = mix(vec3(0.04), m.albedo, m.metallic);
-    float visible = shadow * clamp(n_l * 4.0, 0.0, 1.0);
     float hidden = clamp(open * open + 0.15, 0.0, 1.0);
     vec3 at_edge = f0 + (max(vec3(1.0 - rough), f0) - f0) * pow(1.0 - n_v, 5.0);
-    vec3 gloss = environment(reflected, rough, mirrored) * at_edge * hidden;
-    gloss += key_radiance.rgb * visible * fresnel(f0, max(dot(view, halfway), 0.0)) * ggx(n_h, rough) * 0.25;
+    vec3 gloss = environment(reflected, rough, mirrored) * at_edge * hidden + highlight;
     float coat = m.coat * fresnel(vec3(0.04), n_v).x;
     vec3 film = environment(reflected, 0.06, mirrored) * hidden;
     return (base + gloss) * (1.0 - coat) + coat * film;

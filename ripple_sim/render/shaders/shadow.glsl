@@ -1,44 +1,60 @@
-// Soft shadow of the key light: percentage-closer filtering over a disc as wide as the penumbra.
+// Soft shadow of the first light: percentage-closer filtering over a disc as wide as the penumbra.
 layout(binding = 1) uniform sampler2DShadow shadow_test;
-layout(binding = 2) uniform sampler2D shadow_depth;
+layout(binding = 2) uniform sampler2D shadow_map;
 
 const int SEARCH_TAPS = 12;
-const int FILTER_TAPS = 32;
+const int FILTER_TAPS = 24;
 
 // By the golden angle: points at growing radii spread evenly.
 const mat2 TURN = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);
 
-// The normal is that of the surface at large; `lift` [m] raises the position above bumps that shall not shade each other.
+// Distance from the lamp [m] of a depth in the map.
+float lamp_distance(float depth)
+{
+    return (shadow_depth.x * depth + shadow_depth.y) / (shadow_depth.z * depth + shadow_depth.w);
+}
+
+// Share of the first light that arrives. The normal is that of the surface at large; `lift` [m] raises the position
+// above bumps that shall not shade each other.
 float key_visibility(vec3 position, vec3 normal, float lift)
 {
-    float facing = dot(normal, key_direction.xyz);
-    vec3 p = (shadow_matrix * vec4(position + (lift + (1.5 + 2.5 * (1.0 - facing)) * shadow_scale.z) * normal, 1.0)).xyz;
+    bool far_away = lights[0].position.w == 0.0;
+    vec3 lamp = far_away ? lights[0].direction.xyz : normalize(lights[0].position.xyz - position);
+    float facing = dot(normal, lamp);
+    float away = far_away ? 0.0 : distance(lights[0].position.xyz, position);
+    float texel = (shadow_width.x + shadow_width.y * away) / shadow_width.z;
+    vec3 raised = position + (lift + (1.5 + 2.5 * (1.0 - facing)) * texel) * normal;
+    vec4 clip = shadow_matrix * vec4(raised, 1.0);
+    vec3 p = clip.xyz / clip.w;
+    float to_lamp = lamp_distance(p.z), width = shadow_width.x + shadow_width.y * to_lamp;
+    float stretch = shadow_depth.z * p.z + shadow_depth.w;
+    float metre = stretch * stretch / (shadow_depth.x * shadow_depth.w - shadow_depth.y * shadow_depth.z);
     // depth of the receiver's own plane over the map, so that a wide filter does not see the surface itself
-    vec3 n = mat3(shadow_matrix) * normal * vec3(shadow_scale.x * shadow_scale.x, shadow_scale.x * shadow_scale.x,
-                                                 shadow_scale.y * shadow_scale.y);
-    float steepest = 10.0 * shadow_scale.x / shadow_scale.y;
-    vec2 slope = clamp(-n.xy / min(n.z, -1e-6), -steepest, steepest);
+    vec4 plane = shadow_planes * vec4(normal, -dot(normal, raised));
+    float steepest = 10.0 * width * metre;
+    vec2 slope = -plane.xy * (abs(plane.z) > 1e-9 ? 1.0 / plane.z : 1e9);
+    slope = clamp(slope, -steepest, steepest);
     float turn = 6.2831853 * gradient_noise(gl_FragCoord.xy);
     vec2 direction = vec2(cos(turn), sin(turn));
-    float bias = 0.5 * shadow_scale.z / shadow_scale.y;
-    float widest = 0.11 * shadow_scale.y * key_direction.w / shadow_scale.x;
+    float bias = 0.5 * texel * metre;
+    float widest = shadow_penumbra.z;
 
     // loops that run zero times instead of branches: the software rasteriser executes both sides of a branch
-    bool inside = facing > -0.5 && all(lessThan(abs(p.xy - 0.5), vec2(0.5)));
+    bool inside = counts.w > 0.0 && facing > -0.5 && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
     float depth = 0.0, blockers = 0.0;
     int taps = inside ? SEARCH_TAPS : 0;
     for (int i = 0; i < taps; ++i) {
         // denser in the middle, where a near blocker must not be missed
         vec2 offset = widest * (float(i) + 0.1) / float(SEARCH_TAPS) * direction;
         direction = TURN * direction;
-        float d = textureLod(shadow_depth, p.xy + offset, 0.0).r;
+        float d = textureLod(shadow_map, p.xy + offset, 0.0).r;
         float blocks = step(d, p.z + dot(slope, offset) - 2.0 * bias);
         depth += blocks * d;
         blockers += blocks;
     }
-    float distance = p.z - depth / max(blockers, 1.0);
-    float texel = shadow_scale.z / shadow_scale.x;
-    float penumbra = clamp(distance * shadow_scale.y * key_direction.w / shadow_scale.x, 1.5 * texel, widest);
+    float blocker = lamp_distance(depth / max(blockers, 1.0));
+    float blur = shadow_penumbra.x + shadow_penumbra.y / max(blocker, 1e-6);
+    float penumbra = clamp((to_lamp - blocker) * blur / width, 1.5 / shadow_width.z, widest);
     float lit = 0.0;
     taps = blockers > 0.0 && blockers < float(SEARCH_TAPS) ? FILTER_TAPS : 0;
     for (int i = 0; i < taps; ++i) {
@@ -46,6 +62,5 @@ float key_visibility(vec3 position, vec3 normal, float lift)
         direction = TURN * direction;
         lit += textureLod(shadow_test, vec3(p.xy + offset, p.z + dot(slope, offset) - bias), 0.0);
     }
-    lit = taps > 0 ? lit / float(FILTER_TAPS) : 1.0 - blockers / float(SEARCH_TAPS);
-    return lit;
+    return taps > 0 ? lit / float(FILTER_TAPS) : 1.0 - blockers / float(SEARCH_TAPS);
 }

@@ -1,0 +1,153 @@
+"""What is drawn into: the samples of the visible surfaces, and the picture that is composed from them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+
+from ripple_sim.solver.errors import RippleError
+from ripple_sim.solver.gl import GLContext
+
+from .color import SRGB8_ALPHA8
+from .floor import Floor
+
+_PACKAGE = "ripple_sim.render"
+_FIRST_UNIT = 8  # of the samples' textures, in shaders/compose_fragment.glsl
+_BEHIND_UNIT = 6
+# depths that stand for what a pixel shows; exact in every depth buffer
+_LEVELS = {"SKY": 0.125, "FLOOR": 0.25, "MIXED": 0.5, "SOLID": 0.75}
+
+
+class Picture:
+    """The frame on the GPU.
+
+    Surfaces are first drawn as samples of depth, normals, colours and details; then each surface that shows in a pixel
+    is lit once. Triangles of a few pixels would otherwise be lit many times over, since rasterisers work in blocks.
+
+    Parameters
+    ----------
+    gl : GLContext
+    ctx : OwnedObjects
+    size : (width, height)
+        [pixels].
+    samples : int
+        A pixel; at most what the driver has.
+    cut_out : bool
+        Whether the background stays transparent and the floor shows nothing but shadows.
+    floor : Floor, optional
+
+    Raises
+    ------
+    RippleError
+        If the driver cannot make pictures of this size.
+    """
+
+    def __init__(
+        self, gl: GLContext, ctx: Any, size: tuple[int, int], samples: int, cut_out: bool, floor: Floor | None
+    ) -> None:
+        width, height = size
+        with gl as raw:
+            limit = int(raw.info["GL_MAX_RENDERBUFFER_SIZE"])
+            samples = min(samples, raw.max_samples)
+        if not (1 <= width <= limit and 1 <= height <= limit):
+            raise RippleError(
+                f"frame size is {width}x{height} pixels; this driver makes 1 to {limit} along each side: "
+                "choose a size within that"
+            )
+        many = samples if samples > 1 else 0
+        depth = ctx.depth_texture(size, samples=many)
+        if not many:
+            depth.compare_func = ""
+        layers = [ctx.texture(size, 4, samples=many, dtype="nu2") for _ in range(3)]
+        if not many:
+            for layer in (depth, *layers):
+                layer.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._layers = [depth, *layers]
+        self._samples = ctx.framebuffer(layers, depth)
+        self.frame = ctx.framebuffer([ctx.renderbuffer(size, 4)], ctx.depth_renderbuffer(size))
+        self._behind = ctx.texture(size, 4, internal_format=SRGB8_ALPHA8)
+        self._behind.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        self._behind.repeat_x = self._behind.repeat_y = False
+        self._behind_frame = ctx.framebuffer([self._behind])
+        self._cut_out = cut_out
+        self._passes = {
+            name: ctx.vertex_array(ctx.own(gl.program(_PACKAGE, "screen_vertex", f"{file}_fragment", **defines)), [])
+            for name, file, defines in (
+                ("classes", "classify", {f"{name}_LEVEL": level for name, level in _LEVELS.items()}),
+                ("sky", "sky", {}),
+                ("floor", "floor", {"IMAGE": int(floor is not None and floor.tiled), "CUT_OUT": int(cut_out)}),
+                ("solid", "solid", {"LAYER": 0}),
+                ("layer", "solid", {"LAYER": 1}),
+            )
+            for defines in [{**defines, "SAMPLES": max(many, 1)}]
+        }
+        if floor is not None and floor.tiled:
+            self._passes["floor"].program["tint"] = tuple(floor.tint)
+            self._passes["floor"].program["mapping"] = floor.mapping
+
+    def begin(self, ctx: moderngl.Context) -> None:
+        """Clear the samples and draw into them from now on."""
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        ctx.depth_func = "<="
+        self._samples.use()
+        # the colours of samples without a surface are never read
+        self._samples.color_mask = [(False,) * 4] * 3
+        self._samples.clear(depth=1.0)
+        self._samples.color_mask = [(True,) * 4] * 3
+
+    def compose(self, ctx: moderngl.Context) -> None:
+        """Light what was drawn, with the floor and the background."""
+        for unit, layer in enumerate(self._layers, start=_FIRST_UNIT):
+            layer.use(unit)
+        self.frame.use()
+        ctx.enable_only(moderngl.DEPTH_TEST)
+        ctx.depth_func = "1"
+        self.frame.clear()
+        self._run("classes", 0.0)
+        ctx.depth_func = "=="
+        ctx.enable(moderngl.BLEND)
+        ctx.blend_func = moderngl.ONE, moderngl.ONE
+        self.frame.depth_mask = False
+        if not self._cut_out:
+            self._run("sky", _LEVELS["SKY"])
+        self._run("floor", _LEVELS["FLOOR"])
+        self._run("floor", _LEVELS["MIXED"])
+        self._run("solid", _LEVELS["MIXED"])
+        self._run("solid", _LEVELS["SOLID"])
+        self.frame.depth_mask = True
+        ctx.depth_func = "<="
+
+    def _run(self, name: str, level: float) -> None:
+        self._passes[name].program["level"] = level
+        self._passes[name].render(moderngl.TRIANGLES, vertices=3)
+
+    def add_layer(self, ctx: moderngl.Context, number: int, draw: Any, clip: tuple[int, int, int, int]) -> None:
+        """Draw and light a single clear object over the picture.
+
+        Parameters
+        ----------
+        ctx : moderngl.Context
+        number : int
+            In the table of objects.
+        draw : callable
+            Draws it into the samples.
+        clip : (x, y, width, height)
+            The part of the picture that it lies in [pixels].
+        """
+        if clip[2] <= 0 or clip[3] <= 0:
+            return
+        self._samples.use()
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        draw()
+        ctx.copy_framebuffer(self._behind_frame, self.frame)
+        self._behind.build_mipmaps()
+        self.frame.use()
+        ctx.enable_only(moderngl.BLEND)
+        ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+        self.frame.scissor = clip
+        self._behind.use(_BEHIND_UNIT)
+        self._passes["layer"].program["layer"] = number
+        self._run("layer", 0.0)
+        self.frame.scissor = None
+        ctx.disable(moderngl.BLEND)
