@@ -49,7 +49,7 @@ def contact_pairs(
     if not data.ncon:
         return {}
     contacts = data.contact
-    pairs, points, forces, normals = _pressing(
+    targets, others, points, forces, normals = _pressing(
         contacts.geom,
         contacts.efc_address,
         contacts.dim,
@@ -60,17 +60,21 @@ def contact_pairs(
         model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
         is_target,
     )
-    rows: dict[tuple[int, int], list[int]] = {}
-    for row, (target, other) in enumerate(pairs.tolist()):
-        rows.setdefault((target, other), []).append(row)
-    return {key: ContactPair(*key, points[k], forces[k], normals[k]) for key, k in sorted(rows.items())}
+    pairs = list(zip(targets.tolist(), others.tolist(), strict=True))
+    found, begin = {}, 0
+    for end in range(1, len(pairs) + 1):
+        if end == len(pairs) or pairs[end] != pairs[begin]:
+            rows = slice(begin, end)
+            found[pairs[begin]] = ContactPair(*pairs[begin], points[rows], forces[rows], normals[rows])
+            begin = end
+    return found
 
 
 @numba.njit(cache=True)
 def _pressing(geoms, address, dim, dist, pos, frame, efc_force, pyramidal, is_target):
-    """Rows of (target, other), points, normal forces and normals of all contacts that press on a target."""
+    """Target, other, point, normal force and normal of all contacts that press on a target, pair by pair."""
     most = 2 * len(geoms)
-    pairs, forces = np.empty((most, 2), np.int64), np.empty(most)
+    targets, others, forces = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
     points, normals = np.empty((most, 3)), np.empty((most, 3))
     count = 0
     for i in range(len(geoms)):
@@ -86,8 +90,7 @@ def _pressing(geoms, address, dim, dist, pos, frame, efc_force, pyramidal, is_ta
             continue
         for target, other, side in ((first, second, 1.0), (second, first, -1.0)):
             if is_target[target]:
-                pairs[count, 0], pairs[count, 1] = target, other
-                forces[count] = force
+                targets[count], others[count], forces[count] = target, other, force
                 for k in range(3):
                     # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's
                     # surface is dist/2 away. Somewhat outside of it the nearest surface point is on this side, even of
@@ -95,4 +98,6 @@ def _pressing(geoms, address, dim, dist, pos, frame, efc_force, pyramidal, is_ta
                     normals[count, k] = side * frame[i, k]
                     points[count, k] = pos[i, k] + 1.5 * abs(dist[i]) * normals[count, k]
                 count += 1
-    return pairs[:count], points[:count], forces[:count], normals[:count]
+    # a sort that leaves the contacts of a pair in their order
+    order = np.argsort(targets[:count] * len(is_target) + others[:count], kind="mergesort")
+    return targets[order], others[order], points[order], forces[order], normals[order]

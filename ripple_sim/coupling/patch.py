@@ -79,14 +79,14 @@ class Pressed:
         [N].
     radius : float
         Footprint radius of each [m], which grows with the patch.
-    probes : int64 [k] or None
-        Which of the patch's probes the points are, if they are.
+    probes : int64 [k]
+        Which of the patch's probes the points are; -1 for those that are none.
     """
 
     points: NDArray[np.float64]
     forces: NDArray[np.float64]
     radius: float
-    probes: NDArray[np.int64] | None
+    probes: NDArray[np.int64]
 
 
 class Patch:
@@ -115,42 +115,76 @@ class Patch:
     """
 
     def __init__(self, points: NDArray[np.float64], forces: NDArray[np.float64], radius: float, convex: bool) -> None:
-        self._corners, self._loads = cluster(points, forces, radius)
         self._radius = radius
-        self.probes = self._corners
-        if convex and len(self._loads) > 1:
-            self._first, self._second = np.triu_indices(len(self._loads), 1)
-            middles = (self._corners[self._first] + self._corners[self._second]) / 2
-            self.probes = np.concatenate([self._corners, middles])
+        self._loads, self.probes = _probe(points, forces, radius, convex)
 
-    def pressed(self, surface: NDArray[np.float64]) -> Pressed:
-        """What presses, told from the surface points nearest to `probes`."""
-        corners, loads, radius, count = self._corners, self._loads, self._radius, len(self._loads)
-        if len(self.probes) == count:
-            return Pressed(corners, loads, radius, np.arange(count))
-        away = np.linalg.norm(surface - self.probes, axis=1)
-        # contact points lie a little outside of the surface, by up to their depth: so may the middles
-        touching = away[count:] <= away[:count].max() + radius / 10
-        share = loads[self._first] * loads[self._second] / loads.sum()
-        # where they do not touch between two contacts, the contacts keep their shares
-        kept = share * ~touching
-        own = loads**2 / loads.sum() + np.bincount(self._first, kept, count) + np.bincount(self._second, kept, count)
-        nodes = np.concatenate([np.arange(count), count + np.flatnonzero(touching)])
-        weights = np.concatenate([own, 2 * share[touching]])
-        if not touching.all():
-            return Pressed(self.probes[nodes], weights, radius, nodes)
-        size = float(np.linalg.norm(corners[self._first] - corners[self._second], axis=1).max())
-        middle = loads @ corners / loads.sum()
-        points, forces = _joined(middle + _INSET * (self.probes - middle), weights, size / 8)
-        return Pressed(points, forces, max(radius, _OVERLAP * size), None)
+    def pressed(self, surface: NDArray[np.float64], share: float = 1.0) -> Pressed:
+        """What presses, told from the surface points nearest to `probes`; the forces are multiplied by a share."""
+        return Pressed(*_spread(share * self._loads, self.probes, surface, self._radius))
 
 
-def _joined(
-    points: NDArray[np.float64], forces: NDArray[np.float64], near: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+@numba.njit(cache=True)
+def _probe(points, forces, radius, convex):
+    """Forces at the corners of a patch, and its probes."""
+    corners, loads = cluster(points, forces, radius)
+    count = len(loads)
+    if count == 1 or not convex:
+        return loads, corners
+    probes = np.empty((count * (count + 1) // 2, 3))
+    probes[:count] = corners
+    row = count
+    for i in range(count):
+        for j in range(i + 1, count):
+            probes[row] = (corners[i] + corners[j]) / 2
+            row += 1
+    return loads, probes
+
+
+@numba.njit(cache=True)
+def _spread(loads, probes, surface, radius):
+    """Points, forces and radius of the sources, and which probes they are."""
+    count, total = len(loads), loads.sum()
+    if len(probes) == count:
+        return probes, loads, radius, np.arange(count)
+    away = np.sqrt(((surface - probes) ** 2).sum(axis=1))
+    # contact points lie a little outside of the surface, by up to their depth: so may the middles
+    limit = away[:count].max() + radius / 10
+    forces = np.zeros(len(probes))
+    forces[:count] = loads**2 / total
+    size, row = 0.0, count
+    for i in range(count):
+        for j in range(i + 1, count):
+            share = loads[i] * loads[j] / total
+            if away[row] <= limit:
+                forces[row] = 2 * share
+            else:
+                # where they do not touch between two contacts, the contacts keep their shares
+                forces[i] += share
+                forces[j] += share
+            size = max(size, np.sqrt(((probes[i] - probes[j]) ** 2).sum()))
+            row += 1
+    touching = np.flatnonzero(forces)
+    if len(touching) < len(probes):
+        return probes[touching], forces[touching], radius, touching
+    middle = np.zeros(3)
+    for i in range(count):
+        middle += loads[i] / total * probes[i]
+    points, forces = _joined(middle + _INSET * (probes - middle), forces, size / 8)
+    return points, forces, max(radius, _OVERLAP * size), np.full(len(forces), -1)
+
+
+@numba.njit(cache=True)
+def _joined(points, forces, near):
     """Force-weighted means and sums of the points, each joined with the first one that is near [m]."""
-    close = np.linalg.norm(points[:, None] - points[None], axis=2) <= near
-    _, owner = np.unique(close.argmax(axis=1), return_inverse=True)
-    total = np.bincount(owner, forces).astype(np.float64)
-    means = [np.bincount(owner, forces * points[:, axis]) / total for axis in range(3)]
-    return np.stack(means, axis=1), total
+    means, totals, first = np.zeros_like(points), np.zeros_like(forces), np.empty(len(forces), np.int64)
+    count = 0
+    for i in range(len(forces)):
+        owner = 0
+        while owner < count and _squared_distance(points, i, first[owner]) > near**2:
+            owner += 1
+        if owner == count:
+            first[count] = i
+            count += 1
+        totals[owner] += forces[i]
+        means[owner] += forces[i] * points[i]
+    return means[:count] / totals[:count].copy().reshape(-1, 1), totals[:count]

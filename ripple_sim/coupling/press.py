@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.waves.footprint import footprint_at
-from ripple_sim.solver.waves.load import Load, add_up
+from ripple_sim.solver.waves.load import Load, add_up_by, nowhere
 
 from .patch import Pressed
 
@@ -51,10 +53,12 @@ class Press:
         self._atlas = atlas
         self.carry(carried)
         self.latest = Load.none()
+        # texels, what the surface feels at each of them [N] and is owed there [N s]
         self._texels = np.zeros(0, np.int64)
-        self._rate = self._debt = np.zeros(0)
-        self._middle: NDArray[np.float64] | None = None
-        self._anchor = np.zeros(3)
+        self._felt = self._owed = np.zeros(0)
+        self._owing = False
+        self._middle: list[float] | None = None
+        self._anchor = [0.0, 0.0, 0.0]
         self._age = self._absent = 0.0
 
     def carry(self, carried: NDArray[np.float64]) -> None:
@@ -62,93 +66,92 @@ class Press:
         self._carried = carried
         self._sources: list[_Source] = []
 
-    def press(self, pressed: Pressed, places: Places | None, dt: float) -> Load:
+    def press(self, pressed: Pressed, places: Places, middle: NDArray[np.float64], dt: float) -> Load:
         """Load over a step in which the body touches.
 
         Parameters
         ----------
         pressed : Pressed
             Where and how hard, over this step.
-        places : (float64 [k, 3], int64 [k]), optional
-            The sources' nearest surface points [m] and texels, where they are known.
+        places : (float64 [m, 3], int64 [m])
+            Surface points [m] and texels nearest to the patch's probes.
+        middle : float64 [3]
+            Force-weighted contact point [m].
         dt : float
             Time step [s].
         """
-        points, forces, radius = pressed.points, pressed.forces, pressed.radius
-        self._sources = self._footprints(points, radius, places)
+        self._sources = self._footprints(pressed, places)
+        forces = pressed.forces.tolist()
         self.latest = Load.together(
             [Load(source.texels, force * source.shares) for source, force in zip(self._sources, forces, strict=True)]
         )
-        middle = forces @ points / forces.sum()
-        if self._middle is None:
-            self._middle = self._anchor = middle
-        self._middle = self._middle + min(1.0, 2 * dt / ONSET) * (middle - self._middle)
-        if np.linalg.norm(self._middle - self._anchor) > radius / 2:
-            self._anchor, self._age = self._middle, 0.0
         self._absent = 0.0
-        return self._follow(self.latest, dt)
+        self._move(middle.tolist(), pressed.radius / 2, min(1.0, 2 * dt / ONSET))
+        return self._smooth(self.latest, dt)
 
     def release(self, dt: float) -> Load:
         """Load over a step in which the body does not touch."""
         self._absent += dt
         if self._absent > _LEFT and self._middle is not None:
             self._age, self._middle = 0.0, None
-        return self._follow(Load.none(), dt)
+        return self._smooth(Load.none(), dt)
 
     @property
     def over(self) -> bool:
         """Whether the body has left and nothing is owed."""
-        return self._absent > _LEFT and not self._debt.any()
+        return self._absent > _LEFT and not self._owing
 
-    def _follow(self, present: Load, dt: float) -> Load:
+    def _move(self, middle: list[float], most: float, pace: float) -> None:
+        """Follow the body's smoothed place; all begins anew where that is farther than `most` [m] from its start."""
+        if self._middle is None:
+            self._middle = self._anchor = middle
+        self._middle = [old + pace * (new - old) for old, new in zip(self._middle, middle, strict=True)]
+        if math.dist(self._middle, self._anchor) > most:
+            self._anchor, self._age = self._middle, 0.0
+
+    def _smooth(self, present: Load, dt: float) -> Load:
         left = ONSET - self._age
         self._age += dt
-        if left > 0 and not self._debt.any():
-            self._texels, self._rate, self._debt = present.texels, present.forces, np.zeros(len(present.texels))
+        if left > 0 and not self._owing:
+            self._texels, self._felt, self._owed = present.texels, present.forces, np.zeros(len(present.texels))
             return present
-        rate, debt, now = self._at_all_texels(present)
-        if left > 0:
-            # what is owed from before is paid in even parts until this time is over
-            paid = debt * min(1.0, dt / left)
-            self._rate, self._debt = now, debt - paid
-            return Load(self._texels, now + paid / dt)
-        pace = min(max(_FOLLOW / self._age, _SLOWEST), 0.5 / dt)
-        self._rate = rate + dt * (pace**2 * debt + 2 * pace * (now - rate))
-        self._debt = debt + dt * (now - self._rate)
-        return Load(self._texels, self._rate)
+        # what is owed from before is paid in even parts until the onset is over
+        share = min(1.0, dt / left) if left > 0 else 0.0
+        pace = 0.0 if left > 0 else min(max(_FOLLOW / self._age, _SLOWEST), 0.5 / dt)
+        self._texels, given, self._felt, self._owed, self._owing = _follow(
+            self._texels,
+            self._felt,
+            self._owed,
+            present.texels,
+            present.forces,
+            share,
+            pace,
+            dt,
+            nowhere(self._carried.size),
+        )
+        return Load(self._texels, given)
 
-    def _at_all_texels(self, present: Load) -> NDArray[np.float64]:
-        """Rate, debt and present force, [3, k], on the texels of all three; those that hold nothing any more go."""
-        kept = (self._debt != 0) | (self._rate != 0)
-        before = self._texels[kept]
-        values = np.zeros((3, len(before) + len(present.texels)))
-        values[0, : len(before)], values[1, : len(before)] = self._rate[kept], self._debt[kept]
-        values[2, len(before) :] = present.forces
-        self._texels, values = add_up(np.concatenate([before, present.texels]), values, self._carried.size)
-        return values
-
-    def _footprints(self, points: NDArray[np.float64], radius: float, places: Places | None) -> list[_Source]:
+    def _footprints(self, pressed: Pressed, places: Places) -> list[_Source]:
+        points, radius = pressed.points.tolist(), pressed.radius
         found = [self._used_before(point, radius) for point in points]
         new = [i for i, source in enumerate(found) if source is None]
         if new:
-            closest, centers = self._atlas.nearest(points[new]) if places is None else (each[new] for each in places)
+            known = pressed.probes[new]
+            closest, centers = self._atlas.nearest(pressed.points[new]) if known[0] < 0 else (x[known] for x in places)
             for i, place, center in zip(new, closest, centers.tolist(), strict=True):
                 where = footprint_at(self._atlas, place, center, radius)
                 found[i] = _Source(
                     point=points[i],
                     radius=radius,
-                    tolerance=_SAME_PLACE * float(np.sqrt(self._atlas.areas.flat[center])),
+                    tolerance=_SAME_PLACE * math.sqrt(self._atlas.areas.item(center)),
                     texels=where.texels,
                     shares=where.weights * self._carried[where.texels],
                 )
         return [source for source in found if source is not None]
 
-    def _used_before(self, point: NDArray[np.float64], radius: float) -> _Source | None:
+    def _used_before(self, point: list[float], radius: float) -> _Source | None:
         for source in self._sources:
-            if (
-                abs(source.radius - radius) <= source.tolerance
-                and np.abs(source.point - point).max() <= source.tolerance
-            ):
+            if max(abs(source.radius - radius), math.dist(source.point, point)) <= source.tolerance:
                 return source
         return None
 
@@ -157,8 +160,30 @@ class Press:
 class _Source:
     """A footprint, and how far its point may move before it is made anew."""
 
-    point: NDArray[np.float64]
+    point: list[float]
     radius: float
     tolerance: float
     texels: NDArray[np.int64]
     shares: NDArray[np.float64]
+
+
+@numba.njit(cache=True)
+def _follow(texels, felt, owed, present_texels, present_forces, share, pace, dt, place):
+    """Texels, given force, felt force and debt after a step, and whether there is a debt.
+
+    A share of the debt is paid while pace is 0; then the felt force follows the present one.
+    """
+    kept = (felt != 0) | (owed != 0)
+    before = texels[kept]
+    count = len(before)
+    values = np.zeros((3, count + len(present_texels)))
+    values[0, :count], values[1, :count], values[2, count:] = felt[kept], owed[kept], present_forces
+    texels, values = add_up_by(place, np.concatenate((before, present_texels)), values)
+    felt, owed, present = values[0], values[1], values[2]
+    if pace == 0:
+        paid = share * owed
+        given, felt, owed = present + paid / dt, present, owed - paid
+    else:
+        felt = felt + dt * (pace**2 * owed + 2 * pace * (present - felt))
+        given, owed = felt, owed + dt * (present - felt)
+    return texels, given, felt, owed, owed.any()

@@ -77,10 +77,9 @@ class Sources:
         self._is_target = np.zeros(model.ngeom, dtype=np.bool_)
         self._is_target[list(waves)] = True
         # planes and height fields have no half-extents
-        self._radius = _FOOTPRINT * np.where(
-            np.isin(model.geom_type, _ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1)
-        )
-        self._convex = ~np.isin(model.geom_type, _NOT_CONVEX)
+        extents = np.where(np.isin(model.geom_type, _ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1))
+        self._radius = (_FOOTPRINT * extents).tolist()
+        self._convex = (~np.isin(model.geom_type, _NOT_CONVEX)).tolist()
         self._names = [geom_name(model, geom) for geom in range(model.ngeom)]
         self._carried = {geom: _carried(each) for geom, each in waves.items()}
         self._presses: dict[tuple[int, int], Press] = {}
@@ -119,34 +118,37 @@ class Sources:
         """Loads of the pairs that touch a target; their impulses are noted."""
         waves, timestep = self._waves[geom], self._model.opt.timestep
         position, rotation = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
-        means, patches = [], []
-        for pair in pairs:
-            local = (pair.points - position) @ rotation
-            radius = float(min(self._radius[geom], self._radius[pair.other]))
-            means.append(pair.forces @ local / pair.forces.sum())
-            patches.append(Patch(local, pair.forces, radius, bool(self._convex[pair.other])))
+        begins = np.cumsum([0, *(len(pair.forces) for pair in pairs)])
+        forces = np.concatenate([pair.forces for pair in pairs])
+        points = (np.concatenate([pair.points for pair in pairs]) - position) @ rotation
+        totals = np.add.reduceat(forces, begins[:-1])
+        middles = np.add.reduceat(forces[:, None] * points, begins[:-1]) / totals[:, None]
+        patches = [
+            Patch(points[a:b], pair.forces, min(self._radius[geom], self._radius[pair.other]), self._convex[pair.other])
+            for pair, a, b in zip(pairs, begins.tolist(), begins[1:].tolist(), strict=False)
+        ]
         # one search for all points: each costs little beside the call
-        closest, texels = waves.atlas.nearest(np.concatenate([means, *(patch.probes for patch in patches)]))
-        surface, near = closest[len(pairs) :], texels[len(pairs) :]
-        n, loads = waves.atlas.resolution, []
-        for pair, patch, point, texel in zip(pairs, patches, closest, texels.tolist(), strict=False):
+        closest, texels = waves.atlas.nearest(np.concatenate([middles, *(patch.probes for patch in patches)]))
+        in_world = position + closest[: len(pairs)] @ rotation.T
+        given, nearest = (totals * timestep).tolist(), texels[: len(pairs)].tolist()
+        n, begin, loads = waves.atlas.resolution, len(pairs), []
+        for i, (pair, patch) in enumerate(zip(pairs, patches, strict=True)):
             self.impulses.append(
                 Impulse(
                     geom=self._names[geom],
                     other=self._names[pair.other],
-                    point=position + rotation @ point,
-                    impulse=float(pair.forces.sum()) * timestep,
-                    texel=(texel // (n * n), texel // n % n, texel % n),
+                    point=in_world[i],
+                    impulse=given[i],
+                    texel=(nearest[i] // (n * n), nearest[i] // n % n, nearest[i] % n),
                 )
             )
-            pressed = patch.pressed(surface[: len(patch.probes)])
-            places = None if pressed.probes is None else (surface[pressed.probes], near[pressed.probes])
-            surface, near = surface[len(patch.probes) :], near[len(patch.probes) :]
+            rows = slice(begin, begin + len(patch.probes))
+            begin = rows.stop
             press = self._presses.get((geom, pair.other))
             if press is None:
                 press = self._presses[geom, pair.other] = Press(waves.atlas, self._carried[geom])
-            over_time = dataclasses.replace(pressed, forces=pressed.forces * (timestep / elapsed))
-            loads.append(press.press(over_time, places, elapsed))
+            pressed = patch.pressed(closest[rows], timestep / elapsed)
+            loads.append(press.press(pressed, (closest[rows], texels[rows]), middles[i], elapsed))
             self.touches.append(Touch(pair, press.latest))
         return loads
 

@@ -45,42 +45,35 @@ class Load:
         return cls(np.concatenate([each.texels for each in loads]), np.concatenate([each.forces for each in loads]))
 
     def merged(self, size: int) -> Load:
-        """The same with every texel once, on an atlas of so many texels."""
-        texels, (forces,) = add_up(self.texels, self.forces[None], size)
+        """The same with every texel once, on an atlas of so many texels.
+
+        Raises
+        ------
+        SolverError
+            If a texel is not one of the atlas.
+        """
+        texels = self.texels
+        if len(texels) and not 0 <= texels.min() <= texels.max() < size:
+            raise SolverError(
+                f"texels go from {texels.min()} to {texels.max()}; valid are indices from 0 to {size - 1}"
+            )
+        texels, (forces,) = add_up_by(nowhere(size), texels, self.forces[None])
         return Load(texels, forces)
 
 
-def add_up(
-    texels: NDArray[np.int64], values: NDArray[np.float64], size: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Add the values [m, k] that stand at the same texel: each texel once, in order of first appearance, and sums.
-
-    Parameters
-    ----------
-    texels : int64 [k]
-    values : float64 [m, k]
-    size : int
-        Texels of the whole atlas, 6 N N.
-
-    Raises
-    ------
-    SolverError
-        If a texel is not one of the atlas.
-    """
-    place = _nowhere(size, threading.get_ident())
-    if len(texels) and not 0 <= texels.min() <= texels.max() < size:
-        raise SolverError(f"texels go from {texels.min()} to {texels.max()}; valid are indices from 0 to {size - 1}")
-    return _add_up(texels, values, place)
+def nowhere(size: int) -> NDArray[np.int64]:
+    """Scratch for `add_up_by`, which cleans it up: a sum must not cost more on a larger grid. One for each thread."""
+    return _nowhere(size, threading.get_ident())
 
 
 @functools.lru_cache(maxsize=8)
 def _nowhere(size: int, thread: int) -> NDArray[np.int64]:
-    """Scratch that its users clean up: a sum must not cost more on a larger grid. One for each thread."""
     return np.full(size, -1)
 
 
 @numba.njit(cache=True)
-def _add_up(texels, values, place):
+def add_up_by(place, texels, values):
+    """Add the values [m, k] that stand at the same texel: each texel once, in order of first appearance, and sums."""
     once = np.empty_like(texels)
     sums = np.zeros_like(values)
     count = 0

@@ -9,6 +9,7 @@ from ripple_sim.coupling.patch import Pressed
 from ripple_sim.coupling.press import ONSET, Press
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import WaveSolver, sphere_atlas
+from ripple_sim.solver.waves.load import Load
 
 GRAVITY = 9.81
 TARGETS = {
@@ -87,13 +88,17 @@ def test_box_that_lies_flat_presses_under_its_middle_too() -> None:
     assert np.abs(height[away]).max() < 0.02 * np.abs(height[middle]).max()
 
 
+def press_at(press: Press, point: np.ndarray, force: float, radius: float, dt: float) -> Load:
+    pressed = Pressed(point[None], np.array([force]), radius, np.array([-1]))
+    return press.press(pressed, (np.zeros((0, 3)), np.zeros(0, np.int64)), point, dt)
+
+
 def given_over_time(forces: np.ndarray, dt: float) -> np.ndarray:
     """What a press gives to the surface in each step, while the body touches and for a second after."""
     atlas, given = sphere_atlas(1.0, 16), []
     press = Press(atlas, atlas.areas.reshape(-1))
     for force in np.concatenate([forces, np.zeros(round(1.0 / dt))]):
-        pressed = Pressed(np.array([[0.0, 0.0, 1.0]]), np.array([force]), 0.3, None)
-        out = press.press(pressed, None, dt) if force > 0 else press.release(dt)
+        out = press_at(press, np.array([0.0, 0.0, 1.0]), force, 0.3, dt) if force > 0 else press.release(dt)
         given.append(out.forces.sum())
     assert press.over
     return np.array(given)
@@ -133,8 +138,8 @@ def test_a_body_that_slides_presses_where_it_is() -> None:
     press = Press(atlas, atlas.areas.reshape(-1))
     for step in range(1500):
         angle = 0.5 * step * 0.002
-        point = np.array([[np.sin(angle), 0.0, np.cos(angle)]])
-        load = press.press(Pressed(point, np.array([2.0]), 0.2, None), None, 0.002)
+        point = np.array([np.sin(angle), 0.0, np.cos(angle)])
+        load = press_at(press, point, 2.0, 0.2, 0.002)
         if step * 0.002 > ONSET:
             middle = load.forces @ atlas.positions.reshape(-1, 3)[load.texels] / load.forces.sum()
             assert np.linalg.norm(middle - point) < 0.1
