@@ -18,7 +18,7 @@ from pathlib import Path
 from ripple_sim.errors import VideoError
 
 _JOB, _STATES, _FRAMES, _WHOLE = "job.json", "states.txt", "frames", "whole"
-_STATE = re.compile(r"(\d+) ([0-9a-f]{32})")
+_STATE = re.compile(r"(\d+) ([0-9a-f]+);")  # with an end, since a killed process may have cut it off
 
 
 class Part:
@@ -107,7 +107,7 @@ class Part:
         if frame not in self._states:
             self._states[frame] = digest
             with (self.folder / _STATES).open("a") as file:
-                file.write(f"\n{frame} {digest}\n")  # on a line of its own also where the last one was cut off
+                file.write(f"\n{frame} {digest};\n")  # on a line of its own also where the last one was cut off
         elif self._states[frame] != digest:
             raise VideoError(
                 f"cannot resume {self.video}: at frame {frame} the simulation is not in the state it was in before; a "

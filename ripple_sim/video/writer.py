@@ -129,7 +129,7 @@ class FrameWriter:
         self.frames += 1
 
     def check_state(self, frame: int, digest: str) -> None:
-        """Note a fingerprint, 32 hexadecimal digits, of what a frame was made of, or compare it with the one noted.
+        """Note a fingerprint, in hexadecimal digits, of what a frame was made of, or compare it with the one noted.
 
         Raises
         ------

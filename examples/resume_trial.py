@@ -1,0 +1,69 @@
+"""Is a render that is killed again and again the same as an unbroken one? Tried on the program itself.
+
+    python examples/resume_trial.py [SCENE] [--kills 20] [--seed 0] [--output clip.mp4] [-- OPTIONS OF render]
+
+`ripple-sim render SCENE -o FILE --resume` is started and killed (SIGKILL) at random moments as often as asked, then
+left to finish, and compared byte for byte with the video of a run that was left alone.
+"""
+
+import argparse
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+
+def start(scene: str, output: Path, options: list[str]) -> subprocess.Popen:
+    command = [sys.executable, "-m", "ripple_sim", "render", scene, "-o", output, "--resume", *options]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    return {file.name: file.read_bytes() for file in files}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Kills a render, resumes it, and compares.")
+    parser.add_argument("scene", nargs="?", default="sphere")
+    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--output", default="clip.mp4", help="name of the video; its ending chooses the format")
+    arguments = sys.argv[1:]
+    cut = arguments.index("--") if "--" in arguments else len(arguments)
+    options, passed = parser.parse_args(arguments[:cut]), arguments[cut + 1 :]
+    chance = random.Random(options.seed)
+
+    with tempfile.TemporaryDirectory() as folder:
+        whole, broken = Path(folder) / "whole" / options.output, Path(folder) / "broken" / options.output
+        begun = time.perf_counter()
+        process = start(options.scene, whole, passed)
+        said = process.communicate()[0]
+        if process.returncode:
+            sys.exit(said)
+        length = time.perf_counter() - begun
+        print(f"unbroken: {length:.1f} s")
+        for kill in range(options.kills):
+            process = start(options.scene, broken, passed)
+            # late enough to get somewhere, early enough that the work lasts for all kills
+            time.sleep(length * chance.uniform(0.05, 0.6))
+            process.send_signal(signal.SIGKILL)
+            process.communicate()
+            stored = sorted(path.name for path in broken.with_name(f"{broken.name}.part").glob("frames/[!.]*"))
+            print(
+                f"kill {kill + 1}: {'done before' if broken.exists() else f'kept up to {stored[-1:] or None}'}",
+                flush=True,
+            )
+        process = start(options.scene, broken, passed)
+        print(process.communicate()[0].splitlines()[0])
+        left = sorted(path.name for path in broken.parent.iterdir())
+        same = process.returncode == 0 and contents(whole) == contents(broken) and left == [broken.name]
+    print("identical" if same else "DIFFERENT")
+    sys.exit(not same)
+
+
+if __name__ == "__main__":
+    main()
