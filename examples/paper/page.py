@@ -1,9 +1,11 @@
-"""A page of parts: what each shows, its pictures, its figures."""
+"""A page of parts: what each shows, its pictures, its figures; as HTML, or as Markdown for the documentation."""
 
 import dataclasses
 import html
 from collections.abc import Sequence
 from pathlib import Path
+
+from PIL import Image
 
 _STYLE = """
 body { font: 16px/1.55 system-ui, sans-serif; color: #1b2432; max-width: 62rem; margin: 2.5rem auto; padding: 0 1rem }
@@ -49,3 +51,23 @@ def write_page(path: Path, title: str, lead: str, parts: Sequence[tuple[str, Par
         f"<style>{_STYLE}</style>\n{body}\n</html>\n",
         encoding="utf-8",
     )
+
+
+def write_markdown(path: Path, title: str, lead: str, parts: Sequence[tuple[str, Part]]) -> None:
+    """Write the page in Markdown, its pictures as WebP in a folder of the page's name beside it."""
+    folder = path.with_suffix("")
+    folder.mkdir(exist_ok=True)
+    pieces = [f"# {title}", lead]
+    for command, part in parts:
+        pieces += [f"## {part.title}", part.text]
+        for file, caption in part.pictures:
+            picture = Image.open(file).convert("RGB")
+            picture.thumbnail((1400, 1400))
+            small = folder / f"{file.stem}.webp"
+            picture.save(small, quality=80, method=6)
+            pieces.append(f"![{caption}]({folder.name}/{small.name})\n\n*{caption}*")
+        if part.table:
+            rows = [part.table[0], ["---"] * len(part.table[0]), *part.table[1:]]
+            pieces.append("\n".join(f"| {' | '.join(row)} |" for row in rows))
+        pieces.append(f"`{command}`")
+    path.write_text("\n\n".join(pieces) + "\n", encoding="utf-8")

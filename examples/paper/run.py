@@ -2,7 +2,7 @@
 
 python examples/paper/run.py
 
-Writes out/paper/index.html with its pictures; each part also runs alone. Kira, Nakayama and Fujishiro, "Jacobian-free
+Writes out/paper/index.html with its pictures, and with --docs also docs/paper.md; each part also runs alone. Kira, Nakayama and Fujishiro, "Jacobian-free
 Deformation of Genus-0 Surfaces", The Journal of the Society for Art and Science.
 """
 
@@ -11,10 +11,15 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from page import Part, write_page
+from page import Part, write_markdown, write_page
 
 FOLDER = Path("out/paper")
-PARTS = ("figure_1", "figure_2", "figure_5", "figure_8", "table_1")
+PARTS = ("figure_1", "figure_2", "figure_5", "figures_6_7", "figure_8", "table_1")
+TITLE = "The paper, part by part"
+LEAD = (
+    'The figures of Kira, Nakayama and Fujishiro, "Jacobian-free Deformation of Genus-0 Surfaces", with objects of our '
+    "own, drawn and measured by one command: `python examples/paper/run.py`."
+)
 
 
 def alone(make: Callable[[Path], Part]) -> None:
@@ -35,12 +40,9 @@ def main() -> None:
         print(name, file=sys.stderr)
         parts.append((f"python examples/paper/{name}.py", importlib.import_module(name).make(FOLDER)))
     page = FOLDER / "index.html"
-    write_page(
-        page,
-        "Jacobian-free Deformation of Genus-0 Surfaces, done again",
-        "The figures of Kira, Nakayama and Fujishiro's paper with objects of our own, drawn and measured here.",
-        parts,
-    )
+    write_page(page, TITLE, LEAD, parts)
+    if "--docs" in sys.argv[1:]:
+        write_markdown(Path("docs/paper.md"), TITLE, LEAD, parts)
     print(page)
 
 

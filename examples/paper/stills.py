@@ -13,14 +13,19 @@ from ripple_sim.scene.scene import Scene
 RATE = 20  # frames a second, the grid of times to choose from
 
 
-def strip(scene: Scene, times: Sequence[float], file: Path, size: tuple[int, int], **options: Any) -> Path:
-    """Write frames of a scene at the given times [s] side by side."""
+def strip(
+    scene: Scene, times: Sequence[float], file: Path, size: tuple[int, int], columns: int = 4, **options: Any
+) -> Path:
+    """Write frames of a scene at the given times [s], so many side by side."""
+    width, height = size
+    columns = min(columns, len(times))
     with tempfile.TemporaryDirectory() as folder:
         frames = Path(folder) / "frames"
         render_video(scene, frames, size=size, fps=RATE, duration=max(times) + 1 / RATE, **options)
         drawn = sorted(frames.glob("*.png"))
-        picture = Image.new("RGB", (size[0] * len(times), size[1]))
+        picture = Image.new("RGB", (width * columns, height * -(-len(times) // columns)))
         for i, time in enumerate(times):
-            picture.paste(Image.open(drawn[round(time * RATE)]).convert("RGB"), (i * size[0], 0))
+            place = (i % columns * width, i // columns * height)
+            picture.paste(Image.open(drawn[round(time * RATE)]).convert("RGB"), place)
     picture.save(file)
     return file
