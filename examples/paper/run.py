@@ -2,8 +2,8 @@
 
 python examples/paper/run.py
 
-Writes out/paper/index.html with its pictures, and with --docs also docs/paper.md; each part also runs alone. Kira, Nakayama and Fujishiro, "Jacobian-free
-Deformation of Genus-0 Surfaces", The Journal of the Society for Art and Science.
+Writes out/paper/index.html with its pictures, and with --docs also docs/paper.md; each part also runs alone. The paper
+is by Kira, Nakayama and Fujishiro (The Journal of the Society for Art and Science).
 """
 
 import importlib
