@@ -88,7 +88,7 @@ class Bodies:
         self._depth = ctx.own(gl.program(_PACKAGE, "body_depth_vertex", "depth_fragment"))
         drawn, groups, self.clear = [], {}, []
         for geom in geoms:
-            found = _shape_of(model, geom)
+            found = shape_of(model, geom)
             if found is None:
                 continue
             mapping, opacity = mapping_of(model, geom), float(color(model, geom)[3])
@@ -99,7 +99,7 @@ class Bodies:
             else:
                 groups.setdefault((found[0], mapping.kind, mapping.texture), []).append((geom, number))
         self._opaque = [
-            self._instances(_shape_of(model, members[0][0]), mapping_of(model, members[0][0]), members)
+            self._instances(shape_of(model, members[0][0]), mapping_of(model, members[0][0]), members)
             for members in groups.values()
         ]
         solid = [geom for geom in drawn if model.geom_type[geom] != _GEOM.mjGEOM_PLANE]
@@ -147,7 +147,8 @@ class Bodies:
         )
 
 
-def _shape_of(model: Any, geom: int) -> tuple[str, Callable[[int], Shape]] | None:
+def shape_of(model: Any, geom: int) -> tuple[str, Callable[[int], Shape]] | None:
+    """Name of a geom's shape, and what makes it with a number of segments to a right angle; None for other types."""
     kind, asset = int(model.geom_type[geom]), int(model.geom_dataid[geom])
     if kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF) and asset >= 0:
         return f"mesh {asset}", lambda _: meshes.mesh_asset(model, asset)

@@ -9,7 +9,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from ..render.bodies import visible_geoms
+from ..render.bodies import shape_of, sizes, visible_geoms
 from .session import Session
 from .skin import Skin
 
@@ -18,6 +18,7 @@ _PER_METRE = 1000.0
 
 _GEOM = mujoco.mjtGeom
 _COLORMAP = "coolwarm"
+_SEGMENTS = 8  # of a body, to a right angle
 # What is shown of a plane that is larger than the view: a disc that fades into the background.
 BACKGROUND = (0.74, 0.77, 0.81)
 _FADE_RINGS, _FADE_SIDES = 24, 72
@@ -110,29 +111,15 @@ _SHADING: dict[str, Any] = {"ambient": 0.32, "diffuse": 0.75, "specular": 0.3, "
 
 
 def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
-    """Surface of a geom in its frame [m]; None for types that cannot be drawn."""
-    kind, size = _GEOM(int(model.geom_type[geom])), model.geom_size[geom]
-    along_z = {"center": (0, 0, 0), "direction": (0, 0, 1)}
-    match kind:
-        case _GEOM.mjGEOM_SPHERE:
-            return pv.Sphere(radius=size[0], theta_resolution=32, phi_resolution=24)
-        case _GEOM.mjGEOM_ELLIPSOID:
-            return pv.ParametricEllipsoid(*size, u_res=32, v_res=24, w_res=2)
-        case _GEOM.mjGEOM_CAPSULE:
-            return pv.Capsule(**along_z, radius=size[0], cylinder_length=2 * size[1], resolution=24)
-        case _GEOM.mjGEOM_CYLINDER:
-            return pv.Cylinder(**along_z, radius=size[0], height=2 * size[1], resolution=40)
-        case _GEOM.mjGEOM_BOX:
-            return pv.Box(bounds=(-size[0], size[0], -size[1], size[1], -size[2], size[2]))
-        case _GEOM.mjGEOM_PLANE:
-            return pv.Plane(i_size=2 * size[0], j_size=2 * size[1], i_resolution=1, j_resolution=1)
-        case _GEOM.mjGEOM_MESH | _GEOM.mjGEOM_SDF:
-            mesh = int(model.geom_dataid[geom])
-            if mesh >= 0:
-                vertex, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
-                V = model.mesh_vert[vertex : vertex + model.mesh_vertnum[mesh]]
-                return pv.PolyData.from_regular_faces(V, model.mesh_face[face : face + model.mesh_facenum[mesh]])
-    return None
+    """Surface of a geom in its frame [m], with normals; None for types that cannot be drawn."""
+    found = shape_of(model, geom)
+    if found is None:
+        return None
+    _, make = found
+    shape = make(_SEGMENTS)
+    mesh = pv.PolyData.from_regular_faces(shape.positions(*sizes(model, geom)), shape.faces)
+    mesh.point_data.active_normals = shape.normals
+    return mesh
 
 
 def geom_rgba(model: mujoco.MjModel, geom: int) -> NDArray[np.float32]:
@@ -142,7 +129,6 @@ def geom_rgba(model: mujoco.MjModel, geom: int) -> NDArray[np.float32]:
 
 
 def _add(plotter: pv.Plotter, mesh: pv.PolyData, rgba: NDArray[np.float32]) -> pv.Actor:
-    mesh = mesh.compute_normals(cell_normals=False, split_vertices=True, feature_angle=40.0)
     return plotter.add_mesh(
         mesh, color=rgba[:3].tolist(), opacity=float(rgba[3]), interpolation="Phong", reset_camera=False, **_SHADING
     )

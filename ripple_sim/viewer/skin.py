@@ -71,8 +71,10 @@ def _refined(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     return subdivide(
         index.reshape(F.shape),
         attributes,
-        _SPHERE,
-        max_angle=np.pi / 2 / atlas.resolution,
+        np.arange(len(unique)),
+        position=_POSITION,
+        normal=_NORMAL,
+        max_length=float(np.sqrt(atlas.areas.mean())),
         max_faces=MAX_TRIANGLES,
     )
 

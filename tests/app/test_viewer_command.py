@@ -1,0 +1,135 @@
+"""`ripple-sim view`: its help, its mistakes in one line, what it says where there is no display."""
+
+import ctypes
+import importlib.util
+import re
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ripple_sim.cli import main as cli
+from ripple_sim.errors import DisplayError
+from ripple_sim.viewer.controls import CONTROLS, MOUSE, help_text
+from ripple_sim.viewer.display import check_display
+
+
+@pytest.fixture(autouse=True)
+def no_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+
+
+def complaint(capsys: pytest.CaptureFixture[str], status: int, *argv: str) -> str:
+    assert cli.main(["view", *argv]) == status
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert re.fullmatch(r"ripple-sim: [^\n]+\n", err)
+    return err
+
+
+def test_the_help_lists_every_key_and_what_the_mouse_does(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["view", "--help"]) == 0
+    text = re.sub(r"[\s│]+", " ", capsys.readouterr().out)
+    for control in CONTROLS:
+        assert re.search(rf"\b{control.key.capitalize()}: ", text), control
+    for does in ("poke", "orbit", "pan", "zoom"):
+        assert does in text
+    assert "--benchmark" in text
+
+
+def test_the_list_on_screen_has_a_line_for_each() -> None:
+    lines = help_text().splitlines()
+    assert len(lines) == len(MOUSE) + len(CONTROLS)
+    assert len({control.key for control in CONTROLS}) == len(CONTROLS)
+
+
+def test_without_a_display_one_line_offers_the_web_page(capsys: pytest.CaptureFixture[str]) -> None:
+    line = complaint(capsys, 1, "sphere")
+    assert "DISPLAY is not set" in line
+    assert "--web" in line
+
+
+def test_a_display_without_a_server_is_named(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":4242")
+    assert "no X server at DISPLAY=:4242" in complaint(capsys, 1, "sphere")
+
+
+def test_a_missing_x11_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> None:
+        raise OSError(name)
+
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(ctypes, "CDLL", missing)
+    with pytest.raises(DisplayError, match=r"libX11.so.6 is missing .*apt-get install libx11-6"):
+        check_display()
+
+
+@pytest.mark.parametrize(
+    ("argv", "named"),
+    [
+        ([], "SCENE"),
+        (["sphere", "--size", "wide"], "'wide'"),
+        (["sphere", "--resolution", "0"], "--resolution.*'0'"),
+        (["sphere", "--bodies", "-1"], "--bodies"),
+        (["sphere", "--port", "http"], "--port.*'http'"),
+    ],
+)
+def test_wrong_arguments_are_bad_input(capsys: pytest.CaptureFixture[str], argv: list[str], named: str) -> None:
+    assert re.search(named, complaint(capsys, 2, *argv))
+
+
+@pytest.mark.parametrize("mode", ["--web", "--benchmark"])
+def test_a_missing_scene_is_bad_input_and_named(capsys: pytest.CaptureFixture[str], mode: str) -> None:
+    if mode == "--web":
+        pytest.importorskip("trame_vtk")
+    line = complaint(capsys, 2, "no-such-scene", mode)
+    assert "no scene or mesh 'no-such-scene'" in line
+    assert "sphere" in line
+
+
+def test_an_invalid_mesh_is_bad_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "open.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert "open.obj" in complaint(capsys, 2, str(tmp_path / "open.obj"), "--benchmark")
+
+
+def test_without_trame_the_extra_is_named(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    assert "pip install 'ripple-sim[web]'" in complaint(capsys, 1, "sphere", "--web")
+
+
+def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("trame_vtk")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        line = complaint(capsys, 1, "sphere", "--web", "--port", port)
+    assert port in line
+    assert "--port" in line
+
+
+def test_the_benchmark_runs_without_a_display() -> None:
+    result = subprocess.run(
+        [
+            sys.executable,
+            *["-m", "ripple_sim", "view", "sphere", "--benchmark", "--resolution", "8", "--size", "160x120"],
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    assert re.fullmatch(r"[0-9.]+ updates/s: simulation [0-9.]+ ms, drawing [0-9.]+ ms \(.+\)\n", result.stdout)
+
+
+def test_importing_ripple_sim_or_its_commands_loads_no_vtk() -> None:
+    code = (
+        "import sys, ripple_sim, ripple_sim.cli.commands\n"
+        "print(sorted({name.split('.')[0] for name in sys.modules} & {'vtkmodules', 'pyvista', 'trame'}))"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout == "[]\n"
