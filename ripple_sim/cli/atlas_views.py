@@ -91,7 +91,7 @@ class AtlasPainter:
         directions = np.einsum("ki,kij->kj", weights, self._atlas.sphere[corners])
         normals = np.einsum("ki,kij->kj", weights, self._corner_normals[triangle])
         openness = np.einsum("ki,ki->k", weights, self._openness[corners])
-        return _picture(x.shape, seen, self._lit(self._paint(directions), normals, openness, view))
+        return _picture(x.shape, seen, self._lit(self.paint(directions), normals, openness, view))
 
     def sphere(self, view: View, size: int) -> NDArray[np.float64]:
         """RGBA picture of the unit sphere that the mesh is mapped onto, [size, size, 4]."""
@@ -100,7 +100,7 @@ class AtlasPainter:
         local = np.stack([x.ravel()[seen], y.ravel()[seen]], axis=1)
         local = np.column_stack([local, np.sqrt(1 - (local**2).sum(axis=1))])
         directions = local @ view.axes
-        return _picture(x.shape, seen, self._lit(self._paint(directions), directions, np.ones(len(seen)), view))
+        return _picture(x.shape, seen, self._lit(self.paint(directions), directions, np.ones(len(seen)), view))
 
     def cross(self, size: int) -> NDArray[np.float64]:
         """RGBA picture of the six faces unfolded, [3 size, 4 size, 4]: the belt, and a face over and under it."""
@@ -115,6 +115,10 @@ class AtlasPainter:
                 row.shape, np.arange(row.size), colors
             )
         return picture
+
+    def paint(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Colours [k, 3] of the surface in directions [k, 3] from the cube's centre; override it to paint others."""
+        return self._grid(*face_coordinates(directions, self._atlas.resolution))
 
     @functools.cached_property
     def _vertices(self) -> NDArray[np.float64]:
@@ -135,9 +139,6 @@ class AtlasPainter:
     @functools.cached_property
     def _openness(self) -> NDArray[np.float64]:
         return bake(self._vertices, self._atlas.mesh.F, self._atlas.mesh.vertex_normals)[0]
-
-    def _paint(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self._grid(*face_coordinates(directions, self._atlas.resolution))
 
     def _grid(
         self, face: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
