@@ -1,9 +1,10 @@
 """Is a render that is killed again and again the same as an unbroken one? Tried on the program itself.
 
-    python examples/resume_trial.py [SCENE] [--kills 20] [--seed 0] [--output clip.mp4] [-- OPTIONS OF render]
+    python examples/resume_trial.py [SCENE] [--kills 20] [--step 1] [--output clip.mp4] [-- OPTIONS OF render]
 
-`ripple-sim render SCENE -o FILE --resume` is started and killed (SIGKILL) at random moments as often as asked, then
-left to finish, and compared byte for byte with the video of a run that was left alone.
+`ripple-sim render SCENE -o FILE --resume` is started and killed (SIGKILL) at random moments as often as asked: within
+seconds of its start, or of the next clip or picture that it has stored (the `--step`th at the latest). Then it is left
+to finish, and compared byte for byte with the video of a run that was left alone.
 """
 
 import argparse
@@ -21,6 +22,11 @@ def start(scene: str, output: Path, options: list[str]) -> subprocess.Popen:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
+def stored(path: Path) -> list[str]:
+    """Names of the clips or pictures that are whole."""
+    return sorted(file.name for file in path.with_name(f"{path.name}.part").glob("frames/[!.]*"))
+
+
 def contents(path: Path) -> dict[str, bytes]:
     files = sorted(path.iterdir()) if path.is_dir() else [path]
     return {file.name: file.read_bytes() for file in files}
@@ -30,6 +36,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Kills a render, resumes it, and compares.")
     parser.add_argument("scene", nargs="?", default="sphere")
     parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--step", type=int, default=1, help="stored clips or pictures between kills, at most")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--output", default="clip.mp4", help="name of the video; its ending chooses the format")
     arguments = sys.argv[1:]
@@ -39,24 +46,19 @@ def main() -> None:
 
     with tempfile.TemporaryDirectory() as folder:
         whole, broken = Path(folder) / "whole" / options.output, Path(folder) / "broken" / options.output
-        begun = time.perf_counter()
         process = start(options.scene, whole, passed)
         said = process.communicate()[0]
         if process.returncode:
             sys.exit(said)
-        length = time.perf_counter() - begun
-        print(f"unbroken: {length:.1f} s")
         for kill in range(options.kills):
             process = start(options.scene, broken, passed)
-            # late enough to get somewhere, early enough that the work lasts for all kills
-            time.sleep(length * chance.uniform(0.05, 0.6))
+            wanted = len(stored(broken)) + chance.randint(0, options.step)
+            while len(stored(broken)) < wanted and process.poll() is None:
+                time.sleep(0.01)
+            time.sleep(chance.uniform(0, 3))
             process.send_signal(signal.SIGKILL)
             process.communicate()
-            stored = sorted(path.name for path in broken.with_name(f"{broken.name}.part").glob("frames/[!.]*"))
-            print(
-                f"kill {kill + 1}: {'done before' if broken.exists() else f'kept up to {stored[-1:] or None}'}",
-                flush=True,
-            )
+            print(f"kill {kill + 1}: {'too late' if broken.exists() else f'kept {stored(broken)[-1:]}'}", flush=True)
         process = start(options.scene, broken, passed)
         print(process.communicate()[0].splitlines()[0])
         left = sorted(path.name for path in broken.parent.iterdir())

@@ -6,7 +6,7 @@ import re
 import tempfile
 from pathlib import Path
 
-from ripple_sim.errors import VideoError
+from ripple_sim.errors import EncodingError, VideoError
 
 MIN_SIZE, MAX_SIZE = 16, 8192
 MAX_FPS = 240
@@ -51,7 +51,9 @@ def check_output(path: str | Path, width: int, height: int, fps: int, *, transpa
     ------
     VideoError
         If the ending is unknown, the size or rate is out of range, the size is odd where the format halves its colour
-        resolution, the format keeps no transparency that is asked for, or the place cannot be written to.
+        resolution, the format keeps no transparency that is asked for, or something else stands in the place.
+    EncodingError
+        If the place cannot be written to.
     """
     path = Path(path)
     try:
@@ -62,7 +64,9 @@ def check_output(path: str | Path, width: int, height: int, fps: int, *, transpa
         _check_fps(ending, fps)
         _check_place(path, ending)
     except OSError as error:
-        raise VideoError(f"cannot write {path}: {error.strerror}; name a file in a folder you can write to") from error
+        raise EncodingError(
+            f"cannot write {path}: {error.strerror}; name a file in a folder you can write to"
+        ) from error
 
 
 def _check_size(ending: str, width: int, height: int) -> None:

@@ -199,7 +199,8 @@ class FrameWriter:
 
     def _raise_error(self) -> None:
         if self._error is not None:
-            raise EncodingError(f"cannot write the video {self.path}: {self._error}") from self._error
+            reason = getattr(self._error, "strerror", None) or self._error
+            raise EncodingError(f"cannot write the video {self.path}: {reason}") from self._error
 
     def _encode(self) -> None:
         while (frame := self._queue.get()) is not None:

@@ -104,13 +104,17 @@ def test_a_usage_error_reads_the_same_in_every_locale(encoding):
         (["-o", "x."], r"x\. ends in \.; valid is"),
         (["-o", "clip.mp4", "--size", "641x360"], "641x360.*even"),
         (["-o", "clip.gif", "--fps", "60"], "60.*1 to 50"),
-        (["-o", "/proc/clip.mp4"], "cannot write /proc/clip.mp4"),
     ],
 )
 def test_a_bad_output_is_refused_before_the_scene_is_looked_at(tmp_path, monkeypatch, capsys, command, options, said):
     monkeypatch.chdir(tmp_path)
     assert re.search(said, complaint(capsys, command, "missing", *options))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_place_that_cannot_be_written_is_a_failure_in_one_line(capsys):
+    assert cli.main(["render", "duck", "-o", "/proc/clip.mp4"]) == 1
+    assert re.fullmatch(r"ripple-sim: cannot write /proc/clip\.mp4: .*\n", capsys.readouterr().err)
 
 
 @pytest.mark.parametrize(
