@@ -8,6 +8,7 @@ from typing import Any
 from ripple_sim.cli.info import Info, collect
 
 from .accuracy import arrivals, energy_drift, sphere_modes
+from .coupling import BODIES, coupling_cost
 from .speed import cpu_speed, gl_speed
 from .table import RESOLUTIONS, steps_per_second
 
@@ -21,6 +22,7 @@ def measure(meshes: list[Path], say: Any = lambda stage: None) -> Report:
         "cpu": lambda: {str(n): cpu_speed(n) for n in (256, 512)},
         "gl": lambda: {str(n): gl_speed(n) for n in (256, 512)},
         "table": steps_per_second,
+        "coupling": coupling_cost,
         "sphere": sphere_modes,
         "energy": energy_drift,
         "arrival": lambda: arrivals(meshes),
@@ -74,6 +76,19 @@ def as_text(report: Report) -> str:
                     f"{row[f'atlas {RESOLUTIONS[-1]} [s]']:.2f} s",
                 ]
                 for count, row in report["table"].items()
+            ],
+        ),
+        _title(f"Coupling: {BODIES} bodies rain on a target that collides as its true surface, ms a step")
+        + _grid(
+            ["target", "touching", "mj_step", "coupling", "waves", "coupling over mj_step"],
+            [
+                [
+                    name,
+                    f"{row['touching']:.1f}",
+                    *(f"{1e3 * row[key]:.3f}" for key in ("mj_step [s]", "coupling [s]", "waves [s]")),
+                    _ratio(row["of mj_step"]),
+                ]
+                for name, row in report["coupling"].items()
             ],
         ),
         _title("Unit sphere, mode Y40 after one period: relative L2 error, and order by regression")

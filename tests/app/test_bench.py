@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.bench.arrival import ArrivalError
+from ripple_sim.bench.coupling import coupling_cost
 from ripple_sim.bench.report import as_text
 from ripple_sim.bench.rivals import PlainShader, SparseLeapfrog
 from ripple_sim.bench.table import POLYGONS, knobbly_body
@@ -43,8 +44,15 @@ def test_bodies_have_the_polygons_they_are_asked_for(count: int) -> None:
     assert len(knobbly_body(count).F) == count
 
 
+def test_coupling_is_measured_on_bodies_that_touch() -> None:
+    row = coupling_cost(["dish"], seconds=0.7, bodies=3, resolution=16)["dish"]
+    assert row["touching"] > 0
+    assert row["of mj_step"] == pytest.approx(row["coupling [s]"] / row["mj_step [s]"])
+
+
 def test_report_reads_as_text() -> None:
     sphere = {"16": 0.1, "32": 0.03, "order": 1.9}
+    cost = {"touching": 3.2, "mj_step [s]": 2e-3, "coupling [s]": 3e-4, "waves [s]": 2e-4, "of mj_step": 0.15}
     row = {f"steps/s {n}": 1234.5 for n in (20, 28, 40, 56, 128, 256, 512)}
     text = as_text(
         {
@@ -52,10 +60,11 @@ def test_report_reads_as_text() -> None:
             "cpu": {"256": {"cpu": 3e8, "copy": 4e8, "scipy": 3e7, "of copy": 0.75, "over scipy": 10.0}},
             "gl": {"256": None},
             "table": {"2700": row | {"sphere map [s]": 0.1, "atlas 512 [s]": 1.0}},
+            "coupling": {"dish": cost},
             "sphere": {"fem": sphere, "paper": {"16": 0.1, "order": 0.0}},
             "energy": {"steps": 10_000, "largest": 1e-7, "trend": -2e-8},
             "arrival": {"cat": {"fem": dataclasses.asdict(ArrivalError(0.004, 0.01, 0.99, 0.01, 0.02, 0.95))}},
         }
     )
-    for piece in ("0.75", "1,234", "1.0e-07", "0.40 %", "paper"):
+    for piece in ("0.75", "0.300", "1,234", "1.0e-07", "0.40 %", "paper"):
         assert piece in text
