@@ -92,6 +92,8 @@ class FrameSource:
         [pixels].
     supersample : int
         The picture is drawn so many times as wide and high, and averaged in linear light.
+    transparent : bool
+        Frames have a fourth channel, their opacity: the background is left out.
     annotate : callable, optional
         What the surfaces are to be drawn as.
     gl : GLContext, optional
@@ -105,6 +107,7 @@ class FrameSource:
         width: int,
         height: int,
         supersample: int = 1,
+        transparent: bool = False,
         annotate: Callable[[Surface], Surface] = lambda surface: surface,
         gl: GLContext | None = None,
     ) -> None:
@@ -125,11 +128,16 @@ class FrameSource:
             surfaces[self._geoms[entry.geom]] = annotate(surface)
         gl = gl if gl is not None else shared_context()
         self.renderer = Renderer(
-            gl, simulation.model, surfaces, width=supersample * width, height=supersample * height
+            gl,
+            simulation.model,
+            surfaces,
+            width=supersample * width,
+            height=supersample * height,
+            alpha=transparent,
         )
 
     def draw(self, state: Snapshot) -> NDArray[np.uint8]:
-        """Draw a snapshot, uint8 [height, width, 3]."""
+        """Draw a snapshot, uint8 [height, width, 3], or 4 if it is transparent."""
         sim = self._simulation
         reliefs = {self._geoms[name]: relief for name, relief in state.reliefs.items()}
         return shrink(self.renderer.render(state.data, reliefs, self.camera(state)), self._supersample)
