@@ -64,6 +64,7 @@ def render_video(
     duration: float | None = None,
     slow_motion: float = 1.0,
     supersample: int = 1,
+    transparent: bool = False,
     overlay: Sequence[str] | None = None,
     compare: str | None = None,
     resolution: int | None = None,
@@ -92,6 +93,8 @@ def render_video(
         Seconds of video for a second of the scene.
     supersample : int
         Frames are drawn so many times as wide and high, and averaged.
+    transparent : bool
+        Leave the background out, for .webp and PNG frames, without overlays.
     overlay : sequence of str, optional
         What is drawn over the picture, instead of what the scene says; see `parse_request`.
     compare : str, optional
@@ -114,9 +117,11 @@ def render_video(
     # MuJoCo would write its warnings to a file in the current folder; `Simulation` reports those that matter
     mujoco.set_mju_user_warning(lambda message: None)
     output, (width, height) = Path(output), size
-    check_output(output, width, height, fps)
+    check_output(output, width, height, fps, transparent=transparent)
     overlay, operators = scene.overlay if overlay is None else overlay, compared_operators(compare)
     request = parse_request(overlay)
+    if transparent and (request or len(operators) > 1):
+        raise SceneError("overlays and comparisons have no transparent background; leave out the one or the other")
     count = _frame_count(scene.duration if duration is None else duration, fps, slow_motion)
     gl = shared_context()
     job = {
@@ -125,6 +130,7 @@ def render_video(
         "the number of frames": count,
         "the slow motion": slow_motion,
         "the supersampling": supersample,
+        "transparency": transparent,
         "the overlays": ",".join(overlay),
         "the operators": ",".join(operators),
         "the resolution": resolution or "the scene's",
@@ -132,7 +138,9 @@ def render_video(
         **provenance(scene, gl),
     }
     render_seconds = 0.0
-    with open_writer(output, width=width, height=height, fps=fps, job=job, resume=resume) as writer:
+    with open_writer(
+        output, width=width, height=height, fps=fps, transparent=transparent, job=job, resume=resume
+    ) as writer:
         resumed_at = writer.frames
         rate = fps * slow_motion
         simulations = [
@@ -148,6 +156,7 @@ def render_video(
             rate=rate,
             operators=operators,
             supersample=supersample,
+            transparent=transparent,
             gl=gl,
         )
         ready = time.perf_counter()

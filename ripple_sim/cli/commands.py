@@ -51,6 +51,8 @@ class _Video:
     """Seconds of video for a second of the scene: 4 is four times slower."""
     supersample: Supersample = 1
     """Draw frames so many times as wide and high, and average: finer edges and highlights."""
+    transparent: bool = False
+    """Leave the background out (.webp and PNG frames)."""
     overlay: Overlay = None
     """Draw over the picture: height or velocity in colours, contacts, grid, time, energy; such as
     height,contacts,time or velocity=0.5,energy, where 0.5 m/s is the end of the colours."""
@@ -82,7 +84,7 @@ class _Video:
             parse_request(self.overlay)
         compared_operators(self.compare)
         fps = self.fps or default_fps(self.output)
-        check_output(self.output, *self.size, fps)
+        check_output(self.output, *self.size, fps, transparent=self.transparent)
 
         from ..job import render_video
         from ..solver.gl import select_device, shared_context
@@ -105,6 +107,7 @@ class _Video:
                 duration=self.duration,
                 slow_motion=self.slow_motion,
                 supersample=self.supersample,
+                transparent=self.transparent,
                 overlay=self.overlay,
                 compare=self.compare,
                 resolution=self.resolution,

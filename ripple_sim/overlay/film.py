@@ -59,8 +59,8 @@ class Film:
         Frames in a second of the scene's time.
     operators : sequence of str
         Those of the runs, for their titles where there are two.
-    supersample : int
-        As for `FrameSource`.
+    supersample, transparent
+        As for `FrameSource`; nothing is drawn over transparent frames.
     gl : GLContext, optional
         By default the process's shared one.
     """
@@ -76,6 +76,7 @@ class Film:
         rate: float,
         operators: Sequence[str] = (),
         supersample: int = 1,
+        transparent: bool = False,
         gl: GLContext | None = None,
     ) -> None:
         self.simulations, self._request, self._frames = simulations, request, frames
@@ -88,6 +89,7 @@ class Film:
                 width=right - left,
                 height=height,
                 supersample=supersample,
+                transparent=transparent,
                 annotate=self._annotated,
                 gl=gl,
             )
