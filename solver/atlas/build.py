@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import hashlib
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -18,9 +19,11 @@ from ..errors import AtlasError
 from ..mesh.mesh import Mesh
 from ..sphere_map import conformal_sphere_map, progressive_sphere_map
 from .atlas import Atlas
-from .atlas_file import content_digest, load_atlas, save_atlas
+from .atlas_file import FORMAT, load_atlas, save_atlas
 from .cubemap import check_resolution, texel_directions
 from .rays import cast_rays
+
+STRIDE = 16  # texels from one that is found by a ray to the next
 
 SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {
     "progressive": progressive_sphere_map,
@@ -72,8 +75,10 @@ def build_atlas(mesh: Mesh, resolution: int = 128, method: str = "progressive", 
 
 def _cache_path(mesh: Mesh, method: str) -> Path:
     """One file a mesh and method: the sphere map does not depend on the resolution, and rays are quick."""
-    key = hashlib.sha256(f"{method} {content_digest({'V': mesh.V, 'F': mesh.F})}".encode()).hexdigest()[:32]
-    return Path(platformdirs.user_cache_dir("ripple-sim")) / f"{key}.npz"
+    key = hashlib.sha256(f"{FORMAT} {method} {mesh.V.shape} {mesh.F.shape}".encode())
+    key.update(np.ascontiguousarray(mesh.V))
+    key.update(np.ascontiguousarray(mesh.F))
+    return Path(platformdirs.user_cache_dir("ripple-sim")) / f"{key.hexdigest()[:32]}.npz"
 
 
 def _read_cache(path: Path, mesh: Mesh) -> Atlas | None:
@@ -90,7 +95,9 @@ def _read_cache(path: Path, mesh: Mesh) -> Atlas | None:
 def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: int) -> Atlas:
     """Atlas of a mesh for a given fold-free sphere map [vertex_count, 3] (unit vectors)."""
     directions = texel_directions(check_resolution(resolution))
-    triangles, barycentrics = cast_rays(sphere, mesh.F, directions.reshape(-1, 3))
+    # few texels lie far apart; else a divisor of the resolution, so that every row of texels begins with a ray
+    stride = math.gcd(resolution, STRIDE) if directions.size > 3 * len(mesh.F) else 1
+    triangles, barycentrics = cast_rays(sphere, mesh.F, directions.reshape(-1, 3), stride)
     positions, normals = np.empty((len(triangles), 3)), np.empty((len(triangles), 3))
     _interpolate(mesh.V, mesh.vertex_normals, mesh.F, triangles, barycentrics, positions, normals)
     shape = directions.shape[:3]

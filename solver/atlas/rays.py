@@ -13,11 +13,11 @@ from ..errors import AtlasError
 
 
 def cast_rays(
-    sphere: NDArray[np.float64], F: NDArray[np.int64], directions: NDArray[np.float64]
+    sphere: NDArray[np.float64], F: NDArray[np.int64], directions: NDArray[np.float64], stride: int = 1
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Intersect rays from the origin with the sphere-mapped mesh.
 
-    Embree finds the triangle in float32; the barycentrics are computed again in float64, which also moves a hit to the
+    Embree finds triangles in float32; the barycentrics are computed again in float64, which also moves a hit to the
     neighbouring triangle where float32 chose wrongly and recovers rays that slipped between two triangles.
 
     Parameters
@@ -27,6 +27,9 @@ def cast_rays(
     F : [face_count, 3]
     directions : [k, 3]
         Ray directions.
+    stride : int
+        Embree casts only one ray of so many. Those after it, which should be close by, walk on from its triangle to
+        their own: a texel is mostly in the triangle of the one before it, or next to that.
 
     Returns
     -------
@@ -41,8 +44,9 @@ def cast_rays(
     """
     scene = rtcore_scene.EmbreeScene()
     TriangleMesh(scene, sphere.astype(np.float32), F.astype(np.int32))
-    origins = np.zeros((len(directions), 3), dtype=np.float32)
-    hits = scene.run(origins, directions.astype(np.float32), output=1)["primID"].astype(np.int64)
+    seeds = directions[::stride].astype(np.float32)
+    hits = np.full(len(directions), -1, dtype=np.int64)
+    hits[::stride] = scene.run(np.zeros_like(seeds), seeds, output=1)["primID"]
     neighbours, _ = igl.triangle_triangle_adjacency(F)
     barycentrics = np.empty((len(directions), 3))
     lost = _settle(sphere, F, neighbours.astype(np.int64), directions, hits, barycentrics)

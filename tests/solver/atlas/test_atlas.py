@@ -9,9 +9,14 @@ import pytest
 import trimesh
 
 from ripple_sim.solver import Atlas, AtlasError, Mesh, SphereAtlas, build_atlas, load_atlas, sphere_atlas
+from ripple_sim.solver.atlas.atlas_file import FORMAT
 from ripple_sim.solver.atlas.cubemap import texel_directions
 from ripple_sim.solver.atlas.exhaustive_rays import cast_rays_exhaustively
 from ripple_sim.solver.atlas.rays import cast_rays
+
+
+def surface_points(atlas: Atlas, triangles: np.ndarray, barycentrics: np.ndarray) -> np.ndarray:
+    return np.einsum("ij,ijk->ik", barycentrics, atlas.mesh.V[atlas.mesh.F[triangles]])
 
 
 def test_rays_agree_with_every_ray_against_every_triangle(animal: Atlas) -> None:
@@ -24,13 +29,24 @@ def test_rays_agree_with_every_ray_against_every_triangle(animal: Atlas) -> None
     assert differ.mean() < 0.05
     assert np.abs(weights[differ].min(axis=1)).max(initial=0) < 1e-9
     np.testing.assert_allclose(barycentrics[~differ], weights[~differ], atol=1e-9)
-    points, others = (
-        np.einsum("ij,ijk->ik", w, animal.mesh.V[animal.mesh.F[t]])
-        for t, w in ((triangles, barycentrics), (expected, weights))
-    )
+    points, others = surface_points(animal, triangles, barycentrics), surface_points(animal, expected, weights)
     np.testing.assert_allclose(points, others, atol=1e-9)
     assert (barycentrics >= 0).all()
     np.testing.assert_allclose(barycentrics.sum(axis=1), 1)
+
+
+def test_rays_that_walk_on_from_their_neighbours_hit_the_same(animal: Atlas) -> None:
+    n = 48
+    directions = texel_directions(n).reshape(-1, 3)
+    triangles, barycentrics = cast_rays(animal.sphere, animal.mesh.F, directions)
+    for stride in (3, 16, len(directions)):
+        walked, weights = cast_rays(animal.sphere, animal.mesh.F, directions, stride)
+        inside = barycentrics.min(axis=1) > 0
+        np.testing.assert_array_equal(walked[inside], triangles[inside])
+        np.testing.assert_array_equal(weights[inside], barycentrics[inside])
+        assert inside.mean() > 0.9
+        points, others = surface_points(animal, walked, weights), surface_points(animal, triangles, barycentrics)
+        np.testing.assert_allclose(points, others, atol=1e-12)
 
 
 @pytest.mark.parametrize("what", ["cube edges and corners", "edges and vertices of the mesh", "anywhere"])
@@ -109,6 +125,16 @@ def test_damaged_files_are_refused(tmp_path: Path) -> None:
         path.write_bytes(damaged)
         with pytest.raises(AtlasError, match="make it again"):
             load_atlas(path)
+    np.savez(path, V=np.zeros((3, 3)), format=np.array([FORMAT]))
+    with pytest.raises(AtlasError, match="no atlas or of another version"):
+        load_atlas(path)
+
+
+def test_files_of_another_version_are_refused(animal: Atlas, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    animal.save(tmp_path / "atlas.npz")
+    monkeypatch.setattr("ripple_sim.solver.atlas.atlas_file.FORMAT", FORMAT + 1)
+    with pytest.raises(AtlasError, match="another version"):
+        load_atlas(tmp_path / "atlas.npz")
     with pytest.raises(AtlasError, match="does not exist"):
         load_atlas(tmp_path / "missing.npz")
 
@@ -123,11 +149,16 @@ def test_cache_is_used_verified_and_rebuilt(ball_mesh: Mesh, tmp_path: Path, mon
     finer = build_atlas(ball_mesh, 12)
     np.testing.assert_array_equal(finer.sphere, first.sphere)
     [file] = (tmp_path / "ripple-sim").iterdir()
-    file.write_bytes(file.read_bytes()[:500])
-    rebuilt = build_atlas(ball_mesh, 8)
-    assert "cache" not in rebuilt.timings
-    np.testing.assert_array_equal(first.positions, rebuilt.positions)
-    assert "cache" in build_atlas(ball_mesh, 8).timings
+    whole = file.read_bytes()
+    build_atlas(Mesh(2 * ball_mesh.V, ball_mesh.F), 8)
+    [other] = set((tmp_path / "ripple-sim").iterdir()) - {file}
+    middle = len(whole) // 2
+    for spoilt in (whole[:500], whole[:middle] + bytes([whole[middle] ^ 16]) + whole[middle + 1 :], other.read_bytes()):
+        file.write_bytes(spoilt)
+        rebuilt = build_atlas(ball_mesh, 8)
+        assert "cache" not in rebuilt.timings
+        np.testing.assert_array_equal(first.positions, rebuilt.positions)
+        assert "cache" in build_atlas(ball_mesh, 8).timings
 
 
 def test_unwritable_cache_only_costs_time(ball_mesh: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
