@@ -11,6 +11,8 @@ from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.waves.backend import auto_backend
 
+from .headless import find_problems
+
 PACKAGES = (
     "ripple-sim",
     "mujoco",
@@ -23,11 +25,6 @@ PACKAGES = (
     "moderngl",
     "av",
     "pyvista",
-)
-
-_SOFTWARE_ADVICE = (
-    "OpenGL runs in software, on the processor. Where there is a GPU, install its driver's EGL library "
-    "(for NVIDIA the package libnvidia-gl of the driver's version) to render faster."
 )
 
 
@@ -57,7 +54,7 @@ class Info:
     backend : str
         The wave solver that "auto" takes: "gl" or "cpu".
     advice : str
-        What would make rendering work, or work faster; "" if there is nothing to do.
+        What keeps rendering from working, or from working faster, and what to do, a line each; "" if there is nothing.
     """
 
     versions: dict[str, str | None]
@@ -70,21 +67,21 @@ class Info:
 
 def collect() -> Info:
     """Look at this machine. It never fails for want of OpenGL."""
-    opengl, advice = None, ""
+    opengl, failure = None, ""
     try:
         context = shared_context()
     except GLError as error:
-        advice = str(error)
+        failure = str(error)
     else:
         opengl = OpenGL(context.renderer, context.vendor, context.version, context.software)
-        advice = _SOFTWARE_ADVICE if context.software else ""
+    findings = find_problems(opengl.software if opengl else None)
     return Info(
         versions={"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
         system=platform.platform(),
         processors=os.cpu_count() or 1,
         opengl=opengl,
         backend=auto_backend(),
-        advice=advice,
+        advice="\n".join(map(str, findings)) or failure,
     )
 
 

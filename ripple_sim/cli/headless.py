@@ -1,0 +1,159 @@
+"""Why OpenGL does not run headless, or not on the GPU: the commonest reasons on Linux, each with its fix.
+
+An OpenGL program without a window goes through libEGL.so.1 (of libglvnd), which reads the vendor files: small JSON
+files that name each driver's own EGL library. Mesa's driver then opens a render node, /dev/dri/renderD*; NVIDIA's
+opens /dev/nvidia*.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import grp
+import json
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+_VENDOR_FOLDERS = ("/etc/glvnd/egl_vendor.d", "/usr/share/glvnd/egl_vendor.d")
+_LIBRARIES = {"libEGL.so.1": "libegl1", "libGL.so.1": "libgl1"}
+_NVIDIA_VERSION = Path("/proc/driver/nvidia/version")
+_CONTAINER = "in a container, start that with NVIDIA_DRIVER_CAPABILITIES=all"
+
+
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """What is wrong, and what to do about it."""
+
+    problem: str
+    fix: str
+
+    def __str__(self) -> str:
+        return f"{self.problem}: {self.fix}"
+
+
+def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[Finding]:
+    """Look for what keeps OpenGL from the GPU, or from running at all.
+
+    Parameters
+    ----------
+    software : bool or None
+        Whether OpenGL runs, but on the processor; None if it does not run.
+    devices : Path
+        Folder of the device files.
+
+    Returns
+    -------
+    list of Finding
+        The likeliest cause first; empty if OpenGL runs on a GPU, or none of the known causes is found.
+    """
+    if software is False:
+        return []
+    if software is None:
+        # where a library is missing, the rest follows from that
+        return list(_library_problems()) or list(_vendor_problems()) or list(_device_problems(devices))
+    found = [*_device_problems(devices), *_nvidia_problems(devices)]
+    if found or any(_gpus(devices)):
+        return found
+    return [
+        Finding(
+            f"OpenGL runs in software, on the processor: there is no GPU ({devices}/dri/renderD* or {devices}/nvidia*)",
+            "nothing to mend; on a machine with a GPU rendering is faster (in a container, pass it on with "
+            "--device /dev/dri or --gpus all)",
+        )
+    ]
+
+
+def _library_problems() -> Iterator[Finding]:
+    for library, package in _LIBRARIES.items():
+        try:
+            ctypes.CDLL(library)
+        except OSError as error:
+            missing = "No such file" in str(error)
+            yield Finding(
+                f"the library {library} is missing" if missing else f"the library {library} cannot be loaded ({error})",
+                f"apt-get install {package}" if missing else f"apt-get install --reinstall {package}",
+            )
+
+
+def _vendor_problems() -> Iterator[Finding]:
+    files, where = _vendor_files()
+    if not files:
+        yield Finding(
+            f"there is no EGL vendor file (*.json) in {where}",
+            "apt-get install libegl-mesa0 libgl1-mesa-dri; for an NVIDIA GPU install libnvidia-gl of the driver's "
+            f"version, or, {_CONTAINER}",
+        )
+    for file in files:
+        library = _library_of(file)
+        if library is None:
+            yield Finding(f"the EGL vendor file {file} is damaged", f"install anew what it belongs to: dpkg -S {file}")
+            continue
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            nvidia = "nvidia" in library
+            yield Finding(
+                f"the EGL vendor file {file} names {library}, which cannot be loaded",
+                _install_nvidia() if nvidia else "apt-get install --reinstall libegl-mesa0 libgl1-mesa-dri",
+            )
+
+
+def _device_problems(devices: Path) -> Iterator[Finding]:
+    for node in _render_nodes(devices):
+        if not os.access(node, os.R_OK | os.W_OK, effective_ids=True):
+            group = _group_of(node)
+            yield Finding(
+                f"this user may not use the GPU's render node {node}",
+                f"sudo usermod -aG {group} $USER, then log in anew (in a container: --group-add {group})",
+            )
+
+
+def _nvidia_problems(devices: Path) -> Iterator[Finding]:
+    """An NVIDIA driver in the kernel without its EGL library beside it."""
+    if (devices / "nvidia0").exists() and not any("nvidia" in (_library_of(f) or "") for f in _vendor_files()[0]):
+        yield Finding(
+            "there is an NVIDIA GPU, but no EGL vendor file of its driver, so that OpenGL runs in software",
+            _install_nvidia(),
+        )
+
+
+def _install_nvidia() -> str:
+    version = re.search(r"\b(\d{3})\.\d+", _NVIDIA_VERSION.read_text()) if _NVIDIA_VERSION.exists() else None
+    package = f"libnvidia-gl-{version[1]}" if version else "libnvidia-gl-NNN, with NNN the driver's version"
+    return f"apt-get install {package}; {_CONTAINER}"
+
+
+def _vendor_files() -> tuple[list[Path], str]:
+    """The vendor files that libglvnd reads, and where it looks for them."""
+    names = os.environ.get("__EGL_VENDOR_LIBRARY_FILENAMES")
+    if names:
+        return [Path(name) for name in names.split(":")], f"__EGL_VENDOR_LIBRARY_FILENAMES={names}"
+    folders = os.environ.get("__EGL_VENDOR_LIBRARY_DIRS")
+    places = folders.split(":") if folders else list(_VENDOR_FOLDERS)
+    return sorted(file for place in places for file in Path(place).glob("*.json")), " or ".join(places)
+
+
+def _library_of(file: Path) -> str | None:
+    """Library that a vendor file names; None if it cannot be read."""
+    try:
+        return str(json.loads(file.read_text())["ICD"]["library_path"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _render_nodes(devices: Path) -> list[Path]:
+    return sorted((devices / "dri").glob("renderD*"))
+
+
+def _gpus(devices: Path) -> list[Path]:
+    return [*_render_nodes(devices), *devices.glob("nvidia[0-9]*")]
+
+
+def _group_of(path: Path) -> str:
+    number = path.stat().st_gid
+    try:
+        return grp.getgrgid(number).gr_name
+    except KeyError:
+        return str(number)
