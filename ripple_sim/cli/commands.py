@@ -28,6 +28,7 @@ from .arguments import (
     Supersample,
     UpAxis,
 )
+from .completion_command import Completion
 from .view_command import View
 
 if TYPE_CHECKING:
@@ -249,6 +250,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "info": Info,
     "bench": Bench,
     "view": View,
+    "completion": Completion,
 }
 
 

@@ -1,0 +1,57 @@
+"""The completion script, in a real shell."""
+
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from ripple_sim.cli import main as cli
+
+
+def completed(line: str) -> set[str]:
+    """What bash offers for the last word of a line."""
+    script = subprocess.run(
+        [sys.executable, "-m", "ripple_sim", "completion", "bash"], capture_output=True, text=True, check=True
+    ).stdout
+    words = line.split(" ")
+    quoted = " ".join(f"'{word}'" for word in words)
+    # the script says itself which function completes the program's name
+    trial = f"""{script}
+set -- $(complete -p ripple-sim)
+while [ "$1" != -F ]; do shift; done
+COMP_WORDS=({quoted}); COMP_CWORD={len(words) - 1}; COMP_LINE='{line}'; COMP_POINT={len(line)}
+"$2" ripple-sim '{words[-1]}' '{words[-2]}'
+printf '%s\\n' "${{COMPREPLY[@]}}"
+"""
+    result = subprocess.run(["bash", "--norc", "-c", trial], capture_output=True, text=True, check=True)
+    return {word.strip() for word in result.stdout.split()}
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("ripple-sim re", {"render"}),
+        ("ripple-sim vi", {"view"}),
+        ("ripple-sim render --dur", {"--duration"}),
+        ("ripple-sim view --bench", {"--benchmark"}),
+        ("ripple-sim render --backend c", {"cpu"}),
+    ],
+)
+def test_bash_completes_commands_options_and_choices(line: str, offered: set[str]) -> None:
+    assert completed(line) == offered
+
+
+@pytest.mark.parametrize("shell", ["zsh", "tcsh"])
+def test_other_shells_get_a_script(capsys: pytest.CaptureFixture[str], shell: str) -> None:
+    assert cli.main(["completion", shell]) == 0
+    out, err = capsys.readouterr()
+    assert "ripple-sim" in out
+    assert "render" in out
+    assert err == ""
+
+
+def test_an_unknown_shell_is_bad_input(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["completion", "fish"]) == 2
+    assert "bash" in capsys.readouterr().err
