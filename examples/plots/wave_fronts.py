@@ -1,0 +1,117 @@
+"""Do wave fronts follow the geodesic circles? Iso-lines of when a bump's wave arrives, over the surface.
+
+    python examples/plots/wave_fronts.py [MESH] [--resolution 96] [--up y|z]
+
+writes out/plots/wave_fronts.png. The dark lines are the measured fronts at equal times, the wide pale bands the circles
+of exact geodesic distance that they should run along; colour tells where a front is ahead or behind.
+"""
+
+import argparse
+from pathlib import Path
+
+import igl
+import numpy as np
+from figure import FAINT, FOLDER, NAMES, TEXT, save, sheet
+from matplotlib.colors import ListedColormap
+
+from ripple_sim.bench.arrival import NEAREST, arrival_times, ideal_width, plane_arrival
+from ripple_sim.cli.atlas_views import AtlasPainter, View
+from ripple_sim.orientation import usual_up
+from ripple_sim.overlay.colormap import color_table, colors
+from ripple_sim.solver import Atlas, build_atlas, load_mesh
+from ripple_sim.solver.atlas.cubemap import texel_directions
+from ripple_sim.solver.atlas.sampling import sampling_matrix
+
+MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
+VIEW = {"azimuth": 38.0, "elevation": 24.0}
+LIMIT = 0.25  # relative error at the ends of the colours
+CIRCLES = 12  # from the source to the farthest point
+BAND, LINE, INK = np.array([1.0, 0.82, 0.36]), 0.045, np.array([0.07, 0.09, 0.14])
+
+
+class FrontPainter(AtlasPainter):
+    """Paints the fronts: fields on the texels of the distance that they should have gone, and that they have gone."""
+
+    def __init__(self, atlas: Atlas, distance: np.ndarray, gone: np.ndarray, spacing: float, nearest: float) -> None:
+        super().__init__(atlas, np.ones((*distance.shape, 3)))
+        self._fields = np.stack([distance.ravel(), gone.ravel()], axis=1)
+        self._resolution, self._spacing, self._nearest = atlas.resolution, spacing, nearest
+
+    def paint(self, directions: np.ndarray) -> np.ndarray:
+        distance, gone = (sampling_matrix(directions, self._resolution) @ self._fields).T
+        far = distance > self._nearest
+        painted = colors(np.where(far, gone / np.maximum(distance, 1e-9) - 1, 0), LIMIT) / 255
+        # the gradient of a distance is 1: lines between two of its values have one width
+        circle, front = (np.abs((d / self._spacing + 0.5) % 1 - 0.5) for d in (distance, gone))
+        for near, ink, strength in ((circle < 2.4 * LINE, BAND, 0.85), (front < LINE, INK, 0.9)):
+            weight = (near & far)[:, None] * strength
+            painted = painted * (1 - weight) + ink * weight
+        painted[distance < 0.18 * self._spacing] = INK  # the source
+        return painted
+
+
+def fields(atlas: Atlas, source: int, operator: str) -> tuple[np.ndarray, np.ndarray]:
+    """Exact geodesic distance of the texels from a vertex, and the distance that the wave's front had gone."""
+    mesh = atlas.mesh
+    vertices, none = np.arange(len(mesh.V)), np.empty(0, dtype=np.int64)
+    exact = igl.exact_geodesic(mesh.V, mesh.F, np.array([source]), none, vertices, none)
+    distance = (exact[mesh.F[atlas.triangles]] * atlas.barycentrics).sum(axis=-1)
+    width = ideal_width(atlas)
+    probes = texel_directions(atlas.resolution).reshape(-1, 3)
+    front, _ = arrival_times(atlas, mesh.V[source], probes, width, float(distance.max()), operator)
+    # a front on the plane is a little behind its distance: read off where it would be by now
+    grid = np.linspace(NEAREST - 1, distance.max() / width * 1.3, 400)
+    gone = np.interp(front / width, plane_arrival(grid)[0], grid) * width
+    return distance, np.where(np.isfinite(gone), gone, 0.0).reshape(distance.shape)
+
+
+def make(folder: Path, mesh: Path = MESH, resolution: int = 96, up: str = "z", size: int = 620) -> Path:
+    atlas = build_atlas(load_mesh(mesh), resolution)
+    view = View(**VIEW, up=up)
+    source = int(np.argmax(atlas.mesh.V @ (view.axes[2] + 0.9 * view.axes[1] + 0.2 * view.axes[0])))
+    figure = sheet(
+        16.0,
+        5.6,
+        "Wave fronts and geodesic circles",
+        f"{mesh.stem}, 6 x {resolution} x {resolution} texels; fronts at equal times (dark) over circles of exact "
+        "geodesic distance (yellow), from the black point",
+    )
+    nearest = NEAREST * ideal_width(atlas)
+    for column, operator in enumerate(NAMES):
+        distance, gone = fields(atlas, source, operator)
+        painter = FrontPainter(atlas, distance, gone, float(distance.max()) / CIRCLES, nearest)
+        left = 0.012 + 0.232 * column
+        axes = figure.add_axes((left, 0.10, 0.225, 0.74))
+        axes.imshow(painter.mesh(view, size), interpolation="antialiased")
+        axes.set_axis_off()
+        error = np.abs(gone / distance - 1)[distance > nearest]
+        figure.text(left + 0.112, 0.085, NAMES[operator], fontsize=13, fontweight="bold", color=TEXT, ha="center")
+        figure.text(
+            left + 0.112, 0.04, f"median error {100 * np.median(error):.2f} %", fontsize=10.5, color=FAINT, ha="center"
+        )
+    bar = figure.add_axes((0.951, 0.2, 0.009, 0.52))
+    bar.imshow(np.linspace(1, 0, 256)[:, None], cmap=ListedColormap(color_table() / 255), aspect="auto")
+    bar.set_xticks([])
+    ends = f"{100 * LIMIT:g} %"
+    bar.set_yticks([0, 127.5, 255], [f"+{ends}", "0", f"\N{MINUS SIGN}{ends}"], fontsize=9.5, color=TEXT)
+    bar.yaxis.tick_right()
+    bar.tick_params(length=0)
+    bar.set_title("ahead", fontsize=9.5, color=FAINT)
+    bar.set_xlabel("behind", fontsize=9.5, color=FAINT)
+    for spine in bar.spines.values():
+        spine.set_visible(False)
+    return save(figure, folder, "wave_fronts")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Wave fronts over a surface, and the circles they should follow.")
+    parser.add_argument("mesh", type=Path, nargs="?", default=MESH)
+    parser.add_argument("--resolution", type=int, default=96)
+    parser.add_argument("--up", choices=("y", "z"), help="axis of the mesh that points up")
+    options = parser.parse_args()
+    up = options.up or ("z" if options.mesh == MESH else usual_up(options.mesh))
+    print(make(FOLDER, options.mesh, options.resolution, up))
+
+
+if __name__ == "__main__":
+    main()
