@@ -12,8 +12,8 @@ from tyro.conf import Positional, arg
 class Completion:
     """Print a script by which a shell completes commands and options: source <(ripple-sim completion bash)."""
 
-    shell: Annotated[Positional[Literal["bash", "zsh", "tcsh"]], arg(metavar="SHELL")]
-    """Which shell: bash, zsh or tcsh."""
+    shell: Annotated[Positional[Literal["bash", "zsh"]], arg(metavar="SHELL")]
+    """Which shell: bash or zsh."""
 
     def run(self) -> None:
         """Print the script, which tyro makes from the commands themselves."""

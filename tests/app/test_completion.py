@@ -43,11 +43,10 @@ def test_bash_completes_commands_options_and_choices(line: str, offered: set[str
     assert completed(line) == offered
 
 
-@pytest.mark.parametrize("shell", ["zsh", "tcsh"])
-def test_other_shells_get_a_script(capsys: pytest.CaptureFixture[str], shell: str) -> None:
-    assert cli.main(["completion", shell]) == 0
+def test_zsh_gets_a_script_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["completion", "zsh"]) == 0
     out, err = capsys.readouterr()
-    assert "ripple-sim" in out
+    assert out.startswith("#compdef ripple-sim")
     assert "render" in out
     assert err == ""
 
