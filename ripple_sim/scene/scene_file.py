@@ -2,75 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from ripple_sim.solver import Material
-
 from ..errors import SceneError
 from .events import ChangeEntry, ControlEntry, MaterialChange, PokeEntry
+from .material_entry import MapEntry, MaterialEntry, PresetEntry
 from .motion import DropEntry, PlaceEntry, ThrowEntry, Vector
 from .randomize import RandomEntry
 
 Color = tuple[float, float, float]
-
-
-class MapEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """A coefficient from a picture in the mesh's own texture coordinates, see `texture_map`.
-
-    `map` is the picture's path, relative to the scene file; black stands for `low`, white for `high`.
-    """
-
-    map: str
-    low: float = 0.0
-    high: float = 1.0
-    channel: str = "luminance"
-
-
-Coefficient = float | str | MapEntry
-
-
-class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[ripple.material]`: the wave equation's coefficients, see `Material`.
-
-    Units: speed [m/s], damping [1/s], stiffness [1/s^2], viscosity [m^2/s], density [kg/m^2], bending [m^4/s^2],
-    yield_height [m]. Each is a number, the path of a picture, or a table {map = ..., low = ..., high = ...}.
-    """
-
-    speed: Coefficient = 1.0
-    damping: Coefficient = 0.0
-    stiffness: Coefficient = 0.0
-    viscosity: Coefficient = 0.0
-    density: Coefficient = 1.0
-    bending: Coefficient = 0.0
-    yield_height: Coefficient = math.inf
-
-    def material(self) -> Material:
-        """The solver's material; where a coefficient is a map, with its value for white."""
-        maps = self.maps()
-        return Material(
-            **{name: maps[name].high if name in maps else value for name, value in msgspec.structs.asdict(self).items()}
-        )
-
-    def maps(self) -> dict[str, MapEntry]:
-        """The coefficients that are maps."""
-        return {
-            name: value if isinstance(value, MapEntry) else MapEntry(value)
-            for name, value in msgspec.structs.asdict(self).items()
-            if isinstance(value, str | MapEntry)
-        }
-
-    def located(self, folder: Path) -> MaterialEntry:
-        """The same with the pictures' paths made relative to a folder."""
-        return msgspec.structs.replace(
-            self,
-            **{
-                name: msgspec.structs.replace(entry, map=str(folder / entry.map)) for name, entry in self.maps().items()
-            },
-        )
 
 
 class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -162,6 +104,7 @@ _TABLES: dict[str, type[msgspec.Struct]] = {
     "ripple": RippleEntry,
     "ripple.material": MaterialEntry,
     **{f"ripple.material.{field.name}": MapEntry for field in msgspec.structs.fields(MaterialEntry)},
+    "ripple.material.preset": PresetEntry,
     "ripple.still": StillEntry,
     "camera": CameraEntry,
     "drop": DropEntry,
