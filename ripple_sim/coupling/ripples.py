@@ -107,6 +107,7 @@ class Ripples:
         """
         elapsed = self._elapsed(data)
         if elapsed == 0:
+            self.last_impulses = []
             return
         self._check_speeds(data)
         loads = self._sources.loads(data, elapsed)
@@ -137,7 +138,7 @@ class Ripples:
         SceneError
             For an unknown geom.
         SolverError
-            For an invalid coefficient.
+            For an unknown or invalid coefficient.
         """
         self._surface(name).change_material(**coefficients)
         self._renew(name)

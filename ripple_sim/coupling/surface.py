@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver import Material, WaveSolver
+from ripple_sim.solver import Material, SolverError, WaveSolver
 from ripple_sim.solver.waves.footprint import footprint
 
 from .target import target_atlas
@@ -44,7 +44,17 @@ class RippleSurface:
         self.waves = WaveSolver(target_atlas(model, geom, resolution), material, **options)
 
     def change_material(self, **coefficients: Any) -> None:
-        """Change coefficients of the material, by their names in `Material`."""
+        """Change coefficients of the material, by their names in `Material`.
+
+        Raises
+        ------
+        SolverError
+            For an unknown or invalid coefficient; the old ones stay.
+        """
+        names = [field.name for field in dataclasses.fields(Material)]
+        for name in coefficients:
+            if name not in names:
+                raise SolverError(f"a material has no coefficient {name!r}; valid are {', '.join(names)}")
         self._renew(dataclasses.replace(self._material, **coefficients), self._rigid, self._options)
 
     def change_operator(self, operator: str) -> None:

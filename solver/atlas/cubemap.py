@@ -9,6 +9,7 @@ as a grid line of the next one.
 from __future__ import annotations
 
 import functools
+import numbers
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,8 @@ MAX_RESOLUTION = 4096
 
 def check_resolution(resolution: int) -> int:
     """Return the resolution N as an int, or raise `AtlasError` if it is not a whole number in the valid range."""
-    if int(resolution) != resolution or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
+    whole = isinstance(resolution, numbers.Real) and resolution % 1 == 0
+    if not whole or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
         raise AtlasError(
             f"resolution is {resolution!r}; valid is a whole number of texels per face edge "
             f"from {MIN_RESOLUTION} to {MAX_RESOLUTION}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import numbers
 
 import numba
 import numpy as np
@@ -67,7 +68,7 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
     AtlasError
         If the point is not finite.
     """
-    if not (np.isfinite(radius) and radius >= 0):
+    if not (isinstance(radius, numbers.Real) and np.isfinite(radius) and radius >= 0):
         raise SolverError(f"impulse radius is {radius!r} m; valid is a finite number, 0 or greater")
     points = check_points(point)
     if len(points) != 1:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numbers
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -39,7 +41,7 @@ class WaveSolver:
     Raises
     ------
     SolverError
-        For invalid names or a material of another resolution.
+        For invalid names, something that is no material, or a material of another resolution.
     GLError
         If "gl" is asked for and no context can be made.
     """
@@ -53,6 +55,8 @@ class WaveSolver:
         operator: str = "fem",
         conserve_volume: bool = True,
     ) -> None:
+        if not (material is None or isinstance(material, Material)):
+            raise SolverError(f"material is {material!r}; valid is a Material, for instance Material(speed=1.0)")
         self.atlas = atlas
         self.material = material if material is not None else Material()
         self.conserve_volume = conserve_volume
@@ -142,10 +146,9 @@ class WaveSolver:
         Raises
         ------
         SolverError
-            If the impulse or the radius is not finite, or the radius is negative.
+            If the impulse or the radius is not finite, the radius is negative, or there are several points.
         """
-        if not np.isfinite(impulse):
-            raise SolverError(f"impulse is {impulse!r} N s; valid is a finite number")
+        _require_finite("impulse", impulse, "N s")
         where = footprint(self.atlas, point, radius)
         momentum = -impulse * self._shares(where)
         velocities = momentum / self.operator.mass.reshape(-1)[where.texels]
@@ -169,10 +172,9 @@ class WaveSolver:
         Raises
         ------
         SolverError
-            If the force or the radius is not finite, or the radius is negative.
+            If the force or the radius is not finite, the radius is negative, or there are several points.
         """
-        if not np.isfinite(force):
-            raise SolverError(f"force is {force!r} N; valid is a finite number")
+        _require_finite("force", force, "N")
         where = footprint(self.atlas, point, radius)
         self._hold(Load(where.texels, force * self._shares(where)))
         return where
@@ -213,8 +215,7 @@ class WaveSolver:
             If dt is negative or not finite, a given number of substeps is too small to be stable, a load is not finite
             or names no texel, or the height is no longer finite (on the GPU this is seen when the height is read).
         """
-        if not (np.isfinite(dt) and dt >= 0):
-            raise SolverError(f"time step is {dt!r} s; valid is a finite number, 0 or greater")
+        _require_finite("time step", dt, "s", least=0.0)
         if dt == 0:
             return
         ratio = dt / self.stable_timestep * (1 - 1e-12)
@@ -232,8 +233,10 @@ class WaveSolver:
                 f"{self.stable_timestep:.4g} s; use {needed} or more substeps, or leave the number out"
             )
         self._substep = dt / substeps
-        self._upload(self._held if load is None else Load.together([self._held, load]))
-        self._backend.advance(substeps, self._substep)
+        # what float32 cannot hold becomes infinite here, and is reported below
+        with np.errstate(over="ignore", invalid="ignore"):
+            self._upload(self._held if load is None else Load.together([self._held, load]))
+            self._backend.advance(substeps, self._substep)
         self.time += dt
         self.substeps_taken += substeps
         if not self._backend.finite():
@@ -255,8 +258,9 @@ class WaveSolver:
         continuous energy by O(dt^2). What a dent has swallowed is not in it.
         """
         height, velocity = self.height.astype(np.float64) - self.dent, self.velocity.astype(np.float64)
-        kinetic = float((self.operator.mass * velocity**2).sum()) / 2
-        return kinetic + self._elastic_energy(height) - self._substep**2 / 4 * self._elastic_energy(velocity)
+        with np.errstate(invalid="ignore"):  # NaN says enough
+            kinetic = float((self.operator.mass * velocity**2).sum()) / 2
+            return kinetic + self._elastic_energy(height) - self._substep**2 / 4 * self._elastic_energy(velocity)
 
     def volume(self) -> float:
         """Volume that the waves add to the target, to first order: sum of area times height [m^3]."""
@@ -321,3 +325,9 @@ class WaveSolver:
                 f"height is no longer finite {where}, at time {self.time:.6g} s; a source was too large for float32: "
                 "make it smaller and `reset()` the waves"
             )
+
+
+def _require_finite(name: str, value: float, unit: str, least: float = -np.inf) -> None:
+    if not (isinstance(value, numbers.Real) and np.isfinite(value) and value >= least):
+        bound = "" if least == -np.inf else f", {least:g} or greater"
+        raise SolverError(f"{name} is {value!r} {unit}; valid is a finite number{bound}")
