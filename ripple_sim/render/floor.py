@@ -16,6 +16,7 @@ from .camera import orthographic
 from .color import linear
 from .frame import FrameUniforms
 from .materials import FLAT_IMAGE, Textures, color, mapping_of, texture_pixels
+from .shadow import ShadowMap
 
 _PACKAGE = "ripple_sim.render"
 _MAP_SIZE = 256
@@ -49,7 +50,7 @@ class Floor:
         self._ceiling.compare_func = ""
         self._ceiling.repeat_x = self._ceiling.repeat_y = False
         self._ceiling_target = ctx.framebuffer(depth_attachment=self._ceiling)
-        self._openness = ctx.texture((_MAP_SIZE, _MAP_SIZE), 1, dtype="f2")
+        self._openness = ctx.texture((_MAP_SIZE, _MAP_SIZE), 2, dtype="f2")
         self._openness.repeat_x = self._openness.repeat_y = False
         self._openness.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         self._openness_target = ctx.framebuffer([self._openness])
@@ -72,8 +73,10 @@ class Floor:
         """Unit vector, as placed last."""
         return self._rotation[:, 2]
 
-    def occlude(self, ctx: moderngl.Context, draw_depth: Callable[[tuple[float, ...]], None]) -> None:
-        """Look up from the floor, and spread what hangs low into a map of how much sky is left."""
+    def occlude(
+        self, ctx: moderngl.Context, draw_depth: Callable[[tuple[float, ...]], None], shadow: ShadowMap
+    ) -> None:
+        """Look up from the floor, and spread what hangs low into a map of how much sky is left; mark the shadows."""
         top = self._half_width
         # height above the floor becomes depth; this mirrors the scene, so nothing is culled
         view = np.eye(4)
@@ -87,6 +90,7 @@ class Floor:
         draw_depth(tuple(matrix.T.ravel()))
         self._openness_target.use()
         ctx.disable(moderngl.DEPTH_TEST)
+        shadow.bind_depth()
         self._ceiling.use(2)
         self._occlude.program["extent"] = (2 * self._half_width, top, 0.35 * self._half_width)
         self._occlude.render(moderngl.TRIANGLES, vertices=3)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from .camera import Pose
 from .color import linear
-from .floor import Floor
 from .frame import MAX_LIGHTS, FrameUniforms
 
 _KIND = mujoco.mjtLightType
@@ -88,10 +87,19 @@ class Lighting:
     ambient: NDArray[np.float64]
     studio: bool
 
+    def on(self, point: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Irradiance over pi of a small patch by all lamps, shape [3]."""
+        return sum((light.at(point, normal) for light in self.lights), np.zeros(3))
+
 
 def is_lit(model: Any) -> bool:
     """Whether the MJCF itself sets any light."""
     return bool(model.nlight)
+
+
+def has_near_lamps(model: Any) -> bool:
+    """Whether any lamp of the MJCF stands at a place."""
+    return bool(np.any(model.light_type != _KIND.mjLIGHT_DIRECTIONAL))
 
 
 def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
@@ -146,7 +154,7 @@ def studio_lighting(pose: Pose) -> Lighting:
 
 
 def set_lighting(
-    frame: FrameUniforms, lighting: Lighting, pose: Pose, floor: Floor | None, sky: NDArray | None
+    frame: FrameUniforms, lighting: Lighting, pose: Pose, floor_albedo: NDArray | None, sky: NDArray | None
 ) -> None:
     """Fill the frame's lamps and colour its background.
 
@@ -155,8 +163,8 @@ def set_lighting(
     frame : FrameUniforms
     lighting : Lighting
     pose : Pose
-    floor : Floor, optional
-        The background takes on its colour, so that one fades into the other.
+    floor_albedo : array, optional
+        Linear colour of the floor; the background takes it on so that one fades into the other.
     sky : array, optional
         Mean linear colour of a skybox.
     """
@@ -173,7 +181,7 @@ def set_lighting(
         frame.values["lamp_normal"][index] = [*normal, half_width]
         frame.values["lamp_tangent"][index] = [*tangent / np.linalg.norm(tangent), half_height]
         frame.values["lamp_radiance"][index][:3] = strength * np.array(radiance)
-    tint = np.array([0.40, 0.42, 0.46]) if floor is None else 0.60 * floor.albedo
+    tint = np.array([0.40, 0.42, 0.46]) if floor_albedo is None else 0.60 * floor_albedo
     horizon, zenith = tint, tint * np.array([0.36, 0.40, 0.48])
     frame.set_vector("horizon", horizon)
     frame.set_vector("zenith", zenith)
@@ -182,8 +190,6 @@ def set_lighting(
     else:
         hue = np.ones(3) if sky is None else sky / max(sky.mean(), 1e-6)
         frame.set_vector("sky", lighting.ambient * (0.5 + 0.5 * hue), 0.0)
-    if floor is not None:
-        frame.set_vector("floor_light", sum(light.at(pose.focus, floor.normal) for light in lighting.lights))
     frame.set_vector("floor_fade", [*(_FADE if sky is None else _SKY_FADE), 0.0])
 
 

@@ -16,7 +16,7 @@ _PACKAGE = "ripple_sim.render"
 _FIRST_UNIT = 8  # of the samples' textures, in shaders/compose_fragment.glsl
 _BEHIND_UNIT = 6
 # depths that stand for what a pixel shows; exact in every depth buffer
-_LEVELS = {"SKY": 0.125, "FLOOR": 0.25, "MIXED": 0.5, "SOLID": 0.75}
+_LEVELS = {"SKY": 0.125, "FLOOR": 0.25, "SHADED": 0.375, "MIXED": 0.5, "SOLID": 0.75}
 
 
 class Picture:
@@ -36,6 +36,8 @@ class Picture:
     cut_out : bool
         Whether the background stays transparent and the floor shows nothing but shadows.
     floor : Floor, optional
+    options : dict
+        SKYBOX and NEAR_LAMPS, 0 or 1: whether the light knows them.
 
     Raises
     ------
@@ -44,7 +46,15 @@ class Picture:
     """
 
     def __init__(
-        self, gl: GLContext, ctx: Any, size: tuple[int, int], samples: int, cut_out: bool, floor: Floor | None
+        self,
+        gl: GLContext,
+        ctx: Any,
+        size: tuple[int, int],
+        *,
+        samples: int,
+        cut_out: bool,
+        floor: Floor | None,
+        options: dict[str, int],
     ) -> None:
         width, height = size
         with gl as raw:
@@ -71,20 +81,24 @@ class Picture:
         self._behind.repeat_x = self._behind.repeat_y = False
         self._behind_frame = ctx.framebuffer([self._behind])
         self._cut_out = cut_out
+        tiled = floor is not None and floor.tiled
+        options = {**options, "SAMPLES": max(many, 1), "CUT_OUT": int(cut_out), "IMAGE": int(tiled)}
+        levels = {f"{name}_LEVEL": level for name, level in _LEVELS.items()}
         self._passes = {
-            name: ctx.vertex_array(ctx.own(gl.program(_PACKAGE, "screen_vertex", f"{file}_fragment", **defines)), [])
-            for name, file, defines in (
-                ("classes", "classify", {f"{name}_LEVEL": level for name, level in _LEVELS.items()}),
-                ("sky", "sky", {}),
-                ("floor", "floor", {"IMAGE": int(floor is not None and floor.tiled), "CUT_OUT": int(cut_out)}),
-                ("solid", "solid", {"LAYER": 0}),
-                ("layer", "solid", {"LAYER": 1}),
+            name: ctx.vertex_array(ctx.own(gl.program(_PACKAGE, *files, **options, **more)), [])
+            for name, files, more in (
+                ("classes", ("screen_vertex", "classify_fragment"), levels),
+                ("sky", ("screen_vertex", "sky_fragment"), {}),
+                ("floor", ("floor_vertex", "floor_fragment"), {"SHADOW": 0}),
+                ("shaded floor", ("floor_vertex", "floor_fragment"), {"SHADOW": 1}),
+                ("solid", ("screen_vertex", "solid_fragment"), {"LAYER": 0}),
+                ("layer", ("screen_vertex", "solid_fragment"), {"LAYER": 1}),
             )
-            for defines in [{**defines, "SAMPLES": max(many, 1)}]
         }
-        if floor is not None and floor.tiled:
-            self._passes["floor"].program["tint"] = tuple(floor.tint)
-            self._passes["floor"].program["mapping"] = floor.mapping
+        for name in ("floor", "shaded floor"):
+            if floor is not None and tiled:
+                self._passes[name].program["tint"] = tuple(floor.tint)
+                self._passes[name].program["mapping"] = floor.mapping
 
     def begin(self, ctx: moderngl.Context) -> None:
         """Clear the samples and draw into them from now on."""
@@ -112,7 +126,8 @@ class Picture:
         if not self._cut_out:
             self._run("sky", _LEVELS["SKY"])
         self._run("floor", _LEVELS["FLOOR"])
-        self._run("floor", _LEVELS["MIXED"])
+        self._run("shaded floor", _LEVELS["SHADED"])
+        self._run("shaded floor", _LEVELS["MIXED"])
         self._run("solid", _LEVELS["MIXED"])
         self._run("solid", _LEVELS["SOLID"])
         self.frame.depth_mask = True

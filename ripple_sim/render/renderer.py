@@ -17,7 +17,7 @@ from .bodies import Bodies, visible_geoms
 from .camera import Pose, Viewpoint
 from .floor import Floor, find_floor
 from .frame import FrameUniforms
-from .lights import is_lit, model_lighting, set_lighting, studio_lighting
+from .lights import has_near_lamps, is_lit, model_lighting, set_lighting, studio_lighting
 from .materials import Textures
 from .objects import ObjectTable
 from .owned import OwnedObjects
@@ -78,7 +78,7 @@ class Renderer:
             self._frame = FrameUniforms(ctx)
             self._shadow = ShadowMap(ctx)
             self._table = ObjectTable(ctx)
-            self._open_floor = ctx.texture((1, 1), 1, np.ones(1, dtype=np.float16).tobytes(), dtype="f2")
+            self._open_floor = ctx.texture((1, 1), 2, np.ones(2, dtype=np.float16).tobytes(), dtype="f2")
             textures = Textures(ctx, model)
             self._sky = None if self._studio else textures.skybox()
             self._targets = [
@@ -88,7 +88,18 @@ class Renderer:
             geoms = [geom for geom in visible_geoms(model) if geom not in targets]
             floor = find_floor(model, geoms)
             self._floor = None if floor is None else Floor(gl, ctx, model, floor, textures)
-            self._picture = Picture(gl, ctx, (width, height), samples, alpha, self._floor)
+            self._picture = Picture(
+                gl,
+                ctx,
+                (width, height),
+                samples=samples,
+                cut_out=alpha,
+                floor=self._floor,
+                options={
+                    "SKYBOX": int(self._sky is not None),
+                    "NEAR_LAMPS": int(not self._studio and has_near_lamps(model)),
+                },
+            )
             self._bodies = Bodies(gl, ctx, model, [geom for geom in geoms if geom != floor], textures, self._table)
         self._pixels = bytearray((4 if alpha else 3) * width * height)
 
@@ -183,14 +194,15 @@ class Renderer:
         if self._floor is not None:
             self._floor.place(frame, data, centre, radius)
         lighting = studio_lighting(pose) if self._studio else model_lighting(self._model, data, pose)
-        set_lighting(frame, lighting, pose, self._floor, None if self._sky is None else self._sky[1])
+        albedo = None if self._floor is None else self._floor.albedo
+        set_lighting(frame, lighting, pose, albedo, None if self._sky is None else self._sky[1])
+        if self._floor is not None:
+            frame.set_vector("floor_light", lighting.on(pose.focus, self._floor.normal))
         light_view = None
         if lighting.lights and lighting.lights[0].shadow:
             light_view = tuple(self._shadow.fit(frame, lighting.lights[0], centre, radius).T.ravel())
         occluders = self._bodies.occluders.bind(data, pose.focus)
-        frame.set_vector(
-            "counts", [occluders, len(lighting.lights), self._sky is not None], float(light_view is not None)
-        )
+        frame.set_vector("counts", [occluders, len(lighting.lights), 0], float(light_view is not None))
         frame.bind()
         return light_view
 
@@ -213,7 +225,7 @@ class Renderer:
             self._shadow.target.clear(depth=1.0)
             self._draw_depth(light_view)
         if self._floor is not None:
-            self._floor.occlude(ctx, self._draw_depth)
+            self._floor.occlude(ctx, self._draw_depth, self._shadow)
 
     def _draw_depth(self, view_projection: tuple[float, ...]) -> None:
         for target in self._targets:

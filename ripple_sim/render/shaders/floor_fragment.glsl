@@ -1,8 +1,10 @@
 #version 430
-// Pixels that show the floor, wholly or beside something.
+// Pixels that show the floor: with SHADOW those that a shadow may reach or that show something else too, without it all
+// others.
 #include "frame.glsl"
 #include "samples.glsl"
 #include "studio.glsl"
+#include "development.glsl"
 #include "lights.glsl"
 #include "shadow.glsl"
 #include "floor_ray.glsl"
@@ -13,7 +15,15 @@ layout(binding = 5) uniform sampler2D floor_image;
 uniform vec2 mapping;  // texture coordinates a metre
 uniform vec3 tint;     // that the image is multiplied by
 
+flat in vec3 around;  // ambient light on the open floor
 out vec4 fragment;
+
+// A skybox goes on under the horizon, which the floor hides.
+#if SKYBOX
+const float HORIZON = 0.0;
+#else
+const float HORIZON = -1.0;
+#endif
 
 void main()
 {
@@ -28,8 +38,12 @@ void main()
 #else
     vec3 albedo = floor_albedo.rgb;
 #endif
-    float open = textureLod(floor_openness, (plane - floor_map.xy) / (2.0 * floor_map.z) + 0.5, 1.0).r;
+    float open = textureLod(floor_openness, floor_place(world), 1.0).r;
+#if SHADOW
     float shadow = key_visibility(world, floor_normal.xyz, 0.0);
+#else
+    const float shadow = 1.0;
+#endif
     vec3 light = vec3(0.0), unshaded = vec3(0.0);
     for (int i = 0; i < int(counts.y); ++i) {
         vec3 towards;
@@ -37,14 +51,17 @@ void main()
         light += arrives * (i == 0 ? shadow : 1.0);
         unshaded += arrives;
     }
-    vec3 around = ambient(floor_normal.xyz, vec3(0.0));
     light += around * (0.15 + 0.85 * open);
+#if SHADOW
     float share = 1.0 - float(bitCount(covered(ivec2(gl_FragCoord.xy), at))) / float(SAMPLES);
+#else
+    const float share = 1.0;
+#endif
 #if CUT_OUT
     // of the floor nothing but the shadows is kept
     fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g + around.g, 1e-6)));
 #else
-    vec3 far = backdrop(vec3(direction.xy, at < MISSED && counts.z > 0.0 ? max(direction.z, 0.0) : direction.z));
+    vec3 far = sky_at(at < MISSED ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);
     fragment = share * vec4(dithered(developed(mix(albedo * light, far, fade))), 1.0);
 #endif
 }

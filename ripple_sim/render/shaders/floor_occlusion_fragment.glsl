@@ -1,14 +1,37 @@
 #version 430
 // Share of the sky that a point of the floor sees, from the height of what hangs above it: the form factor of
 // horizontal patches at height h and horizontal distance d, h^2 / (pi (h^2 + d^2)^2) per unit area.
+#include "frame.glsl"
+
 layout(binding = 2) uniform sampler2D ceiling;  // 0 at the floor, 1 at the top
+layout(binding = 1) uniform sampler2D shadow_map;
 
 uniform vec3 extent;  // width of the map [m], height of its top [m], radius of influence [m]
 
 in vec2 screen;
-out vec4 fragment;
+out vec4 fragment;  // r: that share; g: 1 where the first light's shadow may fall
 
-const int TAPS = 48;
+const int TAPS = 36;
+const int SHADOW_TAPS = 16;
+
+// Whether the light meets anything on its way to about a texel of the floor.
+bool is_shaded(vec3 world)
+{
+    vec4 clip = shadow_matrix * vec4(world, 1.0);
+    vec3 p = clip.xyz / clip.w;
+    vec2 off = abs(p.xy - 0.5);
+    float texel = 2.0 * floor_map.z / float(textureSize(ceiling, 0).x);
+    float away = lights[0].position.w > 0.0 ? distance(lights[0].position.xyz, world) : 0.0;
+    float reach = shadow_penumbra.z + 1.5 * texel / (shadow_width.x + shadow_width.y * away);
+    vec2 direction = vec2(1.0, 0.0);
+    bool any = false;
+    for (int i = 0; i < SHADOW_TAPS; ++i) {
+        vec2 offset = reach * sqrt((float(i) + 0.5) / float(SHADOW_TAPS)) * direction;
+        direction = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888) * direction;
+        any = any || textureLod(shadow_map, p.xy + offset, 0.0).r < 1.0;
+    }
+    return counts.w > 0.0 && clip.w > 0.0 && any && max(off.x, off.y) < 0.5 + reach;
+}
 
 void main()
 {
@@ -26,5 +49,7 @@ void main()
         float h = max(height * extent.y, 0.6 * texel), r2 = h * h + distance * distance;
         covered += height < 1.0 ? h * h * area / (3.14159265 * r2 * r2) : 0.0;
     }
-    fragment = vec4(1.0 - min(covered, 1.0));
+    vec2 local = floor_map.xy + screen * floor_map.z;
+    vec3 world = floor_origin.xyz + local.x * floor_u.xyz + local.y * floor_v.xyz;
+    fragment = vec4(1.0 - min(covered, 1.0), is_shaded(world) ? 1.0 : 0.0, 0.0, 1.0);
 }

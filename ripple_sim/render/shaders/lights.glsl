@@ -1,6 +1,10 @@
 // Direction towards a lamp, and what arrives of it where nothing is in the way.
 vec3 incident(Light lamp, vec3 position, out vec3 towards)
 {
+#if !NEAR_LAMPS
+    towards = lamp.direction.xyz;
+    return lamp.radiance.rgb;
+#endif
     vec3 offset = lamp.position.xyz - position;
     float away = max(length(offset), 1e-6);
     bool near = lamp.position.w > 0.0;

@@ -29,9 +29,7 @@ float openness_to_bodies(vec3 position, vec3 normal, float own_geom)
 // Light that the floor sends up to a point; bodies close above it shade it.
 vec3 floor_bounce(vec3 position)
 {
-    vec3 local = position - floor_origin.xyz;
-    vec2 uv = (vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)) - floor_map.xy) / (2.0 * floor_map.z) + 0.5;
-    float open = textureLod(floor_openness, uv, 4.0).r;
+    float open = textureLod(floor_openness, floor_place(position), 4.0).r;
     vec3 lit = floor_albedo.rgb * (floor_light.rgb * 0.7 * open * open + sky.rgb * 0.5 * open);
     lit = mix(lit, vec3(dot(lit, vec3(0.2126, 0.7152, 0.0722))), 0.5);  // a coloured floor shall not stain all that is on it
     return floor_origin.w > 0.0 ? lit : sky.rgb * 0.8;
@@ -46,7 +44,7 @@ float ggx(float n_h, float roughness)
 
 vec3 fresnel(vec3 f0, float cosine)
 {
-    return f0 + (1.0 - f0) * pow(1.0 - cosine, 5.0);
+    return f0 + (1.0 - f0) * pow(max(1.0 - cosine, 0.0), 5.0);
 }
 
 vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_geom, float spread)

@@ -18,7 +18,7 @@ float lamp_distance(float depth)
 // above bumps that shall not shade each other.
 float key_visibility(vec3 position, vec3 normal, float lift)
 {
-    bool far_away = lights[0].position.w == 0.0;
+    bool far_away = NEAR_LAMPS == 0 || lights[0].position.w == 0.0;
     vec3 lamp = far_away ? lights[0].direction.xyz : normalize(lights[0].position.xyz - position);
     float facing = dot(normal, lamp);
     float away = far_away ? 0.0 : distance(lights[0].position.xyz, position);

@@ -3,6 +3,7 @@
 #include "frame.glsl"
 #include "samples.glsl"
 #include "studio.glsl"
+#include "development.glsl"
 #include "lights.glsl"
 #include "shadow.glsl"
 #include "floor_ray.glsl"
