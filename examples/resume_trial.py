@@ -51,6 +51,8 @@ def main() -> None:
         if process.returncode:
             sys.exit(said)
         for kill in range(options.kills):
+            if broken.exists():
+                sys.exit(f"it was done after {kill} kills: ask for a longer --duration")
             process = start(options.scene, broken, passed)
             wanted = len(stored(broken)) + chance.randint(0, options.step)
             while len(stored(broken)) < wanted and process.poll() is None:
@@ -58,7 +60,7 @@ def main() -> None:
             time.sleep(chance.uniform(0, 3))
             process.send_signal(signal.SIGKILL)
             process.communicate()
-            print(f"kill {kill + 1}: {'too late' if broken.exists() else f'kept {stored(broken)[-1:]}'}", flush=True)
+            print(f"kill {kill + 1}: kept {stored(broken)[-1:]}", flush=True)
         process = start(options.scene, broken, passed)
         print(process.communicate()[0].splitlines()[0])
         left = sorted(path.name for path in broken.parent.iterdir())

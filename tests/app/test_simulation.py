@@ -103,6 +103,49 @@ def test_folder_of_frames_is_identical_twice(scene: Scene, tmp_path: Path) -> No
         assert first.shape == (54, 96, 3)
 
 
+def test_a_snapshot_stays_as_it_is_while_the_simulation_goes_on(scene: Scene) -> None:
+    kept, digests = [], []
+    for state in run(Simulation(scene, fps=30, backend="cpu"), 6, alive=6):
+        kept.append(state)
+        digests.append(state.digest())
+    assert [state.digest() for state in kept] == digests
+    assert len(set(digests)) == 6
+    np.testing.assert_allclose([state.data.time for state in kept], np.arange(6) / 30)
+
+
+def test_slow_motion_shows_the_same_simulation_more_often(scene: Scene, tmp_path: Path) -> None:
+    summary = render_video(scene, tmp_path / "slow.mp4", size=(64, 48), fps=10, slow_motion=2.5)
+    assert summary.frames == 12  # half a second of the scene, 25 frames a second of it
+    with av.open(summary.output) as container:
+        assert float(container.streams.video[0].average_rate) == 10
+    heights = [state.data.qpos[2] for state in run(Simulation(scene, fps=10 * 2.5, backend="cpu"), 3)]
+    # it falls freely: at frame k, k / 25 s have gone by
+    np.testing.assert_allclose(heights[0] - heights, 9.81 / 2 * (np.arange(3) / 25) ** 2, rtol=0.06)
+    with pytest.raises(SceneError, match=r"slow motion is 0.*up to 1000"):
+        render_video(scene, tmp_path / "none.mp4", slow_motion=0)
+
+
+def test_supersampled_frames_have_softer_edges_of_the_same_brightness(scene: Scene) -> None:
+    simulation = Simulation(scene, fps=30, backend="cpu")
+    (state,) = run(simulation, 1)
+    plain, fine = (
+        FrameSource(simulation, width=96, height=54, supersample=factor).draw(state).astype(float) for factor in (1, 3)
+    )
+    assert fine.shape == plain.shape
+    assert 0 < np.abs(fine - plain).mean() < 3
+    assert np.abs(fine.mean() - plain.mean()) < 1
+
+
+def test_transparent_frames_show_the_bodies_and_no_background(scene: Scene, tmp_path: Path) -> None:
+    render_video(scene, tmp_path / "frames", size=(96, 54), fps=10, duration=0.1, transparent=True)
+    frame = np.asarray(Image.open(tmp_path / "frames" / "frame_00000.png"))
+    assert frame.shape == (54, 96, 4)
+    assert frame[27, 48, 3] == 255  # the egg is in the middle
+    assert frame[0, 0, 3] < 255
+    with pytest.raises(SceneError, match="no transparent background"):
+        render_video(scene, tmp_path / "other", transparent=True, overlay=["time"])
+
+
 def test_bad_requests_leave_nothing_behind(scene: Scene, tmp_path: Path) -> None:
     before = sorted(tmp_path.iterdir())
     with pytest.raises(VideoError):

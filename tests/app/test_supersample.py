@@ -1,0 +1,33 @@
+"""Averaging pixels: in linear light, weighted by opacity."""
+
+import numpy as np
+import pytest
+
+from ripple_sim.supersample import shrink
+
+
+@pytest.mark.parametrize("factor", [1, 2, 3])
+@pytest.mark.parametrize("channels", [3, 4])
+def test_even_areas_keep_their_colour(factor, channels):
+    small = np.random.default_rng(1).integers(0, 256, (5, 7, channels), np.uint8)
+    small[..., 3:] = 255
+    np.testing.assert_array_equal(shrink(small.repeat(factor, axis=0).repeat(factor, axis=1), factor), small)
+
+
+def test_all_values_survive():
+    small = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, axis=2)
+    np.testing.assert_array_equal(shrink(small.repeat(2, axis=0).repeat(2, axis=1), 2), small)
+
+
+def test_black_and_white_average_to_half_the_light():
+    frame = np.zeros((2, 2, 3), np.uint8)
+    frame[:, 0] = 255
+    assert shrink(frame, 2).tolist() == [[[188, 188, 188]]]  # sRGB of 0.5
+
+
+def test_transparent_pixels_lend_no_colour():
+    frame = np.zeros((2, 2, 4), np.uint8)
+    frame[0, 0] = (200, 100, 50, 255)
+    frame[1, 1] = (0, 255, 0, 0)
+    assert shrink(frame, 2).tolist() == [[[200, 100, 50, 64]]]
+    assert shrink(np.zeros((2, 2, 4), np.uint8), 2).tolist() == [[[0, 0, 0, 0]]]
