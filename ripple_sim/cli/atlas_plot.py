@@ -57,9 +57,9 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
     figure.text(0.03, 0.945, title, fontsize=25, fontweight="bold", color=_TEXT, va="center")
     figure.text(0.03, 0.903, subtitle, fontsize=12.5, color=_FAINT, va="center")
     front, back = View(up=up), View(azimuth=View.azimuth + 180, up=up)
-    _show(figure, (0.015, 0.05, 0.40, 0.82), painter.mesh(front, 800))
-    _show(figure, (0.405, 0.50, 0.215, 0.40), painter.mesh(back, 400), "the other side")
-    _show(figure, (0.415, 0.06, 0.195, 0.36), painter.sphere(front, 380), "on the sphere")
+    _show(figure, (0.025, 0.05, 0.37, 0.82), painter.mesh(front, 800))
+    _show(figure, (0.42, 0.50, 0.20, 0.38), painter.mesh(back, 400), "the other side")
+    _show(figure, (0.42, 0.07, 0.20, 0.355), painter.sphere(front, 380), "on the sphere")
     _show(figure, (0.635, 0.455, 0.35, 0.47), painter.cross(160), "the six faces, unfolded")
     _histogram(figure.add_axes((0.655, 0.300, 0.31, 0.105)), stretch, atlas.areas)
     _figures(figure, atlas)
@@ -79,7 +79,7 @@ def _show(figure: Figure, place: tuple[float, float, float, float], picture: NDA
     axes.imshow(picture, interpolation="antialiased")
     axes.set_axis_off()
     if caption:
-        axes.text(0.5, -0.03, caption, transform=axes.transAxes, ha="center", va="top", fontsize=11, color=_FAINT)
+        axes.text(0.5, -0.03, caption, transform=axes.transAxes, ha="center", va="top", fontsize=11.5, color=_FAINT)
 
 
 def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
@@ -89,6 +89,7 @@ def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float
     middles = np.sqrt(bins[1:] * bins[:-1])
     colors = _COLORS(_shade(middles))
     axes.bar(bins[:-1], share / share.max(), np.diff(bins), align="edge", color=colors, edgecolor="none")
+    axes.stairs(share / share.max(), bins, color=_FAINT, linewidth=0.7)  # pale bars are seen by their outline
     axes.bar(bins[:-1], -0.14, np.diff(bins), bottom=-0.03, align="edge", color=colors, edgecolor="none")
     axes.set_xscale("log")
     axes.set_xlim(bins[0], bins[-1])
@@ -98,7 +99,7 @@ def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float
     axes.set_xticks([], minor=True)
     axes.set_yticks([])
     axes.tick_params(length=0, pad=3)
-    axes.set_xlabel("stretch: texel width relative to an even spread", fontsize=11, color=_FAINT)
+    axes.set_xlabel("stretch: texel width relative to an even spread", fontsize=11.5, color=_FAINT)
     for spine in axes.spines.values():
         spine.set_visible(False)
 
@@ -109,7 +110,7 @@ def _figures(figure: Figure, atlas: Atlas) -> None:
     columns = [
         [
             ("folded triangles", f"{quality['flipped']}"),
-            ("area starved (stretch over 4)", f"{quality['starved']:.2%}"),
+            ("area starved (stretch over 4)", f"{100 * quality['starved']:.2f} %"),
             ("texel area / mesh area", f"{quality['coverage']:.4f}"),
         ],
         [
@@ -118,7 +119,7 @@ def _figures(figure: Figure, atlas: Atlas) -> None:
             ("texel edges / even grid", f"{quality['edge_min'] / even:.2f} to {quality['edge_max'] / even:.2f}"),
         ],
     ]
-    for left, rows in zip((0.655, 0.815), columns, strict=True):
+    for left, rows in zip((0.655, 0.83), columns, strict=True):
         for k, (name, value) in enumerate(rows):
             figure.text(left, 0.196 - 0.062 * k, value, fontsize=16, fontweight="bold", color=_TEXT, va="center")
-            figure.text(left, 0.170 - 0.062 * k, name, fontsize=9.5, color=_FAINT, va="center")
+            figure.text(left, 0.170 - 0.062 * k, name, fontsize=11, color=_FAINT, va="center")

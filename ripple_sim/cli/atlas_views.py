@@ -100,7 +100,8 @@ class AtlasPainter:
         local = np.stack([x.ravel()[seen], y.ravel()[seen]], axis=1)
         local = np.column_stack([local, np.sqrt(1 - (local**2).sum(axis=1))])
         directions = local @ view.axes
-        return _picture(x.shape, seen, self._lit(self.paint(directions), directions, np.ones(len(seen)), view))
+        colors = self._grid(*face_coordinates(directions, self._atlas.resolution))
+        return _picture(x.shape, seen, self._lit(colors, directions, np.ones(len(seen)), view))
 
     def cross(self, size: int) -> NDArray[np.float64]:
         """RGBA picture of the six faces unfolded, [3 size, 4 size, 4]: the belt, and a face over and under it."""
@@ -118,7 +119,7 @@ class AtlasPainter:
 
     def paint(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Colours [k, 3] of the surface in directions [k, 3] from the cube's centre; override it to paint others."""
-        return self._grid(*face_coordinates(directions, self._atlas.resolution))
+        return self._grid(*face_coordinates(directions, self._atlas.resolution), self._widths)
 
     @functools.cached_property
     def _vertices(self) -> NDArray[np.float64]:
@@ -140,17 +141,34 @@ class AtlasPainter:
     def _openness(self) -> NDArray[np.float64]:
         return bake(self._vertices, self._atlas.mesh.F, self._atlas.mesh.vertex_normals)[0]
 
+    @functools.cached_property
+    def _widths(self) -> NDArray[np.float64]:
+        """Width of rows and of columns on the surface, in units of an even spread's, [2, 6, N, N]."""
+        padded, areas = self._atlas.padded_positions, self._atlas.areas
+        along_columns = np.linalg.norm(padded[:, 1:-1, 2:] - padded[:, 1:-1, :-2], axis=-1) / 2
+        along_rows = np.linalg.norm(padded[:, 2:, 1:-1] - padded[:, :-2, 1:-1], axis=-1) / 2
+        even = np.sqrt(areas.mean())
+        return np.stack([areas / np.maximum(side, 1e-6 * even) for side in (along_columns, along_rows)]) / even
+
     def _grid(
-        self, face: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
+        self,
+        face: NDArray[np.int64],
+        row: NDArray[np.float64],
+        column: NDArray[np.float64],
+        widths: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
-        """Colours of places in the faces [k, 3]: the texel's, under a grid of fine lines and the cube's edges."""
+        """Colours of places in the faces [k, 3]: the texel's, under a grid of fine lines and the cube's edges.
+
+        With `widths` the lines are equally wide on the surface, without it in the faces.
+        """
         n = self._atlas.resolution
         i, j = (np.clip(np.rint(x).astype(np.int64), 0, n - 1) for x in (row, column))
         colors = self._colors[face, i, j]
         cells = min(GRID_CELLS, n)
         along = np.stack([row, column]) + 0.5
-        to_line = np.abs((along * (cells / n) + 0.5) % 1 - 0.5).min(axis=0)
-        to_edge = np.minimum(along, n - along).min(axis=0) * (cells / n)
+        scale = cells / n * (1.0 if widths is None else widths[:, face, i, j])
+        to_line = (np.abs((along * (cells / n) + 0.5) % 1 - 0.5) * (n / cells) * scale).min(axis=0)
+        to_edge = (np.minimum(along, n - along) * scale).min(axis=0)
         ink = np.where(to_edge < 0.09, 0.85, np.where(to_line < 0.04, 0.42, 0.0))[:, None]
         return colors * (1 - ink) + _INK * ink
 
