@@ -34,7 +34,8 @@ class Ripples:
     model : mujoco.MjModel
     materials : mapping
         Geom name to its `Material`. Geoms of type mesh, sdf, sphere, ellipsoid, capsule, cylinder and box can ripple.
-        Note that MuJoCo collides a mesh geom as its convex hull; type="sdf" collides as the true surface.
+        Note that MuJoCo collides a mesh geom as its convex hull; type="sdf" collides as the true surface. Impulses are
+        exact with every integrator but RK4.
     resolution : int or mapping
         Texels along an edge of the atlas's faces, for all targets or by geom name.
     backend, operator, conserve_volume
@@ -77,6 +78,7 @@ class Ripples:
             self._surfaces[name] = RippleSurface(model, geom, materials[name], n, options)
             self._warn_of_hull(name)
         self._waves = {geom: self._surfaces[name].waves for name, geom in self._geoms.items()}
+        _warn_of_integrator(model)
         self._sources = Sources(model, self._waves)
         self._check_speeds = SpeedCheck(model, list(self._waves))
         self._push_back = PushBack(model) if two_way else None
@@ -221,3 +223,13 @@ def _check_arguments(
                 f"resolution has no entry for geom {name!r}; it has {', '.join(map(repr, resolution)) or 'none'}: "
                 "give every rippling geom one, or one number for all"
             )
+
+
+def _warn_of_integrator(model: mujoco.MjModel) -> None:
+    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        warnings.warn(
+            "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: "
+            'impulses are off by some per cent; use integrator="implicitfast", or a short time step',
+            RippleWarning,
+            stacklevel=3,
+        )
