@@ -1,4 +1,7 @@
-"""PLY files as triangles, text or binary: polygons of any size, texture coordinates of vertices or of corners."""
+"""PLY files as triangles, text or binary: polygons of any size, texture coordinates of vertices or of corners.
+
+trimesh, which reads the other formats, fails on binary PLY files in which polygons of several sizes are mixed.
+"""
 
 from __future__ import annotations
 

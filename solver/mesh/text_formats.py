@@ -1,4 +1,8 @@
-"""OBJ and OFF files as triangles: polygons of any size, and each corner's own texture coordinates."""
+"""OBJ and OFF files as triangles: polygons of any size, and each corner's own texture coordinates.
+
+The other formats are left to trimesh. Its readers of these two fail on polygons of more than four corners in OFF files
+and on indices that count backwards in OBJ files, both of which are common.
+"""
 
 from __future__ import annotations
 
