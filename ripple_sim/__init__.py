@@ -9,18 +9,40 @@ if TYPE_CHECKING:
     from .coupling.collidable import make_collidable
     from .coupling.ripples import Impulse, Ripples
     from .errors import RippleWarning
+    from .job import render_video
+    from .pictures import Pictures
+    from .render import Camera
+    from .scene.scene import load_scene
+    from .simulation import Simulation
     from .solver import Material, RippleError
 
 __version__ = "0.1.0"
-__all__ = ["Impulse", "Material", "RippleError", "RippleWarning", "Ripples", "make_collidable"]
+__all__ = [
+    "Camera",
+    "Impulse",
+    "Material",
+    "Pictures",
+    "RippleError",
+    "RippleWarning",
+    "Ripples",
+    "Simulation",
+    "load_scene",
+    "make_collidable",
+    "render_video",
+]
 
 _HOMES = {
+    "Camera": ".render",
     "Impulse": ".coupling.ripples",
     "Material": ".solver",
+    "Pictures": ".pictures",
     "RippleError": ".solver",
     "RippleWarning": ".errors",
     "Ripples": ".coupling.ripples",
+    "Simulation": ".simulation",
+    "load_scene": ".scene.scene",
     "make_collidable": ".coupling.collidable",
+    "render_video": ".job",
 }
 
 

@@ -15,6 +15,7 @@ from ripple_sim.solver import Relief
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .coupling.ripples import Impulse
+from .pictures import surface_of
 from .render import Camera, FixedCamera, Renderer, Surface
 from .simulation import Simulation
 from .supersample import shrink
@@ -116,15 +117,7 @@ class FrameSource:
         self._geoms = simulation.ripples.geom_ids
         surfaces = {}
         for entry in simulation.scene.surfaces:
-            atlas = simulation.ripples[entry.geom].atlas
-            surface = Surface(
-                V=atlas.mesh.V,
-                F=atlas.mesh.F,
-                sphere=atlas.sphere,
-                resolution=atlas.resolution,
-                look=entry.look,
-                color=entry.color,
-            )
+            surface = surface_of(simulation.ripples[entry.geom], entry.look, entry.color)
             surfaces[self._geoms[entry.geom]] = annotate(surface)
         gl = gl if gl is not None else shared_context()
         self.renderer = Renderer(
@@ -138,7 +131,6 @@ class FrameSource:
 
     def draw(self, state: Snapshot) -> NDArray[np.uint8]:
         """Draw a snapshot, uint8 [height, width, 3], or 4 if it is transparent."""
-        sim = self._simulation
         reliefs = {self._geoms[name]: relief for name, relief in state.reliefs.items()}
         return shrink(self.renderer.render(state.data, reliefs, self.camera(state)), self._supersample)
 

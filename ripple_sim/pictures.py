@@ -1,0 +1,91 @@
+"""Pictures of anybody's MuJoCo model with its ripples, one at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver import Relief, WaveSolver
+from ripple_sim.solver.gl import GLContext, shared_context
+
+from .coupling.ripples import Ripples
+from .render import Camera, FixedCamera, Renderer, Surface
+from .scene.scene_file import CameraEntry
+from .viewpoint import viewpoint
+
+
+class Pictures:
+    """Draws a model and its rippling surfaces, headless, as `mujoco.Renderer` draws a model.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    ripples : Ripples
+        The surfaces that are drawn as they ripple.
+    width, height : int
+        [pixels].
+    looks : mapping
+        Geom name to the look of its surface: rubber, jelly, clay and so on; rubber where nothing is said. Its colour is
+        that of the geom, where the model gives it one.
+    gl : GLContext, optional
+        By default the process's shared one.
+
+    Raises
+    ------
+    RippleError
+        For an unknown look, or if the driver cannot make pictures of this size.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        ripples: Ripples,
+        *,
+        width: int = 1280,
+        height: int = 720,
+        looks: Mapping[str, str] | None = None,
+        gl: GLContext | None = None,
+    ) -> None:
+        self._model, self._ripples = model, ripples
+        self._reliefs = {name: Relief(ripples[name].atlas) for name in ripples}
+        looks = looks or {}
+        surfaces = {
+            geom: surface_of(ripples[name], looks.get(name, "rubber"), _color(model, geom))
+            for name, geom in ripples.geom_ids.items()
+        }
+        self._renderer = Renderer(gl or shared_context(), model, surfaces, width=width, height=height)
+
+    def draw(self, data: mujoco.MjData, camera: Camera | FixedCamera | str | None = None) -> NDArray[np.uint8]:
+        """Draw the present state, uint8 [height, width, 3].
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+            After `mj_step` or `mj_forward`.
+        camera : Camera, FixedCamera or str, optional
+            A camera, or the name of one of the MJCF; by default MuJoCo's free camera, aimed at the model's middle.
+        """
+        if camera is None or isinstance(camera, str):
+            camera = viewpoint(self._model, data, CameraEntry(name=camera), data.time)
+        reliefs = {
+            self._ripples.geom_ids[name]: relief(self._ripples[name].height) for name, relief in self._reliefs.items()
+        }
+        return self._renderer.render(data, reliefs, camera)
+
+
+def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] | None = None) -> Surface:
+    """What the renderer needs to know of a rippling surface."""
+    atlas = waves.atlas
+    return Surface(
+        V=atlas.mesh.V, F=atlas.mesh.F, sphere=atlas.sphere, resolution=atlas.resolution, look=look, color=color
+    )
+
+
+def _color(model: mujoco.MjModel, geom: int) -> tuple[float, float, float] | None:
+    """Colour of a geom, unless it is MuJoCo's grey."""
+    material = model.geom_matid[geom]
+    red, green, blue, _ = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+    return None if red == green == blue == 0.5 else (float(red), float(green), float(blue))

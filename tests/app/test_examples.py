@@ -1,0 +1,52 @@
+"""The examples run as they stand, and make the pictures that they promise."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def run(name: str, monkeypatch, folder: Path, *arguments: str) -> None:
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(sys, "argv", [name, *arguments])
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    module.main()
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("own_loop", []),
+        ("several_targets", []),
+        ("painted_speed", []),
+        ("own_deformation", []),
+        ("random_batch", ["--scenes", "2", "--seconds", "0.8"]),
+    ],
+)
+def test_an_example_makes_its_picture(name, arguments, monkeypatch, tmp_path, capsys):
+    run(name, monkeypatch, tmp_path, *arguments)
+    assert f"out/{name}.png" in capsys.readouterr().out
+    with Image.open(tmp_path / "out" / f"{name}.png") as picture:
+        assert np.asarray(picture.convert("L")).std() > 10
+
+
+def test_the_mesh_that_any_mesh_writes_is_displaced(monkeypatch, tmp_path):
+    import trimesh
+
+    from ripple_sim.scenes.shapes import LIMBED_FILE
+    from ripple_sim.solver import load_mesh
+
+    run("any_mesh", monkeypatch, tmp_path)
+    mesh, written = load_mesh(LIMBED_FILE), trimesh.load(tmp_path / "out" / "any_mesh.ply", process=False)
+    moved = written.vertices - mesh.V
+    along = (moved * mesh.vertex_normals).sum(axis=1)
+    assert np.allclose(moved, along[:, None] * mesh.vertex_normals, atol=1e-6)
+    assert (tmp_path / "out" / "any_mesh.png").is_file()
+    assert 1e-3 < np.abs(along).max() < 0.05
