@@ -48,7 +48,7 @@ class Benchmark:
         )
 
 
-def benchmark(window: Window, updates: int = 90, tries: int = 3) -> Benchmark:
+def benchmark(window: Window, updates: int = 60, tries: int = 3) -> Benchmark:
     """Best of several tries to go through some updates without waiting, each begun with a poke and a ball."""
     window.open()
     window.plotter.iren.interactor.EnableRenderOff()

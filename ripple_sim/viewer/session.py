@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+import mujoco
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
@@ -73,6 +74,8 @@ class Session:
     """
 
     def __init__(self, scene: Scene, *, fps: int = 30, resolution: int | None = None) -> None:
+        # MuJoCo would write its warnings to a file in the current folder; `Simulation` reports those that matter
+        mujoco.set_mju_user_warning(lambda message: None)
         self.fps = fps
         self.simulation = Simulation(scene, fps=fps, resolution=resolution, backend="cpu", on_step=self._before_step)
         self._balls = Balls(self.simulation.model)

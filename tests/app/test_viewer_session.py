@@ -273,7 +273,8 @@ def test_colours_follow_the_waves_at_once_and_fade_slowly(session: Session) -> N
     assert 0.9 * high < session.color_range < high
 
 
-def test_what_becomes_unstable_is_paused_and_can_start_again(tmp_path: Path) -> None:
+def test_what_becomes_unstable_is_paused_and_can_start_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.xml").write_text("""<mujoco><option gravity="0 0 -1e12"/><worldbody>
       <geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
       <body pos="0 0 1"><freejoint/><geom size="0.05"/></body></worldbody></mujoco>""")
@@ -285,6 +286,7 @@ def test_what_becomes_unstable_is_paused_and_can_start_again(tmp_path: Path) -> 
     assert not session.advance()
     session.reset()
     assert session.time == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.xml", "scene.toml"}  # no log of MuJoCo's
 
 
 def test_a_skin_is_the_surface_while_nothing_moves(session: Session) -> None:
