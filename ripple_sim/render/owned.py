@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import weakref
 from typing import Any
 
+from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext
 
 
@@ -45,7 +47,7 @@ class OwnedObjects:
 
 
 def _release(gl: GLContext, made: list[Any]) -> None:
-    with gl as ctx:
+    with contextlib.suppress(GLError), gl as ctx:  # of a lost context nothing is left to release
         # a deleted framebuffer must not stay bound
         ctx.detect_framebuffer(0).use()
         for each in reversed(made):

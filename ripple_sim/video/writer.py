@@ -135,8 +135,13 @@ class FrameWriter:
         ------
         VideoError
             If it is another than it was before the interruption.
+        EncodingError
+            If it cannot be noted.
         """
-        self._part.check_state(frame, digest)
+        try:
+            self._part.check_state(frame, digest)
+        except OSError as error:
+            raise EncodingError(f"cannot write the video {self.path}: {error.strerror}") from error
 
     def close(self) -> None:
         """Finish the video and move it to its place. Doing it again does nothing.

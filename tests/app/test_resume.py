@@ -4,6 +4,7 @@ import fcntl
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -284,3 +285,34 @@ def test_a_render_of_a_changed_scene_or_with_other_options_is_not_resumed(scene,
 
 def _push(simulation) -> None:
     simulation.data.qvel[0] += 1e-9
+
+
+def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path):
+    program = (
+        "import ctypes, sys\n"
+        "from ripple_sim.cli import main as cli\n"
+        "from ripple_sim.solver.gl import shared_context\n"
+        "def lose(done, total):\n"
+        "    if done == 20:\n"
+        "        egl = ctypes.CDLL('libEGL.so.1')\n"
+        "        egl.eglGetCurrentDisplay.restype = ctypes.c_void_p\n"
+        "        with shared_context():\n"
+        "            egl.eglTerminate(ctypes.c_void_p(egl.eglGetCurrentDisplay()))\n"
+        "from ripple_sim import job\n"
+        "render = job.render_video\n"
+        "job.render_video = lambda *args, **options: render(*args, **{**options, 'progress': lose})\n"
+        "sys.exit(cli.main(['render', *sys.argv[1:], '--size', '64x48', '--fps', '30']))\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", program, tmp_path / "scene.toml", "-o", tmp_path / "frames"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 1
+    lines = [line for line in result.stderr.splitlines() if "nanobind" not in line and not line.startswith(" - ")]
+    assert len(lines) == 1, result.stderr
+    assert re.match(
+        r"ripple-sim: the OpenGL context .* is lost; .* frames are kept in .*; --resume carries on", lines[0]
+    )
+    assert render_video(scene, tmp_path / "frames", resume=True, **OPTIONS, backend="cpu").resumed_at > 8
