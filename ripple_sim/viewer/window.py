@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -19,8 +18,10 @@ from ripple_sim.solver import RippleError
 from ..render.looks import find_look
 from ..viewpoint import viewpoint
 from .actors import BACKGROUND, HEIGHT, BodyActors, SkinActor
+from .camera import level, ray
 from .controls import CONTROLS, help_text
-from .session import OPERATORS, SLIDERS, Session
+from .session import OPERATORS, Session
+from .sliders import add_sliders
 from .takes import Takes
 
 # A click that moves the pointer by more than this turns the camera and pokes nothing [pixels].
@@ -30,10 +31,7 @@ _REACH = 4.0
 # The status line is written anew this often [s]: text is slow to draw.
 _STATUS_EVERY = 0.25
 _MULTISAMPLES = 8
-# Highest elevation of the camera, up or down [degrees].
-_STEEPEST = 88.0
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast")
-_UNITS = {"speed": "m/s", "damping": "1/s", "stiffness": "1/s²"}
 
 
 class Window:
@@ -95,7 +93,7 @@ class Window:
         }
         self._bodies = BodyActors(self.plotter, session, _REACH * pose.distance)
         self._add_bar()
-        self._sliders = [self._add_slider(i, name) for i, name in enumerate(("poke", *SLIDERS))]
+        self._sliders = add_sliders(self.plotter, session)
         self._text = self.plotter.add_text("", position="upper_left", font_size=9, color="black", shadow=False)
         self._help = self.plotter.add_text(
             help_text(), position="upper_right", font_size=8, color="black", shadow=False
@@ -173,7 +171,7 @@ class Window:
 
     def poke_at(self, x: int, y: int) -> bool:
         """Press on what is under a pixel, counted from the lower left; return whether that is a rippling surface."""
-        return self.session.poke(*self._ray(x, y)) is not None
+        return self.session.poke(*ray(self.plotter.renderer, x, y)) is not None
 
     def throw(self) -> None:
         """Throw a ball from the camera at what is under the pointer."""
@@ -181,7 +179,7 @@ class Window:
         if (x, y) == (0, 0):  # it has never been over the window
             width, height = self.plotter.render_window.GetSize()
             x, y = width // 2, height // 2
-        if not self.session.throw(*self._ray(x, y)):
+        if not self.session.throw(*ray(self.plotter.renderer, x, y)):
             self._say("this scene has no ball to throw")
 
     def operator(self) -> None:
@@ -235,13 +233,6 @@ class Window:
         for text in (self._text, self._help):
             text.SetVisibility(False)
 
-    def set_slider(self, name: str, value: float) -> None:
-        """Set the impulse of a poke ("poke") or a coefficient of the material."""
-        if name == "poke":
-            self.session.poke_impulse = value
-            return
-        self.session.set_material(**{name: value})
-
     def _update(self) -> None:
         """Bring the actors up to date with the session."""
         session = self.session
@@ -260,7 +251,7 @@ class Window:
             self._rate = self._updates / (now - self._since)
             self._updates, self._since = 0, now
             self._show_status()
-        self._level()
+        level(self.plotter.camera)
         self.plotter.renderer.ResetCameraClippingRange()
         self.render()
         self._drawn = True
@@ -271,22 +262,6 @@ class Window:
                     self._say("the window has changed its size: the recording has ended")
             except RippleError as error:
                 self._say(str(error))
-
-    def _level(self) -> None:
-        """Keep the horizon level, and the camera off the vertical, where it would have none."""
-        camera = self.plotter.camera
-        focus = np.array(camera.focal_point)
-        x, y, z = np.array(camera.position) - focus
-        across, most = math.hypot(x, y), math.tan(math.radians(_STEEPEST))
-        if across > 0 and abs(z) > most * across:
-            distance, away = math.hypot(across, z), math.hypot(1.0, most)
-            x, y, z = (
-                x / across * distance / away,
-                y / across * distance / away,
-                math.copysign(distance * most / away, z),
-            )
-            camera.position = focus + np.array([x, y, z])
-        camera.up = (0.0, 0.0, 1.0)
 
     def _say(self, message: str) -> None:
         self.message = message
@@ -310,28 +285,6 @@ class Window:
         )  # fmt: skip
         bar.SetVerticalTitleSeparation(10)
         self._bar = bar
-
-    def _add_slider(self, i: int, name: str) -> Any:
-        if name == "poke":
-            value, title = self.session.poke_impulse, "poke [N s]"
-            high = 4 * value
-        else:
-            value, title = self.session.material(name), f"{name} [{_UNITS[name]}]"
-            high = 3 * value if value else 1.0
-        left = 0.03 + 0.24 * i
-        slider = self.plotter.add_slider_widget(
-            None, (0.0, high), value=value, title=title, pointa=(left, 0.07), pointb=(left + 0.2, 0.07),
-            color="black", title_height=0.02, fmt="%.4g", slider_width=0.02, tube_width=0.005,
-        )  # fmt: skip
-        look = slider.GetRepresentation()
-        look.SetLabelHeight(0.02)
-        look.SetSliderLength(0.012)
-        look.SetEndCapLength(0.0)
-        look.GetTubeProperty().SetColor(0.35, 0.37, 0.40)
-        look.GetSliderProperty().SetColor(0.10, 0.35, 0.75)
-        look.GetSelectedProperty().SetColor(0.95, 0.45, 0.10)
-        slider.AddObserver("EndInteractionEvent", lambda *_: self.set_slider(name, slider.GetRepresentation().value))
-        return slider
 
     def _observe(self) -> None:
         iren = self.plotter.iren
@@ -361,16 +314,6 @@ class Window:
 
     def _stale(self) -> None:
         self._drawn = False
-
-    def _ray(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Ray from the camera through a pixel: origin [m] and direction, in the world."""
-        renderer = self.plotter.renderer
-        renderer.SetDisplayPoint(x, y, 0.5)
-        renderer.DisplayToWorld()
-        point = np.array(renderer.GetWorldPoint())
-        eye = np.array(self.plotter.camera.position)
-        along = point[:3] / point[3] - eye
-        return eye, along / np.linalg.norm(along)
 
 
 def _round_up(value: float) -> float:

@@ -1,0 +1,34 @@
+"""The window's camera: kept level, and asked for the ray through a pixel."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+# Highest elevation, up or down [degrees].
+_STEEPEST = 88.0
+
+
+def level(camera: pv.Camera) -> None:
+    """Keep the horizon level, and the camera off the vertical, where it would have none."""
+    focus = np.array(camera.focal_point)
+    x, y, z = np.array(camera.position) - focus
+    across, most = math.hypot(x, y), math.tan(math.radians(_STEEPEST))
+    if across > 0 and abs(z) > most * across:
+        distance, slant = math.hypot(across, z), math.hypot(1.0, most)
+        flat, high = distance / slant / across, math.copysign(distance * most / slant, z)
+        camera.position = focus + np.array([x * flat, y * flat, high])
+    camera.up = (0.0, 0.0, 1.0)
+
+
+def ray(renderer: pv.Renderer, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Origin [m] and unit direction, in the world, of the ray from the camera through a pixel, from the lower left."""
+    renderer.SetDisplayPoint(x, y, 0.5)
+    renderer.DisplayToWorld()
+    point = np.array(renderer.GetWorldPoint())
+    eye = np.array(renderer.camera.position)
+    along = point[:3] / point[3] - eye
+    return eye, along / np.linalg.norm(along)
