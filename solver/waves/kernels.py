@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numba
+import numpy as np
 from numba.extending import overload
 
 
@@ -30,7 +31,7 @@ def _in_overload(x, c):
     return lambda x, c: x
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def fill(h, ring, source):
     """Copy the neighbours' border texels into the ring."""
     flat = h.reshape(-1)
@@ -38,7 +39,7 @@ def fill(h, ring, source):
         flat[ring[i]] = flat[source[i]]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def kick(h, v, texels, kicks, dt):
     """Kick some texels, and drift them by that."""
     heights, velocities = h.reshape(-1), v.reshape(-1)
@@ -106,8 +107,8 @@ def apply(w, h, factor, add, out):
 
 
 @numba.njit(cache=True, nogil=True, fastmath=_FAST)
-def kick_drift(w, h, v, h_next, extra, gain, decay, spring, push, dt):
-    """One substep: v = decay v + gain force - spring h + push, then h_next = h + dt v."""
+def kick_drift(w, h, v, h_next, extra, gain, decay, spring, span, acceleration, dt):
+    """One substep: v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v."""
     n = h.shape[1] - 2
     for f in range(6):
         for r in range(1, n + 1):
@@ -115,11 +116,11 @@ def kick_drift(w, h, v, h_next, extra, gain, decay, spring, push, dt):
             east, north, south = w[f, 0, r], w[f, 1, r], w[f, 1, r - 1]
             rising, risen, falling, fallen = w[f, 2, r], w[f, 2, r - 1], w[f, 3, r], w[f, 3, r - 1]
             velocity, gains, result = v[f, r], gain[f, r - 1], h_next[f, r]
-            more, decays, springs, pushes = (
+            more, decays, springs, spans = (
                 _row(extra, f, r),
                 _row(decay, f, r - 1),
                 _row(spring, f, r - 1),
-                _row(push, f, r - 1),
+                _row(span, f, r - 1),
             )
             for c in range(1, n + 1):
                 force = _force(below, row, above, east, north, south, rising, risen, falling, fallen, c)
@@ -127,7 +128,54 @@ def kick_drift(w, h, v, h_next, extra, gain, decay, spring, push, dt):
                     _in(decays, c - 1) * velocity[c]
                     + gains[c - 1] * (force + _in(more, c))
                     - _in(springs, c - 1) * row[c]
-                    + _in(pushes, c - 1)
+                    + _in(spans, c - 1) * acceleration
                 )
                 velocity[c] = kicked
                 result[c] = row[c] + dt * kicked
+
+
+@numba.njit(cache=True, nogil=True)
+def advance(
+    substeps,
+    dt,
+    ring,
+    source,
+    w,
+    h,
+    v,
+    h_next,
+    gain,
+    decay,
+    spring,
+    span,
+    acceleration,
+    texels,
+    kicks,
+    viscous,
+    laplace,
+    rigidity,
+    moment,
+    extra,
+    limit,
+    dent,
+):
+    """Substeps of dt, from the first half drift to the last; the height ends in `h_next` where their number is odd.
+
+    What a material lacks is None, and compiled away. The interpreter's lock is free all the while.
+    """
+    half = dt / np.float32(2)
+    for step in range(substeps):
+        fill(h, ring, source)
+        if viscous is not None:
+            fill(v, ring, source)
+            apply(viscous, v, np.float32(1), False, extra)
+        if laplace is not None:
+            apply(laplace, h, rigidity, False, moment)
+            fill(moment, ring, source)
+            apply(laplace, moment, np.float32(-1), viscous is not None, extra)
+        drifted = dt if step < substeps - 1 else half
+        kick_drift(w, h, v, h_next, extra, gain, decay, spring, span, acceleration, drifted)
+        h, h_next = h_next, h
+        kick(h, v, texels, kicks, drifted)
+        if limit is not None:
+            flow(h, dent, limit)
