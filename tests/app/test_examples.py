@@ -1,7 +1,9 @@
 """The examples run as they stand, and make the pictures that they promise."""
 
 import importlib.util
+import json
 import sys
+import types
 from pathlib import Path
 
 import numpy as np
@@ -50,3 +52,19 @@ def test_the_mesh_that_any_mesh_writes_is_displaced(monkeypatch, tmp_path):
     assert np.allclose(moved, along[:, None] * mesh.vertex_normals, atol=1e-6)
     assert (tmp_path / "out" / "any_mesh.png").is_file()
     assert 1e-3 < np.abs(along).max() < 0.05
+
+
+def test_the_notebook_runs_from_top_to_bottom(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    shown = []
+    display = types.SimpleNamespace(Video=lambda path, embed: shown.append(path))
+    monkeypatch.setitem(sys.modules, "IPython", types.ModuleType("IPython"))
+    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    cells = json.loads((EXAMPLES / "ripples.ipynb").read_text())["cells"]
+    names = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            exec("".join(cell["source"]), names)
+    assert "highest ripple" in capsys.readouterr().out
+    assert shown == ["sphere.mp4"]
+    assert (tmp_path / "sphere.mp4").stat().st_size > 1000
