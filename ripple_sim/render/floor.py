@@ -43,6 +43,8 @@ class Floor:
         self._image = textures.get(mapping.texture) if self.tiled else None
         if self.tiled:
             self.albedo = self.tint * linear(texture_pixels(model, mapping.texture) / 255.0).mean(axis=(0, 1))
+        material = model.geom_matid[geom]
+        self.reflectance = 0.0 if material < 0 else float(model.mat_reflectance[material])
         half = np.asarray(model.geom_size[geom][:2], dtype=np.float64)
         self._half = np.where(half > 0, half, _ENDLESS)
         self._occlude = ctx.vertex_array(ctx.own(gl.program(_PACKAGE, "screen_vertex", "floor_occlusion_fragment")), [])
@@ -58,10 +60,10 @@ class Floor:
     def place(self, frame: FrameUniforms, data: Any, centre: NDArray, radius: float) -> None:
         """Set where the floor lies, and which part of it the occlusion map covers."""
         rotation = data.geom_xmat[self.geom].reshape(3, 3)
-        self._origin, self._rotation = np.array(data.geom_xpos[self.geom]), rotation
-        local = rotation.T @ (centre - self._origin)
+        self.origin, self._rotation = np.array(data.geom_xpos[self.geom]), rotation
+        local = rotation.T @ (centre - self.origin)
         self._centre, self._half_width = local, 1.2 * radius
-        frame.set_vector("floor_origin", self._origin, 1.0)
+        frame.set_vector("floor_origin", self.origin, 1.0)
         frame.set_vector("floor_u", rotation[:, 0], self._half[0])
         frame.set_vector("floor_v", rotation[:, 1], self._half[1])
         frame.set_vector("floor_normal", rotation[:, 2])
@@ -81,7 +83,7 @@ class Floor:
         # height above the floor becomes depth; this mirrors the scene, so nothing is culled
         view = np.eye(4)
         view[:3, :3] = np.diag([1.0, 1.0, -1.0]) @ self._rotation.T
-        view[:3, 3] = -view[:3, :3] @ (self._origin + self._rotation[:, :2] @ self._centre[:2])
+        view[:3, 3] = -view[:3, :3] @ (self.origin + self._rotation[:, :2] @ self._centre[:2])
         matrix = orthographic(self._half_width, top) @ view
         self._ceiling_target.use()
         ctx.disable(moderngl.CULL_FACE)

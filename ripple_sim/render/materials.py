@@ -59,9 +59,10 @@ class Mapping:
     texture : int
         Id of the texture, -1 without.
     scale : array, shape [3]
-        Texture coordinates a metre, in the geom's frame; a flat image's begin at -0.5.
+        Texture coordinates a metre, in the geom's frame, where a flat image's begin at -0.5; or how often the mesh's own
+        ones are repeated.
     own : bool
-        Whether the mesh's own texture coordinates are used instead.
+        Whether the mesh's own texture coordinates are used.
     """
 
     kind: int
@@ -95,9 +96,11 @@ def mapping_of(model: Any, geom: int) -> Mapping:
         and model.mesh_texcoordadr[mesh] >= 0
     )
     repeat = np.asarray(model.mat_texrepeat[material], dtype=np.float64)
+    if own:
+        return Mapping(FLAT_IMAGE, texture, np.array([repeat[0], repeat[1], 0.0]), True)
     if not uniform:
         repeat = repeat / np.where(size[:2] > 0, size[:2], 1.0)
-    return Mapping(FLAT_IMAGE, texture, np.array([0.5 * repeat[0], -0.5 * repeat[1], 0.0]), own)
+    return Mapping(FLAT_IMAGE, texture, np.array([0.5 * repeat[0], -0.5 * repeat[1], 0.0]), False)
 
 
 def _half_sizes(model: Any, geom: int) -> NDArray[np.float64]:

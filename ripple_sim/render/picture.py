@@ -82,7 +82,14 @@ class Picture:
         self._behind_frame = ctx.framebuffer([self._behind])
         self._cut_out = cut_out
         tiled = floor is not None and floor.tiled
-        options = {**options, "SAMPLES": max(many, 1), "CUT_OUT": int(cut_out), "IMAGE": int(tiled)}
+        reflects = floor is not None and floor.reflectance > 0.0 and not cut_out
+        options = {
+            **options,
+            "SAMPLES": max(many, 1),
+            "CUT_OUT": int(cut_out),
+            "IMAGE": int(tiled),
+            "MIRROR": int(reflects),
+        }
         levels = {f"{name}_LEVEL": level for name, level in _LEVELS.items()}
         self._passes = {
             name: ctx.vertex_array(ctx.own(gl.program(_PACKAGE, *files, **options, **more)), [])
@@ -95,10 +102,12 @@ class Picture:
                 ("layer", ("screen_vertex", "solid_fragment"), {"LAYER": 1}),
             )
         }
-        for name in ("floor", "shaded floor"):
+        for program in (self._passes[name].program for name in ("floor", "shaded floor")):
             if floor is not None and tiled:
-                self._passes[name].program["tint"] = tuple(floor.tint)
-                self._passes[name].program["mapping"] = floor.mapping
+                program["tint"] = tuple(floor.tint)
+                program["mapping"] = floor.mapping
+            if floor is not None and reflects:
+                program["reflectance"] = floor.reflectance
 
     def begin(self, ctx: moderngl.Context) -> None:
         """Clear the samples and draw into them from now on."""

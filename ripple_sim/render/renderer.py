@@ -19,6 +19,7 @@ from .floor import Floor, find_floor
 from .frame import FrameUniforms
 from .lights import has_near_lamps, is_lit, model_lighting, set_lighting, studio_lighting
 from .materials import Textures
+from .mirror import Mirror
 from .objects import ObjectTable
 from .owned import OwnedObjects
 from .picture import Picture
@@ -88,18 +89,16 @@ class Renderer:
             geoms = [geom for geom in visible_geoms(model) if geom not in targets]
             floor = find_floor(model, geoms)
             self._floor = None if floor is None else Floor(gl, ctx, model, floor, textures)
+            options = {
+                "SKYBOX": int(self._sky is not None),
+                "NEAR_LAMPS": int(not self._studio and has_near_lamps(model)),
+            }
             self._picture = Picture(
-                gl,
-                ctx,
-                (width, height),
-                samples=samples,
-                cut_out=alpha,
-                floor=self._floor,
-                options={
-                    "SKYBOX": int(self._sky is not None),
-                    "NEAR_LAMPS": int(not self._studio and has_near_lamps(model)),
-                },
+                gl, ctx, (width, height), samples=samples, cut_out=alpha, floor=self._floor, options=options
             )
+            self._mirror = None
+            if self._floor is not None and self._floor.reflectance > 0.0 and not alpha:
+                self._mirror = Mirror(gl, ctx, (width, height), options)
             self._bodies = Bodies(gl, ctx, model, [geom for geom in geoms if geom != floor], textures, self._table)
         self._pixels = bytearray((4 if alpha else 3) * width * height)
 
@@ -167,11 +166,10 @@ class Renderer:
         with self._gl as ctx:
             light_view = self._update(ctx, data, reliefs, pose)
             self._draw_maps(ctx, light_view)
+            if self._mirror is not None:
+                self._mirror.draw(ctx, self._frame, pose, self._floor, self._draw_solids, self._bind_maps)
             self._picture.begin(ctx)
-            for target in self._targets:
-                if not target.clear:
-                    target.draw()
-            self._bodies.draw()
+            self._draw_solids()
             self._bind_maps()
             self._picture.compose(ctx)
             self._draw_clear(ctx, data, pose)
@@ -227,6 +225,12 @@ class Renderer:
         if self._floor is not None:
             self._floor.occlude(ctx, self._draw_depth, self._shadow)
 
+    def _draw_solids(self) -> None:
+        for target in self._targets:
+            if not target.clear:
+                target.draw()
+        self._bodies.draw()
+
     def _draw_depth(self, view_projection: tuple[float, ...]) -> None:
         for target in self._targets:
             target.draw_depth(view_projection)
@@ -240,6 +244,8 @@ class Renderer:
             self._floor.bind()
         if self._sky is not None:
             self._sky[0].use(7)
+        if self._mirror is not None:
+            self._mirror.bind()
 
     def _draw_clear(self, ctx: moderngl.Context, data: Any, pose: Pose) -> None:
         """Lay whatever the scene behind shows through over the picture, the furthest first."""

@@ -224,7 +224,7 @@ def _appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[
         mapping = mapping_of(model, geom)
         return look_of(model, geom), rgb, mapping if surface.uv is not None or not mapping.own else plain
     if surface.image is not None and surface.uv is not None:
-        return look, np.ones(3), Mapping(FLAT_IMAGE, -1, np.zeros(3), True)
+        return look, np.ones(3), Mapping(FLAT_IMAGE, -1, np.ones(3), True)
     return look, linear(surface.color or look.color), plain
 
 
@@ -269,7 +269,7 @@ def _mapped(vertices: NDArray[np.float64], mapping: Mapping) -> NDArray[np.float
         return vertices[:, _POSITION] * mapping.scale - 0.5
     u, v = vertices[:, _UV].T
     # a surface counts v from the picture's lower edge, MuJoCo's textures lie with the upper edge at 0
-    return np.stack([u, 1.0 - v, np.zeros_like(u)], axis=1)
+    return np.stack([u, 1.0 - v, np.zeros_like(u)], axis=1) * mapping.scale
 
 
 def _load_image(ctx: Any, surface: Surface) -> moderngl.Texture:

@@ -11,7 +11,7 @@ in vec3 in_origin;
 in vec3 in_core_size;
 in vec3 in_shell_size;
 in vec4 in_color;    // linear; w: number of the object
-in vec4 in_mapping;  // texture coordinates a metre; w: 1 where the mesh brings its own
+in vec4 in_mapping;  // texture coordinates a metre; or repetitions; w: 1 where the mesh brings its own
 
 out vec3 normal;
 out vec3 mapped;
@@ -21,7 +21,7 @@ void main()
 {
     vec3 local = in_core * in_core_size + in_shell * in_shell_size;
     normal = in_rotation * (in_normal / in_shell_size);
-    mapped = in_mapping.w > 0.0 ? vec3(in_uv, 0.0) : local * in_mapping.xyz;
+    mapped = (in_mapping.w > 0.0 ? vec3(in_uv, 0.0) : local) * in_mapping.xyz;
 #if MAPPING == 1
     mapped -= in_mapping.w > 0.0 ? vec3(0.0) : vec3(0.5);
 #endif

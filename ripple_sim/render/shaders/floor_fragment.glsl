@@ -18,6 +18,12 @@ uniform vec3 tint;     // that the image is multiplied by
 flat in vec3 around;  // ambient light on the open floor
 out vec4 fragment;
 
+#if MIRROR
+layout(binding = 14) uniform sampler2D mirror;  // the scene as the floor reflects it, sRGB
+
+uniform float reflectance;
+#endif
+
 // A skybox goes on under the horizon, which the floor hides.
 #if SKYBOX
 const float HORIZON = 0.0;
@@ -62,6 +68,11 @@ void main()
     fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g + around.g, 1e-6)));
 #else
     vec3 far = sky_at(at < MISSED ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);
-    fragment = share * vec4(dithered(developed(mix(albedo * light, far, fade))), 1.0);
+    vec3 shown = developed(mix(albedo * light, far, fade));
+#if MIRROR
+    // MuJoCo blends the reflection in by its share, whatever the angle
+    shown = mix(shown, textureLod(mirror, 0.5 + 0.5 * screen, 0.0).rgb, reflectance * (1.0 - fade));
+#endif
+    fragment = share * vec4(dithered(shown), 1.0);
 #endif
 }
