@@ -59,8 +59,8 @@ class Mapping:
     texture : int
         Id of the texture, -1 without.
     scale : array, shape [3]
-        Texture coordinates a metre, in the geom's frame, where a flat image's begin at -0.5; or how often the mesh's own
-        ones are repeated.
+        Texture coordinates a metre, in the geom's frame, where a flat image's begin at -0.5; or how often the mesh's
+        own ones are repeated.
     own : bool
         Whether the mesh's own texture coordinates are used.
     """

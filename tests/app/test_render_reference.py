@@ -58,7 +58,7 @@ def shrunk(picture, factor):
 
 
 def similarity(a, b):
-    """Mean structural similarity of two pictures (Wang et al. 2004), channel by channel, Gaussian window of 1.5 pixels."""
+    """Mean structural similarity of two pictures (Wang et al. 2004), by channels, Gaussian window of 1.5 pixels."""
 
     def blur(x):
         return gaussian_filter(x, (1.5, 1.5, 0.0), truncate=3.5)
