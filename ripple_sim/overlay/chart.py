@@ -62,7 +62,7 @@ class Chart:
                 y = round(self._row(value, limit))
                 patch.box(self._left, y - hair, self._right, y, INK if not value else _GRID, 0.9 if not value else 0.5)
                 patch.text(self._left - 0.4 * em, y + 0.3 * em, number(value * factor), small, INK, "right")
-        step = round_up(self._duration / 4)
+        step = round_up(self._duration / 4, (1.0, 2.0, 5.0))
         last = int(self._duration / step + 1e-9)
         for k in range(last + 1):
             x = round(self._column(k * step))

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.atlas.padding import padded_addresses
 
-_NEARLY_ALL = 0.98
-
 
 def pad_field(field: NDArray[np.float32]) -> NDArray[np.float32]:
     """Surround the faces of a field [6, N, N] by their neighbours' texels, and the mean of three at the corners.
@@ -28,15 +26,13 @@ def pad_field(field: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def magnitude(field: NDArray[np.float32]) -> float:
-    """Magnitude up to which the values of a padded field are worth telling apart.
+    """Mean magnitude of a padded field, each value with its own magnitude as weight: how high waves are where they are.
 
-    Nearly all texels stay below it, and a quarter of the largest value does, so that the first small ring is seen well
-    before it has spread; what is beyond are mostly the dents under contacts.
+    A calm surface round the first small ring does not count, nor do a few texels in the dent under a contact for much.
     """
     inside = np.abs(field[:, 1:-1, 1:-1]).ravel()
-    place = min(int(_NEARLY_ALL * inside.size), inside.size - 1)
-    parted = np.partition(inside, place)
-    return float(max(parted[place], parted[place:].max() / 4))
+    total = float(inside.sum(dtype=np.float64))
+    return float(np.dot(inside, inside)) / total if total else 0.0
 
 
 def grid_spacing(resolution: int) -> int:

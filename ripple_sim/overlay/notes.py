@@ -16,7 +16,9 @@ from .request import Request
 from .scale import Limit
 
 # Until more is seen the colours reach to this share of the targets' size, or to the speed that goes with it.
-_LEAST = 1e-4
+_LEAST = 1e-3
+# A contact's first dent is much deeper than the waves that it sends out, but short [s].
+_MEMORY = 0.25
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -68,7 +70,7 @@ class Notebook:
 
     def __init__(self, request: Request, simulations: Sequence[Simulation], frames: int, rate: float) -> None:
         self._request, self._simulations, self._dt = request, simulations, 1 / rate
-        self._field_limit = Limit(self._least_limit(), request.limit)
+        self._field_limit = Limit(self._least_limit(), request.limit, _MEMORY)
         self._mark_limit, self._energy_limit = Limit(), Limit()
         self._marks = [ContactMarks(simulation, self._dt) for simulation in simulations]
         self._energies = [History(frames) for _ in simulations]

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # halves of these are short numbers too
 _EASE = 0.12  # time in which a limit covers most of the way to its new value [s]
+_FAR = 4.0  # a limit that is more than this factor away catches up at once
 
 
-def round_up(value: float) -> float:
-    """Return the least of 1, 2, 5 times a power of ten that is not below a positive value."""
+def round_up(value: float, steps: tuple[float, ...] = _STEPS) -> float:
+    """Return the least of `steps` times a power of ten that is not below a positive value."""
     power = 10.0 ** math.floor(math.log10(value) + 1e-9)
-    return next((step * power for step in (1.0, 2.0, 5.0) if value <= step * power * (1 + 1e-9)), 10.0 * power)
+    return next((step * power for step in steps if value <= step * power * (1 + 1e-9)), 10.0 * power)
 
 
 class Limit:
@@ -26,10 +28,13 @@ class Limit:
         The least limit. 0: the first positive magnitude sets it.
     fixed : float, optional
         The limit, for good.
+    memory : float
+        Magnitudes are averaged over about this time [s], so that what is short does not count. 0: each counts.
     """
 
-    def __init__(self, floor: float = 0.0, fixed: float | None = None) -> None:
+    def __init__(self, floor: float = 0.0, fixed: float | None = None, memory: float = 0.0) -> None:
         self._fixed = fixed is not None
+        self._memory, self._mean = memory, 0.0
         self.goal = fixed if fixed is not None else round_up(floor) if floor > 0 else 0.0
         self.value = self.goal
 
@@ -37,9 +42,11 @@ class Limit:
         """Take in a magnitude, dt seconds after the last one; return the limit, 0 as long as there is none."""
         if self._fixed:
             return self.value
-        if magnitude > self.goal:
-            self.goal = round_up(magnitude)
-        if self.value == 0 or self.value > 0.995 * self.goal:
+        self._mean += (magnitude - self._mean) * (-math.expm1(-dt / self._memory) if self._memory else 1.0)
+        if self._mean > self.goal:
+            self.goal = round_up(self._mean)
+        self.value = max(self.value, self.goal / _FAR) if self.value else self.goal
+        if self.value > 0.995 * self.goal:
             self.value = self.goal
         else:
             self.value *= (self.goal / self.value) ** -math.expm1(-dt / _EASE)
