@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..errors import MeshError
-from .topology import edges_of
+from .topology import distinct, edges_of
 
 # Relative to the size of the mesh: above the round-off of a file in float32, far below any gap that is meant.
 _CRACK = 1e-6
@@ -97,7 +97,7 @@ def orient_outward(
     """
     oriented = igl.bfs_orient(F)[0].astype(np.int64)
     half_edges = oriented * len(V) + np.roll(oriented, -1, axis=1)
-    if len(np.unique(half_edges)) < half_edges.size:
+    if len(distinct(half_edges)) < half_edges.size:
         raise MeshError(f"{name} is not orientable (one-sided, like a Klein bottle); valid is a two-sided surface")
     volume = signed_volume(V, oriented)
     extent = np.ptp(V, axis=0).max()

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import MeshError
 from .cleaning import merge_vertices, orient_outward, signed_volume
-from .topology import check_topology
+from .topology import check_topology, distinct
 
 # Lengths whose squares and cubes are far from the limits of float64, in either direction.
 _SMALLEST, _LARGEST = 1e-12, 1e12
@@ -124,7 +124,7 @@ def _checked(V: ArrayLike, F: ArrayLike, name: str) -> tuple[NDArray[np.float64]
         raise MeshError(
             f"{name}: triangle indices run from {triangles.min()} to {triangles.max()}, valid is 0 to {len(points) - 1}"
         )
-    used = np.unique(triangles)
+    used = distinct(triangles)
     bad = used[~np.isfinite(points[used]).all(axis=1)]
     if len(bad):
         raise MeshError(f"{name}: {len(bad)} vertices are NaN or infinite (the first is vertex {bad[0]})")

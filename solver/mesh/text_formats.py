@@ -105,8 +105,8 @@ def read_off(content: bytes) -> Soup:
 
 
 def _decoded(content: bytes) -> str:
-    # what is not UTF-8 can only be a name or a comment
-    return content.decode("utf-8", errors="replace")
+    # what is not UTF-8 can only be a name or a comment; Windows may have put a mark at the beginning
+    return content.decode("utf-8-sig", errors="replace")
 
 
 def _corner(word: str, places: int, pairs: int, line: int) -> tuple[int, int]:
