@@ -126,6 +126,7 @@ class FrameSource:
             surfaces,
             width=supersample * width,
             height=supersample * height,
+            lighting=simulation.scene.lighting,
             alpha=transparent,
         )
 

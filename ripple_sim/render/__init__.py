@@ -2,7 +2,7 @@
 
 from .camera import Camera, FixedCamera
 from .looks import LOOKS
-from .renderer import Renderer
+from .renderer import LIGHTING, Renderer
 from .surface import Surface
 
-__all__ = ["LOOKS", "Camera", "FixedCamera", "Renderer", "Surface"]
+__all__ = ["LIGHTING", "LOOKS", "Camera", "FixedCamera", "Renderer", "Surface"]

@@ -46,6 +46,8 @@ class Scene:
         Whether moving surfaces push back on the bodies that touch them.
     overlay : tuple of str
         What is drawn over the pictures, see `parse_request`.
+    lighting : str
+        One of `LIGHTING`: "auto", "model" or "studio", see `Renderer`.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Scene:
     events: Events = dataclasses.field(default_factory=Events)
     two_way: bool = False
     overlay: tuple[str, ...] = ()
+    lighting: str = "auto"
 
 
 def shipped_scenes() -> list[str]:
@@ -106,6 +109,7 @@ def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
         ),
         two_way=content.two_way,
         overlay=tuple(content.overlay),
+        lighting=content.lighting,
     )
     check_scene(scene)
     return scene
@@ -169,7 +173,7 @@ def check_scene(scene: Scene) -> None:
         For an invalid material.
     """
     # the renderer is not needed for anything but the names of its looks and its cameras
-    from ..render import LOOKS
+    from ..render import LIGHTING, LOOKS
     from ..viewpoint import check_camera
 
     if not scene.surfaces:
@@ -199,5 +203,7 @@ def check_scene(scene: Scene) -> None:
             if not 0 < disc.radius < float("inf"):
                 raise SceneError(f"a still disc of geom {entry.geom!r} has radius {disc.radius!r} m; valid is above 0")
     parse_request(scene.overlay)
+    if scene.lighting not in LIGHTING:
+        raise SceneError(f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
     Script(scene.model, scene.events, [entry.geom for entry in scene.surfaces])
     check_camera(scene.model, scene.camera)

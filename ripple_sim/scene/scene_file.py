@@ -57,6 +57,7 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
     ripple: list[RippleEntry]
     duration: float = 5.0
     two_way: bool = False
+    lighting: str = "auto"
     overlay: list[str] = []
     camera: CameraEntry = msgspec.field(default_factory=CameraEntry)
     drop: list[DropEntry] = []
