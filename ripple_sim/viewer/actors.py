@@ -49,6 +49,12 @@ class BodyActors:
                 self._actors[geom] = _add(plotter, mesh, rgba)
         self.update()
 
+    @property
+    def solid(self) -> list[int]:
+        """Geoms that can be seen and are no planes."""
+        kinds = self._session.simulation.model.geom_type
+        return [geom for geom in self._actors if kinds[geom] != _GEOM.mjGEOM_PLANE]
+
     def update(self) -> None:
         """Take the poses from the session."""
         data, parked = self._session.simulation.data, self._session.parked

@@ -21,6 +21,7 @@ from .actors import BACKGROUND, HEIGHT, BodyActors, SkinActor
 from .camera import level, ray
 from .controls import CONTROLS, help_text
 from .session import OPERATORS, Session
+from .shadows import Shadows, find_floor
 from .sliders import add_sliders
 from .takes import Takes
 
@@ -92,6 +93,9 @@ class Window:
             for entry in scene.surfaces
         }
         self._bodies = BodyActors(self.plotter, session, _REACH * pose.distance)
+        floor = find_floor(session.simulation.model, data)
+        casting = [*session.simulation.ripples.geom_ids.values(), *self._bodies.solid]
+        self._shadows = None if floor is None else Shadows(self.plotter, session, casting, floor)
         self._add_bar()
         self._sliders = add_sliders(self.plotter, session)
         self._text = self.plotter.add_text("", position="upper_left", font_size=9, color="black", shadow=False)
@@ -242,6 +246,8 @@ class Window:
             skin.update(data.geom_xpos[geom], data.geom_xmat[geom])
             skin.color_by_height(limit if self._colored else None)
         self._bodies.update()
+        if self._shadows is not None:
+            self._shadows.update()
         self._drawn = False
 
     def _draw(self) -> None:

@@ -275,3 +275,17 @@ def test_the_loop_runs_until_the_user_quits(closed: Window, monkeypatch: pytest.
     desktop.run(closed)
     assert ticks == [True] * 4
     assert closed.session.time == pytest.approx(4 / 30)
+
+
+def test_shadows_darken_as_bodies_come_down(window: Window) -> None:
+    session = window.session
+    model, data = session.simulation.model, session.simulation.data
+    ball = model.geom("ball").id
+    shadow = window._shadows._actors[ball]
+    darkness = []
+    for height in (1.5, 0.3, 0.07):
+        data.geom_xpos[ball] = 1.0, 0.5, height
+        window._shadows.update()
+        darkness.append(shadow.prop.opacity if shadow.GetVisibility() else 0.0)
+    assert 0 == darkness[0] < darkness[1] < darkness[2]
+    np.testing.assert_allclose(shadow.GetCenter(), [1.0, 0.5, 0.0], atol=2e-3)
