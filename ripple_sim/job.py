@@ -120,8 +120,6 @@ def render_video(
     check_output(output, width, height, fps, transparent=transparent)
     overlay, operators = scene.overlay if overlay is None else overlay, compared_operators(compare)
     request = parse_request(overlay)
-    if transparent and (request or len(operators) > 1):
-        raise SceneError("overlays and comparisons have no transparent background; leave out the one or the other")
     count = _frame_count(scene.duration if duration is None else duration, fps, slow_motion)
     gl = shared_context()
     job = {

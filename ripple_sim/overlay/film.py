@@ -20,7 +20,6 @@ from .layout import Layout
 from .marks import draw_marks
 from .notes import Notebook, Notes
 from .painter import Painter
-from .patch import PAPER
 from .projection import Projection
 from .request import Request
 
@@ -60,7 +59,7 @@ class Film:
     operators : sequence of str
         Those of the runs, for their titles where there are two.
     supersample, transparent
-        As for `FrameSource`; nothing is drawn over transparent frames.
+        As for `FrameSource`.
     gl : GLContext, optional
         By default the process's shared one.
     """
@@ -110,13 +109,13 @@ class Film:
             yield Shot(snapshots, self._notebook.follow())
 
     def draw(self, shot: Shot) -> NDArray[np.uint8]:
-        """Draw a frame, uint8 [height, width, 3]."""
+        """Draw a frame, uint8 [height, width, 3], or 4 if it is transparent."""
         pictures = [self._picture(run, shot) for run in range(len(self._sources))]
         frame = pictures[0]
         if len(pictures) > 1:
             frame = np.concatenate(pictures, axis=1)
             seam, half = pictures[0].shape[1], max(1, round(self._layout.em / 16))
-            frame[:, seam - half : seam + half] = PAPER
+            frame[:, seam - half : seam + half] = 255
         self._painter.paint(frame, shot.notes)
         return frame
 

@@ -20,9 +20,14 @@ class Layout:
     height: int
 
     @property
+    def scale(self) -> float:
+        """Size over that of a frame of 1280x720."""
+        return math.sqrt(self.width * self.height / (1280 * 720))
+
+    @property
     def em(self) -> int:
         """Size of the type [pixels]: 16 on 1280x720, and readable on small frames."""
-        return max(9, round(16 * math.sqrt(self.width * self.height / (1280 * 720))))
+        return max(9, round(16 * self.scale))
 
     @property
     def margin(self) -> int:
@@ -32,12 +37,12 @@ class Layout:
     @property
     def arrow_length(self) -> float:
         """Length [pixels] of an arrow at the end of its scale."""
-        return 0.16 * self.height
+        return 115.0 * self.scale
 
     @property
     def arrow_thickness(self) -> float:
         """Thickness [pixels] of an arrow's shaft."""
-        return max(0.0036 * self.height, 1.3)
+        return max(2.6 * self.scale, 1.3)
 
     def panel_width(self, ems: float) -> int:
         """Width of a panel [pixels] of which two shall fit side by side."""

@@ -85,14 +85,23 @@ class Patch:
         self.fill(np.asarray(mask, dtype=np.float32) / 255, color)
 
     def over(self, frame: NDArray[np.uint8], left: int, top: int) -> None:
-        """Lay the patch over a frame, uint8 [height, width, 3], in place; what does not fit is cut off."""
+        """Lay the patch over a frame in place; what does not fit is cut off.
+
+        The frame is uint8 [height, width, 3], or [height, width, 4] with straight alpha.
+        """
         x0, y0 = max(left, 0), max(top, 0)
         x1, y1 = min(left + self.width, frame.shape[1]), min(top + self.height, frame.shape[0])
         if x0 >= x1 or y0 >= y1:
             return
         inside = np.s_[y0 - top : y1 - top, x0 - left : x1 - left]
-        under = frame[y0:y1, x0:x1]
-        under[:] = (under * (1 - self._alpha[inside]) + self._color[inside] + 0.5).astype(np.uint8)
+        under, color, alpha = frame[y0:y1, x0:x1], self._color[inside], self._alpha[inside]
+        if frame.shape[2] == 3:
+            under[:] = under * (1 - alpha) + color + 0.5
+            return
+        below = under[..., 3:] / np.float32(255) * (1 - alpha)
+        total = below + alpha
+        under[..., :3] = (under[..., :3] * below + color) / np.maximum(total, 1e-6) + 0.5
+        under[..., 3:] = 255 * total + 0.5
 
     def _drawn(self, paint: Callable[[ImageDraw.ImageDraw, int], None]) -> NDArray[np.float32]:
         """Coverage of what a function of (ImageDraw, enlargement) paints."""

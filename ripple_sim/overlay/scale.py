@@ -46,7 +46,7 @@ class Limit:
         if self._mean > self.goal:
             self.goal = round_up(self._mean)
         self.value = max(self.value, self.goal / _FAR) if self.value else self.goal
-        if self.value > 0.995 * self.goal:
+        if self.value >= 0.995 * self.goal:
             self.value = self.goal
         else:
             self.value *= (self.goal / self.value) ** -math.expm1(-dt / _EASE)

@@ -244,6 +244,20 @@ def test_everything_at_once_twice_the_same(
     np.testing.assert_array_equal(first, second)
 
 
+def test_overlays_on_a_transparent_background(make_scene: Callable[..., Scene]) -> None:
+    frames = []
+    for words in ([], EVERYTHING):
+        simulation = Simulation(make_scene(), fps=RATE, backend="cpu")
+        request = parse_request(words)
+        film = Film([simulation], request, width=160, height=90, frames=FRAMES, rate=RATE, transparent=True)
+        frames.append(last_frame(film))
+    plain, drawn = frames
+    assert drawn.shape == (90, 160, 4)
+    assert plain[8, 12, 3] < 100  # a corner of the background
+    assert drawn[8, 12, 3] > 200  # where the clock stands
+    assert (drawn[..., 3] >= plain[..., 3]).all()
+
+
 def test_each_alone_changes_the_picture(make_scene: Callable[..., Scene]) -> None:
     scene = make_scene()
     pictures = [last_frame(film_of(scene, words, (96, 54))) for words in ([], *([name] for name in NAMES))]

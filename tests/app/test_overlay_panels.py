@@ -104,6 +104,18 @@ def test_patch_covers_in_proportion() -> None:
     assert frame[3:].max() == 0
 
 
+def test_patch_over_a_transparent_frame() -> None:
+    patch = Patch(3, 1)
+    patch.box(0, 0, 3, 1, (200, 100, 0), 0.5)
+    frame = np.zeros((1, 3, 4), np.uint8)
+    frame[0, 1:] = (0, 0, 80, 255), (0, 0, 80, 51)
+    patch.over(frame, 0, 0)
+    np.testing.assert_array_equal(frame[0, 0], (200, 100, 0, 128))  # the patch's own
+    np.testing.assert_array_equal(frame[0, 1], (100, 50, 40, 255))  # half and half
+    # shares of 0.5 and 0.2 * 0.5 of what is seen, over an opacity of 0.6
+    np.testing.assert_allclose(frame[0, 2], (200 * 5 / 6, 100 * 5 / 6, 80 / 6, 0.6 * 255), atol=1)
+
+
 @pytest.mark.parametrize("place", [(-6, -3), (95, 45), (200, 10), (40, -60)])
 def test_patch_over_the_border_is_cut(place: tuple[int, int]) -> None:
     patch = Patch(12, 8)
