@@ -171,6 +171,8 @@ class Renderer:
             self._picture.begin(ctx)
             self._draw_solids()
             self._bind_maps()
+            if self._gl.software:  # it would draw all this within the next call, which keeps other threads from running
+                self._gl.wait()
             self._picture.compose(ctx)
             self._draw_clear(ctx, data, pose)
         return self._picture.frame
