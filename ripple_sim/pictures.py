@@ -79,8 +79,15 @@ class Pictures:
 def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] | None = None) -> Surface:
     """What the renderer needs to know of a rippling surface."""
     atlas = waves.atlas
+    mesh = atlas.mesh
     return Surface(
-        V=atlas.mesh.V, F=atlas.mesh.F, sphere=atlas.sphere, resolution=atlas.resolution, look=look, color=color
+        V=mesh.V,
+        F=mesh.F,
+        sphere=atlas.sphere,
+        resolution=atlas.resolution,
+        look=look,
+        color=color,
+        uv=mesh.uv if mesh.corner_uv is None else mesh.corner_uv,
     )
 
 

@@ -19,7 +19,7 @@ from .materials import FLAT_IMAGE, Textures, color, mapping_of, texture_pixels
 from .shadow import ShadowMap
 
 _PACKAGE = "ripple_sim.render"
-_MAP_SIZE = 256
+_MAP_SIZE = 224
 _ENDLESS = 1e9  # half size of a plane without an end [m]
 
 

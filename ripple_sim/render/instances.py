@@ -22,8 +22,8 @@ INSTANCE = np.dtype(
         ("mapping", "f4", 4),
     ]
 )
-_LEVELS = (4, 6, 9, 14, 22)  # segments to a right angle
-_FLATNESS = 0.15  # how far the edges of a round shape may stand off its surface [pixels]
+_LEVELS = (4, 6, 8, 11, 15, 22)  # segments to a right angle
+_FLATNESS = 0.25  # how far the edges of a round shape may stand off its surface [pixels]
 
 
 class ShapeLevels:

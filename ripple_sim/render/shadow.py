@@ -12,7 +12,7 @@ from .camera import orthographic, perspective
 from .frame import FrameUniforms
 from .lights import Light
 
-_SIZE = 2048
+_SIZE = 1024
 _WIDEST = 0.022  # penumbra, as a share of the map
 _STEEPEST_FOV = 130.0  # [degrees]
 

@@ -24,7 +24,7 @@ from .objects import ObjectTable
 from .subdivision import subdivide
 
 _PIXELS = 4.0  # length of an edge where the target fills the frame's height
-_PIXELS_PER_FACE = 20  # of the frame
+_PIXELS_PER_FACE = 24  # of the frame
 _LEAST_FACES, _MOST_FACES = 20_000, 400_000
 _PACKAGE = "ripple_sim.render"
 # columns of the vertex attributes while the mesh is refined
