@@ -31,12 +31,14 @@ class BodyActors:
     ----------
     plotter : pyvista.Plotter
     session : Session
+    middle : float64 [3]
+        What the camera is about [m].
     reach : float
-        Bodies farther than this from the origin are not shown [m]: they wait for their turn.
+        Bodies farther than this from the middle are not shown [m]: they wait for their turn.
     """
 
-    def __init__(self, plotter: pv.Plotter, session: Session, reach: float) -> None:
-        self._session, self._reach = session, reach
+    def __init__(self, plotter: pv.Plotter, session: Session, middle: NDArray[np.float64], reach: float) -> None:
+        self._session, self._middle, self._reach = session, middle, reach
         model = session.simulation.model
         self._actors = {}
         for geom in visible_geoms(model):
@@ -44,7 +46,8 @@ class BodyActors:
                 continue
             rgba = geom_rgba(model, geom)
             if _is_floor(model, geom, reach):
-                self._actors[geom] = _add_floor(plotter, reach, rgba)
+                position, rotation = self._pose(geom)
+                self._actors[geom] = _add_floor(plotter, (middle - position) @ rotation, reach, rgba)
             elif (mesh := geom_mesh(model, geom)) is not None:
                 self._actors[geom] = _add(plotter, mesh, rgba)
         self.update()
@@ -57,11 +60,17 @@ class BodyActors:
 
     def update(self) -> None:
         """Take the poses from the session."""
-        data, parked = self._session.simulation.data, self._session.parked
+        parked, solid = self._session.parked, set(self.solid)
         for geom, actor in self._actors.items():
-            _place(actor, data.geom_xpos[geom], data.geom_xmat[geom])
-            far = np.linalg.norm(data.geom_xpos[geom]) > self._reach
+            position, rotation = self._pose(geom)
+            _place(actor, position, rotation)
+            far = geom in solid and np.linalg.norm(position - self._middle) > self._reach
             actor.SetVisibility(not (far or geom in parked))
+
+    def _pose(self, geom: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Position [m] and rotation matrix in the world."""
+        data = self._session.simulation.data
+        return data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
 
 
 class SkinActor:
@@ -131,7 +140,7 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
 def geom_rgba(model: mujoco.MjModel, geom: int) -> NDArray[np.float32]:
     """Colour and opacity (sRGB, 0 to 1) of a geom: its own, or its material's where it has none of its own."""
     rgba, material = model.geom_rgba[geom], model.geom_matid[geom]
-    return model.mat_rgba[material] if material >= 0 and np.array_equal(rgba, np.float32([0.5, 0.5, 0.5, 1])) else rgba
+    return model.mat_rgba[material] if material >= 0 and np.array_equal(rgba, [0.5, 0.5, 0.5, 1.0]) else rgba
 
 
 def _add(plotter: pv.Plotter, mesh: pv.PolyData, rgba: NDArray[np.float32]) -> pv.Actor:
@@ -146,13 +155,14 @@ def _is_floor(model: mujoco.MjModel, geom: int, reach: float) -> bool:
     return model.geom_type[geom] == _GEOM.mjGEOM_PLANE and bool(((size <= 0) | (size > reach / 2)).all())
 
 
-def _add_floor(plotter: pv.Plotter, radius: float, rgba: NDArray[np.float32]) -> pv.Actor:
+def _add_floor(plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, rgba: NDArray[np.float32]) -> pv.Actor:
     """Unlit, for a lit pixel takes software OpenGL much longer and this one has most of them."""
     disc = pv.Disc(inner=0.0, outer=radius, normal=(0, 0, 1), r_res=_FADE_RINGS, c_res=_FADE_SIDES)
     away = np.linalg.norm(disc.points, axis=1) / radius
     share = np.clip((away - 0.1) / 0.7, 0, 1)[:, None]
     share = share * share * (3 - 2 * share)
     colors = (1 - share) * rgba[:3] + share * np.array(BACKGROUND)
+    disc.points[:, :2] += middle[:2]
     disc.point_data["color"] = np.rint(255 * colors).astype(np.uint8)
     return plotter.add_mesh(disc, scalars="color", rgb=True, lighting=False, reset_camera=False)
 

@@ -84,6 +84,8 @@ class Window:
         self.plotter = pv.Plotter(off_screen=off_screen, window_size=list(size), lighting="none", title=scene.name)
         # smooth edges cost software OpenGL four fifths of its speed
         self.plotter.render_window.SetMultiSamples(0)
+        # shadows lie side by side on the floor: plain blending will do, without buffers of the window's size
+        self.plotter.renderer.SetUseOIT(False)
         self.plotter.set_background(BACKGROUND)
         self._light()
         data = session.simulation.data
@@ -92,7 +94,7 @@ class Window:
             entry.geom: SkinActor(self.plotter, session.skins[entry.geom], entry.color or find_look(entry.look).color)
             for entry in scene.surfaces
         }
-        self._bodies = BodyActors(self.plotter, session, _REACH * pose.distance)
+        self._bodies = BodyActors(self.plotter, session, pose.focus, _REACH * pose.distance)
         floor = find_floor(session.simulation.model, data)
         casting = [*session.simulation.ripples.geom_ids.values(), *self._bodies.solid]
         self._shadows = None if floor is None else Shadows(self.plotter, session, casting, floor)
