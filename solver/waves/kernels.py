@@ -107,10 +107,10 @@ def apply(w, h, factor, add, out):
 
 
 @numba.njit(cache=True, nogil=True, fastmath=_FAST)
-def kick_drift(w, h, v, h_next, extra, gain, decay, spring, span, acceleration, dt):
-    """One substep: v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v."""
+def kick_drift(w, h, v, h_next, extra, gain, decay, spring, span, acceleration, dt, first, last):
+    """One substep of some faces: v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v."""
     n = h.shape[1] - 2
-    for f in range(6):
+    for f in range(first, last):
         for r in range(1, n + 1):
             below, row, above = h[f, r - 1], h[f, r], h[f, r + 1]
             east, north, south = w[f, 0, r], w[f, 1, r], w[f, 1, r - 1]
@@ -174,7 +174,7 @@ def advance(
             fill(moment, ring, source)
             apply(laplace, moment, np.float32(-1), viscous is not None, extra)
         drifted = dt if step < substeps - 1 else half
-        kick_drift(w, h, v, h_next, extra, gain, decay, spring, span, acceleration, drifted)
+        kick_drift(w, h, v, h_next, extra, gain, decay, spring, span, acceleration, drifted, 0, 6)
         h, h_next = h_next, h
         kick(h, v, texels, kicks, drifted)
         if limit is not None:
