@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,6 +11,7 @@ from ..errors import AtlasError
 from ..mesh.mesh import Mesh
 from .atlas import Atlas, check_points
 from .cubemap import check_resolution, padded_indices, texel_directions
+from .stencil import lumped_areas
 
 
 class SphereAtlas(Atlas):
@@ -18,6 +21,11 @@ class SphereAtlas(Atlas):
     def radius(self) -> float:
         """Radius of the sphere [m]."""
         return float(np.linalg.norm(self.mesh.V[0]))
+
+    @functools.cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """Area of every texel [m^2], shape [6, N, N]: that of the texel mesh, which is the surface here."""
+        return lumped_areas(self.positions)
 
     def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Closest points on the sphere itself [m] (not on its triangles) and their directions, each [k, 3]."""

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import AtlasError
 from ..mesh.mesh import Mesh
+from .areas import texel_areas
 from .cubemap import face_coordinates, padded_indices
 from .nearest import sphere_directions, texels_at
 from .quality import atlas_quality
-from .stencil import lumped_areas
 from .texcoords import TextureCoordinates, texture_coordinates
 
 # [m]. Squares of what is farther away overflow on the way to the nearest surface point.
@@ -60,8 +60,8 @@ class Atlas:
 
     @functools.cached_property
     def areas(self) -> NDArray[np.float64]:
-        """Lumped real area of every texel [m^2], shape [6, N, N]."""
-        return lumped_areas(self.positions)
+        """Area of the surface that belongs to each texel [m^2], shape [6, N, N]; the mass of its waves sits there."""
+        return texel_areas(self.mesh, self.sphere, self.positions, self.triangles, self.barycentrics)
 
     @functools.cached_property
     def padded_positions(self) -> NDArray[np.float64]:
@@ -115,7 +115,7 @@ class Atlas:
         dict
             `flipped` triangles, `solid_angle` [sr] (4 pi for a bijection), area-weighted stretch quantiles `q001`,
             `q01`, `q50`, `q99`, `q999`, `starved` share of the area whose texels are over 4 times too wide, `edge_min`
-            and `edge_max` [m], `coverage` (texel area over mesh area).
+            and `edge_max` [m], `coverage` (texel area over mesh area: 1 but for limbs that fall between the texels).
         """
         return atlas_quality(self)
 

@@ -5,8 +5,9 @@ at each of the 8 cube corners. Together they give a symmetric 9-point stencil. O
 
 A quad takes its gradient from its two diagonals (one-point integration), and a little stiffness against the one pattern
 that this does not see, the hourglass + - + - (Flanagan and Belytschko 1981). That pattern is a second derivative: its
-stiffness is free, and linear triangles give it far too much in a sheared or narrow quad. There waves ran ahead: by 3 %
-in the median over the elephant at N = 96, by 12 % behind its ears.
+stiffness is free. It decides whether short waves lag behind or run ahead, and follows from the quad's shape. Linear
+triangles give it far too much in a sheared quad: there waves ran ahead, by 3 % in the median over the elephant at
+N = 96.
 
 Layout. Fields are padded faces [6, N + 2, N + 2] (`cubemap.padded_indices`). A stencil is [6, 4, N + 1, N + 1]: the
 weights of the links of padded cell (r, c) to the east (r, c)-(r, c + 1), north (r, c)-(r + 1, c), north-east
@@ -24,9 +25,12 @@ from .cubemap import padded_indices
 
 EAST, NORTH, NORTHEAST, NORTHWEST = range(4)
 
-# Stiffness of a square against the hourglass. 1/2 makes the 5-point stencil, 1/3 an isotropic one, 1/4 allows the
-# longest time step. Less of it slows waves down where texels are wide, more hurries them on where quads are sheared.
+# Stiffness of a square against the hourglass. At 1 waves lag along its sides as much as they lead along its diagonals,
+# 1/2 makes the 5-point stencil, 1/3 an isotropic one, 1/4 allows the longest time step.
 _HOURGLASS = 0.4
+
+# Elongated quads take up to this share of the hourglass stiffness that would begin to shorten their own time step.
+_SHARE = 0.75
 
 # A cell folded to a line would ask for an infinitely short time step: least area, in units of a square's as large.
 _LEAST_AREA = 0.02
@@ -43,13 +47,15 @@ def pad(field: NDArray) -> NDArray:
 
 def lumped_areas(positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Area of the texel mesh that belongs to each texel [m^2], [6, N, N]."""
-    padded = pad(positions)
-    areas = np.zeros(positions.shape[:3])
-    _assemble(padded, np.ones(padded.shape[:3]), np.zeros((6, 4, len(padded[0]) - 1, len(padded[0]) - 1)), areas)
+    n = positions.shape[1]
+    even, areas = np.ones((6, n + 2, n + 2)), np.zeros((6, n, n))
+    _assemble(pad(positions), even, even, np.zeros((6, 4, n + 1, n + 1)), areas)
     return areas
 
 
-def stiffness_stencil(positions: NDArray[np.float64], coefficient: NDArray[np.float64]) -> NDArray[np.float64]:
+def stiffness_stencil(
+    positions: NDArray[np.float64], coefficient: NDArray[np.float64], softening: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
     """Stiffness weights of -div(coefficient grad).
 
     Parameters
@@ -59,6 +65,8 @@ def stiffness_stencil(positions: NDArray[np.float64], coefficient: NDArray[np.fl
     coefficient : [6, N, N]
         Averaged harmonically over the corners of every cell, as media in series: the operator stays symmetric, and a
         region where it is 0 is cut off at its edge.
+    softening : [6, N, N], optional
+        Factors up to 1: the stiffness of every cell is multiplied by the least of those at its corners.
 
     Returns
     -------
@@ -67,7 +75,8 @@ def stiffness_stencil(positions: NDArray[np.float64], coefficient: NDArray[np.fl
     """
     n = positions.shape[1]
     weights = np.zeros((6, 4, n + 1, n + 1))
-    _assemble(pad(positions), pad(coefficient), weights, np.zeros((6, n, n)))
+    soft = np.ones((6, n, n)) if softening is None else softening
+    _assemble(pad(positions), pad(coefficient), pad(soft), weights, np.zeros((6, n, n)))
     return agree_across_edges(weights)
 
 
@@ -143,13 +152,28 @@ def _between(a, b):
 def _quad_area(sw, se, nw, ne):
     """Area of a quad that need not be flat: that of its smaller triangulation.
 
-    The flat area p x q / 2 misses what a fold holds, the other triangulation spans it twice: with that much mass waves
-    are late, by 1 % in the median over the elephant.
+    The flat area p x q / 2 misses what a fold holds, the other triangulation spans it twice.
     """
     south, west, north, east = _between(sw, se), _between(sw, nw), _between(ne, nw), _between(ne, se)
     rising = _cross_length(south, east) + _cross_length(north, west)
     falling = _cross_length(south, west) + _cross_length(north, east)
     return min(rising, falling) / 2
+
+
+@numba.njit(cache=True)
+def _hourglass(pp, qq, pq, area):
+    """Hourglass stiffness of a quad of given area whose diagonals p and q have the products pp, qq and pq.
+
+    In a parallelogram with the squared sides a >= b, the product d of its sides and the area J, a wave of wave number k
+    has omega^2 = k^2 - k^4 (a + b) / 16 + k^4 H (J^2 + 3 d^2) / 8 J in the mean over its directions, to leading order:
+    waves are in time on average at H = (a + b) J / 2 (J^2 + 3 d^2). Its time step begins to shorten at
+    H = (a^2 - d^2) / 4 a J.
+    """
+    both_sides = (pp + qq) / 2
+    a, d = (both_sides + abs(pq)) / 2, (pp - qq) / 4
+    in_time = both_sides * area / (2 * (area * area + 3 * d * d))
+    free = (a * a - d * d) / (4 * a * area)
+    return min(in_time, max(_SHARE * free, _HOURGLASS * 2 * area / both_sides))
 
 
 @numba.njit(cache=True)
@@ -164,9 +188,8 @@ def _quad(sw, se, nw, ne):
     pp, qq, pq, cross = _dot(p, p), _dot(q, q), _dot(p, q), _cross_length(p, q)
     if pp + qq == 0:
         return 0.0, 0.0, 0.0, 0.0, 0.0
-    squareness = 2 * cross / (pp + qq)
     twice = 2 * max(cross, _LEAST_AREA / 2 * (pp + qq))
-    hourglass = _HOURGLASS * squareness
+    hourglass = _hourglass(pp, qq, pq, twice / 4)
     return (
         pq / twice + hourglass,
         hourglass - pq / twice,
@@ -189,8 +212,8 @@ def _triangle(a, b, c):
 
 
 @numba.njit(cache=True)
-def _assemble(x, k, weights, areas):
-    """Add up the cells of the padded positions x with padded coefficients k."""
+def _assemble(x, k, s, weights, areas):
+    """Add up the cells of the padded positions x with padded coefficients k, softened by the padded factors s."""
     n = x.shape[1] - 2
     # one cell wider than the stencil: links inside the ring are collected too and left behind
     link = np.zeros((4, n + 2, n + 2))
@@ -207,6 +230,7 @@ def _assemble(x, k, weights, areas):
                     _, vertical, horizontal, whole = _triangle(x[f, r0, c0], x[f, r0, c1], x[f, r1, c0])
                     a, b, d = k[f, r0, c0], k[f, r0, c1], k[f, r1, c0]
                     conductance = 3 / (1 / a + 1 / b + 1 / d) if a * b * d > 0 else 0.0
+                    conductance *= min(s[f, r0, c0], s[f, r0, c1], s[f, r1, c0])
                     area[r0, c0] += whole / 3
                     link[1, r, c0] += conductance * vertical
                     link[0, r0, c] += conductance * horizontal
@@ -216,6 +240,7 @@ def _assemble(x, k, weights, areas):
                 )
                 a, b, d, e = k[f, r, c], k[f, r, c + 1], k[f, r + 1, c], k[f, r + 1, c + 1]
                 conductance = 4 / (1 / a + 1 / b + 1 / d + 1 / e) if a * b * d * e > 0 else 0.0
+                conductance *= min(s[f, r, c], s[f, r, c + 1], s[f, r + 1, c], s[f, r + 1, c + 1])
                 link[0, r, c] += conductance * south_north
                 link[0, r + 1, c] += conductance * south_north
                 link[1, r, c] += conductance * west_east

@@ -19,7 +19,10 @@ from .material import Material
 OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
 
 # Share of the theoretical stability limit that is used: round-off in float32 must not cross it.
-SAFETY = 0.98
+SAFETY = 0.99
+
+# No texel may be this much faster (by the sum of its weights over its area) than this share of all texels.
+_FASTER, _BULK = 1.2, 0.99
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -106,7 +109,7 @@ class WaveOperator:
         return float((_row_sums(np.abs(stencil), self.mass.shape[1]) * 2 / self.mass).max())
 
     def _largest_eigenvalue(self, force: Callable[[NDArray[np.float64]], NDArray[np.float64]], bound: float) -> float:
-        """Upper bound, within about 1 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
+        """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
 
         A bound that is always safe caps the estimate.
         """
@@ -121,7 +124,7 @@ class WaveOperator:
         start = np.random.default_rng(0).standard_normal(size)
         matrix = LinearOperator((size, size), matvec=multiply, dtype=np.float64)
         value = eigsh(matrix, k=1, which="LA", v0=start, tol=2e-3, return_eigenvectors=False, maxiter=size)
-        return float(np.clip(1.01 * value[0], 0, bound))
+        return float(np.clip(1.005 * value[0], 0, bound))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -186,7 +189,7 @@ def build_operator(atlas: Atlas, material: Material, kind: str) -> WaveOperator:
     field = {each.name: material.texels(each.name, atlas.resolution) for each in dataclasses.fields(material)}
     density, area = field["density"], atlas.areas
     if kind == "fem":
-        assemble = functools.partial(stiffness_stencil, atlas.positions)
+        assemble = functools.partial(stiffness_stencil, atlas.positions, softening=_softening(atlas))
     else:
         # these formulas give accelerations without masses: one area for all keeps the units, one density as well
         area, density = np.full_like(area, area.mean()), np.full_like(density, density.mean())
@@ -207,6 +210,17 @@ def build_operator(atlas: Atlas, material: Material, kind: str) -> WaveOperator:
         yield_height=field["yield_height"] if yields else None,
         fixed=field["fixed"] if field["fixed"].any() else None,
     )
+
+
+def _softening(atlas: Atlas) -> NDArray[np.float64]:
+    """Factors that slow those few texels down that would set the time step for all others, [6, N, N].
+
+    Where the texel mesh crosses a crease, single texels are needles. Waves are through them in no time, even slowed
+    down. Smooth surfaces that the texels resolve have none: on the sphere all factors are 1.
+    """
+    stencil = stiffness_stencil(atlas.positions, np.ones_like(atlas.areas))
+    rate = _row_sums(np.abs(stencil), atlas.resolution) / atlas.areas
+    return np.minimum(1, _FASTER * np.quantile(rate, _BULK) / rate)
 
 
 def _difference_stencil(atlas: Atlas, kind: str, area: float, coefficient: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,10 +1,13 @@
 """The wave solver against theory: modes, order, conservation, damping, stability."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from ripple_sim.bench.accuracy import energy_drift
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, sphere_atlas
+from ripple_sim.solver.waves.operator import _softening
 
 
 def zonal_harmonic(z: np.ndarray) -> np.ndarray:
@@ -146,6 +149,20 @@ def test_stable_timestep_is_stable_and_close_to_the_limit(animal: Atlas) -> None
     with np.errstate(over="ignore", invalid="ignore"):
         waves._backend.advance(3000, 1.05 * waves.stable_timestep)
     assert not np.abs(waves._backend.height()).max() < 1e3
+
+
+def test_needles_do_not_set_the_time_step_of_all() -> None:
+    ball = sphere_atlas(1.0, 32)
+    assert (_softening(ball) == 1).all()
+    needles = dataclasses.replace(ball, positions=ball.positions.copy())
+    # nine texels almost in one place
+    crowd = needles.positions[4, 9:12, 9:12]
+    crowd += 0.8 * (crowd[1, 1] - crowd)
+    factors = _softening(needles)
+    assert 1 <= (factors < 1).sum() <= 9
+    assert factors.min() < 0.3
+    steps = [WaveSolver(atlas, backend="cpu").stable_timestep for atlas in (ball, needles)]
+    assert steps[1] > 0.9 * steps[0]
 
 
 def test_result_does_not_depend_on_how_time_is_cut() -> None:
