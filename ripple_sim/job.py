@@ -157,10 +157,11 @@ def render_video(
             transparent=transparent,
             gl=gl,
         )
-        ready = time.perf_counter()
         states = film.states(alive=_WAITING + 2)
         # waves on the GPU share the renderer's OpenGL context, which belongs to one thread at a time
         with Ahead(states, _WAITING) if simulations[0].backend == "cpu" else contextlib.nullcontext(states) as states:
+            film.prepare()
+            ready = time.perf_counter()
             for state in states:
                 if state.number % _CHECKED == 0:
                     writer.check_state(state.number, state.digest())

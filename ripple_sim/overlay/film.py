@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,19 +82,8 @@ class Film:
         self.simulations, self._request, self._frames = simulations, request, frames
         self._layout = Layout(width, height)
         self._notebook = Notebook(request, simulations, frames, rate)
-        ends = [round(width * k / len(simulations)) for k in range(len(simulations) + 1)]
-        self._sources = [
-            FrameSource(
-                simulation,
-                width=right - left,
-                height=height,
-                supersample=supersample,
-                transparent=transparent,
-                annotate=self._annotated,
-                gl=gl,
-            )
-            for simulation, left, right in zip(simulations, ends[:-1], ends[1:], strict=True)
-        ]
+        self._drawing: dict[str, Any] = {"supersample": supersample, "transparent": transparent, "gl": gl}
+        self._sources: list[FrameSource] = []
         self._painter = Painter(
             request,
             self._layout,
@@ -101,6 +91,17 @@ class Film:
             spacing=_common_spacing(simulations[0]),
             titles=[TITLES[operator] for operator in operators] if len(operators) > 1 else [],
         )
+
+    def prepare(self) -> None:
+        """Make the renderers, which takes a while, before the first `draw` does; the simulations may run meanwhile."""
+        if self._sources:
+            return
+        count, width, height = len(self.simulations), self._layout.width, self._layout.height
+        ends = [round(width * k / count) for k in range(count + 1)]
+        self._sources = [
+            FrameSource(simulation, width=right - left, height=height, annotate=self._annotated, **self._drawing)
+            for simulation, left, right in zip(self.simulations, ends[:-1], ends[1:], strict=True)
+        ]
 
     def states(self, alive: int = 1) -> Iterator[Shot]:
         """Run the simulations; see `ripple_sim.frames.run`."""
@@ -110,6 +111,7 @@ class Film:
 
     def draw(self, shot: Shot) -> NDArray[np.uint8]:
         """Draw a frame, uint8 [height, width, 3], or 4 if it is transparent."""
+        self.prepare()
         pictures = [self._picture(run, shot) for run in range(len(self._sources))]
         frame = pictures[0]
         if len(pictures) > 1:

@@ -142,8 +142,6 @@ def test_transparent_frames_show_the_bodies_and_no_background(scene: Scene, tmp_
     assert frame.shape == (54, 96, 4)
     assert frame[27, 48, 3] == 255  # the egg is in the middle
     assert frame[0, 0, 3] < 255
-    with pytest.raises(SceneError, match="no transparent background"):
-        render_video(scene, tmp_path / "other", transparent=True, overlay=["time"])
 
 
 def test_bad_requests_leave_nothing_behind(scene: Scene, tmp_path: Path) -> None:
