@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -276,6 +277,20 @@ def test_notes_do_not_grow(make_scene: Callable[..., Scene]) -> None:
     for _ in range(20):
         notes = notebook.follow()
     assert len(notes.energies[0][0]) == 1  # a thousand frames share a point
+
+
+def test_resumed_video_is_the_unbroken_one(make_scene: Callable[..., Scene], tmp_path: Path) -> None:
+    def render(name: str, **options: Any) -> list[bytes]:
+        render_video(make_scene(), tmp_path / name, size=(96, 54), fps=20, duration=0.3, overlay=EVERYTHING, **options)
+        return [path.read_bytes() for path in sorted((tmp_path / name).iterdir())]
+
+    def interrupt(done: int, total: int) -> None:
+        if done == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        render("broken", progress=interrupt)
+    assert render("broken", resume=True) == render("whole")
 
 
 def test_scene_file_names_overlays_and_a_video_shows_them(make_scene: Callable[..., Scene], tmp_path: Path) -> None:
