@@ -77,6 +77,7 @@ class ShadowMap:
 
     def bind_depth(self) -> None:
         """Bind the map for the shader of the floor's map."""
+        self._test.clear(1)  # the last frame's would go on testing depths
         self._depth.use(1)
 
     def bind(self) -> None:
