@@ -25,7 +25,7 @@ SLIDERS = ("speed", "damping", "stiffness")
 # The range of the colours follows the waves: at once where they grow, by this factor a frame where they die.
 _FADE = 0.96
 # Colours are full at this share of the greatest height: where something hits, the surface is higher than its waves.
-_FULL = 0.4
+_FULL = 0.25
 # Least range of the colours over the surface's size, so that rounding noise is not shown.
 _FAINT = 1e-4
 

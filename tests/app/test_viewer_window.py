@@ -34,12 +34,12 @@ def screen() -> Iterator[str]:
         server.wait()
 
 
-def check(display: str | None) -> None:
+def check(display: str | None, *options: str) -> None:
     environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
     if display is not None:
         environment["DISPLAY"] = display
     result = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(CHECKS)],
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(CHECKS), *options],
         env=environment,
         capture_output=True,
         text=True,
@@ -53,4 +53,4 @@ def test_off_screen() -> None:
 
 
 def test_on_a_screen(screen: str) -> None:
-    check(screen)
+    check(screen, "-k", "click or drag or key or knob or loop")  # what comes from its events
