@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
 
 from ripple_sim.solver import GLError, Material, sphere_atlas
 from ripple_sim.solver.waves.backend import Backend, make_backend
+from ripple_sim.solver.waves.backend_cpu import CPUBackend
 from ripple_sim.solver.waves.operator import WaveOperator, build_operator
 
 from .rivals import Copy, PlainShader, SparseLeapfrog
@@ -35,7 +37,7 @@ class Waited:
         self._backend.wait()
 
 
-def updates_per_second(contestants: dict[str, Advances], texels: int) -> dict[str, float]:
+def updates_per_second(contestants: Mapping[str, Advances], texels: int) -> dict[str, float]:
     """Texel updates a second of each, the best of several turns taken in rotation."""
     dt = 1e-6
     counts = {}
@@ -54,20 +56,28 @@ def updates_per_second(contestants: dict[str, Advances], texels: int) -> dict[st
 
 
 def cpu_speed(resolution: int) -> dict[str, float]:
-    """CPU backend against a memory copy and a sparse matrix."""
+    """CPU backend as it is and in one thread, against a memory copy and a sparse matrix, which have one thread."""
     operator = _operator(resolution)
     texels = operator.mass.size
-    rates = updates_per_second(
-        {"cpu": make_backend("cpu", operator), "copy": Copy(texels), "scipy": SparseLeapfrog(operator)}, texels
-    )
-    return rates | {"of copy": rates["cpu"] / rates["copy"], "over scipy": rates["cpu"] / rates["scipy"]}
+    contestants = {
+        "cpu": CPUBackend(operator),
+        "one thread": CPUBackend(operator, 1),
+        "copy": Copy(texels),
+        "scipy": SparseLeapfrog(operator),
+    }
+    rates = updates_per_second(contestants, texels)
+    return rates | {
+        "of copy": rates["one thread"] / rates["copy"],
+        "over scipy": rates["cpu"] / rates["scipy"],
+        "one thread over scipy": rates["one thread"] / rates["scipy"],
+    }
 
 
 def gl_speed(resolution: int) -> dict[str, float] | None:
     """GL backend against the plain shader; None without OpenGL."""
     operator = _operator(resolution)
     try:
-        contestants: dict[str, Advances] = {"gl": Waited(make_backend("gl", operator)), "plain": PlainShader(operator)}
+        contestants = {"gl": Waited(make_backend("gl", operator)), "plain": PlainShader(operator)}
     except GLError:
         return None
     rates = updates_per_second(contestants, operator.mass.size)
