@@ -155,6 +155,12 @@ class Window:
         window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
         return vtk_to_numpy(pixels).reshape(height, width, 3)[::-1]
 
+    def key(self, name: str) -> None:
+        """Do what a key stands for, large or small; other keys do nothing."""
+        for control in CONTROLS:
+            if name.lower() == control.key:
+                getattr(self, control.action)()
+
     def pause(self) -> None:
         """Pause, or go on."""
         self.session.paused = not self.session.paused
@@ -304,12 +310,6 @@ class Window:
         iren.add_observer("LeftButtonReleaseEvent", lambda *_: self._release())
         iren.add_observer("RenderEvent", lambda *_: self._stale())
         iren.add_observer("ExitEvent", lambda *_: self.quit())
-
-    def key(self, key: str) -> None:
-        """Do what a key stands for; other keys do nothing."""
-        for control in CONTROLS:
-            if key == control.key:
-                getattr(self, control.action)()
 
     def _press(self) -> None:
         self._pressed = self.plotter.iren.get_event_position()

@@ -110,7 +110,7 @@ def test_pause_step_and_reset_by_keys(window: Window) -> None:
     assert session.paused
     assert session.time == time
     assert not window.tick()  # nothing new: nothing drawn
-    press(window, "n")
+    press(window, "N")  # with the caps lock on as well
     assert session.time == pytest.approx(time + 1 / 30)
     assert window.tick()
     press(window, "r")
