@@ -70,8 +70,11 @@ class FieldLayout:
     def read(self, buffer: moderngl.Buffer) -> NDArray[np.float32]:
         """A field's texels, [6, N, N]."""
         with self._gl:
-            places = np.frombuffer(buffer.read(), np.float32)
-        return places[self.inside].reshape(6, self.n, self.n)
+            places = np.frombuffer(buffer.read(), np.float32).reshape(6, self._face_strips, self.n + 2, self.stride)
+        texels = np.empty((6, self.n, self.n), np.float32)
+        for strip, first, last in self._columns():
+            texels[:, :, first:last] = places[:, strip, 1:-1, EIGHT : EIGHT + last - first]
+        return texels
 
     def write(self, buffer: moderngl.Buffer, field: NDArray[np.float32]) -> None:
         """Replace a field's texels; the ring becomes 0."""
