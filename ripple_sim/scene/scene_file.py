@@ -51,7 +51,11 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
-    """The whole TOML file."""
+    """The whole TOML file.
+
+    `overlay` names what is drawn over the pictures: "height" or "velocity" in colours (with the end of the colours in m
+    or m/s where it shall be fixed, such as "height=0.02"), "contacts", "grid", "time", "energy".
+    """
 
     model: str
     ripple: list[RippleEntry]

@@ -1,8 +1,11 @@
 """What overlays are made of, without a picture: names, colours, limits that hold still, bounded histories."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from ripple_sim.cli.main import main
 from ripple_sim.errors import SceneError
 from ripple_sim.overlay.colormap import SIZE, color_table, colors, lab_to_srgb
 from ripple_sim.overlay.comparison import compared_operators
@@ -55,6 +58,18 @@ def test_request_takes_every_name_and_ranges() -> None:
 def test_request_refuses(words: list[str], said: str) -> None:
     with pytest.raises(SceneError, match=said):
         parse_request(words)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [(["--overlay", "height,hight"], "valid are height, velocity"), (["--compare", "fem"], "valid are paper")],
+)
+def test_program_refuses_bad_names(
+    options: list[str], said: str, capsys: pytest.CaptureFixture, tmp_path: Path
+) -> None:
+    assert main(["render", "duck", "-o", str(tmp_path / "x.mp4"), *options]) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def test_comparison_names_its_baselines() -> None:
