@@ -15,7 +15,7 @@ from .looks import Look
 
 _GEOM = mujoco.mjtGeom
 _ROLES = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
-_OWN_GEOMETRY = (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF, _GEOM.mjGEOM_HFIELD)
+_MESHES = (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF)
 
 NO_IMAGE, FLAT_IMAGE, CUBE_IMAGE = range(3)  # MAPPING of the geometry shaders
 
@@ -83,18 +83,14 @@ def mapping_of(model: Any, geom: int) -> Mapping:
     texture = max(textures, default=-1)
     if texture < 0 or model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
         return Mapping(NO_IMAGE, -1, np.zeros(3), False)
-    size = _half_sizes(model, geom)
+    kind, size = int(model.geom_type[geom]), _half_sizes(model, geom)
     uniform = bool(model.mat_texuniform[material])
     if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE:
-        shaped = model.geom_type[geom] in _OWN_GEOMETRY
+        shaped = kind in _MESHES or kind == _GEOM.mjGEOM_HFIELD
         scale = np.ones(3) if uniform or shaped else 1.0 / np.where(size > 0, size, 1.0)
         return Mapping(CUBE_IMAGE, texture, scale, False)
     mesh = int(model.geom_dataid[geom])
-    own = (
-        model.geom_type[geom] in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF)
-        and mesh >= 0
-        and model.mesh_texcoordadr[mesh] >= 0
-    )
+    own = kind in _MESHES and mesh >= 0 and model.mesh_texcoordadr[mesh] >= 0
     repeat = np.asarray(model.mat_texrepeat[material], dtype=np.float64)
     if own:
         return Mapping(FLAT_IMAGE, texture, np.array([repeat[0], repeat[1], 0.0]), True)

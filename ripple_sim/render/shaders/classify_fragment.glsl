@@ -19,6 +19,8 @@ void main()
     vec2 aside = abs(clip.xy / clip.w - 0.5);
     bool shaded = max(off.x, off.y) < 0.5 ? textureLod(floor_map_image, place, 0.0).g > 0.0
                                           : max(aside.x, aside.y) < 0.5 && clip.w > 0.0 && counts.w > 0.0;
+    // blocks of pixels go together, so that their shadows can be averaged
+    shaded = block_mean(shaded ? 1.0 : 0.0) > 0.0;
     float open = floor_at < MISSED ? shaded ? SHADED_LEVEL : FLOOR_LEVEL : SKY_LEVEL;
     fragment = vec4(0.0);
     gl_FragDepth = count == 0 ? open : count == SAMPLES ? SOLID_LEVEL : MIXED_LEVEL;

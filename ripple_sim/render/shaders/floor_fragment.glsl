@@ -47,10 +47,14 @@ void main()
     float open = textureLod(floor_openness, floor_place(world), 1.0).r;
 #if SHADOW
     float shadow = key_visibility(world, floor_normal.xyz, 0.0);
-    // the mean of a block of 2 x 2 pixels, whose filters are turned differently: half the noise
-    vec2 side = 1.0 - 2.0 * vec2(ivec2(gl_FragCoord.xy) & 1);
-    shadow += 0.5 * side.x * dFdx(shadow);
-    shadow += 0.5 * side.y * dFdy(shadow);
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    int solid = bitCount(covered(pixel, at));
+    // The filters of neighbouring pixels are turned differently: their mean has half the noise. It is taken where all
+    // four pixels of a block are of this pass: what others have reckoned is undefined.
+    bool inside = all(lessThan(pixel | 1, textureSize(depths BASE_LEVEL)));
+    bool whole = inside && block_mean(solid > 0 || at >= MISSED ? 1.0 : 0.0) == 0.0;
+    float mean = block_mean(shadow);
+    shadow = whole ? mean : shadow;
 #else
     const float shadow = 1.0;
 #endif
@@ -63,7 +67,7 @@ void main()
     }
     light += around * (0.15 + 0.85 * open);
 #if SHADOW
-    float share = 1.0 - float(bitCount(covered(ivec2(gl_FragCoord.xy), at))) / float(SAMPLES);
+    float share = 1.0 - float(solid) / float(SAMPLES);
 #else
     const float share = 1.0;
 #endif

@@ -1,8 +1,10 @@
 // The samples of the geometry pass.
 #if SAMPLES > 1
 #define BUFFER sampler2DMS
+#define BASE_LEVEL
 #else
 #define BUFFER sampler2D
+#define BASE_LEVEL , 0
 #endif
 layout(binding = 8) uniform BUFFER depths;
 layout(binding = 9) uniform BUFFER normals;
@@ -10,6 +12,14 @@ layout(binding = 10) uniform BUFFER paints;
 layout(binding = 11) uniform BUFFER details;
 
 in vec2 screen;
+
+// Mean over a block of 2 x 2 pixels.
+float block_mean(float value)
+{
+    vec2 side = 1.0 - 2.0 * vec2(ivec2(gl_FragCoord.xy) & 1);
+    value += 0.5 * side.x * dFdx(value);
+    return value + 0.5 * side.y * dFdy(value);
+}
 
 // From the eye through the pixel, one metre along the camera's axis.
 vec3 way_of_pixel()
