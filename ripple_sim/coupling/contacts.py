@@ -34,7 +34,7 @@ class ContactPair:
 
 
 def contact_pairs(
-    model: mujoco.MjModel, data: mujoco.MjData, is_target: NDArray[np.bool_]
+    model: mujoco.MjModel, data: mujoco.MjData, is_target: NDArray[np.bool_], extents: NDArray[np.float64]
 ) -> dict[tuple[int, int], ContactPair]:
     """Collect the pressing contacts of some geoms, by (target, other) in ascending order.
 
@@ -45,6 +45,8 @@ def contact_pairs(
     model, data
     is_target : bool [ngeom]
         By geom id.
+    extents : float64 [ngeom]
+        Smallest half-extents [m]; see `smallest_extents`.
     """
     if not data.ncon:
         return {}
@@ -59,6 +61,7 @@ def contact_pairs(
         data.efc_force,
         model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
         is_target,
+        extents,
     )
     pairs = list(zip(targets.tolist(), others.tolist(), strict=True))
     found, begin = {}, 0
@@ -70,8 +73,14 @@ def contact_pairs(
     return found
 
 
+def smallest_extents(model: mujoco.MjModel) -> NDArray[np.float64]:
+    """Smallest half-extent of every geom [m]; planes and height fields have none, and count as endless."""
+    endless = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+    return np.where(np.isin(model.geom_type, endless), np.inf, model.geom_aabb[:, 3:].min(axis=1))
+
+
 @numba.njit(cache=True)
-def _pressing(geoms, address, dim, dist, pos, frame, efc_force, pyramidal, is_target):
+def _pressing(geoms, address, dim, dist, pos, frame, efc_force, pyramidal, is_target, extents):
     """Target, other, point, normal force and normal of all contacts that press on a target, pair by pair."""
     most = 2 * len(geoms)
     targets, others, forces = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
@@ -88,6 +97,8 @@ def _pressing(geoms, address, dim, dist, pos, frame, efc_force, pyramidal, is_ta
         force = efc_force[address[i] : address[i] + rows].sum()
         if force <= 0:
             continue
+        # overlaps deeper than a body are none: MuJoCo's speculative contacts say by `dist` how hard to stop what comes
+        depth = min(abs(dist[i]), extents[first], extents[second])
         for target, other, side in ((first, second, 1.0), (second, first, -1.0)):
             if is_target[target]:
                 targets[count], others[count], forces[count] = target, other, force
@@ -96,7 +107,7 @@ def _pressing(geoms, address, dim, dist, pos, frame, efc_force, pyramidal, is_ta
                     # surface is dist/2 away. Somewhat outside of it the nearest surface point is on this side, even of
                     # a thin part.
                     normals[count, k] = side * frame[i, k]
-                    points[count, k] = pos[i, k] + 1.5 * abs(dist[i]) * normals[count, k]
+                    points[count, k] = pos[i, k] + 1.5 * depth * normals[count, k]
                 count += 1
     # a sort that leaves the contacts of a pair in their order
     order = np.argsort(targets[:count] * len(is_target) + others[:count], kind="mergesort")

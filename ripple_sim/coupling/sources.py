@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.waves.load import Load
 
-from .contacts import ContactPair, contact_pairs
+from .contacts import ContactPair, contact_pairs, smallest_extents
 from .patch import Patch
 from .press import Press
 from .target import geom_name
@@ -21,7 +21,6 @@ from .target import geom_name
 _FOOTPRINT = 0.5
 
 _NOT_CONVEX = (int(mujoco.mjtGeom.mjGEOM_SDF), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-_ENDLESS = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -76,9 +75,8 @@ class Sources:
         self._model, self._waves = model, waves
         self._is_target = np.zeros(model.ngeom, dtype=np.bool_)
         self._is_target[list(waves)] = True
-        # planes and height fields have no half-extents
-        extents = np.where(np.isin(model.geom_type, _ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1))
-        self._radius = (_FOOTPRINT * extents).tolist()
+        self._extents = smallest_extents(model)
+        self._radius = (_FOOTPRINT * self._extents).tolist()
         self._convex = (~np.isin(model.geom_type, _NOT_CONVEX)).tolist()
         self._names = [geom_name(model, geom) for geom in range(model.ngeom)]
         self._carried = {geom: _carried(each) for geom, each in waves.items()}
@@ -102,7 +100,7 @@ class Sources:
         """Loads on each target over a time [s], from the contact forces that MuJoCo held over its latest time step."""
         self.impulses, self.touches = [], []
         loads: dict[int, list[Load]] = {geom: [] for geom in self._waves}
-        pairs = contact_pairs(self._model, data, self._is_target)
+        pairs = contact_pairs(self._model, data, self._is_target, self._extents)
         for geom in loads:
             touching = [pair for key, pair in pairs.items() if key[0] == geom]
             if touching:

@@ -10,11 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RippleWarning
+from .contacts import smallest_extents
 from .target import geom_name
 
-_ENDLESS = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+_SDF = int(mujoco.mjtGeom.mjGEOM_SDF)
+# The flag of MuJoCo's speculative contacts, which it has from version 4 on; before, 0.
+SPECULATIVE = int(getattr(mujoco.mjtEnableBit, "mjENBL_SPECULATIVE", 0))
 
 _SAFE = 0.85
+# Depth over a body's smallest half-extent at which contacts with a signed distance begin to push from all sides: seen
+# at 1.4, not yet at 1.2.
+_SAFE_IN_SDF = 1.2
 # Speeds are looked at this often [steps], and for as many steps ahead.
 _EVERY = 5
 
@@ -25,7 +31,10 @@ class SpeedCheck:
     A body that arrives at speed v gets in by about v dt before MuJoCo sees the contact, and then by v t_soft before the
     contact's spring has stopped it: t_soft = tau zeta exp(-zeta) for a `solref` of time constant tau and damping ratio
     zeta (a critically damped spring at zeta = 1). Past the sum of the two geoms' smallest half-extents it comes out
-    on the other side or stays inside; the first that do were seen at 0.9 of it. Every pair is warned of once.
+    on the other side or stays inside; the first that do were seen at 0.9 of it. In an SDF geom a body that is in by
+    more than its own half-extent is pushed from all sides: the normal forces then add up to many times the momentum
+    that is exchanged. Every pair is warned of once. MuJoCo's speculative contacts, where the version has them and they
+    are enabled, stop bodies in time, but not at SDF geoms: then only those are checked.
 
     Parameters
     ----------
@@ -36,16 +45,22 @@ class SpeedCheck:
 
     def __init__(self, model: mujoco.MjModel, targets: list[int]) -> None:
         self._model = model
-        kinds, bodies = model.geom_type, model.geom_bodyid
-        thickness = model.geom_aabb[:, 3:].min(axis=1)
+        bodies, extents, sdf = model.geom_bodyid, smallest_extents(model), model.geom_type == _SDF
+        in_time = bool(model.opt.enableflags & SPECULATIVE)
         pairs = [
             (target, other)
             for target in targets
             for other in range(model.ngeom)
-            if kinds[other] not in _ENDLESS and bodies[other] != bodies[target] and _collide(model, target, other)
+            if np.isfinite(extents[other])
+            and bodies[other] != bodies[target]
+            and _collide(model, target, other)
+            and (sdf[target] or sdf[other] or not in_time)
         ]
         self._target, self._other = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-        self._limit = _SAFE * (thickness[self._target] + thickness[self._other])
+        of_target, of_other = extents[self._target], extents[self._other]
+        self._limit = _SAFE * (of_target + of_other)
+        for inside, of_inside in ((self._other, of_target), (self._target, of_other)):
+            self._limit = np.where(sdf[inside], np.minimum(self._limit, _SAFE_IN_SDF * of_inside), self._limit)
         self._reach = model.geom_rbound[self._target] + model.geom_rbound[self._other]
         solref = (model.geom_solref[self._target] + model.geom_solref[self._other]) / 2
         self._soft = _stopping_time(solref, model.opt.timestep)
@@ -87,8 +102,8 @@ class SpeedCheck:
         )
         return (
             f"body {body!r} meets geom {geom_name(model, int(self._target[i]))!r} at {speed:.3g} m/s and would go "
-            f"through it or get stuck: with a time step of {model.opt.timestep:.2g} s it gets in by "
-            f"{speed * (model.opt.timestep + float(self._soft[i])):.2g} m, of which {limit:.2g} m are safe; {advice}"
+            f"through it, get stuck or give a wrong impulse: with a time step of {model.opt.timestep:.2g} s it gets in "
+            f"by {speed * (model.opt.timestep + float(self._soft[i])):.2g} m, of which {limit:.2g} m are safe; {advice}"
         )
 
 

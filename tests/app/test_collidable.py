@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, Ripples, make_collidable
+from ripple_sim.coupling import collidable
 from ripple_sim.coupling.collidable import hull_gap
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.scenes.shapes import limbed, peanut
@@ -58,6 +59,14 @@ def test_starting_points_are_lowered_but_never_raised() -> None:
 def test_primitives_are_left_alone() -> None:
     spec = spec_of(*peanut(0.05))
     assert make_collidable(spec, "knob").type == mujoco.mjtGeom.mjGEOM_SPHERE
+
+
+def test_fast_bodies_are_stopped_by_speculative_contacts_where_there_are_any(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(collidable, "SPECULATIVE", 1 << 20)
+    for geom, route, enabled in (("target", "sdf", False), ("target", "hull", True), ("knob", "sdf", True)):
+        spec = spec_of(*peanut(0.05))
+        make_collidable(spec, geom, route)
+        assert bool(spec.option.enableflags & 1 << 20) == enabled
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, RippleError, Ripples
+from ripple_sim.coupling.contacts import contact_pairs, smallest_extents
 from ripple_sim.coupling.patch import cluster
 from ripple_sim.scenes.shapes import limbed
 
@@ -222,6 +223,19 @@ def test_two_targets_that_touch_both_ripple() -> None:
     assert low.point[2] > 0.29
     assert high.point[2] < 0.33
     assert all(ripples[name].height.any() for name in ripples)
+
+
+def test_contact_that_only_says_how_hard_to_stop_a_body_presses_where_it_is() -> None:
+    """MuJoCo's speculative contacts have a made-up overlap of metres, which must not carry their points away."""
+    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0.1 0 0.53"))
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data)
+    is_target, extents = np.array([True, False]), smallest_extents(model)
+    [before] = contact_pairs(model, data, is_target, extents).values()
+    data.contact.dist[:] = -7.0
+    [after] = contact_pairs(model, data, is_target, extents).values()
+    np.testing.assert_array_equal(after.forces, before.forces)
+    assert np.linalg.norm(after.points - before.points) < 1.5 * 0.05
 
 
 def test_far_contacts_of_one_pair_stay_apart_and_add_up() -> None:

@@ -6,8 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from ripple_sim.coupling import speeds
 from ripple_sim.coupling.speeds import SpeedCheck
 from ripple_sim.errors import RippleWarning
+from ripple_sim.scenes.shapes import peanut
 
 PLATE = '<geom name="plate" type="box" size="0.3 0.3 0.02"/>'
 
@@ -67,4 +69,54 @@ def test_moving_target_counts_with_its_own_speed() -> None:
     data.qvel[2], data.qvel[8] = 15, -15
     mujoco.mj_forward(model, data)
     with pytest.warns(RippleWarning, match="at 30 m/s"):
+        SpeedCheck(model, [0])(data)
+
+
+@pytest.mark.parametrize("solref", ["0.02 1", "0.01 0.2", "0.149 0.0335"])
+def test_what_an_sdf_pushes_from_all_sides_was_warned_of(solref: str) -> None:
+    V, F = peanut(0.05)
+    mesh = f'vertex="{" ".join(f"{x:.5g}" for x in V.ravel())}" face="{" ".join(map(str, F.ravel()))}"'
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="0.002" gravity="0 0 0" sdf_initpoints="10"/>
+        <default><geom solref="{solref}" condim="1"/></default><asset><mesh name="m" {mesh}/></asset><worldbody>
+        <geom name="target" type="sdf" mesh="m"/><body name="ball" pos="-0.17 0.01 0.3"><freejoint/>
+        <geom size="0.03" mass="0.3"/></body></worldbody></mujoco>"""
+    )
+    outcomes = []
+    for speed in np.geomspace(1, 30, 8):
+        data, check, wrench = mujoco.MjData(model), SpeedCheck(model, [0]), np.zeros(6)
+        data.qvel[2], forces, push = -speed, 0.0, 0.0
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            while data.time < 0.2 / speed + 0.06:
+                mujoco.mj_step(model, data)
+                check(data)
+                total = np.zeros(3)
+                for i, contact in enumerate(data.contact):
+                    mujoco.mj_contactForce(model, data, i, wrench)
+                    forces, total = forces + wrench[0], total + wrench[0] * contact.frame[:3]
+                push += float(np.linalg.norm(total))
+        outcomes.append((forces / push < 1.03, bool(caught)))
+    assert all(warned for right, warned in outcomes if not right)
+    # and not much too early: within two of the speeds tried
+    first_wrong, first_warned = [right for right, _ in outcomes].index(False), [w for _, w in outcomes].index(True)
+    assert first_wrong - first_warned <= 2
+
+
+def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: pytest.MonkeyPatch) -> None:
+    flags = [flag for name, flag in mujoco.mjtEnableBit.__members__.items() if "SPECULATIVE" in name]
+    assert speeds.SPECULATIVE == sum(int(flag) for flag in flags)
+    monkeypatch.setattr(speeds, "SPECULATIVE", 1 << 20)
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option gravity="0 0 0"/><worldbody>{PLATE}<body name="ball" pos="0 0 0.2"><freejoint/>
+        <geom size="0.03"/></body></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    data.qvel[2] = -60
+    mujoco.mj_forward(model, data)
+    with pytest.warns(RippleWarning, match="at 60 m/s"):
+        SpeedCheck(model, [0])(data)
+    model.opt.enableflags |= 1 << 20
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
         SpeedCheck(model, [0])(data)
