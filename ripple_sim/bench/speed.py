@@ -59,7 +59,7 @@ def cpu_speed(resolution: int) -> dict[str, float]:
     """CPU backend as it is and in one thread, against a memory copy and a sparse matrix, which have one thread."""
     operator = _operator(resolution)
     texels = operator.mass.size
-    contestants = {
+    contestants: dict[str, Advances] = {
         "cpu": CPUBackend(operator),
         "one thread": CPUBackend(operator, 1),
         "copy": Copy(texels),
@@ -77,7 +77,7 @@ def gl_speed(resolution: int) -> dict[str, float] | None:
     """GL backend against the plain shader; None without OpenGL."""
     operator = _operator(resolution)
     try:
-        contestants = {"gl": Waited(make_backend("gl", operator)), "plain": PlainShader(operator)}
+        contestants: dict[str, Advances] = {"gl": Waited(make_backend("gl", operator)), "plain": PlainShader(operator)}
     except GLError:
         return None
     rates = updates_per_second(contestants, operator.mass.size)

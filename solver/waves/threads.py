@@ -32,9 +32,9 @@ def advance(threads: int, substeps: int, *fields: Any) -> None:
     No thread is waited for before it has taken on a face: one that comes late, or never, leaves its share to others.
     Every texel is computed by the same code whatever the thread, so the numbers do not depend on how many there are.
     """
-    counters = np.zeros(_COUNTERS, np.int64)
-    helpers = [_pool().submit(_advance, substeps, *fields, counters) for _ in range(threads - 1)]
-    _advance(substeps, *fields, counters)
+    share = functools.partial(_advance, substeps, *fields, np.zeros(_COUNTERS, np.int64))
+    helpers = [_pool().submit(share) for _ in range(threads - 1)]
+    share()
     for helper in helpers:
         helper.cancel()
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import Atlas, Material, WaveSolver, sphere_atlas
+from ripple_sim.solver.gl import GLContext
 from ripple_sim.solver.waves.backend import make_backend
 from ripple_sim.solver.waves.backend_cpu import CPUBackend
 from ripple_sim.solver.waves.operator import build_operator
@@ -55,8 +56,12 @@ def test_gl_equals_cpu_after_a_thousand_steps(gl_backend: str, feature: str) -> 
         assert np.abs(gl - cpu).max() <= tolerance * np.abs(cpu).max()
 
 
+@pytest.mark.parametrize("software", [True, False], ids=["software blocks", "hardware blocks"])
 @pytest.mark.parametrize("resolution", [4, 5, 13, 63, 65, 130])
-def test_gl_equals_cpu_at_resolutions_that_fill_no_strip(gl_backend: str, resolution: int) -> None:
+def test_gl_equals_cpu_at_resolutions_that_fill_no_strip(
+    gl_backend: str, monkeypatch: pytest.MonkeyPatch, resolution: int, software: bool
+) -> None:
+    monkeypatch.setattr(GLContext, "software", software)
     atlas = sphere_atlas(1.0, resolution)
     operator = build_operator(atlas, Material(speed=1.0, viscosity=1e-4, bending=1e-7), "fem")
     height = np.random.default_rng(resolution).standard_normal(atlas.areas.shape).astype(np.float32)
