@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from .corner_table import CornerTable, collapse, following, gather_star, preceding
-from .vectors import Floats, Ints, cross, dot, kernel, row, subtract
+from .vectors import Floats, Ints, cross, dot, kernel, row, set_row, subtract
 
-ROUND_SHARE = 0.15  # of the vertices left, removed in one round
+ROUND_SHARE = 0.2  # of the vertices left, removed in one round
 COMFORTABLE_DEGREE = 8
 DEGREE_LIMIT = 12  # of a merged vertex, raised where nothing else is left to collapse
 
@@ -107,6 +107,7 @@ def _price(
 ) -> None:
     """Find the cheapest legal collapse of every stale vertex (`blur`: a squared length below which all are alike)."""
     neighbours, mark = np.empty(len(V), np.int32), np.full(len(V), -1, np.int32)
+    ring = np.empty((len(V), 3))
     for u in alive:
         if not stale[u]:
             continue
@@ -116,23 +117,27 @@ def _price(
             continue
         gather_star(table, u, neighbours)
         _mark_neighbours(table, u, mark)
-        for i in range(degree[u]):
+        position, size = row(V, u), degree[u]
+        for i in range(size):
+            set_row(ring, i, row(V, table.tail[following(neighbours[i])]))
+        least, cheapest = np.inf, -1
+        for i in range(size):
             h = neighbours[i]
             v = table.tail[following(h)]
-            merged_degree = degree[u] + degree[v] - 4
+            merged_degree = size + degree[v] - 4
             if merged_degree > limit:
                 continue
-            p = row(V, v)
+            p = row(ring, i)
             span = 0.0
-            for j in range(degree[u]):
-                e = subtract(row(V, table.tail[following(neighbours[j])]), p)
+            for j in range(size):
+                e = subtract(row(ring, j), p)
                 span = max(span, dot(e, e))
-            e = subtract(row(V, u), p)
+            e = subtract(position, p)
             shape = (span + blur) * (dot(e, e) + blur) * (1.0 + 0.5 * max(merged_degree - COMFORTABLE_DEGREE, 0))
             price = shape + max(_quadric_error(quadrics[u], p[0], p[1], p[2]), 0.0) + blur * blur * merged[u]
-            if price < cost[u] and _is_legal(table, u, v, mark):
-                cost[u] = price
-                target[u] = h
+            if price < least and _is_legal(table, u, v, mark):
+                least, cheapest = price, h
+        cost[u], target[u] = least, cheapest
 
 
 @kernel

@@ -51,6 +51,7 @@ def assemble(
         u, v, w = tail[h], tail[h + 1], tail[h + 2]
         cot_a, cot_b, cot_c = reference.cotangent[h], reference.cotangent[h + 1], reference.cotangent[h + 2]
         a, b, c = row(S, u), row(S, v), row(S, w)
+        xa, ya, xb, yb, xc, yc = row(x, u), row(y, u), row(x, v), row(y, v), row(x, w), row(y, w)
         ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
         dirichlet = cot_a * dot(bc, bc) + cot_b * dot(ac, ac) + cot_c * dot(ab, ab)
         jacobian = half * dot(a, cross(ab, ac))
@@ -59,9 +60,9 @@ def assemble(
         grad_a = combine(-2.0 * cot_c, ab, -2.0 * cot_b, ac)
         grad_b = combine(-2.0 * cot_a, bc, 2.0 * cot_c, ab)
         grad_c = combine(2.0 * cot_b, ac, 2.0 * cot_a, bc)
-        at_a = _slopes(grad_a, cross(b, c), half, row(x, u), row(y, u))
-        at_b = _slopes(grad_b, cross(c, a), half, row(x, v), row(y, v))
-        at_c = _slopes(grad_c, cross(a, b), half, row(x, w), row(y, w))
+        at_a = _slopes(grad_a, cross(b, c), half, xa, ya)
+        at_b = _slopes(grad_b, cross(c, a), half, xb, yb)
+        at_c = _slopes(grad_c, cross(a, b), half, xc, yc)
         along_d, along_j = shares[0], shares[1] * jacobian
         radial[u] += along_d * dot(grad_a, a) + along_j
         radial[v] += along_d * dot(grad_b, b) + along_j
@@ -70,9 +71,9 @@ def assemble(
         _add_vertex(v, at_b, cot_c + cot_a, shares, gradient, diagonal)
         _add_vertex(w, at_c, cot_a + cot_b, shares, gradient, diagonal)
         i, j, k = edge[h], edge[h + 1], edge[h + 2]
-        _add_edge(i, ends[i, 0] == u, u, v, c, cot_c, half, at_a, at_b, shares, x, y, blocks)
-        _add_edge(j, ends[j, 0] == v, v, w, a, cot_a, half, at_b, at_c, shares, x, y, blocks)
-        _add_edge(k, ends[k, 0] == w, w, u, b, cot_b, half, at_c, at_a, shares, x, y, blocks)
+        _add_edge(i, ends[i, 0] == u, (xa, ya), (xb, yb), c, cot_c, half, at_a, at_b, shares, blocks)
+        _add_edge(j, ends[j, 0] == v, (xb, yb), (xc, yc), a, cot_a, half, at_b, at_c, shares, blocks)
+        _add_edge(k, ends[k, 0] == w, (xc, yc), (xa, ya), b, cot_b, half, at_c, at_a, shares, blocks)
     for v in range(len(S)):
         # on the sphere a tangent step also falls towards the centre: the Hessian gains minus the radial slope
         shift = max(-radial[v], 0.0) + 1e-8 * (diagonal[v, 0] + diagonal[v, 2])
@@ -140,20 +141,18 @@ def _add_vertex(v: int, at_v: Slopes, bend: float, shares: Shares, gradient: Flo
 def _add_edge(
     e: int,
     forwards: bool,
-    u: int,
-    v: int,
+    tangents_u: tuple[Vector, Vector],
+    tangents_v: tuple[Vector, Vector],
     apex: Vector,
     cotangent: float,
     half: float,
     at_u: Slopes,
     at_v: Slopes,
     shares: Shares,
-    x: Floats,
-    y: Floats,
     blocks: Floats,
 ) -> None:
-    """Add what the triangle u, v, apex says about edge e, which begins at u if `forwards`."""
-    ux, uy, vx, vy = row(x, u), row(y, u), row(x, v), row(y, v)
+    """Add what the triangle u, v, apex says about its edge e, which `blocks` takes from u to v if `forwards`."""
+    (ux, uy), (vx, vy) = tangents_u, tangents_v
     flat, twist = -2.0 * shares[2] * cotangent, shares[3] * half
     bent_x, bent_y = combine(flat, ux, twist, cross(apex, ux)), combine(flat, uy, twist, cross(apex, uy))
     px, py, qx, qy = _combined(at_u, shares)
