@@ -105,7 +105,7 @@ def test_what_an_sdf_pushes_from_all_sides_was_warned_of(solref: str) -> None:
 
 def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: pytest.MonkeyPatch) -> None:
     flags = [flag for name, flag in mujoco.mjtEnableBit.__members__.items() if "SPECULATIVE" in name]
-    assert speeds.SPECULATIVE == sum(int(flag) for flag in flags)
+    assert sum(int(flag) for flag in flags) == speeds.SPECULATIVE
     monkeypatch.setattr(speeds, "SPECULATIVE", 1 << 20)
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option gravity="0 0 0"/><worldbody>{PLATE}<body name="ball" pos="0 0 0.2"><freejoint/>
