@@ -1,6 +1,8 @@
 """CPU backend: the leapfrog update as one pass over the texels, compiled by numba.
 
-One thread on small atlases: a substep takes 0.07 ms at N = 128, and the other cores render and encode meanwhile.
+One thread on all but the largest atlases: a substep takes 0.07 ms at N = 128 and 0.3 ms at N = 256, less than a helper
+may be kept from its core by the threads that render and encode meanwhile. Whoever waits for it then loses more than two
+threads gain.
 """
 
 from __future__ import annotations
@@ -12,8 +14,8 @@ from ..atlas.padding import padded_addresses
 from . import kernels, threads
 from .operator import StepCoefficients, WaveOperator, number_or_field, step_coefficients
 
-# From this resolution on several threads share out the faces.
-_THREADED = 256
+# From this resolution on, where a substep takes milliseconds, several threads share out the faces.
+_THREADED = 512
 
 # Floats of a page of memory.
 _PAGE = 1024
@@ -27,7 +29,7 @@ class CPUBackend:
     operator : WaveOperator
     thread_count : int, optional
         How many share out the faces, where the material neither bends, drags nor yields; by default as many as can be
-        of use from N = 256 on. The numbers do not depend on it.
+        of use from N = 512 on. The numbers do not depend on it.
     """
 
     name = "cpu"
