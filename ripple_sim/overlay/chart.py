@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .layout import Layout
 from .panels import panel
-from .patch import FAINT, INK, Patch, text_width
+from .patch import FAINT, INK, Color, Patch, text_width
 from .scale import number, readable, round_up
 
 Curve = tuple[NDArray[np.float64], NDArray[np.float64]]  # times [s], values
 
-_COLORS = ((38, 92, 160), (196, 88, 52))
+COLORS = ((38, 92, 160), (196, 88, 52))  # of the curves
 _GRID = (150, 158, 170)
 
 
@@ -45,7 +45,7 @@ class Chart:
         if self._axes is None or self._axes[0] != (limit, goal):
             self._axes = (limit, goal), self._draw_axes(limit, goal)
         patch = self._axes[1].copy()
-        for color, (times, values) in zip(_COLORS, curves, strict=False):
+        for color, (times, values) in zip(COLORS, curves, strict=False):
             self._draw_curve(patch, times, values, limit, color)
         return patch
 
@@ -57,15 +57,16 @@ class Chart:
         patch.text(round(0.7 * em) + text_width(self._title, em) + 0.5 * em, 1.4 * em, prefixed, small, FAINT)
         self._draw_names(patch, small)
         hair = max(1, round(em / 16))
-        for value in (0.0, goal / 2, goal) if goal else (0.0,):
+        half = [goal / 2] if self._bottom - self._top > 2.6 * small else []
+        for value in [0.0, *half, goal] if goal else [0.0]:
             if value <= 1.001 * limit or not value:
-                y = round(self._row(value, limit))
+                y = round(float(self._row(value, limit)))
                 patch.box(self._left, y - hair, self._right, y, INK if not value else _GRID, 0.9 if not value else 0.5)
                 patch.text(self._left - 0.4 * em, y + 0.3 * em, number(value * factor), small, INK, "right")
         step = round_up(self._duration / 4, (1.0, 2.0, 5.0))
         last = int(self._duration / step + 1e-9)
         for k in range(last + 1):
-            x = round(self._column(k * step))
+            x = round(float(self._column(k * step)))
             patch.box(x, self._bottom, x + hair, self._bottom + 0.25 * em, INK)
             unit = " s" if k == last else ""
             patch.text(x, self._bottom + 1.25 * em, number(k * step) + unit, small, INK, "middle")
@@ -73,16 +74,17 @@ class Chart:
 
     def _draw_names(self, patch: Patch, size: int) -> None:
         x = float(self._width - round(0.7 * self._em))
-        for color, name in reversed(list(zip(_COLORS, self._names, strict=False))):
+        titles = text_width(f"{self._title} {self._unit}", self._em) + self._em
+        if sum(text_width(name, size) + 0.9 * self._em for name in self._names) > x - titles:
+            return  # too narrow; the runs' titles have the curves' colours, too
+        for color, name in reversed(list(zip(COLORS, self._names, strict=False))):
             patch.text(x, 1.4 * self._em, name, size, color, "right")
             x -= text_width(name, size) + 0.9 * self._em
 
-    def _draw_curve(
-        self, patch: Patch, times: NDArray, values: NDArray, limit: float, color: tuple[int, int, int]
-    ) -> None:
+    def _draw_curve(self, patch: Patch, times: NDArray, values: NDArray, limit: float, color: Color) -> None:
         if len(times) == 0 or limit <= 0:
             return
-        end = self._column(times[-1])
+        end = float(self._column(times[-1]))
         edges = np.arange(self._left, int(np.ceil(end)) + 1)
         rows = np.interp(edges, self._column(times), self._row(values, limit))
         thick = self._em / 9
@@ -95,14 +97,14 @@ class Chart:
         if len(self._names) < 2:
             patch.fill(coverage[0], color, 0.14)
         patch.fill(coverage[1], color)
-        patch.disc(end, self._row(values[-1], limit), 0.26 * self._em, color)
+        patch.disc(end, float(self._row(values[-1], limit)), 0.26 * self._em, color)
 
-    def _column(self, time: NDArray | float) -> NDArray:
-        return self._left + (self._right - self._left) * np.asarray(time) / self._duration
+    def _column(self, time: ArrayLike) -> NDArray[np.float64]:
+        return self._left + (self._right - self._left) * np.asarray(time, dtype=np.float64) / self._duration
 
-    def _row(self, value: NDArray | float, limit: float) -> NDArray:
-        share = np.clip(np.asarray(value) / limit, 0, 1) if limit else 0.0
-        return self._bottom - (self._bottom - self._top) * share
+    def _row(self, value: ArrayLike, limit: float) -> NDArray[np.float64]:
+        share = np.asarray(value, dtype=np.float64) / (limit or 1.0)
+        return self._bottom - (self._bottom - self._top) * np.clip(share, 0, 1)
 
 
 def _columns_between(low: NDArray[np.float64], high: NDArray[np.float64], height: int) -> NDArray[np.float32]:

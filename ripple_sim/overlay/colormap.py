@@ -59,7 +59,7 @@ def _arm(hue_near: float, hue_end: float) -> NDArray[np.float64]:
 def _smooth(place: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Polynomial through control points at equal distances."""
     knots = np.linspace(0, 1, len(points))
-    return np.polyval(np.polyfit(knots, points, len(points) - 1), place)
+    return np.asarray(np.polyval(np.polyfit(knots, points, len(points) - 1), place), dtype=np.float64)
 
 
 def _evenly(lab: NDArray[np.float64]) -> NDArray[np.float64]:

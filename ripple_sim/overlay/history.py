@@ -31,4 +31,4 @@ class History:
     def curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Frame numbers and values of the points so far: copies."""
         points = -(-self._frames // self._stride)
-        return np.arange(points) * float(self._stride), self._values[:points].copy()
+        return np.arange(points, dtype=np.float64) * self._stride, self._values[:points].copy()

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .chart import Chart
+from .chart import COLORS, Chart
 from .layout import Layout
 from .notes import Notes
 from .panels import arrow_key, color_bar, label
@@ -45,13 +45,17 @@ class Painter:
         self._chart = Chart(self._layout, "wave energy", "J", duration, [title for title, _ in titles])
         self._spacing = spacing
         self._decimals = 2 if duration < 100 else 1
+        # a title leaves room for the clock on the seam
+        self._title_width = layout.width / 2 - 2 * layout.margin - 4.5 * layout.em
         # what stands still is drawn once
         self._label = functools.lru_cache(maxsize=8)(label)
         self._bar = functools.lru_cache(maxsize=1)(color_bar)
         self._key = functools.lru_cache(maxsize=1)(arrow_key)
 
     def paint(self, frame: NDArray[np.uint8], notes: Notes) -> None:
-        """Draw the panels over a frame, uint8 [height, width, 3], in place."""
+        """Draw the panels over a frame, uint8 [height, width, 3 or 4], in place; there are none on a tiny one."""
+        if self._layout.width < 20 * self._layout.em or self._layout.height < 10 * self._layout.em:
+            return
         for corner, panels in self._panels(notes).items():
             self._stack(frame, corner, panels)
 
@@ -61,8 +65,11 @@ class Painter:
         corners: dict[str, list[Patch]] = {
             name: [] for name in ("top left", "top", "top right", "bottom left", "bottom right")
         }
-        for corner, title in zip(("top left", "top right"), self._titles, strict=False):
-            corners[corner].append(self._label(title[0], em, title[1]))
+        for corner, title, color in zip(("top left", "top right"), self._titles, COLORS, strict=False):
+            panel = self._label(title[0], em, title[1], color)
+            if panel.width > self._title_width:
+                panel = self._label(title[0], em, "", color)
+            corners[corner].append(panel)
         if request.time:
             clock = label(f"t = {notes.time:.{self._decimals}f} s", em)
             corners["top" if self._titles else "top left"].append(clock)

@@ -7,7 +7,7 @@ import numpy as np
 from .arrows import draw_arrow
 from .colormap import colors
 from .layout import Layout
-from .patch import FAINT, INK, Patch, text_width
+from .patch import FAINT, INK, Color, Patch, text_width
 from .scale import number, readable
 
 PANEL_OPACITY = 0.86
@@ -21,13 +21,13 @@ def panel(width: int, height: int, em: int) -> Patch:
     return patch
 
 
-def label(text: str, em: int, detail: str = "") -> Patch:
+def label(text: str, em: int, detail: str = "", color: Color = INK) -> Patch:
     """One line of text, and a fainter one after it."""
     pad, small = round(_PADDING * em), round(0.85 * em)
     middle = text_width(text, em) + (0.6 * em if detail else 0)
     patch = panel(round(2 * pad + middle + text_width(detail, small)), round(1.9 * em), em)
     baseline = 1.3 * em
-    patch.text(pad, baseline, text, em)
+    patch.text(pad, baseline, text, em, color)
     patch.text(pad + middle, baseline, detail, small, FAINT)
     return patch
 

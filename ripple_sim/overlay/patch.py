@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+Color = tuple[int, int, int]
+
 INK, FAINT, PAPER = (27, 36, 50), (97, 107, 122), (255, 255, 255)
 
 _SUPERSAMPLING = 8
@@ -40,7 +42,7 @@ class Patch:
         other._color, other._alpha = self._color.copy(), self._alpha.copy()
         return other
 
-    def fill(self, coverage: NDArray[np.floating], color: NDArray | tuple[int, int, int], opacity: float = 1.0) -> None:
+    def fill(self, coverage: NDArray[np.floating], color: NDArray | Color, opacity: float = 1.0) -> None:
         """Lay a colour, or a picture [height, width, 3], over the share `coverage`, 0 to 1, of each pixel."""
         alpha = (opacity * coverage[..., None]).astype(np.float32)
         self._color += alpha * (np.asarray(color, dtype=np.float32) - self._color)
@@ -52,20 +54,18 @@ class Patch:
         top: float,
         right: float,
         bottom: float,
-        color: NDArray | tuple[int, int, int],
+        color: NDArray | Color,
         opacity: float = 1.0,
     ) -> None:
         """Fill an upright rectangle."""
         across, down = _overlap(left, right, self.width), _overlap(top, bottom, self.height)
         self.fill(down[:, None] * across, color, opacity)
 
-    def polygon(
-        self, corners: list[tuple[float, float]], color: NDArray | tuple[int, int, int], opacity: float = 1.0
-    ) -> None:
+    def polygon(self, corners: list[tuple[float, float]], color: NDArray | Color, opacity: float = 1.0) -> None:
         """Fill a polygon."""
         self.fill(self._drawn(lambda draw, k: draw.polygon([(k * x, k * y) for x, y in corners], 255)), color, opacity)
 
-    def disc(self, x: float, y: float, radius: float, color: tuple[int, int, int]) -> None:
+    def disc(self, x: float, y: float, radius: float, color: Color) -> None:
         """Fill a circle."""
         across, down = np.arange(self.width) + 0.5 - x, np.arange(self.height) + 0.5 - y
         self.fill(np.clip(radius + 0.5 - np.hypot(across, down[:, None]), 0, 1), color)
@@ -75,9 +75,7 @@ class Patch:
         size = (0, 0, _SUPERSAMPLING * self.width - 1, _SUPERSAMPLING * self.height - 1)
         self.fill(self._drawn(lambda draw, k: draw.rounded_rectangle(size, k * radius, 255)), PAPER, opacity)
 
-    def text(
-        self, x: float, y: float, text: str, size: int, color: tuple[int, int, int] = INK, align: str = "left"
-    ) -> None:
+    def text(self, x: float, y: float, text: str, size: int, color: Color = INK, align: str = "left") -> None:
         """Write a line on the baseline y that begins, has its middle or ends at x ("left", "middle", "right")."""
         mask = Image.new("L", (self.width, self.height))
         x -= _CORNERS[align] * text_width(text, size)
@@ -108,7 +106,7 @@ class Patch:
         k = _SUPERSAMPLING
         large = Image.new("L", (k * self.width, k * self.height))
         paint(ImageDraw.Draw(large), k)
-        return np.asarray(large.reduce(k), dtype=np.float32) / 255
+        return np.asarray(large.reduce(k), dtype=np.float32) / np.float32(255)
 
 
 def text_width(text: str, size: int) -> float:

@@ -236,7 +236,7 @@ def test_without_a_request_nothing_is_drawn_over(make_scene: Callable[..., Scene
     np.testing.assert_array_equal(last_frame(film_of(scene, [], (96, 54))), plain)
 
 
-@pytest.mark.parametrize(("size", "baseline"), [((320, 180), None), ((90, 160), "paper")])
+@pytest.mark.parametrize(("size", "baseline"), [((192, 108), None), ((180, 320), "paper")])
 def test_everything_at_once_twice_the_same(
     make_scene: Callable[..., Scene], size: tuple[int, int], baseline: str | None
 ) -> None:
@@ -250,10 +250,10 @@ def test_overlays_on_a_transparent_background(make_scene: Callable[..., Scene]) 
     for words in ([], EVERYTHING):
         simulation = Simulation(make_scene(), fps=RATE, backend="cpu")
         request = parse_request(words)
-        film = Film([simulation], request, width=160, height=90, frames=FRAMES, rate=RATE, transparent=True)
+        film = Film([simulation], request, width=192, height=108, frames=FRAMES, rate=RATE, transparent=True)
         frames.append(last_frame(film))
     plain, drawn = frames
-    assert drawn.shape == (90, 160, 4)
+    assert drawn.shape == (108, 192, 4)
     assert plain[8, 12, 3] < 100  # a corner of the background
     assert drawn[8, 12, 3] > 200  # where the clock stands
     assert (drawn[..., 3] >= plain[..., 3]).all()
@@ -261,7 +261,7 @@ def test_overlays_on_a_transparent_background(make_scene: Callable[..., Scene]) 
 
 def test_each_alone_changes_the_picture(make_scene: Callable[..., Scene]) -> None:
     scene = make_scene()
-    pictures = [last_frame(film_of(scene, words, (96, 54))) for words in ([], *([name] for name in NAMES))]
+    pictures = [last_frame(film_of(scene, words, (192, 108))) for words in ([], *([name] for name in NAMES))]
     for first, second in itertools.combinations(pictures, 2):
         assert (first != second).any()
 
@@ -281,7 +281,9 @@ def test_notes_do_not_grow(make_scene: Callable[..., Scene]) -> None:
 
 def test_resumed_video_is_the_unbroken_one(make_scene: Callable[..., Scene], tmp_path: Path) -> None:
     def render(name: str, **options: Any) -> list[bytes]:
-        render_video(make_scene(), tmp_path / name, size=(96, 54), fps=20, duration=0.3, overlay=EVERYTHING, **options)
+        render_video(
+            make_scene(), tmp_path / name, size=(192, 108), fps=20, duration=0.3, overlay=EVERYTHING, **options
+        )
         return [path.read_bytes() for path in sorted((tmp_path / name).iterdir())]
 
     def interrupt(done: int, total: int) -> None:

@@ -10,9 +10,13 @@ from ripple_sim.overlay import patch as patch_module
 from ripple_sim.overlay.arrows import draw_arrow
 from ripple_sim.overlay.chart import Chart
 from ripple_sim.overlay.colormap import colors
+from ripple_sim.overlay.comparison import TITLES
 from ripple_sim.overlay.layout import Layout
+from ripple_sim.overlay.notes import Notes, Scale
+from ripple_sim.overlay.painter import Painter
 from ripple_sim.overlay.panels import arrow_key, color_bar, label
 from ripple_sim.overlay.patch import Patch, text_width
+from ripple_sim.overlay.request import NAMES, parse_request
 from ripple_sim.overlay.scale import number
 
 SIZES = [(320, 180), (640, 360), (720, 1280), (1280, 720), (3840, 2160)]
@@ -65,6 +69,34 @@ def test_panels_and_their_type_stay_inside_and_apart(size: tuple[int, int], writ
         assert right <= panel.width
         assert bottom <= panel.height
     assert layout.em >= 9
+
+
+@pytest.mark.parametrize("size", [(320, 180), (1280, 720)])
+def test_a_comparison_fits(size: tuple[int, int], written: list) -> None:
+    titles = [TITLES["fem"], TITLES["dynamic-paint"]]
+    painter = Painter(parse_request(NAMES[1:]), Layout(*size), duration=5.0, spacing=8, titles=titles)
+    curve = np.linspace(0, 5, 9), np.ones(9)
+    scale = Scale(1.0, 1.0)
+    panels = painter._panels(Notes(1.0, [], scale, [], scale, [curve, curve], scale))
+    left, middle, right = (panels[corner][0].width for corner in ("top left", "top", "top right"))
+    assert max(left, right) + middle / 2 < size[0] / 2 - Layout(*size).margin
+    assert panels["bottom left"][0].width + panels["bottom right"][0].width < size[0]
+    chart = panels["bottom right"][0]
+    heading = [box for box in written if box[4].height == chart.height and box[3] < 2 * Layout(*size).em]
+    lines = sorted(box[:3:2] for box in heading)
+    assert len(lines) == (2 if size[0] < 400 else 4)  # title, unit, and the names where there is room
+    for (_, end), (begin, _) in itertools.pairwise(lines):
+        assert end < begin
+
+
+@pytest.mark.parametrize("size", [(16, 16), (32, 400), (400, 32), (160, 90)])
+def test_a_tiny_frame_has_no_panels(size: tuple[int, int]) -> None:
+    frame = np.zeros((*size[::-1], 3), np.uint8)
+    scale = Scale(1.0, 1.0)
+    Painter(parse_request(["time"]), Layout(*size), duration=5.0).paint(
+        frame, Notes(1, [], scale, [], scale, [], scale)
+    )
+    assert not frame.any()
 
 
 @pytest.mark.parametrize("size", SIZES)
