@@ -48,7 +48,7 @@ class Snapshot:
         """Fingerprint of the bodies' and the surfaces' state, the same if and only if every bit of it is."""
         hasher = hashlib.blake2b(digest_size=16)
         for array in (self.data.qpos, self.data.qvel, self.data.act, *self.heights.values()):
-            hasher.update(np.ascontiguousarray(array).view(np.uint8))
+            hasher.update(array.tobytes())
         return hasher.hexdigest()
 
 

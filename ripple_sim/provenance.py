@@ -31,7 +31,7 @@ def scene_digest(scene: Scene) -> str:
     hasher = hashlib.blake2b(digest_size=8)
     model = np.zeros(mujoco.mj_sizeModel(scene.model), np.uint8)
     mujoco.mj_saveModel(scene.model, None, model)
-    hasher.update(model)
+    hasher.update(model.tobytes())
     for entry in scene.surfaces:
         for each in entry.material.maps().values():
             hasher.update(Path(each.map).read_bytes())

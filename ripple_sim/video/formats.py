@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,7 @@ class Segment(Protocol):
 class Still:
     """One frame in a picture of its own."""
 
-    def __init__(self, path: Path, **settings: object) -> None:
+    def __init__(self, path: Path, **settings: Any) -> None:
         self._path, self._settings = path, settings
 
     def write(self, frame: NDArray[np.uint8]) -> None:
