@@ -1,5 +1,6 @@
 """The viewer without a window: running, pausing, resetting, poking, throwing, and the surface that is shown."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -343,3 +344,10 @@ def test_a_session_needs_no_vtk() -> None:
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.splitlines()[-1] == "[]"
+
+
+def test_the_example_of_the_documentation_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "viewer.md").read_text(encoding="utf-8")
+    [code] = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(compile(code, "docs/viewer.md", "exec"), {})
+    assert float(capsys.readouterr().out.split()[0]) < 0
