@@ -223,7 +223,10 @@ class Renderer:
         if light_view is not None:
             self._shadow.target.use()
             self._shadow.target.clear(depth=1.0)
-            self._draw_depth(light_view)
+            for target in self._targets:
+                if target.shades:
+                    target.draw_depth(light_view)
+            self._bodies.draw_depth(light_view)
         if self._floor is not None:
             self._floor.occlude(ctx, self._draw_depth, self._shadow)
 

@@ -26,6 +26,7 @@ from .subdivision import subdivide
 _PIXELS = 4.0  # length of an edge where the target fills the frame's height
 _PIXELS_PER_FACE = 24  # of the frame
 _LEAST_FACES, _MOST_FACES = 20_000, 400_000
+_NO_SHADOW = 0.75  # transparency from which on light goes through as if nothing were there
 _PACKAGE = "ripple_sim.render"
 # columns of the vertex attributes while the mesh is refined
 _POSITION, _DIRECTION, _SPHERE, _NORMAL, _BAKED, _UV = (
@@ -107,6 +108,7 @@ class SurfaceMesh:
         shows_field = surface.field_colors is not None
         look, rgb, mapping = _appearance(model, geom, surface)
         self.clear = look.transparency > 0.0
+        self.shades = look.transparency < _NO_SHADOW
         self.radius = float(np.linalg.norm(surface.V, axis=1).max())
         self._table = table
         self.number = table.add(look, geom, size=self.radius, painted=shows_field)

@@ -102,7 +102,7 @@ def test_skybox_fills_the_background(gl):
 
 
 def test_floor_texture_repeats_as_in_mujoco(gl):
-    """A repetition of a uniform 2 x 2 checker is 2 m wide and begins at -1 m: squares of 1 m, a corner at the origin."""
+    """A repetition of a 2 x 2 checker is 2 m wide and begins at -1 m: squares of 1 m, a corner at the origin."""
     asset = (
         '<texture name="c" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 0" width="64" height="64"/>'
         '<material name="c" texture="c" texuniform="true"/>'
