@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .signals import INTERRUPTED, TERMINATED, handle_signals
+from .signals import INTERRUPTED, TERMINATED, end_at_once, end_in_good_order
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -23,7 +23,7 @@ _DESCRIPTION = "Surface ripples on any genus-0 mesh, driven by the contact force
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program with the arguments `argv` (by default the process's own) and return its exit status."""
-    handle_signals()
+    end_at_once()
     command = _parse(list(sys.argv[1:] if argv is None else argv))
     if isinstance(command, int):
         return command
@@ -32,6 +32,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from ..errors import DisplayError, EncodingError
     from ..solver.errors import GLError, RippleError
 
+    end_in_good_order()
     try:
         command.run()
         sys.stdout.flush()

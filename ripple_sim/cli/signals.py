@@ -1,7 +1,7 @@
 """Ctrl-C and SIGTERM: exceptions, so that what is unfinished is cleared away on the way out.
 
-While a module is being imported an exception would come out of it as any other error, with a traceback; but nothing has
-begun then that needs clearing away, so the process ends at once.
+Before anything has begun, and while a module is being imported, which an exception would leave as any other error,
+nothing needs clearing away, and the process ends at once.
 """
 
 from __future__ import annotations
@@ -9,27 +9,41 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Callable
 from types import FrameType
 
 INTERRUPTED, TERMINATED = 130, 143
 _STATUS = {signal.SIGINT: (INTERRUPTED, "interrupted"), signal.SIGTERM: (TERMINATED, "terminated")}
 
 
-def handle_signals() -> None:
-    """Let both signals end the program in good order; one that the caller had ignored stays ignored."""
+def end_at_once() -> None:
+    """Let both signals end the process, with one line; one that the caller had ignored stays ignored."""
+    _handle(_end)
+
+
+def end_in_good_order() -> None:
+    """Let both signals raise `KeyboardInterrupt` or `SystemExit`; one that the caller had ignored stays ignored."""
+    _handle(_raise)
+
+
+def _handle(handler: Callable[[int, FrameType | None], None]) -> None:
     for number in _STATUS:
         if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _end)
+            signal.signal(number, handler)
 
 
 def _end(number: int, frame: FrameType | None) -> None:
     status, word = _STATUS[signal.Signals(number)]
+    os.write(2, f"ripple-sim: {word}\n".encode())
+    os._exit(status)
+
+
+def _raise(number: int, frame: FrameType | None) -> None:
     if _importing(frame):
-        os.write(2, f"ripple-sim: {word}\n".encode())
-        os._exit(status)
+        _end(number, frame)
     if number == signal.SIGINT:
         raise KeyboardInterrupt
-    sys.exit(status)
+    sys.exit(TERMINATED)
 
 
 def _importing(frame: FrameType | None) -> bool:

@@ -188,15 +188,17 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
 @pytest.mark.parametrize(
     ("number", "status", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
 )
-def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_path, number, status, word):
+@pytest.mark.parametrize("where", ["cli._parse = meet_signal", "commands.Info.run = meet_signal"])
+def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_path, number, status, word, where):
     (tmp_path / "slow.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\nfor _ in range(10**9): pass\n")
     code = (
         "import sys\n"
+        "from ripple_sim.cli import commands\n"
         "from ripple_sim.cli import main as cli\n"
-        "def parse(argv):\n"
+        "def meet_signal(argument):\n"
         "    import slow\n"
-        "cli._parse = parse\n"
-        "sys.exit(cli.main([]))\n"
+        f"{where}\n"
+        "sys.exit(cli.main(['info']))\n"
     )
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False
