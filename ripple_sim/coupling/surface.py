@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver import Material, SolverError, WaveSolver
 from ripple_sim.solver.waves.footprint import footprint
+from ripple_sim.solver.waves.holding import hold
 
 from .target import target_atlas
 
@@ -62,7 +63,7 @@ class RippleSurface:
         self._renew(self._material, self._rigid, {**self._options, "operator": operator})
 
     def make_rigid(self, point: ArrayLike, radius: float) -> None:
-        """Let a disc carry no waves, of a radius [m] round a point [m] in the frame of the geom."""
+        """Hold a disc still, of a radius [m] round a point [m] in the frame of the geom; waves bounce off its rim."""
         atlas = self.waves.atlas
         rigid = np.zeros(atlas.areas.shape, bool) if self._rigid is None else self._rigid.copy()
         rigid.reshape(-1)[footprint(atlas, point, radius).texels] = True
@@ -78,16 +79,7 @@ class RippleSurface:
         """Make the solver anew; nothing has changed if that fails."""
         old, whole = self.waves, material
         if rigid is not None:
-            # a region that nothing pulls on takes up nothing, and without viscosity nothing drags it along either
-            coefficients = ("speed", "stiffness", "bending", "viscosity")
-            material = dataclasses.replace(
-                material,
-                **{
-                    name: material.texels(name, old.atlas.resolution) * ~rigid
-                    for name in coefficients
-                    if np.any(getattr(material, name))
-                },
-            )
+            material = hold(old.atlas, material, rigid)
         new = WaveSolver(old.atlas, material, **options)
         new.height, new.velocity, new.pressure = old.height, old.velocity, old.pressure
         new.time, new.substeps_taken = old.time, old.substeps_taken

@@ -30,7 +30,7 @@ def texel_areas(
 ) -> NDArray[np.float64]:
     """Area of the surface that belongs to each texel [m^2], [6, N, N]; for the parameters see `Atlas`."""
     spanned = lumped_areas(positions)
-    level = _smooth(_sampled_areas(mesh, sphere, triangles, barycentrics)) / np.maximum(_smooth(spanned), 1e-300)
+    level = smoothed(_sampled_areas(mesh, sphere, triangles, barycentrics)) / np.maximum(smoothed(spanned), 1e-300)
     return spanned * np.clip(level, _LEAST, _MOST)
 
 
@@ -56,8 +56,8 @@ def _sampled_areas(
     return solid_angles(triangles.shape[1]) * real[triangles] * np.linalg.norm(meeting, axis=-1) ** 3
 
 
-def _smooth(field: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean over the neighbourhood of each texel, by passes of the weights 1 2 1 along rows and columns."""
+def smoothed(field: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean of a field [6, N, N] round each texel, by passes of the weights 1 2 1 along rows and columns."""
     exists = _sum_around(np.ones_like(field))
     for _ in range(_PASSES):
         # at the cube's corners a texel has no neighbour

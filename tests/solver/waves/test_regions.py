@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, absorbing_damping, sphere_atlas
+from ripple_sim.solver.waves.holding import hold
 
 
 def after_one_period(n: int, material: Material, mode: np.ndarray, eigenvalue: float, backend: str = "cpu") -> float:
@@ -116,3 +117,64 @@ def test_bad_absorbers_are_named(arguments: dict, message: str) -> None:
     atlas = sphere_atlas(1.0, 8)
     with pytest.raises(SolverError, match=message):
         absorbing_damping(atlas, **({"region": atlas.positions[..., 2] > 0, "speed": 1.0} | arguments))
+
+
+def held_cap(n: int, kind: str) -> tuple[WaveSolver, np.ndarray]:
+    """A pulse on its way to a cap that is held, round a point that is no symmetry of the texels; angle from there."""
+    atlas = sphere_atlas(1.0, n)
+    center = np.array([0.36, -0.48, 0.8])
+    angle = np.arccos(np.clip(atlas.positions @ center, -1, 1))
+    cap = angle < 1.0
+    materials = {
+        "held": hold(atlas, Material(), cap),
+        "clamped": Material(fixed=cap),
+        "free": Material(speed=np.where(cap, 0.0, 1.0)),
+    }
+    waves = WaveSolver(atlas, materials[kind], backend="cpu")
+    pulse = np.exp(-(((angle - 1.8) / 0.12) ** 2))
+    waves.height, waves.velocity = pulse, -2 * (angle - 1.8) / 0.12**2 * pulse
+    return waves, angle
+
+
+def test_held_region_reflects_all_energy_inverted() -> None:
+    waves, angle = held_cap(96, "held")
+    waves.step(0.8)
+    energy = waves.energy()
+    assert not waves.height[angle < 0.9].any()
+    waves.step(0.8)
+    assert waves.energy() == pytest.approx(energy, rel=1e-5)
+    # back at 1.8, upside down, but for twice the texel or two by which the rim gives way
+    around = np.arange(1.6, 2.0, 0.01)
+    rings = [waves.height[np.abs(angle - middle) < 0.01].mean() for middle in around]
+    assert min(rings) == pytest.approx(-1, abs=0.06)
+    assert around[np.argmin(rings)] == pytest.approx(1.8, abs=4 * np.pi / 2 / 96)
+
+
+def test_rim_of_a_held_region_is_smooth() -> None:
+    unevenness = {}
+    for kind in ("held", "clamped", "free"):
+        waves, angle = held_cap(64, kind)
+        waves.step(0.7)
+        # what the texels' staircase leaves of a round wave: height about the rim, less its mean at that distance
+        rim = np.abs(angle - 1.02) < 0.08
+        distance, height = angle[rim] - 1.0, waves.height[rim]
+        mean = np.polyval(np.polyfit(distance, height, 8), distance)
+        unevenness[kind] = np.std(height - mean) / np.abs(waves.height).max()
+    assert unevenness["held"] < 0.01
+    assert unevenness["held"] < 0.4 * unevenness["clamped"]
+    assert unevenness["held"] < 0.1 * unevenness["free"]
+
+
+def test_held_region_costs_little_of_the_time_step_and_is_moved_by_nothing(animal: Atlas) -> None:
+    region = animal.positions[..., 2] > 0.05
+    free = WaveSolver(animal, Material(speed=0.5), backend="cpu")
+    held = WaveSolver(animal, hold(animal, Material(speed=0.5), region), backend="cpu")
+    assert held.stable_timestep > 0.93 * free.stable_timestep
+    inside = animal.positions[held.operator.fixed]
+    held.add_impulse(inside[np.argmax(inside[:, 2])], 1.0, 0.01)
+    held.step(0.2)
+    assert not held.height.any()
+    with pytest.raises(SolverError, match="from 0 to 1"):
+        hold(animal, Material(), 2.0 * region)
+    with pytest.raises(SolverError, match="shape"):
+        hold(animal, Material(), region[:, :5])
