@@ -174,9 +174,11 @@ def _create_context(device: int | None) -> moderngl.Context:
                 reasons.append(str(error))
                 if "not loaded" in str(error):
                     break
-    which = "any EGL device" if device is None else f"EGL device {device}"
+    reason = reasons[-1] if reasons else "no device"
+    if device is not None:
+        raise GLError(f"no OpenGL 4.3 context on EGL device {device} ({reason}); devices are counted from 0")
     raise GLError(
-        f"no OpenGL 4.3 context on {which} ({reasons[-1] if reasons else 'no device'}); "
+        f"no OpenGL 4.3 context on any EGL device ({reason}); "
         "install Mesa with: apt-get install libegl1 libgl1 libgl1-mesa-dri libegl-mesa0"
     )
 

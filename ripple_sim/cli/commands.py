@@ -40,8 +40,7 @@ if TYPE_CHECKING:
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class _Video:
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
-    """Where the video goes: a name ending in .mp4, .webm, .gif or .webp, or one without ending for a folder of PNG
-    frames."""
+    """Name of the video, ending in .mp4, .webm, .gif or .webp, or without ending for a folder of PNG frames."""
     size: Size = (1280, 720)
     """Frame size in pixels."""
     fps: FrameRate = None
