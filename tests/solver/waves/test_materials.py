@@ -30,9 +30,8 @@ def decaying(omega0: float, rate: float, time: float) -> float:
 @pytest.mark.parametrize("degree", LEGENDRE)
 def test_membrane_speed_is_root_of_tension_over_density(degree: int) -> None:
     omega = np.sqrt(18.0 / 2.0 * degree * (degree + 1))
-    assert amplitude(Material.membrane(tension=18.0, density=2.0), degree, 0.9 * np.pi / omega) == pytest.approx(
-        np.cos(0.9 * np.pi), abs=0.01
-    )
+    # where the mode passes through zero its amplitude shows the error of the frequency: 0.02 is a quarter of a per cent
+    assert abs(amplitude(Material.membrane(tension=18.0, density=2.0), degree, 2.5 * np.pi / omega)) < 0.02
 
 
 @pytest.mark.parametrize("degree", LEGENDRE)
