@@ -19,6 +19,7 @@ from .materials import Mapping, Textures, color, look_of, mapping_of
 from .meshes import Shape
 from .objects import ObjectTable
 from .occluders import Occluders
+from .owned import OwnedObjects
 
 _PACKAGE = "ripple_sim.render"
 _VISIBLE_GROUPS = 3
@@ -80,13 +81,16 @@ class Bodies:
     """All geoms of a model but the floor and the targets."""
 
     def __init__(
-        self, gl: GLContext, ctx: Any, model: Any, geoms: Iterable[int], textures: Textures, table: ObjectTable
+        self, gl: GLContext, ctx: OwnedObjects, model: Any, geoms: Iterable[int], textures: Textures, table: ObjectTable
     ) -> None:
         self._gl, self._ctx, self._model, self._textures = gl, ctx, model, textures
         self._shapes: dict[str, ShapeLevels] = {}
         self._programs: dict[int, moderngl.Program] = {}
         self._depth = ctx.own(gl.program(_PACKAGE, "body_depth_vertex", "depth_fragment"))
-        drawn, groups, self.clear = [], {}, []
+        drawn: list[int] = []
+        groups: dict[tuple[str, int, int], list[tuple[int, int]]] = {}
+        shapes: dict[str, tuple[str, Callable[[int], Shape]]] = {}
+        self.clear: list[ClearBody] = []
         for geom in geoms:
             found = shape_of(model, geom)
             if found is None:
@@ -94,13 +98,14 @@ class Bodies:
             mapping, opacity = mapping_of(model, geom), float(color(model, geom)[3])
             number = table.add(look_of(model, geom), geom, opacity=opacity)
             drawn.append(geom)
+            shapes[found[0]] = found
             if opacity < 1.0:
                 self.clear.append(ClearBody(geom, number, self._instances(found, mapping, [(geom, number)])))
             else:
                 groups.setdefault((found[0], mapping.kind, mapping.texture), []).append((geom, number))
         self._opaque = [
-            self._instances(shape_of(model, members[0][0]), mapping_of(model, members[0][0]), members)
-            for members in groups.values()
+            self._instances(shapes[name], mapping_of(model, members[0][0]), members)
+            for (name, _, _), members in groups.items()
         ]
         solid = [geom for geom in drawn if model.geom_type[geom] != _GEOM.mjGEOM_PLANE]
         self.occluders = Occluders(ctx, model, np.array(solid, dtype=np.int64))

@@ -8,6 +8,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from .owned import OwnedObjects
+
 SRGB8_ALPHA8 = 0x8C43
 
 
@@ -17,7 +19,7 @@ def linear(srgb: Any) -> NDArray[np.float64]:
     return np.where(value <= 0.04045, value / 12.92, ((np.maximum(value, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
-def srgb_texture(ctx: Any, pixels: NDArray[np.uint8]) -> moderngl.Texture:
+def srgb_texture(ctx: OwnedObjects, pixels: NDArray[np.uint8]) -> moderngl.Texture:
     """Repeating, mip-mapped texture of sRGB pixels [height, width, 3], first row at v = 0; it reads as linear light."""
     height, width, _ = pixels.shape
     opaque = np.concatenate([pixels, np.full((height, width, 1), 255, dtype=np.uint8)], axis=2)

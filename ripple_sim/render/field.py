@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver.errors import RippleError
 
 from .looks import Look
+from .owned import OwnedObjects
 
 # What the light falls on under the colours: its shadows are all that is kept of it.
 UNDER_COLORS = Look(color=(0.81, 0.81, 0.81), roughness=0.8)
@@ -21,14 +22,14 @@ class FieldTexture:
 
     Parameters
     ----------
-    ctx : moderngl.Context
+    ctx : OwnedObjects
     width : int
         Texels N + 2 along an edge of the padded faces.
     colors : array of uint8, shape [k, 3]
         sRGB, from the least to the greatest value.
     """
 
-    def __init__(self, ctx: moderngl.Context, width: int, colors: NDArray[np.uint8]) -> None:
+    def __init__(self, ctx: OwnedObjects, width: int, colors: NDArray[np.uint8]) -> None:
         self._shape = (6, width, width)
         self._values = ctx.texture_array((width, width, 6), 1, dtype="f4")
         self._colors = ctx.texture((len(colors), 1), 3, np.ascontiguousarray(colors).tobytes(), alignment=1)

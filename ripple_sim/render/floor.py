@@ -16,6 +16,7 @@ from .camera import orthographic
 from .color import linear
 from .frame import FrameUniforms
 from .materials import FLAT_IMAGE, Textures, color, mapping_of, texture_pixels
+from .owned import OwnedObjects
 from .shadow import ShadowMap
 
 _PACKAGE = "ripple_sim.render"
@@ -34,7 +35,7 @@ def find_floor(model: Any, geoms: list[int]) -> int | None:
 class Floor:
     """A model's floor plane. It is not drawn: the picture's shader meets it with a ray."""
 
-    def __init__(self, gl: GLContext, ctx: Any, model: Any, geom: int, textures: Textures) -> None:
+    def __init__(self, gl: GLContext, ctx: OwnedObjects, model: Any, geom: int, textures: Textures) -> None:
         self.geom = geom
         mapping = mapping_of(model, geom)
         self.albedo = color(model, geom)[:3]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Pose, perspective, view_matrix
+from .owned import OwnedObjects
 
 MAX_LIGHTS = 8
 _NEAR, _FAR = 0.02, 200.0  # clip planes, in camera distances
@@ -51,7 +51,7 @@ _FRAME = np.dtype(
 class FrameUniforms:
     """The block's values and its buffer."""
 
-    def __init__(self, ctx: moderngl.Context) -> None:
+    def __init__(self, ctx: OwnedObjects) -> None:
         self.values = np.zeros((), dtype=_FRAME)
         self.set_vector("floor_map", [0.0, 0.0, 1.0])
         self._buffer = ctx.buffer(reserve=_FRAME.itemsize, dynamic=True)

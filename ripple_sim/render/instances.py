@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .materials import Mapping
 from .meshes import Shape
+from .owned import OwnedObjects
 
 INSTANCE = np.dtype(
     [
@@ -29,7 +30,7 @@ _FLATNESS = 0.25  # how far the edges of a round shape may stand off its surface
 class ShapeLevels:
     """A shape at several levels of detail, each uploaded at its first use."""
 
-    def __init__(self, ctx: moderngl.Context, make: Callable[[int], Shape]) -> None:
+    def __init__(self, ctx: OwnedObjects, make: Callable[[int], Shape]) -> None:
         self._ctx, self._make = ctx, make
         self._made: dict[int, tuple[moderngl.Buffer, moderngl.Buffer]] = {}
 
@@ -51,7 +52,7 @@ class Instances:
 
     Parameters
     ----------
-    ctx : moderngl.Context
+    ctx : OwnedObjects
     shape : ShapeLevels
     programs : tuple
         For the geometry pass and for depth alone.
@@ -64,7 +65,7 @@ class Instances:
 
     def __init__(
         self,
-        ctx: moderngl.Context,
+        ctx: OwnedObjects,
         shape: ShapeLevels,
         programs: tuple[moderngl.Program, moderngl.Program],
         geoms: list[int],

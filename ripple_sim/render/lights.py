@@ -71,8 +71,8 @@ class Light:
             distance = max(float(np.linalg.norm(offset)), 1e-9)
             towards = offset / distance
             along = float(towards @ self.direction)
-            strength = max(along, 0.0) ** self.exponent if along >= np.cos(self.cutoff) else 0.0
-            strength /= self.falloff @ [1.0, distance, distance**2]
+            beam = max(along, 0.0) ** self.exponent if along >= np.cos(self.cutoff) else 0.0
+            strength = beam / float(self.falloff @ [1.0, distance, distance**2])
         return self.radiance * strength * max(float(towards @ normal), 0.0)
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .color import SRGB8_ALPHA8, linear, srgb_texture
 from .looks import Look
+from .owned import OwnedObjects
 
 _GEOM = mujoco.mjtGeom
 _ROLES = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
@@ -32,7 +33,8 @@ def color(model: Any, geom: int) -> NDArray[np.float64]:
 def look_of(model: Any, geom: int) -> Look:
     """How a geom's material answers light; MuJoCo's shininess stands for roughness where the material gives none."""
     material = model.geom_matid[geom]
-    rgb = tuple(float(x) for x in color(model, geom)[:3])
+    red, green, blue = (float(x) for x in color(model, geom)[:3])
+    rgb = red, green, blue
     if material < 0:
         return Look(color=rgb, roughness=0.42, coat=0.2)
     roughness, metallic = float(model.mat_roughness[material]), float(model.mat_metallic[material])
@@ -114,7 +116,7 @@ def _half_sizes(model: Any, geom: int) -> NDArray[np.float64]:
 class Textures:
     """The textures of a model on the GPU, each made at its first use."""
 
-    def __init__(self, ctx: moderngl.Context, model: Any) -> None:
+    def __init__(self, ctx: OwnedObjects, model: Any) -> None:
         self._ctx, self._model = ctx, model
         self._made: dict[int, moderngl.Texture | moderngl.TextureCube] = {}
 
@@ -131,7 +133,8 @@ class Textures:
         for texture in range(self._model.ntex):
             if self._model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
                 pixels = texture_pixels(self._model, texture)
-                return self.get(texture), linear(pixels[::4, ::4] / 255.0).mean(axis=(0, 1))
+                self._made[texture] = cube = self._cube(pixels)
+                return cube, linear(pixels[::4, ::4] / 255.0).mean(axis=(0, 1))
         return None
 
     def _cube(self, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:

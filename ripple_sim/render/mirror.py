@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import moderngl
 import numpy as np
@@ -13,6 +12,7 @@ from ripple_sim.solver.gl import GLContext
 from .camera import Pose
 from .floor import Floor
 from .frame import FrameUniforms
+from .owned import OwnedObjects
 from .picture import Picture
 
 _UNIT = 14  # of the reflection's texture, in shaders/floor_fragment.glsl
@@ -31,7 +31,7 @@ class Mirror:
         As for `Picture`.
     """
 
-    def __init__(self, gl: GLContext, ctx: Any, size: tuple[int, int], options: dict[str, int]) -> None:
+    def __init__(self, gl: GLContext, ctx: OwnedObjects, size: tuple[int, int], options: dict[str, int]) -> None:
         half = (max(size[0] // 2, 1), max(size[1] // 2, 1))
         self._aspect = size[0] / size[1]
         self._frame = FrameUniforms(ctx)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import moderngl
 import numpy as np
 
 from .looks import Look
+from .owned import OwnedObjects
 
 _ROW = np.dtype([("base", "f4", 4), ("volume", "f4", 4), ("place", "f4", 4)])
 
@@ -15,7 +14,7 @@ _ROW = np.dtype([("base", "f4", 4), ("volume", "f4", 4), ("place", "f4", 4)])
 class ObjectTable:
     """Rows of the shaders' `Object`; the row's number is what a draw call writes."""
 
-    def __init__(self, ctx: Any) -> None:
+    def __init__(self, ctx: OwnedObjects) -> None:
         self._ctx = ctx
         self._rows: list[np.ndarray] = []
         self._buffer: moderngl.Buffer | None = None

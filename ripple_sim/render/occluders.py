@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
+
+from .owned import OwnedObjects
 
 _MOST = 16
 
@@ -14,7 +15,7 @@ _MOST = 16
 class Occluders:
     """Capsules of about each geom's size."""
 
-    def __init__(self, ctx: moderngl.Context, model: Any, geoms: NDArray[np.int64]) -> None:
+    def __init__(self, ctx: OwnedObjects, model: Any, geoms: NDArray[np.int64]) -> None:
         self._geoms = geoms
         self._centre, self._half_axis, self._radius = _capsules(model, geoms)
         self._bounds = np.linalg.norm(model.geom_aabb[geoms, 3:], axis=1)
@@ -25,9 +26,11 @@ class Occluders:
         return self._middles(data)[1], self._bounds
 
     def ball(self, data: Any, geom: int) -> tuple[NDArray[np.float64], float]:
-        """Bounding ball of one body: centre [3] and radius, in metres."""
-        index = int(np.flatnonzero(self._geoms == geom)[0])
-        return self._middles(data)[1][index], float(self._bounds[index])
+        """Bounding ball of one body: centre [3] and radius, in metres; that of a plane has no end."""
+        found = np.flatnonzero(self._geoms == geom)
+        if not len(found):
+            return data.geom_xpos[geom], np.inf
+        return self._middles(data)[1][found[0]], float(self._bounds[found[0]])
 
     def bind(self, data: Any, focus: NDArray[np.float64]) -> int:
         """Bind the capsules nearest to a point; return how many there are."""

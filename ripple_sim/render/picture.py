@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import moderngl
@@ -11,6 +12,7 @@ from ripple_sim.solver.gl import GLContext
 
 from .color import SRGB8_ALPHA8
 from .floor import Floor
+from .owned import OwnedObjects
 
 _PACKAGE = "ripple_sim.render"
 _FIRST_UNIT = 8  # of the samples' textures, in shaders/compose_fragment.glsl
@@ -48,7 +50,7 @@ class Picture:
     def __init__(
         self,
         gl: GLContext,
-        ctx: Any,
+        ctx: OwnedObjects,
         size: tuple[int, int],
         *,
         samples: int,
@@ -91,16 +93,17 @@ class Picture:
             "MIRROR": int(reflects),
         }
         levels = {f"{name}_LEVEL": level for name, level in _LEVELS.items()}
+        stages: tuple[tuple[str, str, str, dict[str, Any]], ...] = (
+            ("classes", "screen_vertex", "classify_fragment", levels),
+            ("sky", "screen_vertex", "sky_fragment", {}),
+            ("floor", "floor_vertex", "floor_fragment", {"SHADOW": 0}),
+            ("shaded floor", "floor_vertex", "floor_fragment", {"SHADOW": 1}),
+            ("solid", "screen_vertex", "solid_fragment", {"LAYER": 0}),
+            ("layer", "screen_vertex", "solid_fragment", {"LAYER": 1}),
+        )
         self._passes = {
-            name: ctx.vertex_array(ctx.own(gl.program(_PACKAGE, *files, **options, **more)), [])
-            for name, files, more in (
-                ("classes", ("screen_vertex", "classify_fragment"), levels),
-                ("sky", ("screen_vertex", "sky_fragment"), {}),
-                ("floor", ("floor_vertex", "floor_fragment"), {"SHADOW": 0}),
-                ("shaded floor", ("floor_vertex", "floor_fragment"), {"SHADOW": 1}),
-                ("solid", ("screen_vertex", "solid_fragment"), {"LAYER": 0}),
-                ("layer", ("screen_vertex", "solid_fragment"), {"LAYER": 1}),
-            )
+            name: ctx.vertex_array(ctx.own(gl.program(_PACKAGE, vertex, fragment, **{**options, **more})), [])
+            for name, vertex, fragment, more in stages
         }
         for program in (self._passes[name].program for name in ("floor", "shaded floor")):
             if floor is not None and tiled:
@@ -146,7 +149,9 @@ class Picture:
         self._passes[name].program["level"] = level
         self._passes[name].render(moderngl.TRIANGLES, vertices=3)
 
-    def add_layer(self, ctx: moderngl.Context, number: int, draw: Any, clip: tuple[int, int, int, int]) -> None:
+    def add_layer(
+        self, ctx: moderngl.Context, number: int, draw: Callable[[], None], clip: tuple[int, int, int, int]
+    ) -> None:
         """Draw and light a single clear object over the picture.
 
         Parameters

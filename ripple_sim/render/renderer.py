@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any
 
@@ -166,7 +166,7 @@ class Renderer:
         with self._gl as ctx:
             light_view = self._update(ctx, data, reliefs, pose)
             self._draw_maps(ctx, light_view)
-            if self._mirror is not None:
+            if self._mirror is not None and self._floor is not None:
                 self._mirror.draw(ctx, self._frame, pose, self._floor, self._draw_solids, self._bind_maps)
             self._picture.begin(ctx)
             self._draw_solids()
@@ -254,14 +254,13 @@ class Renderer:
 
     def _draw_clear(self, ctx: moderngl.Context, data: Any, pose: Pose) -> None:
         """Lay whatever the scene behind shows through over the picture, the furthest first."""
-        layers = []
+        layers: list[tuple[NDArray[np.float64], float, int, Callable[[], None]]] = []
         for target in self._targets:
             if target.clear:
-                centre, radius = target.ball()
-                layers.append((centre[0], float(radius[0]), target.number, target.draw))
+                centres, radii = target.ball()
+                layers.append((centres[0], float(radii[0]), target.number, target.draw))
         for body in self._bodies.clear:
-            centre, radius = self._bodies.occluders.ball(data, body.geom)
-            layers.append((centre, radius, body.number, body.instances.draw))
+            layers.append((*self._bodies.occluders.ball(data, body.geom), body.number, body.instances.draw))
         layers.sort(key=lambda layer: -float(np.linalg.norm(layer[0] - pose.position)))
         for centre, radius, number, draw in layers:
             self._picture.add_layer(ctx, number, draw, self._clip(centre, radius, pose))
@@ -271,7 +270,7 @@ class Renderer:
         local = pose.rotation.T @ (centre - pose.position)
         whole = (0, 0, self.width, self.height)
         away = -local[2] - radius
-        if away <= 0.01 * radius:
+        if not away > 0.01 * radius:
             return whole
         scale = self.height / (2 * np.tan(np.radians(pose.fovy) / 2))
         # the nearest point of the ball's box is seen under the widest angle

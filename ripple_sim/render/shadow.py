@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .camera import orthographic, perspective
 from .frame import FrameUniforms
 from .lights import Light
+from .owned import OwnedObjects
 
 _SIZE = 1024
 _WIDEST = 0.022  # penumbra, as a share of the map
@@ -20,7 +21,7 @@ _STEEPEST_FOV = 130.0  # [degrees]
 class ShadowMap:
     """A square depth map of the scene as a lamp sees it."""
 
-    def __init__(self, ctx: moderngl.Context) -> None:
+    def __init__(self, ctx: OwnedObjects) -> None:
         self._depth = ctx.depth_texture((_SIZE, _SIZE))
         self._depth.compare_func = ""
         self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)

@@ -21,6 +21,7 @@ from .looks import MODEL_LOOK, Look, find_look
 from .materials import CUBE_IMAGE, FLAT_IMAGE, NO_IMAGE, Mapping, Textures, color, look_of, mapping_of
 from .meshes import corner_normals
 from .objects import ObjectTable
+from .owned import OwnedObjects
 from .subdivision import subdivide
 
 _PIXELS = 4.0  # length of an edge where the target fills the frame's height
@@ -95,7 +96,7 @@ class SurfaceMesh:
     def __init__(
         self,
         gl: GLContext,
-        ctx: Any,
+        ctx: OwnedObjects,
         model: Any,
         geom: int,
         surface: Surface,
@@ -274,7 +275,7 @@ def _mapped(vertices: NDArray[np.float64], mapping: Mapping) -> NDArray[np.float
     return np.stack([u, 1.0 - v, np.zeros_like(u)], axis=1) * mapping.scale
 
 
-def _load_image(ctx: Any, surface: Surface) -> moderngl.Texture:
+def _load_image(ctx: OwnedObjects, surface: Surface) -> moderngl.Texture:
     try:
         picture = Image.open(str(surface.image)).convert("RGB")
     except OSError as error:

@@ -189,6 +189,11 @@ def test_a_clear_body_lets_what_is_behind_through(gl):
     np.testing.assert_allclose(mixed, (red + blue) / 2, atol=12)
 
 
+def test_a_clear_plane_is_drawn_too(gl):
+    pane = '<geom type="plane" size=".5 .5 .1" pos="0 0 .5" rgba="1 0 0 .5"/>'
+    assert (picture(gl, FLOOR + pane) - picture(gl, FLOOR))[60, 80, 2] < -40
+
+
 def test_the_model_look_takes_the_material_of_the_geom(gl):
     asset = '<material name="green" rgba="0 .8 0 1"/>'
     body = '<geom name="t" type="sphere" size=".5" pos="0 0 .5" material="green"/>'
