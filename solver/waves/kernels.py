@@ -1,4 +1,4 @@
-"""Compiled loops over padded faces [6, N + 2, N + 2] of float32; coefficients are one number or [6, N, N]."""
+"""Compiled loops over padded faces [6, N + 2, N + 2 or more] of float32; coefficients are one number or [6, N, N]."""
 
 from __future__ import annotations
 
