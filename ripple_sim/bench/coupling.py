@@ -73,7 +73,7 @@ def coupling_cost(
 def rain(shape: Shape, bodies: int) -> mujoco.MjModel:
     """Bodies of five shapes in a cloud over a target on a floor."""
     spec, rng, (V, F) = mujoco.MjSpec(), np.random.default_rng(0), shape
-    spec.default.geom.solref = [0.01, 0.2]
+    spec.default.geom.solref = [0.01, 1.0]  # stiff enough for 5 m/s
     spec.add_mesh(name="target", uservert=V.ravel(), userface=F.ravel())
     spec.worldbody.add_geom(name="target", type=_GEOM.mjGEOM_MESH, meshname="target")
     make_collidable(spec, "target")
