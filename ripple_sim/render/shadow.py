@@ -13,7 +13,7 @@ from .frame import FrameUniforms
 from .lights import Light
 from .owned import OwnedObjects
 
-_SIZE = 1024
+_SIZE = 1536
 _WIDEST = 0.022  # penumbra, as a share of the map
 _STEEPEST_FOV = 130.0  # [degrees]
 
