@@ -14,7 +14,7 @@ from .array_file import read_arrays, write_arrays
 from .atlas import Atlas
 
 # Raise it when the sphere map or the file's layout changes: older files are then rebuilt.
-FORMAT = 6
+FORMAT = 7
 _FIELDS = ("sphere", "positions", "normals", "triangles", "barycentrics")
 _INDICES = ("F", "triangles")  # in 32 bits
 

@@ -13,7 +13,7 @@ import numpy as np
 from .corner_table import CornerTable, collapse, following, gather_star, preceding
 from .vectors import Floats, Ints, cross, dot, kernel, row, set_row, subtract
 
-ROUND_SHARE = 0.2  # of the vertices left, removed in one round
+ROUND_SHARE = 0.15  # of the vertices left, removed in one round
 COMFORTABLE_DEGREE = 8
 DEGREE_LIMIT = 12  # of a merged vertex, raised where nothing else is left to collapse
 
