@@ -54,7 +54,9 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
     """The whole TOML file.
 
     `overlay` names what is drawn over the pictures: "height" or "velocity" in colours (with the end of the colours in m
-    or m/s where it shall be fixed, such as "height=0.02"), "contacts", "grid", "time", "energy".
+    or m/s where it shall be fixed, such as "height=0.02"), "contacts", "grid", "time", "energy". `lighting` is "model"
+    for the MJCF's lamps and skybox, "studio" for a photo studio in their place, or "auto": the studio where the MJCF
+    sets no lamp.
     """
 
     model: str
