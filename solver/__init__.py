@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .mesh.mesh_file import load_mesh
     from .waves.absorber import absorbing_damping
     from .waves.footprint import Footprint
+    from .waves.load import Load
     from .waves.material import Material
     from .waves.relief import Relief
     from .waves.wave_solver import WaveSolver
@@ -28,6 +29,7 @@ _HOME = {
     "AtlasError": "errors",
     "Footprint": "waves.footprint",
     "GLError": "errors",
+    "Load": "waves.load",
     "Material": "waves.material",
     "Mesh": "mesh.mesh",
     "MeshError": "errors",
@@ -51,6 +53,7 @@ __all__ = [
     "AtlasError",
     "Footprint",
     "GLError",
+    "Load",
     "Material",
     "Mesh",
     "MeshError",

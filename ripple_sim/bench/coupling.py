@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.scenes.implicit import ellipsoid, polygonise, smooth_intersection
 from ripple_sim.scenes.shapes import duck
-from ripple_sim.solver import Material
-from ripple_sim.solver.waves.load import Load
+from ripple_sim.solver import Load, Material
 
 from ..coupling.collidable import make_collidable
 from ..coupling.ripples import Ripples

@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver import WaveSolver
-from ripple_sim.solver.waves.load import Load
+from ripple_sim.solver import Load, WaveSolver
 
 from .contacts import ContactPair
 from .sources import Touch

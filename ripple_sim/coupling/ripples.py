@@ -10,8 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver import Material, WaveSolver
-from ripple_sim.solver.waves.load import Load
+from ripple_sim.solver import Load, Material, WaveSolver
 
 from ..errors import RippleWarning, SceneError
 from .collidable import collides_as_hull, hull_warning

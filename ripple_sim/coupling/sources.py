@@ -9,8 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver import WaveSolver
-from ripple_sim.solver.waves.load import Load
+from ripple_sim.solver import Load, WaveSolver
 
 from .contacts import ContactPair, contact_pairs, smallest_extents
 from .patch import Patch

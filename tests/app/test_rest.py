@@ -8,8 +8,7 @@ from ripple_sim import Material, Ripples
 from ripple_sim.coupling.patch import Pressed
 from ripple_sim.coupling.press import ONSET, Press
 from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver import WaveSolver, sphere_atlas
-from ripple_sim.solver.waves.load import Load
+from ripple_sim.solver import Load, WaveSolver, sphere_atlas
 
 GRAVITY = 9.81
 TARGETS = {

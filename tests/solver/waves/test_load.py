@@ -5,10 +5,9 @@ import warnings
 import numpy as np
 import pytest
 
-from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, sphere_atlas
+from ripple_sim.solver import Atlas, Load, Material, SolverError, WaveSolver, sphere_atlas
 from ripple_sim.solver.waves.distance import distance_from_point
 from ripple_sim.solver.waves.footprint import footprint, footprint_at
-from ripple_sim.solver.waves.load import Load
 
 
 def test_load_acts_over_its_step_alone_beside_what_is_held(backend: str) -> None:
