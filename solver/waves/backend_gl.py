@@ -105,8 +105,7 @@ class GLBackend:
 
     def wait(self) -> None:
         """Return when all steps are done."""
-        with self._gl as ctx:
-            ctx.finish()
+        self._gl.wait()
 
     def finite(self) -> bool:
         """Whether all heights are finite, as far as it is known without waiting for the GPU: it is not."""

@@ -70,6 +70,7 @@ class FieldLayout:
     def read(self, buffer: moderngl.Buffer) -> NDArray[np.float32]:
         """A field's texels, [6, N, N]."""
         with self._gl:
+            self._gl.wait()
             places = np.frombuffer(buffer.read(), np.float32).reshape(6, self._face_strips, self.n + 2, self.stride)
         texels = np.empty((6, self.n, self.n), np.float32)
         for strip, first, last in self._columns():
