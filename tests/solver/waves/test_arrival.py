@@ -45,7 +45,7 @@ def test_waves_arrive_in_time_on_known_meshes(name: str) -> None:
     atlas = build_atlas(load_mesh(MESHES / name), 96, cache=False)
     errors = [arrival_error(atlas, source) for source in spread_sources(atlas, 3)]
     assert np.mean([error.front_median for error in errors]) < 0.01
-    # crests lag by what the texels disperse and by what limbs and furrows bend: half of it is left on texels of any width
+    # a crest lags by what texels disperse, and by what limbs and furrows bend, however narrow the texels
     assert np.mean([error.crest_median for error in errors]) < 0.012
     assert np.mean([error.front_under_3_percent for error in errors]) > 0.88
 
