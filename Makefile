@@ -19,8 +19,8 @@ $(STAMP): requirements.txt pyproject.toml .ci/setup .ci/egl.py
 	@touch $@
 
 # numba notices a changed kernel only by its own file, not by the files of the kernels that it calls.
-$(KERNELS): $(STAMP) $(wildcard solver/*.py solver/*/*.py)
-	@find solver -name '*.nb[ic]' -delete
+$(KERNELS): $(STAMP) $(wildcard solver/*.py solver/*/*.py ripple_sim/coupling/*.py)
+	@find solver ripple_sim -name '*.nb[ic]' -delete
 	@touch $@
 
 demo: setup $(KERNELS)
