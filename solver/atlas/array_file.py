@@ -60,7 +60,7 @@ def _read_array(path: Path, member: zipfile.ZipInfo) -> NDArray:
             raise damaged
         file.seek(sum(_LOCAL_HEADER.unpack(start)), os.SEEK_CUR)
         content = np.empty(size, np.uint8)
-        if file.readinto(memoryview(content)) != size or zlib.crc32(content) != member.CRC:
+        if file.readinto(content.data) != size or zlib.crc32(content.data) != member.CRC:
             raise damaged
     head = io.BytesIO(content[:_LONGEST_HEAD].tobytes())
     version = npy.read_magic(head)

@@ -14,7 +14,7 @@ from .array_file import read_arrays, write_arrays
 from .atlas import Atlas
 
 # Raise it when the sphere map or the file's layout changes: older files are then rebuilt.
-FORMAT = 7
+FORMAT = 8
 _FIELDS = ("sphere", "positions", "normals", "triangles", "barycentrics")
 _INDICES = ("F", "triangles")  # in 32 bits
 
@@ -63,4 +63,11 @@ def load_atlas(path: str | Path) -> Atlas:
     arrays |= {name: arrays[name].astype(np.int64) for name in _INDICES}
     mesh = Mesh(arrays["V"], arrays["F"], arrays.get("uv"), arrays.get("corner_uv"))
     kind = SphereAtlas if arrays["kind"].tolist() == [SphereAtlas.__name__] else Atlas
-    return kind(mesh, **{name: arrays[name] for name in _FIELDS})
+    return kind(
+        mesh=mesh,
+        sphere=arrays["sphere"],
+        positions=arrays["positions"],
+        normals=arrays["normals"],
+        triangles=arrays["triangles"],
+        barycentrics=arrays["barycentrics"],
+    )

@@ -76,8 +76,8 @@ def build_atlas(mesh: Mesh, resolution: int = 128, method: str = "progressive", 
 def _cache_path(mesh: Mesh, method: str) -> Path:
     """One file a mesh and method: the sphere map does not depend on the resolution, and rays are quick."""
     key = hashlib.sha256(f"{FORMAT} {method} {mesh.V.shape} {mesh.F.shape}".encode())
-    key.update(np.ascontiguousarray(mesh.V))
-    key.update(np.ascontiguousarray(mesh.F))
+    key.update(np.ascontiguousarray(mesh.V).data)
+    key.update(np.ascontiguousarray(mesh.F).data)
     return Path(platformdirs.user_cache_dir("ripple-sim")) / f"{key.hexdigest()[:32]}.npz"
 
 

@@ -17,7 +17,7 @@ from .vectors import Floats
 
 MOST_SWEEPS, TIRED_SWEEP = 5, 0.1  # stop when a sweep lowers the energy by less than this share
 MOST_NEWTON_STEPS, TIRED_NEWTON = 20, 5e-3  # stop when two steps in a row do
-LARGE, TIRED_LARGE = 8000, 1e-2  # vertices of a level that is content with less
+LARGE, TIRED_LARGE = 8000, 1.5e-2  # vertices of a level that is content with less
 LEAST_CG_STEPS, MOST_CG_STEPS = 10, 60
 SHORT_STEP = 0.3  # a Newton step cut to less than this asks for fewer steps of conjugate gradients
 EXPLODED = 1e5 * 4 * np.pi  # energy of a level that is stuck: start over from the sweeps

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ripple_sim.solver import Atlas, Mesh, build_atlas
 
 SEEDS = st.integers(0, 2**32 - 1)
-EXAMPLES = settings(max_examples=8, deadline=None, derandomize=True)
+EXAMPLES = settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 
 
 def sphere(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -12,7 +12,7 @@ from ripple_sim.solver.atlas.build import atlas_from_sphere_map
 from ripple_sim.solver.sphere_map import certify, orientation, progressive_sphere_map, stretch_quantiles
 
 SEEDS = st.integers(0, 2**32 - 1)
-EXAMPLES = settings(max_examples=15, deadline=None, derandomize=True)
+EXAMPLES = settings(max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 
 
 def arrays(mesh):
