@@ -35,5 +35,7 @@ def scene_digest(scene: Scene) -> str:
     for entry in scene.surfaces:
         for each in entry.material.maps().values():
             hasher.update(Path(each.map).read_bytes())
+        if entry.still_map is not None:
+            hasher.update(Path(entry.still_map).read_bytes())
     hasher.update(msgspec.json.encode((scene.surfaces, scene.camera, scene.events, scene.two_way)))
     return hasher.hexdigest()

@@ -71,6 +71,8 @@ class Simulation:
             }
             if maps:
                 self.ripples.change_material(entry.geom, **maps)
+            if entry.still_map is not None:
+                self.ripples.hold(entry.geom, 1.0 - texture_map(atlas, entry.still_map, 0.0, 1.0))
             for disc in entry.still:
                 self.ripples.make_rigid(entry.geom, self.ripples.to_geom(entry.geom, disc.point), disc.radius)
         self._materials = {name: self.ripples[name].material for name in self.ripples}

@@ -159,6 +159,24 @@ class Ripples:
         self._surface(name).make_rigid(point, radius)
         self._renew(name)
 
+    def hold(self, name: str, region: ArrayLike) -> None:
+        """Let a region of a geom's surface carry no waves, as `make_rigid` does with a disc.
+
+        Parameters
+        ----------
+        name : str
+            Geom.
+        region : bool or float [6, N, N]
+            What is held; from 0 to 1, where only a share of a texel is.
+
+        Raises
+        ------
+        SolverError
+            If the region is of another shape, or holds numbers that are not from 0 to 1.
+        """
+        self._surface(name).hold(region)
+        self._renew(name)
+
     def change_operator(self, operator: str) -> None:
         """Take another wave operator on all surfaces, by its name in `WaveSolver`; height and velocity stay.
 

@@ -41,7 +41,7 @@ class RippleSurface:
         self, model: mujoco.MjModel, geom: int, material: Material, resolution: int, options: Mapping[str, Any]
     ) -> None:
         self._model, self._geom, self._material, self._options = model, geom, material, dict(options)
-        self._rigid: NDArray[np.bool_] | None = None
+        self._rigid: NDArray[np.float64] | None = None
         self.waves = WaveSolver(target_atlas(model, geom, resolution), material, **options)
 
     def change_material(self, **coefficients: Any) -> None:
@@ -64,10 +64,16 @@ class RippleSurface:
 
     def make_rigid(self, point: ArrayLike, radius: float) -> None:
         """Hold a disc still, of a radius [m] round a point [m] in the frame of the geom; waves bounce off its rim."""
-        atlas = self.waves.atlas
-        rigid = np.zeros(atlas.areas.shape, bool) if self._rigid is None else self._rigid.copy()
-        rigid.reshape(-1)[footprint(atlas, point, radius).texels] = True
-        self._renew(self._material, rigid, self._options)
+        disc = np.zeros(self.waves.atlas.areas.shape)
+        disc.reshape(-1)[footprint(self.waves.atlas, point, radius).texels] = 1.0
+        self.hold(disc)
+
+    def hold(self, region: ArrayLike) -> None:
+        """Hold a region still, bool or shares from 0 to 1, [6, N, N], beside what is held already; see `hold`."""
+        held = np.asarray(region, dtype=np.float64)
+        if self._rigid is not None and held.shape == self._rigid.shape:
+            held = np.maximum(held, self._rigid)
+        self._renew(self._material, held, self._options)
 
     def to_geom(self, point: ArrayLike) -> NDArray[np.float64]:
         """Carry a point [m] from the frame of the geom's body to that of the geom."""
@@ -75,7 +81,7 @@ class RippleSurface:
         mujoco.mju_quat2Mat(rotation, self._model.geom_quat[self._geom])
         return (np.asarray(point, dtype=np.float64) - self._model.geom_pos[self._geom]) @ rotation.reshape(3, 3)
 
-    def _renew(self, material: Material, rigid: NDArray[np.bool_] | None, options: dict[str, Any]) -> None:
+    def _renew(self, material: Material, rigid: NDArray[np.float64] | None, options: dict[str, Any]) -> None:
         """Make the solver anew; nothing has changed if that fails."""
         old, whole = self.waves, material
         if rigid is not None:

@@ -94,9 +94,7 @@ def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
     scene = Scene(
         name=path.stem,
         model=model,
-        surfaces=tuple(
-            msgspec.structs.replace(entry, material=entry.material.located(path.parent)) for entry in content.ripple
-        ),
+        surfaces=tuple(entry.located(path.parent) for entry in content.ripple),
         camera=content.camera,
         duration=content.duration,
         events=Events(
@@ -199,6 +197,11 @@ def check_scene(scene: Scene) -> None:
                     f"ripple.material.{coefficient} names the picture {each.map!r}, which does not exist; "
                     "valid is a number, or the path of a picture relative to the scene file"
                 )
+        if entry.still_map is not None and not Path(entry.still_map).is_file():
+            raise SceneError(
+                f"ripple.still_map names the picture {entry.still_map!r}, which does not exist; valid is the path of a "
+                "picture relative to the scene file"
+            )
         for disc in entry.still:
             if not 0 < disc.radius < float("inf"):
                 raise SceneError(f"a still disc of geom {entry.geom!r} has radius {disc.radius!r} m; valid is above 0")

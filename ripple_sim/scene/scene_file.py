@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -23,7 +24,10 @@ class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[ripple]]`: one surface that carries waves, and how it looks."""
+    """`[[ripple]]`: one surface that carries waves, and how it looks.
+
+    `still_map` is the path of a picture in the mesh's own texture coordinates: no waves run where it is black.
+    """
 
     geom: str
     resolution: int = 128
@@ -31,6 +35,12 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     color: Color | None = None
     material: MaterialEntry = msgspec.field(default_factory=MaterialEntry)
     still: list[StillEntry] = []
+    still_map: str | None = None
+
+    def located(self, folder: Path) -> RippleEntry:
+        """The same with the pictures' paths made relative to a folder."""
+        still_map = None if self.still_map is None else str(folder / self.still_map)
+        return msgspec.structs.replace(self, material=self.material.located(folder), still_map=still_map)
 
 
 class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):

@@ -12,8 +12,11 @@ from ..atlas.atlas import Atlas
 from ..errors import SolverError
 from .material import Material
 
-# Stiffness of the rim, in units of what a texel's neighbours have: a wave falls to 1/e within 1.4 texels.
-_STIFFNESS = 0.5
+# Stiffness of the rim, in units of what a texel's neighbours have: a wave falls to 1/e within a texel.
+_STIFFNESS = 1.0
+
+# Where so much of the neighbourhood is held a texel is held wholly: at the outline it is a half.
+_WHOLE = 0.8
 
 # Texels that are held by this much and more are clamped.
 _CLAMPED = 0.98
@@ -23,9 +26,9 @@ def hold(atlas: Atlas, material: Material, region: ArrayLike) -> Material:
     """Material that holds a region still: waves bounce off it, inverted as from a clamp, and pushes do not move it.
 
     A clamp, like a region of speed 0, ends at texels: its rim is a staircase, and the surface is torn or kinked along
-    it. Here springs lead up to the clamp. They stiffen with the share of the neighbourhood that is held, over about
-    three texels on both sides of the rim, so that the height fades out along the region's true outline. They take no
-    energy. Waves turn about one texel inside of the outline.
+    it. Here springs lead up to the clamp, over a few texels about the rim. They stiffen with the share of the
+    neighbourhood that is held, so that the height fades out along the region's true outline. They take no energy. Waves
+    turn at the outline, within a texel.
 
     Parameters
     ----------
@@ -50,7 +53,7 @@ def hold(atlas: Atlas, material: Material, region: ArrayLike) -> Material:
         raise SolverError(f"held region has shape {share.shape}; valid is {atlas.areas.shape}")
     if not ((share >= 0) & (share <= 1)).all():
         raise SolverError("held region has shares below 0, above 1 or NaN; valid are numbers from 0 to 1")
-    share = smoothed(share)
+    share = np.clip(smoothed(share) / _WHOLE, 0, 1)
     speed, bending, stiffness, fixed = (
         material.texels(name, atlas.resolution) for name in ("speed", "bending", "stiffness", "fixed")
     )

@@ -118,9 +118,8 @@ def test_still_disc_carries_no_waves(tmp_path: Path) -> None:
     distance = np.linalg.norm(waves.atlas.positions - centre, axis=-1)
     around = np.abs(waves.height[(distance > 0.1) & (distance < 0.14)]).max()
     assert around > 0
-    # the height fades out over the rim: nothing is left at the disc's middle, a little on the way there
-    assert not waves.height[distance < 0.02].any()
-    assert np.abs(waves.height[distance < 0.06]).max() < 0.1 * around
+    assert not waves.height[distance < 0.03].any()
+    assert np.abs(waves.height[distance < 0.07]).max() < 0.1 * around  # at this resolution a texel is 30 mm wide
 
 
 def test_hook_is_called_before_every_step(tmp_path: Path) -> None:

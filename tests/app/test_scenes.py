@@ -44,8 +44,7 @@ def test_eyes_of_the_animal_stay_still_while_its_head_ripples() -> None:
          for eye in simulation.scene.surfaces[0].still],
         axis=0,
     )  # fmt: skip
-    # a disc of 25 mm, whose rim is three texels of 4 mm wide on both sides
-    eyes, round_them = away < 0.01, (away > 0.04) & (away < 0.08)
+    eyes, round_them = away < 0.016, (away > 0.045) & (away < 0.08)  # discs of 25 mm, texels of 4 mm
     assert eyes.sum() >= 2
     highest = 0.0
     for _ in range(24):

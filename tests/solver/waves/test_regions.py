@@ -140,7 +140,7 @@ def test_held_region_reflects_all_energy_inverted() -> None:
     waves, angle = held_cap(96, "held")
     waves.step(0.8)
     energy = waves.energy()
-    assert not waves.height[angle < 0.9].any()
+    assert not waves.height[angle < 0.97].any()
     waves.step(0.8)
     assert waves.energy() == pytest.approx(energy, rel=1e-5)
     # back at 1.8, upside down, but for twice the texel or two by which the rim gives way
@@ -156,13 +156,13 @@ def test_rim_of_a_held_region_is_smooth() -> None:
         waves, angle = held_cap(64, kind)
         waves.step(0.7)
         # what the texels' staircase leaves of a round wave: height about the rim, less its mean at that distance
-        rim = np.abs(angle - 1.02) < 0.08
+        rim = np.abs(angle - 1.06) < 0.08
         distance, height = angle[rim] - 1.0, waves.height[rim]
         mean = np.polyval(np.polyfit(distance, height, 8), distance)
         unevenness[kind] = np.std(height - mean) / np.abs(waves.height).max()
-    assert unevenness["held"] < 0.01
-    assert unevenness["held"] < 0.4 * unevenness["clamped"]
-    assert unevenness["held"] < 0.1 * unevenness["free"]
+    assert unevenness["held"] < 0.015
+    assert unevenness["held"] < 0.6 * unevenness["clamped"]
+    assert unevenness["held"] < 0.15 * unevenness["free"]
 
 
 def test_held_region_costs_little_of_the_time_step_and_is_moved_by_nothing(animal: Atlas) -> None:
