@@ -68,7 +68,7 @@ def test_smooth_star_shapes_are_never_starved(seed, roughness):
     V, F = sphere()
     V = V * smooth_radius(V, np.random.default_rng(seed), roughness)[:, None]
     S = assert_certified(V, F)
-    assert stretch_quantiles(V, F, S, [0.999])[0] < 2
+    assert stretch_quantiles(V, F, S, [0.999])[0] < 2.2
 
 
 @EXAMPLES
