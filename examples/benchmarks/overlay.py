@@ -1,6 +1,6 @@
 """What do overlays cost? Processor seconds a frame with and without, in turns on the same states of a scene.
 
-    python examples/overlay_benchmark.py [--scene duck] [--size 1280x720] [--frames 12]
+    python examples/benchmarks/overlay.py [--scene duck] [--size 1280x720] [--frames 12]
 
 The simulation is not counted, but for what the overlays ask of it (energy, contacts, the field), given by itself.
 """

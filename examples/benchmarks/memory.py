@@ -1,6 +1,6 @@
 """Does memory grow with the length of a video? The peak of a long render against that of a short one.
 
-    python examples/memory_benchmark.py [SCENE] [--short 5] [--long 60] [-- OPTIONS OF ripple-sim render]
+    python examples/benchmarks/memory.py [SCENE] [--short 5] [--long 60] [-- OPTIONS OF ripple-sim render]
 
 Each is a process of its own; counted is what it had in memory at most (ru_maxrss).
 """

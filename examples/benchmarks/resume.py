@@ -1,6 +1,6 @@
 """Is a render that is killed again and again the same as an unbroken one? Tried on the program itself.
 
-    python examples/resume_trial.py [SCENE] [--kills 20] [--step 1] [--output clip.mp4] [-- OPTIONS OF render]
+    python examples/benchmarks/resume.py [SCENE] [--kills 20] [--step 1] [--output clip.mp4] [-- OPTIONS OF render]
 
 `ripple-sim render SCENE -o FILE --resume` is started and killed (SIGKILL) at random moments as often as asked: within
 seconds of its start, or of the next clip or picture that it has stored (the `--step`th at the latest). Then it is left

@@ -1,6 +1,6 @@
 """How long does a frame take, against MuJoCo's own renderer on the same model without ripples?
 
-    python examples/render_benchmark.py [--size 1280x720] [--frames 10] [--resolution 128] [--look rubber]
+    python examples/benchmarks/render.py [--size 1280x720] [--frames 10] [--resolution 128] [--look rubber]
 
 The model is one target of about 6,000 triangles, twelve balls, a floor and a lamp with a shadow; both renderers smooth
 edges with 4 samples. Theirs runs in a process of its own, and the two take turns, so that both meet the same machine.

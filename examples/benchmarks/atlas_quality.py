@@ -1,6 +1,6 @@
 """How good and how quick are the atlases of all the meshes in a folder?
 
-    python examples/atlas_quality.py FOLDER [--resolution 96] [--method progressive|conformal]
+    python examples/benchmarks/atlas_quality.py FOLDER [--resolution 96] [--method progressive|conformal]
 
 One line a mesh: folded triangles, stretch below which 99.9 % of the area lies (1 is an even spread of texels), starved
 area, texel area over mesh area, the stable time step relative to that of an even square grid with as many texels on

@@ -1,6 +1,6 @@
 """How much quicker is an atlas than by exhaustive rays, and than building it again?
 
-    python examples/atlas_benchmark.py MESH [--resolution 512] [--rays 64]
+    python examples/benchmarks/atlas.py MESH [--resolution 512] [--rays 64]
 
 The paper casts every texel's ray against every triangle. That takes hours, so a few rays are timed and the rest is
 reckoned from them. Each figure is the least of several runs; the compiled kernels are warm.

@@ -1,6 +1,6 @@
 """How well do the stages of a render overlap? The whole, against the sum of its stages run alone.
 
-    python examples/overlap_benchmark.py [SCENE] [--size 1280x720] [--frames 48] [--rounds 3]
+    python examples/benchmarks/overlap.py [SCENE] [--size 1280x720] [--frames 48] [--rounds 3]
 
 Set-up, simulation, drawing and encoding run one after the other, each alone with what it needs ready in memory, then
 the whole `render_video`; all that several times in turn, so that everything meets the same machine. The least times
