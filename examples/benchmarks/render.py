@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-MESH = Path(__file__).parents[1] / "scenes" / "meshes" / "limbed.obj"
+MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "limbed.obj"
 LOOKAT, DISTANCE, AZIMUTH, ELEVATION = (0.0, 0.0, 0.35), 2.0, 130.0, -22.0
 
 

@@ -21,6 +21,7 @@ TARGET_TYPES = {
 
 # Primitives are cut into triangles of about this share of their size before they are mapped.
 _FINENESS = 1 / 24
+_SECTIONS = 96  # round a cylinder
 
 
 def geom_name(model: mujoco.MjModel, geom: int) -> str:
@@ -78,12 +79,27 @@ def _target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
         solid = trimesh.creation.capsule(height=2 * size[1], radius=size[0], count=(48, 48))
         solid.apply_translation([0, 0, -solid.bounds.mean(axis=0)[2]])
     elif kind == "cylinder":
-        solid = trimesh.creation.cylinder(radius=size[0], height=2 * size[1], sections=64)
+        solid = trimesh.creation.cylinder(radius=size[0], height=2 * size[1], sections=_SECTIONS)
     else:
         solid = trimesh.creation.box(extents=2 * size)
     longest = float(np.max(solid.extents)) * _FINENESS
     V, F = trimesh.remesh.subdivide_to_size(solid.vertices, solid.faces, max_edge=longest)
-    return Mesh.from_arrays(V, F, name=name)
+    return Mesh.from_arrays(_on_round_surface(kind, size, V), F, name=name)
+
+
+def _on_round_surface(kind: str, size: NDArray[np.float64], V: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vertices moved from the chords of a round solid onto its surface, along the radius [m]."""
+    if kind == "ellipsoid":
+        return V / np.linalg.norm(V / size, axis=1, keepdims=True)
+    if kind == "capsule":
+        axis = np.clip(V[:, 2:], -size[1], size[1]) * [0.0, 0.0, 1.0]
+        return axis + size[0] * (V - axis) / np.linalg.norm(V - axis, axis=1, keepdims=True)
+    if kind == "cylinder":
+        radius = np.linalg.norm(V[:, :2], axis=1)
+        round_part = radius > size[0] * (np.cos(np.pi / _SECTIONS) - 1e-9)  # the rest lies inside the flat ends
+        V = V.copy()
+        V[round_part, :2] *= (size[0] / radius[round_part])[:, None]
+    return V
 
 
 def _texture_coordinates(model: mujoco.MjModel, mesh: int) -> NDArray[np.float64] | None:

@@ -362,6 +362,6 @@ def test_primitives_ripple_on_their_own_surface(
     numbers = " ".join(map(str, size))
     model = model_of(f'<geom name="target" type="{kind}" size="{numbers}"/>' + BALL.format("0 0 2"))
     mesh = Ripples(model, {"target": Material()}, resolution=24, backend="cpu")["target"].atlas.mesh
-    assert mesh.volume == pytest.approx(volume, rel=0.02)
+    assert mesh.volume == pytest.approx(volume, rel=0.005)
     np.testing.assert_allclose(mesh.V.max(axis=0), half_extents, rtol=0.01)
     np.testing.assert_allclose(mesh.V.min(axis=0), np.negative(half_extents), rtol=0.01)
