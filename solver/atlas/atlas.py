@@ -115,7 +115,8 @@ class Atlas:
         dict
             `flipped` triangles, `solid_angle` [sr] (4 pi for a bijection), area-weighted stretch quantiles `q001`,
             `q01`, `q50`, `q99`, `q999`, `starved` share of the area whose texels are over 4 times too wide, `edge_min`
-            and `edge_max` [m], `coverage` (texel area over mesh area: 1 but for limbs that fall between the texels).
+            and `edge_max` [m], `coverage` (texel area over mesh area: 1 but for limbs that fall between the texels),
+            `spanned` (area of the mesh of texel centres over mesh area: it cuts creases short too).
         """
         return atlas_quality(self)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..sphere_map import certify, stretch, stretch_quantiles
-from .stencil import EAST, NORTH, link_lengths
+from .stencil import EAST, NORTH, link_lengths, lumped_areas
 
 if TYPE_CHECKING:
     from .atlas import Atlas
@@ -32,4 +32,5 @@ def atlas_quality(atlas: Atlas) -> dict[str, float]:
         "edge_min": float(edges.min()),
         "edge_max": float(edges.max()),
         "coverage": float(atlas.areas.sum() / mesh.area),
+        "spanned": float(lumped_areas(atlas.positions).sum() / mesh.area),
     }
