@@ -205,7 +205,8 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
 def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_path, number, status, word, where):
     (tmp_path / "slow.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\nfor _ in range(10**9): pass\n")
     code = (
-        "import sys\n"
+        "import signal, sys\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # which a job in the background has ignored
         "from ripple_sim.cli import commands\n"
         "from ripple_sim.cli import main as cli\n"
         "def meet_signal(argument):\n"
