@@ -24,38 +24,38 @@ def parse_size(word: str) -> tuple[int, int]:
 
 def parse_count(word: str) -> int:
     """Read a whole number from 1 on."""
-    if not re.fullmatch(r"[0-9]{1,9}", word) or int(word) == 0:
-        raise ValueError(f"{word!r} is not valid; it must be a whole number from 1 on")
-    return int(word)
+    return _whole(word, 1)
 
 
 def parse_seed(word: str) -> int:
     """Read a whole number from 0 on."""
-    if not re.fullmatch(r"[0-9]{1,9}", word):
-        raise ValueError(f"{word!r} is not valid; it must be a whole number from 0 on")
+    return _whole(word, 0)
+
+
+def _whole(word: str, least: int) -> int:
+    if not re.fullmatch(r"[0-9]{1,9}", word) or int(word) < least:
+        raise ValueError(f"{word!r} is not valid; it must be a whole number from {least} on")
     return int(word)
 
 
 def parse_seconds(word: str) -> float:
     """Read a positive, finite time [s]."""
-    try:
-        seconds = float(word)
-    except ValueError:
-        seconds = math.nan
-    if not (seconds > 0 and math.isfinite(seconds)):
-        raise ValueError(f"{word!r} is not valid; it must be a positive number of seconds")
-    return seconds
+    return _positive(word, "a positive number of seconds")
 
 
 def parse_factor(word: str) -> float:
     """Read a positive, finite factor."""
+    return _positive(word, "a positive number, such as 4")
+
+
+def _positive(word: str, valid: str) -> float:
     try:
-        factor = float(word)
+        number = float(word)
     except ValueError:
-        factor = math.nan
-    if not (factor > 0 and math.isfinite(factor)):
-        raise ValueError(f"{word!r} is not valid; it must be a positive number, such as 4")
-    return factor
+        number = math.nan
+    if not (number > 0 and math.isfinite(number)):
+        raise ValueError(f"{word!r} is not valid; it must be {valid}")
+    return number
 
 
 def parse_supersample(word: str) -> int:
