@@ -1,13 +1,8 @@
 #version 430
 #include "geometry_write.glsl"
+#include "mapping.glsl"
 #include "relief.glsl"
 #include "annotation.glsl"
-
-#if MAPPING == 2
-layout(binding = 6) uniform samplerCube image;
-#else
-layout(binding = 5) uniform sampler2D image;
-#endif
 
 uniform mat3 rotation;
 uniform vec4 color;  // linear; w: number of the object
@@ -22,12 +17,7 @@ void main()
 {
     vec3 n = normalize(normal);
     vec4 ripple = relief_at(sphere);
-    vec3 albedo = color.rgb;
-#if MAPPING == 1
-    albedo *= texture(image, mapped.xy).rgb;
-#elif MAPPING == 2
-    albedo *= texture(image, mapped).rgb;
-#endif
+    vec3 albedo = painted(color.rgb, mapped);
     vec3 shown = sqrt(albedo);
     float ink = 0.0;
 #if FIELD
