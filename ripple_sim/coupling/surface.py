@@ -41,7 +41,7 @@ class RippleSurface:
         self, model: mujoco.MjModel, geom: int, material: Material, resolution: int, options: Mapping[str, Any]
     ) -> None:
         self._model, self._geom, self._material, self._options = model, geom, material, dict(options)
-        self._rigid: NDArray[np.float64] | None = None
+        self._held: NDArray[np.float64] | None = None
         self.waves = WaveSolver(target_atlas(model, geom, resolution), material, **options)
 
     def change_material(self, **coefficients: Any) -> None:
@@ -56,11 +56,11 @@ class RippleSurface:
         for name in coefficients:
             if name not in names:
                 raise SolverError(f"a material has no coefficient {name!r}; valid are {', '.join(names)}")
-        self._renew(dataclasses.replace(self._material, **coefficients), self._rigid, self._options)
+        self._renew(dataclasses.replace(self._material, **coefficients), self._held, self._options)
 
     def change_operator(self, operator: str) -> None:
         """Take another wave operator, by its name in `WaveSolver`."""
-        self._renew(self._material, self._rigid, {**self._options, "operator": operator})
+        self._renew(self._material, self._held, {**self._options, "operator": operator})
 
     def make_rigid(self, point: ArrayLike, radius: float) -> None:
         """Hold a disc still, of a radius [m] round a point [m] in the frame of the geom; waves bounce off its rim."""
@@ -71,8 +71,8 @@ class RippleSurface:
     def hold(self, region: ArrayLike) -> None:
         """Hold a region still, bool or shares from 0 to 1, [6, N, N], beside what is held already; see `hold`."""
         held = np.asarray(region, dtype=np.float64)
-        if self._rigid is not None and held.shape == self._rigid.shape:
-            held = np.maximum(held, self._rigid)
+        if self._held is not None and held.shape == self._held.shape:
+            held = np.maximum(held, self._held)
         self._renew(self._material, held, self._options)
 
     def to_geom(self, point: ArrayLike) -> NDArray[np.float64]:
@@ -81,12 +81,12 @@ class RippleSurface:
         mujoco.mju_quat2Mat(rotation, self._model.geom_quat[self._geom])
         return (np.asarray(point, dtype=np.float64) - self._model.geom_pos[self._geom]) @ rotation.reshape(3, 3)
 
-    def _renew(self, material: Material, rigid: NDArray[np.float64] | None, options: dict[str, Any]) -> None:
+    def _renew(self, material: Material, held: NDArray[np.float64] | None, options: dict[str, Any]) -> None:
         """Make the solver anew; nothing has changed if that fails."""
         old, whole = self.waves, material
-        if rigid is not None:
-            material = hold(old.atlas, material, rigid)
+        if held is not None:
+            material = hold(old.atlas, material, held)
         new = WaveSolver(old.atlas, material, **options)
         new.height, new.velocity, new.pressure = old.height, old.velocity, old.pressure
         new.time, new.substeps_taken = old.time, old.substeps_taken
-        self.waves, self._material, self._rigid, self._options = new, whole, rigid, options
+        self.waves, self._material, self._held, self._options = new, whole, held, options
