@@ -26,7 +26,6 @@ from ripple_sim.render import Camera, Renderer, Surface, meshes
 from ripple_sim.render.camera import perspective, view_matrix
 from ripple_sim.scene.scene import Scene, load_scene
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver import RippleError
 from ripple_sim.solver.atlas.cubemap import texel_directions
 from ripple_sim.solver.gl import shared_context
 
@@ -49,12 +48,7 @@ N, RATE, FRAMES = 24, 30, 8
 EVERYTHING = ["height", "contacts", "grid", "time", "energy"]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _context() -> None:
-    try:
-        shared_context()
-    except RippleError as error:
-        pytest.skip(str(error))
+pytestmark = pytest.mark.usefixtures("opengl")
 
 
 @pytest.fixture

@@ -33,12 +33,7 @@ material = {speed = 0.5, density = 20.0}
 """
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _context() -> None:
-    try:
-        shared_context()
-    except RippleError as error:
-        pytest.skip(str(error))
+pytestmark = pytest.mark.usefixtures("opengl")
 
 
 @pytest.fixture
