@@ -13,6 +13,7 @@ from typing import Any
 import moderngl
 
 from .errors import GLError
+from .fence import Fences
 
 _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swr", "software")
 
@@ -48,7 +49,7 @@ class GLContext:
         self.vendor: str = info["GL_VENDOR"]
         self.version: str = info["GL_VERSION"]
         self._depth = 0
-        self._finish = _find_finish()
+        self._fences = Fences(_egl().eglGetProcAddress)
         self._shared_shaders: dict[str, moderngl.ComputeShader] = {}
 
     @property
@@ -94,11 +95,18 @@ class GLContext:
 
         moderngl holds the interpreter's lock while it waits, in `finish` as well as in reading back.
         """
-        with self as ctx:
-            if self._finish is None:
-                ctx.finish()
-            else:
-                self._finish()
+        with self:
+            self.wait_for(self.put_fence())
+
+    def put_fence(self) -> int:
+        """Mark the place behind all that the driver was told so far; wait for each mark once."""
+        with self:
+            return self._fences.put()
+
+    def wait_for(self, fence: int) -> None:
+        """Return when the driver has got to a fence, whatever it was told since; as `wait` does otherwise."""
+        with self:
+            self._fences.wait(fence)
 
     def compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
         """Compile `shaders/{name}.glsl` of `package` as a compute shader with `#define`s put in."""
@@ -183,16 +191,6 @@ def _create_context(device: int | None) -> moderngl.Context:
     )
 
 
-def _find_finish() -> Callable[[], None] | None:
-    """OpenGL's glFinish as a function that does not hold the interpreter's lock; None if the library is not found."""
-    for library in ("libGL.so.1", "libOpenGL.so.0"):
-        with contextlib.suppress(OSError, AttributeError):
-            finish = ctypes.CDLL(library).glFinish
-            finish.restype = None
-            return finish
-    return None
-
-
 def _current_context() -> int | None:
     """Handle of the EGL context that is current in this thread; None if there is none."""
     return _egl().eglGetCurrentContext()
@@ -204,7 +202,7 @@ def _egl() -> ctypes.CDLL:
     for libraries in _LIBRARIES:
         with contextlib.suppress(OSError):
             egl = ctypes.CDLL(libraries.get("libegl", "libEGL.so"))
-            egl.eglGetCurrentContext.restype = ctypes.c_void_p
+            egl.eglGetCurrentContext.restype = egl.eglGetProcAddress.restype = ctypes.c_void_p
             return egl
     raise GLError("the EGL library has vanished since the context was made; see `ripple-sim info`")
 

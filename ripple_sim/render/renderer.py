@@ -23,6 +23,7 @@ from .mirror import Mirror
 from .objects import ObjectTable
 from .owned import OwnedObjects
 from .picture import Picture
+from .readback import Readback
 from .shadow import ShadowMap
 from .surface import Surface, SurfaceMesh
 from .undrawn import warn_of_undrawn
@@ -72,7 +73,7 @@ class Renderer:
             raise RippleError(f"lighting is {lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
         warn_of_undrawn(model)
         self.width, self.height = width, height
-        self._gl, self._model, self._alpha = gl, model, alpha
+        self._gl, self._model = gl, model
         self._studio = lighting == "studio" or (lighting == "auto" and not is_lit(model))
         self._owned = ctx = OwnedObjects(gl, self)
         with gl:
@@ -100,7 +101,7 @@ class Renderer:
             if self._floor is not None and self._floor.reflectance > 0.0 and not alpha:
                 self._mirror = Mirror(gl, ctx, (width, height), options)
             self._bodies = Bodies(gl, ctx, model, [geom for geom in geoms if geom != floor], textures, self._table)
-        self._pixels = bytearray((4 if alpha else 3) * width * height)
+        self._readback = Readback(gl, ctx, (width, height), alpha=alpha)
 
     def __enter__(self) -> Renderer:
         return self
@@ -146,13 +147,17 @@ class Renderer:
         array of uint8, shape [height, width, 3], or [height, width, 4] with alpha
             sRGB, top row first; alpha is straight. A fresh array for every frame.
         """
-        channels = 4 if self._alpha else 3
+        self.submit(data, reliefs, camera)
+        return self.fetch()
+
+    def submit(self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint) -> None:
+        """Draw one frame as `render` does, without waiting for it: `fetch` returns it, after those submitted before."""
         with self._gl:
-            picture = self.draw(data, reliefs, camera)
-            self._gl.wait()  # reading back would keep all other Python threads waiting for the driver, too
-            picture.read_into(self._pixels, components=channels, alignment=1)
-        frame = np.frombuffer(self._pixels, dtype=np.uint8).reshape(self.height, self.width, channels)[::-1].copy()
-        return _straight(frame) if self._alpha else frame
+            self._readback.submit(self.draw(data, reliefs, camera))
+
+    def fetch(self) -> NDArray[np.uint8]:
+        """Wait for the earliest submitted frame, and return it as `render` does."""
+        return self._readback.fetch()
 
     def draw(self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint) -> moderngl.Framebuffer:
         """Draw one frame as `render` does, and leave it on the GPU.
@@ -279,10 +284,3 @@ class Renderer:
         low = np.clip(np.floor(middle + scale * np.min(corners, axis=0)), 0, whole[2:]).astype(int)
         high = np.clip(np.ceil(middle + scale * np.max(corners, axis=0)), 0, whole[2:]).astype(int)
         return int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])
-
-
-def _straight(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Divide colours by alpha."""
-    alpha = np.maximum(frame[..., 3:].astype(np.float32), 1.0) / 255.0
-    frame[..., :3] = np.minimum(frame[..., :3] / alpha + 0.5, 255.0).astype(np.uint8)
-    return frame
