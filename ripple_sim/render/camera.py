@@ -1,13 +1,14 @@
-"""Where the picture is taken from: MuJoCo's free camera, or a camera fixed in the model."""
+"""Where the picture is taken from: MuJoCo's free camera, a camera fixed in the model, or a point of its lens."""
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver.errors import RippleError
 
@@ -17,13 +18,27 @@ class Pose:
     """A camera in the world.
 
     `rotation` has the columns right, up and backwards (OpenGL and MuJoCo alike: it looks along -z), `distance` [m] is
-    how far away lies what the camera is about, and `fovy` the vertical field of view [degrees].
+    how far away lies what the camera is about, and `fovy` the vertical field of view [degrees]. The eye may stand
+    beside the camera's position, at a point of the `lens` (to the right, up) [m]: what lies in the plane at the
+    `focal_distance` [m] then stays where it is in the picture.
     """
 
     position: NDArray[np.float64]
     rotation: NDArray[np.float64]
     distance: float
     fovy: float
+    lens: tuple[float, float] = (0.0, 0.0)
+    focal_distance: float = np.inf
+
+    @property
+    def eye(self) -> NDArray[np.float64]:
+        """The point that the picture is seen from [m], shape [3]."""
+        return self.position + self.rotation[:, :2] @ self.lens
+
+    @property
+    def shear(self) -> NDArray[np.float64]:
+        """Where the ray through the middle of the picture goes: to the right and up, one metre in front of the eye."""
+        return -np.divide(self.lens, self.focal_distance)
 
     @property
     def focus(self) -> NDArray[np.float64]:
@@ -104,23 +119,39 @@ class FixedCamera:
         return Pose(self.position, self.rotation, self.distance, self.fovy)
 
 
+@dataclass(frozen=True)
+class ThroughLens:
+    """A camera whose eye stands at a point of its lens (to the right, up) [m], focused on a distance [m]."""
+
+    camera: Viewpoint
+    lens: tuple[float, float]
+    focal_distance: float
+
+    def pose(self) -> Pose:
+        """Return position and axes in the world."""
+        return dataclasses.replace(self.camera.pose(), lens=self.lens, focal_distance=self.focal_distance)
+
+
 def view_matrix(pose: Pose) -> NDArray[np.float64]:
     """World to eye coordinates, shape [4, 4], for column vectors."""
     view = np.eye(4)
     view[:3, :3] = pose.rotation.T
-    view[:3, 3] = -pose.rotation.T @ pose.position
+    view[:3, 3] = -pose.rotation.T @ pose.eye
     return view
 
 
-def perspective(fovy: float, aspect: float, near: float, far: float) -> NDArray[np.float64]:
+def perspective(
+    fovy: float, aspect: float, near: float, far: float, shear: ArrayLike = (0.0, 0.0)
+) -> NDArray[np.float64]:
     """Eye to clip coordinates in OpenGL's convention, shape [4, 4], for column vectors.
 
-    `fovy` in degrees; `aspect` is width over height; `near` and `far` in metres.
+    `fovy` in degrees; `aspect` is width over height; `near` and `far` in metres; for `shear` see `Pose`.
     """
     scale = 1.0 / np.tan(np.radians(fovy) / 2)
     projection = np.zeros((4, 4))
     projection[0, 0] = scale / aspect
     projection[1, 1] = scale
+    projection[:2, 2] = np.multiply([scale / aspect, scale], shear)
     projection[2, 2] = (near + far) / (near - far)
     projection[2, 3] = 2 * near * far / (near - far)
     projection[3, 2] = -1.0

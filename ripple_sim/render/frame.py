@@ -68,12 +68,12 @@ class FrameUniforms:
     def set_camera(self, pose: Pose, aspect: float) -> NDArray[np.float64]:
         """Set all that depends on the camera alone; return the world-to-clip matrix. `aspect` is width over height."""
         near, far = _NEAR * pose.distance, _FAR * pose.distance
-        matrix = perspective(pose.fovy, aspect, near, far) @ view_matrix(pose)
+        matrix = perspective(pose.fovy, aspect, near, far, pose.shear) @ view_matrix(pose)
         half = np.tan(np.radians(pose.fovy) / 2)
         self.set_matrix("view_projection", matrix)
-        self.set_vector("eye", pose.position, pose.distance)
+        self.set_vector("eye", pose.eye, pose.distance)
         self.set_vector("focus", pose.focus)
-        self.set_vector("ray", -pose.rotation[:, 2], near)
+        self.set_vector("ray", pose.rotation @ [*pose.shear, -1.0], near)
         self.set_vector("ray_right", half * aspect * pose.rotation[:, 0], far)
         self.set_vector("ray_up", half * pose.rotation[:, 1])
         return matrix

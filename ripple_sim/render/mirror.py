@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import moderngl
@@ -53,7 +54,8 @@ class Mirror:
         self._frame.values[...] = frame.values
         flip = np.eye(3) - 2 * np.outer(floor.normal, floor.normal)
         position = floor.origin + flip @ (pose.position - floor.origin)
-        self._frame.set_camera(Pose(position, flip @ pose.rotation, pose.distance, pose.fovy), self._aspect)
+        mirrored = dataclasses.replace(pose, position=position, rotation=flip @ pose.rotation)
+        self._frame.set_camera(mirrored, self._aspect)
         self._frame.set_vector("floor_origin", floor.origin, 0.0)
         self._frame.bind()
         ctx.front_face = "cw"

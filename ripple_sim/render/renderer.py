@@ -266,13 +266,13 @@ class Renderer:
                 layers.append((centres[0], float(radii[0]), target.number, target.draw))
         for body in self._bodies.clear:
             layers.append((*self._bodies.occluders.ball(data, body.geom), body.number, body.instances.draw))
-        layers.sort(key=lambda layer: -float(np.linalg.norm(layer[0] - pose.position)))
+        layers.sort(key=lambda layer: -float(np.linalg.norm(layer[0] - pose.eye)))
         for centre, radius, number, draw in layers:
             self._picture.add_layer(ctx, number, draw, self._clip(centre, radius, pose))
 
     def _clip(self, centre: NDArray, radius: float, pose: Pose) -> tuple[int, int, int, int]:
         """Return x, y, width and height [pixels] of a box about a ball in the picture."""
-        local = pose.rotation.T @ (centre - pose.position)
+        local = pose.rotation.T @ (centre - pose.eye)
         whole = (0, 0, self.width, self.height)
         away = -local[2] - radius
         if not away > 0.01 * radius:
@@ -280,7 +280,7 @@ class Renderer:
         scale = self.height / (2 * np.tan(np.radians(pose.fovy) / 2))
         # the nearest point of the ball's box is seen under the widest angle
         corners = [(local[:2] + side * radius) / depth for side in (-1, 1) for depth in (away, away + 2 * radius)]
-        middle = np.array([self.width, self.height]) / 2
+        middle = np.array([self.width, self.height]) / 2 - scale * pose.shear
         low = np.clip(np.floor(middle + scale * np.min(corners, axis=0)), 0, whole[2:]).astype(int)
         high = np.clip(np.ceil(middle + scale * np.max(corners, axis=0)), 0, whole[2:]).astype(int)
         return int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])

@@ -15,8 +15,8 @@ layout(std140, binding = 0) uniform Frame {
     vec4 shadow_penumbra;  // x: tangent of the lamp's radius; y: radius [m] of a near lamp; z: widest in the map
     vec4 eye;              // xyz [m]; w: distance to the focus [m]
     vec4 focus;            // what the camera is about [m]
-    vec4 ray;              // forwards; w: near plane [m]
-    vec4 ray_right;        // from the middle of the picture to its right edge, one metre away; w: far plane [m]
+    vec4 ray;              // through the middle of the picture, one metre along the camera's axis; w: near plane [m]
+    vec4 ray_right;        // from there to the picture's right edge; w: far plane [m]
     vec4 ray_up;
     vec4 zenith;           // radiance of the background overhead
     vec4 horizon;          // and at the horizon
