@@ -132,8 +132,17 @@ class FrameSource:
 
     def draw(self, state: Snapshot) -> NDArray[np.uint8]:
         """Draw a snapshot, uint8 [height, width, 3], or 4 if it is transparent."""
+        self.submit(state)
+        return self.fetch()
+
+    def submit(self, state: Snapshot) -> None:
+        """Draw a snapshot without waiting for it: `fetch` returns it, after those submitted before."""
         reliefs = {self._geoms[name]: relief for name, relief in state.reliefs.items()}
-        return shrink(self.renderer.render(state.data, reliefs, self.camera(state)), self._supersample)
+        self.renderer.submit(state.data, reliefs, self.camera(state))
+
+    def fetch(self) -> NDArray[np.uint8]:
+        """Wait for the earliest submitted snapshot's picture, and return it as `draw` does."""
+        return shrink(self.renderer.fetch(), self._supersample)
 
     def camera(self, state: Snapshot) -> Camera | FixedCamera:
         """Camera of a snapshot."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import mujoco
@@ -15,13 +15,13 @@ from ripple_sim.solver.waves.backend import auto_backend
 
 from .errors import SceneError
 from .overlay.comparison import compared_operators
-from .overlay.film import Film
+from .overlay.film import Film, Shot
 from .overlay.request import parse_request
 from .pipeline import Ahead
 from .provenance import provenance
 from .scene.scene import MAX_DURATION, Scene
 from .simulation import Simulation
-from .video import check_output, open_writer
+from .video import FrameWriter, check_output, open_writer
 
 # Snapshots that wait to be drawn. One would do if all frames took the same time.
 _WAITING = 2
@@ -30,6 +30,8 @@ _WAITING = 2
 _CHECKED = 16
 
 MAX_SLOW_MOTION = 1000
+
+Progress = Callable[[int, int], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,7 +72,7 @@ def render_video(
     resolution: int | None = None,
     backend: str = "auto",
     resume: bool = False,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     on_step: Callable[[Simulation], None] | None = None,
 ) -> Summary:
     """Simulate a scene and write its video.
@@ -135,7 +137,8 @@ def render_video(
         "the wave solver": auto_backend() if backend == "auto" else backend,
         **provenance(scene, gl),
     }
-    render_seconds = 0.0
+    # software draws on the processor, which has enough to do with one frame
+    ahead = 0 if gl.software else 1
     with open_writer(
         output, width=width, height=height, fps=fps, transparent=transparent, job=job, resume=resume
     ) as writer:
@@ -157,21 +160,15 @@ def render_video(
             transparent=transparent,
             gl=gl,
         )
-        states = film.states(alive=_WAITING + 2)
+        states = film.states(alive=_WAITING + ahead + 2)
         # waves on the GPU share the renderer's OpenGL context, which belongs to one thread at a time
         with Ahead(states, _WAITING) if simulations[0].backend == "cpu" else contextlib.nullcontext(states) as states:
             film.prepare()
             ready = time.perf_counter()
-            for state in states:
-                if state.number % _CHECKED == 0:
-                    writer.check_state(state.number, state.digest())
-                if state.number >= resumed_at:
-                    before = time.perf_counter()
-                    frame = film.draw(state)
-                    render_seconds += time.perf_counter() - before
-                    writer.write(frame)
+            for frame in film.draw_all(_missing(states, writer, progress, count), ahead):
+                writer.write(frame)
                 if progress is not None:
-                    progress(state.number + 1, count)
+                    progress(writer.frames, count)
     return Summary(
         output=output,
         frames=count,
@@ -182,10 +179,22 @@ def render_video(
         setup_seconds=ready - start,
         physics_seconds=sum(simulation.physics_seconds for simulation in simulations),
         wave_seconds=sum(simulation.wave_seconds for simulation in simulations),
-        render_seconds=render_seconds,
+        render_seconds=film.seconds,
         encode_seconds=writer.encode_seconds,
         wall_seconds=time.perf_counter() - start,
     )
+
+
+def _missing(states: Iterable[Shot], writer: FrameWriter, progress: Progress | None, count: int) -> Iterator[Shot]:
+    """Check the states, and pass over those whose frames were there before."""
+    resumed_at = writer.frames
+    for state in states:
+        if state.number % _CHECKED == 0:
+            writer.check_state(state.number, state.digest())
+        if state.number >= resumed_at:
+            yield state
+        elif progress is not None:
+            progress(state.number + 1, count)
 
 
 def _frame_count(duration: float, fps: int, slow_motion: float) -> int:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+import time
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -63,6 +65,11 @@ class Film:
         As for `FrameSource`.
     gl : GLContext, optional
         By default the process's shared one.
+
+    Attributes
+    ----------
+    seconds : float
+        Time spent on frames so far [s].
     """
 
     def __init__(
@@ -84,6 +91,8 @@ class Film:
         self._notebook = Notebook(request, simulations, frames, rate)
         self._drawing: dict[str, Any] = {"supersample": supersample, "transparent": transparent, "gl": gl}
         self._sources: list[FrameSource] = []
+        self._submitted: deque[Shot] = deque()
+        self.seconds = 0.0
         self._painter = Painter(
             request,
             self._layout,
@@ -109,9 +118,40 @@ class Film:
         for snapshots in zip(*runs, strict=True):
             yield Shot(snapshots, self._notebook.follow())
 
+    def draw_all(self, shots: Iterable[Shot], ahead: int = 0) -> Iterator[NDArray[np.uint8]]:
+        """Draw frames in their order, as `draw` does, and wait for each when `ahead` later ones have been submitted."""
+        for shot in shots:
+            self.submit(shot)
+            if len(self._submitted) > ahead:
+                yield self.fetch()
+        while self._submitted:
+            yield self.fetch()
+
     def draw(self, shot: Shot) -> NDArray[np.uint8]:
         """Draw a frame, uint8 [height, width, 3], or 4 if it is transparent."""
+        self.submit(shot)
+        return self.fetch()
+
+    def submit(self, shot: Shot) -> None:
+        """Draw a frame without waiting for it: `fetch` returns it, after those submitted before.
+
+        The shot must stay as it is until then.
+        """
         self.prepare()
+        start = time.perf_counter()
+        for number, (source, snapshot) in enumerate(zip(self._sources, shot.snapshots, strict=True)):
+            if self._request.field:
+                geoms = self.simulations[number].ripples.geom_ids
+                for name, field in shot.notes.fields[number].items():
+                    source.renderer.set_field(geoms[name], field, shot.notes.field_scale.value)
+            source.submit(snapshot)
+        self._submitted.append(shot)
+        self.seconds += time.perf_counter() - start
+
+    def fetch(self) -> NDArray[np.uint8]:
+        """Wait for the earliest submitted frame, and return it as `draw` does."""
+        start = time.perf_counter()
+        shot = self._submitted.popleft()
         pictures = [self._picture(run, shot) for run in range(len(self._sources))]
         frame = pictures[0]
         if len(pictures) > 1:
@@ -119,16 +159,13 @@ class Film:
             seam, half = pictures[0].shape[1], max(1, round(self._layout.em / 16))
             frame[:, seam - half : seam + half] = 255
         self._painter.paint(frame, shot.notes)
+        self.seconds += time.perf_counter() - start
         return frame
 
     def _picture(self, run: int, shot: Shot) -> NDArray[np.uint8]:
-        """What the renderer draws of a run, and the contacts in it."""
+        """What the renderer has drawn of a run, and the contacts in it."""
         source, snapshot, notes = self._sources[run], shot.snapshots[run], shot.notes
-        if self._request.field:
-            geoms = self.simulations[run].ripples.geom_ids
-            for name, field in notes.fields[run].items():
-                source.renderer.set_field(geoms[name], field, notes.field_scale.value)
-        picture = source.draw(snapshot)
+        picture = source.fetch()
         if self._request.contacts and notes.marks[run]:
             projection = Projection(source.camera(snapshot).pose(), picture.shape[1], picture.shape[0])
             hiding = self.simulations[run].model, snapshot.data
