@@ -1,4 +1,4 @@
-"""Video: frames go in one by one, a finished file (or folder of PNG frames) appears at the end or not at all."""
+"""Video: frames go in one by one, a finished file (or folder of frames) appears at the end or not at all."""
 
 from .output import check_output, default_fps
 from .writer import FrameWriter, open_writer

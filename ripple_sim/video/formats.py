@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from .clip import H264, LOSSLESS, VP9, Clip, Codec, Stream, join_clips
+from .exr import Exr
 from .gif import join_gif
 from .webp import join_webp
 
@@ -24,8 +25,8 @@ Segments = Sequence[tuple[Path, int]]
 class Segment(Protocol):
     """A file of some frames that is being written."""
 
-    def write(self, frame: NDArray[np.uint8]) -> None:
-        """Add one frame, uint8 [height, width, 3 or 4]."""
+    def write(self, frame: NDArray) -> None:
+        """Add one frame, [height, width, 3 or 4], of the format's type."""
 
     def finish(self) -> None:
         """Complete the file."""
@@ -53,7 +54,7 @@ class Still:
 
 @dataclasses.dataclass(frozen=True)
 class Format:
-    """How the videos of one ending are made.
+    """How the videos of one ending, or the frames of a folder, are made.
 
     Attributes
     ----------
@@ -66,12 +67,15 @@ class Format:
     join : callable or None
         Makes the file of all segments, given with the number of each one's first frame. None: their folder is the
         video.
+    linear : bool
+        Whether frames are linear light, float16, colours multiplied by opacity; otherwise sRGB, uint8, not multiplied.
     """
 
     suffix: str
     length: int
     start: Callable[[Path, Stream], Segment]
     join: Callable[[Segments, Path, Stream], None] | None
+    linear: bool = False
 
 
 def _of_clips(suffix: str, codec: Codec, join: Callable[[Segments, Path, Stream], None] | None = None) -> Format:
@@ -83,6 +87,7 @@ def _of_clips(suffix: str, codec: Codec, join: Callable[[Segments, Path, Stream]
     )
 
 
+# By the ending of a video, or the name of the format of a folder's frames; see `video_format`.
 FORMATS = {
     ".mp4": _of_clips(".mp4", H264),
     ".webm": _of_clips(".webm", VP9),
@@ -93,10 +98,11 @@ FORMATS = {
         start=lambda path, stream: Still(path, format="WEBP", quality=88, method=3),
         join=lambda stills, path, stream: join_webp([still for still, _ in stills], path, stream),
     ),
-    "": Format(
+    "png": Format(
         suffix=".png",
         length=1,
         start=lambda path, stream: Still(path, format="PNG", compress_level=3),
         join=None,
     ),
+    "exr": Format(suffix=".exr", length=1, start=Exr, join=None, linear=True),
 }

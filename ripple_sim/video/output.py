@@ -8,35 +8,40 @@ from pathlib import Path
 
 from ripple_sim.errors import EncodingError, VideoError
 
+from .exr import check_exr
+
 MIN_SIZE, MAX_SIZE = 16, 8192
 MAX_FPS = 240
 # Browsers slow a GIF down to 10 frames a second where a frame lasts less than two hundredths of a second.
 MAX_GIF_FPS = 50
 
 ENDINGS = (".mp4", ".webm", ".gif", ".webp")
-_FRAME_PATTERN = re.compile(r"frame_\d{5,}\.png")
+FRAME_FORMATS = ("png", "exr")
+_FRAME_PATTERN = re.compile(rf"frame_\d{{5,}}\.({'|'.join(FRAME_FORMATS)})")
 _SUBSAMPLED = (".mp4", ".webm")
-_WITH_OPACITY = (".webp", "")
-_VALID = f"valid is {', '.join(ENDINGS)}, or a name without ending for a folder of PNG frames"
+_WITH_OPACITY = (".webp", *FRAME_FORMATS)
+_VALID = f"valid is {', '.join(ENDINGS)}, or a name without ending for a folder of frames"
 
 
-def video_format(path: Path) -> str:
-    """Tell the format a path asks for: one of `ENDINGS`, or "" for a folder of PNG frames.
+def video_format(path: Path, frame_format: str = "png") -> str:
+    """Tell the format a path asks for: one of `ENDINGS`, or for a folder the format of its frames.
 
     Raises
     ------
     VideoError
-        If the path names no file, or has any other ending and is no folder.
+        If the path names no file, or has any other ending and is no folder, or frames have no such format.
     """
+    if frame_format not in FRAME_FORMATS:
+        raise VideoError(f"frame format is {frame_format!r}; valid is {' or '.join(map(repr, FRAME_FORMATS))}")
     name = path.name
     if name in ("", "..") or name.lower() in ENDINGS:
         raise VideoError(f"output is {str(path)!r}, which names no file; {_VALID}")
     if path.is_dir() and path.suffix.lower() not in ENDINGS:
-        return ""
+        return frame_format
     _, dot, ending = name[1:].rpartition(".")  # a name may begin with a dot
     if dot and f".{ending}".lower() not in ENDINGS:
         raise VideoError(f"{path} ends in {dot}{ending}; {_VALID}")
-    return f"{dot}{ending}".lower() if dot else ""
+    return f"{dot}{ending}".lower() if dot else frame_format
 
 
 def default_fps(path: Path) -> int:
@@ -44,59 +49,83 @@ def default_fps(path: Path) -> int:
     return 25 if video_format(path) == ".gif" else 60
 
 
-def check_output(path: str | Path, width: int, height: int, fps: int, *, transparent: bool = False) -> None:
+def check_output(
+    path: str | Path,
+    width: int,
+    height: int,
+    fps: int,
+    *,
+    transparent: bool = False,
+    frame_format: str = "png",
+    overlaid: bool = False,
+) -> None:
     """Make sure that a video of this size and rate [1/s] can be written to `path`; leave nothing behind.
 
     Raises
     ------
     VideoError
         If the ending is unknown, the size or rate is out of range, the size is odd where the format halves its colour
-        resolution, the format keeps no transparency that is asked for, or something else stands in the place.
+        resolution, the format keeps no transparency or takes no overlays that are asked for, frames of another format
+        than PNG are asked for and the video is no folder, or something else stands in the place.
     EncodingError
         If the place cannot be written to.
     """
     path = Path(path)
     try:
-        ending = video_format(path)
-        if transparent and ending not in _WITH_OPACITY:
-            raise VideoError(f"{path} cannot be transparent; valid is .webp or a folder of PNG frames")
-        _check_size(ending, width, height)
-        _check_fps(ending, fps)
-        _check_place(path, ending)
+        form = video_format(path, frame_format)
+        if frame_format != "png" and form != frame_format:
+            raise VideoError(f"cannot write {frame_format.upper()} frames to {path}: name a folder, without an ending")
+        if form == "exr":
+            _check_exr(overlaid)
+        if transparent and form not in _WITH_OPACITY:
+            raise VideoError(f"{path} cannot be transparent; valid is .webp or a folder of frames")
+        _check_size(form, width, height)
+        _check_fps(form, fps)
+        _check_place(path, form)
     except OSError as error:
         raise EncodingError(
             f"cannot write {path}: {error.strerror}; name a file in a folder you can write to"
         ) from error
 
 
-def _check_size(ending: str, width: int, height: int) -> None:
+def _check_size(form: str, width: int, height: int) -> None:
     if not all(isinstance(side, int) and MIN_SIZE <= side <= MAX_SIZE for side in (width, height)):
         raise VideoError(f"frame size is {width}x{height}; valid is {MIN_SIZE} to {MAX_SIZE} pixels along each side")
-    if ending in _SUBSAMPLED and (width % 2 or height % 2):
+    if form in _SUBSAMPLED and (width % 2 or height % 2):
         raise VideoError(
-            f"frame size is {width}x{height}; {ending} needs an even width and height, "
+            f"frame size is {width}x{height}; {form} needs an even width and height, "
             f"such as {width + width % 2}x{height + height % 2}"
         )
 
 
-def _check_fps(ending: str, fps: int) -> None:
-    highest = MAX_GIF_FPS if ending == ".gif" else MAX_FPS
+def _check_fps(form: str, fps: int) -> None:
+    highest = MAX_GIF_FPS if form == ".gif" else MAX_FPS
     if not isinstance(fps, int) or not 1 <= fps <= highest:
-        what = "a GIF's frame rate" if ending == ".gif" else "frame rate"
+        what = "a GIF's frame rate" if form == ".gif" else "frame rate"
         raise VideoError(f"{what} is {fps}; valid is a whole number from 1 to {highest} frames per second")
 
 
-def _check_place(path: Path, ending: str) -> None:
+def _check_exr(overlaid: bool) -> None:
+    check_exr()
+    if overlaid:
+        raise VideoError(
+            "EXR frames are linear light, over which overlays and comparisons are not drawn; leave them out "
+            "(--overlay '', and no --compare), or take PNG frames"
+        )
+
+
+def _check_place(path: Path, form: str) -> None:
+    is_file = form in ENDINGS
     if path.is_dir():
-        if ending:
+        if is_file:
             raise VideoError(f"cannot write {path}: it is a folder; name a file")
         strangers = [entry.name for entry in path.iterdir() if not _FRAME_PATTERN.fullmatch(entry.name)]
         if strangers:
             raise VideoError(
                 f"cannot write frames to {path}: it holds other files ({sorted(strangers)[0]}); name a new folder"
             )
-    elif path.exists() and (not ending or not path.is_file()):
-        raise VideoError(f"cannot write {path}: it exists and is no {'file' if ending else 'folder'}")
+    elif path.exists() and not (is_file and path.is_file()):
+        raise VideoError(f"cannot write {path}: it exists and is no {'file' if is_file else 'folder'}")
     folder = path.absolute().parent
     while not folder.exists():
         folder = folder.parent

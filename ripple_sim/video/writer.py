@@ -22,7 +22,7 @@ from .formats import FORMATS, Format, Segment
 from .output import check_output, video_format
 from .part import Part
 
-# Rendering runs ahead of encoding by at most this many frames; 8 frames of 1280x720 are 22 MB.
+# Rendering runs ahead of encoding by at most this many frames; 8 frames of 1280x720 are 22 MB, or 44 MB of EXR.
 QUEUE_FRAMES = 8
 
 # They would come again.
@@ -36,15 +36,17 @@ def open_writer(
     height: int,
     fps: int,
     transparent: bool = False,
+    frame_format: str = "png",
     job: Mapping[str, str | int | float] | None = None,
     resume: bool = False,
 ) -> FrameWriter:
     """Start a video, or go on with one; the ending of `path` chooses its format.
 
     `.mp4` is H.264, `.webm` VP9, `.gif` and `.webp` are animated pictures; a name without ending becomes a folder of
-    PNG frames. Missing parent folders are created. Nothing appears at `path` before the video is complete; what was
-    there stays until then. Meanwhile the frames are in a folder beside it, `path` with `.part` behind: clips of some
-    frames that play, or pictures. They join to the same video, bit for bit, however often the work was interrupted.
+    PNG or EXR frames. Missing parent folders are created. Nothing appears at `path` before the video is complete; what
+    was there stays until then. Meanwhile the frames are in a folder beside it, `path` with `.part` behind: clips of
+    some frames that play, or pictures. They join to the same video, bit for bit, however often the work was
+    interrupted.
 
     Parameters
     ----------
@@ -55,7 +57,9 @@ def open_writer(
     fps : int
         Frames per second.
     transparent : bool
-        Frames have a fourth channel, their opacity (not premultiplied).
+        Frames have a fourth channel, their opacity, by which the colours are multiplied for EXR, and for others not.
+    frame_format : str
+        Of a folder's frames, "png" or "exr".
     job : mapping, optional
         What the video is made of and how. With it, what is finished stays after an interruption, to be gone on with.
     resume : bool
@@ -70,8 +74,8 @@ def open_writer(
         If the folder cannot be written.
     """
     path = Path(path)
-    check_output(path, width, height, fps, transparent=transparent)
-    video = FORMATS[video_format(path)]
+    check_output(path, width, height, fps, transparent=transparent, frame_format=frame_format)
+    video = FORMATS[video_format(path, frame_format)]
     try:
         part = Part(path, suffix=video.suffix, length=video.length, job=job or {}, resume=resume)
     except OSError as error:
@@ -101,17 +105,22 @@ class FrameWriter:
         self.frames = part.frames
         self.encode_seconds = 0.0
         self._part, self._format, self._stream, self._shape = part, video, stream, shape
+        self._type = np.dtype(np.float16 if video.linear else np.uint8)
         self._resumable = resumable
         self._segment: Segment | None = None
         self._pending = 0
-        self._queue: queue.Queue[NDArray[np.uint8] | None] = queue.Queue(QUEUE_FRAMES)
+        self._queue: queue.Queue[NDArray | None] = queue.Queue(QUEUE_FRAMES)
         self._error: Exception | None = None
         self._abandoned = self._finished = False
         self._thread = threading.Thread(target=self._encode, name="video encoder", daemon=True)
         self._thread.start()
 
-    def write(self, frame: NDArray[np.uint8]) -> None:
-        """Add one frame, uint8 [height, width, 3], first row on top. It is copied; this waits where the queue is full.
+    def write(self, frame: NDArray) -> None:
+        """Add one frame, first row on top. It is copied; this waits where the queue is full.
+
+        Parameters
+        ----------
+        frame : uint8 (sRGB) or for EXR float16 (linear light), [height, width, 3 or 4]
 
         Raises
         ------
@@ -122,8 +131,8 @@ class FrameWriter:
         """
         if not self._thread.is_alive():
             raise VideoError(f"the video {self.path} is closed; open another writer")
-        if frame.shape != self._shape or frame.dtype != np.uint8:
-            raise VideoError(f"frame is {frame.dtype} {list(frame.shape)}; valid is uint8 {list(self._shape)}")
+        if frame.shape != self._shape or frame.dtype != self._type:
+            raise VideoError(f"frame is {frame.dtype} {list(frame.shape)}; valid is {self._type} {list(self._shape)}")
         self._raise_error()
         self._queue.put(frame.copy())
         self.frames += 1
@@ -215,7 +224,7 @@ class FrameWriter:
             with contextlib.suppress(Exception):  # what it could say has been said
                 self._segment.close()
 
-    def _add(self, frame: NDArray[np.uint8]) -> None:
+    def _add(self, frame: NDArray) -> None:
         if self._segment is None:
             self._segment = self._format.start(self._part.unfinished, self._stream)
         self._segment.write(frame)
