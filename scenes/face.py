@@ -1,6 +1,6 @@
-"""A face on an egg: a mesh with texture coordinates, and the picture that tells where waves run.
+"""A cartoon head: its mesh with texture coordinates, its colours, and the picture that tells where waves run.
 
-`python -m ripple_sim.scenes.face` writes `meshes/face.obj` and `meshes/face_waves.png` again.
+`python -m ripple_sim.scenes.face` writes `meshes/face.obj`, `meshes/face.png` and `meshes/face_waves.png` again.
 """
 
 from __future__ import annotations
@@ -8,58 +8,143 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw
+from numpy.typing import NDArray
+from PIL import Image
+
+from ripple_sim.solver.whole_file import whole_file
+
+from .implicit import (
+    Array,
+    Sdf,
+    capsule,
+    ellipsoid,
+    half_space,
+    mirrored,
+    polygonise,
+    rounded_cone,
+    smooth_intersection,
+    smooth_union,
+    sphere,
+)
 
 FOLDER = Path(__file__).parent / "meshes"
 
-# longitudes and latitudes of the mesh; the picture's pixels
-_COLUMNS, _ROWS = 48, 24
-_WIDTH, _HEIGHT = 512, 256
+_MIDDLE = np.array([0.0, 0.0, 0.52])  # texture coordinates are longitude and latitude about this point [m]
+_HEIGHT = 512  # of the pictures [pixels]; they are twice as wide
+_FINER = 2  # they are painted so many times as fine, for smooth edges
+
+_EYE, _EYE_RADIUS = np.array([0.205, 0.108, 0.575]), 0.088
+_GAZE = np.array([0.955, -0.10, 0.12])  # of the eye at y > 0
+_IRIS, _PUPIL, _GLINT = 0.048, 0.026, 0.011  # radii [m]
+
+_SKIN, _CHEEK, _LIP = (236, 190, 150), (232, 150, 124), (196, 92, 84)
+_WHITE, _BLUE, _BLACK = (250, 250, 246), (58, 128, 150), (24, 24, 30)
+
+_FOOT = 0.13  # height at which the neck is cut off [m]
+# ears stand off the head towards the back
+_FLARED = np.array([[np.cos(0.45), np.sin(0.45), 0.0], [-np.sin(0.45), np.cos(0.45), 0.0], [0.0, 0.0, 1.0]])
+
+_LIPS = smooth_union(
+    0.02,
+    mirrored(capsule((0.268, 0.0, 0.352), (0.222, 0.095, 0.378), 0.019)),
+    mirrored(capsule((0.262, 0.0, 0.322), (0.222, 0.092, 0.368), 0.021)),
+)
+
+
+def head(cell: float = 0.019) -> tuple[Array, NDArray[np.int64]]:
+    """Model a head 0.75 m high that faces +x and stands on z = 0, vertices and triangles as `polygonise` gives them."""
+    V, F = polygonise(_head_solid(), ((-0.4, -0.4, 0.1), (0.45, 0.4, 0.95)), cell)
+    return V - [0.0, 0.0, _FOOT], F
+
+
+def _head_solid() -> Sdf:
+    skull = ellipsoid((-0.03, 0.0, 0.60), (0.29, 0.26, 0.28))
+    jaw = ellipsoid((0.05, 0.0, 0.40), (0.215, 0.205, 0.20))
+    cheek = sphere((0.13, 0.115, 0.425), 0.10)
+    neck = rounded_cone((-0.03, 0.0, 0.34), (-0.04, 0.0, 0.10), 0.13, 0.17)
+    nose = rounded_cone((0.255, 0.0, 0.56), (0.315, 0.0, 0.475), 0.03, 0.056)
+    brow = capsule((0.243, 0.06, 0.672), (0.188, 0.165, 0.676), 0.024)
+    ear = ellipsoid((-0.03, 0.285, 0.55), (0.062, 0.026, 0.092), _FLARED)
+    hollow = ellipsoid((-0.005, 0.322, 0.56), (0.036, 0.03, 0.056), _FLARED)
+    ear = smooth_intersection(0.02, ear, lambda points: -hollow(points))
+    solid = smooth_union(0.10, skull, jaw, mirrored(cheek))
+    solid = smooth_union(0.05, solid, neck, nose, mirrored(brow))
+    solid = smooth_union(0.04, solid, mirrored(ear))
+    solid = smooth_union(0.012, solid, mirrored(sphere(_EYE, _EYE_RADIUS)))
+    solid = smooth_union(0.012, solid, _LIPS)
+    return smooth_intersection(0.03, solid, half_space((0.0, 0.0, -1.0), -_FOOT))
 
 
 def write_mesh(path: Path) -> None:
-    """Write the egg as OBJ: u is the longitude, with the face in the middle of the picture, v the latitude."""
-    lines = ["# an egg 0.9 m high that faces +x"]
-    latitude = np.pi * (np.arange(1, _ROWS) / _ROWS - 0.5)
-    longitude = 2 * np.pi * (np.arange(_COLUMNS) / _COLUMNS - 0.5)
-    for z in latitude:
-        for a in longitude:
-            # narrower above than below
-            width = 0.36 * np.cos(z) * (1 - 0.12 * np.sin(z))
-            lines.append(f"v {width * np.cos(a):.6f} {width * np.sin(a):.6f} {0.45 * np.sin(z):.6f}")
-    lines += ["v 0 0 -0.45", "v 0 0 0.45"]
-    south, north = len(latitude) * _COLUMNS + 1, len(latitude) * _COLUMNS + 2
-    # one column more than there are vertices: at the back two pairs of coordinates meet
-    lines += [f"vt {i / _COLUMNS:.6f} {j / _ROWS:.6f}" for j in range(_ROWS + 1) for i in range(_COLUMNS + 1)]
-
-    def corner(j: int, i: int) -> str:
-        vertex = south if j == 0 else north if j == _ROWS else (j - 1) * _COLUMNS + i % _COLUMNS + 1
-        return f"{vertex}/{j * (_COLUMNS + 1) + i + 1}"
-
-    for j in range(_ROWS):
-        for i in range(_COLUMNS):
-            a, b, c, d = corner(j, i), corner(j, i + 1), corner(j + 1, i + 1), corner(j + 1, i)
-            if j == 0:
-                lines.append(f"f {a} {c} {d}")
-            else:
-                lines.append(f"f {a} {b} {d}")
-            if 0 < j < _ROWS - 1:
-                lines.append(f"f {b} {c} {d}")
-    path.write_text("\n".join(lines) + "\n")
+    """Write the head as OBJ, with texture coordinates that end at the back."""
+    V, F = head()
+    uv = _coordinates(V + np.array([0.0, 0.0, _FOOT]))[F]
+    # triangles across the end of the picture go on into its next repetition
+    uv[..., 0] += uv[..., 0] < uv[..., 0].max(axis=1, keepdims=True) - 0.5
+    unique, index = np.unique(np.round(uv.reshape(-1, 2), 5), axis=0, return_inverse=True)
+    lines = ["# made by python -m ripple_sim.scenes.face"]
+    lines += [f"v {x:.5g} {y:.5g} {z:.5g}" for x, y, z in V]
+    lines += [f"vt {u:.5g} {v:.5g}" for u, v in unique]
+    corners = np.stack([F, index.reshape(F.shape)], axis=2) + 1
+    lines += ["f " + " ".join(f"{vertex}/{texture}" for vertex, texture in face) for face in corners]
+    with whole_file(path) as unfinished:
+        unfinished.write_text("\n".join(lines) + "\n")
 
 
-def write_picture(path: Path) -> None:
-    """Write where waves run: white; eyes and mouth, black, stay still."""
-    picture = Image.new("L", (_WIDTH, _HEIGHT), 255)
-    draw = ImageDraw.Draw(picture)
-    middle = _WIDTH / 2
-    for side in (-1, 1):
-        x, y = middle + side * 34, 0.42 * _HEIGHT
-        draw.ellipse([x - 15, y - 17, x + 15, y + 17], fill=0)
-    draw.arc([middle - 42, 0.42 * _HEIGHT, middle + 42, 0.66 * _HEIGHT], 25, 155, fill=0, width=11)
-    picture.save(path, optimize=True)
+def write_pictures(colors: Path, waves: Path) -> None:
+    """Write the colours, and where waves run: white; the eyes, black, stay still."""
+    points = _painted_points()
+    size = (2 * _HEIGHT, _HEIGHT)
+    Image.fromarray(_colors(points)).resize(size, Image.Resampling.BOX).save(colors, optimize=True)
+    still = np.where(_is_eye(points), 0, 255).astype(np.uint8)
+    Image.fromarray(still).resize(size, Image.Resampling.BOX).save(waves, optimize=True)
+
+
+def _coordinates(points: Array) -> Array:
+    """Texture coordinates [..., 2] of points [..., 3]: longitude, with the face in the middle, and latitude."""
+    x, y, z = np.moveaxis(points - _MIDDLE, -1, 0)
+    return np.stack([0.5 + np.arctan2(y, x) / (2 * np.pi), 0.5 + np.arctan2(z, np.hypot(x, y)) / np.pi], axis=-1)
+
+
+def _painted_points() -> Array:
+    """Outermost points of the head that a picture's pixels stand for, [height, width, 3], top row first."""
+    height, width = _FINER * _HEIGHT, 2 * _FINER * _HEIGHT
+    latitude = np.pi * (0.5 - (np.arange(height) + 0.5) / height)[:, None]
+    longitude = 2 * np.pi * ((np.arange(width) + 0.5) / width - 0.5)
+    x, y, z = np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)
+    ways = np.stack([x, y, np.broadcast_to(z, x.shape)], axis=-1)
+    solid, away = _head_solid(), np.full((height, width), 0.5)
+    front = x > 0.5  # what is painted lies here
+    for _ in range(30):  # from outside inwards; the distances are approximate, so in shorter steps
+        away[front] -= 0.8 * solid(_MIDDLE + away[front][:, None] * ways[front])
+    return _MIDDLE + away[..., None] * ways
+
+
+def _colors(points: Array) -> NDArray[np.uint8]:
+    picture = np.empty(points.shape)
+    picture[:] = _SKIN
+    both = points * [1.0, 0.0, 1.0] + np.abs(points) * [0.0, 1.0, 0.0]
+    flush = np.exp(-((np.linalg.norm(both - [0.225, 0.15, 0.44], axis=-1) / 0.06) ** 2))
+    picture += 0.7 * flush[..., None] * np.subtract(_CHEEK, _SKIN)
+    picture[_LIPS(points.reshape(-1, 3)).reshape(points.shape[:2]) < 0.002] = _LIP
+    eye = _is_eye(points)
+    picture[eye] = _WHITE
+    gaze = _GAZE / np.linalg.norm(_GAZE)
+    middle = _EYE + _EYE_RADIUS * gaze
+    off = np.linalg.norm(both - middle, axis=-1)
+    picture[eye & (off < _IRIS)] = _BLUE
+    picture[eye & (off < _PUPIL)] = _BLACK
+    glint = np.linalg.norm(both - middle - [0.0, -0.013, 0.020], axis=-1)
+    picture[eye & (glint < _GLINT)] = _WHITE
+    return picture.round().astype(np.uint8)
+
+
+def _is_eye(points: Array) -> NDArray[np.bool_]:
+    """Whether points [..., 3] of the surface lie on an eyeball."""
+    eye = mirrored(sphere(_EYE, _EYE_RADIUS))
+    return eye(points.reshape(-1, 3)).reshape(points.shape[:-1]) < 0.0015
 
 
 if __name__ == "__main__":
     write_mesh(FOLDER / "face.obj")
-    write_picture(FOLDER / "face_waves.png")
+    write_pictures(FOLDER / "face.png", FOLDER / "face_waves.png")

@@ -15,8 +15,8 @@ def make(folder: Path) -> Part:
     file = strip(load_scene("face"), [0.2, 0.35, 0.5, 0.8], folder / "figure_1.png", (400, 400))
     return Part(
         "Figure 1: a ball hits a face",
-        "The ball is a rigid body of MuJoCo; its contact force presses on the nose. "
-        "The waves run round the eyes and the mouth, where a picture says that no waves run.",
+        "The ball is a rigid body of MuJoCo; its contact force presses on the forehead. "
+        "The waves run round the eyes, where a picture says that no waves run.",
         [(file, "The scene `face` at 0.2, 0.35, 0.5 and 0.8 s.")],
     )
 
