@@ -1,4 +1,4 @@
-"""The geoms of a MuJoCo model other than its floor and its targets."""
+"""The geoms of a MuJoCo model other than its floor and its targets, and its sites."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from ripple_sim.solver.gl import GLContext
 
 from . import meshes
 from .instances import INSTANCE, Instances, ShapeLevels
-from .materials import Mapping, Textures, color, look_of, mapping_of
+from .materials import Textures, look_of, mapping_of
 from .meshes import Shape
 from .objects import ObjectTable
 from .occluders import Occluders
 from .owned import OwnedObjects
+from .pieces import Piece, geom_piece, host_of, site_piece, visible_sites
 
 _PACKAGE = "ripple_sim.render"
-_VISIBLE_GROUPS = 3
 _BEVEL = 0.06
 _ENDLESS = 100.0  # half size of planes without an end, in extents of the model
 
 _GEOM = mujoco.mjtGeom
 # name, and how the shape is made with a number of segments to a right angle
-_SHAPES: dict[int, tuple[str, Callable[[int], Shape]]] = {
+_Shape = tuple[str, Callable[[int], Shape]]
+_SHAPES: dict[int, _Shape] = {
     _GEOM.mjGEOM_SPHERE: ("ball", meshes.ball),
     _GEOM.mjGEOM_ELLIPSOID: ("ball", meshes.ball),
     _GEOM.mjGEOM_CAPSULE: ("capsule", lambda n: meshes.capsule(4 * n, n)),
@@ -38,77 +39,80 @@ _SHAPES: dict[int, tuple[str, Callable[[int], Shape]]] = {
 }
 
 
-def visible_geoms(model: Any) -> list[int]:
-    """Ids of the geoms that MuJoCo shows by default: groups 0 to 2, not fully transparent."""
-    return [
-        geom for geom in range(model.ngeom) if model.geom_group[geom] < _VISIBLE_GROUPS and color(model, geom)[3] > 0.0
-    ]
-
-
-def sizes(model: Any, geom: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Core and shell size of a geom [m], shape [3] each (see meshes.py)."""
-    size = np.asarray(model.geom_size[geom], dtype=np.float64)
-    match model.geom_type[geom]:
-        case _GEOM.mjGEOM_SPHERE:
-            return np.zeros(3), np.full(3, size[0])
-        case _GEOM.mjGEOM_ELLIPSOID:
-            return np.zeros(3), size
+def sizes(model: Any, piece: Piece) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Core and shell size of a piece [m], shape [3] each (see meshes.py)."""
+    half = piece.half_sizes
+    match piece.kind:
+        case _GEOM.mjGEOM_SPHERE | _GEOM.mjGEOM_ELLIPSOID:
+            return np.zeros(3), half
         case _GEOM.mjGEOM_CAPSULE:
-            return np.array([0.0, 0.0, size[1]]), np.full(3, size[0])
+            return np.array([0.0, 0.0, half[2]]), np.full(3, half[0])
         case _GEOM.mjGEOM_PLANE:
-            half = np.where(size > 0, size, _ENDLESS * model.stat.extent)
+            half = np.where(half > 0, half, _ENDLESS * model.stat.extent)
             return np.array([half[0], half[1], 0.0]), np.full(3, 1e-9)
-        case _GEOM.mjGEOM_CYLINDER:
-            half = np.array([size[0], size[0], size[1]])
-        case _GEOM.mjGEOM_BOX:
-            half = size
+        case _GEOM.mjGEOM_CYLINDER | _GEOM.mjGEOM_BOX:
+            bevel = _BEVEL * half.min()
+            return half - bevel, np.full(3, bevel)
         case _:
             return np.zeros(3), np.ones(3)
-    bevel = _BEVEL * half.min()
-    return half - bevel, np.full(3, bevel)
 
 
 @dataclass(frozen=True)
 class ClearBody:
     """A body that the scene behind it shows through."""
 
-    geom: int
+    piece: Piece
     number: int  # in the table of objects
     instances: Instances
 
+    def ball(self, model: Any, data: Any) -> tuple[NDArray[np.float64], float]:
+        """Bounding ball: centre [3] and radius, in metres; that of a plane has no end."""
+        piece = self.piece
+        if piece.site:
+            half = piece.half_sizes
+            return data.site_xpos[piece.index], float(np.linalg.norm(half) + half[0])  # a capsule has ends, too
+        box, position = model.geom_aabb[piece.index], data.geom_xpos[piece.index]
+        if piece.kind == _GEOM.mjGEOM_PLANE:
+            return position, np.inf
+        return position + data.geom_xmat[piece.index].reshape(3, 3) @ box[:3], float(np.linalg.norm(box[3:]))
+
 
 class Bodies:
-    """All geoms of a model but the floor and the targets."""
+    """All geoms of a model but the floor and the targets, and its sites, which shade nothing.
+
+    Parameters
+    ----------
+    gl : GLContext
+    ctx : OwnedObjects
+    model : mujoco.MjModel
+    geoms : iterable of int
+    textures : Textures
+    table : ObjectTable
+        Takes a row for each.
+    """
 
     def __init__(
         self, gl: GLContext, ctx: OwnedObjects, model: Any, geoms: Iterable[int], textures: Textures, table: ObjectTable
     ) -> None:
         self._gl, self._ctx, self._model, self._textures = gl, ctx, model, textures
         self._shapes: dict[str, ShapeLevels] = {}
-        self._programs: dict[int, moderngl.Program] = {}
+        self._programs: dict[tuple[int, bool], moderngl.Program] = {}
         self._depth = ctx.own(gl.program(_PACKAGE, "body_depth_vertex", "depth_fragment"))
-        drawn: list[int] = []
-        groups: dict[tuple[str, int, int], list[tuple[int, int]]] = {}
-        shapes: dict[str, tuple[str, Callable[[int], Shape]]] = {}
-        self.clear: list[ClearBody] = []
-        for geom in geoms:
-            found = shape_of(model, geom)
-            if found is None:
-                continue
-            mapping, opacity = mapping_of(model, geom), float(color(model, geom)[3])
-            number = table.add(look_of(model, geom), geom, opacity=opacity)
-            drawn.append(geom)
-            shapes[found[0]] = found
-            if opacity < 1.0:
-                self.clear.append(ClearBody(geom, number, self._instances(found, mapping, [(geom, number)])))
-            else:
-                groups.setdefault((found[0], mapping.kind, mapping.texture), []).append((geom, number))
-        self._opaque = [
-            self._instances(shapes[name], mapping_of(model, members[0][0]), members)
-            for (name, _, _), members in groups.items()
-        ]
-        solid = [geom for geom in drawn if model.geom_type[geom] != _GEOM.mjGEOM_PLANE]
+        pieces = [geom_piece(model, geom) for geom in geoms] + [site_piece(model, i) for i in visible_sites(model)]
+        shaped = [(piece, shape) for piece in pieces if (shape := shape_of(model, piece)) is not None]
+        solid = [piece.index for piece, _ in shaped if not piece.site and piece.kind != _GEOM.mjGEOM_PLANE]
         self.occluders = Occluders(ctx, model, np.array(solid, dtype=np.int64))
+        groups: dict[tuple[Any, ...], tuple[_Shape, list[tuple[Piece, int]]]] = {}
+        self.clear: list[ClearBody] = []
+        for piece, shape in shaped:
+            mapping = mapping_of(model, piece)
+            number = table.add(look_of(model, piece), host_of(model, piece), opacity=piece.opacity)
+            if piece.opacity < 1.0:
+                self.clear.append(ClearBody(piece, number, self._instances(shape, [(piece, number)])))
+            else:
+                key = piece.site, shape[0], mapping.kind, mapping.texture
+                groups.setdefault(key, (shape, []))[1].append((piece, number))
+        self._opaque = [self._instances(shape, members) for shape, members in groups.values()]
 
     def update(self, data: Any, eye: NDArray[np.float64], pixels: float) -> None:
         """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""
@@ -121,40 +125,44 @@ class Bodies:
             instances.draw()
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the opaque bodies' depth alone, under a matrix of 16 numbers, column by column."""
+        """Draw the depth of what shades others, under a matrix of 16 numbers, column by column."""
         for instances in self._opaque:
-            instances.draw_depth(view_projection)
+            if not instances.sites:
+                instances.draw_depth(view_projection)
 
-    def _instances(
-        self, shape: tuple[str, Callable[[int], Shape]], mapping: Mapping, members: list[tuple[int, int]]
-    ) -> Instances:
+    def _instances(self, shape: _Shape, members: list[tuple[Piece, int]]) -> Instances:
+        """Pieces of one shape under one texture, each with its number in the table of objects."""
         name, make = shape
         if name not in self._shapes:
             self._shapes[name] = ShapeLevels(self._ctx, make)
-        if mapping.kind not in self._programs:
-            self._programs[mapping.kind] = self._ctx.own(
-                self._gl.program(_PACKAGE, "body_geometry_vertex", "body_geometry_fragment", MAPPING=mapping.kind)
+        mappings = [mapping_of(self._model, piece) for piece, _ in members]
+        mapping = mappings[0]
+        variant = mapping.kind, mapping.own
+        if variant not in self._programs:
+            options = {"MAPPING": mapping.kind, "OWN": int(mapping.own)}
+            self._programs[variant] = self._ctx.own(
+                self._gl.program(_PACKAGE, "body_geometry_vertex", "body_geometry_fragment", **options)
             )
         records = np.zeros(len(members), dtype=INSTANCE)
-        for record, (geom, number) in zip(records, members, strict=True):
-            own = mapping_of(self._model, geom)
-            record["core_size"], record["shell_size"] = sizes(self._model, geom)
-            record["color"] = [*color(self._model, geom)[:3], number]
-            record["mapping"] = [*own.scale, own.own]
+        for record, (piece, number), own in zip(records, members, mappings, strict=True):
+            record["core_size"], record["shell_size"] = sizes(self._model, piece)
+            record["color"] = [*piece.color, number]
+            record["mapping"] = [*own.scale, own.stretch * own.scale[2]]
+            record["tiling"] = own.tiling
         return Instances(
             self._ctx,
             self._shapes[name],
-            (self._programs[mapping.kind], self._depth),
-            [geom for geom, _ in members],
+            (self._programs[variant], self._depth),
+            [piece for piece, _ in members],
             records,
             mapping,
             None if mapping.texture < 0 else self._textures.get(mapping.texture),
         )
 
 
-def shape_of(model: Any, geom: int) -> tuple[str, Callable[[int], Shape]] | None:
-    """Name of a geom's shape, and what makes it with a number of segments to a right angle; None for other types."""
-    kind, asset = int(model.geom_type[geom]), int(model.geom_dataid[geom])
+def shape_of(model: Any, piece: Piece) -> _Shape | None:
+    """Name of a piece's shape, and what makes it with a number of segments to a right angle; None for other types."""
+    kind, asset = piece.kind, piece.asset
     if kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF) and asset >= 0:
         return f"mesh {asset}", lambda _: meshes.mesh_asset(model, asset)
     if kind == _GEOM.mjGEOM_HFIELD and asset >= 0:

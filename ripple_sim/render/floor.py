@@ -15,8 +15,9 @@ from ripple_sim.solver.gl import GLContext
 from .camera import orthographic
 from .color import linear
 from .frame import FrameUniforms
-from .materials import FLAT_IMAGE, Textures, color, mapping_of, texture_pixels
+from .materials import FLAT_IMAGE, Textures, mapping_of, texture_pixels
 from .owned import OwnedObjects
+from .pieces import geom_piece
 from .shadow import ShadowMap
 
 _PACKAGE = "ripple_sim.render"
@@ -37,15 +38,15 @@ class Floor:
 
     def __init__(self, gl: GLContext, ctx: OwnedObjects, model: Any, geom: int, textures: Textures) -> None:
         self.geom = geom
-        mapping = mapping_of(model, geom)
-        self.albedo = color(model, geom)[:3]
+        piece = geom_piece(model, geom)
+        mapping = mapping_of(model, piece)
+        self.albedo = piece.color
         self.tiled = mapping.kind == FLAT_IMAGE
-        self.mapping, self.tint = tuple(mapping.scale[:2]), self.albedo
+        self.tiling, self.tint = mapping.tiling, self.albedo
         self._image = textures.get(mapping.texture) if self.tiled else None
         if self.tiled:
             self.albedo = self.tint * linear(texture_pixels(model, mapping.texture) / 255.0).mean(axis=(0, 1))
-        material = model.geom_matid[geom]
-        self.reflectance = 0.0 if material < 0 else float(model.mat_reflectance[material])
+        self.reflectance = 0.0 if piece.material < 0 else float(model.mat_reflectance[piece.material])
         half = np.asarray(model.geom_size[geom][:2], dtype=np.float64)
         self._half = np.where(half > 0, half, _ENDLESS)
         self._occlude = ctx.vertex_array(ctx.own(gl.program(_PACKAGE, "screen_vertex", "floor_occlusion_fragment")), [])

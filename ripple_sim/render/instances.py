@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .materials import Mapping
 from .meshes import Shape
 from .owned import OwnedObjects
+from .pieces import Piece
 
 INSTANCE = np.dtype(
     [
@@ -21,6 +22,7 @@ INSTANCE = np.dtype(
         ("shell_size", "f4", 3),
         ("color", "f4", 4),
         ("mapping", "f4", 4),
+        ("tiling", "f4", 4),
     ]
 )
 _LEVELS = (4, 6, 8, 11, 15, 22)  # segments to a right angle
@@ -48,7 +50,7 @@ class ShapeLevels:
 
 
 class Instances:
-    """Geoms of one shape with one texture.
+    """Geoms or sites of one shape with one texture.
 
     Parameters
     ----------
@@ -56,7 +58,8 @@ class Instances:
     shape : ShapeLevels
     programs : tuple
         For the geometry pass and for depth alone.
-    geoms : list of int
+    pieces : list of Piece
+        Either geoms or sites.
     records : array of INSTANCE
         What does not change; poses are filled in by `update`.
     mapping : Mapping
@@ -68,13 +71,14 @@ class Instances:
         ctx: OwnedObjects,
         shape: ShapeLevels,
         programs: tuple[moderngl.Program, moderngl.Program],
-        geoms: list[int],
+        pieces: list[Piece],
         records: NDArray,
         mapping: Mapping,
         texture: moderngl.Texture | moderngl.TextureCube | None,
     ) -> None:
         self._ctx, self._shape, self._programs = ctx, shape, programs
-        self.geoms = np.array(geoms, dtype=np.int64)
+        self.sites = pieces[0].site
+        self._indices = np.array([piece.index for piece in pieces], dtype=np.int64)
         self._records, self._mapping, self._texture = records, mapping, texture
         self._buffer = ctx.buffer(reserve=records.nbytes, dynamic=True)
         self._arrays: dict[int, tuple[moderngl.VertexArray, moderngl.VertexArray]] = {}
@@ -82,11 +86,13 @@ class Instances:
 
     def update(self, data: Any, eye: NDArray[np.float64], pixels: float) -> None:
         """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""
-        self._records["rotation"] = data.geom_xmat[self.geoms].reshape(-1, 3, 3).transpose(0, 2, 1)
-        self._records["origin"] = data.geom_xpos[self.geoms]
+        poses = (data.site_xpos, data.site_xmat) if self.sites else (data.geom_xpos, data.geom_xmat)
+        position, rotation = (pose[self._indices] for pose in poses)
+        self._records["rotation"] = rotation.reshape(-1, 3, 3).transpose(0, 2, 1)
+        self._records["origin"] = position
         self._buffer.write(self._records.tobytes())
         radius = (self._records["core_size"] + self._records["shell_size"]).max(axis=1)
-        away = np.maximum(np.linalg.norm(data.geom_xpos[self.geoms] - eye, axis=1) - radius, 0.1 * radius)
+        away = np.maximum(np.linalg.norm(position - eye, axis=1) - radius, 0.1 * radius)
         largest = float((radius / away).max()) * pixels
         # the sagitta of a chord over a right angle's nth part: r (1 - cos(pi / 4n))
         needed = np.pi / 4 / np.sqrt(2 * min(_FLATNESS / max(largest, 1e-9), 1.0))
@@ -96,19 +102,19 @@ class Instances:
         """Draw into the geometry pass."""
         if self._texture is not None:
             self._texture.use(self._mapping.unit)
-        self._array()[0].render(instances=len(self.geoms))
+        self._array()[0].render(instances=len(self._records))
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth alone, under a matrix of 16 numbers, column by column."""
         self._programs[1]["view_projection"] = view_projection
-        self._array()[1].render(instances=len(self.geoms))
+        self._array()[1].render(instances=len(self._records))
 
     def _array(self) -> tuple[moderngl.VertexArray, moderngl.VertexArray]:
         if self._segments not in self._arrays:
             vertices, indices = self._shape.level(self._segments)
             content = [
                 (vertices, "3f 3f 3f 2f", "in_core", "in_shell", "in_normal", "in_uv"),
-                (self._buffer, "9f 3f 3f 3f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
+                (self._buffer, "9f 3f 3f 3f 4f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
             ]
             # programs that do not use all of them have them optimised away
             first, second = (

@@ -25,13 +25,6 @@ class Occluders:
         """Bounding balls of the bodies: centres [k, 3] and radii [k], in metres."""
         return self._middles(data)[1], self._bounds
 
-    def ball(self, data: Any, geom: int) -> tuple[NDArray[np.float64], float]:
-        """Bounding ball of one body: centre [3] and radius, in metres; that of a plane has no end."""
-        found = np.flatnonzero(self._geoms == geom)
-        if not len(found):
-            return data.geom_xpos[geom], np.inf
-        return self._middles(data)[1][found[0]], float(self._bounds[found[0]])
-
     def bind(self, data: Any, focus: NDArray[np.float64]) -> int:
         """Bind the capsules nearest to a point; return how many there are."""
         rotation, middle = self._middles(data)

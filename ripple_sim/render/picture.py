@@ -108,7 +108,7 @@ class Picture:
         for program in (self._passes[name].program for name in ("floor", "shaded floor")):
             if floor is not None and tiled:
                 program["tint"] = tuple(floor.tint)
-                program["mapping"] = floor.mapping
+                program["tiling"] = floor.tiling
             if floor is not None and reflects:
                 program["reflectance"] = floor.reflectance
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.gl import GLContext
 
-from .bodies import Bodies, visible_geoms
+from .bodies import Bodies
 from .camera import Pose, Viewpoint
 from .floor import Floor, find_floor
 from .frame import FrameUniforms
@@ -23,6 +23,7 @@ from .mirror import Mirror
 from .objects import ObjectTable
 from .owned import OwnedObjects
 from .picture import Picture
+from .pieces import visible_geoms
 from .readback import Readback
 from .shadow import ShadowMap
 from .surface import Surface, SurfaceMesh
@@ -265,7 +266,7 @@ class Renderer:
                 centres, radii = target.ball()
                 layers.append((centres[0], float(radii[0]), target.number, target.draw))
         for body in self._bodies.clear:
-            layers.append((*self._bodies.occluders.ball(data, body.geom), body.number, body.instances.draw))
+            layers.append((*body.ball(self._model, data), body.number, body.instances.draw))
         layers.sort(key=lambda layer: -float(np.linalg.norm(layer[0] - pose.eye)))
         for centre, radius, number, draw in layers:
             self._picture.add_layer(ctx, number, draw, self._clip(centre, radius, pose))

@@ -18,10 +18,11 @@ from . import occlusion
 from .color import linear, srgb_texture
 from .field import UNDER_COLORS, FieldTexture
 from .looks import MODEL_LOOK, Look, find_look
-from .materials import CUBE_IMAGE, FLAT_IMAGE, NO_IMAGE, Mapping, Textures, color, look_of, mapping_of
+from .materials import CUBE_IMAGE, FLAT_IMAGE, NO_IMAGE, Mapping, Textures, look_of, mapping_of
 from .meshes import corner_normals
 from .objects import ObjectTable
 from .owned import OwnedObjects
+from .pieces import geom_piece
 from .subdivision import subdivide
 
 _PIXELS = 4.0  # length of an edge where the target fills the frame's height
@@ -201,6 +202,8 @@ class SurfaceMesh:
         self._relief.use(0)
         if self._image is not None:
             self._image.use(self._mapping.unit)
+        if self._mapping.kind not in (NO_IMAGE, CUBE_IMAGE):
+            self._program["tiling"] = self._mapping.tiling
         self._program["rotation"] = self._rotation
         self._program["color"] = self._color
         self._program["size"] = self.radius
@@ -218,16 +221,16 @@ class SurfaceMesh:
 
 def _appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[np.float64], Mapping]:
     """Look, linear colour under the picture, and how the picture lies on the surface."""
-    plain = Mapping(NO_IMAGE, -1, np.zeros(3), False)
+    plain, piece = Mapping(), geom_piece(model, geom)
     if surface.field_colors is not None:
         return UNDER_COLORS, np.ones(3), plain
     look = find_look(surface.look)
     if surface.look == MODEL_LOOK:
-        rgb = color(model, geom)[:3] if surface.color is None else linear(surface.color)
-        mapping = mapping_of(model, geom)
-        return look_of(model, geom), rgb, mapping if surface.uv is not None or not mapping.own else plain
+        rgb = piece.color if surface.color is None else linear(surface.color)
+        mapping = mapping_of(model, piece)
+        return look_of(model, piece), rgb, mapping if surface.uv is not None or not mapping.own else plain
     if surface.image is not None and surface.uv is not None:
-        return look, np.ones(3), Mapping(FLAT_IMAGE, -1, np.ones(3), True)
+        return look, np.ones(3), Mapping(FLAT_IMAGE, own=True)
     return look, linear(surface.color or look.color), plain
 
 
@@ -265,14 +268,12 @@ def _packed(vertices: NDArray[np.float64], *columns: slice) -> bytes:
 
 
 def _mapped(vertices: NDArray[np.float64], mapping: Mapping) -> NDArray[np.float64]:
-    """Where the picture is looked up, [n, 3]: texture coordinates, or a direction for a cube."""
-    if mapping.kind == CUBE_IMAGE:
-        return vertices[:, _POSITION] * mapping.scale
+    """Coordinates of the picture, [n, 3]; see `Mapping`."""
     if not mapping.own:
-        return vertices[:, _POSITION] * mapping.scale - 0.5
+        return mapping.at(vertices[:, _POSITION])
     u, v = vertices[:, _UV].T
     # a surface counts v from the picture's lower edge, MuJoCo's textures lie with the upper edge at 0
-    return np.stack([u, 1.0 - v, np.zeros_like(u)], axis=1) * mapping.scale
+    return np.stack([u, 1.0 - v, np.zeros_like(u)], axis=1)
 
 
 def _load_image(ctx: OwnedObjects, surface: Surface) -> moderngl.Texture:

@@ -9,7 +9,8 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from ..render.bodies import shape_of, sizes, visible_geoms
+from ..render.bodies import shape_of, sizes
+from ..render.pieces import geom_piece, visible_geoms
 from .session import Session
 from .skin import Skin
 
@@ -44,7 +45,7 @@ class BodyActors:
         for geom in visible_geoms(model):
             if geom in session.simulation.ripples.geom_ids.values():
                 continue
-            rgba = geom_rgba(model, geom)
+            rgba = geom_piece(model, geom).rgba
             if _is_floor(model, geom, reach):
                 position, rotation = self._pose(geom)
                 self._actors[geom] = _add_floor(plotter, (middle - position) @ rotation, reach, rgba)
@@ -127,20 +128,15 @@ _SHADING: dict[str, Any] = {"ambient": 0.32, "diffuse": 0.75, "specular": 0.3, "
 
 def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
     """Surface of a geom in its frame [m], with normals; None for types that cannot be drawn."""
-    found = shape_of(model, geom)
+    piece = geom_piece(model, geom)
+    found = shape_of(model, piece)
     if found is None:
         return None
     _, make = found
     shape = make(_SEGMENTS)
-    mesh = pv.PolyData.from_regular_faces(shape.positions(*sizes(model, geom)), shape.faces)
+    mesh = pv.PolyData.from_regular_faces(shape.positions(*sizes(model, piece)), shape.faces)
     mesh.point_data.active_normals = shape.normals
     return mesh
-
-
-def geom_rgba(model: mujoco.MjModel, geom: int) -> NDArray[np.float32]:
-    """Colour and opacity (sRGB, 0 to 1) of a geom: its own, or its material's where it has none of its own."""
-    rgba, material = model.geom_rgba[geom], model.geom_matid[geom]
-    return model.mat_rgba[material] if material >= 0 and np.array_equal(rgba, [0.5, 0.5, 0.5, 1.0]) else rgba
 
 
 def _add(plotter: pv.Plotter, mesh: pv.PolyData, rgba: NDArray[np.float32]) -> pv.Actor:

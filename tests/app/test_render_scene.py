@@ -10,7 +10,6 @@ from scipy.ndimage import binary_erosion
 from ripple_sim.errors import RippleWarning
 from ripple_sim.render import Camera, Renderer, Surface, meshes
 from ripple_sim.render.lights import model_lighting
-from ripple_sim.render.materials import FLAT_IMAGE, mapping_of
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
@@ -114,21 +113,6 @@ def test_floor_texture_repeats_as_in_mujoco(gl):
     assert abs(quarters[0, 0] - quarters[1, 1]) < 15
     assert abs(quarters[0, 1] - quarters[1, 0]) < 15
     assert abs(quarters[0, 0] - quarters[0, 1]) > 100
-
-
-def test_a_mesh_keeps_its_texture_coordinates():
-    model = mujoco.MjModel.from_xml_string("""<mujoco><asset>
-      <texture name="t" type="2d" builtin="checker" width="8" height="8"/>
-      <material name="t" texture="t" texrepeat="3 2"/>
-      <mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1" texcoord="0 0 1 0 0 1 1 1" face="0 2 1 0 1 3 0 3 2 1 2 3"/>
-      </asset>
-      <worldbody><geom name="m" type="mesh" mesh="m" material="t"/></worldbody></mujoco>""")
-    mapping = mapping_of(model, 0)
-    assert mapping.kind == FLAT_IMAGE
-    assert mapping.own
-    np.testing.assert_array_equal(mapping.scale[:2], [3.0, 2.0])
-    shape = meshes.mesh_asset(model, 0)
-    assert {tuple(uv) for uv in shape.uv} == {(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)}
 
 
 def test_height_field_stands_as_high_as_it_says():

@@ -5,10 +5,11 @@
 in vec3 normal;
 in vec3 mapped;
 flat in vec4 color;  // linear; w: number of the object
+flat in vec4 tiling;
 
 void main()
 {
-    vec3 albedo = painted(color.rgb, mapped);
+    vec3 albedo = painted(color.rgb, mapped, tiling);
     vec3 n = normalize(normal);
     store(n, n, sqrt(albedo), color.w, vec3(1.0, 1.0, 0.0));
 }

@@ -11,20 +11,24 @@ in vec3 in_origin;
 in vec3 in_core_size;
 in vec3 in_shell_size;
 in vec4 in_color;    // linear; w: number of the object
-in vec4 in_mapping;  // texture coordinates a metre; or repetitions; w: 1 where the mesh brings its own
+in vec4 in_mapping;  // coordinates a metre; w: and along z outside the core
+in vec4 in_tiling;   // scale and offset of the place in a flat picture
 
 out vec3 normal;
 out vec3 mapped;
 flat out vec4 color;
+flat out vec4 tiling;
 
 void main()
 {
-    vec3 local = in_core * in_core_size + in_shell * in_shell_size;
+    vec3 core = in_core * in_core_size, shell = in_shell * in_shell_size;
     normal = in_rotation * (in_normal / in_shell_size);
-    mapped = (in_mapping.w > 0.0 ? vec3(in_uv, 0.0) : local) * in_mapping.xyz;
-#if MAPPING == 1
-    mapped -= in_mapping.w > 0.0 ? vec3(0.0) : vec3(0.5);
+#if OWN
+    mapped = vec3(in_uv, 0.0);
+#else
+    mapped = core * in_mapping.xyz + shell * in_mapping.xyw;
 #endif
     color = in_color;
-    gl_Position = view_projection * vec4(in_rotation * local + in_origin, 1.0);
+    tiling = in_tiling;
+    gl_Position = view_projection * vec4(in_rotation * (core + shell) + in_origin, 1.0);
 }

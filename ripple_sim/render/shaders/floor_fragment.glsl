@@ -12,7 +12,7 @@
 layout(binding = 3) uniform sampler2D floor_openness;
 layout(binding = 5) uniform sampler2D floor_image;
 
-uniform vec2 mapping;  // texture coordinates a metre
+uniform vec4 tiling;   // texture coordinates a metre, and at the origin
 uniform vec3 tint;     // that the image is multiplied by
 
 flat in vec3 around;  // ambient light on the open floor
@@ -40,7 +40,7 @@ void main()
     // the lamps stand near: a pool of light about the focus, and the background's colour beyond
     float fade = at < MISSED ? smoothstep(floor_fade.x, floor_fade.y, length(world - focus.xyz) / eye.w) : 1.0;
 #if IMAGE
-    vec3 albedo = texture(floor_image, plane * mapping - 0.5).rgb * tint;
+    vec3 albedo = texture(floor_image, plane * tiling.xy + tiling.zw).rgb * tint;
 #else
     vec3 albedo = floor_albedo.rgb;
 #endif

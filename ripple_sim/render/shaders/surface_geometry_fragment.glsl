@@ -7,6 +7,7 @@
 uniform mat3 rotation;
 uniform vec4 color;  // linear; w: number of the object
 uniform float size;  // of the body [m]
+uniform vec4 tiling;
 
 in vec3 normal;
 in vec3 sphere;
@@ -17,7 +18,7 @@ void main()
 {
     vec3 n = normalize(normal);
     vec4 ripple = relief_at(sphere);
-    vec3 albedo = painted(color.rgb, mapped);
+    vec3 albedo = painted(color.rgb, mapped, tiling);
     vec3 shown = sqrt(albedo);
     float ink = 0.0;
 #if FIELD
