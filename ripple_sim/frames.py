@@ -15,30 +15,36 @@ from ripple_sim.solver import Relief
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .coupling.ripples import Impulse
+from .exposure import Exposures
+from .moments import Moments
 from .pictures import surface_of
 from .render import Camera, FixedCamera, Renderer, Surface
+from .render.camera import ThroughLens, Viewpoint
+from .sensor import Sensor
 from .simulation import Simulation
-from .supersample import shrink
-from .viewpoint import viewpoint
+from .viewpoint import focal_distance, viewpoint
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A simulation's state at one frame, which stays as it is while the simulation goes on.
+    """A simulation's state at one exposure of a frame, which stays as it is while the simulation goes on.
 
     Attributes
     ----------
     number : int
         Of the frame, from 0.
+    exposure : int
+        Of the frame's exposures, from 0: that is the frame's own moment, at which the shutter opens.
     data : mujoco.MjData
         Copy of MuJoCo's state.
     heights, reliefs : dict
         By the geom's name: height [m], float32 [6, N, N], and what is drawn of it (see `Relief`).
     impulses : list of Impulse
-        All of the frame.
+        All of the frame, up to its own moment.
     """
 
     number: int
+    exposure: int
     data: mujoco.MjData
     heights: dict[str, NDArray[np.float32]]
     reliefs: dict[str, NDArray[np.float32]]
@@ -53,7 +59,7 @@ class Snapshot:
 
 
 def run(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterator[Snapshot]:
-    """Advance a simulation frame by frame.
+    """Advance a simulation frame by frame, and through the exposures of each frame that its camera takes.
 
     Parameters
     ----------
@@ -66,20 +72,18 @@ def run(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterator[Snap
     """
     ring = itertools.cycle([mujoco.MjData(simulation.model) for _ in range(alive)])
     ripples = simulation.ripples
-    reliefs = {name: Relief(ripples[name].atlas) for name in ripples}
+    relief_of = {name: Relief(ripples[name].atlas) for name in ripples}
+    moments = Moments(simulation, Exposures.of(simulation.scene.camera).moments)
     for number in range(frames):
         if number:
             simulation.advance_frame()
-        data = next(ring)
-        mujoco.mj_copyData(data, simulation.model, simulation.data)
-        heights = {name: ripples[name].height for name in ripples}
-        yield Snapshot(
-            number=number,
-            data=data,
-            heights=heights,
-            reliefs={name: reliefs[name](height) for name, height in heights.items()},
-            impulses=simulation.impulses,
-        )
+        impulses, shown = simulation.impulses, None
+        for exposure, (state, heights) in enumerate(moments):
+            if heights is not shown:
+                data, shown = next(ring), heights
+                mujoco.mj_copyData(data, simulation.model, state)
+                reliefs = {name: relief_of[name](height) for name, height in heights.items()}
+            yield Snapshot(number, exposure, data, heights, reliefs, impulses)
 
 
 class FrameSource:
@@ -112,8 +116,10 @@ class FrameSource:
         annotate: Callable[[Surface], Surface] = lambda surface: surface,
         gl: GLContext | None = None,
     ) -> None:
-        self._supersample = supersample
+        self.width, self.height = width, height
         self._simulation = simulation
+        self._exposures = Exposures.of(simulation.scene.camera)
+        self._sensor = Sensor(supersample, len(self._exposures))
         self._geoms = simulation.ripples.geom_ids
         surfaces = {}
         for entry in simulation.scene.surfaces:
@@ -130,21 +136,27 @@ class FrameSource:
             alpha=transparent,
         )
 
-    def draw(self, state: Snapshot) -> NDArray[np.uint8]:
-        """Draw a snapshot, uint8 [height, width, 3], or 4 if it is transparent."""
+    def draw(self, state: Snapshot) -> NDArray[np.uint8] | None:
+        """Draw an exposure; return the frame after its last, uint8 [height, width, 3], or 4 if it is transparent."""
         self.submit(state)
         return self.fetch()
 
     def submit(self, state: Snapshot) -> None:
         """Draw a snapshot without waiting for it: `fetch` returns it, after those submitted before."""
         reliefs = {self._geoms[name]: relief for name, relief in state.reliefs.items()}
-        self.renderer.submit(state.data, reliefs, self.camera(state))
+        camera: Viewpoint = self.camera(state)
+        lens = self._exposures.offsets[state.exposure]
+        if lens.any():
+            sim = self._simulation
+            focus = focal_distance(sim.model, state.data, sim.scene.camera, camera.pose())
+            camera = ThroughLens(camera, tuple(lens), focus)
+        self.renderer.submit(state.data, reliefs, camera)
 
-    def fetch(self) -> NDArray[np.uint8]:
+    def fetch(self) -> NDArray[np.uint8] | None:
         """Wait for the earliest submitted snapshot's picture, and return it as `draw` does."""
-        return shrink(self.renderer.fetch(), self._supersample)
+        return self._sensor.expose(self.renderer.fetch())
 
     def camera(self, state: Snapshot) -> Camera | FixedCamera:
-        """Camera of a snapshot."""
+        """Camera of a snapshot, through the middle of its lens."""
         sim = self._simulation
         return viewpoint(sim.model, state.data, sim.scene.camera, state.data.time)

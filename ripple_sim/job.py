@@ -22,6 +22,7 @@ from .provenance import provenance
 from .scene.scene import MAX_DURATION, Scene
 from .simulation import Simulation
 from .video import FrameWriter, check_output, open_writer
+from .viewpoint import with_exposure
 
 # Snapshots that wait to be drawn. One would do if all frames took the same time.
 _WAITING = 2
@@ -66,6 +67,10 @@ def render_video(
     duration: float | None = None,
     slow_motion: float = 1.0,
     supersample: int = 1,
+    shutter: float | None = None,
+    aperture: float | None = None,
+    focus: float | str | tuple[float, float, float] | None = None,
+    exposures: int | None = None,
     transparent: bool = False,
     overlay: Sequence[str] | None = None,
     compare: str | None = None,
@@ -95,6 +100,15 @@ def render_video(
         Seconds of video for a second of the scene.
     supersample : int
         Frames are drawn so many times as wide and high, and averaged.
+    shutter : float, optional
+        Shutter angle [degrees], for motion blur: 360 leaves the shutter open from one frame to the next, 180 half of
+        that time. This and the next three are used instead of what the scene's camera says.
+    aperture : float, optional
+        Diameter of the lens [m], for depth of field.
+    focus : float, str or (x, y, z), optional
+        What is sharp: a distance along the camera's axis [m], a body or a geom, or a point in the world [m].
+    exposures : int, optional
+        A frame is the mean of so many, each at its own moment and through its own point of the lens.
     transparent : bool
         Leave the background out, for .webp and PNG frames, without overlays.
     overlay : sequence of str, optional
@@ -120,6 +134,7 @@ def render_video(
     mujoco.set_mju_user_warning(lambda message: None)
     output, (width, height) = Path(output), size
     check_output(output, width, height, fps, transparent=transparent)
+    scene = with_exposure(scene, shutter=shutter, aperture=aperture, focus=focus, exposures=exposures)
     overlay, operators = scene.overlay if overlay is None else overlay, compared_operators(compare)
     request = parse_request(overlay)
     count = _frame_count(scene.duration if duration is None else duration, fps, slow_motion)
@@ -130,6 +145,10 @@ def render_video(
         "the number of frames": count,
         "the slow motion": slow_motion,
         "the supersampling": supersample,
+        "the shutter angle": scene.camera.shutter,
+        "the aperture": scene.camera.aperture,
+        "the focus": str(scene.camera.focus or "what the camera looks at"),
+        "the number of exposures": scene.camera.exposures,
         "transparency": transparent,
         "the overlays": ",".join(overlay),
         "the operators": ",".join(operators),
@@ -189,11 +208,11 @@ def _missing(states: Iterable[Shot], writer: FrameWriter, progress: Progress | N
     """Check the states, and pass over those whose frames were there before."""
     resumed_at = writer.frames
     for state in states:
-        if state.number % _CHECKED == 0:
+        if state.exposure == 0 and state.number % _CHECKED == 0:
             writer.check_state(state.number, state.digest())
         if state.number >= resumed_at:
             yield state
-        elif progress is not None:
+        elif progress is not None and state.exposure == 0:
             progress(state.number + 1, count)
 
 

@@ -36,6 +36,13 @@ class Simulation:
         As for `WaveSolver`.
     on_step : callable, optional
         Called with the simulation before each physics step: to steer actuators, move mocap bodies, press on surfaces.
+
+    Attributes
+    ----------
+    steps_per_frame : int
+        Physics steps that make a frame.
+    impulses : list of Impulse
+        All of the present frame, so far.
     """
 
     def __init__(
@@ -51,8 +58,8 @@ class Simulation:
         self.scene = scene
         self._on_step = on_step
         self.model = copy.copy(scene.model)
-        self._steps_per_frame = _steps_per_frame(fps, self.model.opt.timestep)
-        self.model.opt.timestep = 1 / (fps * self._steps_per_frame)
+        self.steps_per_frame = _steps_per_frame(fps, self.model.opt.timestep)
+        self.model.opt.timestep = 1 / (fps * self.steps_per_frame)
         self.data = mujoco.MjData(self.model)
         self._reset_bodies()
         self.ripples = Ripples(
@@ -79,6 +86,7 @@ class Simulation:
         self._script = Script(self.model, scene.events, list(self.ripples))
         self.physics_seconds = self.wave_seconds = 0.0
         self.impulses: list[Impulse] = []
+        self._steps = 0
 
     @property
     def backend(self) -> str:
@@ -91,26 +99,38 @@ class Simulation:
         return sum(self.ripples[name].substeps_taken for name in self.ripples)
 
     def advance_frame(self) -> None:
-        """Advance physics and waves by one frame; `impulses` then holds all impulses of the frame.
+        """Advance physics and waves to the next frame; `impulses` then holds all impulses since the last one.
 
         Raises
         ------
         SimulationError
             If MuJoCo's state is no longer finite.
         """
-        self.impulses = []
-        for _ in range(self._steps_per_frame):
-            start = time.perf_counter()
-            if self._on_step is not None:
-                self._on_step(self)
-            self._script.apply(self.data, self.ripples)
-            mujoco.mj_step(self.model, self.data)
-            stepped = time.perf_counter()
-            self._check_state()
-            self.ripples.step(self.data)
-            self.impulses += self.ripples.last_impulses
-            self.physics_seconds += stepped - start
-            self.wave_seconds += time.perf_counter() - stepped
+        for _ in range(self.steps_per_frame - self._steps % self.steps_per_frame):
+            self.step()
+
+    def step(self) -> None:
+        """Advance physics and waves by one physics step; `advance_frame` then makes the rest of the frame's.
+
+        Raises
+        ------
+        SimulationError
+            If MuJoCo's state is no longer finite.
+        """
+        if self._steps % self.steps_per_frame == 0:
+            self.impulses = []
+        self._steps += 1
+        start = time.perf_counter()
+        if self._on_step is not None:
+            self._on_step(self)
+        self._script.apply(self.data, self.ripples)
+        mujoco.mj_step(self.model, self.data)
+        stepped = time.perf_counter()
+        self._check_state()
+        self.ripples.step(self.data)
+        self.impulses += self.ripples.last_impulses
+        self.physics_seconds += stepped - start
+        self.wave_seconds += time.perf_counter() - stepped
 
     def reset(self) -> None:
         """Go back to the beginning: bodies, waves, materials and script."""
@@ -122,6 +142,7 @@ class Simulation:
                 self._materials[name] = self.ripples[name].material
         self._script = Script(self.model, self.scene.events, list(self.ripples))
         self.impulses = []
+        self._steps = 0
 
     def _reset_bodies(self) -> None:
         if self.model.nkey:

@@ -1,24 +1,29 @@
-"""Where the camera of a scene stands at a given time: free, fixed in the model, orbiting, following a body."""
+"""Where the camera of a scene stands at a given time, free or fixed, orbiting or tracking; and what it focuses on."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import msgspec
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import SceneError
 from .render import Camera, FixedCamera
+from .render.camera import Pose
 from .scene.scene_file import CameraEntry
 
 if TYPE_CHECKING:
     from .scene.scene import Scene
 
+MAX_EXPOSURES = 1024
+_NEAREST = 0.02  # focal distance, in camera distances: there the picture begins
+
 
 def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
-    """Make sure that the model has what the camera names.
+    """Make sure that the model has what the camera names, and that a frame can be exposed as it says.
 
     Raises
     ------
@@ -29,8 +34,25 @@ def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
         (entry.track, mujoco.mjtObj.mjOBJ_BODY, model.nbody, "body {!r} for the camera to track; its bodies are"),
     ):
         if name is not None and mujoco.mj_name2id(model, kind, name) < 0:
-            names = [known for i in range(count) if (known := mujoco.mj_id2name(model, kind, i))]
-            raise SceneError(f"the model has no {missing.format(name)} {', '.join(names) or 'none'}")
+            raise SceneError(f"the model has no {missing.format(name)} {_names(model, kind, count)}")
+    body, geom = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM
+    if isinstance(entry.focus, str) and all(mujoco.mj_name2id(model, kind, entry.focus) < 0 for kind in (body, geom)):
+        raise SceneError(
+            f"the model has nothing {entry.focus!r} for the camera to focus on; its bodies are "
+            f"{_names(model, body, model.nbody)}; its geoms are {_names(model, geom, model.ngeom)}"
+        )
+    for name, value, valid, right in (
+        ("shutter angle", entry.shutter, "0 to 360 degrees", 0 <= entry.shutter <= 360),
+        ("aperture", entry.aperture, "0 m or more", 0 <= entry.aperture < np.inf),
+        ("focus", entry.focus, "more than 0 m", not isinstance(entry.focus, float) or 0 < entry.focus < np.inf),
+        ("number of exposures", entry.exposures, f"1 to {MAX_EXPOSURES}", 1 <= entry.exposures <= MAX_EXPOSURES),
+    ):
+        if not right:
+            raise SceneError(f"the camera's {name} is {value!r}; valid is {valid}")
+
+
+def _names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> str:
+    return ", ".join(name for i in range(count) if (name := mujoco.mj_id2name(model, kind, i))) or "none"
 
 
 def through_camera(scene: Scene, name: str) -> Scene:
@@ -42,6 +64,23 @@ def through_camera(scene: Scene, name: str) -> Scene:
         If the model has no such camera.
     """
     camera = CameraEntry(name=name)
+    check_camera(scene.model, camera)
+    return dataclasses.replace(scene, camera=camera)
+
+
+def with_exposure(scene: Scene, **changes: Any) -> Scene:
+    """The scene with other values of its camera's shutter, aperture, focus and exposures; None leaves one as it is.
+
+    Raises
+    ------
+    SceneError
+        If one is invalid.
+    """
+    given = {name: value for name, value in changes.items() if value is not None}
+    try:
+        camera = msgspec.convert({**msgspec.structs.asdict(scene.camera), **given}, CameraEntry)
+    except msgspec.ValidationError as error:
+        raise SceneError(f"camera: {str(error).replace('`$.', '`')}") from error
     check_camera(scene.model, camera)
     return dataclasses.replace(scene, camera=camera)
 
@@ -69,6 +108,20 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, ti
         elevation=entry.elevation,
         fovy=entry.fovy,
     )
+
+
+def focal_distance(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, pose: Pose) -> float:
+    """How far in front of a camera of a scene lies the plane of what is sharp, along its axis [m]."""
+    if entry.focus is None:
+        return pose.distance
+    if isinstance(entry.focus, float):
+        return entry.focus
+    if isinstance(entry.focus, str):
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, entry.focus)
+        point = data.subtree_com[body] if body >= 0 else data.geom_xpos[model.geom(entry.focus).id]
+    else:
+        point = np.array(entry.focus)
+    return max(float((pose.position - point) @ pose.rotation[:, 2]), _NEAREST * pose.distance)
 
 
 def _aimed(camera: FixedCamera, target: NDArray[np.float64]) -> FixedCamera:

@@ -20,7 +20,7 @@ from .colormap import color_table
 from .comparison import TITLES
 from .field import grid_spacing
 from .layout import Layout
-from .marks import draw_marks
+from .marks import PlacedMark, draw_marks, place_marks
 from .notes import Notebook, Notes
 from .painter import Painter
 from .projection import Projection
@@ -29,7 +29,7 @@ from .request import Request
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Shot:
-    """One frame of a film: a snapshot of each run, and what the overlays show."""
+    """An exposure of a film's frame: a snapshot of each run, and what the overlays show, the same all frame long."""
 
     snapshots: tuple[Snapshot, ...]
     notes: Notes
@@ -38,6 +38,11 @@ class Shot:
     def number(self) -> int:
         """Of the frame, from 0."""
         return self.snapshots[0].number
+
+    @property
+    def exposure(self) -> int:
+        """Of the frame's exposures, from 0."""
+        return self.snapshots[0].exposure
 
     def digest(self) -> str:
         """Fingerprint of all runs, see `Snapshot.digest`."""
@@ -92,6 +97,7 @@ class Film:
         self._drawing: dict[str, Any] = {"supersample": supersample, "transparent": transparent, "gl": gl}
         self._sources: list[FrameSource] = []
         self._submitted: deque[Shot] = deque()
+        self._marks: list[list[PlacedMark]] = []
         self.seconds = 0.0
         self._painter = Painter(
             request,
@@ -116,31 +122,34 @@ class Film:
         """Run the simulations; see `ripple_sim.frames.run`."""
         runs = [run(simulation, self._frames, alive=alive) for simulation in self.simulations]
         for snapshots in zip(*runs, strict=True):
-            yield Shot(snapshots, self._notebook.follow())
+            if snapshots[0].exposure == 0:
+                notes = self._notebook.follow()
+            yield Shot(snapshots, notes)
 
     def draw_all(self, shots: Iterable[Shot], ahead: int = 0) -> Iterator[NDArray[np.uint8]]:
-        """Draw frames in their order, as `draw` does, and wait for each when `ahead` later ones have been submitted."""
+        """Draw frames in their order, as `draw` does, and wait for each shot when `ahead` later ones are submitted."""
         for shot in shots:
             self.submit(shot)
-            if len(self._submitted) > ahead:
-                yield self.fetch()
+            if len(self._submitted) > ahead and (frame := self.fetch()) is not None:
+                yield frame
         while self._submitted:
-            yield self.fetch()
+            if (frame := self.fetch()) is not None:
+                yield frame
 
-    def draw(self, shot: Shot) -> NDArray[np.uint8]:
-        """Draw a frame, uint8 [height, width, 3], or 4 if it is transparent."""
+    def draw(self, shot: Shot) -> NDArray[np.uint8] | None:
+        """Draw an exposure; return the frame after its last, uint8 [height, width, 3], or 4 if it is transparent."""
         self.submit(shot)
         return self.fetch()
 
     def submit(self, shot: Shot) -> None:
-        """Draw a frame without waiting for it: `fetch` returns it, after those submitted before.
+        """Draw an exposure without waiting for it: `fetch` returns what `draw` does, after those submitted before.
 
         The shot must stay as it is until then.
         """
         self.prepare()
         start = time.perf_counter()
         for number, (source, snapshot) in enumerate(zip(self._sources, shot.snapshots, strict=True)):
-            if self._request.field:
+            if self._request.field and shot.exposure == 0:
                 geoms = self.simulations[number].ripples.geom_ids
                 for name, field in shot.notes.fields[number].items():
                     source.renderer.set_field(geoms[name], field, shot.notes.field_scale.value)
@@ -148,29 +157,37 @@ class Film:
         self._submitted.append(shot)
         self.seconds += time.perf_counter() - start
 
-    def fetch(self) -> NDArray[np.uint8]:
-        """Wait for the earliest submitted frame, and return it as `draw` does."""
+    def fetch(self) -> NDArray[np.uint8] | None:
+        """Wait for the earliest submitted exposure, and return what `draw` does."""
         start = time.perf_counter()
         shot = self._submitted.popleft()
-        pictures = [self._picture(run, shot) for run in range(len(self._sources))]
+        if shot.exposure == 0:
+            self._marks = [self._placed_marks(run, shot) for run in range(len(self._sources))]
+        pictures = [picture for source in self._sources if (picture := source.fetch()) is not None]
+        frame = self._composed(pictures, shot) if pictures else None
+        self.seconds += time.perf_counter() - start
+        return frame
+
+    def _composed(self, pictures: list[NDArray[np.uint8]], shot: Shot) -> NDArray[np.uint8]:
+        """The pictures of the runs side by side, under the overlays."""
+        for picture, marks in zip(pictures, self._marks, strict=True):
+            draw_marks(picture, marks, self._layout)
         frame = pictures[0]
         if len(pictures) > 1:
             frame = np.concatenate(pictures, axis=1)
             seam, half = pictures[0].shape[1], max(1, round(self._layout.em / 16))
             frame[:, seam - half : seam + half] = 255
         self._painter.paint(frame, shot.notes)
-        self.seconds += time.perf_counter() - start
         return frame
 
-    def _picture(self, run: int, shot: Shot) -> NDArray[np.uint8]:
-        """What the renderer has drawn of a run, and the contacts in it."""
+    def _placed_marks(self, run: int, shot: Shot) -> list[PlacedMark]:
+        """Where the contacts of a run lie in its picture."""
         source, snapshot, notes = self._sources[run], shot.snapshots[run], shot.notes
-        picture = source.fetch()
-        if self._request.contacts and notes.marks[run]:
-            projection = Projection(source.camera(snapshot).pose(), picture.shape[1], picture.shape[0])
-            hiding = self.simulations[run].model, snapshot.data
-            draw_marks(picture, notes.marks[run], notes.mark_scale.value, self._layout, projection, *hiding)
-        return picture
+        if not self._request.contacts:
+            return []
+        projection = Projection(source.camera(snapshot).pose(), source.width, source.height)
+        hiding = self.simulations[run].model, snapshot.data
+        return place_marks(notes.marks[run], notes.mark_scale.value, self._layout, projection, *hiding)
 
     def _annotated(self, surface: Surface) -> Surface:
         """A target with what the request asks for."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,25 +19,25 @@ _HIDDEN = 0.3  # opacity of what stands behind something
 _SAMPLES = 9  # along an arrow, to see what hides it
 
 
-def draw_marks(
-    frame: NDArray[np.uint8],
-    marks: Sequence[Mark],
-    scale: float,
-    layout: Layout,
-    projection: Projection,
-    model: Any,
-    data: Any,
-) -> None:
-    """Draw contacts over a frame in place, as the camera sees them.
+class PlacedMark(NamedTuple):
+    """An arrow on a frame: its ends [pixels], and its opacity along it."""
+
+    tip: NDArray[np.float64]
+    tail: NDArray[np.float64]
+    opacity: NDArray[np.float64]
+
+
+def place_marks(
+    marks: Sequence[Mark], scale: float, layout: Layout, projection: Projection, model: Any, data: Any
+) -> list[PlacedMark]:
+    """Place contacts on a frame, as the camera sees them.
 
     Arrows stand on the surface, in perspective but for their size, which is the same at every distance. What stands
     before them shows through.
 
     Parameters
     ----------
-    frame : uint8 [height, width, 3]
     marks : sequence of Mark
-        The later ones cover the earlier.
     scale : float
         Impulse [N s] that is `Layout.arrow_length` long, seen from the side.
     layout : Layout
@@ -46,20 +46,25 @@ def draw_marks(
     model, data : mujoco.MjModel, mujoco.MjData
         What may hide the arrows.
     """
+    placed = []
     for mark in marks:
         length = layout.arrow_length * projection.metres(mark.point) * min(mark.impulse / scale, _LONGEST)
         points = mark.point + length * np.linspace(0, 1, _SAMPLES)[:, None] * mark.axis
         pixels = projection.pixels(points)
         if np.isfinite(pixels).all():
             opacity = mark.opacity * np.where(projection.seen(model, data, points), 1.0, _HIDDEN)
-            _draw(frame, pixels[0], pixels[-1], layout.arrow_thickness, opacity)
+            placed.append(PlacedMark(pixels[0], pixels[-1], opacity))
+    return placed
 
 
-def _draw(frame: NDArray[np.uint8], tip: NDArray, tail: NDArray, thickness: float, opacity: NDArray) -> None:
+def draw_marks(frame: NDArray[np.uint8], marks: Sequence[PlacedMark], layout: Layout) -> None:
+    """Draw contacts over a frame, uint8 [height, width, 3 or 4], in place; the later ones cover the earlier."""
+    thickness = layout.arrow_thickness
     reach = thickness * (HEAD_WIDTH + RIM) + 1
-    low = np.floor(np.maximum(np.minimum(tip, tail) - reach, 0)).astype(int)
-    high = np.ceil(np.minimum(np.maximum(tip, tail) + reach, frame.shape[1::-1])).astype(int)
-    if (low < high).all():
-        patch = Patch(int(high[0] - low[0]), int(high[1] - low[1]))
-        draw_arrow(patch, tip - low, tail - low, thickness, opacity)
-        patch.over(frame, int(low[0]), int(low[1]))
+    for tip, tail, opacity in marks:
+        low = np.floor(np.maximum(np.minimum(tip, tail) - reach, 0)).astype(int)
+        high = np.ceil(np.minimum(np.maximum(tip, tail) + reach, frame.shape[1::-1])).astype(int)
+        if (low < high).all():
+            patch = Patch(int(high[0] - low[0]), int(high[1] - low[1]))
+            draw_arrow(patch, tip - low, tail - low, thickness, opacity)
+            patch.over(frame, int(low[0]), int(low[1]))

@@ -48,6 +48,12 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
 
     With `orbit` it goes round by so many degrees a second. With `track` it follows a body: the free camera moves along
     with the body's centre of mass, from which `lookat` then counts; a named one turns to it.
+
+    A frame is the mean of so many `exposures`, where `shutter` or `aperture` is not 0. `shutter` is the shutter angle
+    [degrees]: 360 leaves the shutter open from one frame to the next, 180, usual in film, half of that time. `aperture`
+    is the diameter of the lens [m]; an f-number would need a focal length, which MuJoCo's cameras do not have. `focus`
+    is what is sharp: a distance along the camera's axis [m], a body or a geom by its name, which the camera then keeps
+    sharp, or a point in the world [m]; by default it is what the camera looks at.
     """
 
     name: str | None = None
@@ -58,6 +64,10 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
     elevation: float = -20.0
     fovy: float = 45.0
     orbit: float = 0.0
+    shutter: float = 0.0
+    aperture: float = 0.0
+    focus: float | str | Vector | None = None
+    exposures: int = 32
 
 
 class SceneFile(msgspec.Struct, forbid_unknown_fields=True):

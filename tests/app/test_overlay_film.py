@@ -18,7 +18,7 @@ from ripple_sim.overlay.contacts import MEMORY, ContactMarks, Mark
 from ripple_sim.overlay.field import pad_field
 from ripple_sim.overlay.film import Film
 from ripple_sim.overlay.layout import Layout
-from ripple_sim.overlay.marks import draw_marks
+from ripple_sim.overlay.marks import draw_marks, place_marks
 from ripple_sim.overlay.notes import Notebook
 from ripple_sim.overlay.projection import Projection
 from ripple_sim.overlay.request import NAMES, parse_request
@@ -150,7 +150,8 @@ def test_mark_lies_at_the_projected_contact(make_scene: Callable[..., Scene]) ->
     bare = mujoco.MjModel.from_xml_string("<mujoco/>")
     data = mujoco.MjData(bare)
     mujoco.mj_forward(bare, data)
-    draw_marks(frame, gathered, 1e9, Layout(width, height_px), projection, bare, data)  # nothing but its dot
+    layout = Layout(width, height_px)
+    draw_marks(frame, place_marks(gathered, 1e9, layout, projection, bare, data), layout)  # nothing but its dot
     dark = (255.0 - frame.min(axis=2)).round()
     rows, columns = np.indices(dark.shape)
     centre = np.array([(dark * (columns + 0.5)).sum(), (dark * (rows + 0.5)).sum()]) / dark.sum()
@@ -187,7 +188,8 @@ def test_hidden_marks_are_faint() -> None:
     def ink(y: float) -> int:
         frame = np.full((120, 160, 3), 255, np.uint8)
         mark = Mark(np.array([0.0, y, 0.0]), np.array([0.0, 0.0, 1.0]), 1.0)
-        draw_marks(frame, [mark], 1.0, Layout(160, 120), projection, model, data)
+        layout = Layout(160, 120)
+        draw_marks(frame, place_marks([mark], 1.0, layout, projection, model, data), layout)
         return int((255 - frame.astype(int)).max())
 
     assert ink(-1.0) > 200

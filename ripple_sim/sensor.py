@@ -1,0 +1,113 @@
+"""A camera's sensor: it gathers light, over the finer pixels and the exposures that make up a frame."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+# sRGB, IEC 61966-2-1. Fine enough that every one of the 256 values has entries of its own, also the darkest.
+_FINE = 1 << 14
+_CODES = np.arange(256) / 255
+_LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4).astype(np.float32)
+_LIGHT = np.arange(_FINE + 1) / _FINE
+_SRGB = np.rint(255 * np.where(_LIGHT <= 0.0031308, 12.92 * _LIGHT, 1.055 * _LIGHT ** (1 / 2.4) - 0.055)).astype(
+    np.uint8
+)
+
+
+class Sensor:
+    """Averages pictures in linear light.
+
+    Pictures are uint8, in sRGB, or float32, in linear light; with a fourth channel for their opacity (0 to 255, or 0
+    to 1), by which the colours are weighted.
+
+    Parameters
+    ----------
+    factor : int
+        Blocks of so many by so many pixels become one.
+    exposures : int
+        Pictures that make up a frame.
+    """
+
+    def __init__(self, factor: int = 1, exposures: int = 1) -> None:
+        self._factor, self._exposures = factor, exposures
+        self._count = 0
+        self._light = np.zeros((0, 0, 4), np.float32)  # sums: light times opacity, opacity
+
+    def expose(self, picture: NDArray) -> NDArray | None:
+        """Take in a picture.
+
+        Parameters
+        ----------
+        picture : uint8 or float32 [factor height, factor width, 3 or 4]
+            The same shape and kind for all exposures of a frame.
+
+        Returns
+        -------
+        uint8 or float32 [height, width, 3 or 4]
+            The frame after its last exposure; None before.
+        """
+        if self._factor == self._exposures == 1:
+            return picture
+        factor, (height, width, channels) = self._factor, picture.shape
+        if self._count == 0:
+            self._light = np.zeros((height // factor, width // factor, 4), np.float32)
+        if picture.dtype == np.uint8:
+            _gather_codes(picture, factor, _LINEAR, self._light)
+        else:
+            _gather_light(picture, factor, self._light)
+        self._count = (self._count + 1) % self._exposures
+        if self._count:
+            return None
+        most = factor * factor * self._exposures
+        if picture.dtype != np.uint8:
+            return _mean_light(self._light, most)[..., :channels]
+        frame = np.empty((*self._light.shape[:2], channels), np.uint8)
+        _develop(self._light, most, _SRGB, frame)
+        return frame
+
+
+@numba.njit(cache=True, nogil=True)
+def _gather_codes(picture, factor, linear, light):
+    opaque = picture.shape[2] == 3
+    for row in range(light.shape[0]):
+        for column in range(light.shape[1]):
+            red = green = blue = opacity = np.float32(0)
+            for i in range(factor * row, factor * (row + 1)):
+                for j in range(factor * column, factor * (column + 1)):
+                    weight = np.float32(1) if opaque else np.float32(picture[i, j, 3])
+                    red += weight * linear[picture[i, j, 0]]
+                    green += weight * linear[picture[i, j, 1]]
+                    blue += weight * linear[picture[i, j, 2]]
+                    opacity += weight
+            light[row, column, 0] += red
+            light[row, column, 1] += green
+            light[row, column, 2] += blue
+            light[row, column, 3] += opacity
+
+
+@numba.njit(cache=True, nogil=True)
+def _develop(light, most, srgb, frame):
+    for row in range(light.shape[0]):
+        for column in range(light.shape[1]):
+            opacity = light[row, column, 3]
+            scale = (len(srgb) - 1) / opacity if opacity > 0 else np.float32(0)
+            for channel in range(3):
+                frame[row, column, channel] = srgb[int(light[row, column, channel] * scale + 0.5)]
+            if frame.shape[2] == 4:
+                frame[row, column, 3] = int(opacity / most + 0.5)
+
+
+def _gather_light(picture: NDArray[np.float32], factor: int, light: NDArray[np.float32]) -> None:
+    height, width = light.shape[:2]
+    blocks = picture.reshape(height, factor, width, factor, -1)
+    opacity = blocks[..., 3:] if blocks.shape[-1] == 4 else np.ones_like(blocks[..., :1])
+    light[..., :3] += (blocks[..., :3] * opacity).sum(axis=(1, 3))
+    light[..., 3:] += opacity.sum(axis=(1, 3))
+
+
+def _mean_light(light: NDArray[np.float32], most: int) -> NDArray[np.float32]:
+    opacity = light[..., 3:]
+    colors = np.divide(light[..., :3], opacity, out=np.zeros_like(light[..., :3]), where=opacity > 0)
+    return np.concatenate([colors, opacity / most], axis=2)
