@@ -287,12 +287,15 @@ def _push(simulation) -> None:
     simulation.data.qvel[0] += 1e-9
 
 
-def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path):
+@pytest.mark.parametrize("ahead", [False, True])
+def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
     program = (
         "import ctypes, sys\n"
         "from ripple_sim.cli import main as cli\n"
-        "from ripple_sim.solver.gl import shared_context\n"
-        "def lose(done, total):\n"
+        "from ripple_sim.solver.gl import GLContext, shared_context\n"
+        + "GLContext.software = False\n"
+        * ahead  # a frame is on its way back when it happens
+        + "def lose(done, total):\n"
         "    if done == 20:\n"
         "        egl = ctypes.CDLL('libEGL.so.1')\n"
         "        egl.eglGetCurrentDisplay.restype = ctypes.c_void_p\n"
@@ -301,7 +304,7 @@ def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path):
         "from ripple_sim import job\n"
         "render = job.render_video\n"
         "job.render_video = lambda *args, **options: render(*args, **{**options, 'progress': lose})\n"
-        "sys.exit(cli.main(['render', *sys.argv[1:], '--size', '64x48', '--fps', '30']))\n"
+        "sys.exit(cli.main(['render', *sys.argv[1:], '--size', '64x48', '--fps', '30', '--backend', 'cpu']))\n"
     )
     result = subprocess.run(
         [sys.executable, "-c", program, tmp_path / "scene.toml", "-o", tmp_path / "frames"],

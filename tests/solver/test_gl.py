@@ -76,6 +76,28 @@ def test_what_moderngl_raises_becomes_one_error(gl_backend: str) -> None:
         ctx.buffer(b"1234").read(size=8)
 
 
+def test_waiting_for_a_fence_is_waiting_for_what_stands_before_it(gl_backend: str) -> None:
+    gl = shared_context()
+    with gl as ctx:
+        buffers = [ctx.buffer(np.full(1 << 16, value, np.uint32)) for value in (1, 2)]
+        copy = ctx.buffer(reserve=4 << 16)
+        fences = []
+        for buffer in buffers:
+            ctx.copy_buffer(copy, buffer)
+            fences.append(gl.put_fence())
+        for fence in fences[::-1]:
+            gl.wait_for(fence)
+        assert set(np.frombuffer(copy.read(), np.uint32)) == {2}
+
+
+def test_a_fence_that_is_gone_is_an_error_and_no_endless_wait(gl_backend: str) -> None:
+    gl = shared_context()
+    fence = gl.put_fence()
+    gl.wait_for(fence)
+    with pytest.raises(GLError, match="cannot wait"):
+        gl.wait_for(fence)
+
+
 def test_lost_context_is_reported() -> None:
     script = """
         import ctypes, sys
