@@ -48,14 +48,40 @@ def parse_factor(word: str) -> float:
     return _positive(word, "a positive number, such as 4")
 
 
+def parse_angle(word: str) -> float:
+    """Read a shutter angle [degrees]."""
+    number = _number(word)
+    if not 0 <= number <= 360:
+        raise ValueError(f"{word!r} is not valid; it must be an angle from 0 to 360 degrees, such as 180")
+    return number
+
+
+def parse_diameter(word: str) -> float:
+    """Read the diameter of a lens [m]."""
+    number = _number(word)
+    if not 0 <= number < math.inf:
+        raise ValueError(f"{word!r} is not valid; it must be a number of metres from 0 on, such as 0.02")
+    return number
+
+
+def parse_focus(word: str) -> float | str:
+    """Read a distance [m], or a name."""
+    number = _number(word)
+    return word if math.isnan(number) else number
+
+
 def _positive(word: str, valid: str) -> float:
-    try:
-        number = float(word)
-    except ValueError:
-        number = math.nan
-    if not (number > 0 and math.isfinite(number)):
+    number = _number(word)
+    if not 0 < number < math.inf:
         raise ValueError(f"{word!r} is not valid; it must be {valid}")
     return number
+
+
+def _number(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        return math.nan
 
 
 def parse_supersample(word: str) -> int:
@@ -107,5 +133,11 @@ Baseline = Annotated[
 ]
 Factor = Annotated[float, _one_word(parse_factor, "F")]
 Supersample = Annotated[int, _one_word(parse_supersample, "N")]
+Shutter = Annotated[float | None, _one_word(parse_angle, "DEGREES"), arg(help_behavior_hint="(default: the scene's)")]
+Aperture = Annotated[float | None, _one_word(parse_diameter, "M"), arg(help_behavior_hint="(default: the scene's)")]
+Focus = Annotated[
+    float | str | None, _one_word(parse_focus, "M|NAME"), arg(help_behavior_hint="(default: what the camera looks at)")
+]
+Exposures = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's, or 32)")]
 Device = Annotated[int | None, _one_word(parse_seed, "N"), arg(help_behavior_hint="(default: the first that works)")]
 UpAxis = Annotated[str | None, _one_word(parse_axis, "{y,z}"), arg(help_behavior_hint="(default: z for STL, else y)")]

@@ -15,15 +15,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import Positional, arg
 
 from .arguments import (
+    Aperture,
     Baseline,
     Count,
     Device,
     Duration,
+    Exposures,
     Factor,
+    Focus,
     FrameRate,
     Overlay,
     Resolution,
     Seed,
+    Shutter,
     Size,
     Supersample,
     UpAxis,
@@ -51,6 +55,14 @@ class _Video:
     """Seconds of video for a second of the scene: 4 is four times slower."""
     supersample: Supersample = 1
     """Draw frames so many times as wide and high, and average: finer edges and highlights."""
+    shutter: Shutter = None
+    """Shutter angle in degrees, for motion blur: 180 leaves the shutter open for half of the time between frames."""
+    aperture: Aperture = None
+    """Diameter of the lens in metres, for depth of field."""
+    focus: Focus = None
+    """What is sharp: a distance in metres, or a body or a geom by its name."""
+    exposures: Exposures = None
+    """A frame is the mean of so many pictures, where shutter or aperture blur it; more are smoother and take longer."""
     transparent: bool = False
     """Leave the background out (.webp and PNG frames)."""
     overlay: Overlay = None
@@ -107,6 +119,10 @@ class _Video:
                 duration=self.duration,
                 slow_motion=self.slow_motion,
                 supersample=self.supersample,
+                shutter=self.shutter,
+                aperture=self.aperture,
+                focus=self.focus,
+                exposures=self.exposures,
                 transparent=self.transparent,
                 overlay=self.overlay,
                 compare=self.compare,
