@@ -20,7 +20,7 @@ from .meshes import Shape
 from .objects import ObjectTable
 from .occluders import Occluders
 from .owned import OwnedObjects
-from .pieces import Piece, geom_piece, host_of, site_piece, visible_sites
+from .pieces import Piece, ball_of, geom_piece, host_of, site_piece, visible_sites
 
 _PACKAGE = "ripple_sim.render"
 _BEVEL = 0.06
@@ -65,20 +65,9 @@ class ClearBody:
     number: int  # in the table of objects
     instances: Instances
 
-    def ball(self, model: Any, data: Any) -> tuple[NDArray[np.float64], float]:
-        """Bounding ball: centre [3] and radius, in metres; that of a plane has no end."""
-        piece = self.piece
-        if piece.site:
-            half = piece.half_sizes
-            return data.site_xpos[piece.index], float(np.linalg.norm(half) + half[0])  # a capsule has ends, too
-        box, position = model.geom_aabb[piece.index], data.geom_xpos[piece.index]
-        if piece.kind == _GEOM.mjGEOM_PLANE:
-            return position, np.inf
-        return position + data.geom_xmat[piece.index].reshape(3, 3) @ box[:3], float(np.linalg.norm(box[3:]))
-
 
 class Bodies:
-    """All geoms of a model but the floor and the targets, and its sites, which shade nothing.
+    """All geoms of a model but the floor and the targets, and its sites, which throw shadows but hide no sky.
 
     Parameters
     ----------
@@ -113,6 +102,15 @@ class Bodies:
                 key = piece.site, shape[0], mapping.kind, mapping.texture
                 groups.setdefault(key, (shape, []))[1].append((piece, number))
         self._opaque = [self._instances(shape, members) for shape, members in groups.values()]
+        self._sites = [piece for piece, _ in shaped if piece.site and piece.opacity == 1.0]
+
+    def balls(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Bounding balls of all that may throw a shadow: centres [k, 3] and radii [k], in metres."""
+        centres, radii = self.occluders.balls(data)
+        sites = [ball_of(self._model, data, site) for site in self._sites]
+        return np.array([*centres, *(ball[0] for ball in sites)]).reshape(-1, 3), np.array(
+            [*radii, *(ball[1] for ball in sites)]
+        )
 
     def update(self, data: Any, eye: NDArray[np.float64], pixels: float) -> None:
         """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""
@@ -124,10 +122,10 @@ class Bodies:
         for instances in self._opaque:
             instances.draw()
 
-    def draw_depth(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the depth of what shades others, under a matrix of 16 numbers, column by column."""
+    def draw_depth(self, view_projection: tuple[float, ...], *, sites: bool) -> None:
+        """Draw the opaque bodies' depth alone, under a matrix of 16 numbers, column by column; sites on request."""
         for instances in self._opaque:
-            if not instances.sites:
+            if sites or not instances.sites:
                 instances.draw_depth(view_projection)
 
     def _instances(self, shape: _Shape, members: list[tuple[Piece, int]]) -> Instances:

@@ -104,6 +104,17 @@ def host_of(model: Any, piece: Piece) -> int:
     return int(near[np.argmin(np.linalg.norm(model.geom_pos[near] - model.site_pos[piece.index], axis=1))])
 
 
+def ball_of(model: Any, data: Any, piece: Piece) -> tuple[NDArray[np.float64], float]:
+    """Bounding ball of a piece in the world: centre [3] and radius, in metres; that of a plane has no end."""
+    if piece.site:
+        half = piece.half_sizes
+        return data.site_xpos[piece.index], float(np.linalg.norm(half) + half[0])  # a capsule has ends, too
+    box, position = model.geom_aabb[piece.index], data.geom_xpos[piece.index]
+    if piece.kind == _GEOM.mjGEOM_PLANE:
+        return position, np.inf
+    return position + data.geom_xmat[piece.index].reshape(3, 3) @ box[:3], float(np.linalg.norm(box[3:]))
+
+
 def _piece(model: Any, which: str, index: int, asset: int) -> Piece:
     def value(name: str) -> Any:
         return getattr(model, f"{which}_{name}")[index]

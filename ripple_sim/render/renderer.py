@@ -23,7 +23,7 @@ from .mirror import Mirror
 from .objects import ObjectTable
 from .owned import OwnedObjects
 from .picture import Picture
-from .pieces import visible_geoms
+from .pieces import ball_of, visible_geoms
 from .readback import Readback
 from .shadow import ShadowMap
 from .surface import Surface, SurfaceMesh
@@ -214,7 +214,7 @@ class Renderer:
 
     def _extent(self, data: Any, pose: Pose) -> tuple[NDArray[np.float64], float]:
         """Return centre and radius [m] of a ball about all that casts shadows near the camera's focus."""
-        balls = [self._bodies.occluders.balls(data), *(target.ball() for target in self._targets)]
+        balls = [self._bodies.balls(data), *(target.ball() for target in self._targets)]
         centres, radii = np.concatenate([b[0] for b in balls]), np.concatenate([b[1] for b in balls])
         near = np.linalg.norm(centres - pose.focus, axis=1) - radii < _SHADOW_REACH * pose.distance
         if not near.any():
@@ -232,7 +232,7 @@ class Renderer:
             for target in self._targets:
                 if target.shades:
                     target.draw_depth(light_view)
-            self._bodies.draw_depth(light_view)
+            self._bodies.draw_depth(light_view, sites=True)
         if self._floor is not None:
             self._floor.occlude(ctx, self._draw_depth, self._shadow)
 
@@ -245,7 +245,7 @@ class Renderer:
     def _draw_depth(self, view_projection: tuple[float, ...]) -> None:
         for target in self._targets:
             target.draw_depth(view_projection)
-        self._bodies.draw_depth(view_projection)
+        self._bodies.draw_depth(view_projection, sites=False)
 
     def _bind_maps(self) -> None:
         self._shadow.bind()
@@ -266,7 +266,7 @@ class Renderer:
                 centres, radii = target.ball()
                 layers.append((centres[0], float(radii[0]), target.number, target.draw))
         for body in self._bodies.clear:
-            layers.append((*body.ball(self._model, data), body.number, body.instances.draw))
+            layers.append((*ball_of(self._model, data, body.piece), body.number, body.instances.draw))
         layers.sort(key=lambda layer: -float(np.linalg.norm(layer[0] - pose.eye)))
         for centre, radius, number, draw in layers:
             self._picture.add_layer(ctx, number, draw, self._clip(centre, radius, pose))

@@ -138,6 +138,34 @@ def test_groups_above_two_are_hidden(gl):
     assert np.abs(picture(gl, FLOOR + BALL) - picture(gl, FLOOR)).max() > 60
 
 
+def test_sites_of_visible_groups_are_drawn_like_bodies(gl):
+    """As MuJoCo draws them: round, in their colour or their material's, clear where they are, with a shadow."""
+    site = '<site type="sphere" size=".3" pos="0 0 .8" {}/>'
+    plain = picture(gl, FLOOR, camera=FRONT)
+    as_body = picture(gl, FLOOR + BALL, camera=FRONT)
+    as_site = picture(gl, FLOOR + site.format('rgba=".8 .2 .2 1"'), camera=FRONT)
+    ball = (as_body[..., 0] - as_body[..., 2] > 60) & (as_site[..., 0] - as_site[..., 2] > 60)
+    assert ball.sum() > 400
+    upper = ball & (np.arange(SIZE[1])[:, None] < 45)  # of the floor's light the body shades itself a little
+    np.testing.assert_allclose(as_site[upper], as_body[upper], atol=12)
+    np.testing.assert_array_equal(picture(gl, FLOOR + site.format('group="3"'), camera=FRONT), plain)
+    clear = picture(gl, FLOOR + site.format('rgba=".8 .2 .2 .3"'), camera=FRONT)
+    assert (as_site[ball][:, 0] - as_site[ball][:, 2]).mean() > 2 * (clear[ball][:, 0] - clear[ball][:, 2]).mean() > 10
+    green = picture(gl, site.format('material="g"'), asset='<material name="g" rgba="0 .8 0 1"/>', camera=FRONT)
+    assert (green[ball][:, 1] > green[ball][:, 0] + 60).mean() > 0.9
+
+
+def test_sites_hide_no_sky(gl):
+    """Under a wide site the floor stays as light as without it where no lamp shines."""
+    roof = '<site type="box" size=".5 .5 .02" pos="0 0 .4" rgba="1 0 0 1"/>'
+    light = {"visual": '<headlight ambient=".5 .5 .5" diffuse="0 0 0"/>', "lighting": "model", "camera": FRONT}
+    frames = [picture(gl, FLOOR + body, **light) for body in (roof, roof.replace("site", "geom"), "")]
+    under = np.s_[78:82, 75:85]
+    site, geom, none = (frame[under].mean() for frame in frames)
+    assert abs(site - none) < 1
+    assert geom < none - 10
+
+
 def test_a_reflecting_floor_shows_the_ball_upside_down(gl):
     def frame(reflectance: float):
         asset = f'<material name="f" rgba=".4 .4 .4 1" reflectance="{reflectance}"/>'
