@@ -13,6 +13,8 @@ from ripple_sim.solver.gl import GLContext, shared_context
 
 from .coupling.ripples import Ripples
 from .render import Camera, FixedCamera, Renderer, Surface
+from .render.materials import NO_IMAGE, mapping_of
+from .render.pieces import geom_piece
 from .scene.scene_file import CameraEntry
 from .viewpoint import viewpoint
 
@@ -29,7 +31,7 @@ class Pictures:
         [pixels].
     looks : mapping
         Geom name to the look of its surface: rubber, jelly, clay and so on; rubber where nothing is said. Its colour is
-        that of the geom, where the model gives it one.
+        that of the geom, where the model gives it a texture or a colour.
     gl : GLContext, optional
         By default the process's shared one.
 
@@ -92,7 +94,8 @@ def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] |
 
 
 def _color(model: mujoco.MjModel, geom: int) -> tuple[float, float, float] | None:
-    """Colour of a geom, unless it is MuJoCo's grey."""
-    material = model.geom_matid[geom]
-    red, green, blue, _ = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
-    return None if red == green == blue == 0.5 else (float(red), float(green), float(blue))
+    """Colour of a geom, unless it is MuJoCo's grey or a texture."""
+    piece = geom_piece(model, geom)
+    red, green, blue = (float(x) for x in piece.rgba[:3])
+    plain = mapping_of(model, piece).kind == NO_IMAGE
+    return (red, green, blue) if plain and not red == green == blue == 0.5 else None

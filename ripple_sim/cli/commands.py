@@ -160,6 +160,8 @@ class Drop(_Video):
     """Chooses where and what falls; the same seed gives the same video."""
     up: UpAxis = None
     """Axis of the mesh that points up."""
+    texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Picture in the mesh's own texture coordinates; by default the one that the file names, or NAME_texture.png."""
     repair: bool = False
     """Mend a mesh that is open or not manifold (needs the package pymeshfix)."""
 
@@ -167,7 +169,9 @@ class Drop(_Video):
         """Build a scene round the mesh."""
         from ..scene.drop import drop_scene
 
-        return drop_scene(self.mesh, bodies=self.bodies, seed=self.seed, up=self.up, repair=self.repair)
+        return drop_scene(
+            self.mesh, bodies=self.bodies, seed=self.seed, up=self.up, texture=self.texture, repair=self.repair
+        )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -53,7 +53,7 @@ class Surface:
     look : str
         Name of one of `LOOKS`; "model" takes colour, texture and gloss from the geom's MuJoCo material.
     color : tuple, optional
-        sRGB, 0 to 1. By default the look's own.
+        sRGB, 0 to 1. By default the texture of the geom's MuJoCo material, if it has one, or else the look's own.
     uv, image : optional
         Texture coordinates, shape [n, 2] or per corner [m, 3, 2], and the picture that they index.
     field_colors : array of uint8, shape [k, 3], optional
@@ -224,13 +224,16 @@ def _appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[
     plain, piece = Mapping(), geom_piece(model, geom)
     if surface.field_colors is not None:
         return UNDER_COLORS, np.ones(3), plain
-    look = find_look(surface.look)
+    look, mapping = find_look(surface.look), mapping_of(model, piece)
+    if mapping.own and surface.uv is None:
+        mapping = plain
     if surface.look == MODEL_LOOK:
         rgb = piece.color if surface.color is None else linear(surface.color)
-        mapping = mapping_of(model, piece)
-        return look_of(model, piece), rgb, mapping if surface.uv is not None or not mapping.own else plain
+        return look_of(model, piece), rgb, mapping
     if surface.image is not None and surface.uv is not None:
         return look, np.ones(3), Mapping(FLAT_IMAGE, own=True)
+    if surface.color is None and mapping.kind != NO_IMAGE:
+        return look, piece.color, mapping
     return look, linear(surface.color or look.color), plain
 
 

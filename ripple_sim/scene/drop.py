@@ -15,6 +15,7 @@ from ripple_sim.solver.atlas.rays import downward_hits
 from ..errors import SceneError
 from ..orientation import UP_AXES, usual_up
 from .events import Events
+from .mesh_picture import load_picture, mesh_picture
 from .motion import DropEntry
 from .scene import Edit, Scene
 from .scene_file import CameraEntry, MaterialEntry, RippleEntry
@@ -41,6 +42,7 @@ def drop_scene(
     seed: int = 0,
     up: str | None = None,
     look: str = "rubber",
+    texture: str | Path | None = None,
     repair: bool = False,
     edit: Edit | None = None,
 ) -> Scene:
@@ -60,6 +62,9 @@ def drop_scene(
         Axis of the file that points up, "y" or "z". By default "z" for STL, else "y", as is usual for each.
     look : str
         Of the target.
+    texture : path, optional
+        Picture in the mesh's own texture coordinates, which takes the place of the look's colour. By default the one
+        that the file names (an OBJ's material library, a GLB), or NAME_texture.png beside it.
     repair : bool
         Mend a mesh that is open or not manifold (needs the package pymeshfix).
     edit : callable, optional
@@ -70,7 +75,8 @@ def drop_scene(
     MeshError
         If the mesh cannot be read or is not closed and of genus 0.
     SceneError
-        For an invalid number of bodies or axis, or if MuJoCo refuses the mesh.
+        For an invalid number of bodies or axis, if MuJoCo refuses the mesh, or for a texture that cannot be read or
+        that a mesh without texture coordinates cannot show.
     """
     if not 0 <= bodies <= 100:
         raise SceneError(f"the number of bodies is {bodies}; valid is 0 to 100")
@@ -81,6 +87,7 @@ def drop_scene(
     V = _standing(mesh, up)
     rng = np.random.default_rng(seed)
     spec, drops = _build(V, mesh.F, bodies, rng)
+    _paint(spec, mesh, mesh_path, texture)
     if edit is not None:
         edit(spec)
     try:
@@ -155,6 +162,31 @@ def _build(
             DropEntry(body=f"body_{i}", time=float(times[i]), position=(float(x), float(y), float(z + height)))
         )
     return spec, drops
+
+
+def _paint(spec: mujoco.MjSpec, mesh: Mesh, mesh_path: str | Path, texture: str | Path | None) -> None:
+    """Give the target its picture, where it has one and can show it."""
+    if mesh.corner_uv is None:
+        if texture is not None:
+            raise SceneError(
+                f"texture {str(texture)!r} finds no place on {str(mesh_path)!r}, which has no texture coordinates: "
+                "choose a mesh that has them (and needs no repair, which loses them)"
+            )
+        return
+    pixels = mesh_picture(mesh_path) if texture is None else load_picture(texture)
+    if pixels is None:
+        return
+    asset = spec.mesh("target")
+    # MuJoCo counts v from the picture's upper edge
+    asset.usertexcoord = (mesh.corner_uv * [1.0, -1.0] + [0.0, 1.0]).ravel()
+    asset.userfacetexcoord = np.arange(mesh.F.size)
+    height, width, channels = pixels.shape
+    image = spec.add_texture(
+        name="target", type=mujoco.mjtTexture.mjTEXTURE_2D, height=height, width=width, nchannel=channels
+    )
+    image.data = pixels.tobytes()
+    spec.add_material(name="target").textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "target"
+    spec.geom("target").material = "target"
 
 
 def _landing_points(

@@ -107,14 +107,17 @@ def test_a_cube_picture_is_stretched_over_a_primitive_or_with_texuniform_is_not(
     assert names(gl, painted(geom, 'texuniform="true"', kind="cube"), [(-20, 0), (20, 0)]) != "rr"
 
 
-@pytest.mark.parametrize("shape", ["sphere", "capsule"])
-def test_a_target_wears_the_picture_as_a_body_does(gl, shape):
+@pytest.mark.parametrize(("shape", "look"), [("sphere", "model"), ("capsule", "model"), ("sphere", "rubber")])
+def test_a_target_wears_the_picture_as_a_body_does(gl, shape, look):
     model = painted(f'<geom type="{shape}" size=".4 .2" material="m"/>')
     ball = meshes.ball(12)
     V = 0.4 * ball.shell + (np.sign(ball.shell) * [0, 0, 0.2] if shape == "capsule" else 0.0)
-    target = Surface(V, ball.faces, ball.shell, 8, "model")
     places = [*corners(5), *corners(12)]
-    assert names(gl, model, places, targets={0: target}) == names(gl, model, places)
+    surface = Surface(V, ball.faces, ball.shell, 8, look)
+    assert names(gl, model, places, targets={0: surface}) == names(gl, model, places)
+    if look == "rubber":
+        plain = Surface(V, ball.faces, ball.shell, 8, look, color=(0.0, 0.8, 0.0))
+        assert names(gl, model, corners(5), targets={0: plain}) == "gggg"
 
 
 def test_the_first_role_for_colours_is_found_among_layers(gl):

@@ -1,0 +1,99 @@
+"""The picture that belongs to a mesh file's texture coordinates."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from PIL import Image
+
+from ..errors import RippleWarning, SceneError
+
+_SUFFIXES = (".png", ".jpg", ".jpeg")
+_SCENES = (".glb", ".gltf")
+
+
+def mesh_picture(mesh_path: str | Path) -> NDArray[np.uint8] | None:
+    """Picture of a mesh file, or None: what an OBJ's material library or a GLB names, or NAME_texture.png beside it.
+
+    Where several pictures colour one mesh, none is taken, with a warning.
+
+    Returns
+    -------
+    uint8 [height, width, 3], top row first, or None
+    """
+    mesh_path = Path(mesh_path)
+    if mesh_path.suffix.lower() in _SCENES:
+        found: list[Any] = _embedded(mesh_path)
+    else:
+        named = _of_materials(mesh_path) if mesh_path.suffix.lower() == ".obj" else []
+        beside = [mesh_path.with_name(f"{mesh_path.stem}_texture{suffix}") for suffix in _SUFFIXES]
+        found = named or [path for path in beside if path.is_file()][:1]
+    if len(found) > 1:
+        warnings.warn(
+            f"{mesh_path.name} is coloured by {len(found)} pictures, and one mesh shows one: none is drawn; join them "
+            "to one picture, or choose one with --texture",
+            RippleWarning,
+            stacklevel=3,
+        )
+    return load_picture(found[0]) if len(found) == 1 else None
+
+
+def load_picture(source: Any) -> NDArray[np.uint8]:
+    """Pixels of a picture file or of a PIL image, uint8 [height, width, 3], top row first.
+
+    Raises
+    ------
+    SceneError
+        If the file cannot be read as a picture.
+    """
+    try:
+        picture = source if isinstance(source, Image.Image) else Image.open(source)
+        return np.asarray(picture.convert("RGB"))
+    except (OSError, ValueError, Image.DecompressionBombError) as error:
+        raise SceneError(f"texture {str(source)!r} cannot be read: {error}") from error
+
+
+def _of_materials(mesh_path: Path) -> list[Path]:
+    """Pictures (map_Kd) of the materials that an OBJ file uses, as far as they are there."""
+    libraries, used = [], set()
+    for words in _statements(mesh_path):
+        if words[0] == "mtllib":
+            libraries.append(mesh_path.parent / words[1])
+        elif words[0] == "usemtl":
+            used.add(words[1])
+    pictures: dict[Path, None] = {}
+    for library in filter(Path.is_file, libraries):
+        material = ""
+        for words in _statements(library):
+            if words[0] == "newmtl":
+                material = words[1]
+            elif words[0] == "map_Kd" and (material in used or not used):
+                # options come first, and the file's name may have spaces and backslashes
+                name = words[1].replace("\\", "/")
+                path = library.parent / (name if not name.startswith("-") else name.split()[-1])
+                if path.is_file():
+                    pictures[path] = None
+    return list(pictures)
+
+
+def _statements(path: Path) -> list[tuple[str, str]]:
+    """Keyword and the rest of every line that has both."""
+    text = path.read_text(encoding="utf-8", errors="replace")
+    pairs = (line.strip().split(maxsplit=1) for line in text.splitlines() if line[:1] not in "vf#")
+    return [(pair[0], pair[1].strip()) for pair in pairs if len(pair) == 2]
+
+
+def _embedded(mesh_path: Path) -> list[Image.Image]:
+    """Pictures of the base colours in a GLB or glTF file."""
+    materials = {
+        id(material): material
+        for part in trimesh.load_scene(mesh_path).geometry.values()
+        if (material := getattr(part.visual, "material", None)) is not None
+    }
+    pictures = (getattr(material, "baseColorTexture", None) for material in materials.values())
+    return list({id(picture): picture for picture in pictures if picture is not None}.values())
