@@ -24,7 +24,7 @@ _LEVELS = {"SKY": 0.125, "FLOOR": 0.25, "SHADED": 0.375, "MIXED": 0.5, "SOLID": 
 class Picture:
     """The frame on the GPU.
 
-    Surfaces are first drawn as samples of depth, normals, colours and details; then each surface that shows in a pixel
+    Surfaces are first drawn as samples of depth, normals and colours; then each surface that shows in a pixel
     is lit once. Triangles of a few pixels would otherwise be lit many times over, since rasterisers work in blocks.
 
     Parameters
@@ -71,7 +71,7 @@ class Picture:
         depth = ctx.depth_texture(size, samples=many)
         if not many:
             depth.compare_func = ""
-        layers = [ctx.texture(size, 4, samples=many, dtype="nu2") for _ in range(3)]
+        layers = [ctx.texture(size, 4, samples=many, dtype="nu2") for _ in range(2)]
         if not many:
             for layer in (depth, *layers):
                 layer.filter = (moderngl.NEAREST, moderngl.NEAREST)
@@ -118,9 +118,9 @@ class Picture:
         ctx.depth_func = "<="
         self._samples.use()
         # the colours of samples without a surface are never read
-        self._samples.color_mask = [(False,) * 4] * 3
+        self._samples.color_mask = [(False,) * 4] * 2
         self._samples.clear(depth=1.0)
-        self._samples.color_mask = [(True,) * 4] * 3
+        self._samples.color_mask = [(True,) * 4] * 2
 
     def compose(self, ctx: moderngl.Context) -> None:
         """Light what was drawn, with the floor and the background."""

@@ -25,6 +25,7 @@ from .owned import OwnedObjects
 from .picture import Picture
 from .pieces import ball_of, visible_geoms
 from .readback import Readback
+from .reliefs import ReliefTextures
 from .shadow import ShadowMap
 from .surface import Surface, SurfaceMesh
 from .undrawn import warn_of_undrawn
@@ -84,9 +85,10 @@ class Renderer:
             self._open_floor = ctx.texture((1, 1), 2, np.ones(2, dtype=np.float16).tobytes(), dtype="f2")
             textures = Textures(ctx, model)
             self._sky = None if self._studio else textures.skybox()
+            self._reliefs = ReliefTextures(ctx, [surface.resolution for surface in targets.values()])
             self._targets = [
-                SurfaceMesh(gl, ctx, model, geom, surface, textures, self._table, (width, height))
-                for geom, surface in sorted(targets.items())
+                SurfaceMesh(gl, ctx, model, geom, surface, textures, self._table, self._reliefs, index, (width, height))
+                for index, (geom, surface) in enumerate(sorted(targets.items()))
             ]
             geoms = [geom for geom in visible_geoms(model) if geom not in targets]
             floor = find_floor(model, geoms)
@@ -187,9 +189,10 @@ class Renderer:
         self, ctx: moderngl.Context, data: Any, reliefs: Mapping[int, NDArray[np.float32]], pose: Pose
     ) -> tuple[float, ...] | None:
         """Bring everything on the GPU up to date; return the matrix of the light that casts shadows."""
+        occluders = self._bodies.occluders.bind(data, pose.focus)
         for target in self._targets:
             rotation = data.geom_xmat[target.geom].reshape(3, 3)
-            target.update(ctx, rotation, data.geom_xpos[target.geom], reliefs.get(target.geom))
+            target.update(ctx, rotation, data.geom_xpos[target.geom], reliefs.get(target.geom), occluders)
         pixels = self.height / (2 * np.tan(np.radians(pose.fovy) / 2))
         self._bodies.update(data, pose.position, pixels)
         self._table.bind()
@@ -207,7 +210,6 @@ class Renderer:
         light_view = None
         if lighting.lights and lighting.lights[0].shadow:
             light_view = tuple(self._shadow.fit(frame, lighting.lights[0], centre, radius).T.ravel())
-        occluders = self._bodies.occluders.bind(data, pose.focus)
         frame.set_vector("counts", [occluders, len(lighting.lights), 0], float(light_view is not None))
         frame.bind()
         return light_view
@@ -248,6 +250,7 @@ class Renderer:
         self._bodies.draw_depth(view_projection, sites=False)
 
     def _bind_maps(self) -> None:
+        self._reliefs.bind()
         self._shadow.bind()
         if self._floor is None:
             self._open_floor.use(3)

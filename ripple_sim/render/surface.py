@@ -23,6 +23,7 @@ from .meshes import corner_normals
 from .objects import ObjectTable
 from .owned import OwnedObjects
 from .pieces import geom_piece
+from .reliefs import LAYERS, ReliefTextures
 from .subdivision import subdivide
 
 _PIXELS = 4.0  # length of an edge where the target fills the frame's height
@@ -90,6 +91,10 @@ class SurfaceMesh:
         Of the model.
     table : ObjectTable
         Takes a row for the target.
+    reliefs : ReliefTextures
+        Takes the target's relief.
+    index : int
+        Of the target among those that have a relief there.
     size : (width, height)
         Of the frame [pixels].
     """
@@ -103,6 +108,8 @@ class SurfaceMesh:
         surface: Surface,
         textures: Textures,
         table: ObjectTable,
+        reliefs: ReliefTextures,
+        index: int,
         size: tuple[int, int],
     ) -> None:
         self.geom = geom
@@ -112,8 +119,10 @@ class SurfaceMesh:
         self.clear = look.transparency > 0.0
         self.shades = look.transparency < _NO_SHADOW
         self.radius = float(np.linalg.norm(surface.V, axis=1).max())
-        self._table = table
-        self.number = table.add(look, geom, size=self.radius, painted=shows_field)
+        self._table, self._reliefs, self._first_layer = table, reliefs, LAYERS * index
+        self.number = table.add(
+            look, geom, size=self.radius, painted=shows_field, relief=(self._first_layer, self.resolution)
+        )
         faces, vertices = _refined(surface, 2 * self.radius * _PIXELS / size[1], size[0] * size[1] // _PIXELS_PER_FACE)
         self.count = len(vertices)
         self._displace = ctx.own(gl.compute_shader(_PACKAGE, "displace"))
@@ -128,30 +137,28 @@ class SurfaceMesh:
             )
         )
         depth = ctx.own(gl.program(_PACKAGE, "surface_depth_vertex", "depth_fragment"))
-        texels = surface.resolution + 2
-        self._relief = ctx.texture_array((texels, texels, 6), 4, dtype="f4")
-        self._relief.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        self._relief.repeat_x = self._relief.repeat_y = False
         self._rest = ctx.buffer(_packed(vertices, _POSITION, _DIRECTION, _SPHERE))
-        self._moved = ctx.buffer(reserve=12 * self.count)
+        self._moved = ctx.buffer(reserve=16 * self.count)
         still = np.concatenate([vertices[:, _NORMAL], vertices[:, _SPHERE], vertices[:, _BAKED]], axis=1)
         still = np.concatenate([still, _mapped(vertices, mapping)], axis=1).astype("f4")
         indices = ctx.buffer(faces.astype("i4").tobytes())
         self._solid = ctx.vertex_array(
             self._program,
             [
-                (self._moved, "3f", "in_world"),
+                (self._moved, "4f", "in_moved"),
                 (ctx.buffer(still.tobytes()), "3f 3f 2f 3f", "in_normal", "in_sphere", "in_baked", "in_mapped"),
             ],
             indices,
             skip_errors=True,
         )
-        self._depth = ctx.vertex_array(depth, [(self._moved, "3f", "in_world")], indices)
+        self._depth = ctx.vertex_array(depth, [(self._moved, "4f", "in_moved")], indices)
         self._mapping = mapping
         self._image = None
         if mapping.kind != NO_IMAGE:
             self._image = textures.get(mapping.texture) if mapping.texture >= 0 else _load_image(ctx, surface)
-        self._field = None if surface.field_colors is None else FieldTexture(ctx, texels, surface.field_colors)
+        self._field = (
+            None if surface.field_colors is None else FieldTexture(ctx, self.resolution + 2, surface.field_colors)
+        )
         self._grid = surface.grid
         self._color = (*rgb, float(self.number))
 
@@ -161,8 +168,9 @@ class SurfaceMesh:
         rotation: NDArray[np.float64],
         origin: NDArray[np.float64],
         relief: NDArray[np.float32] | None,
+        occluders: int,
     ) -> None:
-        """Take in a relief (none: flat) and put the displaced vertices where the geom is."""
+        """Take in a relief (none: flat) and put the displaced vertices where the geom is, among the bound occluders."""
         shape = (6, self.resolution + 2, self.resolution + 2, 4)
         if relief is None:
             relief = np.zeros(shape, dtype=np.float32)
@@ -172,15 +180,19 @@ class SurfaceMesh:
                 f"{list(shape)}: six faces padded by one texel, gradient and height"
             )
         self._origin, self._highest = np.array(origin), float(np.abs(relief[..., 3]).max())
-        self._table.set_lift(self.number, min(1.5 * self._highest, 0.05 * self.radius))
-        self._relief.write(np.ascontiguousarray(relief, dtype=np.float32))
-        self._relief.use(0)
+        self._table.set_relief(self.number, min(1.5 * self._highest, 0.05 * self.radius), rotation)
+        self._reliefs.write(self._first_layer, relief)
+        self._reliefs.bind()
         self._rest.bind_to_storage_buffer(0)
         self._moved.bind_to_storage_buffer(1)
         self._rotation = tuple(rotation.T.ravel())
         self._displace["rotation"] = self._rotation
         self._displace["origin"] = tuple(origin)
         self._displace["count"] = self.count
+        self._displace["resolution"] = float(self.resolution)
+        self._displace["geom"] = float(self.geom)
+        self._displace["occluder_count"] = occluders
+        self._displace["first_layer"] = float(self._first_layer)
         self._displace.run(-(-self.count // 64))
         ctx.memory_barrier()
 
@@ -199,18 +211,18 @@ class SurfaceMesh:
 
     def draw(self) -> None:
         """Draw into the geometry pass."""
-        self._relief.use(0)
         if self._image is not None:
             self._image.use(self._mapping.unit)
         if self._mapping.kind not in (NO_IMAGE, CUBE_IMAGE):
             self._program["tiling"] = self._mapping.tiling
         self._program["rotation"] = self._rotation
         self._program["color"] = self._color
-        self._program["size"] = self.radius
         if self._field is not None:
             self._field.use(self._program)
         if self._grid:
             self._program["grid_spacing"] = float(self._grid)
+        if self._field is not None or self._grid:
+            self._program["resolution"] = float(self.resolution)
         self._solid.render()
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:

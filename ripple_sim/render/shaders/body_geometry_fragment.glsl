@@ -10,6 +10,5 @@ flat in vec4 tiling;
 void main()
 {
     vec3 albedo = painted(color.rgb, mapped, tiling);
-    vec3 n = normalize(normal);
-    store(n, n, sqrt(albedo), color.w, vec3(1.0, 1.0, 0.0));
+    store(normal, normal, sqrt(albedo), color.w, vec2(1.0), 0.0);
 }

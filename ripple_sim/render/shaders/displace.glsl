@@ -1,16 +1,22 @@
 #version 430
-// Vertices of a target, displaced along their smooth normals and put into the world: once a frame for all passes.
+// Vertices of a target, displaced along their smooth normals and put into the world, and how much sky the bodies near by
+// leave them: once a frame for all passes.
 layout(local_size_x = 64) in;
 
 #include "relief.glsl"
+#include "occluders.glsl"
 
 struct Vertex { float position[3], direction[3], sphere[3]; };
 layout(std430, binding = 0) readonly buffer Rest { Vertex rest[]; };
-layout(std430, binding = 1) writeonly buffer Moved { float moved[]; };
+layout(std430, binding = 1) writeonly buffer Moved { vec4 moved[]; };
 
 uniform mat3 rotation;
 uniform vec3 origin;
 uniform int count;
+uniform float resolution;
+uniform float first_layer;
+uniform float geom;
+uniform int occluder_count;
 
 void main()
 {
@@ -18,11 +24,9 @@ void main()
     if (i >= count)
         return;
     Vertex v = rest[i];
-    float height = relief_at(vec3(v.sphere[0], v.sphere[1], v.sphere[2])).w;
-    vec3 local = vec3(v.position[0], v.position[1], v.position[2])
-               + height * vec3(v.direction[0], v.direction[1], v.direction[2]);
-    vec3 world = rotation * local + origin;
-    moved[3 * i] = world.x;
-    moved[3 * i + 1] = world.y;
-    moved[3 * i + 2] = world.z;
+    vec3 sphere = vec3(v.sphere[0], v.sphere[1], v.sphere[2]);
+    float height = spline_at(relief, resolution, first_layer, sphere).w;
+    vec3 direction = vec3(v.direction[0], v.direction[1], v.direction[2]);
+    vec3 world = rotation * (vec3(v.position[0], v.position[1], v.position[2]) + height * direction) + origin;
+    moved[i] = vec4(world, openness_to_bodies(world, rotation * direction, geom, occluder_count));
 }

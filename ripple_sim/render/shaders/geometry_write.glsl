@@ -1,13 +1,12 @@
 #include "geometry.glsl"
 
-layout(location = 0) out vec4 normals;  // with ripples, and of the surface at large
-layout(location = 1) out vec4 paint;    // square root of the albedo; number of the object
-layout(location = 2) out vec4 details;  // openness, half the thickness, ink of lines on top, spread of the normals in the pixel
+layout(location = 0) out vec4 shape;  // normal without ripples; where the relief is looked up
+layout(location = 1) out vec4 paint;  // two shares a channel; number of the object
 
-void store(vec3 rippled, vec3 normal, vec3 color, float object, vec3 baked)
+// The colour is the square root of the albedo; `baked` holds the openness and half the thickness; `ink` is that of lines
+// on top.
+void store(vec3 normal, vec3 sphere, vec3 color, float object, vec2 baked, float ink)
 {
-    vec3 dx = dFdx(rippled), dy = dFdy(rippled);
-    normals = vec4(folded(rippled), folded(normal));
-    paint = vec4(color, object / 65535.0);
-    details = vec4(baked, sqrt(min(0.5 * (dot(dx, dx) + dot(dy, dy)), 0.2) * 5.0));
+    shape = vec4(folded(normal), folded(sphere));
+    paint = vec4(joined(color.r, color.g), joined(color.b, ink), joined(baked.x, baked.y), object / 65535.0);
 }

@@ -1,4 +1,4 @@
-// The relief of a target: gradient (xyz) and height (w) on six faces with a ring of neighbour texels.
+// The reliefs of all targets: gradient (xyz) and height (w) on six faces each with a ring of neighbour texels.
 layout(binding = 0) uniform sampler2DArray relief;
 
 // Face and position, in texels of the padded face, that a direction from the cube's centre meets.
@@ -28,24 +28,20 @@ vec3 relief_position(vec3 d, float resolution)
 
 // Quadratic B-spline over 3 x 3 texels, from four bilinear taps: a surface whose normals have no kinks. It needs one
 // ring of neighbours, and where three faces meet all three give the same value.
-vec4 spline_at(sampler2DArray faces, vec3 direction)
+vec4 spline_at(sampler2DArray faces, float resolution, float first_layer, vec3 direction)
 {
-    float padded = float(textureSize(faces, 0).x);
-    vec3 position = relief_position(direction, padded - 2.0);
+    float width = float(textureSize(faces, 0).x);
+    vec3 position = relief_position(direction, resolution);
+    position.z += first_layer;
     vec2 texel = floor(position.xy);
     vec2 t = position.xy - texel - 0.5;
     vec2 left = 0.5 * (1.0 - t), right = 0.5 * (1.0 + t);
     vec2 low = texel - 0.5 + (0.75 - t * t) / (2.0 * left);
     vec2 high = texel + 0.5 + 0.5 * (0.5 + t) * (0.5 + t) / right;
-    low /= padded;
-    high /= padded;
+    low /= width;
+    high /= width;
     return left.y * (left.x * textureLod(faces, vec3(low.x, low.y, position.z), 0.0)
                      + right.x * textureLod(faces, vec3(high.x, low.y, position.z), 0.0))
          + right.y * (left.x * textureLod(faces, vec3(low.x, high.y, position.z), 0.0)
                       + right.x * textureLod(faces, vec3(high.x, high.y, position.z), 0.0));
-}
-
-vec4 relief_at(vec3 direction)
-{
-    return spline_at(relief, direction);
 }

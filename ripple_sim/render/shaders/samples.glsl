@@ -7,9 +7,8 @@
 #define BASE_LEVEL , 0
 #endif
 layout(binding = 8) uniform BUFFER depths;
-layout(binding = 9) uniform BUFFER normals;
+layout(binding = 9) uniform BUFFER shapes;
 layout(binding = 10) uniform BUFFER paints;
-layout(binding = 11) uniform BUFFER details;
 
 in vec2 screen;
 

@@ -1,6 +1,7 @@
 // How a solid surface answers the light.
+#include "occluders.glsl"
+
 layout(binding = 3) uniform sampler2D floor_openness;
-layout(std430, binding = 4) readonly buffer Occluders { vec4 occluders[]; };  // pairs: end a, radius; end b, geom
 
 struct Material {
     vec3 albedo;
@@ -8,23 +9,9 @@ struct Material {
     float thickness;  // of the body under the surface, 0 to about 1
     vec3 behind;      // radiance of what is seen through the body
     float lift;       // height of bumps that the shading normal accounts for [m]
-    float openness;   // share of the sky that the body itself leaves free
+    float openness;   // share of the sky that the body itself leaves free, and its neighbours where `occluders` is 0
+    int occluders;
 };
-
-// Share of the hemisphere about the normal that other bodies, taken as capsules, cover.
-float openness_to_bodies(vec3 position, vec3 normal, float own_geom)
-{
-    float open = 1.0;
-    for (int i = 0; i < int(counts.x); ++i) {
-        vec4 a = occluders[2 * i], b = occluders[2 * i + 1];
-        vec3 axis = b.xyz - a.xyz, to = a.xyz - position;
-        vec3 nearest = to + axis * clamp(-dot(axis, to) / max(dot(axis, axis), 1e-12), 0.0, 1.0);
-        float away = length(nearest), ratio = min(a.w / max(away, 1e-9), 1.0);
-        float above = clamp((dot(normal, nearest) / max(away, 1e-9) + ratio) / (1.0 + ratio), 0.0, 1.0);
-        open *= 1.0 - (b.w == own_geom ? 0.0 : 0.9 * ratio * ratio * above * above);
-    }
-    return open;
-}
 
 // Light that the floor sends up to a point; bodies close above it shade it.
 vec3 floor_bounce(vec3 position)
@@ -55,7 +42,7 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     vec3 reflected = reflect(-view, normal);
     float n_v = clamp(dot(normal, view), 0.1, 1.0);
 
-    float open = m.openness * openness_to_bodies(position, flat_normal, own_geom);
+    float open = m.openness * openness_to_bodies(position, flat_normal, own_geom, m.occluders);
     vec3 bounce = floor_bounce(position);
     float height = max(dot(position - floor_origin.xyz, floor_normal.xyz), 0.0);
     vec3 mirrored = 1.7 * floor_bounce(position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2));

@@ -9,6 +9,7 @@
 #include "floor_ray.glsl"
 #include "shading.glsl"
 #include "geometry.glsl"
+#include "relief.glsl"
 
 layout(binding = 6) uniform sampler2D scene;  // the picture without the clear bodies
 
@@ -16,6 +17,8 @@ struct Object {
     vec4 base;    // roughness, metallic, sheen, coat
     vec4 volume;  // translucency, transparency, emission, opacity
     vec4 place;   // geom, size [m], height of its highest ripple [m], 1 where its paint goes over the light
+    vec4 relief;  // first layer, texels along an edge of a face; 0 without a relief
+    mat3 rotation;
 };
 layout(std430, binding = 5) readonly buffer Objects { Object objects[]; };
 
@@ -45,23 +48,51 @@ int object_of(ivec2 pixel, int s)
     return int(texelFetch(paints, pixel, s).w * 65535.0 + 0.5);
 }
 
-// Colour and opacity of what a sample shows.
-vec4 lit_solid(ivec2 pixel, int s, vec3 position)
+// What a sample shows.
+struct Spot {
+    int object;
+    vec3 normal;   // of the surface at large
+    vec3 rippled;
+    vec3 color;    // square root of the albedo
+    float ink;     // of lines on top
+    float openness, thickness;
+};
+
+Spot spot_at(ivec2 pixel, int s)
 {
-    vec4 coded = texelFetch(normals, pixel, s), paint = texelFetch(paints, pixel, s), detail = texelFetch(details, pixel, s);
-    Object object = objects[int(paint.w * 65535.0 + 0.5)];
-    vec3 rippled = unfolded(coded.xy), normal = unfolded(coded.zw), behind = vec3(0.0);
+    vec4 shape = texelFetch(shapes, pixel, s), paint = texelFetch(paints, pixel, s);
+    Spot spot;
+    spot.object = int(paint.w * 65535.0 + 0.5);
+    spot.normal = unfolded(shape.xy);
+    vec2 red_green = parted(paint.x), blue_ink = parted(paint.y), baked = parted(paint.z);
+    spot.color = vec3(red_green, blue_ink.x);
+    spot.ink = blue_ink.y;
+    Object object = objects[spot.object];
+    vec4 ripple = vec4(0.0);
+    for (int once = object.relief.y > 0.0 ? 1 : 0; once > 0; --once)
+        ripple = spline_at(relief, object.relief.y, object.relief.x, unfolded(shape.zw));
+    spot.rippled = normalize(spot.normal - object.rotation * ripple.xyz);
+    // troughs lie deeper than their surroundings: less light finds its way in
+    spot.openness = baked.x * (1.0 - 0.4 * smoothstep(0.0, 0.03, -ripple.w / object.place.y));
+    spot.thickness = 2.0 * baked.y;
+    return spot;
+}
+
+// Colour and opacity of a spot; `spread` is the variance of the normals in the pixel.
+vec4 lit_solid(Spot spot, vec3 position, float spread)
+{
+    Object object = objects[spot.object];
+    vec3 behind = vec3(0.0);
     bool painted = object.place.w > 0.0;
-    float thickness = 2.0 * detail.y;
 #if LAYER
-    behind = seen_through(position, rippled, thickness, object.place.y, object.volume.x);
+    behind = seen_through(position, spot.rippled, spot.thickness, object.place.y, object.volume.x);
 #endif
-    Material m = Material(painted ? vec3(NEUTRAL) : paint.rgb * paint.rgb, object.base.x, object.base.y, object.base.z,
-                          object.base.w, object.volume.x, object.volume.y, object.volume.z, thickness, behind,
-                          object.place.z, detail.x);
-    vec3 shown = developed(shaded(m, position, rippled, normal, object.place.x, 0.2 * detail.w * detail.w));
+    Material m = Material(painted ? vec3(NEUTRAL) : spot.color * spot.color, object.base.x, object.base.y, object.base.z,
+                          object.base.w, object.volume.x, object.volume.y, object.volume.z, spot.thickness, behind,
+                          object.place.z, spot.openness, object.relief.y > 0.0 ? 0 : int(counts.x));
+    vec3 shown = developed(shaded(m, position, spot.rippled, spot.normal, object.place.x, spread));
     float shade = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / FULL_LIGHT, DARKEST, 1.0);
-    return vec4(mix(painted ? paint.rgb * shade : shown, INK, detail.z), object.volume.w);
+    return vec4(mix(painted ? spot.color * shade : shown, INK, spot.ink), object.volume.w);
 }
 
 void main()
@@ -74,25 +105,39 @@ void main()
     for (int s = 0; s < SAMPLES; ++s)
         own |= object_of(pixel, s) == layer ? 1 << s : 0;
     left &= own;
+#endif
+    int first = max(findLSB(left), 0);
+    float at = eye_distance(texelFetch(depths, pixel, first).r);
+    Spot spot = spot_at(pixel, first);
+    // how far the normals turn from one pixel to the next, where both show the same
+    float number = left == 0 ? -1.0 : float(spot.object);
+    bvec2 same = equal(vec2(dFdx(number), dFdy(number)), vec2(0.0));
+    bvec2 near = lessThan(abs(vec2(dFdx(at), dFdy(at))), vec2(0.02 * at));
+    vec3 across = same.x && near.x ? dFdx(spot.rippled) : vec3(0.0), up = same.y && near.y ? dFdy(spot.rippled) : vec3(0.0);
+    float spread = min(0.5 * (dot(across, across) + dot(up, up)), 0.2);
+#if LAYER
     if (left == 0)
         discard;
 #endif
     vec4 sum = vec4(0.0);
     while (left != 0) {
         // samples of the same surface share their light
-        int first = findLSB(left), alike = 1 << first;
-        float at = eye_distance(texelFetch(depths, pixel, first).r);
-        int object = object_of(pixel, first);
-        vec2 normal = texelFetch(normals, pixel, first).zw;
+        int alike = 1 << first;
+        vec2 normal = texelFetch(shapes, pixel, first).xy;
         for (int s = 1; s < SAMPLES; ++s) {
-            bool same = abs(eye_distance(texelFetch(depths, pixel, s).r) - at) < 0.01 * at && object_of(pixel, s) == object
-                     && distance(texelFetch(normals, pixel, s).zw, normal) < 0.06;
+            bool same = abs(eye_distance(texelFetch(depths, pixel, s).r) - at) < 0.01 * at && object_of(pixel, s) == spot.object
+                     && distance(texelFetch(shapes, pixel, s).xy, normal) < 0.06;
             alike |= same ? 1 << s : 0;
         }
         alike &= left;
         left &= ~alike;
-        vec4 color = lit_solid(pixel, first, eye.xyz + at * way);
+        vec4 color = lit_solid(spot, eye.xyz + at * way, spread);
         sum += float(bitCount(alike)) / float(SAMPLES) * vec4(dithered(color.rgb) * color.a, color.a);
+        for (int once = left != 0 ? 1 : 0; once > 0; --once) {
+            first = findLSB(left);
+            at = eye_distance(texelFetch(depths, pixel, first).r);
+            spot = spot_at(pixel, first);
+        }
     }
     fragment = sum;
 }

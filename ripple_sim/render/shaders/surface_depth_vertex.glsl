@@ -1,9 +1,9 @@
 #version 430
-in vec3 in_world;
+in vec4 in_moved;
 
 uniform mat4 view_projection;
 
 void main()
 {
-    gl_Position = view_projection * vec4(in_world, 1.0);
+    gl_Position = view_projection * vec4(in_moved.xyz, 1.0);
 }

@@ -1,12 +1,9 @@
 #version 430
 #include "geometry_write.glsl"
 #include "mapping.glsl"
-#include "relief.glsl"
 #include "annotation.glsl"
 
-uniform mat3 rotation;
 uniform vec4 color;  // linear; w: number of the object
-uniform float size;  // of the body [m]
 uniform vec4 tiling;
 
 in vec3 normal;
@@ -16,10 +13,7 @@ in vec3 mapped;
 
 void main()
 {
-    vec3 n = normalize(normal);
-    vec4 ripple = relief_at(sphere);
-    vec3 albedo = painted(color.rgb, mapped, tiling);
-    vec3 shown = sqrt(albedo);
+    vec3 shown = sqrt(painted(color.rgb, mapped, tiling));
     float ink = 0.0;
 #if FIELD
     shown = field_color(sphere);
@@ -27,7 +21,5 @@ void main()
 #if GRID
     ink = grid_ink(sphere);
 #endif
-    // troughs lie deeper than their surroundings: less light finds its way in
-    float open = baked.x * (1.0 - 0.4 * smoothstep(0.0, 0.03, -ripple.w / size));
-    store(rotation * normalize(n - ripple.xyz), rotation * n, shown, color.w, vec3(open, 0.5 * baked.y, ink));
+    store(normal, sphere, shown, color.w, vec2(baked.x, 0.5 * baked.y), ink);
 }

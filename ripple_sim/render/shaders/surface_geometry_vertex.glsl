@@ -1,11 +1,13 @@
 #version 430
 #include "frame.glsl"
 
-in vec3 in_world;
+in vec4 in_moved;  // w: share of the sky that the bodies near by leave
 in vec3 in_normal;
 in vec3 in_sphere;
 in vec2 in_baked;
 in vec3 in_mapped;
+
+uniform mat3 rotation;
 
 out vec3 normal;
 out vec3 sphere;
@@ -14,9 +16,9 @@ out vec3 mapped;
 
 void main()
 {
-    normal = in_normal;
+    normal = rotation * in_normal;
     sphere = in_sphere;
-    baked = in_baked;
+    baked = in_baked * vec2(in_moved.w, 1.0);
     mapped = in_mapped;
-    gl_Position = view_projection * vec4(in_world, 1.0);
+    gl_Position = view_projection * vec4(in_moved.xyz, 1.0);
 }
