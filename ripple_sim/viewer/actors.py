@@ -139,7 +139,7 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
     return mesh
 
 
-def _add(plotter: pv.Plotter, mesh: pv.PolyData, rgba: NDArray[np.float32]) -> pv.Actor:
+def _add(plotter: pv.Plotter, mesh: pv.PolyData, rgba: NDArray[np.float64]) -> pv.Actor:
     return plotter.add_mesh(
         mesh, color=rgba[:3].tolist(), opacity=float(rgba[3]), interpolation="Phong", reset_camera=False, **_SHADING
     )
@@ -151,7 +151,7 @@ def _is_floor(model: mujoco.MjModel, geom: int, reach: float) -> bool:
     return model.geom_type[geom] == _GEOM.mjGEOM_PLANE and bool(((size <= 0) | (size > reach / 2)).all())
 
 
-def _add_floor(plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, rgba: NDArray[np.float32]) -> pv.Actor:
+def _add_floor(plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, rgba: NDArray[np.float64]) -> pv.Actor:
     """Unlit, for a lit pixel takes software OpenGL much longer and this one has most of them."""
     disc = pv.Disc(inner=0.0, outer=radius, normal=(0, 0, 1), r_res=_FADE_RINGS, c_res=_FADE_SIDES)
     away = np.linalg.norm(disc.points, axis=1) / radius
