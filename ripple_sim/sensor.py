@@ -19,8 +19,8 @@ _SRGB = np.rint(255 * np.where(_LIGHT <= 0.0031308, 12.92 * _LIGHT, 1.055 * _LIG
 class Sensor:
     """Averages pictures in linear light.
 
-    Pictures are uint8, in sRGB, or float32, in linear light; with a fourth channel for their opacity (0 to 255, or 0
-    to 1), by which the colours are weighted.
+    Pictures are uint8, in sRGB, with a fourth channel for their opacity, by which the colours are weighted; or float16,
+    in linear light, with colours that are multiplied by their opacity already.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ class Sensor:
 
         Parameters
         ----------
-        picture : uint8 or float32 [factor height, factor width, 3 or 4]
+        picture : uint8 or float16 [factor height, factor width, 3 or 4]
             The same shape and kind for all exposures of a frame.
 
         Returns
         -------
-        uint8 or float32 [height, width, 3 or 4]
+        uint8 or float16 [height, width, 3 or 4]
             The frame after its last exposure; None before.
         """
         if self._factor == self._exposures == 1:
@@ -56,13 +56,14 @@ class Sensor:
         if picture.dtype == np.uint8:
             _gather_codes(picture, factor, _LINEAR, self._light)
         else:
-            _gather_light(picture, factor, self._light)
+            blocks = picture.reshape(height // factor, factor, width // factor, factor, channels)
+            self._light[..., :channels] += blocks.sum(axis=(1, 3), dtype=np.float32)
         self._count = (self._count + 1) % self._exposures
         if self._count:
             return None
         most = factor * factor * self._exposures
         if picture.dtype != np.uint8:
-            return _mean_light(self._light, most)[..., :channels]
+            return (self._light[..., :channels] / most).astype(picture.dtype)
         frame = np.empty((*self._light.shape[:2], channels), np.uint8)
         _develop(self._light, most, _SRGB, frame)
         return frame
@@ -97,17 +98,3 @@ def _develop(light, most, srgb, frame):
                 frame[row, column, channel] = srgb[int(light[row, column, channel] * scale + 0.5)]
             if frame.shape[2] == 4:
                 frame[row, column, 3] = int(opacity / most + 0.5)
-
-
-def _gather_light(picture: NDArray[np.float32], factor: int, light: NDArray[np.float32]) -> None:
-    height, width = light.shape[:2]
-    blocks = picture.reshape(height, factor, width, factor, -1)
-    opacity = blocks[..., 3:] if blocks.shape[-1] == 4 else np.ones_like(blocks[..., :1])
-    light[..., :3] += (blocks[..., :3] * opacity).sum(axis=(1, 3))
-    light[..., 3:] += opacity.sum(axis=(1, 3))
-
-
-def _mean_light(light: NDArray[np.float32], most: int) -> NDArray[np.float32]:
-    opacity = light[..., 3:]
-    colors = np.divide(light[..., :3], opacity, out=np.zeros_like(light[..., :3]), where=opacity > 0)
-    return np.concatenate([colors, opacity / most], axis=2)

@@ -37,3 +37,16 @@ def test_transparent_pixels_lend_no_colour():
     frame[1, 1] = (0, 255, 0, 0)
     assert shrink(frame, 2).tolist() == [[[200, 100, 50, 64]]]
     assert shrink(np.zeros((2, 2, 4), np.uint8), 2).tolist() == [[[0, 0, 0, 0]]]
+
+
+def test_linear_light_is_averaged_as_it_is() -> None:
+    rng = np.random.default_rng(5)
+    pictures = np.exp(rng.uniform(-5, 8, (3, 8, 6, 4))).astype(np.float16)
+    sensor = Sensor(factor=2, exposures=3)
+    assert sensor.expose(pictures[0]) is None
+    assert sensor.expose(pictures[1]) is None
+    frame = sensor.expose(pictures[2])
+    assert frame is not None
+    assert frame.dtype == np.float16
+    expected = pictures.astype(float).reshape(3, 4, 2, 3, 2, 4).mean(axis=(0, 2, 4))
+    np.testing.assert_allclose(frame, expected, rtol=1e-3)
