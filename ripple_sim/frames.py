@@ -150,7 +150,7 @@ class FrameSource:
             sim = self._simulation
             focus = focal_distance(sim.model, state.data, sim.scene.camera, camera.pose())
             camera = ThroughLens(camera, tuple(lens), focus)
-        self.renderer.submit(state.data, reliefs, camera)
+        self.renderer.submit(state.data, reliefs, camera, state.exposure)
 
     def fetch(self) -> NDArray[np.uint8] | None:
         """Wait for the earliest submitted snapshot's picture, and return it as `draw` does."""

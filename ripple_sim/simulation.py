@@ -86,7 +86,7 @@ class Simulation:
         self._script = Script(self.model, scene.events, list(self.ripples))
         self.physics_seconds = self.wave_seconds = 0.0
         self.impulses: list[Impulse] = []
-        self._steps = 0
+        self._steps = 0  # of the next frame, already made
 
     @property
     def backend(self) -> str:
@@ -106,18 +106,19 @@ class Simulation:
         SimulationError
             If MuJoCo's state is no longer finite.
         """
-        for _ in range(self.steps_per_frame - self._steps % self.steps_per_frame):
+        for _ in range(self.steps_per_frame - self._steps):
             self.step()
+        self._steps = 0
 
     def step(self) -> None:
-        """Advance physics and waves by one physics step; `advance_frame` then makes the rest of the frame's.
+        """Advance physics and waves by one physics step; `advance_frame` then makes the rest of the frame.
 
         Raises
         ------
         SimulationError
             If MuJoCo's state is no longer finite.
         """
-        if self._steps % self.steps_per_frame == 0:
+        if self._steps == 0:
             self.impulses = []
         self._steps += 1
         start = time.perf_counter()

@@ -133,7 +133,9 @@ class Renderer:
         with self._gl:
             next(target for target in self._targets if target.geom == geom).set_field(field, limit)
 
-    def render(self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint) -> NDArray[np.uint8]:
+    def render(
+        self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
+    ) -> NDArray[np.uint8]:
         """Draw one frame.
 
         Parameters
@@ -143,26 +145,32 @@ class Renderer:
         reliefs : mapping
             Geom id to relief, shape [6, N + 2, N + 2, 4]: gradient of the height (xyz, in the geom's frame) and height
             [m] (w), each face padded by a ring of neighbour texels. A target without one is flat.
-        camera : Camera or FixedCamera
+        camera : Camera, FixedCamera or ThroughLens
+        exposure : int
+            Number of this picture among those whose mean is a frame: the noise of shadows differs from one to the next.
 
         Returns
         -------
         array of uint8, shape [height, width, 3], or [height, width, 4] with alpha
             sRGB, top row first; alpha is straight. A fresh array for every frame.
         """
-        self.submit(data, reliefs, camera)
+        self.submit(data, reliefs, camera, exposure)
         return self.fetch()
 
-    def submit(self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint) -> None:
+    def submit(
+        self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
+    ) -> None:
         """Draw one frame as `render` does, without waiting for it: `fetch` returns it, after those submitted before."""
         with self._gl:
-            self._readback.submit(self.draw(data, reliefs, camera))
+            self._readback.submit(self.draw(data, reliefs, camera, exposure))
 
     def fetch(self) -> NDArray[np.uint8]:
         """Wait for the earliest submitted frame, and return it as `render` does."""
         return self._readback.fetch()
 
-    def draw(self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint) -> moderngl.Framebuffer:
+    def draw(
+        self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
+    ) -> moderngl.Framebuffer:
         """Draw one frame as `render` does, and leave it on the GPU.
 
         Returns
@@ -172,7 +180,7 @@ class Renderer:
         """
         pose = camera.pose()
         with self._gl as ctx:
-            light_view = self._update(ctx, data, reliefs, pose)
+            light_view = self._update(ctx, data, reliefs, pose, exposure)
             self._draw_maps(ctx, light_view)
             if self._mirror is not None and self._floor is not None:
                 self._mirror.draw(ctx, self._frame, pose, self._floor, self._draw_solids, self._bind_maps)
@@ -186,7 +194,7 @@ class Renderer:
         return self._picture.frame
 
     def _update(
-        self, ctx: moderngl.Context, data: Any, reliefs: Mapping[int, NDArray[np.float32]], pose: Pose
+        self, ctx: moderngl.Context, data: Any, reliefs: Mapping[int, NDArray[np.float32]], pose: Pose, exposure: int
     ) -> tuple[float, ...] | None:
         """Bring everything on the GPU up to date; return the matrix of the light that casts shadows."""
         occluders = self._bodies.occluders.bind(data, pose.focus)
@@ -210,7 +218,7 @@ class Renderer:
         light_view = None
         if lighting.lights and lighting.lights[0].shadow:
             light_view = tuple(self._shadow.fit(frame, lighting.lights[0], centre, radius).T.ravel())
-        frame.set_vector("counts", [occluders, len(lighting.lights), 0], float(light_view is not None))
+        frame.set_vector("counts", [occluders, len(lighting.lights), exposure], float(light_view is not None))
         frame.bind()
         return light_view
 

@@ -34,7 +34,8 @@ float key_visibility(vec3 position, vec3 normal, float lift)
     float steepest = 10.0 * width * metre;
     vec2 slope = -plane.xy * (abs(plane.z) > 1e-9 ? 1.0 / plane.z : 1e9);
     slope = clamp(slope, -steepest, steepest);
-    float turn = 6.2831853 * gradient_noise(gl_FragCoord.xy);
+    // another noise in each exposure: a step along the diagonal turns the filter by about the golden angle
+    float turn = 6.2831853 * gradient_noise(gl_FragCoord.xy + 5.588238 * counts.z);
     vec2 direction = vec2(cos(turn), sin(turn));
     float bias = 0.5 * texel * metre;
     float widest = shadow_penumbra.z;
