@@ -71,7 +71,9 @@ class Pictures:
             A camera, or the name of one of the MJCF; by default MuJoCo's free camera, aimed at the model's middle.
         """
         if camera is None or isinstance(camera, str):
-            camera = viewpoint(self._model, data, CameraEntry(name=camera), data.time)
+            free = self._model.vis.global_
+            entry = CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)
+            camera = viewpoint(self._model, data, entry, data.time)
         reliefs = {
             self._ripples.geom_ids[name]: relief(self._ripples[name].height) for name, relief in self._reliefs.items()
         }

@@ -15,6 +15,7 @@ from .frame import MAX_LIGHTS, FrameUniforms
 
 _KIND = mujoco.mjtLightType
 _SUN_TANGENT = 0.05  # of the angular radius of a directional lamp: MJCF gives none
+_GAMMA = 2.2  # of sRGB, about: a beam that falls off in sRGB falls off by so many times its exponent in linear light
 _BRIGHTEST = 1.3  # sum of all lamps at which exposure is drawn back, as MuJoCo's picture saturates
 
 _KEY_RADIANCE = np.array([1.34, 1.28, 1.19])
@@ -28,7 +29,8 @@ _LAMPS = (
     (10.0, 66.0, 0.65, 0.20, (3.6, 3.7, 3.8)),
 )
 _LAMPS_BESIDE_LIGHTS = 0.5  # how bright the soft boxes' reflections are where the MJCF sets the light
-_FADE, _SKY_FADE = (0.4, 3.4), (1.5, 10.0)  # of the floor into the background, in distances of the focus
+_FLOOR_IN_BACKGROUND = 0.6  # most of the floor's colour that the background takes on
+_STUDIO_FADE, _FADE = (0.4, 3.4), (1.5, 10.0)  # of the floor into the background, in distances of the focus
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
                 position=None if directional else np.array(data.light_xpos[index]),
                 size=_SUN_TANGENT if directional else float(model.light_bulbradius[index]),
                 cutoff=np.radians(min(float(model.light_cutoff[index]), 180.0)) if spot else np.pi,
-                exponent=float(model.light_exponent[index]) if spot else 0.0,
+                exponent=_GAMMA * float(model.light_exponent[index]) if spot else 0.0,
                 falloff=np.array(model.light_attenuation[index], dtype=np.float64),
                 shadow=bool(model.light_castshadow[index]),
             )
@@ -181,7 +183,7 @@ def set_lighting(
         frame.values["lamp_normal"][index] = [*normal, half_width]
         frame.values["lamp_tangent"][index] = [*tangent / np.linalg.norm(tangent), half_height]
         frame.values["lamp_radiance"][index][:3] = strength * np.array(radiance)
-    tint = np.array([0.40, 0.42, 0.46]) if floor_albedo is None else 0.60 * floor_albedo
+    tint = np.array([0.40, 0.42, 0.46]) if floor_albedo is None else _far_light(lighting, pose) * floor_albedo
     horizon, zenith = tint, tint * np.array([0.36, 0.40, 0.48])
     frame.set_vector("horizon", horizon)
     frame.set_vector("zenith", zenith)
@@ -190,7 +192,16 @@ def set_lighting(
     else:
         hue = np.ones(3) if sky is None else sky / max(sky.mean(), 1e-6)
         frame.set_vector("sky", lighting.ambient * (0.5 + 0.5 * hue), 0.0)
-    frame.set_vector("floor_fade", [*(_FADE if sky is None else _SKY_FADE), 0.0])
+    frame.set_vector("floor_fade", [*(_STUDIO_FADE if lighting.studio else _FADE), 0.0])
+
+
+def _far_light(lighting: Lighting, pose: Pose) -> NDArray[np.float64]:
+    """Irradiance over pi of the floor far away, as far as it colours the background, shape [3]."""
+    if lighting.studio:
+        return np.full(3, _FLOOR_IN_BACKGROUND)
+    up = np.array([0.0, 0.0, 1.0])
+    far = [light.at(pose.focus, up) for light in lighting.lights if light.position is None]
+    return np.minimum(sum(far, lighting.ambient), _FLOOR_IN_BACKGROUND)
 
 
 def _direction(pose: Pose, azimuth: float, elevation: float) -> NDArray[np.float64]:

@@ -42,6 +42,13 @@ def test_the_same_state_gives_the_same_picture_in_the_colour_of_the_geom(egg):
     assert red > 1.5 * blue
 
 
+def test_without_a_camera_it_is_the_free_one_of_the_model(egg):
+    model, data, ripples = egg
+    pictures = Pictures(model, ripples, width=96, height=72)
+    free = Camera(lookat=tuple(model.stat.center), distance=1.5 * model.stat.extent, azimuth=90.0, elevation=-45.0)
+    assert np.array_equal(pictures.draw(data), pictures.draw(data, free))
+
+
 def test_an_unknown_look_or_camera_is_refused_by_name(egg):
     model, data, ripples = egg
     with pytest.raises(RippleError, match="glass"):

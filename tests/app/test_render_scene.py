@@ -92,6 +92,29 @@ def test_light_adds_up_to_mujocos_brightness_in_both_extremes():
     assert lighting.lights[0].shadow
 
 
+def test_the_beam_of_a_spot_falls_off_in_srgb_as_in_mujoco():
+    """At 60 degrees from the axis, MuJoCo's cosine to the power of 2 leaves a quarter of the light, in sRGB."""
+    lamp = '<light pos="0 0 1" dir="0 0 -1" diffuse=".5 .5 .5" cutoff="80" exponent="2"/>'
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><visual><headlight active="0"/></visual><worldbody>{lamp}</worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    lighting = model_lighting(model, data, ABOVE.pose())
+    beside = np.array([np.sqrt(3.0), 0.0, 0.0])
+    towards = np.array([-np.sqrt(3.0), 0.0, 1.0]) / 2
+    under, aside = lighting.on(np.zeros(3), np.array([0.0, 0.0, 1.0])), lighting.on(beside, towards)
+    np.testing.assert_allclose((aside / under) ** (1 / 2.2), 0.25, rtol=1e-6)
+
+
+def test_a_scene_lit_by_a_spot_alone_is_dark_all_round(gl):
+    spot = SPOT.format(0.0, 0.0).replace('exponent="1"', 'exponent="20"')
+    dark = picture(gl, FLOOR + BALL + spot, visual='<headlight active="0"/>', camera=FRONT)
+    light = picture(gl, FLOOR + BALL + SUN.format(0.0, "true"), visual='<headlight active="0"/>', camera=FRONT)
+    assert dark[:10].mean() < 20 < 80 < light[:10].mean()
+    assert dark.max() > 150
+
+
 def test_skybox_fills_the_background(gl):
     sky = '<texture type="skybox" builtin="flat" rgb1=".1 .2 .9" width="16" height="96"/>'
     frame = picture(gl, SUN.format(0.0, "true"), asset=sky, camera=FRONT)
