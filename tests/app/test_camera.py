@@ -5,10 +5,13 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError
+from ripple_sim.render import Camera
+from ripple_sim.render.camera import ThroughLens, perspective, view_matrix
 from ripple_sim.scene.scene_file import CameraEntry
-from ripple_sim.viewpoint import check_camera, viewpoint
+from ripple_sim.viewpoint import check_camera, focal_distance, viewpoint
 
 MJCF = """<mujoco><worldbody>
+<geom name="lamp" size="0.1" pos="1 0.5 3"/>
 <camera name="corner" pos="3 -2 1" xyaxes="0 1 0 0 0 1"/>
 <body name="cart" pos="0.5 0.25 1"><freejoint/><geom size="0.1"/>
 <body name="flag" pos="0 0 2"><geom size="0.1"/></body></body>
@@ -67,10 +70,45 @@ def test_a_tracking_camera_of_the_model_turns_to_the_body_upright(world):
         assert pose.rotation[2, 1] > 0  # and not upside down
 
 
+def test_a_camera_focuses_on_what_it_is_told_to(world):
+    model, data = world
+    free = {"lookat": (0.0, 0.0, 1.0), "distance": 4.0, "azimuth": 0.0, "elevation": 0.0}  # looks along x, from x = -4
+    for focus, depth in ((None, 4.0), (1.5, 1.5), ("cart", 4.5), ("lamp", 5.0), ((2.0, 7.0, -3.0), 6.0)):
+        entry = CameraEntry(**free, focus=focus)
+        check_camera(model, entry)
+        assert focal_distance(model, data, entry, viewpoint(model, data, entry, 0.0).pose()) == pytest.approx(depth)
+    entry = CameraEntry(**free, focus="cart")
+    pose = viewpoint(model, data, entry, 0.0).pose()
+    for shift, depth in ((1.0, 5.5), (-9.0, 0.08)):  # behind the camera: as near as anything is drawn
+        data.qpos[0] = 0.5 + shift
+        mujoco.mj_forward(model, data)
+        assert focal_distance(model, data, entry, pose) == pytest.approx(depth)
+
+
+def test_the_eye_goes_over_the_lens_and_the_focal_plane_stays(world):
+    camera = Camera((0.1, 0.2, 0.3), distance=3.0, azimuth=130.0, elevation=-25.0, fovy=40.0)
+    lens, focus, aspect = (0.05, -0.02), 2.0, 1.5
+    middle, pose = camera.pose(), ThroughLens(camera, lens, focus).pose()
+    half = np.tan(np.radians(20.0))
+    for depth in (0.5, focus, 9.0):
+        point = middle.position + middle.rotation @ [0.3, -0.2, -depth]
+        seen = []
+        for each in (middle, pose):
+            clip = perspective(40.0, aspect, 0.1, 50.0, each.shear) @ view_matrix(each) @ [*point, 1.0]
+            x, y = clip[:2] / clip[3]
+            seen.append([half * aspect * x, half * y])
+            # the ray that the shaders send through that pixel meets the point
+            way = each.rotation @ [seen[-1][0] + each.shear[0], seen[-1][1] + each.shear[1], -1.0]
+            np.testing.assert_allclose(each.eye + depth * way, point, atol=1e-12)
+        # thin lens: a point of the aperture sees it shifted by its share of the circle of confusion
+        np.testing.assert_allclose(np.subtract(*seen[::-1]), np.array(lens) * (1 / focus - 1 / depth), atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
         (CameraEntry(name="ear"), "no camera 'ear'; its cameras are corner"),
+        (CameraEntry(focus="cat"), "nothing 'cat' .* its bodies are world, cart, flag; its geoms are lamp"),
         (CameraEntry(track="cat"), "no body 'cat' for the camera to track; its bodies are world, cart, flag"),
     ],
 )
