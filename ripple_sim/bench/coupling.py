@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.scenes.implicit import ellipsoid, polygonise, smooth_intersection
 from ripple_sim.scenes.shapes import duck
-from ripple_sim.solver import Load, Material
+from ripple_sim.solver import Material
 
 from ..coupling.collidable import make_collidable
 from ..coupling.ripples import Ripples
@@ -101,7 +101,7 @@ def _run(model: mujoco.MjModel, seconds: float, resolution: int) -> tuple[NDArra
         check_speeds(data)
         loads = sources.loads(data, dt)
         loaded = time.thread_time()
-        waves.step(dt, load=Load.together(loads[geom]))
+        waves.step(dt, load=loads[geom])
         times.append((moved - start, loaded - moved, time.thread_time() - loaded))
         pairs += len(sources.impulses)
     return np.array(times), pairs / len(times)

@@ -1,23 +1,29 @@
-"""MuJoCo's contacts, one pair of geoms at a time: normal forces and where they act."""
+"""MuJoCo's contacts, target by target and body by body: normal forces and where they act."""
 
 from __future__ import annotations
 
-import dataclasses
+from itertools import pairwise
+from typing import NamedTuple
 
 import mujoco
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
+_PYRAMIDAL = int(mujoco.mjtCone.mjCONE_PYRAMIDAL)
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ContactPair:
-    """All contacts between a target and another geom in one step.
+
+class Contacts(NamedTuple):
+    """All contacts that press on one target in one step.
 
     Attributes
     ----------
-    target, other : int
-        Geom ids.
+    target : int
+        Geom id.
+    others : int64 [p]
+        Ids of the geoms that touch it, ascending.
+    begins : int64 [p + 1]
+        The contacts with others[i] are those from begins[i] to begins[i + 1].
     points : float64 [k, 3]
         Contact points in the world [m], just outside the target's surface.
     forces : float64 [k]
@@ -27,18 +33,19 @@ class ContactPair:
     """
 
     target: int
-    other: int
+    others: NDArray[np.int64]
+    begins: NDArray[np.int64]
     points: NDArray[np.float64]
     forces: NDArray[np.float64]
     normals: NDArray[np.float64]
 
 
-def contact_pairs(
+def pressing_contacts(
     model: mujoco.MjModel, data: mujoco.MjData, is_target: NDArray[np.bool_], extents: NDArray[np.float64]
-) -> dict[tuple[int, int], ContactPair]:
-    """Collect the pressing contacts of some geoms, by (target, other) in ascending order.
+) -> dict[int, Contacts]:
+    """Contacts that press on each target that is touched, by its geom id in ascending order.
 
-    Where two targets touch, the pair is reported for each of them.
+    Where two targets touch, their contacts are reported for each of them.
 
     Parameters
     ----------
@@ -51,26 +58,14 @@ def contact_pairs(
     if not data.ncon:
         return {}
     contacts = data.contact
-    targets, others, points, forces, normals = _pressing(
-        contacts.geom,
-        contacts.efc_address,
-        contacts.dim,
-        contacts.dist,
-        contacts.pos,
-        contacts.frame,
-        data.efc_force,
-        model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
-        is_target,
-        extents,
+    forces = _normal_forces(contacts.efc_address, contacts.dim, data.efc_force, model.opt.cone == _PYRAMIDAL)
+    starts, targets, others, begins, *at_contacts = _by_pair(
+        contacts.geom, forces, contacts.frame, contacts.pos, contacts.dist, is_target, extents
     )
-    pairs = list(zip(targets.tolist(), others.tolist(), strict=True))
-    found, begin = {}, 0
-    for end in range(1, len(pairs) + 1):
-        if end == len(pairs) or pairs[end] != pairs[begin]:
-            rows = slice(begin, end)
-            found[pairs[begin]] = ContactPair(*pairs[begin], points[rows], forces[rows], normals[rows])
-            begin = end
-    return found
+    return {
+        target: Contacts(target, others[a:b], begins[a : b + 1], *at_contacts)
+        for target, (a, b) in zip(targets.tolist(), pairwise(starts.tolist()), strict=True)
+    }
 
 
 def smallest_extents(model: mujoco.MjModel) -> NDArray[np.float64]:
@@ -79,36 +74,60 @@ def smallest_extents(model: mujoco.MjModel) -> NDArray[np.float64]:
     return np.where(np.isin(model.geom_type, endless), np.inf, model.geom_aabb[:, 3:].min(axis=1))
 
 
-@numba.njit(cache=True)
-def _pressing(geoms, address, dim, dist, pos, frame, efc_force, pyramidal, is_target, extents):
-    """Target, other, point, normal force and normal of all contacts that press on a target, pair by pair."""
-    most = 2 * len(geoms)
-    targets, others, forces = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
-    points, normals = np.empty((most, 3)), np.empty((most, 3))
+@numba.njit(cache=True, nogil=True)
+def _normal_forces(address, dim, efc_force, pyramidal):
+    """Normal force of every contact [N]."""
+    forces = np.zeros(len(address))
+    for i in range(len(address)):
+        # without a row in the constraint solver (excluded, or in the margin only) a contact carries no force
+        if address[i] >= 0:
+            # the edges of a friction pyramid share the normal force among them
+            rows = 2 * (dim[i] - 1) if pyramidal and dim[i] > 1 else 1
+            forces[i] = efc_force[address[i] : address[i] + rows].sum()
+    return forces
+
+
+@numba.njit(cache=True, nogil=True)
+def _by_pair(geoms, forces, frames, positions, dist, is_target, extents):
+    """Targets in ascending order, pair by pair what touches them, and contact by contact how.
+
+    Returned are the first pair of each target, the targets, the other geom and the first contact of each pair, and
+    points, normal forces and normals of the contacts. `geoms` [ncon, 2] are the ids of what touches; the first three
+    numbers of a frame are the normal that points from the first to the second.
+    """
     count = 0
+    pair, source = np.empty(2 * len(geoms), np.int64), np.empty(2 * len(geoms), np.int64)
     for i in range(len(geoms)):
-        first, second = geoms[i, 0], geoms[i, 1]
-        # without a row in the constraint solver (excluded, or in the margin only) a contact carries no force; a
-        # flex is no geom
-        if address[i] < 0 or first < 0 or second < 0 or not (is_target[first] or is_target[second]):
-            continue
-        # the edges of a friction pyramid share the normal force among them
-        rows = 2 * (dim[i] - 1) if pyramidal and dim[i] > 1 else 1
-        force = efc_force[address[i] : address[i] + rows].sum()
-        if force <= 0:
-            continue
-        # overlaps deeper than a body are none: MuJoCo's speculative contacts say by `dist` how hard to stop what comes
-        depth = min(abs(dist[i]), extents[first], extents[second])
-        for target, other, side in ((first, second, 1.0), (second, first, -1.0)):
-            if is_target[target]:
-                targets[count], others[count], forces[count] = target, other, force
-                for k in range(3):
-                    # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's
-                    # surface is dist/2 away. Somewhat outside of it the nearest surface point is on this side, even of
-                    # a thin part.
-                    normals[count, k] = side * frame[i, k]
-                    points[count, k] = pos[i, k] + 1.5 * depth * normals[count, k]
-                count += 1
+        # a flex is no geom
+        if forces[i] > 0 and geoms[i, 0] >= 0 and geoms[i, 1] >= 0:
+            for side in range(2):
+                target, other = geoms[i, side], geoms[i, 1 - side]
+                if is_target[target]:
+                    pair[count], source[count] = target * len(is_target) + other, 2 * i + side
+                    count += 1
     # a sort that leaves the contacts of a pair in their order
-    order = np.argsort(targets[:count] * len(is_target) + others[:count], kind="mergesort")
-    return targets[order], others[order], points[order], forces[order], normals[order]
+    order = np.argsort(pair[:count], kind="mergesort")
+    starts, targets = np.empty(count + 1, np.int64), np.empty(count, np.int64)
+    others, begins = np.empty(count, np.int64), np.empty(count + 1, np.int64)
+    points, loads, normals = np.empty((count, 3)), np.empty(count), np.empty((count, 3))
+    found, pairs, latest = 0, 0, -1
+    for row in range(count):
+        if pair[order[row]] != latest:
+            latest = pair[order[row]]
+            target, others[pairs] = divmod(latest, len(is_target))
+            begins[pairs] = row
+            if found == 0 or target != targets[found - 1]:
+                targets[found], starts[found] = target, pairs
+                found += 1
+            pairs += 1
+        i, side = divmod(source[order[row]], 2)
+        loads[row] = forces[i]
+        # overlaps deeper than a body are none: MuJoCo's speculative contacts say by `dist` how hard to stop what comes
+        depth = min(abs(dist[i]), extents[geoms[i, 0]], extents[geoms[i, 1]])
+        for k in range(3):
+            # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's surface is
+            # dist/2 away. Somewhat outside of it the nearest surface point is on this side, even of a thin part.
+            normals[row, k] = -frames[i, k] if side else frames[i, k]
+            points[row, k] = positions[i, k] + 1.5 * depth * normals[row, k]
+    starts[found], begins[pairs] = pairs, count
+    return starts[: found + 1], targets[:found], others[:pairs], begins[: pairs + 1], points, loads, normals

@@ -1,12 +1,15 @@
-"""Where a pair of bodies presses: contacts joined where they are near, filled in where they bound a flat patch."""
+"""Where a body presses on a target: contacts joined where they are near, filled in where they bound a flat patch.
+
+Contacts mark the corners of the patch. Between two of them a convex body touches as well, provided that the target's
+surface is there. The force is spread as the middle of two contacts drawn at random, each with a chance in proportion to
+its force: force and torque stay what they are, and four equal corners of a square, or two ends of a line, press evenly
+over it.
+"""
 
 from __future__ import annotations
 
-import dataclasses
-
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 MAX_CONTACTS = 8
 
@@ -16,7 +19,7 @@ _INSET = 0.75
 _OVERLAP = 0.3
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def cluster(points, forces, radius):
     """Join contacts that lie within a radius [m] of the strongest one: force-weighted points and summed forces.
 
@@ -41,7 +44,7 @@ def cluster(points, forces, radius):
         if seed < 0:
             break
         for i in range(len(forces)):
-            if owner[i] < 0 and _squared_distance(points, i, seed) <= radius**2:
+            if owner[i] < 0 and squared_distance(points, i, points, seed) <= radius**2:
                 owner[i] = count
         seeds[count] = seed
         count += 1
@@ -50,7 +53,7 @@ def cluster(points, forces, radius):
         if owner[i] < 0:
             owner[i] = 0
             for j in range(1, count):
-                if _squared_distance(points, i, seeds[j]) < _squared_distance(points, i, seeds[owner[i]]):
+                if squared_distance(points, i, points, seeds[j]) < squared_distance(points, i, points, seeds[owner[i]]):
                     owner[i] = j
         totals[owner[i]] += forces[i]
         means[owner[i]] += forces[i] * points[i]
@@ -59,73 +62,32 @@ def cluster(points, forces, radius):
     return means, totals
 
 
-@numba.njit(cache=True)
-def _squared_distance(points, i, j):
+@numba.njit(cache=True, nogil=True)
+def squared_distance(points, i, others, j):
+    """Of row i of some points from row j of others, [m^2]."""
     total = 0.0
     for k in range(3):
-        total += (points[i, k] - points[j, k]) ** 2
+        total += (points[i, k] - others[j, k]) ** 2
     return total
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Pressed:
-    """What presses on a target: 36 sources at most.
+@numba.njit(cache=True, nogil=True)
+def probe(points, forces, radius, convex):
+    """Forces at the corners of a patch [N], and its probes [m].
 
-    Attributes
-    ----------
-    points : float64 [k, 3]
-        Near the surface, in the target's frame [m].
-    forces : float64 [k]
-        [N].
-    radius : float
-        Footprint radius of each [m], which grows with the patch.
-    probes : int64 [k]
-        Which of the patch's probes the points are; -1 for those that are none.
-    """
-
-    points: NDArray[np.float64]
-    forces: NDArray[np.float64]
-    radius: float
-    probes: NDArray[np.int64]
-
-
-class Patch:
-    """The patch that the contacts of a pair bound.
-
-    Contacts mark the corners of the patch. Between two of them a convex body touches as well, provided that the
-    target's surface is there. The force is spread as the middle of two contacts drawn at random, each with a chance in
-    proportion to its force: force and torque stay what they are, and four equal corners of a square, or two ends of
-    a line, press evenly over it.
+    Probes are the points whose distances from the surface decide over the patch: the corners and, where the body is
+    convex, the middles of all pairs of them.
 
     Parameters
     ----------
-    points : [k, 3]
+    points : float64 [k, 3]
         Contact points near the surface, in the target's frame [m].
-    forces : [k]
+    forces : float64 [k]
         [N].
     radius : float
         Footprint radius of a single contact [m].
     convex : bool
-        Whether the body is convex.
-
-    Attributes
-    ----------
-    probes : float64 [m, 3]
-        Points whose distances from the surface decide over the patch [m]: the corners, and the middles of all pairs.
     """
-
-    def __init__(self, points: NDArray[np.float64], forces: NDArray[np.float64], radius: float, convex: bool) -> None:
-        self._radius = radius
-        self._loads, self.probes = _probe(points, forces, radius, convex)
-
-    def pressed(self, surface: NDArray[np.float64], share: float = 1.0) -> Pressed:
-        """What presses, told from the surface points nearest to `probes`; the forces are multiplied by a share."""
-        return Pressed(*_spread(share * self._loads, self.probes, surface, self._radius))
-
-
-@numba.njit(cache=True)
-def _probe(points, forces, radius, convex):
-    """Forces at the corners of a patch, and its probes."""
     corners, loads = cluster(points, forces, radius)
     count = len(loads)
     if count == 1 or not convex:
@@ -140,9 +102,12 @@ def _probe(points, forces, radius, convex):
     return loads, probes
 
 
-@numba.njit(cache=True)
-def _spread(loads, probes, surface, radius):
-    """Points, forces and radius of the sources, and which probes they are."""
+@numba.njit(cache=True, nogil=True)
+def spread(loads, probes, surface, radius):
+    """Points, forces and radius of what presses, told from the surface points nearest to the probes, [m, 3].
+
+    And which of the probes the points are, [n], -1 for those that are none. The radius grows with the patch.
+    """
     count, total = len(loads), loads.sum()
     if len(probes) == count:
         return probes, loads, radius, np.arange(count)
@@ -173,14 +138,14 @@ def _spread(loads, probes, surface, radius):
     return points, forces, max(radius, _OVERLAP * size), np.full(len(forces), -1)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _joined(points, forces, near):
     """Force-weighted means and sums of the points, each joined with the first one that is near [m]."""
     means, totals, first = np.zeros_like(points), np.zeros_like(forces), np.empty(len(forces), np.int64)
     count = 0
     for i in range(len(forces)):
         owner = 0
-        while owner < count and _squared_distance(points, i, first[owner]) > near**2:
+        while owner < count and squared_distance(points, i, points, first[owner]) > near**2:
             owner += 1
         if owner == count:
             first[count] = i

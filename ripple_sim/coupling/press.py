@@ -1,189 +1,178 @@
-"""How one body presses on one target over time: as it hits while it moves, ever more steadily once it rests."""
+"""From the contacts on one target to the load on its texels."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver import Atlas
-from ripple_sim.solver.waves.footprint import footprint_at
-from ripple_sim.solver.waves.load import Load, add_up_by, nowhere
+from ripple_sim.solver import Load, WaveSolver
+from ripple_sim.solver.waves.distance import everywhere_infinite
+from ripple_sim.solver.waves.footprint import texel_grid
+from ripple_sim.solver.waves.load import nowhere
 
-from .patch import Pressed
-
-Places = tuple[NDArray[np.float64], NDArray[np.int64]]
-
-# A hit is over within this time [s]; until then the surface feels every force as it is.
-ONSET = 0.1
-# A body that has not touched for this long has left [s]. Contacts of a body at rest flicker from step to step.
-_LEFT = 0.02
-# A body that has stayed in its place for a time t is followed with a frequency of _FOLLOW / t, [1/s] at the least.
-_FOLLOW, _SLOWEST = 2.0, 1.0
-# A footprint is used again while its point moves by less than this share of a texel.
-_SAME_PLACE = 0.3
-
-
-class Press:
-    """The pressure of one body on one target.
-
-    MuJoCo's contact forces flicker from step to step also where a body lies still, and would keep the surface
-    boiling. So the longer a body stays in its place, the slower the force on the surface follows the contact force f:
-    g' = w^2 d + 2 w (f - g), d' = f - g, with w falling as one over the time. The debt d is what the surface has not
-    got yet [N s]: nothing is lost, a constant force comes through as it is, and noise is averaged. All this is
-    done texel by texel, so that places are smoothed as well as amounts.
-
-    Parameters
-    ----------
-    atlas : Atlas
-        Of the target.
-    carried : float64 [6 N N]
-        Area of each texel that takes up pressure [m^2], 0 where nothing moves.
-
-    Attributes
-    ----------
-    latest : Load
-        How the body pressed in its latest contact, before that is smoothed.
-    """
-
-    def __init__(self, atlas: Atlas, carried: NDArray[np.float64]) -> None:
-        self._atlas = atlas
-        self.carry(carried)
-        self.latest = Load.none()
-        # texels, what the surface feels at each of them [N] and is owed there [N s]
-        self._texels = np.zeros(0, np.int64)
-        self._felt = self._owed = np.zeros(0)
-        self._owing = False
-        self._middle: list[float] | None = None
-        self._anchor = [0.0, 0.0, 0.0]
-        self._age = self._absent = 0.0
-
-    def carry(self, carried: NDArray[np.float64]) -> None:
-        """Press on a surface that has changed from now on: what is owed stays owed."""
-        self._carried = carried
-        self._sources: list[_Source] = []
-
-    def press(self, pressed: Pressed, places: Places, middle: NDArray[np.float64], dt: float) -> Load:
-        """Load over a step in which the body touches.
-
-        Parameters
-        ----------
-        pressed : Pressed
-            Where and how hard, over this step.
-        places : (float64 [m, 3], int64 [m])
-            Surface points [m] and texels nearest to the patch's probes.
-        middle : float64 [3]
-            Force-weighted contact point [m].
-        dt : float
-            Time step [s].
-        """
-        self._sources = self._footprints(pressed, places)
-        forces = pressed.forces.tolist()
-        self.latest = Load.together(
-            [Load(source.texels, force * source.shares) for source, force in zip(self._sources, forces, strict=True)]
-        )
-        self._absent = 0.0
-        self._move(middle.tolist(), pressed.radius / 2, min(1.0, 2 * dt / ONSET))
-        return self._smooth(self.latest, dt)
-
-    def release(self, dt: float) -> Load:
-        """Load over a step in which the body does not touch."""
-        self._absent += dt
-        if self._absent > _LEFT and self._middle is not None:
-            self._age, self._middle = 0.0, None
-        return self._smooth(Load.none(), dt)
-
-    @property
-    def over(self) -> bool:
-        """Whether the body has left and nothing is owed."""
-        return self._absent > _LEFT and not self._owing
-
-    def _move(self, middle: list[float], most: float, pace: float) -> None:
-        """Follow the body's smoothed place; all begins anew where that is farther than `most` [m] from its start."""
-        if self._middle is None:
-            self._middle = self._anchor = middle
-        self._middle = [old + pace * (new - old) for old, new in zip(self._middle, middle, strict=True)]
-        if math.dist(self._middle, self._anchor) > most:
-            self._anchor, self._age = self._middle, 0.0
-
-    def _smooth(self, present: Load, dt: float) -> Load:
-        left = ONSET - self._age
-        self._age += dt
-        if left > 0 and not self._owing:
-            self._texels, self._felt, self._owed = present.texels, present.forces, np.zeros(len(present.texels))
-            return present
-        # what is owed from before is paid in even parts until the onset is over
-        share = min(1.0, dt / left) if left > 0 else 0.0
-        pace = 0.0 if left > 0 else min(max(_FOLLOW / self._age, _SLOWEST), 0.5 / dt)
-        self._texels, given, self._felt, self._owed, self._owing = _follow(
-            self._texels,
-            self._felt,
-            self._owed,
-            present.texels,
-            present.forces,
-            share,
-            pace,
-            dt,
-            nowhere(self._carried.size),
-        )
-        return Load(self._texels, given)
-
-    def _footprints(self, pressed: Pressed, places: Places) -> list[_Source]:
-        points, radius = pressed.points.tolist(), pressed.radius
-        found = [self._used_before(point, radius) for point in points]
-        new = [i for i, source in enumerate(found) if source is None]
-        if new:
-            known = pressed.probes[new]
-            closest, centers = self._atlas.nearest(pressed.points[new]) if known[0] < 0 else (x[known] for x in places)
-            for i, place, center in zip(new, closest, centers.tolist(), strict=True):
-                where = footprint_at(self._atlas, place, center, radius)
-                found[i] = _Source(
-                    point=points[i],
-                    radius=radius,
-                    tolerance=_SAME_PLACE * math.sqrt(self._atlas.areas.item(center)),
-                    texels=where.texels,
-                    shares=where.weights * self._carried[where.texels],
-                )
-        return [source for source in found if source is not None]
-
-    def _used_before(self, point: list[float], radius: float) -> _Source | None:
-        for source in self._sources:
-            if max(abs(source.radius - radius), math.dist(source.point, point)) <= source.tolerance:
-                return source
-        return None
+from .contacts import Contacts
+from .footing import NO_FOOTPRINTS, Footprints, lay, used_before
+from .patches import Patches, find_patches, find_spots
+from .rest import BODY, NO_PRESSURE, NOTHING_FELT, Felt, Pressure, follow
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Source:
-    """A footprint, and how far its point may move before it is made anew."""
+class Pressed:
+    """How bodies press on a target in a step, before that is smoothed.
 
-    point: list[float]
-    radius: float
-    tolerance: float
-    texels: NDArray[np.int64]
-    shares: NDArray[np.float64]
-
-
-@numba.njit(cache=True)
-def _follow(texels, felt, owed, present_texels, present_forces, share, pace, dt, place):
-    """Texels, given force, felt force and debt after a step, and whether there is a debt.
-
-    A share of the debt is paid while pace is 0; then the felt force follows the present one.
+    Attributes
+    ----------
+    contacts : Contacts
+    position, rotation : float64 [3], [3, 3]
+        From the target's frame to the world, [m].
+    patches : Patches
+    surface, texels : float64 [m, 3], int64 [m]
+        Surface points nearest to those of the patches [m], and flat indices of the texels nearest to them.
+    pressure : Pressure
     """
-    kept = (felt != 0) | (owed != 0)
-    before = texels[kept]
-    count = len(before)
-    values = np.zeros((3, count + len(present_texels)))
-    values[0, :count], values[1, :count], values[2, count:] = felt[kept], owed[kept], present_forces
-    texels, values = add_up_by(place, np.concatenate((before, present_texels)), values)
-    felt, owed, present = values[0], values[1], values[2]
-    if pace == 0:
-        paid = share * owed
-        given, felt, owed = present + paid / dt, present, owed - paid
-    else:
-        felt = felt + dt * (pace**2 * owed + 2 * pace * (present - felt))
-        given, owed = felt, owed + dt * (present - felt)
-    return texels, given, felt, owed, owed.any()
+
+    contacts: Contacts
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    patches: Patches
+    surface: NDArray[np.float64]
+    texels: NDArray[np.int64]
+    pressure: Pressure
+
+    def in_world(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Surface points nearest to the force-weighted middle of each body's contacts [m], and their texels."""
+        return _in_world(self.position, self.rotation, self.patches, self.surface, self.texels)
+
+
+class _State(NamedTuple):
+    """What a step leaves to the next one; `over` where all bodies have left, and nothing is owed."""
+
+    known: Footprints
+    bodies: NDArray[np.void]
+    felt: Felt
+    over: bool
+
+
+class Press:
+    """The pressure of all bodies on one target.
+
+    Parameters
+    ----------
+    waves : WaveSolver
+        Of the target.
+    radii : float64 [ngeom]
+        Footprint radius of each geom [m]: the smaller one of a pair counts.
+    convex : bool [ngeom]
+        Whether a geom touches also between its contacts.
+    """
+
+    def __init__(self, waves: WaveSolver, radii: NDArray[np.float64], convex: NDArray[np.bool_]) -> None:
+        self._atlas, self._grid, self._radii, self._convex = waves.atlas, texel_grid(waves.atlas), radii, convex
+        self._state = _State(NO_FOOTPRINTS, np.zeros(len(radii), BODY), NOTHING_FELT, True)
+        self.renew(waves)
+
+    def renew(self, waves: WaveSolver) -> None:
+        """Go on with the new waves of the target: what is owed stays owed."""
+        self._carried = (waves.atlas.areas * waves.operator.carries).reshape(-1)
+        self._state = self._state._replace(known=NO_FOOTPRINTS)
+
+    def press(
+        self,
+        contacts: Contacts,
+        position: NDArray[np.float64],
+        rotation: NDArray[np.float64],
+        timestep: float,
+        elapsed: float,
+    ) -> tuple[Load, Pressed]:
+        """Load over a time in which bodies touch, and how they pressed.
+
+        Parameters
+        ----------
+        contacts : Contacts
+        position : float64 [3]
+            Of the target in the world [m].
+        rotation : float64 [3, 3]
+            From the target's frame to the world.
+        timestep, elapsed : float
+            How long the contacts' forces were held, and over which time their impulse is given [s].
+        """
+        patches = find_patches(contacts, position, rotation, self._radii, self._convex)
+        surface, texels = self._atlas.nearest(patches.points)
+        spots, rows, lost = _stand(self._state, contacts.others, patches, surface, texels, timestep / elapsed)
+        if len(lost):
+            spots.places[lost], spots.texels[lost] = self._atlas.nearest(spots.points[lost])
+        size = len(self._carried)
+        self._state, given, pressure = _press(
+            self._state,
+            contacts.others,
+            patches,
+            spots,
+            rows,
+            self._grid,
+            self._carried,
+            elapsed,
+            everywhere_infinite(size),
+            nowhere(size),
+        )
+        pressed = Pressed(contacts, position, rotation, patches, surface, texels, pressure)
+        return Load(self._state.felt.texels, given), pressed
+
+    def release(self, elapsed: float) -> Load:
+        """Load over a time in which no body touches."""
+        if self._state.over:
+            return Load.none()
+        self._state, given = _release(self._state, elapsed, nowhere(len(self._carried)))
+        return Load(self._state.felt.texels, given)
+
+
+@numba.njit(cache=True, nogil=True)
+def _stand(state, others, patches, surface, texels, share):
+    """Spots at which bodies press, the known footprints that serve them, and spots whose places are to be found."""
+    spots = find_spots(others, patches, surface, texels, share)
+    rows, lost = used_before(state.known, spots, state.bodies)
+    return spots, rows, lost
+
+
+@numba.njit(cache=True, nogil=True)
+def _press(state, others, patches, spots, rows, grid, carried, dt, distance_scratch, texel_scratch):
+    """State after a step, forces on the texels that are felt then, and the pressure before that is smoothed."""
+    known = lay(state.known, spots, rows, grid, carried, distance_scratch)
+    pressure = _pressure(others, patches, spots, known)
+    felt, given, over = follow(state.bodies, state.felt, pressure, dt, texel_scratch)
+    return _State(known, state.bodies, felt, over), given, pressure
+
+
+@numba.njit(cache=True, nogil=True)
+def _release(state, dt, texel_scratch):
+    felt, given, over = follow(state.bodies, state.felt, NO_PRESSURE, dt, texel_scratch)
+    return _State(state.known, state.bodies, felt, over), given
+
+
+@numba.njit(cache=True, nogil=True)
+def _pressure(others, patches, spots, footprints):
+    """Forces on texels; the first footprints are those of the spots."""
+    bodies, count = len(others), footprints.begins[len(spots.forces)]
+    middles, reaches, begins = np.empty((bodies, 3)), np.empty(bodies), np.zeros(bodies + 1, np.int64)
+    forces = np.empty(count)
+    for i in range(bodies):
+        middles[i] = patches.points[patches.begins[i]]
+        reaches[i] = spots.radii[spots.begins[i]] / 2
+        begins[i + 1] = footprints.begins[spots.begins[i + 1]]
+        for spot in range(spots.begins[i], spots.begins[i + 1]):
+            for j in range(footprints.begins[spot], footprints.begins[spot + 1]):
+                forces[j] = spots.forces[spot] * footprints.shares[j]
+    return Pressure(others, middles, reaches, begins, footprints.texels[:count], forces)
+
+
+@numba.njit(cache=True, nogil=True)
+def _in_world(position, rotation, patches, surface, texels):
+    bodies = len(patches.forces)
+    points, nearest = np.empty((bodies, 3)), np.empty(bodies, np.int64)
+    for i in range(bodies):
+        middle = patches.begins[i]
+        points[i], nearest[i] = position + (rotation * surface[middle]).sum(axis=1), texels[middle]
+    return points, nearest

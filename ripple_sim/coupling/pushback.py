@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Load, WaveSolver
 
-from .contacts import ContactPair
 from .sources import Touch
 
 
@@ -46,28 +45,23 @@ class PushBack:
 
     def apply(self, data: mujoco.MjData, touches: Sequence[Touch], waves: Mapping[int, WaveSolver]) -> None:
         """Set the forces for the next step, from what touches and the waves of each target, by geom id."""
-        velocities = {touch.pair.target: waves[touch.pair.target].velocity.reshape(-1) for touch in touches}
+        velocities = {touch.target: waves[touch.target].velocity.reshape(-1) for touch in touches}
         for touch in touches:
-            mass = waves[touch.pair.target].operator.mass.reshape(-1)
+            mass = waves[touch.target].operator.mass.reshape(-1)
             load = touch.load.merged(mass.size)
             pressed = load.forces.sum()
             if pressed <= 0:
                 continue
             shares = load.forces / pressed
             patch_mass = 1 / float((shares**2 / mass[load.texels]).sum())
-            outward = float(shares @ velocities[touch.pair.target][load.texels])
+            outward = float(shares @ velocities[touch.target][load.texels])
             if outward > 0:
-                self._exchange(data, touch.pair, patch_mass, outward, Load(load.texels, shares))
+                self._exchange(data, touch, patch_mass, outward, Load(load.texels, shares))
         data.xfrc_applied += self._applied
 
-    def _exchange(
-        self, data: mujoco.MjData, pair: ContactPair, patch_mass: float, outward: float, shares: Load
-    ) -> None:
-        model = self._model
-        point = pair.forces @ pair.points / pair.forces.sum()
-        normal = pair.forces @ pair.normals
-        normal /= np.linalg.norm(normal)
-        body, base = int(model.geom_bodyid[pair.other]), int(model.geom_bodyid[pair.target])
+    def _exchange(self, data: mujoco.MjData, touch: Touch, patch_mass: float, outward: float, shares: Load) -> None:
+        model, point, normal = self._model, touch.point, touch.normal
+        body, base = int(model.geom_bodyid[touch.other]), int(model.geom_bodyid[touch.target])
         along = normal @ (_jacobian(model, data, body, point) - _jacobian(model, data, base, point))
         response = np.zeros((1, model.nv))
         mujoco.mj_solveM(model, data, response, along[None])
@@ -80,7 +74,7 @@ class PushBack:
             if index:
                 self._applied[index, :3] += sign * force * normal
                 self._applied[index, 3:] += sign * force * np.cross(point - data.xipos[index], normal)
-        self._loads.append((pair.target, Load(shares.texels, force * shares.forces)))
+        self._loads.append((touch.target, Load(shares.texels, force * shares.forces)))
 
 
 def _jacobian(model: mujoco.MjModel, data: mujoco.MjData, body: int, point: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -43,11 +43,6 @@ class Ripples:
         Let the moving surfaces push back on the bodies that touch them, through `data.xfrc_applied`. What others have
         put there stays, as long as they add to it or set it before `step`.
 
-    Attributes
-    ----------
-    last_impulses : list of Impulse
-        What was given to the surfaces in the latest step, one record for each pair of geoms.
-
     Raises
     ------
     SceneError
@@ -82,7 +77,6 @@ class Ripples:
         self._check_speeds = SpeedCheck(model, list(self._waves))
         self._push_back = PushBack(model) if two_way else None
         self._time: float | None = None
-        self.last_impulses: list[Impulse] = []
 
     def __getitem__(self, name: str) -> WaveSolver:
         """Waves of a geom, by name."""
@@ -99,6 +93,11 @@ class Ripples:
         """Geom id of every rippling geom, by name."""
         return dict(self._geoms)
 
+    @property
+    def last_impulses(self) -> list[Impulse]:
+        """What was given to the surfaces in the latest step, one record for each pair of geoms."""
+        return self._sources.impulses
+
     def step(self, data: mujoco.MjData) -> None:
         """Let the contact forces of the physics step just made press on the surfaces; advance the waves to `data.time`.
 
@@ -108,23 +107,21 @@ class Ripples:
         """
         elapsed = self._elapsed(data)
         if elapsed == 0:
-            self.last_impulses = []
+            self._sources.skip()
             return
         self._check_speeds(data)
         loads = self._sources.loads(data, elapsed)
-        self.last_impulses = self._sources.impulses
         if self._push_back is not None:
             for geom, load in self._push_back.withdraw(data):
-                loads[geom].append(load)
+                loads[geom] = Load.together([loads[geom], load])
         for geom, waves in self._waves.items():
-            waves.step(elapsed, load=Load.together(loads[geom]))
+            waves.step(elapsed, load=loads[geom])
         if self._push_back is not None:
             self._push_back.apply(data, self._sources.touches, self._waves)
 
     def reset(self) -> None:
         """Flatten all surfaces."""
         self._time = None
-        self.last_impulses = []
         self._sources.clear()
         if self._push_back is not None:
             self._push_back.forget()

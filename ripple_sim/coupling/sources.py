@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import mujoco
 import numpy as np
@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Load, WaveSolver
 
-from .contacts import ContactPair, contact_pairs, smallest_extents
-from .patch import Patch
-from .press import Press
+from .contacts import pressing_contacts, smallest_extents
+from .press import Press, Pressed
 from .target import geom_name
 
 # Footprint radius over the touching body's smallest half-extent: about the patch of a ball sunk in by an eighth.
@@ -47,9 +46,24 @@ class Impulse:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Touch:
-    """A pair of geoms that touch: its contacts, and the forces on the texels of its target."""
+    """A pair of geoms that touch.
 
-    pair: ContactPair
+    Attributes
+    ----------
+    target, other : int
+        Geom ids.
+    point : float64 [3]
+        Force-weighted contact point in the world [m].
+    normal : float64 [3]
+        Unit normal in the world, from the target to the other geom.
+    load : Load
+        Forces on the texels of the target.
+    """
+
+    target: int
+    other: int
+    point: NDArray[np.float64]
+    normal: NDArray[np.float64]
     load: Load
 
 
@@ -60,14 +74,7 @@ class Sources:
     ----------
     model : mujoco.MjModel
     waves : mapping
-        Geom id of every target to its waves. Looked at in each step, so that they may be replaced.
-
-    Attributes
-    ----------
-    impulses : list of Impulse
-        Of the latest step, one for each pair.
-    touches : list of Touch
-        Of the latest step.
+        Geom id of every target to its waves. Looked at again by `renew` and `clear`.
     """
 
     def __init__(self, model: mujoco.MjModel, waves: Mapping[int, WaveSolver]) -> None:
@@ -75,80 +82,71 @@ class Sources:
         self._is_target = np.zeros(model.ngeom, dtype=np.bool_)
         self._is_target[list(waves)] = True
         self._extents = smallest_extents(model)
-        self._radius = (_FOOTPRINT * self._extents).tolist()
-        self._convex = (~np.isin(model.geom_type, _NOT_CONVEX)).tolist()
+        self._convex = ~np.isin(model.geom_type, _NOT_CONVEX)
         self._names = [geom_name(model, geom) for geom in range(model.ngeom)]
-        self._carried = {geom: _carried(each) for geom, each in waves.items()}
-        self._presses: dict[tuple[int, int], Press] = {}
         self.clear()
 
     def clear(self) -> None:
         """Forget all contacts."""
-        self._presses.clear()
-        self.impulses: list[Impulse] = []
-        self.touches: list[Touch] = []
+        self._presses = {
+            geom: Press(waves, _FOOTPRINT * self._extents, self._convex) for geom, waves in self._waves.items()
+        }
+        self.skip()
+
+    def skip(self) -> None:
+        """Forget what the latest step gave: there was none."""
+        self._pressed: list[Pressed] = []
+        self._impulses: list[Impulse] | None = None
 
     def renew(self, geom: int) -> None:
         """Go on with the new waves of a target."""
-        self._carried[geom] = _carried(self._waves[geom])
-        for (target, _), press in self._presses.items():
-            if target == geom:
-                press.carry(self._carried[geom])
+        self._presses[geom].renew(self._waves[geom])
 
-    def loads(self, data: mujoco.MjData, elapsed: float) -> dict[int, list[Load]]:
-        """Loads on each target over a time [s], from the contact forces that MuJoCo held over its latest time step."""
-        self.impulses, self.touches = [], []
-        loads: dict[int, list[Load]] = {geom: [] for geom in self._waves}
-        pairs = contact_pairs(self._model, data, self._is_target, self._extents)
-        for geom in loads:
-            touching = [pair for key, pair in pairs.items() if key[0] == geom]
-            if touching:
-                loads[geom] += self._press(data, geom, touching, elapsed)
-        for key, press in list(self._presses.items()):
-            if key not in pairs:
-                loads[key[0]].append(press.release(elapsed))
-                if press.over:
-                    del self._presses[key]
+    def loads(self, data: mujoco.MjData, elapsed: float) -> dict[int, Load]:
+        """Load on each target over a time [s], from the contact forces that MuJoCo held over its latest time step."""
+        loads = {}
+        self.skip()
+        self._timestep = self._model.opt.timestep
+        touched = pressing_contacts(self._model, data, self._is_target, self._extents)
+        for geom, press in self._presses.items():
+            if geom in touched:
+                # copies, since MuJoCo's own arrays will move on
+                position, rotation = data.geom_xpos[geom].copy(), data.geom_xmat[geom].reshape(3, 3).copy()
+                loads[geom], pressed = press.press(touched[geom], position, rotation, self._timestep, elapsed)
+                self._pressed.append(pressed)
+            else:
+                loads[geom] = press.release(elapsed)
         return loads
 
-    def _press(self, data: mujoco.MjData, geom: int, pairs: list[ContactPair], elapsed: float) -> list[Load]:
-        """Loads of the pairs that touch a target; their impulses are noted."""
-        waves, timestep = self._waves[geom], self._model.opt.timestep
-        position, rotation = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
-        begins = np.cumsum([0, *(len(pair.forces) for pair in pairs)])
-        forces = np.concatenate([pair.forces for pair in pairs])
-        points = (np.concatenate([pair.points for pair in pairs]) - position) @ rotation
-        totals = np.add.reduceat(forces, begins[:-1])
-        middles = np.add.reduceat(forces[:, None] * points, begins[:-1]) / totals[:, None]
-        patches = [
-            Patch(points[a:b], pair.forces, min(self._radius[geom], self._radius[pair.other]), self._convex[pair.other])
-            for pair, a, b in zip(pairs, begins.tolist(), begins[1:].tolist(), strict=False)
-        ]
-        # one search for all points: each costs little beside the call
-        closest, texels = waves.atlas.nearest(np.concatenate([middles, *(patch.probes for patch in patches)]))
-        in_world = position + closest[: len(pairs)] @ rotation.T
-        given, nearest = (totals * timestep).tolist(), texels[: len(pairs)].tolist()
-        n, begin, loads = waves.atlas.resolution, len(pairs), []
-        for i, (pair, patch) in enumerate(zip(pairs, patches, strict=True)):
-            self.impulses.append(
-                Impulse(
-                    geom=self._names[geom],
-                    other=self._names[pair.other],
-                    point=in_world[i],
-                    impulse=given[i],
-                    texel=(nearest[i] // (n * n), nearest[i] // n % n, nearest[i] % n),
-                )
-            )
-            rows = slice(begin, begin + len(patch.probes))
-            begin = rows.stop
-            press = self._presses.get((geom, pair.other))
-            if press is None:
-                press = self._presses[geom, pair.other] = Press(waves.atlas, self._carried[geom])
-            pressed = patch.pressed(closest[rows], timestep / elapsed)
-            loads.append(press.press(pressed, (closest[rows], texels[rows]), middles[i], elapsed))
-            self.touches.append(Touch(pair, press.latest))
-        return loads
+    @property
+    def impulses(self) -> list[Impulse]:
+        """What was given in the latest step, one record for each pair."""
+        if self._impulses is None:
+            self._impulses = [impulse for pressed in self._pressed for impulse in self._given(pressed)]
+        return self._impulses
+
+    @property
+    def touches(self) -> list[Touch]:
+        """What touched in the latest step."""
+        return [touch for pressed in self._pressed for touch in _touches(pressed)]
+
+    def _given(self, pressed: Pressed) -> Iterator[Impulse]:
+        target = pressed.contacts.target
+        geom, n = self._names[target], self._waves[target].atlas.resolution
+        points, texels = pressed.in_world()
+        for other, point, force, texel in zip(
+            pressed.contacts.others.tolist(), points, pressed.patches.forces.tolist(), texels.tolist(), strict=True
+        ):
+            place = (texel // (n * n), texel // n % n, texel % n)
+            yield Impulse(geom=geom, other=self._names[other], point=point, impulse=force * self._timestep, texel=place)
 
 
-def _carried(waves: WaveSolver) -> NDArray[np.float64]:
-    return (waves.atlas.areas * waves.operator.carries).reshape(-1)
+def _touches(pressed: Pressed) -> Iterator[Touch]:
+    contacts, pressure = pressed.contacts, pressed.pressure
+    for i, other in enumerate(contacts.others.tolist()):
+        rows = slice(*contacts.begins[i : i + 2].tolist())
+        forces = contacts.forces[rows]
+        point, normal = forces @ contacts.points[rows] / forces.sum(), forces @ contacts.normals[rows]
+        texels = slice(*pressure.begins[i : i + 2].tolist())
+        load = Load(pressure.texels[texels], pressure.forces[texels])
+        yield Touch(contacts.target, other, point, normal / np.linalg.norm(normal), load)

@@ -123,7 +123,7 @@ def _stopping_time(solref: NDArray[np.float64], timestep: float) -> NDArray[np.f
     return period * np.exp(-np.clip(ratio, 0, 1))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _meeting(target, other, limit, reach, soft, timestep, place, velocity, mass_centre, body, root):
     """Indices of the pairs that come near each other too fast within the steps to the next look, and their speeds."""
     found, speeds = np.empty(len(target), np.int64), np.empty(len(target))
@@ -141,7 +141,7 @@ def _meeting(target, other, limit, reach, soft, timestep, place, velocity, mass_
     return found[:count], speeds[:count]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _at(geom, place, velocity, mass_centre, body, root):
     """Velocity of a geom's centre in the world [m/s]."""
     b = body[geom]

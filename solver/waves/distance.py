@@ -56,7 +56,7 @@ def _everywhere_infinite(size: int, thread: int) -> NDArray[np.float64]:
     return np.full(size, np.inf)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _through(p, q, s, dp, dq):
     """Distance at s of a point source that is dp from p and dq from q, unfolded into the plane of the triangle.
 
@@ -82,7 +82,7 @@ def _through(p, q, s, dp, dq):
     return np.sqrt((along - source_along) ** 2 + (above + below) ** 2)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def march(index, positions, seeds, limit, distance):
     """Fast marching with point-source updates over the triangles of both triangulations of every quad.
 
@@ -137,7 +137,7 @@ def march(index, positions, seeds, limit, distance):
     return np.array(order), np.array(touched)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def march_from_point(index, positions, center, point, limit, scratch):
     """Texels within a distance along the surface of a point, nearest first, and their distances.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import numbers
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -79,40 +80,51 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
 
 def footprint_at(atlas: Atlas, point: NDArray[np.float64], center: int, radius: float) -> Footprint:
     """The footprint round a point of the surface whose nearest texel is known, see `Atlas.nearest`."""
-    texels, weights, radius = _weigh(
+    texels, weights, radius = weigh(texel_grid(atlas), center, point, radius, everywhere_infinite(atlas.areas.size))
+    return Footprint(texels, weights, center, point, radius)
+
+
+class TexelGrid(NamedTuple):
+    """What `weigh` asks of an atlas: its `padded_indices`, and places, normals and areas by flat texel index."""
+
+    padded: NDArray[np.int64]
+    positions: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    areas: NDArray[np.float64]
+
+
+def texel_grid(atlas: Atlas) -> TexelGrid:
+    """An atlas as compiled code reads it."""
+    return TexelGrid(
         padded_indices(atlas.resolution),
         atlas.positions.reshape(-1, 3),
         atlas.normals.reshape(-1, 3),
         atlas.areas.reshape(-1),
-        center,
-        point,
-        radius,
-        everywhere_infinite(atlas.areas.size),
     )
-    return Footprint(texels, weights, center, point, radius)
 
 
-@numba.njit(cache=True)
-def _weigh(index, positions, normals, areas, center, point, radius, scratch):
-    """Texels, weights and radius of a footprint."""
-    radius = max(radius, MIN_TEXELS * _spacing(index, positions, center))
-    texels, distance, flat = _patch(index, positions, normals, center, point, radius, scratch)
+@numba.njit(cache=True, nogil=True)
+def weigh(grid, center, point, radius, scratch):
+    """Texels, weights and radius of a footprint; `scratch` is `everywhere_infinite`."""
+    radius = max(radius, MIN_TEXELS * _spacing(grid, center))
+    texels, distance, flat = _patch(grid, center, point, radius, scratch)
     if not flat:
-        texels, distance = _blended(index, positions, center, point, radius, scratch)
+        texels, distance = _blended(grid, center, point, radius, scratch)
     weights = np.empty(len(texels))
     kept, total = 0, 0.0
     for i in range(len(texels)):
         weight = max(1 - (distance[i] / radius) ** 2, 0.0) ** 3
         if weight > 0:
             texels[kept], weights[kept] = texels[i], weight
-            total += weight * areas[texels[i]]
+            total += weight * grid.areas[texels[i]]
             kept += 1
-    return texels[:kept].copy(), weights[:kept] / total, radius
+    return texels[:kept], weights[:kept] / total, radius
 
 
-@numba.njit(cache=True)
-def _spacing(index, positions, center):
+@numba.njit(cache=True, nogil=True)
+def _spacing(grid, center):
     """Greatest distance from a texel to the four beside it."""
+    index, positions = grid.padded, grid.positions
     n = index.shape[1] - 2
     face, row, column = center // (n * n), center // n % n, center % n
     greatest = 0.0
@@ -123,13 +135,14 @@ def _spacing(index, positions, center):
     return greatest
 
 
-@numba.njit(cache=True)
-def _patch(index, positions, normals, center, point, radius, scratch):
+@numba.njit(cache=True, nogil=True)
+def _patch(grid, center, point, radius, scratch):
     """Texels that hang together within a straight distance of a point, their distances, and whether they lie flat.
 
     Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph over the plane there
     whose slope makes no way along it longer than 1.05 times the straight one.
     """
+    index, positions, normals = grid.padded, grid.positions, grid.normals
     n = index.shape[1] - 2
     room = 256
     texels = np.empty(room, np.int64)
@@ -165,12 +178,12 @@ def _patch(index, positions, normals, center, point, radius, scratch):
     return texels, distance, flat
 
 
-@numba.njit(cache=True)
-def _blended(index, positions, center, point, radius, scratch):
+@numba.njit(cache=True, nogil=True)
+def _blended(grid, center, point, radius, scratch):
     """Texels within a little more than the radius along the surface, and the distances that count."""
-    texels, distance = march_from_point(index, positions, center, point, 1.1 * radius, scratch)
+    texels, distance = march_from_point(grid.padded, grid.positions, center, point, 1.1 * radius, scratch)
     for i in range(len(texels)):
-        straight = np.sqrt(((positions[texels[i]] - point) ** 2).sum())
+        straight = np.sqrt(((grid.positions[texels[i]] - point) ** 2).sum())
         if straight > 0:
             bend = min(max((distance[i] / straight - _FLAT) / (_BENT - _FLAT), 0.0), 1.0)
             bend = bend * bend * (3 - 2 * bend)

@@ -71,7 +71,7 @@ def _nowhere(size: int, thread: int) -> NDArray[np.int64]:
     return np.full(size, -1)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def add_up_by(place, texels, values):
     """Add the values [m, k] that stand at the same texel: each texel once, in order of first appearance, and sums."""
     once = np.empty_like(texels)

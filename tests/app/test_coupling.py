@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, RippleError, Ripples
-from ripple_sim.coupling.contacts import contact_pairs, smallest_extents
+from ripple_sim.coupling.contacts import pressing_contacts, smallest_extents
 from ripple_sim.coupling.patch import cluster
 from ripple_sim.scenes.shapes import limbed
 
@@ -231,9 +231,9 @@ def test_contact_that_only_says_how_hard_to_stop_a_body_presses_where_it_is() ->
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data)
     is_target, extents = np.array([True, False]), smallest_extents(model)
-    [before] = contact_pairs(model, data, is_target, extents).values()
+    [before] = pressing_contacts(model, data, is_target, extents).values()
     data.contact.dist[:] = -7.0
-    [after] = contact_pairs(model, data, is_target, extents).values()
+    [after] = pressing_contacts(model, data, is_target, extents).values()
     np.testing.assert_array_equal(after.forces, before.forces)
     assert np.linalg.norm(after.points - before.points) < 1.5 * 0.05
 

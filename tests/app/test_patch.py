@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.patch import MAX_CONTACTS, Patch, cluster
+from ripple_sim.coupling.patch import MAX_CONTACTS, cluster, probe, spread
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas
 
@@ -13,11 +13,11 @@ SQUARE = 0.1 * np.array([[-1, -1, 5], [1, -1, 5], [-1, 1, 5], [1, 1, 5]])
 def pressed_patch(
     atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: float, convex: bool
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    patch = Patch(points, forces, radius, convex)
-    pressed = patch.pressed(atlas.project(patch.probes)[0])
-    if pressed.probes[0] >= 0:
-        np.testing.assert_array_equal(patch.probes[pressed.probes], pressed.points)
-    return pressed.points, pressed.forces, pressed.radius
+    loads, probes = probe(points, forces, radius, convex)
+    spots, pressing, greater, rows = spread(loads, probes, atlas.project(probes)[0], radius)
+    if rows[0] >= 0:
+        np.testing.assert_array_equal(probes[rows], spots)
+    return spots, pressing, greater
 
 
 @pytest.fixture(scope="module")

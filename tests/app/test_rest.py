@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, Ripples
-from ripple_sim.coupling.patch import Pressed
-from ripple_sim.coupling.press import ONSET, Press
+from ripple_sim.coupling.rest import BODY, NO_PRESSURE, NOTHING_FELT, ONSET, Pressure, follow
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Load, WaveSolver, sphere_atlas
+from ripple_sim.solver.waves.footprint import footprint
+from ripple_sim.solver.waves.load import nowhere
 
 GRAVITY = 9.81
 TARGETS = {
@@ -87,19 +88,35 @@ def test_box_that_lies_flat_presses_under_its_middle_too() -> None:
     assert np.abs(height[away]).max() < 0.02 * np.abs(height[middle]).max()
 
 
-def press_at(press: Press, point: np.ndarray, force: float, radius: float, dt: float) -> Load:
-    pressed = Pressed(point[None], np.array([force]), radius, np.array([-1]))
-    return press.press(pressed, (np.zeros((0, 3)), np.zeros(0, np.int64)), point, dt)
+class Pressing:
+    """One body, geom 0, that presses on a sphere of 1 m."""
+
+    def __init__(self, resolution: int, radius: float, dt: float) -> None:
+        self.atlas, self.radius, self.dt = sphere_atlas(1.0, resolution), radius, dt
+        self.states, self.felt, self.over = np.zeros(1, BODY), NOTHING_FELT, True
+
+    def at(self, point: np.ndarray, force: float) -> Load:
+        where = footprint(self.atlas, point, self.radius)
+        forces = force * where.weights * self.atlas.areas.reshape(-1)[where.texels]
+        rows = np.array([0, len(forces)])
+        return self.follow(
+            Pressure(np.zeros(1, np.int64), point[None], np.array([self.radius / 2]), rows, where.texels, forces)
+        )
+
+    def follow(self, pressure: Pressure) -> Load:
+        scratch = nowhere(self.atlas.areas.size)
+        self.felt, given, self.over = follow(self.states, self.felt, pressure, self.dt, scratch)
+        return Load(self.felt.texels, given)
 
 
 def given_over_time(forces: np.ndarray, dt: float) -> np.ndarray:
-    """What a press gives to the surface in each step, while the body touches and for a second after."""
-    atlas, given = sphere_atlas(1.0, 16), []
-    press = Press(atlas, atlas.areas.reshape(-1))
+    """What a body gives to the surface in each step, while it touches and for a second after."""
+    body, given = Pressing(16, 0.3, dt), []
     for force in np.concatenate([forces, np.zeros(round(1.0 / dt))]):
-        out = press_at(press, np.array([0.0, 0.0, 1.0]), force, 0.3, dt) if force > 0 else press.release(dt)
+        out = body.at(np.array([0.0, 0.0, 1.0]), force) if force > 0 else body.follow(NO_PRESSURE)
         given.append(out.forces.sum())
-    assert press.over
+    assert body.over
+    assert not len(body.felt.texels)
     return np.array(given)
 
 
@@ -133,12 +150,11 @@ def test_steady_weight_comes_through_at_once() -> None:
 
 
 def test_a_body_that_slides_presses_where_it_is() -> None:
-    atlas = sphere_atlas(1.0, 32)
-    press = Press(atlas, atlas.areas.reshape(-1))
+    body = Pressing(32, 0.2, 0.002)
     for step in range(1500):
         angle = 0.5 * step * 0.002
         point = np.array([np.sin(angle), 0.0, np.cos(angle)])
-        load = press_at(press, point, 2.0, 0.2, 0.002)
+        load = body.at(point, 2.0)
         if step * 0.002 > ONSET:
-            middle = load.forces @ atlas.positions.reshape(-1, 3)[load.texels] / load.forces.sum()
+            middle = load.forces @ body.atlas.positions.reshape(-1, 3)[load.texels] / load.forces.sum()
             assert np.linalg.norm(middle - point) < 0.1
