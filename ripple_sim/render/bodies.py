@@ -102,6 +102,7 @@ class Bodies:
                 key = piece.site, shape[0], mapping.kind, mapping.texture
                 groups.setdefault(key, (shape, []))[1].append((piece, number))
         self._opaque = [self._instances(shape, members) for shape, members in groups.values()]
+        self._planes = [piece.index for piece, _ in shaped if not piece.site and piece.kind == _GEOM.mjGEOM_PLANE]
         self._sites = [piece for piece, _ in shaped if piece.site and piece.opacity == 1.0]
 
     def balls(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -111,6 +112,10 @@ class Bodies:
         return np.array([*centres, *(ball[0] for ball in sites)]).reshape(-1, 3), np.array(
             [*radii, *(ball[1] for ball in sites)]
         )
+
+    def planes(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Positions [k, 3] of the planes, which no ball bounds, and as many infinite radii."""
+        return data.geom_xpos[self._planes].reshape(-1, 3), np.full(len(self._planes), np.inf)
 
     def update(self, data: Any, eye: NDArray[np.float64], pixels: float) -> None:
         """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""

@@ -7,9 +7,11 @@ from collections.abc import Callable
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.solver.gl import GLContext
 
+from .bounds import boxes_of
 from .camera import Pose
 from .floor import Floor
 from .frame import FrameUniforms
@@ -33,7 +35,7 @@ class Mirror:
     """
 
     def __init__(self, gl: GLContext, ctx: OwnedObjects, size: tuple[int, int], options: dict[str, int]) -> None:
-        half = (max(size[0] // 2, 1), max(size[1] // 2, 1))
+        self._size = half = (max(size[0] // 2, 1), max(size[1] // 2, 1))
         self._aspect = size[0] / size[1]
         self._frame = FrameUniforms(ctx)
         self._picture = Picture(gl, ctx, half, samples=0, cut_out=False, floor=None, options=options)
@@ -47,6 +49,7 @@ class Mirror:
         frame: FrameUniforms,
         pose: Pose,
         floor: Floor,
+        balls: tuple[NDArray[np.float64], NDArray[np.float64]],
         draw_solids: Callable[[], None],
         bind_maps: Callable[[], None],
     ) -> None:
@@ -63,7 +66,7 @@ class Mirror:
         draw_solids()
         ctx.front_face = "ccw"
         bind_maps()
-        self._picture.compose(ctx)
+        self._picture.compose(ctx, boxes_of(*balls, mirrored, self._size))
         ctx.copy_framebuffer(self._target, self._picture.frame)
         frame.bind()
 

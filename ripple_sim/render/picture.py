@@ -6,19 +6,23 @@ from collections.abc import Callable
 from typing import Any
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.gl import GLContext
 
+from .bounds import Tiles
 from .color import SRGB8_ALPHA8
 from .floor import Floor
 from .owned import OwnedObjects
 
 _PACKAGE = "ripple_sim.render"
-_FIRST_UNIT = 8  # of the samples' textures, in shaders/compose_fragment.glsl
+_FIRST_UNIT = 8  # of the samples' textures, in shaders/samples.glsl
 _BEHIND_UNIT = 6
-# depths that stand for what a pixel shows; exact in every depth buffer
-_LEVELS = {"SKY": 0.125, "FLOOR": 0.25, "SHADED": 0.375, "MIXED": 0.5, "SOLID": 0.75}
+# depths that stand for what a pixel shows: background out of reach of the shadow or within it, solids in some of its
+# samples or in all of them; exact in every depth buffer
+_LEVELS = {"OPEN": 1.0, "SHADED": 0.75, "MIXED": 0.5, "SOLID": 0.25}
 
 
 class Picture:
@@ -94,10 +98,8 @@ class Picture:
         }
         levels = {f"{name}_LEVEL": level for name, level in _LEVELS.items()}
         stages: tuple[tuple[str, str, str, dict[str, Any]], ...] = (
-            ("classes", "screen_vertex", "classify_fragment", levels),
-            ("sky", "screen_vertex", "sky_fragment", {}),
-            ("floor", "floor_vertex", "floor_fragment", {"SHADOW": 0}),
-            ("shaded floor", "floor_vertex", "floor_fragment", {"SHADOW": 1}),
+            ("background", "background_vertex", "background_fragment", {"SHADOW": 0, **levels}),
+            ("shaded background", "background_vertex", "background_fragment", {"SHADOW": 1}),
             ("solid", "screen_vertex", "solid_fragment", {"LAYER": 0}),
             ("layer", "screen_vertex", "solid_fragment", {"LAYER": 1}),
         )
@@ -105,12 +107,16 @@ class Picture:
             name: ctx.vertex_array(ctx.own(gl.program(_PACKAGE, vertex, fragment, **{**options, **more})), [])
             for name, vertex, fragment, more in stages
         }
-        for program in (self._passes[name].program for name in ("floor", "shaded floor")):
+        for program in (self._passes[name].program for name in ("background", "shaded background")):
             if floor is not None and tiled:
                 program["tint"] = tuple(floor.tint)
                 program["tiling"] = floor.tiling
             if floor is not None and reflects:
                 program["reflectance"] = floor.reflectance
+        self._tiles = Tiles(ctx, size)
+        classify = ctx.own(gl.program(_PACKAGE, "tiles_vertex", "classify_fragment", **{**options, **levels}))
+        classify["extent"] = self._tiles.extent
+        self._classify = ctx.vertex_array(classify, [(self._tiles.buffer, "2f/i", "in_corner")])
 
     def begin(self, ctx: moderngl.Context) -> None:
         """Clear the samples and draw into them from now on."""
@@ -122,26 +128,34 @@ class Picture:
         self._samples.clear(depth=1.0)
         self._samples.color_mask = [(True,) * 4] * 2
 
-    def compose(self, ctx: moderngl.Context) -> None:
-        """Light what was drawn, with the floor and the background."""
+    def compose(self, ctx: moderngl.Context, boxes: NDArray[np.int64]) -> None:
+        """Light what was drawn, with the floor and the background.
+
+        Parameters
+        ----------
+        ctx : moderngl.Context
+        boxes : int64 [k, 4]
+            Where solids may show; see `boxes_of`.
+        """
         for unit, layer in enumerate(self._layers, start=_FIRST_UNIT):
             layer.use(unit)
+        self._tiles.cover(boxes)
         self.frame.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
         ctx.depth_func = "1"
-        self.frame.clear()
-        self._run("classes", 0.0)
+        self.frame.clear(depth=_LEVELS["OPEN"])
+        if self._tiles.count:
+            self._classify.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=self._tiles.count)
+        ctx.depth_func = "<="
+        self._run("background", 0.0)
         ctx.depth_func = "=="
+        self.frame.depth_mask = False
+        self._run("shaded background", _LEVELS["SHADED"])
+        self._run("shaded background", _LEVELS["MIXED"])
+        self._run("solid", _LEVELS["SOLID"])
         ctx.enable(moderngl.BLEND)
         ctx.blend_func = moderngl.ONE, moderngl.ONE
-        self.frame.depth_mask = False
-        if not self._cut_out:
-            self._run("sky", _LEVELS["SKY"])
-        self._run("floor", _LEVELS["FLOOR"])
-        self._run("shaded floor", _LEVELS["SHADED"])
-        self._run("shaded floor", _LEVELS["MIXED"])
         self._run("solid", _LEVELS["MIXED"])
-        self._run("solid", _LEVELS["SOLID"])
         self.frame.depth_mask = True
         ctx.depth_func = "<="
 
@@ -149,9 +163,7 @@ class Picture:
         self._passes[name].program["level"] = level
         self._passes[name].render(moderngl.TRIANGLES, vertices=3)
 
-    def add_layer(
-        self, ctx: moderngl.Context, number: int, draw: Callable[[], None], clip: tuple[int, int, int, int]
-    ) -> None:
+    def add_layer(self, ctx: moderngl.Context, number: int, draw: Callable[[], None], box: NDArray[np.int64]) -> None:
         """Draw and light a single clear object over the picture.
 
         Parameters
@@ -161,10 +173,11 @@ class Picture:
             In the table of objects.
         draw : callable
             Draws it into the samples.
-        clip : (x, y, width, height)
-            The part of the picture that it lies in [pixels].
+        box : int64 [4]
+            The part of the picture that it lies in; see `boxes_of`.
         """
-        if clip[2] <= 0 or clip[3] <= 0:
+        left, lower, right, upper = (int(edge) for edge in box)
+        if left >= right or lower >= upper:
             return
         self._samples.use()
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
@@ -174,7 +187,7 @@ class Picture:
         self.frame.use()
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-        self.frame.scissor = clip
+        self.frame.scissor = left, lower, right - left, upper - lower
         self._behind.use(_BEHIND_UNIT)
         self._passes["layer"].program["layer"] = number
         self._run("layer", 0.0)

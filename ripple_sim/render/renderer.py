@@ -14,6 +14,7 @@ from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.gl import GLContext
 
 from .bodies import Bodies
+from .bounds import boxes_of
 from .camera import Pose, Viewpoint
 from .floor import Floor, find_floor
 from .frame import FrameUniforms
@@ -183,13 +184,13 @@ class Renderer:
             light_view = self._update(ctx, data, reliefs, pose, exposure)
             self._draw_maps(ctx, light_view)
             if self._mirror is not None and self._floor is not None:
-                self._mirror.draw(ctx, self._frame, pose, self._floor, self._draw_solids, self._bind_maps)
+                self._mirror.draw(ctx, self._frame, pose, self._floor, self._balls, self._draw_solids, self._bind_maps)
             self._picture.begin(ctx)
             self._draw_solids()
             self._bind_maps()
             if self._gl.software:  # it would draw all this within the next call, which keeps other threads from running
                 self._gl.wait()
-            self._picture.compose(ctx)
+            self._picture.compose(ctx, boxes_of(*self._balls, pose, (self.width, self.height)))
             self._draw_clear(ctx, data, pose)
         return self._picture.frame
 
@@ -207,7 +208,8 @@ class Renderer:
 
         frame = self._frame
         self._view_projection = frame.set_camera(pose, self.width / self.height)
-        centre, radius = self._extent(data, pose)
+        self._balls = self._bounding_balls(data)
+        centre, radius = self._extent(pose)
         if self._floor is not None:
             self._floor.place(frame, data, centre, radius)
         lighting = studio_lighting(pose) if self._studio else model_lighting(self._model, data, pose)
@@ -222,11 +224,16 @@ class Renderer:
         frame.bind()
         return light_view
 
-    def _extent(self, data: Any, pose: Pose) -> tuple[NDArray[np.float64], float]:
+    def _bounding_balls(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Balls about all that is drawn: centres [k, 3] and radii [k], in metres; those of planes are infinite."""
+        balls = [self._bodies.balls(data), self._bodies.planes(data), *(target.ball() for target in self._targets)]
+        return np.concatenate([b[0] for b in balls]), np.concatenate([b[1] for b in balls])
+
+    def _extent(self, pose: Pose) -> tuple[NDArray[np.float64], float]:
         """Return centre and radius [m] of a ball about all that casts shadows near the camera's focus."""
-        balls = [self._bodies.balls(data), *(target.ball() for target in self._targets)]
-        centres, radii = np.concatenate([b[0] for b in balls]), np.concatenate([b[1] for b in balls])
+        centres, radii = self._balls
         near = np.linalg.norm(centres - pose.focus, axis=1) - radii < _SHADOW_REACH * pose.distance
+        near &= np.isfinite(radii)
         if not near.any():
             return pose.focus, pose.distance
         centres, radii = centres[near], radii[near, None]
@@ -280,19 +287,5 @@ class Renderer:
             layers.append((*ball_of(self._model, data, body.piece), body.number, body.instances.draw))
         layers.sort(key=lambda layer: -float(np.linalg.norm(layer[0] - pose.eye)))
         for centre, radius, number, draw in layers:
-            self._picture.add_layer(ctx, number, draw, self._clip(centre, radius, pose))
-
-    def _clip(self, centre: NDArray, radius: float, pose: Pose) -> tuple[int, int, int, int]:
-        """Return x, y, width and height [pixels] of a box about a ball in the picture."""
-        local = pose.rotation.T @ (centre - pose.eye)
-        whole = (0, 0, self.width, self.height)
-        away = -local[2] - radius
-        if not away > 0.01 * radius:
-            return whole
-        scale = self.height / (2 * np.tan(np.radians(pose.fovy) / 2))
-        # the nearest point of the ball's box is seen under the widest angle
-        corners = [(local[:2] + side * radius) / depth for side in (-1, 1) for depth in (away, away + 2 * radius)]
-        middle = np.array([self.width, self.height]) / 2 - scale * pose.shear
-        low = np.clip(np.floor(middle + scale * np.min(corners, axis=0)), 0, whole[2:]).astype(int)
-        high = np.clip(np.ceil(middle + scale * np.max(corners, axis=0)), 0, whole[2:]).astype(int)
-        return int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])
+            box = boxes_of(centre[None], np.array([radius]), pose, (self.width, self.height))[0]
+            self._picture.add_layer(ctx, number, draw, box)

@@ -68,14 +68,22 @@ Spot spot_at(ivec2 pixel, int s)
     spot.color = vec3(red_green, blue_ink.x);
     spot.ink = blue_ink.y;
     Object object = objects[spot.object];
-    vec4 ripple = vec4(0.0);
-    for (int once = object.relief.y > 0.0 ? 1 : 0; once > 0; --once)
-        ripple = spline_at(relief, object.relief.y, object.relief.x, unfolded(shape.zw));
+    vec4 ripple = spline_at(relief, object.relief.y, object.relief.x, unfolded(shape.zw));
+    ripple *= object.relief.y > 0.0 ? 1.0 : 0.0;
     spot.rippled = normalize(spot.normal - object.rotation * ripple.xyz);
     // troughs lie deeper than their surroundings: less light finds its way in
     spot.openness = baked.x * (1.0 - 0.4 * smoothstep(0.0, 0.03, -ripple.w / object.place.y));
     spot.thickness = 2.0 * baked.y;
     return spot;
+}
+
+// Variance of the normals in the pixel: how far they turn from one to the next, where both show the same object.
+float spread_of(Spot spot, float at)
+{
+    float object = float(spot.object);
+    vec3 across = dFdx(spot.rippled), up = dFdy(spot.rippled);
+    bool same_x = dFdx(object) == 0.0 && abs(dFdx(at)) < 0.02 * at, same_y = dFdy(object) == 0.0 && abs(dFdy(at)) < 0.02 * at;
+    return min(0.5 * ((same_x ? dot(across, across) : 0.0) + (same_y ? dot(up, up) : 0.0)), 0.2);
 }
 
 // Colour and opacity of a spot; `spread` is the variance of the normals in the pixel.
@@ -106,23 +114,15 @@ void main()
         own |= object_of(pixel, s) == layer ? 1 << s : 0;
     left &= own;
 #endif
-    int first = max(findLSB(left), 0);
-    float at = eye_distance(texelFetch(depths, pixel, first).r);
-    Spot spot = spot_at(pixel, first);
-    // how far the normals turn from one pixel to the next, where both show the same
-    float number = left == 0 ? -1.0 : float(spot.object);
-    bvec2 same = equal(vec2(dFdx(number), dFdy(number)), vec2(0.0));
-    bvec2 near = lessThan(abs(vec2(dFdx(at), dFdy(at))), vec2(0.02 * at));
-    vec3 across = same.x && near.x ? dFdx(spot.rippled) : vec3(0.0), up = same.y && near.y ? dFdy(spot.rippled) : vec3(0.0);
-    float spread = min(0.5 * (dot(across, across) + dot(up, up)), 0.2);
-#if LAYER
-    if (left == 0)
-        discard;
-#endif
     vec4 sum = vec4(0.0);
-    while (left != 0) {
+    float spread = 0.0;
+    bool again = false;
+    do {
+        int first = max(findLSB(left), 0), alike = 1 << first;
+        float at = eye_distance(texelFetch(depths, pixel, first).r);
+        Spot spot = spot_at(pixel, first);
+        spread = again ? spread : spread_of(spot, left == 0 ? -1.0 : at);
         // samples of the same surface share their light
-        int alike = 1 << first;
         vec2 normal = texelFetch(shapes, pixel, first).xy;
         for (int s = 1; s < SAMPLES; ++s) {
             bool same = abs(eye_distance(texelFetch(depths, pixel, s).r) - at) < 0.01 * at && object_of(pixel, s) == spot.object
@@ -133,11 +133,7 @@ void main()
         left &= ~alike;
         vec4 color = lit_solid(spot, eye.xyz + at * way, spread);
         sum += float(bitCount(alike)) / float(SAMPLES) * vec4(dithered(color.rgb) * color.a, color.a);
-        for (int once = left != 0 ? 1 : 0; once > 0; --once) {
-            first = findLSB(left);
-            at = eye_distance(texelFetch(depths, pixel, first).r);
-            spot = spot_at(pixel, first);
-        }
-    }
+        again = true;
+    } while (left != 0);
     fragment = sum;
 }

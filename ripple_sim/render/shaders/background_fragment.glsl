@@ -1,6 +1,6 @@
 #version 430
-// Pixels that show the floor: with SHADOW those that a shadow may reach or that show something else too, without it all
-// others.
+// The floor and what is behind it, without the first light's shadow; where that may fall is marked as a depth. With SHADOW
+// the pixels that were marked, or that show solids, too.
 #include "frame.glsl"
 #include "samples.glsl"
 #include "studio.glsl"
@@ -31,8 +31,20 @@ const float HORIZON = 0.0;
 const float HORIZON = -1.0;
 #endif
 
+#if !SHADOW
+// Whether the first light's shadow may fall on a point of the floor; `near` is what the floor's map says of it.
+bool may_be_shaded(vec2 place, vec2 near, vec3 world)
+{
+    vec2 off = abs(place - 0.5);
+    vec4 clip = shadow_matrix * vec4(world, 1.0);
+    vec2 aside = abs(clip.xy / clip.w - 0.5);
+    return max(off.x, off.y) < 0.5 ? near.g > 0.0 : max(aside.x, aside.y) < 0.5 && clip.w > 0.0 && counts.w > 0.0;
+}
+#endif
+
 void main()
 {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec3 way = way_of_pixel();
     float at = floor_distance(way);
     vec3 direction = normalize(way), world = eye.xyz + min(at, 1e6) * way, local = world - floor_origin.xyz;
@@ -44,20 +56,23 @@ void main()
 #else
     vec3 albedo = floor_albedo.rgb;
 #endif
-    float open = textureLod(floor_openness, floor_place(world), 1.0).r;
+    vec2 place = floor_place(world), near = textureLod(floor_openness, place, 1.0).rg;
 #if SHADOW
     float shadow = key_visibility(world, floor_normal.xyz, 0.0);
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
-    int solid = bitCount(covered(pixel, at));
     // The filters of neighbouring pixels are turned differently: their mean has half the noise. It is taken where all
     // four pixels of a block are of this pass: what others have reckoned is undefined.
+    int solid = bitCount(covered(pixel, at));
     bool inside = all(lessThan(pixel | 1, textureSize(depths BASE_LEVEL)));
     bool whole = inside && block_mean(solid > 0 || at >= MISSED ? 1.0 : 0.0) == 0.0;
-    float mean = block_mean(shadow);
+    float mean = block_mean(shadow), share = 1.0 - float(solid) / float(SAMPLES);
     shadow = whole ? mean : shadow;
 #else
-    const float shadow = 1.0;
+    const float shadow = 1.0, share = 1.0;
+    // blocks of pixels go together, so that their shadows can be averaged
+    bool shaded = block_mean(at < MISSED && may_be_shaded(place, near, world) ? 1.0 : 0.0) > 0.0;
+    gl_FragDepth = shaded ? SHADED_LEVEL : OPEN_LEVEL;
 #endif
+#if NEAR_LAMPS
     vec3 light = vec3(0.0), unshaded = vec3(0.0);
     for (int i = 0; i < int(counts.y); ++i) {
         vec3 towards;
@@ -65,12 +80,11 @@ void main()
         light += arrives * (i == 0 ? shadow : 1.0);
         unshaded += arrives;
     }
-    light += around * (0.15 + 0.85 * open);
-#if SHADOW
-    float share = 1.0 - float(solid) / float(SAMPLES);
 #else
-    const float share = 1.0;
+    vec3 key = lights[0].radiance.rgb * max(dot(floor_normal.xyz, lights[0].direction.xyz), 0.0);
+    vec3 unshaded = floor_light.rgb, light = unshaded - (1.0 - shadow) * key;
 #endif
+    light += around * (0.15 + 0.85 * near.r);
 #if CUT_OUT
     // of the floor nothing but the shadows is kept
     fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g + around.g, 1e-6)));
