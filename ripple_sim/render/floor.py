@@ -21,7 +21,7 @@ from .pieces import geom_piece
 from .shadow import ShadowMap
 
 _PACKAGE = "ripple_sim.render"
-_MAP_SIZE = 224
+_CEILING_SIZE, _MAP_SIZE = 224, 112
 _ENDLESS = 1e9  # half size of a plane without an end [m]
 
 
@@ -50,7 +50,7 @@ class Floor:
         half = np.asarray(model.geom_size[geom][:2], dtype=np.float64)
         self._half = np.where(half > 0, half, _ENDLESS)
         self._occlude = ctx.vertex_array(ctx.own(gl.program(_PACKAGE, "screen_vertex", "floor_occlusion_fragment")), [])
-        self._ceiling = ctx.depth_texture((_MAP_SIZE, _MAP_SIZE))
+        self._ceiling = ctx.depth_texture((_CEILING_SIZE, _CEILING_SIZE))
         self._ceiling.compare_func = ""
         self._ceiling.repeat_x = self._ceiling.repeat_y = False
         self._ceiling_target = ctx.framebuffer(depth_attachment=self._ceiling)

@@ -27,7 +27,7 @@ from .reliefs import LAYERS, ReliefTextures
 from .subdivision import subdivide
 
 _PIXELS = 4.0  # length of an edge where the target fills the frame's height
-_PIXELS_PER_FACE = 24  # of the frame
+_PIXELS_PER_FACE = 48  # of the frame
 _LEAST_FACES, _MOST_FACES = 20_000, 400_000
 _NO_SHADOW = 0.75  # transparency from which on light goes through as if nothing were there
 _PACKAGE = "ripple_sim.render"

@@ -56,7 +56,7 @@ void main()
 #else
     vec3 albedo = floor_albedo.rgb;
 #endif
-    vec2 place = floor_place(world), near = textureLod(floor_openness, place, 1.0).rg;
+    vec2 place = floor_place(world), near = textureLod(floor_openness, place, 0.0).rg;
 #if SHADOW
     float shadow = key_visibility(world, floor_normal.xyz, 0.0);
     // The filters of neighbouring pixels are turned differently: their mean has half the noise. It is taken where all

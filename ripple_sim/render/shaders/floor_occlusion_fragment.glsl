@@ -11,8 +11,8 @@ uniform vec3 extent;  // width of the map [m], height of its top [m], radius of 
 in vec2 screen;
 out vec4 fragment;  // r: that share; g: 1 where the first light's shadow may fall
 
-const int TAPS = 36;
-const int SHADOW_TAPS = 16;
+const int TAPS = 48;
+const int SHADOW_TAPS = 24;
 
 // Whether the light meets anything on its way to about a texel of the floor.
 bool is_shaded(vec3 world)
@@ -20,9 +20,9 @@ bool is_shaded(vec3 world)
     vec4 clip = shadow_matrix * vec4(world, 1.0);
     vec3 p = clip.xyz / clip.w;
     vec2 off = abs(p.xy - 0.5);
-    float texel = 2.0 * floor_map.z / float(textureSize(ceiling, 0).x);
+    float texel = floor_map.z * dFdx(screen.x);
     float away = lights[0].position.w > 0.0 ? distance(lights[0].position.xyz, world) : 0.0;
-    float reach = shadow_penumbra.z + 1.5 * texel / (shadow_width.x + shadow_width.y * away);
+    float reach = shadow_penumbra.z + texel / (shadow_width.x + shadow_width.y * away);
     vec2 direction = vec2(1.0, 0.0);
     bool any = false;
     for (int i = 0; i < SHADOW_TAPS; ++i) {

@@ -16,7 +16,7 @@ struct Material {
 // Light that the floor sends up to a point; bodies close above it shade it.
 vec3 floor_bounce(vec3 position)
 {
-    float open = textureLod(floor_openness, floor_place(position), 4.0).r;
+    float open = textureLod(floor_openness, floor_place(position), 3.0).r;
     vec3 lit = floor_albedo.rgb * (floor_light.rgb * 0.7 * open * open + sky.rgb * 0.5 * open);
     lit = mix(lit, vec3(dot(lit, vec3(0.2126, 0.7152, 0.0722))), 0.5);  // a coloured floor shall not stain all that is on it
     return floor_origin.w > 0.0 ? lit : sky.rgb * 0.8;
