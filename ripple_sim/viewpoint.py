@@ -74,7 +74,7 @@ def with_exposure(scene: Scene, **changes: Any) -> Scene:
     Raises
     ------
     SceneError
-        If one is invalid.
+        If one is invalid, or would do nothing.
     """
     given = {name: value for name, value in changes.items() if value is not None}
     try:
@@ -82,6 +82,13 @@ def with_exposure(scene: Scene, **changes: Any) -> Scene:
     except msgspec.ValidationError as error:
         raise SceneError(f"camera: {str(error).replace('`$.', '`')}") from error
     check_camera(scene.model, camera)
+    if "focus" in given and not camera.aperture:
+        raise SceneError("a focus needs a lens: give the camera an aperture of more than 0 m, such as 0.05")
+    if given.get("exposures", 1) > 1 and not (camera.shutter or camera.aperture):
+        raise SceneError(
+            f"all {camera.exposures} exposures would be the same: give the camera a shutter angle, such as 180 degrees,"
+            " an aperture, such as 0.05 m, or both"
+        )
     return dataclasses.replace(scene, camera=camera)
 
 

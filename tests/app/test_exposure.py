@@ -271,6 +271,8 @@ def test_a_blurred_video_is_resumed_to_the_same_one(make_scene, tmp_path):
         ({"focus": (1.0, 2.0)}, "focus"),
         ({"exposures": 0}, "number of exposures is 0; valid is 1 to"),
         ({"shutter": "half"}, "shutter"),
+        ({"focus": 2.0}, "give the camera an aperture"),
+        ({"exposures": 16}, "all 16 exposures would be the same: give the camera a shutter angle"),
     ],
 )
 def test_what_no_camera_can_do_is_refused(make_scene, wrong, message):
