@@ -26,7 +26,8 @@ class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
 class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     """`[[ripple]]`: one surface that carries waves, and how it looks.
 
-    `still_map` is the path of a picture in the mesh's own texture coordinates: no waves run where it is black.
+    `color` (sRGB, 0 to 1) takes the place of the look's own colour, or of the texture of the geom's material, if it has
+    one. `still_map` is the path of a picture in the mesh's own texture coordinates: no waves run where it is black.
     """
 
     geom: str
