@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Load, WaveSolver
 
+from .hovering import Hovering
 from .sources import Touch
 
 
@@ -17,18 +18,21 @@ class PushBack:
     """Forces between moving surfaces and the bodies that touch them, held over the next physics step.
 
     MuJoCo sees a target's undeformed surface, which stops what comes in. So only the surface's own outward motion is
-    left to pass on: a patch of mass m_s that moves outwards at u meets a body of effective mass m_b that moves along
-    the normal at w >= 0, both seen from the target. As in a perfectly inelastic collision, which cannot create energy,
-    they exchange J = (u - w) m_s m_b / (m_s + m_b) if u > w: +J on the body, -J on the surface and on the target's
-    body.
+    left to pass on, to what touches that surface and to what the displaced one reaches above it: a patch of mass m_s
+    that moves outwards at u meets a body of effective mass m_b that moves along the normal at w >= 0, both seen from
+    the target. As in a perfectly inelastic collision, which cannot create energy, they exchange
+    J = (u - w) m_s m_b / (m_s + m_b) if u > w: +J on the body, -J on the surface and on the target's body.
 
     Parameters
     ----------
     model : mujoco.MjModel
+    targets : iterable of int
+        Geom ids.
     """
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, targets: Iterable[int]) -> None:
         self._model = model
+        self._hovering = Hovering(model, targets)
         self._applied = np.zeros((model.nbody, 6))
         self._loads: list[tuple[int, Load]] = []
 
@@ -45,6 +49,8 @@ class PushBack:
 
     def apply(self, data: mujoco.MjData, touches: Sequence[Touch], waves: Mapping[int, WaveSolver]) -> None:
         """Set the forces for the next step, from what touches and the waves of each target, by geom id."""
+        pairs = {(touch.target, touch.other) for touch in touches}
+        touches = [*touches, *self._hovering.reached(data, waves, pairs)]
         velocities = {touch.target: waves[touch.target].velocity.reshape(-1) for touch in touches}
         for touch in touches:
             mass = waves[touch.target].operator.mass.reshape(-1)

@@ -75,7 +75,7 @@ class Ripples:
         _warn_of_integrator(model)
         self._sources = Sources(model, self._waves)
         self._check_speeds = SpeedCheck(model, list(self._waves))
-        self._push_back = PushBack(model) if two_way else None
+        self._push_back = PushBack(model, self._waves) if two_way else None
         self._time: float | None = None
 
     def __getitem__(self, name: str) -> WaveSolver:

@@ -16,7 +16,7 @@ from .press import Press, Pressed
 from .target import geom_name
 
 # Footprint radius over the touching body's smallest half-extent: about the patch of a ball sunk in by an eighth.
-_FOOTPRINT = 0.5
+FOOTPRINT = 0.5
 
 _NOT_CONVEX = (int(mujoco.mjtGeom.mjGEOM_SDF), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
@@ -89,7 +89,7 @@ class Sources:
     def clear(self) -> None:
         """Forget all contacts."""
         self._presses = {
-            geom: Press(waves, _FOOTPRINT * self._extents, self._convex) for geom, waves in self._waves.items()
+            geom: Press(waves, FOOTPRINT * self._extents, self._convex) for geom, waves in self._waves.items()
         }
         self.skip()
 

@@ -53,7 +53,7 @@ class SpeedCheck:
             for other in range(model.ngeom)
             if np.isfinite(extents[other])
             and bodies[other] != bodies[target]
-            and _collide(model, target, other)
+            and can_collide(model, target, other)
             and (sdf[target] or sdf[other] or not in_time)
         ]
         self._target, self._other = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
@@ -107,7 +107,8 @@ class SpeedCheck:
         )
 
 
-def _collide(model: mujoco.MjModel, first: int, second: int) -> bool:
+def can_collide(model: mujoco.MjModel, first: int, second: int) -> bool:
+    """Whether MuJoCo's bit masks let two geoms collide."""
     types, affinities = model.geom_contype, model.geom_conaffinity
     return bool(types[first] & affinities[second] or types[second] & affinities[first])
 

@@ -8,12 +8,20 @@ from ripple_sim import Material, Ripples
 GRAVITY = 9.81
 
 
-def run(two_way: bool, speed: float = 2.0, target: str = "", mass: float = 0.2):
-    """A ball at rest on a block under which the surface starts to move outwards; heights, and momenta over time."""
+def run(
+    two_way: bool,
+    speed: float = 2.0,
+    target: str = "",
+    mass: float = 0.2,
+    gap: float = -1e-4,
+    gravity: float = GRAVITY,
+):
+    """Let a ring run to a ball on a block, or above it: heights, and over time both momenta and the speed under it."""
     model = mujoco.MjModel.from_xml_string(
-        f"""<mujoco><option timestep="0.001"/><worldbody><body name="block" pos="0 0 -0.2">{target}
+        f"""<mujoco><option timestep="0.001" gravity="0 0 {-gravity}"/><worldbody>
+        <body name="block" pos="0 0 -0.2">{target}
         <geom name="block" type="box" size="0.5 0.5 0.2" mass="5"/></body>
-        <body name="ball" pos="0 0 0.0499"><freejoint/><geom name="ball" size="0.05" mass="{mass}"/></body>
+        <body name="ball" pos="0 0 {0.05 + gap}"><freejoint/><geom name="ball" size="0.05" mass="{mass}"/></body>
         </worldbody></mujoco>"""
     )
     data = mujoco.MjData(model)
@@ -31,7 +39,8 @@ def run(two_way: bool, speed: float = 2.0, target: str = "", mass: float = 0.2):
         joints = data.qvel[2::6] if target else data.qvel[2:3]
         masses = [5.0, mass] if target else [mass]
         heights.append(float(data.body("ball").xpos[2]) - 0.05)
-        total.append((data.time, float(np.dot(masses, joints)), waves.momentum()))
+        under = float(waves.velocity[(away < 0.03) & (place[..., 2] > 0.19)].max())
+        total.append((data.time, float(np.dot(masses, joints)), waves.momentum(), under))
     return np.array(heights), np.array(total), waves
 
 
@@ -46,7 +55,7 @@ def test_passing_ripple_kicks_a_resting_ball_only_if_it_may() -> None:
 
 def test_ball_and_surface_exchange_momentum_and_keep_the_sum() -> None:
     _, total, _ = run(two_way=True)
-    time, ball, surface = total.T
+    time, ball, surface, _ = total.T
     # gravity is all that acts from outside: no springs, no damping. Until 0.1 s nothing is owed from a long contact.
     early = time < 0.1
     start = surface[0] + ball[0] + 0.2 * GRAVITY * time[0]
@@ -60,13 +69,24 @@ def test_ball_and_surface_exchange_momentum_and_keep_the_sum() -> None:
 def test_free_target_recoils() -> None:
     """The rigid bodies alone keep their momentum: what the ball gains, the block under it loses."""
     _, total, _ = run(two_way=True, target="<freejoint/>")
-    time, bodies, _ = total.T
+    time, bodies, _, _ = total.T
     np.testing.assert_allclose(bodies, -5.2 * GRAVITY * time, atol=2e-3)
 
 
 def test_ball_is_never_thrown_faster_than_the_surface_moves() -> None:
     _, total, _ = run(two_way=True, speed=3.0, mass=0.001)
-    assert 0.3 < total[:, 1].max() / 0.001 < 3.0
+    fastest, surface = total[:, 1].max() / 0.001, total[:, 3].max()
+    assert 0.5 * surface < fastest < surface
+
+
+def test_ripple_reaches_a_ball_that_hovers_as_high_as_the_wave_only() -> None:
+    """MuJoCo sees no contact; the ball is met by the displaced surface, and what it gains the surface loses."""
+    heights, total, _ = run(two_way=True, speed=4.0, mass=0.05, gap=0.004, gravity=0.0)
+    assert heights[-1] > 0.05
+    _, ball, surface, _ = total.T
+    np.testing.assert_allclose((ball + surface)[1:], surface[0], rtol=1e-4)
+    missed, _, _ = run(two_way=True, speed=4.0, mass=0.05, gap=0.5, gravity=0.0)
+    np.testing.assert_array_equal(missed, missed[0])
 
 
 def test_forces_of_others_stay() -> None:
