@@ -15,14 +15,20 @@ from ripple_sim.solver.gl import GLContext
 from .camera import orthographic
 from .color import linear
 from .frame import FrameUniforms
+from .lights import Light
 from .materials import FLAT_IMAGE, Textures, mapping_of, texture_pixels
 from .owned import OwnedObjects
 from .pieces import geom_piece
 from .shadow import ShadowMap
 
 _PACKAGE = "ripple_sim.render"
+_CEILING_UNIT = 3  # of the texture, in shaders/floor_occlusion_fragment.glsl
 _CEILING_SIZE, _MAP_SIZE = 224, 112
 _ENDLESS = 1e9  # half size of a plane without an end [m]
+_SOFT = 0.1  # margin about shadows for their soft edges, in half widths of the map
+_LOWEST_SINE = 0.02  # elevation of a lamp at which shadows have no end
+
+_CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(8, 3)  # of a box about a ball
 
 
 def find_floor(model: Any, geoms: list[int]) -> int | None:
@@ -49,7 +55,9 @@ class Floor:
         self.reflectance = 0.0 if piece.material < 0 else float(model.mat_reflectance[piece.material])
         half = np.asarray(model.geom_size[geom][:2], dtype=np.float64)
         self._half = np.where(half > 0, half, _ENDLESS)
-        self._occlude = ctx.vertex_array(ctx.own(gl.program(_PACKAGE, "screen_vertex", "floor_occlusion_fragment")), [])
+        self._occlude = ctx.vertex_array(
+            ctx.own(gl.program(_PACKAGE, "screen_vertex", "floor_occlusion_fragment", NEAR_LAMPS=1)), []
+        )
         self._ceiling = ctx.depth_texture((_CEILING_SIZE, _CEILING_SIZE))
         self._ceiling.compare_func = ""
         self._ceiling.repeat_x = self._ceiling.repeat_y = False
@@ -71,6 +79,21 @@ class Floor:
         frame.set_vector("floor_normal", rotation[:, 2])
         frame.set_vector("floor_albedo", self.albedo)
         frame.set_vector("floor_map", [local[0], local[1], self._half_width])
+
+    def shade(self, frame: FrameUniforms, light: Light, centres: NDArray, radii: NDArray) -> None:
+        """Set the part of the floor that the shadows of some balls [m] may fall on."""
+        points = centres[:, None] + radii[:, None, None] * _CORNERS
+        towards = light.direction if light.position is None else light.position - points
+        height = np.maximum((points - self.origin) @ self.normal, 0.0)
+        rise = np.broadcast_to(towards @ self.normal, height.shape)
+        low = rise < _LOWEST_SINE * np.linalg.norm(towards, axis=-1)
+        shadows = points - towards * (height / np.where(low, 1.0, rise))[..., None]
+        local = ((shadows - self.origin) @ self._rotation)[..., :2] - self._centre[:2]
+        least, most = local.min(axis=(0, 1)), local.max(axis=(0, 1))
+        if low.any():
+            least, most = np.full(2, -_ENDLESS), np.full(2, _ENDLESS)
+        box = 0.5 + 0.5 * np.concatenate([least / self._half_width - _SOFT, most / self._half_width + _SOFT])
+        frame.values["floor_shade"] = box
 
     @property
     def normal(self) -> NDArray[np.float64]:
@@ -94,8 +117,8 @@ class Floor:
         draw_depth(tuple(matrix.T.ravel()))
         self._openness_target.use()
         ctx.disable(moderngl.DEPTH_TEST)
-        shadow.bind_depth()
-        self._ceiling.use(2)
+        shadow.bind()
+        self._ceiling.use(_CEILING_UNIT)
         self._occlude.program["extent"] = (2 * self._half_width, top, 0.35 * self._half_width)
         self._occlude.render(moderngl.TRIANGLES, vertices=3)
         self._openness.build_mipmaps()

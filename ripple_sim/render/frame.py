@@ -42,6 +42,7 @@ _FRAME = np.dtype(
         ("floor_light", "f4", 4),
         ("floor_map", "f4", 4),
         ("floor_fade", "f4", 4),
+        ("floor_shade", "f4", 4),
         ("lights", _LIGHT, MAX_LIGHTS),
         ("counts", "f4", 4),
     ]

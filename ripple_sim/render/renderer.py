@@ -209,7 +209,8 @@ class Renderer:
         frame = self._frame
         self._view_projection = frame.set_camera(pose, self.width / self.height)
         self._balls = self._bounding_balls(data)
-        centre, radius = self._extent(pose)
+        casters = self._casters(pose)
+        centre, radius = _ball_about(*casters) if len(casters[1]) else (pose.focus, pose.distance)
         if self._floor is not None:
             self._floor.place(frame, data, centre, radius)
         lighting = studio_lighting(pose) if self._studio else model_lighting(self._model, data, pose)
@@ -220,6 +221,8 @@ class Renderer:
         light_view = None
         if lighting.lights and lighting.lights[0].shadow:
             light_view = tuple(self._shadow.fit(frame, lighting.lights[0], centre, radius).T.ravel())
+            if self._floor is not None and len(casters[1]):
+                self._floor.shade(frame, lighting.lights[0], *casters)
         frame.set_vector("counts", [occluders, len(lighting.lights), exposure], float(light_view is not None))
         frame.bind()
         return light_view
@@ -229,16 +232,12 @@ class Renderer:
         balls = [self._bodies.balls(data), self._bodies.planes(data), *(target.ball() for target in self._targets)]
         return np.concatenate([b[0] for b in balls]), np.concatenate([b[1] for b in balls])
 
-    def _extent(self, pose: Pose) -> tuple[NDArray[np.float64], float]:
-        """Return centre and radius [m] of a ball about all that casts shadows near the camera's focus."""
+    def _casters(self, pose: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Balls about all that casts shadows near the camera's focus: centres [k, 3] and radii [k], in metres."""
         centres, radii = self._balls
         near = np.linalg.norm(centres - pose.focus, axis=1) - radii < _SHADOW_REACH * pose.distance
         near &= np.isfinite(radii)
-        if not near.any():
-            return pose.focus, pose.distance
-        centres, radii = centres[near], radii[near, None]
-        centre = ((centres - radii).min(axis=0) + (centres + radii).max(axis=0)) / 2
-        return centre, float((np.linalg.norm(centres - centre, axis=1) + radii[:, 0]).max())
+        return centres[near], radii[near]
 
     def _draw_maps(self, ctx: moderngl.Context, light_view: tuple[float, ...] | None) -> None:
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
@@ -289,3 +288,9 @@ class Renderer:
         for centre, radius, number, draw in layers:
             box = boxes_of(centre[None], np.array([radius]), pose, (self.width, self.height))[0]
             self._picture.add_layer(ctx, number, draw, box)
+
+
+def _ball_about(centres: NDArray[np.float64], radii: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Centre and radius of a ball that holds others, [k, 3] and [k]."""
+    centre = ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0)) / 2
+    return centre, float((np.linalg.norm(centres - centre, axis=1) + radii).max())

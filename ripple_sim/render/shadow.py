@@ -76,11 +76,6 @@ class ShadowMap:
         rotation = _axes(towards)
         return perspective(float(np.degrees(2 * half)), 1.0, near, far) @ _view(rotation, rotation @ position)
 
-    def bind_depth(self) -> None:
-        """Bind the map for the shader of the floor's map."""
-        self._test.clear(1)  # the last frame's would go on testing depths
-        self._depth.use(1)
-
     def bind(self) -> None:
         """Bind the map for the shaders, once with and once without the depth test."""
         self._depth.use(1)

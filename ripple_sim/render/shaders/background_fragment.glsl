@@ -32,13 +32,12 @@ const float HORIZON = -1.0;
 #endif
 
 #if !SHADOW
-// Whether the first light's shadow may fall on a point of the floor; `near` is what the floor's map says of it.
-bool may_be_shaded(vec2 place, vec2 near, vec3 world)
+// Whether the first light's shadow may fall on a place of the floor; `near` is what the floor's map says of it.
+bool may_be_shaded(vec2 place, vec2 near)
 {
     vec2 off = abs(place - 0.5);
-    vec4 clip = shadow_matrix * vec4(world, 1.0);
-    vec2 aside = abs(clip.xy / clip.w - 0.5);
-    return max(off.x, off.y) < 0.5 ? near.g > 0.0 : max(aside.x, aside.y) < 0.5 && clip.w > 0.0 && counts.w > 0.0;
+    bool boxed = all(greaterThan(place, floor_shade.xy)) && all(lessThan(place, floor_shade.zw));
+    return counts.w > 0.0 && boxed && (max(off.x, off.y) > 0.5 || near.g > 0.0);
 }
 #endif
 
@@ -69,7 +68,7 @@ void main()
 #else
     const float shadow = 1.0, share = 1.0;
     // blocks of pixels go together, so that their shadows can be averaged
-    bool shaded = block_mean(at < MISSED && may_be_shaded(place, near, world) ? 1.0 : 0.0) > 0.0;
+    bool shaded = block_mean(at < MISSED && may_be_shaded(place, near) ? 1.0 : 0.0) > 0.0;
     gl_FragDepth = shaded ? SHADED_LEVEL : OPEN_LEVEL;
 #endif
 #if NEAR_LAMPS

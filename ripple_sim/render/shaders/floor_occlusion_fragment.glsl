@@ -2,9 +2,10 @@
 // Share of the sky that a point of the floor sees, from the height of what hangs above it: the form factor of
 // horizontal patches at height h and horizontal distance d, h^2 / (pi (h^2 + d^2)^2) per unit area.
 #include "frame.glsl"
+#include "development.glsl"
+#include "shadow.glsl"
 
-layout(binding = 2) uniform sampler2D ceiling;  // 0 at the floor, 1 at the top
-layout(binding = 1) uniform sampler2D shadow_map;
+layout(binding = 3) uniform sampler2D ceiling;  // 0 at the floor, 1 at the top
 
 uniform vec3 extent;  // width of the map [m], height of its top [m], radius of influence [m]
 
@@ -21,15 +22,18 @@ bool is_shaded(vec3 world)
     vec3 p = clip.xyz / clip.w;
     vec2 off = abs(p.xy - 0.5);
     float texel = floor_map.z * dFdx(screen.x);
-    float away = lights[0].position.w > 0.0 ? distance(lights[0].position.xyz, world) : 0.0;
-    float reach = shadow_penumbra.z + texel / (shadow_width.x + shadow_width.y * away);
+    float to_lamp = lamp_distance(p.z), margin = texel / (shadow_width.x + shadow_width.y * to_lamp);
+    float reach = shadow_penumbra.z + margin, closest = 1e9, widest = 0.0;
     vec2 direction = vec2(1.0, 0.0);
-    bool any = false;
     for (int i = 0; i < SHADOW_TAPS; ++i) {
-        vec2 offset = reach * sqrt((float(i) + 0.5) / float(SHADOW_TAPS)) * direction;
-        direction = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888) * direction;
-        any = any || textureLod(shadow_map, p.xy + offset, 0.0).r < 1.0;
+        float offset = reach * sqrt((float(i) + 0.5) / float(SHADOW_TAPS));
+        direction = TURN * direction;
+        float depth = textureLod(shadow_map, p.xy + offset * direction, 0.0).r;
+        closest = depth < 1.0 ? min(closest, offset) : closest;
+        widest = depth < 1.0 ? max(widest, penumbra_of(lamp_distance(depth), to_lamp)) : widest;
     }
+    // between two points may be something closer
+    bool any = closest < widest + margin + 0.3 * reach;
     return counts.w > 0.0 && clip.w > 0.0 && any && max(off.x, off.y) < 0.5 + reach;
 }
 
@@ -44,7 +48,7 @@ void main()
         // radii grow with the square of the index: contacts want dense samples, and their area goes with it
         float s = (float(i) + 0.5) / float(TAPS);
         float distance = extent.z * s * s, area = 6.2831853 * distance * 2.0 * extent.z * s / float(TAPS);
-        direction = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888) * direction;  // by the golden angle
+        direction = TURN * direction;
         float height = textureLod(ceiling, uv + distance * direction / extent.x, 0.0).r;
         float h = max(height * extent.y, 0.6 * texel), r2 = h * h + distance * distance;
         covered += height < 1.0 ? h * h * area / (3.14159265 * r2 * r2) : 0.0;

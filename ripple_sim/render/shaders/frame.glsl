@@ -32,6 +32,7 @@ layout(std140, binding = 0) uniform Frame {
     vec4 floor_light;      // irradiance of the floor over pi where nothing shades it
     vec4 floor_map;        // occlusion map: xy centre, z half width [m]
     vec4 floor_fade;       // x, y: from where to where, in distances of the focus, it fades into the background
+    vec4 floor_shade;      // box about the first light's shadows, in the occlusion map: lower and upper corner
     Light lights[8];       // the first one casts shadows
     vec4 counts;           // x: occluders, y: lights, z: number of the exposure, w: 1 with a shadow
 };

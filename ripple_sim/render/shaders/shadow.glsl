@@ -14,6 +14,14 @@ float lamp_distance(float depth)
     return (shadow_depth.x * depth + shadow_depth.y) / (shadow_depth.z * depth + shadow_depth.w);
 }
 
+// Radius of the penumbra, in the map, on what lies behind a blocker; both by their distance from the lamp [m].
+float penumbra_of(float blocker, float behind)
+{
+    float blur = shadow_penumbra.x + shadow_penumbra.y / max(blocker, 1e-6);
+    float width = shadow_width.x + shadow_width.y * behind;
+    return min((behind - blocker) * blur / width, shadow_penumbra.z);
+}
+
 // Share of the first light that arrives. The normal is that of the surface at large; `lift` [m] raises the position
 // above bumps that shall not shade each other.
 float key_visibility(vec3 position, vec3 normal, float lift)
@@ -54,8 +62,7 @@ float key_visibility(vec3 position, vec3 normal, float lift)
         blockers += blocks;
     }
     float blocker = lamp_distance(depth / max(blockers, 1.0));
-    float blur = shadow_penumbra.x + shadow_penumbra.y / max(blocker, 1e-6);
-    float penumbra = clamp((to_lamp - blocker) * blur / width, 1.5 / shadow_width.z, widest);
+    float penumbra = max(penumbra_of(blocker, to_lamp), 1.5 / shadow_width.z);
     float lit = 0.0;
     taps = blockers > 0.0 && blockers < float(SEARCH_TAPS) ? FILTER_TAPS : 0;
     for (int i = 0; i < taps; ++i) {
