@@ -99,6 +99,8 @@ class FrameSource:
         The picture is drawn so many times as wide and high, and averaged in linear light.
     transparent : bool
         Frames have a fourth channel, their opacity: the background is left out.
+    linear : bool
+        Frames are linear light, float16, multiplied by opacity; otherwise sRGB, uint8.
     annotate : callable, optional
         What the surfaces are to be drawn as.
     gl : GLContext, optional
@@ -113,6 +115,7 @@ class FrameSource:
         height: int,
         supersample: int = 1,
         transparent: bool = False,
+        linear: bool = False,
         annotate: Callable[[Surface], Surface] = lambda surface: surface,
         gl: GLContext | None = None,
     ) -> None:
@@ -134,10 +137,11 @@ class FrameSource:
             height=supersample * height,
             lighting=simulation.scene.lighting,
             alpha=transparent,
+            linear=linear,
         )
 
-    def draw(self, state: Snapshot) -> NDArray[np.uint8] | None:
-        """Draw an exposure; return the frame after its last, uint8 [height, width, 3], or 4 if it is transparent."""
+    def draw(self, state: Snapshot) -> NDArray | None:
+        """Draw an exposure; return the frame after its last, [height, width, 3], or 4 if it is transparent."""
         self.submit(state)
         return self.fetch()
 
@@ -152,7 +156,7 @@ class FrameSource:
             camera = ThroughLens(camera, tuple(lens), focus)
         self.renderer.submit(state.data, reliefs, camera, state.exposure)
 
-    def fetch(self) -> NDArray[np.uint8] | None:
+    def fetch(self) -> NDArray | None:
         """Wait for the earliest submitted snapshot's picture, and return it as `draw` does."""
         return self._sensor.expose(self.renderer.fetch())
 

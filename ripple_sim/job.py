@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 import mujoco
@@ -72,6 +73,7 @@ def render_video(
     focus: float | str | tuple[float, float, float] | None = None,
     exposures: int | None = None,
     transparent: bool = False,
+    frame_format: str = "png",
     overlay: Sequence[str] | None = None,
     compare: str | None = None,
     resolution: int | None = None,
@@ -89,7 +91,7 @@ def render_video(
     ----------
     scene : Scene
     output : path
-        .mp4, .webm, .gif, .webp, or a folder for PNG frames. It appears when it is whole.
+        .mp4, .webm, .gif, .webp, or a folder for frames. It appears when it is whole.
     size : (width, height)
         [pixels].
     fps : int
@@ -110,7 +112,10 @@ def render_video(
     exposures : int, optional
         A frame is the mean of so many, each at its own moment and through its own point of the lens.
     transparent : bool
-        Leave the background out, for .webp and PNG frames, without overlays.
+        Leave the background out, for .webp and a folder of frames.
+    frame_format : str
+        Of a folder's frames: "png", or "exr" for linear light before tone mapping, in half floats, without overlays
+        (needs the package OpenEXR).
     overlay : sequence of str, optional
         What is drawn over the picture, instead of what the scene says; see `parse_request`.
     compare : str, optional
@@ -133,10 +138,12 @@ def render_video(
     # MuJoCo would write its warnings to a file in the current folder; `Simulation` reports those that matter
     mujoco.set_mju_user_warning(lambda message: None)
     output, (width, height) = Path(output), size
-    check_output(output, width, height, fps, transparent=transparent)
-    scene = with_exposure(scene, shutter=shutter, aperture=aperture, focus=focus, exposures=exposures)
     overlay, operators = scene.overlay if overlay is None else overlay, compared_operators(compare)
     request = parse_request(overlay)
+    overlaid = bool(overlay) or len(operators) > 1
+    check_output(output, width, height, fps, transparent=transparent, frame_format=frame_format, overlaid=overlaid)
+    scene = with_exposure(scene, shutter=shutter, aperture=aperture, focus=focus, exposures=exposures)
+    linear = frame_format == "exr"
     count = _frame_count(scene.duration if duration is None else duration, fps, slow_motion)
     gl = shared_context()
     job = {
@@ -150,16 +157,25 @@ def render_video(
         "the camera's focus": str(scene.camera.focus or "what the camera looks at"),
         "the camera's exposures": scene.camera.exposures,
         "transparency": transparent,
+        "the frame format": frame_format,
         "the overlays": ",".join(overlay),
         "the operators": ",".join(operators),
         "the resolution": resolution or "the scene's",
         "the wave solver": auto_backend() if backend == "auto" else backend,
         **provenance(scene, gl),
+        **({"the version of OpenEXR": version("OpenEXR")} if linear else {}),
     }
     # software draws on the processor, which has enough to do with one frame
     ahead = 0 if gl.software else 1
     with open_writer(
-        output, width=width, height=height, fps=fps, transparent=transparent, job=job, resume=resume
+        output,
+        width=width,
+        height=height,
+        fps=fps,
+        transparent=transparent,
+        frame_format=frame_format,
+        job=job,
+        resume=resume,
     ) as writer:
         resumed_at = writer.frames
         rate = fps * slow_motion
@@ -177,6 +193,7 @@ def render_video(
             operators=operators,
             supersample=supersample,
             transparent=transparent,
+            linear=linear,
             gl=gl,
         )
         states = film.states(alive=_WAITING + ahead + 2)

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class _Video:
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
-    """Name of the video, ending in .mp4, .webm, .gif or .webp, or without ending for a folder of PNG frames."""
+    """Name of the video, ending in .mp4, .webm, .gif or .webp, or without ending for a folder of frames."""
     size: Size = (1280, 720)
     """Frame size in pixels."""
     fps: FrameRate = None
@@ -64,7 +64,9 @@ class _Video:
     exposures: Exposures = None
     """A frame is the mean of so many pictures, where shutter or aperture blur it; more are smoother and take longer."""
     transparent: bool = False
-    """Leave the background out (.webp and PNG frames)."""
+    """Leave the background out (.webp and folders of frames)."""
+    frame_format: Literal["png", "exr"] = "png"
+    """Of a folder's frames: EXR is linear light, without overlays (needs the package OpenEXR)."""
     overlay: Overlay = None
     """Draw over the picture: height or velocity in colours, contacts, grid, time, energy; such as
     height,contacts,time or velocity=0.5,energy, where 0.5 m/s is the end of the colours."""
@@ -96,7 +98,14 @@ class _Video:
             parse_request(self.overlay)
         compared_operators(self.compare)
         fps = self.fps or default_fps(self.output)
-        check_output(self.output, *self.size, fps, transparent=self.transparent)
+        check_output(
+            self.output,
+            *self.size,
+            fps,
+            transparent=self.transparent,
+            frame_format=self.frame_format,
+            overlaid=bool(self.overlay) or self.compare is not None,
+        )
 
         from ..job import render_video
         from ..solver.gl import select_device, shared_context
@@ -124,6 +133,7 @@ class _Video:
                 focus=self.focus,
                 exposures=self.exposures,
                 transparent=self.transparent,
+                frame_format=self.frame_format,
                 overlay=self.overlay,
                 compare=self.compare,
                 resolution=self.resolution,

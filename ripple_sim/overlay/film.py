@@ -66,8 +66,8 @@ class Film:
         Frames in a second of the scene's time.
     operators : sequence of str
         Those of the runs, for their titles where there are two.
-    supersample, transparent
-        As for `FrameSource`.
+    supersample, transparent, linear
+        As for `FrameSource`; linear frames are without overlays, and of one run.
     gl : GLContext, optional
         By default the process's shared one.
 
@@ -89,12 +89,18 @@ class Film:
         operators: Sequence[str] = (),
         supersample: int = 1,
         transparent: bool = False,
+        linear: bool = False,
         gl: GLContext | None = None,
     ) -> None:
         self.simulations, self._request, self._frames = simulations, request, frames
         self._layout = Layout(width, height)
         self._notebook = Notebook(request, simulations, frames, rate)
-        self._drawing: dict[str, Any] = {"supersample": supersample, "transparent": transparent, "gl": gl}
+        self._drawing: dict[str, Any] = {
+            "supersample": supersample,
+            "transparent": transparent,
+            "linear": linear,
+            "gl": gl,
+        }
         self._sources: list[FrameSource] = []
         self._submitted: deque[Shot] = deque()
         self._marks: list[list[PlacedMark]] = []
@@ -126,7 +132,7 @@ class Film:
                 notes = self._notebook.follow()
             yield Shot(snapshots, notes)
 
-    def draw_all(self, shots: Iterable[Shot], ahead: int = 0) -> Iterator[NDArray[np.uint8]]:
+    def draw_all(self, shots: Iterable[Shot], ahead: int = 0) -> Iterator[NDArray]:
         """Draw frames in their order, as `draw` does, and wait for each shot when `ahead` later ones are submitted."""
         for shot in shots:
             self.submit(shot)
@@ -136,8 +142,8 @@ class Film:
             if (frame := self.fetch()) is not None:
                 yield frame
 
-    def draw(self, shot: Shot) -> NDArray[np.uint8] | None:
-        """Draw an exposure; return the frame after its last, uint8 [height, width, 3], or 4 if it is transparent."""
+    def draw(self, shot: Shot) -> NDArray | None:
+        """Draw an exposure; return the frame after its last, [height, width, 3], or 4 if it is transparent."""
         self.submit(shot)
         return self.fetch()
 
@@ -157,7 +163,7 @@ class Film:
         self._submitted.append(shot)
         self.seconds += time.perf_counter() - start
 
-    def fetch(self) -> NDArray[np.uint8] | None:
+    def fetch(self) -> NDArray | None:
         """Wait for the earliest submitted exposure, and return what `draw` does."""
         start = time.perf_counter()
         shot = self._submitted.popleft()
@@ -168,7 +174,7 @@ class Film:
         self.seconds += time.perf_counter() - start
         return frame
 
-    def _composed(self, pictures: list[NDArray[np.uint8]], shot: Shot) -> NDArray[np.uint8]:
+    def _composed(self, pictures: list[NDArray], shot: Shot) -> NDArray:
         """The pictures of the runs side by side, under the overlays."""
         for picture, marks in zip(pictures, self._marks, strict=True):
             draw_marks(picture, marks, self._layout)

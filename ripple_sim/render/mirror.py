@@ -39,7 +39,7 @@ class Mirror:
         self._aspect = size[0] / size[1]
         self._frame = FrameUniforms(ctx)
         self._picture = Picture(gl, ctx, half, samples=0, cut_out=False, floor=None, options=options)
-        self._image = ctx.texture(half, 4)
+        self._image = ctx.texture(half, 4, dtype=self._picture.dtype)
         self._image.repeat_x = self._image.repeat_y = False
         self._target = ctx.framebuffer([self._image])
 

@@ -43,7 +43,14 @@ class Picture:
         Whether the background stays transparent and the floor shows nothing but shadows.
     floor : Floor, optional
     options : dict
-        SKYBOX and NEAR_LAMPS, 0 or 1: whether the light knows them.
+        0 or 1 each: SKYBOX and NEAR_LAMPS, whether the light knows them; LINEAR, whether the frame is linear light.
+
+    Attributes
+    ----------
+    frame : moderngl.Framebuffer
+        The composed picture, multiplied by alpha.
+    dtype : str
+        Of its channels, in moderngl's words.
 
     Raises
     ------
@@ -81,8 +88,10 @@ class Picture:
                 layer.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._layers = [depth, *layers]
         self._samples = ctx.framebuffer(layers, depth)
-        self.frame = ctx.framebuffer([ctx.renderbuffer(size, 4)], ctx.depth_renderbuffer(size))
-        self._behind = ctx.texture(size, 4, internal_format=SRGB8_ALPHA8)
+        self.dtype = "f2" if options["LINEAR"] else "f1"
+        self.frame = ctx.framebuffer([ctx.renderbuffer(size, 4, dtype=self.dtype)], ctx.depth_renderbuffer(size))
+        linear_light = {"dtype": "f2"} if options["LINEAR"] else {"internal_format": SRGB8_ALPHA8}
+        self._behind = ctx.texture(size, 4, **linear_light)
         self._behind.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         self._behind.repeat_x = self._behind.repeat_y = False
         self._behind_frame = ctx.framebuffer([self._behind])

@@ -28,12 +28,16 @@ class Readback:
         [pixels].
     alpha : bool
         Whether opacity is kept.
+    linear : bool
+        Whether frames are linear light: they then come back as they are.
     """
 
-    def __init__(self, gl: GLContext, ctx: OwnedObjects, size: tuple[int, int], *, alpha: bool) -> None:
-        self._gl, self._ctx, self._alpha = gl, ctx, alpha
+    def __init__(
+        self, gl: GLContext, ctx: OwnedObjects, size: tuple[int, int], *, alpha: bool, linear: bool = False
+    ) -> None:
+        self._gl, self._ctx, self._alpha, self._linear = gl, ctx, alpha, linear
         # always four channels: drivers copy those as they are, and convert any other number on the processor
-        self._pixels = np.empty((size[1], size[0], 4), np.uint8)
+        self._pixels = np.empty((size[1], size[0], 4), np.uint16 if linear else np.uint8)
         self._free: list[moderngl.Buffer] = []
         self._pending: deque[tuple[moderngl.Buffer, int]] = deque()
 
@@ -43,22 +47,23 @@ class Readback:
         Parameters
         ----------
         frame : moderngl.Framebuffer
-            RGBA8, bottom row first, multiplied by alpha.
+            RGBA8, or RGBA16F of linear light; bottom row first, multiplied by alpha.
         """
         with self._gl:
             if self._gl.software:  # it would draw the frame in the next call, and keep other Python threads waiting
                 self._gl.wait()
             buffer = self._free.pop() if self._free else self._ctx.buffer(reserve=self._pixels.nbytes, dynamic=True)
-            frame.read_into(buffer, components=4, alignment=1)
+            frame.read_into(buffer, components=4, alignment=1, dtype="f2" if self._linear else "f1")
             self._pending.append((buffer, self._gl.put_fence()))
 
-    def fetch(self) -> NDArray[np.uint8]:
+    def fetch(self) -> NDArray:
         """Wait for the earliest frame that is on its way.
 
         Returns
         -------
-        array of uint8, shape [height, width, 3], or [height, width, 4] with alpha
-            Top row first; alpha is straight. A fresh array for every frame.
+        array, shape [height, width, 3], or [height, width, 4] with alpha
+            Top row first; a fresh array for every frame. uint8, alpha straight; or, of linear light, float16,
+            multiplied by alpha.
 
         Raises
         ------
@@ -72,8 +77,10 @@ class Readback:
             self._gl.wait_for(fence)
             buffer.read_into(self._pixels)
         self._free.append(buffer)
-        frame = np.empty((*self._pixels.shape[:2], 4 if self._alpha else 3), np.uint8)
+        frame = np.empty((*self._pixels.shape[:2], 4 if self._alpha else 3), self._pixels.dtype)
         _turn(self._pixels, frame)
+        if self._linear:
+            return frame.view(np.float16)
         if self._alpha:
             _straighten(frame)
         return frame

@@ -53,11 +53,14 @@ class Renderer:
         where the MJCF sets no lamp.
     alpha : bool
         Frames have an alpha channel: the background is transparent, and of the floor nothing but the shadows is left.
+    linear : bool
+        Frames are linear light as it was before tone mapping, in half floats.
 
     Raises
     ------
     RippleError
-        If the driver cannot make frames of this size, or a look or the lighting is unknown.
+        If the driver cannot make frames of this size, a look or the lighting is unknown, or linear frames are to show a
+        field or a grid, whose colours are the screen's.
     """
 
     def __init__(
@@ -71,9 +74,12 @@ class Renderer:
         samples: int = 4,
         lighting: str = "auto",
         alpha: bool = False,
+        linear: bool = False,
     ) -> None:
         if lighting not in LIGHTING:
             raise RippleError(f"lighting is {lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
+        if linear and any(surface.field_colors is not None or surface.grid for surface in targets.values()):
+            raise RippleError("fields and grids have the screen's colours, which linear light lacks: take linear=False")
         warn_of_undrawn(model)
         self.width, self.height = width, height
         self._gl, self._model = gl, model
@@ -97,6 +103,7 @@ class Renderer:
             options = {
                 "SKYBOX": int(self._sky is not None),
                 "NEAR_LAMPS": int(not self._studio and has_near_lamps(model)),
+                "LINEAR": int(linear),
             }
             self._picture = Picture(
                 gl, ctx, (width, height), samples=samples, cut_out=alpha, floor=self._floor, options=options
@@ -105,7 +112,7 @@ class Renderer:
             if self._floor is not None and self._floor.reflectance > 0.0 and not alpha:
                 self._mirror = Mirror(gl, ctx, (width, height), options)
             self._bodies = Bodies(gl, ctx, model, [geom for geom in geoms if geom != floor], textures, self._table)
-        self._readback = Readback(gl, ctx, (width, height), alpha=alpha)
+        self._readback = Readback(gl, ctx, (width, height), alpha=alpha, linear=linear)
 
     def __enter__(self) -> Renderer:
         return self
@@ -136,7 +143,7 @@ class Renderer:
 
     def render(
         self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
-    ) -> NDArray[np.uint8]:
+    ) -> NDArray:
         """Draw one frame.
 
         Parameters
@@ -152,8 +159,9 @@ class Renderer:
 
         Returns
         -------
-        array of uint8, shape [height, width, 3], or [height, width, 4] with alpha
-            sRGB, top row first; alpha is straight. A fresh array for every frame.
+        array, shape [height, width, 3], or [height, width, 4] with alpha
+            Top row first; a fresh array for every frame. uint8 in sRGB, alpha straight; or, of linear light, float16,
+            with ITU-R BT.709's primaries, multiplied by alpha.
         """
         self.submit(data, reliefs, camera, exposure)
         return self.fetch()
@@ -165,7 +173,7 @@ class Renderer:
         with self._gl:
             self._readback.submit(self.draw(data, reliefs, camera, exposure))
 
-    def fetch(self) -> NDArray[np.uint8]:
+    def fetch(self) -> NDArray:
         """Wait for the earliest submitted frame, and return it as `render` does."""
         return self._readback.fetch()
 
@@ -177,7 +185,8 @@ class Renderer:
         Returns
         -------
         moderngl.Framebuffer
-            RGBA8, bottom row first, sRGB, multiplied by alpha. The next frame is drawn over it.
+            RGBA8 in sRGB, or RGBA16F of linear light; bottom row first, multiplied by alpha. The next frame is drawn
+            over it.
         """
         pose = camera.pose()
         with self._gl as ctx:

@@ -19,7 +19,7 @@ flat in vec3 around;  // ambient light on the open floor
 out vec4 fragment;
 
 #if MIRROR
-layout(binding = 14) uniform sampler2D mirror;  // the scene as the floor reflects it, sRGB
+layout(binding = 14) uniform sampler2D mirror;  // the scene as the floor reflects it, developed
 
 uniform float reflectance;
 #endif

@@ -1,9 +1,20 @@
-// From linear radiance to the picture.
+// From linear radiance to the picture; with LINEAR that is the radiance itself.
 float gradient_noise(vec2 pixel)
 {
     return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))));
 }
 
+#if LINEAR
+vec3 developed(vec3 radiance)
+{
+    return clamp(radiance, 0.0, 65504.0);  // what half floats hold
+}
+
+vec3 dithered(vec3 color)
+{
+    return color;
+}
+#else
 // Linear radiance to sRGB: values under the shoulder keep hue and contrast, brighter ones roll off towards white.
 vec3 developed(vec3 radiance)
 {
@@ -20,3 +31,4 @@ vec3 dithered(vec3 color)
 {
     return color + (gradient_noise(gl_FragCoord.xy) - 0.5) / 255.0;
 }
+#endif
