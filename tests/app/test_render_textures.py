@@ -1,8 +1,13 @@
 """Where the pictures of MuJoCo's materials lie on its geoms, as in mujoco.Renderer since 3.12."""
 
+import os
+import subprocess
+import sys
+
 import mujoco
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from ripple_sim.render import Camera, Renderer, Surface, meshes
 from ripple_sim.render.materials import FLAT_IMAGE, mapping_of
@@ -143,3 +148,74 @@ def test_a_mesh_keeps_its_texture_coordinates():
     assert (mapping.kind, mapping.own, mapping.tiling) == (FLAT_IMAGE, True, (3.0, 2.0, 0.0, 0.0))
     shape = meshes.mesh_asset(model, 0)
     assert {tuple(uv) for uv in shape.uv} == {(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)}
+
+
+# All primitives, turned in all directions, in sight of a camera above them
+SHELF = "".join(
+    f'<geom type="{kind}" size="{size}" pos="{place} 0" euler="{turn}" material="m"/>'
+    for kind, size, place, turn in [
+        ("sphere", ".4", "-1.1 .55", "30 20 40"),
+        ("ellipsoid", ".45 .3 .35", "0 .55", "70 20 -40"),
+        ("capsule", ".22 .25", "1.1 .55", "60 40 0"),
+        ("cylinder", ".35 .3", "-1.1 -.55", "40 20 110"),
+        ("box", ".4 .3 .35", "0 -.55", "-40 30 200"),
+        ("plane", ".4 .5 .1", "1.1 -.55", "10 -30 40"),
+    ]
+)
+THEIRS = """
+import sys, mujoco, numpy as np
+frames = []
+for path in sys.argv[2:]:
+    model = mujoco.MjModel.from_binary_path(path)
+    model.vis.headlight.ambient[:], model.vis.headlight.diffuse[:] = 1, 0
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    camera = mujoco.MjvCamera()
+    camera.distance, camera.azimuth, camera.elevation = 4.2, 70, -50
+    with mujoco.Renderer(model, 240, 320) as renderer:
+        renderer.update_scene(data, camera)
+        frames.append(renderer.render())
+np.save(sys.argv[1], frames)
+"""
+
+
+def colours(frame) -> np.ndarray:
+    """Which of red, green and blue each pixel has."""
+    frame = frame.astype(int)
+    return frame > 0.5 * (frame.min(axis=2, keepdims=True) + frame.max(axis=2, keepdims=True))
+
+
+@pytest.mark.skipif(
+    tuple(map(int, mujoco.__version__.split(".")[:2])) < (3, 12), reason="MuJoCo laid pictures otherwise before 3.12"
+)
+def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
+    variants = [
+        ("2d", 'texuniform="false"'),
+        ("2d", 'texuniform="true" texrepeat="3 2"'),
+        ("2d", 'texrepeat="2.5 1"'),
+        ("cube", 'texuniform="false"'),
+        ("cube", 'texuniform="true"'),
+    ]
+    models = [
+        painted(SHELF + '<geom type="plane" size="0 0 .1" pos="0 0 -9"/>', text, kind=kind) for kind, text in variants
+    ]
+    paths = [str(tmp_path / f"{i}.mjb") for i in range(len(models))]
+    for model, path in zip(models, paths, strict=True):
+        mujoco.mj_saveModel(model, path, None)
+    command = [sys.executable, "-c", THEIRS, str(tmp_path / "theirs.npy"), *paths]
+    done = subprocess.run(command, env={**os.environ, "MUJOCO_GL": "egl"}, capture_output=True, text=True, check=False)
+    if done.returncode:
+        pytest.skip(f"MuJoCo's renderer does not run here: {done.stderr[-200:]}")
+    for model, theirs, variant in zip(models, np.load(tmp_path / "theirs.npy"), variants, strict=True):
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        with Renderer(gl, model, {}, width=320, height=240, lighting="studio") as renderer:
+            ours = renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 4.2, 70.0, -50.0, 45.0))
+        theirs_shows, ours_shows = colours(theirs), colours(ours)
+        # away from edges, where they show a clear colour
+        bright = theirs.max(axis=2).astype(int) - theirs.min(axis=2) > 150
+        same = np.stack([minimum_filter(c, 5) | ~maximum_filter(c, 5) for c in np.moveaxis(theirs_shows, 2, 0)], axis=2)
+        inside = minimum_filter(bright, 5) & same.all(axis=2)
+        agree = (theirs_shows == ours_shows).all(axis=2)[inside]
+        assert inside.sum() > 3000, variant
+        assert agree.mean() > 0.99, variant
