@@ -10,7 +10,7 @@ import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from ripple_sim.render import Camera, Renderer, Surface, meshes
-from ripple_sim.render.materials import FLAT_IMAGE, mapping_of
+from ripple_sim.render.materials import FLAT_IMAGE, look_of, mapping_of
 from ripple_sim.render.pieces import geom_piece
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
@@ -219,3 +219,17 @@ def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
         agree = (theirs_shows == ours_shows).all(axis=2)[inside]
         assert inside.sum() > 3000, variant
         assert agree.mean() > 0.99, variant
+
+
+def test_a_material_answers_light_as_it_says():
+    """Roughness is taken where it is given; otherwise more shininess is less of it. Reflectance is a coat."""
+
+    def look(attributes: str):
+        return look_of(model := painted('<geom size=".1" material="m"/>', attributes), geom_piece(model, 0))
+
+    assert look('roughness="0.3" metallic="1" shininess="0.9"').roughness == pytest.approx(0.3)
+    assert look('roughness="0.3" metallic="1"').metallic == 1.0
+    assert look('shininess="0"').roughness > look('shininess="0.5"').roughness > look('shininess="1"').roughness
+    assert look('reflectance="0.4"').coat == pytest.approx(0.4)
+    assert look('emission="0.7"').emission == pytest.approx(0.7)
+    assert look("").metallic == 0.0

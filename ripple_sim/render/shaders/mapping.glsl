@@ -7,7 +7,7 @@ layout(binding = 5) uniform sampler2D image;
 #endif
 
 #if MAPPING > 2
-const float ONE_TURN = 0.15915494;  // over a turn's radians
+const float TURNS = 0.15915494;  // in a radian
 
 // The picture's place u, v (from its upper edge) at a point, and how it changes along x, y and z.
 vec2 wrapped(vec3 p, out mat3x2 slope)
@@ -21,22 +21,28 @@ vec2 wrapped(vec3 p, out mat3x2 slope)
     return 0.5 + slope * p;
 #else
     float radius = max(length(p.xy), 1e-6);
+    float u = fract(TURNS * atan(p.y, p.x)), v = 0.5 - 0.5 * p.z;
+    vec3 along_u = TURNS / (radius * radius) * vec3(-p.y, p.x, 0.0), along_v = vec3(0.0, 0.0, -0.5);
 #if MAPPING == 5
     if (side.z > radius) {
         slope = mat3x2(0.5, 0.0, 0.0, 0.5, 0.0, 0.0);
         return 0.5 + slope * p;
     }
-#endif
-    vec3 around = ONE_TURN / (radius * radius) * vec3(-p.y, p.x, 0.0);
-    float u = fract(ONE_TURN * atan(p.y, p.x));
+#else
+#if MAPPING == 4
+    const float up = 1.0, equator = 0.5, rate = -2.0 * TURNS;
+    float z = p.z;
+#else
     // a capsule's ends are half balls on the discs at -1 and 1
-    float up = MAPPING == 6 ? sign(p.z) : 1.0, z = MAPPING == 6 ? max(side.z - 1.0, 0.0) : p.z;
-    vec3 along = vec3(-z * p.xy / radius, up * radius) / (radius * radius + z * z);
-    float elevation = atan(z, radius), quarters = MAPPING == 6 ? 4.0 * up * ONE_TURN : 2.0 * ONE_TURN;
-    bool straight = MAPPING == 5 || MAPPING == 6 && side.z < 1.0;
-    vec3 down = straight ? vec3(0.0, 0.0, -0.5) : -quarters * along;
-    float v = straight ? 0.5 - 0.5 * p.z : (MAPPING == 6 ? 0.5 + 0.5 * up : 0.5) - quarters * elevation;
-    slope = mat3x2(around.x, down.x, around.y, down.y, around.z, down.z);
+    float up = sign(p.z), equator = 0.5 + 0.5 * up, rate = -4.0 * TURNS * up;
+    float z = side.z - 1.0;
+#endif
+    // v goes with the elevation over the equator
+    bool curved = MAPPING == 4 || z > 0.0;
+    v = curved ? equator + rate * atan(z, radius) : v;
+    along_v = curved ? rate / (radius * radius + z * z) * vec3(-z * p.xy / radius, up * radius) : along_v;
+#endif
+    slope = mat3x2(along_u.x, along_v.x, along_u.y, along_v.y, along_u.z, along_v.z);
     return vec2(u, v);
 #endif
 }
