@@ -83,7 +83,7 @@ class Bodies:
     def __init__(
         self, gl: GLContext, ctx: OwnedObjects, model: Any, geoms: Iterable[int], textures: Textures, table: ObjectTable
     ) -> None:
-        self._gl, self._ctx, self._model, self._textures = gl, ctx, model, textures
+        self._gl, self._ctx, self._model, self._textures, self._table = gl, ctx, model, textures, table
         self._shapes: dict[str, ShapeLevels] = {}
         self._programs: dict[tuple[int, bool], moderngl.Program] = {}
         self._depth = ctx.own(gl.program(_PACKAGE, "body_depth_vertex", "depth_fragment"))
@@ -108,10 +108,11 @@ class Bodies:
     def balls(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Bounding balls of all that may throw a shadow: centres [k, 3] and radii [k], in metres."""
         centres, radii = self.occluders.balls(data)
-        sites = [ball_of(self._model, data, site) for site in self._sites]
-        return np.array([*centres, *(ball[0] for ball in sites)]).reshape(-1, 3), np.array(
-            [*radii, *(ball[1] for ball in sites)]
-        )
+        if self._sites:
+            balls = [ball_of(self._model, data, site) for site in self._sites]
+            centres = np.concatenate([centres, [ball[0] for ball in balls]])
+            radii = np.concatenate([radii, [ball[1] for ball in balls]])
+        return centres, radii
 
     def planes(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Positions [k, 3] of the planes, which no ball bounds, and as many infinite radii."""
@@ -121,6 +122,8 @@ class Bodies:
         """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""
         for instances in (*self._opaque, *(body.instances for body in self.clear)):
             instances.update(data, eye, pixels)
+            for number, lift in zip(instances.numbers, instances.lifts, strict=True):
+                self._table.set_lift(number, float(lift))
 
     def draw(self) -> None:
         """Draw the opaque bodies into the geometry pass."""

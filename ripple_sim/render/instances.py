@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import moderngl
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,7 +26,10 @@ INSTANCE = np.dtype(
         ("tiling", "f4", 4),
     ]
 )
+_GEOM = mujoco.mjtGeom
+_ROUND = (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_CAPSULE, _GEOM.mjGEOM_CYLINDER)
 _LEVELS = (4, 6, 8, 11, 15, 22)  # segments to a right angle
+_CLEARANCE = 3.0  # of shadows above the edges, in their sagitta: where light grazes, one is not enough
 _FLATNESS = 0.25  # how far the edges of a round shape may stand off its surface [pixels]
 
 
@@ -64,6 +68,15 @@ class Instances:
         What does not change; poses are filled in by `update`.
     mapping : Mapping
     texture : texture, optional
+
+    Attributes
+    ----------
+    sites : bool
+        Whether they are sites.
+    numbers : list of int
+        In the table of objects.
+    lifts : float array
+        How far above each one's surface shadows must be looked up so that its edges do not shade it [m].
     """
 
     def __init__(
@@ -78,11 +91,14 @@ class Instances:
     ) -> None:
         self._ctx, self._shape, self._programs = ctx, shape, programs
         self.sites = pieces[0].site
+        self._round = pieces[0].kind in _ROUND
         self._indices = np.array([piece.index for piece in pieces], dtype=np.int64)
+        self.numbers = [int(number) for number in records["color"][:, 3]]
         self._records, self._mapping, self._texture = records, mapping, texture
         self._buffer = ctx.buffer(reserve=records.nbytes, dynamic=True)
         self._arrays: dict[int, tuple[moderngl.VertexArray, moderngl.VertexArray]] = {}
         self._segments = _LEVELS[-1]
+        self.lifts = np.zeros(len(pieces))
 
     def update(self, data: Any, eye: NDArray[np.float64], pixels: float) -> None:
         """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""
@@ -97,6 +113,8 @@ class Instances:
         # the sagitta of a chord over a right angle's nth part: r (1 - cos(pi / 4n))
         needed = np.pi / 4 / np.sqrt(2 * min(_FLATNESS / max(largest, 1e-9), 1.0))
         self._segments = next((n for n in _LEVELS if n >= needed), _LEVELS[-1])
+        if self._round:
+            self.lifts = _CLEARANCE * radius * (1.0 - np.cos(np.pi / 4 / self._segments))
 
     def draw(self) -> None:
         """Draw into the geometry pass."""

@@ -45,9 +45,13 @@ class ObjectTable:
         self._rows.append(row)
         return len(self._rows) - 1
 
+    def set_lift(self, number: int, lift: float) -> None:
+        """Set how high an object's bumps or edges stand off it [m]: they shall not shade each other."""
+        self._rows[number]["place"][2] = lift
+
     def set_relief(self, number: int, lift: float, rotation: NDArray[np.float64]) -> None:
         """Set the height of an object's highest bump [m], and the rotation of its relief into the world."""
-        self._rows[number]["place"][2] = lift
+        self.set_lift(number, lift)
         self._rows[number]["rotation"][:, :3] = rotation.T  # column by column
 
     def bind(self) -> None:

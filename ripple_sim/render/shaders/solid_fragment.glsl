@@ -16,7 +16,7 @@ layout(binding = 6) uniform sampler2D scene;  // the picture without the clear b
 struct Object {
     vec4 base;    // roughness, metallic, sheen, coat
     vec4 volume;  // translucency, transparency, emission, opacity
-    vec4 place;   // geom, size [m], height of its highest ripple [m], 1 where its paint goes over the light
+    vec4 place;   // geom, size [m], height of its bumps [m], 1 where its paint goes over the light
     vec4 relief;  // first layer, texels along an edge of a face; 0 without a relief
     mat3 rotation;
 };
