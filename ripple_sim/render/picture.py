@@ -107,10 +107,10 @@ class Picture:
         }
         levels = {f"{name}_LEVEL": level for name, level in _LEVELS.items()}
         stages: tuple[tuple[str, str, str, dict[str, Any]], ...] = (
-            ("background", "background_vertex", "background_fragment", {"SHADOW": 0, **levels}),
-            ("shaded background", "background_vertex", "background_fragment", {"SHADOW": 1}),
-            ("solid", "screen_vertex", "solid_fragment", {"LAYER": 0}),
-            ("layer", "screen_vertex", "solid_fragment", {"LAYER": 1}),
+            ("background", "view_vertex", "background_fragment", {"SHADOW": 0, **levels}),
+            ("shaded background", "view_vertex", "background_fragment", {"SHADOW": 1}),
+            ("solid", "view_vertex", "solid_fragment", {"LAYER": 0}),
+            ("layer", "view_vertex", "solid_fragment", {"LAYER": 1}),
         )
         self._passes = {
             name: ctx.vertex_array(ctx.own(gl.program(_PACKAGE, vertex, fragment, **{**options, **more})), [])

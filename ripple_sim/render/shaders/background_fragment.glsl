@@ -2,12 +2,12 @@
 // The floor and what is behind it, without the first light's shadow; where that may fall is marked as a depth. With SHADOW
 // the pixels that were marked, or that show solids, too.
 #include "frame.glsl"
+#include "ray.glsl"
 #include "samples.glsl"
 #include "studio.glsl"
 #include "development.glsl"
 #include "lights.glsl"
 #include "shadow.glsl"
-#include "floor_ray.glsl"
 
 layout(binding = 3) uniform sampler2D floor_openness;
 layout(binding = 5) uniform sampler2D floor_image;
@@ -15,7 +15,8 @@ layout(binding = 5) uniform sampler2D floor_image;
 uniform vec4 tiling;   // texture coordinates a metre, and at the origin
 uniform vec3 tint;     // that the image is multiplied by
 
-flat in vec3 around;  // ambient light on the open floor
+flat in vec3 focus_local;
+flat in vec3 around;
 out vec4 fragment;
 
 #if MIRROR
@@ -44,31 +45,32 @@ bool may_be_shaded(vec2 place, vec2 near)
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec3 way = way_of_pixel();
-    float at = floor_distance(way);
-    vec3 direction = normalize(way), world = eye.xyz + min(at, 1e6) * way, local = world - floor_origin.xyz;
-    vec2 plane = vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz));
+    bool met = meets_floor();
+    float at = floor_distance();
+    vec2 plane = eye_local.xy + at * way_local.xy;
     // the lamps stand near: a pool of light about the focus, and the background's colour beyond
-    float fade = at < MISSED ? smoothstep(floor_fade.x, floor_fade.y, length(world - focus.xyz) / eye.w) : 1.0;
+    float away = length(vec3(plane - focus_local.xy, focus_local.z));
+    float fade = met ? smoothstep(floor_fade.x, floor_fade.y, away / eye.w) : 1.0;
 #if IMAGE
     vec3 albedo = texture(floor_image, plane * tiling.xy + tiling.zw).rgb * tint;
 #else
     vec3 albedo = floor_albedo.rgb;
 #endif
-    vec2 place = floor_place(world), near = textureLod(floor_openness, place, 0.0).rg;
+    vec3 world = eye.xyz + at * way;
+    vec2 place = (plane - floor_map.xy) / (2.0 * floor_map.z) + 0.5, near = textureLod(floor_openness, place, 0.0).rg;
 #if SHADOW
     float shadow = key_visibility(world, floor_normal.xyz, 0.0);
     // The filters of neighbouring pixels are turned differently: their mean has half the noise. It is taken where all
     // four pixels of a block are of this pass: what others have reckoned is undefined.
-    int solid = bitCount(covered(pixel, at));
+    int solid = bitCount(covered(pixel, floor_depth()));
     bool inside = all(lessThan(pixel | 1, textureSize(depths BASE_LEVEL)));
-    bool whole = inside && block_mean(solid > 0 || at >= MISSED ? 1.0 : 0.0) == 0.0;
+    bool whole = inside && block_mean(solid > 0 || !met ? 1.0 : 0.0) == 0.0;
     float mean = block_mean(shadow), share = 1.0 - float(solid) / float(SAMPLES);
     shadow = whole ? mean : shadow;
 #else
     const float shadow = 1.0, share = 1.0;
     // blocks of pixels go together, so that their shadows can be averaged
-    bool shaded = block_mean(at < MISSED && may_be_shaded(place, near) ? 1.0 : 0.0) > 0.0;
+    bool shaded = block_mean(met && may_be_shaded(place, near) ? 1.0 : 0.0) > 0.0;
     gl_FragDepth = shaded ? SHADED_LEVEL : OPEN_LEVEL;
 #endif
 #if NEAR_LAMPS
@@ -88,7 +90,8 @@ void main()
     // of the floor nothing but the shadows is kept
     fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g + around.g, 1e-6)));
 #else
-    vec3 far = sky_at(at < MISSED ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);
+    vec3 direction = normalize(way);
+    vec3 far = sky_at(met ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);
     vec3 shown = developed(mix(albedo * light, far, fade));
 #if MIRROR
     // MuJoCo blends the reflection in by its share, whatever the angle

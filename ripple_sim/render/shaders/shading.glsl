@@ -13,6 +13,13 @@ struct Material {
     int occluders;
 };
 
+// Where a point of the floor lies in its map.
+vec2 floor_place(vec3 world)
+{
+    vec3 local = world - floor_origin.xyz;
+    return (vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)) - floor_map.xy) / (2.0 * floor_map.z) + 0.5;
+}
+
 // Light that the floor sends up to a point; bodies close above it shade it.
 vec3 floor_bounce(vec3 position)
 {

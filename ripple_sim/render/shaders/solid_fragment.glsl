@@ -1,12 +1,12 @@
 #version 430
 // Pixels that show solids, wholly or in part: every surface that is visible in a pixel is lit once.
 #include "frame.glsl"
+#include "ray.glsl"
 #include "samples.glsl"
 #include "studio.glsl"
 #include "development.glsl"
 #include "lights.glsl"
 #include "shadow.glsl"
-#include "floor_ray.glsl"
 #include "shading.glsl"
 #include "geometry.glsl"
 #include "relief.glsl"
@@ -106,8 +106,7 @@ vec4 lit_solid(Spot spot, vec3 position, float spread)
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    vec3 way = way_of_pixel();
-    int left = covered(pixel, floor_distance(way));
+    int left = covered(pixel, floor_depth());
 #if LAYER
     int own = 0;
     for (int s = 0; s < SAMPLES; ++s)

@@ -1,16 +1,17 @@
 #version 430
 // One triangle over the whole target, at a given depth, and what is the same all over the floor.
-#include "frame.glsl"
+#include "ray_cast.glsl"
 #include "studio.glsl"
 
 uniform float level;
 
-out vec2 screen;
-flat out vec3 around;
+flat out vec3 focus_local;
+flat out vec3 around;  // ambient light on the open floor
 
 void main()
 {
-    screen = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+    cast_ray(vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0));
+    focus_local = along_floor(focus.xyz - floor_origin.xyz);
     around = ambient(floor_normal.xyz, vec3(0.0));
     gl_Position = vec4(screen, 2.0 * level - 1.0, 1.0);
 }

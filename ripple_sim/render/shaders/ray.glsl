@@ -1,0 +1,31 @@
+// The pixel's ray, see ray_cast.glsl. The floor is a plane that it meets in closed form.
+in vec2 screen;
+in vec3 way;
+in vec3 way_local;
+flat in vec3 eye_local;
+
+// Whether the ray meets the floor's upper side.
+bool meets_floor()
+{
+    vec2 beside = abs(way_local.z * eye_local.xy + eye_local.z * way_local.xy);
+    return floor_origin.w > 0.0 && eye_local.z > 0.0 && way_local.z > 1e-6 * eye_local.z
+        && all(lessThan(beside, way_local.z * vec2(floor_u.w, floor_v.w)));
+}
+
+// How far along the way the floor's plane lies.
+float floor_distance()
+{
+    return min(eye_local.z / max(way_local.z, 1e-9), 1e6);
+}
+
+float eye_distance(float depth)
+{
+    return ray.w * ray_right.w / (ray_right.w - depth * (ray_right.w - ray.w));
+}
+
+// Depth in the buffer at which the floor lies; that of nothing where it is not met.
+float floor_depth()
+{
+    float met = (ray_right.w - ray.w * ray_right.w * way_local.z / eye_local.z) / (ray_right.w - ray.w);
+    return meets_floor() ? met : 1.0;
+}
