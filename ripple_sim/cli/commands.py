@@ -66,7 +66,7 @@ class _Video:
     transparent: bool = False
     """Leave the background out (.webp and folders of frames)."""
     frame_format: Literal["png", "exr"] = "png"
-    """Of a folder's frames: EXR is linear light, without overlays (needs the package OpenEXR)."""
+    """Frames of a folder: PNG, or EXR for linear light, not tone-mapped, without overlays (needs OpenEXR)."""
     overlay: Overlay = None
     """Draw over the picture: height or velocity in colours, contacts, grid, time, energy; such as
     height,contacts,time or velocity=0.5,energy, where 0.5 m/s is the end of the colours."""

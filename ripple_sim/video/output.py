@@ -20,7 +20,7 @@ FRAME_FORMATS = ("png", "exr")
 _FRAME_PATTERN = re.compile(rf"frame_\d{{5,}}\.({'|'.join(FRAME_FORMATS)})")
 _SUBSAMPLED = (".mp4", ".webm")
 _WITH_OPACITY = (".webp", *FRAME_FORMATS)
-_VALID = f"valid is {', '.join(ENDINGS)}, or a name without ending for a folder of frames"
+_VALID = f"valid is {', '.join(ENDINGS)}, or a name without ending for a folder of PNG or EXR frames"
 
 
 def video_format(path: Path, frame_format: str = "png") -> str:
