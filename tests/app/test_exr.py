@@ -1,7 +1,9 @@
 """EXR frames: linear light as the shaders reckon it, whole in the file, and refused in time where it cannot be had."""
 
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 
@@ -34,6 +36,15 @@ resolution = 12
 material = {speed = 0.3, density = 20.0}
 """
 OPTIONS = {"size": (WIDTH, HEIGHT), "fps": 30, "frame_format": "exr"}
+
+
+@pytest.fixture(autouse=True)
+def _left_as_found() -> Iterator[None]:
+    """Keep the program's signal handlers to these tests."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture
