@@ -22,10 +22,13 @@ class Patches(NamedTuple):
         Footprint radius of a single contact with it [m].
     begins : int64 [p + 1]
         The points of body i are those from begins[i] to begins[i + 1].
+    probes : int64 [p]
+        Where the probes of body i begin among them: what is before is the force-weighted middle of its contacts. Where
+        there is but one corner, that is the middle.
     corners : int64 [p]
-        How many corners each patch has.
+        How many of the probes are corners.
     points : float64 [m, 3]
-        In the target's frame [m]. For each body the force-weighted middle of its contacts, then its probes.
+        In the target's frame [m].
     loads : float64 [m]
         Forces at the corners [N], 0 at all other points.
     """
@@ -33,6 +36,7 @@ class Patches(NamedTuple):
     forces: NDArray[np.float64]
     radii: NDArray[np.float64]
     begins: NDArray[np.int64]
+    probes: NDArray[np.int64]
     corners: NDArray[np.int64]
     points: NDArray[np.float64]
     loads: NDArray[np.float64]
@@ -85,8 +89,8 @@ def find_patches(contacts, position, rotation, radii, convex):
     """
     bodies = len(contacts.others)
     most = bodies * (1 + MAX_CONTACTS * (MAX_CONTACTS + 1) // 2)
-    forces, used, corners = np.zeros(bodies), np.empty(bodies), np.empty(bodies, np.int64)
-    begins, points, loads = np.zeros(bodies + 1, np.int64), np.empty((most, 3)), np.zeros(most)
+    forces, used, points, loads = np.zeros(bodies), np.empty(bodies), np.empty((most, 3)), np.zeros(most)
+    begins, probes, corners = np.zeros(bodies + 1, np.int64), np.empty(bodies, np.int64), np.empty(bodies, np.int64)
     for i in range(bodies):
         first, last = contacts.begins[i], contacts.begins[i + 1]
         local, pressing = _carried(contacts.points[first:last], position, rotation), contacts.forces[first:last]
@@ -95,14 +99,14 @@ def find_patches(contacts, position, rotation, radii, convex):
             forces[i] += pressing[j]
             middle += pressing[j] * local[j]
         used[i] = min(radii[contacts.target], radii[contacts.others[i]])
-        at_corners, probes = probe(local, pressing, used[i], convex[contacts.others[i]])
+        at_corners, found = probe(local, pressing, used[i], convex[contacts.others[i]])
         corners[i] = len(at_corners)
-        row = begins[i]
-        begins[i + 1] = row + 1 + len(probes)
-        points[row] = middle / forces[i]
-        points[row + 1 : begins[i + 1]] = probes
-        loads[row + 1 : row + 1 + corners[i]] = at_corners
-    return Patches(forces, used, begins, corners, points[: begins[bodies]], loads[: begins[bodies]])
+        points[begins[i]] = middle / forces[i]
+        probes[i] = row = begins[i] + 1 if corners[i] > 1 else begins[i]
+        begins[i + 1] = row + len(found)
+        points[row : begins[i + 1]] = found
+        loads[row : row + corners[i]] = at_corners
+    return Patches(forces, used, begins, probes, corners, points[: begins[bodies]], loads[: begins[bodies]])
 
 
 @numba.njit(cache=True, nogil=True)
@@ -111,24 +115,20 @@ def find_spots(others, patches, surface, texels, share):
 
     `others` [p] are the geom ids of the bodies; the forces are multiplied by a share.
     """
-    most, begins, bodies = (
-        len(patches.points),
-        np.zeros(len(others) + 1, np.int64),
-        np.empty(len(patches.points), np.int64),
-    )
-    points, forces, radii = np.empty((most, 3)), np.empty(most), np.empty(most)
+    most, begins = len(patches.points), np.zeros(len(others) + 1, np.int64)
+    bodies, points, forces, radii = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most), np.empty(most)
     places, nearest = np.empty((most, 3)), np.full(most, -1)
     for i in range(len(others)):
-        first, last = patches.begins[i] + 1, patches.begins[i + 1]
+        first, last = patches.probes[i], patches.begins[i + 1]
         loads = share * patches.loads[first : first + patches.corners[i]]
-        at, pressing, radius, probes = spread(loads, patches.points[first:last], surface[first:last], patches.radii[i])
+        at, pressing, radius, rows = spread(loads, patches.points[first:last], surface[first:last], patches.radii[i])
         row = begins[i]
         begins[i + 1] = row + len(pressing)
         for j in range(len(pressing)):
             bodies[row + j], points[row + j] = others[i], at[j]
             forces[row + j], radii[row + j] = pressing[j], radius
-            if probes[j] >= 0:
-                places[row + j], nearest[row + j] = surface[first + probes[j]], texels[first + probes[j]]
+            if rows[j] >= 0:
+                places[row + j], nearest[row + j] = surface[first + rows[j]], texels[first + rows[j]]
     n = begins[-1]
     return Spots(begins, bodies[:n], points[:n], forces[:n], radii[:n], places[:n], nearest[:n])
 

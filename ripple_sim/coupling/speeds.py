@@ -129,24 +129,30 @@ def _meeting(target, other, limit, reach, soft, timestep, place, velocity, mass_
     """Indices of the pairs that come near each other too fast within the steps to the next look, and their speeds."""
     found, speeds = np.empty(len(target), np.int64), np.empty(len(target))
     count = 0
+    moving = _velocities(place, velocity, mass_centre, body, root)
     for i in range(len(target)):
-        offset = place[other[i]] - place[target[i]]
-        relative = _at(other[i], place, velocity, mass_centre, body, root) - _at(
-            target[i], place, velocity, mass_centre, body, root
-        )
-        speed = np.sqrt((relative**2).sum())
-        near = np.sqrt((offset**2).sum()) < reach[i] + (1 + _EVERY) * speed * timestep
-        if near and (offset * relative).sum() < 0 and speed * (timestep + soft[i]) > limit[i]:
+        away2, speed2, approach = 0.0, 0.0, 0.0
+        for k in range(3):
+            x, v = place[other[i], k] - place[target[i], k], moving[other[i], k] - moving[target[i], k]
+            away2, speed2, approach = away2 + x * x, speed2 + v * v, approach - x * v
+        speed = np.sqrt(speed2)
+        near = np.sqrt(away2) < reach[i] + (1 + _EVERY) * speed * timestep
+        if near and approach > 0 and speed * (timestep + soft[i]) > limit[i]:
             found[count], speeds[count] = i, speed
             count += 1
     return found[:count], speeds[:count]
 
 
 @numba.njit(cache=True, nogil=True)
-def _at(geom, place, velocity, mass_centre, body, root):
-    """Velocity of a geom's centre in the world [m/s]."""
-    b = body[geom]
-    # MuJoCo gives a body's velocity at the centre of mass of the tree that it belongs to
-    x, y, z = place[geom] - mass_centre[root[b]]
-    wx, wy, wz, vx, vy, vz = velocity[b]
-    return np.array([vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x])
+def _velocities(place, velocity, mass_centre, body, root):
+    """Velocities of all geoms' centres in the world [m/s]."""
+    found = np.empty((len(body), 3))
+    for geom in range(len(body)):
+        b = body[geom]
+        for k in range(3):
+            # MuJoCo gives a body's velocity at the centre of mass of the tree that it belongs to
+            y, z = (k + 1) % 3, (k + 2) % 3
+            turning = velocity[b, y] * (place[geom, z] - mass_centre[root[b], z])
+            turning -= velocity[b, z] * (place[geom, y] - mass_centre[root[b], y])
+            found[geom, k] = velocity[b, 3 + k] + turning
+    return found

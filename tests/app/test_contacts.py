@@ -1,0 +1,76 @@
+"""Contacts by target and body: nothing is lost, doubled or turned round, against MuJoCo's own list."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim.coupling.contacts import Contacts, pressing_contacts, smallest_extents
+
+SHAPES = ('type="box" size="0.2 0.2 0.1"', 'type="sphere" size="0.15"', 'type="capsule" size="0.08 0.1"')
+
+
+def pit(seed: int, cone: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Bodies of three shapes that have fallen into a pit, with contacts of several dimensions."""
+    rng = np.random.default_rng(seed)
+    walls = "".join(
+        f'<geom type="plane" size="3 3 0.1" pos="{-0.35 * x} {-0.35 * y} 0" zaxis="{x} {y} {z}"/>'
+        for x, y, z in ((0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))
+    )
+    bodies = "".join(
+        f'<body pos="{x:.3f} {y:.3f} {0.2 + 0.25 * i:.3f}"><freejoint/>'
+        f'<geom {SHAPES[i % 3]} condim="{(1, 3, 4, 6)[i % 4]}"/></body>'
+        for i, (x, y) in enumerate(rng.uniform(-0.1, 0.1, (8, 2)))
+    )
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="0.002" cone="{cone}"/><worldbody>{walls}{bodies}</worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, nstep=400)
+    return model, data
+
+
+def by_body(contacts: Contacts) -> dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    rows = [slice(a, b) for a, b in zip(contacts.begins[:-1], contacts.begins[1:], strict=True)]
+    return {
+        other: (contacts.points[row], contacts.forces[row], contacts.normals[row])
+        for other, row in zip(contacts.others.tolist(), rows, strict=True)
+    }
+
+
+@pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
+@pytest.mark.parametrize("seed", range(3))
+def test_every_pressing_contact_is_found_once_for_each_target_it_touches(cone: str, seed: int) -> None:
+    model, data = pit(seed, cone)
+    is_target = np.zeros(model.ngeom, dtype=bool)
+    is_target[[5, 6, 8, 9, 11]] = True
+    found = pressing_contacts(model, data, is_target, smallest_extents(model))
+    expected: dict[int, dict[int, list[tuple[float, np.ndarray, np.ndarray]]]] = {}
+    for i, contact in enumerate(data.contact):
+        wrench = np.zeros(6)
+        mujoco.mj_contactForce(model, data, i, wrench)
+        for target, other, sign in ((*contact.geom, 1.0), (*contact.geom[::-1], -1.0)):
+            if is_target[target] and wrench[0] > 0:
+                of_target = expected.setdefault(int(target), {})
+                of_target.setdefault(int(other), []).append((wrench[0], sign * contact.frame[:3], contact.pos))
+    assert list(found) == sorted(expected), "targets stand in ascending order"
+    assert sum(len(others) for others in expected.values()) > 6
+    for target, others in expected.items():
+        contacts = by_body(found[target])
+        assert found[target].target == target
+        assert list(contacts) == sorted(others), "so do the bodies that touch one"
+        for other, (points, forces, normals) in contacts.items():
+            force, normal, place = (np.array(each) for each in zip(*others[other], strict=True))
+            np.testing.assert_allclose(forces, force, rtol=1e-12)
+            np.testing.assert_array_equal(normals, normal)
+            outside = np.einsum("ij,ij->i", points - place, normal)
+            assert (outside >= 0).all(), "points lie outside of the target's surface"
+            np.testing.assert_allclose(points - place, outside[:, None] * normal, atol=1e-15)
+
+
+def test_what_touches_no_target_is_left_out() -> None:
+    model, data = pit(0, "pyramidal")
+    extents = smallest_extents(model)
+    assert data.ncon > 0
+    assert not pressing_contacts(model, data, np.zeros(model.ngeom, dtype=bool), extents)
+    data.contact.efc_address[:] = -1
+    assert not pressing_contacts(model, data, np.ones(model.ngeom, dtype=bool), extents)
