@@ -63,8 +63,7 @@ void main()
     // The filters of neighbouring pixels are turned differently: their mean has half the noise. It is taken where all
     // four pixels of a block are of this pass: what others have reckoned is undefined.
     int solid = bitCount(covered(pixel, floor_depth()));
-    bool inside = all(lessThan(pixel | 1, textureSize(depths BASE_LEVEL)));
-    bool whole = inside && block_mean(solid > 0 || !met ? 1.0 : 0.0) == 0.0;
+    bool whole = block_inside(pixel) && block_mean(solid > 0 || !met ? 1.0 : 0.0) == 0.0;
     float mean = block_mean(shadow), share = 1.0 - float(solid) / float(SAMPLES);
     shadow = whole ? mean : shadow;
 #else

@@ -11,6 +11,7 @@ struct Material {
     float lift;       // height of bumps that the shading normal accounts for [m]
     float openness;   // share of the sky that the body itself leaves free, and its neighbours where `occluders` is 0
     int occluders;
+    bvec2 block;      // neighbours in the block of 2 x 2 pixels that share their shadows with this one
 };
 
 // Where a point of the floor lies in its map.
@@ -61,7 +62,7 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     vec3 wrap = 0.6 * m.translucency * m.albedo;
     // what enters elsewhere and leaves here: more of it where the body is thin, and the deeper its colour the further
     float thin = exp(-4.0 * m.thickness);
-    float shadow = key_visibility(position, flat_normal, m.lift);
+    float shadow = block_mean(key_visibility(position, flat_normal, m.lift), m.block);
     vec3 direct = vec3(0.0), highlight = vec3(0.0), glow = vec3(0.0);
     for (int i = 0; i < int(counts.y); ++i) {
         vec3 light;

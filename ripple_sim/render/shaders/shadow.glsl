@@ -2,8 +2,8 @@
 layout(binding = 1) uniform sampler2DShadow shadow_test;
 layout(binding = 2) uniform sampler2D shadow_map;
 
-const int SEARCH_TAPS = 12;
-const int FILTER_TAPS = 24;
+const int SEARCH_TAPS = 10;
+const int FILTER_TAPS = 16;
 
 // By the golden angle: points at growing radii spread evenly.
 const mat2 TURN = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);

@@ -77,17 +77,23 @@ Spot spot_at(ivec2 pixel, int s)
     return spot;
 }
 
-// Variance of the normals in the pixel: how far they turn from one to the next, where both show the same object.
-float spread_of(Spot spot, float at)
+// Whether the neighbours in the block of 2 x 2 pixels, to the side and above or below, show the same object as near.
+bvec2 same_beside(Spot spot, float at)
 {
     float object = float(spot.object);
-    vec3 across = dFdx(spot.rippled), up = dFdy(spot.rippled);
-    bool same_x = dFdx(object) == 0.0 && abs(dFdx(at)) < 0.02 * at, same_y = dFdy(object) == 0.0 && abs(dFdy(at)) < 0.02 * at;
-    return min(0.5 * ((same_x ? dot(across, across) : 0.0) + (same_y ? dot(up, up) : 0.0)), 0.2);
+    return bvec2(dFdx(object) == 0.0 && abs(dFdx(at)) < 0.02 * at, dFdy(object) == 0.0 && abs(dFdy(at)) < 0.02 * at);
 }
 
-// Colour and opacity of a spot; `spread` is the variance of the normals in the pixel.
-vec4 lit_solid(Spot spot, vec3 position, float spread)
+// Variance of the normals in the pixel: how far they turn from one to the next.
+float spread_of(Spot spot, bvec2 same)
+{
+    vec3 across = dFdx(spot.rippled), up = dFdy(spot.rippled);
+    return min(0.5 * ((same.x ? dot(across, across) : 0.0) + (same.y ? dot(up, up) : 0.0)), 0.2);
+}
+
+// Colour and opacity of a spot; `spread` is the variance of the normals in the pixel, `block` says which neighbours in the
+// block of 2 x 2 share their shadows with it.
+vec4 lit_solid(Spot spot, vec3 position, float spread, bvec2 block)
 {
     Object object = objects[spot.object];
     vec3 behind = vec3(0.0);
@@ -97,7 +103,7 @@ vec4 lit_solid(Spot spot, vec3 position, float spread)
 #endif
     Material m = Material(painted ? vec3(NEUTRAL) : spot.color * spot.color, object.base.x, object.base.y, object.base.z,
                           object.base.w, object.volume.x, object.volume.y, object.volume.z, spot.thickness, behind,
-                          object.place.z, spot.openness, object.relief.y > 0.0 ? 0 : int(counts.x));
+                          object.place.z, spot.openness, object.relief.y > 0.0 ? 0 : int(counts.x), block);
     vec3 shown = developed(shaded(m, position, spot.rippled, spot.normal, object.place.x, spread));
     float shade = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / FULL_LIGHT, DARKEST, 1.0);
     return vec4(mix(painted ? spot.color * shade : shown, INK, spot.ink), object.volume.w);
@@ -114,23 +120,27 @@ void main()
     left &= own;
 #endif
     vec4 sum = vec4(0.0);
-    float spread = 0.0;
+    float spread = 0.0, count = float(bitCount(left));
+    // pixels that show as many samples are of the same pass: what others have reckoned is undefined
+    bvec2 block = bvec2(block_inside(pixel) && dFdx(count) == 0.0, block_inside(pixel) && dFdy(count) == 0.0);
     bool again = false;
     do {
         int first = max(findLSB(left), 0), alike = 1 << first;
         float at = eye_distance(texelFetch(depths, pixel, first).r);
         Spot spot = spot_at(pixel, first);
-        spread = again ? spread : spread_of(spot, left == 0 ? -1.0 : at);
+        bvec2 same = same_beside(spot, left == 0 ? -1.0 : at);
+        spread = again ? spread : spread_of(spot, same);
+        block = bvec2(block.x && same.x && !again, block.y && same.y && !again);
         // samples of the same surface share their light
         vec2 normal = texelFetch(shapes, pixel, first).xy;
         for (int s = 1; s < SAMPLES; ++s) {
-            bool same = abs(eye_distance(texelFetch(depths, pixel, s).r) - at) < 0.01 * at && object_of(pixel, s) == spot.object
+            bool joined = abs(eye_distance(texelFetch(depths, pixel, s).r) - at) < 0.01 * at && object_of(pixel, s) == spot.object
                      && distance(texelFetch(shapes, pixel, s).xy, normal) < 0.06;
-            alike |= same ? 1 << s : 0;
+            alike |= joined ? 1 << s : 0;
         }
         alike &= left;
         left &= ~alike;
-        vec4 color = lit_solid(spot, eye.xyz + at * way, spread);
+        vec4 color = lit_solid(spot, eye.xyz + at * way, spread, block);
         sum += float(bitCount(alike)) / float(SAMPLES) * vec4(dithered(color.rgb) * color.a, color.a);
         again = true;
     } while (left != 0);
