@@ -9,17 +9,16 @@ import trimesh
 from ripple_sim.solver import Atlas
 
 from ..errors import SceneError
+from .shell import GAP_TOLERANCE, add_shell, remove_shell
 from .speeds import SPECULATIVE
+from .target import contact_masks, geom_name, shell_thickness, shells
 
 _GEOM = mujoco.mjtGeom
-ROUTES = ("sdf", "hull")
+ROUTES = ("sdf", "flex", "hull")
 
 # Starting points of MuJoCo's search for contacts with a signed distance: fewer miss contacts, its default of 40 costs
 # five times as much.
 SDF_INITPOINTS = 10
-
-# A hull this share of the target's size off its surface is seen: bodies stop in mid-air.
-HULL_TOLERANCE = 0.02
 
 
 def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "sdf") -> mujoco.MjsGeom:
@@ -31,18 +30,19 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "sdf") -> mujoc
     Parameters
     ----------
     spec : mujoco.MjSpec
-        Changed in place, before it is compiled.
+        Changed in place, before it is compiled. A route taken before is left again.
     geom : str
         Name of a geom.
     route : str
         "sdf": as its signed distance, which MuJoCo computes when it compiles the model; for moving targets too. A plane
-        still meets the mesh's convex hull, and height fields do not collide with it at all.
+        still meets the mesh's convex hull, and height fields do not collide with it at all. What is in doubt is best
+        done this way.
+        "flex": through a rigid flex of its triangles, with the geom's name and on its body; the geom itself stays for
+        looks and mass. Planes and height fields meet it too, and up to some ten thousand triangles a step takes a
+        fifth of the time of a signed distance. Spheres, capsules and ellipsoids are met as well as by an SDF, and
+        cylinders and meshes too that get in by less than 0.7 of the shell's thickness (2 to 5 % of the mesh's size).
+        Boxes may be thrown aside, and SDF geoms sink in: both are warned of. See `add_shell`.
         "hull": as its convex hull, MuJoCo's way for mesh geoms: fast, and right for convex meshes only.
-
-        A rigid flex of the mesh's triangles is no route. Its contacts are those of single triangles, and of a flat
-        surface too many triangles touch a box or a cylinder edge-on: the normal forces on a box at rest added up to 14
-        times, on a cylinder to 19 times the momentum that was exchanged (spheres, capsules and ellipsoids were right;
-        MuJoCo 3.17). Besides it is a thin shell, which bodies pass at 20 m/s and a time step of 2 ms.
 
     Returns
     -------
@@ -52,14 +52,12 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "sdf") -> mujoc
     Raises
     ------
     SceneError
-        For an unknown route or geom.
+        For an unknown route or geom, or a specification from which no flex can be made.
+    MeshError
+        If the mesh of a flex is not a closed genus-0 surface.
     """
     if route not in ROUTES:
-        flex = " (flat bodies get sideways forces from a flex's triangles, and fast ones pass through its thin shell)"
-        reason = flex if route == "flex" else ""
-        raise SceneError(
-            f"collision route {route!r} is not supported{reason}; valid are {', '.join(map(repr, ROUTES))}"
-        )
+        raise SceneError(f"collision route {route!r} is not known; valid are {', '.join(map(repr, ROUTES))}")
     found = spec.geom(geom)
     if found is None:
         names = ", ".join(repr(g.name) for g in spec.geoms if g.name)
@@ -68,9 +66,12 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "sdf") -> mujoc
         spec.option.enableflags |= SPECULATIVE
     if not found.meshname:
         return found
+    remove_shell(spec, found)
     found.type = _GEOM.mjGEOM_SDF if route == "sdf" else _GEOM.mjGEOM_MESH
     if route == "sdf":
         spec.option.sdf_initpoints = min(spec.option.sdf_initpoints, SDF_INITPOINTS)
+    elif route == "flex":
+        add_shell(spec, found)
     return found
 
 
@@ -91,9 +92,51 @@ def hull_gap(atlas: Atlas) -> float:
 def hull_warning(name: str, atlas: Atlas) -> str | None:
     """What to warn of where the hull of a geom is off its surface by more than can be overlooked, else None."""
     gap, size = hull_gap(atlas), float(np.ptp(atlas.mesh.V, axis=0).max())
-    if gap <= HULL_TOLERANCE * size:
+    if gap <= GAP_TOLERANCE * size:
         return None
     return (
         f"geom {name!r} collides as its convex hull, up to {gap:.3g} m ({gap / size:.0%} of its size) off the surface "
         f'that ripples; give it type="sdf" in the MJCF, or call make_collidable(spec, {name!r})'
     )
+
+
+def shell_warning(model: mujoco.MjModel, geom: int) -> str | None:
+    """What to warn of where the flex that stands for a geom meets others in a way that nobody wants, else None."""
+    flex, body, name = shells(model)[geom], int(model.geom_bodyid[geom]), geom_name(model, geom)
+    types, affinities = contact_masks(model)
+    weld = model.body_weldid[model.geom_bodyid]
+    meets = ((types[geom] & affinities) | (affinities[geom] & types) != 0) & (weld != weld[geom])
+    reasons = (
+        (model.geom_type == _GEOM.mjGEOM_BOX, "MuJoCo may throw boxes aside, though not box-shaped meshes"),
+        (
+            model.geom_type == _GEOM.mjGEOM_SDF,
+            f"SDF geoms sink {shell_thickness(model, flex):.2g} m into it before they are pushed out",
+        ),
+        (
+            np.isin(model.geom_bodyid, _kept_apart(model, body)),
+            "MuJoCo does not keep a flex apart from bodies that are joined to its own or excluded",
+        ),
+    )
+    found = [
+        f"{why} ({', '.join(repr(geom_name(model, other)) for other in np.flatnonzero(which & meets).tolist())})"
+        for which, why in reasons
+        if (which & meets).any()
+    ]
+    if not found:
+        return None
+    return (
+        f'geom {name!r} collides through a flex: {"; ".join(found)}; call make_collidable(spec, {name!r}, "sdf"), or '
+        "choose contype and conaffinity so that they do not meet"
+    )
+
+
+def _kept_apart(model: mujoco.MjModel, body: int) -> list[int]:
+    """Bodies whose geoms MuJoCo lets pass through those of a body: joined to it, or excluded by name."""
+    weld = model.body_weldid
+    above = weld[model.body_parentid[weld]]
+    joined = (weld != weld[body]) & (weld != 0) & ((above == weld[body]) | (above[body] == weld)) & bool(weld[body])
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT:
+        joined[:] = False
+    pairs = [(int(signature) >> 16, int(signature) & 0xFFFF) for signature in model.exclude_signature]
+    excluded = {b for pair in pairs if body in pair for b in pair if b != body}
+    return sorted(excluded.union(np.flatnonzero(joined).tolist()))

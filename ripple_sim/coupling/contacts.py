@@ -41,7 +41,11 @@ class Contacts(NamedTuple):
 
 
 def pressing_contacts(
-    model: mujoco.MjModel, data: mujoco.MjData, is_target: NDArray[np.bool_], extents: NDArray[np.float64]
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    is_target: NDArray[np.bool_],
+    extents: NDArray[np.float64],
+    geoms: NDArray[np.int64] | None = None,
 ) -> dict[int, Contacts]:
     """Contacts that press on each target that is touched, by its geom id in ascending order.
 
@@ -54,11 +58,13 @@ def pressing_contacts(
         By geom id.
     extents : float64 [ngeom]
         Smallest half-extents [m]; see `smallest_extents`.
+    geoms : int [ncon, 2]
+        What touches, by geom id, where that is not what MuJoCo says.
     """
     if not data.ncon:
         return {}
     contacts = data.contact
-    geoms, address = contacts.geom, contacts.efc_address
+    geoms, address = contacts.geom if geoms is None else geoms, contacts.efc_address
     rows = _on_targets(geoms, address, is_target)
     if not len(rows):
         return {}

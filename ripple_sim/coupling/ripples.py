@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from ripple_sim.solver import Load, Material, WaveSolver
 
 from ..errors import RippleWarning, SceneError
-from .collidable import collides_as_hull, hull_warning
+from .collidable import collides_as_hull, hull_warning, shell_warning
 from .pushback import PushBack
 from .sources import Impulse, Sources
 from .speeds import SpeedCheck
 from .surface import RippleSurface
-from .target import find_target
+from .target import find_target, shells
 
 __all__ = ["Impulse", "Ripples"]
 
@@ -33,8 +33,9 @@ class Ripples:
     model : mujoco.MjModel
     materials : mapping
         Geom name to its `Material`. Geoms of type mesh, sdf, sphere, ellipsoid, capsule, cylinder and box can ripple.
-        Note that MuJoCo collides a mesh geom as its convex hull; type="sdf" collides as the true surface. Impulses are
-        exact with every integrator but RK4.
+        Note that MuJoCo collides a mesh geom as its convex hull; type="sdf" collides as the true surface, and so does
+        a rigid flex of the same name on the same body, which then stands for the geom; see `make_collidable`. Impulses
+        are exact with every integrator but RK4.
     resolution : int or mapping
         Texels along an edge of the atlas's faces, for all targets or by geom name.
     backend, operator, conserve_volume
@@ -70,7 +71,7 @@ class Ripples:
         for name, geom in self._geoms.items():
             n = resolution[name] if isinstance(resolution, Mapping) else resolution
             self._surfaces[name] = RippleSurface(model, geom, materials[name], n, options)
-            self._warn_of_hull(name)
+            self._warn_of_collisions(name)
         self._waves = {geom: self._surfaces[name].waves for name, geom in self._geoms.items()}
         _warn_of_integrator(model)
         self._sources = Sources(model, self._waves)
@@ -215,11 +216,14 @@ class Ripples:
         steps = round(elapsed / timestep)
         return steps * timestep if abs(elapsed - steps * timestep) < 1e-6 * timestep else elapsed
 
-    def _warn_of_hull(self, name: str) -> None:
-        if collides_as_hull(self.model, self._geoms[name]):
+    def _warn_of_collisions(self, name: str) -> None:
+        message, geom = None, self._geoms[name]
+        if geom in shells(self.model):
+            message = shell_warning(self.model, geom)
+        elif collides_as_hull(self.model, geom):
             message = hull_warning(name, self._surfaces[name].waves.atlas)
-            if message is not None:
-                warnings.warn(message, RippleWarning, stacklevel=3)
+        if message is not None:
+            warnings.warn(message, RippleWarning, stacklevel=3)
 
 
 def _check_arguments(

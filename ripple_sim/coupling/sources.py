@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Load, WaveSolver
 
-from .contacts import pressing_contacts, smallest_extents
+from .contacts import Contacts, pressing_contacts, smallest_extents
 from .press import Press, Pressed
-from .target import geom_name
+from .shell_contacts import ShellContacts
+from .target import geom_name, shells
 
 # Footprint radius over the touching body's smallest half-extent: about the patch of a ball sunk in by an eighth.
 FOOTPRINT = 0.5
@@ -32,7 +33,8 @@ class Impulse:
     point : float64 [3]
         Force-weighted contact point on the target's true surface, in the world [m].
     impulse : float
-        Sum of normal force times time step [N s], not negative; it presses inwards.
+        Sum of normal force times time step [N s], not negative; it presses inwards. On a flex that stands for the geom,
+        of the whole force along the surface's normal.
     texel : tuple of int
         Face, row and column of the texel nearest to the point.
     """
@@ -83,6 +85,11 @@ class Sources:
         self._is_target[list(waves)] = True
         self._extents = smallest_extents(model)
         self._convex = ~np.isin(model.geom_type, _NOT_CONVEX)
+        self._shells = None
+        if shells(model):
+            self._shells = ShellContacts(model, {geom: each.atlas.mesh for geom, each in waves.items()})
+            self._is_target[self._shells.targets] = False
+            self._convex[list(shells(model))] = False
         self._names = [geom_name(model, geom) for geom in range(model.ngeom)]
         self.clear()
 
@@ -107,7 +114,7 @@ class Sources:
         loads = {}
         self.skip()
         self._timestep = self._model.opt.timestep
-        touched = pressing_contacts(self._model, data, self._is_target, self._extents)
+        touched = self._touched(data)
         for geom, press in self._presses.items():
             if geom in touched:
                 # copies, since MuJoCo's own arrays will move on
@@ -117,6 +124,14 @@ class Sources:
             else:
                 loads[geom] = press.release(elapsed)
         return loads
+
+    def _touched(self, data: mujoco.MjData) -> dict[int, Contacts]:
+        """What presses on each target."""
+        if self._shells is None:
+            return pressing_contacts(self._model, data, self._is_target, self._extents)
+        geoms = self._shells.geoms(data)
+        touched = pressing_contacts(self._model, data, self._is_target, self._extents, geoms)
+        return touched | self._shells.pressing(data, geoms, self._extents)
 
     @property
     def impulses(self) -> list[Impulse]:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from ..errors import RippleWarning
 from .contacts import smallest_extents
-from .target import geom_name
+from .target import contact_masks, geom_name, shell_thickness, shells
 
 _SDF = int(mujoco.mjtGeom.mjGEOM_SDF)
+_CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 # The flag of MuJoCo's speculative contacts, which it has from version 4 on; before, 0.
 SPECULATIVE = int(getattr(mujoco.mjtEnableBit, "mjENBL_SPECULATIVE", 0))
 
@@ -21,6 +22,8 @@ _SAFE = 0.85
 # Depth over a body's smallest half-extent at which contacts with a signed distance begin to push from all sides: seen
 # at 1.4, not yet at 1.2.
 _SAFE_IN_SDF = 1.2
+# Depth over a shell's thickness at which it begins to throw cylinders aside.
+_SAFE_IN_SHELL = 0.7
 # Speeds are looked at this often [steps], and for as many steps ahead.
 _EVERY = 5
 
@@ -34,7 +37,10 @@ class SpeedCheck:
     on the other side or stays inside; the first that do were seen at 0.9 of it. In an SDF geom a body that is in by
     more than its own half-extent is pushed from all sides: the normal forces then add up to many times the momentum
     that is exchanged. Every pair is warned of once. MuJoCo's speculative contacts, where the version has them and they
-    are enabled, stop bodies in time, but not at SDF geoms: then only those are checked.
+    are enabled, stop bodies in time, but not at SDF geoms or flexes: then only those are checked.
+
+    A flex that stands for a geom holds bodies off by its thickness, which counts in place of the geom's half-extent.
+    Cylinders that get in by 0.7 of it begin to be thrown aside.
 
     Parameters
     ----------
@@ -45,8 +51,12 @@ class SpeedCheck:
 
     def __init__(self, model: mujoco.MjModel, targets: list[int]) -> None:
         self._model = model
-        bodies, extents, sdf = model.geom_bodyid, smallest_extents(model), model.geom_type == _SDF
-        in_time = bool(model.opt.enableflags & SPECULATIVE)
+        bodies, extents, solref = model.geom_bodyid, smallest_extents(model), model.geom_solref.copy()
+        sdf, cylinder = model.geom_type == _SDF, model.geom_type == _CYLINDER
+        shell = np.zeros(model.ngeom, dtype=bool)
+        for geom, flex in shells(model).items():
+            shell[geom], extents[geom], solref[geom] = True, shell_thickness(model, flex), model.flex_solref[flex]
+        unchecked = sdf | shell if model.opt.enableflags & SPECULATIVE else np.ones(model.ngeom, dtype=bool)
         pairs = [
             (target, other)
             for target in targets
@@ -54,16 +64,16 @@ class SpeedCheck:
             if np.isfinite(extents[other])
             and bodies[other] != bodies[target]
             and can_collide(model, target, other)
-            and (sdf[target] or sdf[other] or not in_time)
+            and (unchecked[target] or unchecked[other])
         ]
         self._target, self._other = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-        of_target, of_other = extents[self._target], extents[self._other]
-        self._limit = _SAFE * (of_target + of_other)
-        for inside, of_inside in ((self._other, of_target), (self._target, of_other)):
-            self._limit = np.where(sdf[inside], np.minimum(self._limit, _SAFE_IN_SDF * of_inside), self._limit)
+        self._limit = _SAFE * (extents[self._target] + extents[self._other])
+        for body, around in ((self._target, self._other), (self._other, self._target)):
+            safe = np.where(sdf[around], _SAFE_IN_SDF * extents[body], np.inf)
+            safe = np.where(shell[around] & cylinder[body], _SAFE_IN_SHELL * extents[around], safe)
+            self._limit = np.minimum(self._limit, safe)
         self._reach = model.geom_rbound[self._target] + model.geom_rbound[self._other]
-        solref = (model.geom_solref[self._target] + model.geom_solref[self._other]) / 2
-        self._soft = _stopping_time(solref, model.opt.timestep)
+        self._soft = _stopping_time((solref[self._target] + solref[self._other]) / 2, model.opt.timestep)
         self._warned = np.zeros(len(pairs), dtype=bool)
         self._steps = 0
 
@@ -108,8 +118,8 @@ class SpeedCheck:
 
 
 def can_collide(model: mujoco.MjModel, first: int, second: int) -> bool:
-    """Whether MuJoCo's bit masks let two geoms collide."""
-    types, affinities = model.geom_contype, model.geom_conaffinity
+    """Whether MuJoCo's bit masks let two geoms, or the flexes that stand for them, collide."""
+    types, affinities = contact_masks(model)
     return bool(types[first] & affinities[second] or types[second] & affinities[first])
 
 

@@ -1,4 +1,4 @@
-"""The targets of a MuJoCo model: which geom, which surface, and its atlas in the geom's own frame."""
+"""The targets of a MuJoCo model: which geom, which surface, its atlas in the geom's own frame, and its shell."""
 
 from __future__ import annotations
 
@@ -60,10 +60,11 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int) -> Atlas:
     """
     if TARGET_TYPES[int(model.geom_type[geom])] == "sphere":
         return sphere_atlas(float(model.geom_size[geom, 0]), resolution)
-    return build_atlas(_target_mesh(model, geom), resolution)
+    return build_atlas(target_mesh(model, geom), resolution)
 
 
-def _target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
+def target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
+    """Surface of a geom in the geom's frame [m]; see `target_atlas`."""
     kind, size = TARGET_TYPES[int(model.geom_type[geom])], model.geom_size[geom]
     name = f"mesh of geom {geom_name(model, geom)!r}"
     if kind in ("mesh", "sdf"):
@@ -85,6 +86,32 @@ def _target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
     longest = float(np.max(solid.extents)) * _FINENESS
     V, F = trimesh.remesh.subdivide_to_size(solid.vertices, solid.faces, max_edge=longest)
     return Mesh.from_arrays(_on_round_surface(kind, size, V), F, name=name)
+
+
+def shells(model: mujoco.MjModel) -> dict[int, int]:
+    """Flex that collides in place of a geom, by geom id: a rigid one of triangles, of its name and on its body."""
+    found = {}
+    for flex in range(model.nflex):
+        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex)
+        geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name) if name else -1
+        if geom < 0 or model.flex_dim[flex] != 2 or not model.flex_rigid[flex]:
+            continue
+        if model.flex_vertbodyid[model.flex_vertadr[flex]] == model.geom_bodyid[geom]:
+            found[geom] = flex
+    return found
+
+
+def shell_thickness(model: mujoco.MjModel, flex: int) -> float:
+    """How far off its triangles a flex holds bodies [m]."""
+    return float(model.flex_margin[flex] + model.flex_radius[flex])
+
+
+def contact_masks(model: mujoco.MjModel) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Contact types and affinities of all geoms, or of the flexes that stand for them, [ngeom]."""
+    types, affinities = model.geom_contype.copy(), model.geom_conaffinity.copy()
+    for geom, flex in shells(model).items():
+        types[geom], affinities[geom] = model.flex_contype[flex], model.flex_conaffinity[flex]
+    return types, affinities
 
 
 def _on_round_surface(kind: str, size: NDArray[np.float64], V: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
+from ..coupling.target import shells
 from ..errors import RippleWarning
 
 
 def warn_of_undrawn(model: Any) -> None:
-    """Say once what of a model will be missing from the picture."""
-    kinds = {"tendons": model.ntendon, "flexes": model.nflex, "skins": model.nskin}
+    """Say once what of a model will be missing from the picture; flexes that stand for a geom are not."""
+    kinds = {"tendons": model.ntendon, "flexes": model.nflex - len(shells(model)), "skins": model.nskin}
     missing = [f"{count} {kind}" for kind, count in kinds.items() if count]
     if missing:
         warnings.warn(

@@ -25,9 +25,21 @@ def spec_of(V: np.ndarray, F: np.ndarray) -> mujoco.MjSpec:
 def rest_height(model: mujoco.MjModel) -> float:
     """Height at which the ball of radius 0.02 m first touches something."""
     data = mujoco.MjData(model)
-    while data.time < 2 and not any(contact.dist < 0 for contact in data.contact):
+    while data.time < 2 and not any(contact.dist < contact.includemargin for contact in data.contact):
         mujoco.mj_step(model, data)
     return float(data.body("ball").xpos[2]) - 0.02
+
+
+def throw(model: mujoco.MjModel) -> tuple[float, float, float]:
+    """What a ball gives to the target and loses, and the share of its speed with which it comes back."""
+    data, given = mujoco.MjData(model), 0.0
+    ripples = Ripples(model, {"target": Material(density=50)}, resolution=8, backend="cpu")
+    data.qvel[2] = -1.5
+    while data.time < 0.3:
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+        given += sum(impulse.impulse for impulse in ripples.last_impulses)
+    return given, 0.1 * float(np.linalg.norm(data.qvel[:3] - [0, 0, -1.5])), data.qvel[2] / 1.5
 
 
 def test_body_comes_down_on_the_surface_that_the_route_promises() -> None:
@@ -35,7 +47,7 @@ def test_body_comes_down_on_the_surface_that_the_route_promises() -> None:
     V, F = peanut(0.04)
     waist = V[np.abs(V[:, 0]) < 0.03][:, 2].max()
     heights = {}
-    for route in ("sdf", "hull"):
+    for route in ("sdf", "flex", "hull"):
         spec = spec_of(V, F)
         make_collidable(spec, "target", route)
         ball = spec.worldbody.add_body(name="ball", pos=[0, 0, 0.35])
@@ -43,8 +55,27 @@ def test_body_comes_down_on_the_surface_that_the_route_promises() -> None:
         ball.add_geom(size=[0.02, 0, 0], mass=0.1)
         heights[route] = rest_height(spec.compile())
     assert heights["sdf"] == pytest.approx(waist, abs=0.012)
+    assert heights["flex"] == pytest.approx(waist, abs=0.012)
     assert heights["hull"] == pytest.approx(V[:, 2].max(), abs=0.012)
     assert heights["hull"] - heights["sdf"] > 0.03
+
+
+@pytest.mark.parametrize(("solref", "restitution"), [([0.02, 1.0], 0.13), ([-40000.0, -90.0], 0.5)])
+def test_routes_agree_where_the_hull_is_the_surface(solref: list[float], restitution: float) -> None:
+    V, F = peanut(0.05)
+    results = {}
+    for route in ("sdf", "flex", "hull"):
+        spec = spec_of(0.3 * V / np.linalg.norm(V, axis=1, keepdims=True), F)
+        spec.option.gravity = [0, 0, 0]
+        spec.geom("target").solref = solref
+        make_collidable(spec, "target", route)
+        ball = spec.worldbody.add_body(name="ball", pos=[0.001, 0.002, 0.4])
+        ball.add_freejoint()
+        ball.add_geom(size=[0.04, 0, 0], mass=0.1, solref=solref, condim=1)
+        results[route] = throw(spec.compile())
+    given, lost, back = np.array(list(results.values())).T
+    np.testing.assert_allclose(given, lost, rtol=0.03)
+    np.testing.assert_allclose(back, restitution, atol=0.1)
 
 
 def test_starting_points_are_lowered_but_never_raised() -> None:
@@ -73,8 +104,7 @@ def test_fast_bodies_are_stopped_by_speculative_contacts_where_there_are_any(mon
     ("geom", "route", "message"),
     [
         ("nose", "sdf", "geoms are 'target', 'knob'"),
-        ("target", "flex", "thin shell.*valid are 'sdf', 'hull'"),
-        ("target", "ghost", "valid are 'sdf', 'hull'"),
+        ("target", "ghost", "valid are 'sdf', 'flex', 'hull'"),
     ],
 )
 def test_unknown_names_are_refused(geom: str, route: str, message: str) -> None:

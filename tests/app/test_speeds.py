@@ -5,12 +5,16 @@ import warnings
 import mujoco
 import numpy as np
 import pytest
+import trimesh
 
+from ripple_sim import make_collidable
 from ripple_sim.coupling import speeds
 from ripple_sim.coupling.speeds import SpeedCheck
 from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import peanut
 
+# springs that throw back 0.9 of the speed
+BOUNCY = "0.149 0.0335"
 PLATE = '<geom name="plate" type="box" size="0.3 0.3 0.02"/>'
 
 
@@ -101,6 +105,41 @@ def test_what_an_sdf_pushes_from_all_sides_was_warned_of(solref: str) -> None:
     # and not much too early: within two of the speeds tried
     first_wrong, first_warned = [right for right, _ in outcomes].index(False), [w for _, w in outcomes].index(True)
     assert first_wrong - first_warned <= 2
+
+
+def slab_of_flex(kind: str, solref: str) -> mujoco.MjModel:
+    slab = trimesh.creation.box(extents=(0.6, 0.6, 0.4))
+    V, F = trimesh.remesh.subdivide_to_size(slab.vertices, slab.faces, 0.06)
+    mesh = f'vertex="{" ".join(f"{x:.5g}" for x in V.ravel())}" face="{" ".join(map(str, F.ravel()))}"'
+    spec = mujoco.MjSpec.from_string(
+        f"""<mujoco><option timestep="0.002" gravity="0 0 0"/><default><geom solref="{solref}" condim="3"/></default>
+        <asset><mesh name="m" {mesh}/></asset><worldbody><geom name="slab" type="mesh" mesh="m"/>
+        <body name="body" pos="-0.03 0.01 0.26"><freejoint/><geom type="{kind}" size="0.05 0.04" mass="0.3"/></body>
+        </worldbody></mujoco>"""
+    )
+    make_collidable(spec, "slab", "flex")
+    return spec.compile()
+
+
+@pytest.mark.parametrize(("kind", "solref"), [("sphere", "0.02 1"), ("sphere", BOUNCY), ("cylinder", BOUNCY)])
+def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(kind: str, solref: str) -> None:
+    model = slab_of_flex(kind, solref)
+    right, warned, back = [], [], None
+    for speed in np.geomspace(0.5, 60, 9):
+        data, check = mujoco.MjData(model), SpeedCheck(model, [0])
+        data.qvel[2] = -speed
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            while data.time < 0.03 / speed + 0.06:
+                mujoco.mj_step(model, data)
+                check(data)
+        back = data.qvel[2] / speed if back is None else back
+        aside = np.linalg.norm([*data.qvel[:2], 0.05 * np.linalg.norm(data.qvel[3:])]) / speed
+        right.append(abs(data.qvel[2] / speed - back) < 0.2 and aside < 0.5)
+        warned.append(bool(caught))
+    assert all(was_warned for ok, was_warned in zip(right, warned, strict=True) if not ok)
+    # and not much too early: within a factor of six in speed
+    assert 0 < right.index(False) - warned.index(True) + 1 <= 4
 
 
 def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: pytest.MonkeyPatch) -> None:
