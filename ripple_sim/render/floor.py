@@ -19,7 +19,7 @@ from .lights import Light
 from .materials import FLAT_IMAGE, Textures, mapping_of, texture_pixels
 from .owned import OwnedObjects
 from .pieces import geom_piece
-from .shadow import ShadowMap
+from .shadow import ShadowMaps
 
 _PACKAGE = "ripple_sim.render"
 _CEILING_UNIT = 3  # of the texture, in shaders/floor_occlusion_fragment.glsl
@@ -40,9 +40,23 @@ def find_floor(model: Any, geoms: list[int]) -> int | None:
 
 
 class Floor:
-    """A model's floor plane. It is not drawn: the picture's shader meets it with a ray."""
+    """A model's floor plane. It is not drawn: the picture's shader meets it with a ray.
 
-    def __init__(self, gl: GLContext, ctx: OwnedObjects, model: Any, geom: int, textures: Textures) -> None:
+    Parameters
+    ----------
+    gl : GLContext
+    ctx : OwnedObjects
+    model : mujoco.MjModel
+    geom : int
+        The plane.
+    textures : Textures
+    shadows : int
+        How many lamps may cast shadows.
+    """
+
+    def __init__(
+        self, gl: GLContext, ctx: OwnedObjects, model: Any, geom: int, textures: Textures, shadows: int
+    ) -> None:
         self.geom = geom
         piece = geom_piece(model, geom)
         mapping = mapping_of(model, piece)
@@ -55,8 +69,9 @@ class Floor:
         self.reflectance = 0.0 if piece.material < 0 else float(model.mat_reflectance[piece.material])
         half = np.asarray(model.geom_size[geom][:2], dtype=np.float64)
         self._half = np.where(half > 0, half, _ENDLESS)
+        options = {"NEAR_LAMPS": 1, "SHADOWS": shadows}
         self._occlude = ctx.vertex_array(
-            ctx.own(gl.program(_PACKAGE, "screen_vertex", "floor_occlusion_fragment", NEAR_LAMPS=1)), []
+            ctx.own(gl.program(_PACKAGE, "screen_vertex", "floor_occlusion_fragment", **options)), []
         )
         self._ceiling = ctx.depth_texture((_CEILING_SIZE, _CEILING_SIZE))
         self._ceiling.compare_func = ""
@@ -80,9 +95,14 @@ class Floor:
         frame.set_vector("floor_albedo", self.albedo)
         frame.set_vector("floor_map", [local[0], local[1], self._half_width])
 
-    def shade(self, frame: FrameUniforms, light: Light, centres: NDArray, radii: NDArray) -> None:
-        """Set the part of the floor that the shadows of some balls [m] may fall on."""
+    def shade(self, frame: FrameUniforms, lights: list[Light], centres: NDArray, radii: NDArray) -> None:
+        """Set the parts of the floor that the shadows of some balls [m] may fall on, for each light."""
         points = centres[:, None] + radii[:, None, None] * _CORNERS
+        for shadow, light in zip(frame.values["shadows"], lights, strict=False):
+            shadow["floor"] = self._shaded_box(light, points)
+
+    def _shaded_box(self, light: Light, points: NDArray) -> NDArray[np.float64]:
+        """Lower and upper corner, in the occlusion map, of a box about the shadows of points [m]."""
         towards = light.direction if light.position is None else light.position - points
         height = np.maximum((points - self.origin) @ self.normal, 0.0)
         rise = np.broadcast_to(towards @ self.normal, height.shape)
@@ -92,8 +112,7 @@ class Floor:
         least, most = local.min(axis=(0, 1)), local.max(axis=(0, 1))
         if low.any():
             least, most = np.full(2, -_ENDLESS), np.full(2, _ENDLESS)
-        box = 0.5 + 0.5 * np.concatenate([least / self._half_width - _SOFT, most / self._half_width + _SOFT])
-        frame.values["floor_shade"] = box
+        return 0.5 + 0.5 * np.concatenate([least / self._half_width - _SOFT, most / self._half_width + _SOFT])
 
     @property
     def normal(self) -> NDArray[np.float64]:
@@ -101,7 +120,7 @@ class Floor:
         return self._rotation[:, 2]
 
     def occlude(
-        self, ctx: moderngl.Context, draw_depth: Callable[[tuple[float, ...]], None], shadow: ShadowMap
+        self, ctx: moderngl.Context, draw_depth: Callable[[tuple[float, ...]], None], shadows: ShadowMaps
     ) -> None:
         """Look up from the floor, and spread what hangs low into a map of how much sky is left; mark the shadows."""
         top = self._half_width
@@ -117,7 +136,7 @@ class Floor:
         draw_depth(tuple(matrix.T.ravel()))
         self._openness_target.use()
         ctx.disable(moderngl.DEPTH_TEST)
-        shadow.bind()
+        shadows.bind()
         self._ceiling.use(_CEILING_UNIT)
         self._occlude.program["extent"] = (2 * self._half_width, top, 0.35 * self._half_width)
         self._occlude.render(moderngl.TRIANGLES, vertices=3)

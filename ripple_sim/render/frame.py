@@ -10,19 +10,18 @@ from numpy.typing import NDArray
 from .camera import Pose, perspective, view_matrix
 from .owned import OwnedObjects
 
-MAX_LIGHTS = 8
+MAX_LIGHTS, MAX_SHADOWS = 8, 4
 _NEAR, _FAR = 0.02, 200.0  # clip planes, in camera distances
 
 # the layout of shaders/frame.glsl (std140: everything is vec4 or mat4)
 _LIGHT = np.dtype([(name, "f4", 4) for name in ("position", "direction", "radiance", "falloff")])
+_SHADOW = np.dtype(
+    [(name, "f4", (4, 4)) for name in ("matrix", "planes")]
+    + [(name, "f4", 4) for name in ("depth", "width", "penumbra", "floor")]
+)
 _FRAME = np.dtype(
     [
         ("view_projection", "f4", (4, 4)),
-        ("shadow_matrix", "f4", (4, 4)),
-        ("shadow_planes", "f4", (4, 4)),
-        ("shadow_depth", "f4", 4),
-        ("shadow_width", "f4", 4),
-        ("shadow_penumbra", "f4", 4),
         ("eye", "f4", 4),
         ("focus", "f4", 4),
         ("ray", "f4", 4),
@@ -42,8 +41,8 @@ _FRAME = np.dtype(
         ("floor_light", "f4", 4),
         ("floor_map", "f4", 4),
         ("floor_fade", "f4", 4),
-        ("floor_shade", "f4", 4),
         ("lights", _LIGHT, MAX_LIGHTS),
+        ("shadows", _SHADOW, MAX_SHADOWS),
         ("counts", "f4", 4),
     ]
 )

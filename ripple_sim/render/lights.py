@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .camera import Pose
 from .color import linear
-from .frame import MAX_LIGHTS, FrameUniforms
+from .frame import MAX_LIGHTS, MAX_SHADOWS, FrameUniforms
 
 _KIND = mujoco.mjtLightType
 _SUN_TANGENT = 0.05  # of the angular radius of a directional lamp: MJCF gives none
@@ -80,7 +80,7 @@ class Light:
 
 @dataclass(frozen=True)
 class Lighting:
-    """All light of a frame: the lamps, the first of which may cast a shadow, and what comes from everywhere else.
+    """All light of a frame: the lamps, of which the first may cast shadows, and what comes from everywhere else.
 
     `ambient` is the radiance from all around, shape [3]; `studio` says that the photo studio replaces the MJCF's lamps.
     """
@@ -102,6 +102,12 @@ def is_lit(model: Any) -> bool:
 def has_near_lamps(model: Any) -> bool:
     """Whether any lamp of the MJCF stands at a place."""
     return bool(np.any(model.light_type != _KIND.mjLIGHT_DIRECTIONAL))
+
+
+def casting_lamps(model: Any) -> int:
+    """How many lamps of the MJCF may cast shadows: 1 to MAX_SHADOWS."""
+    casting = model.light_castshadow.astype(bool) & (model.light_type != _KIND.mjLIGHT_IMAGE)
+    return int(np.clip(casting.sum(), 1, MAX_SHADOWS))
 
 
 def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
@@ -136,7 +142,7 @@ def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
             )
         )
     lights = [light for light in lights if light.radiance.any()]
-    # the brightest lamp that casts shadows comes first, then the others by brightness
+    # lamps that cast shadows come before the others, the brightest first
     lights.sort(key=lambda light: (not light.shadow, -light.radiance.sum()))
     lights = lights[:MAX_LIGHTS]
     total = sum((light.radiance for light in lights), np.zeros(3)).max()

@@ -43,7 +43,8 @@ class Picture:
         Whether the background stays transparent and the floor shows nothing but shadows.
     floor : Floor, optional
     options : dict
-        0 or 1 each: SKYBOX and NEAR_LAMPS, whether the light knows them; LINEAR, whether the frame is linear light.
+        SKYBOX and NEAR_LAMPS, 0 or 1: whether the light knows them; LINEAR, 0 or 1: whether the frame is linear light;
+        SHADOWS: how many lamps may cast them.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""One frame: shadow map, floor occlusion, the visible surfaces, their light, and the way back to memory."""
+"""One frame: shadow maps, floor occlusion, the visible surfaces, their light, and the way back to memory."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .bounds import boxes_of
 from .camera import Pose, Viewpoint
 from .floor import Floor, find_floor
 from .frame import FrameUniforms
-from .lights import has_near_lamps, is_lit, model_lighting, set_lighting, studio_lighting
+from .lights import casting_lamps, has_near_lamps, is_lit, model_lighting, set_lighting, studio_lighting
 from .materials import Textures
 from .mirror import Mirror
 from .objects import ObjectTable
@@ -27,7 +27,7 @@ from .picture import Picture
 from .pieces import ball_of, visible_geoms
 from .readback import Readback
 from .reliefs import ReliefTextures
-from .shadow import ShadowMap
+from .shadow import ShadowMaps
 from .surface import Surface, SurfaceMesh
 from .undrawn import warn_of_undrawn
 
@@ -87,7 +87,8 @@ class Renderer:
         self._owned = ctx = OwnedObjects(gl, self)
         with gl:
             self._frame = FrameUniforms(ctx)
-            self._shadow = ShadowMap(ctx)
+            shadows = 1 if self._studio else casting_lamps(model)
+            self._shadows = ShadowMaps(ctx, shadows)
             self._table = ObjectTable(ctx)
             self._open_floor = ctx.texture((1, 1), 2, np.ones(2, dtype=np.float16).tobytes(), dtype="f2")
             textures = Textures(ctx, model)
@@ -99,10 +100,11 @@ class Renderer:
             ]
             geoms = [geom for geom in visible_geoms(model) if geom not in targets]
             floor = find_floor(model, geoms)
-            self._floor = None if floor is None else Floor(gl, ctx, model, floor, textures)
+            self._floor = None if floor is None else Floor(gl, ctx, model, floor, textures, shadows)
             options = {
                 "SKYBOX": int(self._sky is not None),
                 "NEAR_LAMPS": int(not self._studio and has_near_lamps(model)),
+                "SHADOWS": shadows,
                 "LINEAR": int(linear),
             }
             self._picture = Picture(
@@ -190,8 +192,8 @@ class Renderer:
         """
         pose = camera.pose()
         with self._gl as ctx:
-            light_view = self._update(ctx, data, reliefs, pose, exposure)
-            self._draw_maps(ctx, light_view)
+            self._update(ctx, data, reliefs, pose, exposure)
+            self._draw_maps(ctx)
             if self._mirror is not None and self._floor is not None:
                 self._mirror.draw(ctx, self._frame, pose, self._floor, self._balls, self._draw_solids, self._bind_maps)
             self._picture.begin(ctx)
@@ -205,8 +207,8 @@ class Renderer:
 
     def _update(
         self, ctx: moderngl.Context, data: Any, reliefs: Mapping[int, NDArray[np.float32]], pose: Pose, exposure: int
-    ) -> tuple[float, ...] | None:
-        """Bring everything on the GPU up to date; return the matrix of the light that casts shadows."""
+    ) -> None:
+        """Bring everything on the GPU up to date."""
         occluders = self._bodies.occluders.bind(data, pose.focus)
         for target in self._targets:
             rotation = data.geom_xmat[target.geom].reshape(3, 3)
@@ -227,14 +229,11 @@ class Renderer:
         set_lighting(frame, lighting, pose, albedo, None if self._sky is None else self._sky[1])
         if self._floor is not None:
             frame.set_vector("floor_light", lighting.on(pose.focus, self._floor.normal))
-        light_view = None
-        if lighting.lights and lighting.lights[0].shadow:
-            light_view = tuple(self._shadow.fit(frame, lighting.lights[0], centre, radius).T.ravel())
-            if self._floor is not None and len(casters[1]):
-                self._floor.shade(frame, lighting.lights[0], *casters)
-        frame.set_vector("counts", [occluders, len(lighting.lights), exposure], float(light_view is not None))
+        casting = self._shadows.fit(frame, lighting.lights, centre, radius)
+        if self._floor is not None and len(casters[1]):
+            self._floor.shade(frame, casting, *casters)
+        frame.set_vector("counts", [occluders, len(lighting.lights), exposure], len(casting))
         frame.bind()
-        return light_view
 
     def _bounding_balls(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Balls about all that is drawn: centres [k, 3] and radii [k], in metres; those of planes are infinite."""
@@ -248,18 +247,18 @@ class Renderer:
         near &= np.isfinite(radii)
         return centres[near], radii[near]
 
-    def _draw_maps(self, ctx: moderngl.Context, light_view: tuple[float, ...] | None) -> None:
+    def _draw_maps(self, ctx: moderngl.Context) -> None:
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.depth_func = "<="
-        if light_view is not None:
-            self._shadow.target.use()
-            self._shadow.target.clear(depth=1.0)
-            for target in self._targets:
-                if target.shades:
-                    target.draw_depth(light_view)
-            self._bodies.draw_depth(light_view, sites=True)
+        self._shadows.draw(self._draw_casters)
         if self._floor is not None:
-            self._floor.occlude(ctx, self._draw_depth, self._shadow)
+            self._floor.occlude(ctx, self._draw_depth, self._shadows)
+
+    def _draw_casters(self, view_projection: tuple[float, ...]) -> None:
+        for target in self._targets:
+            if target.shades:
+                target.draw_depth(view_projection)
+        self._bodies.draw_depth(view_projection, sites=True)
 
     def _draw_solids(self) -> None:
         for target in self._targets:
@@ -274,7 +273,7 @@ class Renderer:
 
     def _bind_maps(self) -> None:
         self._reliefs.bind()
-        self._shadow.bind()
+        self._shadows.bind()
         if self._floor is None:
             self._open_floor.use(3)
         else:

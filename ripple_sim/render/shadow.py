@@ -1,7 +1,8 @@
-"""The first light's shadow map."""
+"""The shadow maps of the lamps."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import moderngl
@@ -16,16 +17,26 @@ from .owned import OwnedObjects
 _SIZE = 1536
 _WIDEST = 0.022  # penumbra, as a share of the map
 _STEEPEST_FOV = 130.0  # [degrees]
+_REACH = 30.0  # how far behind the casters shadows fall, in their radius
 
 
-class ShadowMap:
-    """A square depth map of the scene as a lamp sees it."""
+class ShadowMaps:
+    """Square depth maps, side by side, of the scene as the lamps see it.
 
-    def __init__(self, ctx: OwnedObjects) -> None:
-        self._depth = ctx.depth_texture((_SIZE, _SIZE))
+    Parameters
+    ----------
+    ctx : OwnedObjects
+    count : int
+        How many lamps may cast shadows, 1 to MAX_SHADOWS.
+    """
+
+    def __init__(self, ctx: OwnedObjects, count: int) -> None:
+        self._count = count
+        self._views: list[tuple[float, ...]] = []
+        self._depth = ctx.depth_texture((count * _SIZE, _SIZE))
         self._depth.compare_func = ""
         self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self.target = ctx.framebuffer(depth_attachment=self._depth)
+        self._target = ctx.framebuffer(depth_attachment=self._depth)
         self._test = ctx.sampler(
             texture=self._depth,
             compare_func="<=",
@@ -34,53 +45,70 @@ class ShadowMap:
             repeat_y=False,
         )
 
-    def fit(self, frame: FrameUniforms, light: Light, centre: NDArray, radius: float) -> NDArray[np.float64]:
-        """Aim the map at a ball [m] that holds all casters; fill the frame's shadow and return the light's matrix."""
-        aim = self._fit_far if light.position is None else self._fit_near
-        matrix = aim(frame, light, centre, radius)
-        to_map = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1]]) @ matrix
-        frame.set_matrix("shadow_matrix", to_map)
-        frame.set_matrix("shadow_planes", np.linalg.inv(to_map).T)
-        return matrix
+    def fit(self, frame: FrameUniforms, lights: list[Light], centre: NDArray, radius: float) -> list[Light]:
+        """Aim the maps at a ball [m] that holds all casters, and fill the frame's shadows; return their lights.
 
-    def _fit_far(self, frame: FrameUniforms, light: Light, centre: NDArray, radius: float) -> NDArray[np.float64]:
-        """Cover the ball by a box that grows in coarse steps and moves by whole texels: shadow edges do not crawl.
-
-        It reaches behind the ball, where the shadows fall.
+        Lights that cast shadows come first.
         """
-        half_width = 2.0 ** (np.ceil(4 * np.log2(radius)) / 4)
-        texel = 2 * half_width / _SIZE
-        rotation = _axes(light.direction)
-        eye = rotation @ centre
-        eye[:2] = np.round(eye[:2] / texel) * texel
-        eye[2] += half_width
-        depth = 4 * half_width
-        frame.set_vector("shadow_depth", [depth, 0, 0], 1)
-        frame.set_vector("shadow_width", [2 * half_width, 0, _SIZE])
-        frame.set_vector("shadow_penumbra", [light.size, 0, _WIDEST])
-        return orthographic(half_width, depth) @ _view(rotation, eye)
+        casting = [light for light in lights if light.shadow][: self._count]
+        self._views = []
+        for shadow, light in zip(frame.values["shadows"], casting, strict=False):
+            aim = _fit_far if light.position is None else _fit_near
+            matrix = aim(shadow, light, centre, radius)
+            to_map = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1]]) @ matrix
+            shadow["matrix"], shadow["planes"] = to_map.T, np.linalg.inv(to_map)
+            self._views.append(tuple(matrix.T.ravel()))
+        return casting
 
-    def _fit_near(self, frame: FrameUniforms, light: Light, centre: NDArray, radius: float) -> NDArray[np.float64]:
-        """Cover the ball by the lamp's view of it, no wider than its beam."""
-        position: Any = light.position
-        away = float(np.linalg.norm(centre - position))
-        towards = light.direction if away < radius else (position - centre) / away
-        widest = np.radians(_STEEPEST_FOV / 2)
-        half = widest if away < 1.1 * radius else min(float(np.arcsin(radius / away)), widest)
-        half = np.ceil(half * 64) / 64
-        far = away + 4 * radius
-        near = max(0.5 * (away - radius), 0.004 * far)
-        frame.set_vector("shadow_depth", [0, near * far, near - far], far)
-        frame.set_vector("shadow_width", [0, 2 * np.tan(half), _SIZE])
-        frame.set_vector("shadow_penumbra", [0, light.size, _WIDEST])
-        rotation = _axes(towards)
-        return perspective(float(np.degrees(2 * half)), 1.0, near, far) @ _view(rotation, rotation @ position)
+    def draw(self, draw_depth: Callable[[tuple[float, ...]], None]) -> None:
+        """Draw all maps by a function that draws the casters' depth under a matrix of 16 numbers."""
+        for index, view in enumerate(self._views):
+            self._target.viewport = (index * _SIZE, 0, _SIZE, _SIZE)
+            self._target.use()
+            if index == 0:
+                self._target.clear(depth=1.0)
+            draw_depth(view)
 
     def bind(self) -> None:
-        """Bind the map for the shaders, once with and once without the depth test."""
+        """Bind the maps for the shaders, once with and once without the depth test."""
         self._depth.use(1)
         self._test.use(1)
         self._depth.use(2)
+
+
+def _fit_far(shadow: NDArray, light: Light, centre: NDArray, radius: float) -> NDArray[np.float64]:
+    """Cover the ball by a box that grows in coarse steps and moves by whole texels: shadow edges do not crawl.
+
+    It reaches behind the ball, where the shadows fall.
+    """
+    half_width = 2.0 ** (np.ceil(4 * np.log2(radius)) / 4)
+    texel = 2 * half_width / _SIZE
+    rotation = _axes(light.direction)
+    eye = rotation @ centre
+    eye[:2] = np.round(eye[:2] / texel) * texel
+    eye[2] += half_width
+    depth = (2 + _REACH) * half_width
+    shadow["depth"] = depth, 0, 0, 1
+    shadow["width"] = 2 * half_width, 0, _SIZE, 0
+    shadow["penumbra"] = light.size, 0, _WIDEST, 0
+    return orthographic(half_width, depth) @ _view(rotation, eye)
+
+
+def _fit_near(shadow: NDArray, light: Light, centre: NDArray, radius: float) -> NDArray[np.float64]:
+    """Cover the ball by the lamp's view of it, no wider than its beam."""
+    position: Any = light.position
+    away = float(np.linalg.norm(centre - position))
+    towards = light.direction if away < radius else (position - centre) / away
+    widest = np.radians(_STEEPEST_FOV / 2)
+    half = widest if away < 1.1 * radius else min(float(np.arcsin(radius / away)), widest)
+    half = np.ceil(half * 64) / 64
+    far = away + _REACH * radius
+    near = max(0.5 * (away - radius), 0.004 * far)
+    shadow["depth"] = 0, near * far, near - far, far
+    shadow["width"] = 0, 2 * np.tan(half), _SIZE, 0
+    shadow["penumbra"] = 0, light.size, _WIDEST, 0
+    rotation = _axes(towards)
+    return perspective(float(np.degrees(2 * half)), 1.0, near, far) @ _view(rotation, rotation @ position)
 
 
 def _axes(back: NDArray[np.float64]) -> NDArray[np.float64]:

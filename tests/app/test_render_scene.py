@@ -68,6 +68,50 @@ def test_a_near_lamp_throws_a_shadow_away_from_itself(gl):
     assert frame[56:64, spot - 3 : spot + 3].mean() < frame[56:64, spot - 70 : spot - 64].mean() - 40
 
 
+@pytest.mark.parametrize("lamps", [2, 3, 4])
+def test_every_lamp_throws_its_shadow(gl, lamps):
+    """Each of up to four suns, from four sides, darkens the floor where the ball stands in its way."""
+    sun = '<light directional="true" pos="0 0 3" dir="{} {} -1" diffuse=".2 .2 .2" castshadow="{}"/>'
+    ways = [(1, 0), (-1, 0), (0, 1), (0, -1)][:lamps]
+    plain = picture(gl, FLOOR + BALL + "".join(sun.format(*way, "false") for way in ways))
+    shaded = picture(gl, FLOOR + BALL + "".join(sun.format(*way, "true") for way in ways))
+    pixels = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))
+    for x, y in ways:  # the ball's middle, 0.8 m up, throws its shadow 0.8 m away
+        column, row = int(SIZE[0] / 2 + 0.8 * x * pixels), int(SIZE[1] / 2 - 0.8 * y * pixels)
+        here = np.s_[row - 2 : row + 2, column - 2 : column + 2]
+        assert shaded[here].mean() < plain[here].mean() - 6
+    beside = np.s_[:8, :8]
+    assert abs(shaded[beside].mean() - plain[beside].mean()) < 1
+
+
+def test_more_lamps_than_can_throw_shadows_shine_all_the_same(gl):
+    suns = "".join(SUN.format(x, "true").replace(".8 .8 .8", ".1 .1 .1") for x in np.linspace(-1, 1, 6))
+    assert picture(gl, FLOOR + BALL + suns)[:8].mean() > picture(gl, FLOOR + BALL, lighting="model")[:8].mean() + 20
+
+
+def test_a_near_lamp_and_a_sun_throw_shadows_side_by_side(gl):
+    pixels = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))
+    sun = SUN.format(-1.0, "{}").replace(".8 .8 .8", ".4 .4 .4")
+    spot = SPOT.format(-1.0, 0.5).replace("/>", ' castshadow="{}"/>')
+    places = [int(SIZE[0] / 2 + x * pixels) for x in (-0.8, 0.75)]
+    frames = {
+        flags: picture(gl, FLOOR + BALL + sun.format(flags[0]) + spot.format(flags[1]))
+        for flags in (("false", "false"), ("true", "true"))
+    }
+    plain, shaded = ([frame[56:64, x - 3 : x + 3].mean() for x in places] for frame in frames.values())
+    assert shaded[0] < plain[0] - 6
+    assert shaded[1] < plain[1] - 6
+
+
+def test_a_shadow_falls_far_below_its_body(gl):
+    """A small ball ten of its radii above the floor, lit from the left."""
+    ball = '<geom type="sphere" size=".1" pos="-.5 0 1" rgba=".8 .2 .2 1"/>'
+    frame = picture(gl, FLOOR + ball + SUN.format(1.0, "true"))
+    pixels = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))
+    x = int(SIZE[0] / 2 + 0.5 * pixels)
+    assert frame[58:62, x - 2 : x + 2].mean() < frame[58:62, x + 20 : x + 30].mean() - 60
+
+
 def test_the_edges_of_a_coarse_ball_do_not_shade_it(gl):
     """A small picture, whose ball has few triangles, looks as a large one does."""
     scene = FLOOR + BALL + SUN.format(1.0, "true")

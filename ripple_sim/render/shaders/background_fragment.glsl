@@ -1,6 +1,6 @@
 #version 430
-// The floor and what is behind it, without the first light's shadow; where that may fall is marked as a depth. With SHADOW
-// the pixels that were marked, or that show solids, too.
+// The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW the pixels that
+// were marked, or that show solids, too.
 #include "frame.glsl"
 #include "ray.glsl"
 #include "samples.glsl"
@@ -33,12 +33,16 @@ const float HORIZON = -1.0;
 #endif
 
 #if !SHADOW
-// Whether the first light's shadow may fall on a place of the floor; `near` is what the floor's map says of it.
+// Whether a shadow may fall on a place of the floor; `near` is what the floor's map says of it.
 bool may_be_shaded(vec2 place, vec2 near)
 {
     vec2 off = abs(place - 0.5);
-    bool boxed = all(greaterThan(place, floor_shade.xy)) && all(lessThan(place, floor_shade.zw));
-    return counts.w > 0.0 && boxed && (max(off.x, off.y) > 0.5 || near.g > 0.0);
+    bool boxed = false;
+    for (int i = 0; i < SHADOWS; ++i) {
+        vec4 box = shadows[i].floor;
+        boxed = boxed || counts.w > float(i) && all(greaterThan(place, box.xy)) && all(lessThan(place, box.zw));
+    }
+    return boxed && (max(off.x, off.y) > 0.5 || near.g > 0.0);
 }
 #endif
 
@@ -59,15 +63,18 @@ void main()
     vec3 world = eye.xyz + at * way;
     vec2 place = (plane - floor_map.xy) / (2.0 * floor_map.z) + 0.5, near = textureLod(floor_openness, place, 0.0).rg;
 #if SHADOW
-    float shadow = key_visibility(world, floor_normal.xyz, 0.0);
     // The filters of neighbouring pixels are turned differently: their mean has half the noise. It is taken where all
     // four pixels of a block are of this pass: what others have reckoned is undefined.
     int solid = bitCount(covered(pixel, floor_depth()));
     bool whole = block_inside(pixel) && block_mean(solid > 0 || !met ? 1.0 : 0.0) == 0.0;
-    float mean = block_mean(shadow), share = 1.0 - float(solid) / float(SAMPLES);
-    shadow = whole ? mean : shadow;
+    float shadow[SHADOWS], share = 1.0 - float(solid) / float(SAMPLES);
+    for (int i = 0; i < SHADOWS; ++i) {
+        shadow[i] = visibility(i, world, floor_normal.xyz, 0.0);
+        float mean = block_mean(shadow[i]);
+        shadow[i] = whole ? mean : shadow[i];
+    }
 #else
-    const float shadow = 1.0, share = 1.0;
+    const float share = 1.0;
     // blocks of pixels go together, so that their shadows can be averaged
     bool shaded = block_mean(met && may_be_shaded(place, near) ? 1.0 : 0.0) > 0.0;
     gl_FragDepth = shaded ? SHADED_LEVEL : OPEN_LEVEL;
@@ -77,12 +84,21 @@ void main()
     for (int i = 0; i < int(counts.y); ++i) {
         vec3 towards;
         vec3 arrives = incident(lights[i], world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
-        light += arrives * (i == 0 ? shadow : 1.0);
+#if SHADOW
+        light += arrives * (i < SHADOWS ? shadow[i] : 1.0);
+#else
+        light += arrives;
+#endif
         unshaded += arrives;
     }
 #else
-    vec3 key = lights[0].radiance.rgb * max(dot(floor_normal.xyz, lights[0].direction.xyz), 0.0);
-    vec3 unshaded = floor_light.rgb, light = unshaded - (1.0 - shadow) * key;
+    vec3 unshaded = floor_light.rgb, light = unshaded;
+#if SHADOW
+    for (int i = 0; i < SHADOWS; ++i) {
+        vec3 arrives = lights[i].radiance.rgb * max(dot(floor_normal.xyz, lights[i].direction.xyz), 0.0);
+        light -= (1.0 - shadow[i]) * arrives;
+    }
+#endif
 #endif
     light += around * (0.15 + 0.85 * near.r);
 #if CUT_OUT

@@ -10,31 +10,30 @@ layout(binding = 3) uniform sampler2D ceiling;  // 0 at the floor, 1 at the top
 uniform vec3 extent;  // width of the map [m], height of its top [m], radius of influence [m]
 
 in vec2 screen;
-out vec4 fragment;  // r: that share; g: 1 where the first light's shadow may fall
+out vec4 fragment;  // r: that share; g: 1 where a shadow may fall
 
 const int TAPS = 48;
 const int SHADOW_TAPS = 24;
 
-// Whether the light meets anything on its way to about a texel of the floor.
-bool is_shaded(vec3 world)
+// Whether a light meets anything on its way to about a texel of the floor, which is as wide as `texel` [m].
+bool is_shaded(int lamp, vec3 world, float texel)
 {
-    vec4 clip = shadow_matrix * vec4(world, 1.0);
+    vec4 clip = shadows[lamp].matrix * vec4(world, 1.0), width = shadows[lamp].width;
     vec3 p = clip.xyz / clip.w;
     vec2 off = abs(p.xy - 0.5);
-    float texel = floor_map.z * dFdx(screen.x);
-    float to_lamp = lamp_distance(p.z), margin = texel / (shadow_width.x + shadow_width.y * to_lamp);
-    float reach = shadow_penumbra.z + margin, closest = 1e9, widest = 0.0;
+    float to_lamp = lamp_distance(lamp, p.z), margin = texel / (width.x + width.y * to_lamp);
+    float reach = shadows[lamp].penumbra.z + margin, closest = 1e9, widest = 0.0;
     vec2 direction = vec2(1.0, 0.0);
     for (int i = 0; i < SHADOW_TAPS; ++i) {
         float offset = reach * sqrt((float(i) + 0.5) / float(SHADOW_TAPS));
         direction = TURN * direction;
-        float depth = textureLod(shadow_map, p.xy + offset * direction, 0.0).r;
+        float depth = textureLod(shadow_map, in_maps(lamp, p.xy + offset * direction), 0.0).r;
         closest = depth < 1.0 ? min(closest, offset) : closest;
-        widest = depth < 1.0 ? max(widest, penumbra_of(lamp_distance(depth), to_lamp)) : widest;
+        widest = depth < 1.0 ? max(widest, penumbra_of(lamp, lamp_distance(lamp, depth), to_lamp)) : widest;
     }
     // between two points may be something closer
     bool any = closest < widest + margin + 0.3 * reach;
-    return counts.w > 0.0 && clip.w > 0.0 && any && max(off.x, off.y) < 0.5 + reach;
+    return counts.w > float(lamp) && clip.w > 0.0 && any && max(off.x, off.y) < 0.5 + reach;
 }
 
 void main()
@@ -55,5 +54,9 @@ void main()
     }
     vec2 local = floor_map.xy + screen * floor_map.z;
     vec3 world = floor_origin.xyz + local.x * floor_u.xyz + local.y * floor_v.xyz;
-    fragment = vec4(1.0 - min(covered, 1.0), is_shaded(world) ? 1.0 : 0.0, 0.0, 1.0);
+    float size = floor_map.z * dFdx(screen.x);
+    bool shaded = false;
+    for (int i = 0; i < SHADOWS; ++i)
+        shaded = shaded || is_shaded(i, world, size);
+    fragment = vec4(1.0 - min(covered, 1.0), shaded ? 1.0 : 0.0, 0.0, 1.0);
 }

@@ -6,13 +6,17 @@ struct Light {
     vec4 falloff;    // constant, linear [1/m], quadratic [1/m^2]
 };
 
+struct Shadow {
+    mat4 matrix;    // world -> the lamp's map, all three coordinates 0 to 1 after the division
+    mat4 planes;    // its inverse transpose: takes planes along
+    vec4 depth;     // (x z + y) / (z z + w) turns a depth of the map into metres from the lamp
+    vec4 width;     // x + y times that distance: the map's width [m]; z: its texels
+    vec4 penumbra;  // x: tangent of the lamp's radius; y: radius [m] of a near lamp; z: widest in the map
+    vec4 floor;     // box about the shadows on the floor, in its occlusion map: lower and upper corner
+};
+
 layout(std140, binding = 0) uniform Frame {
     mat4 view_projection;
-    mat4 shadow_matrix;    // world -> shadow map, all three coordinates 0 to 1 after the division
-    mat4 shadow_planes;    // its inverse transpose: takes planes along
-    vec4 shadow_depth;     // (x z + y) / (z z + w) turns a depth of the map into metres from the lamp
-    vec4 shadow_width;     // x + y times that distance: the map's width [m]; z: its texels
-    vec4 shadow_penumbra;  // x: tangent of the lamp's radius; y: radius [m] of a near lamp; z: widest in the map
     vec4 eye;              // xyz [m]; w: distance to the focus [m]
     vec4 focus;            // what the camera is about [m]
     vec4 ray;              // through the middle of the picture, one metre along the camera's axis; w: near plane [m]
@@ -32,7 +36,7 @@ layout(std140, binding = 0) uniform Frame {
     vec4 floor_light;      // irradiance of the floor over pi where nothing shades it
     vec4 floor_map;        // occlusion map: xy centre, z half width [m]
     vec4 floor_fade;       // x, y: from where to where, in distances of the focus, it fades into the background
-    vec4 floor_shade;      // box about the first light's shadows, in the occlusion map: lower and upper corner
-    Light lights[8];       // the first one casts shadows
-    vec4 counts;           // x: occluders, y: lights, z: number of the exposure, w: 1 with a shadow
+    Light lights[8];       // the first ones cast shadows
+    Shadow shadows[4];     // of those
+    vec4 counts;           // x: occluders, y: lights, z: number of the exposure, w: lights that cast shadows
 };

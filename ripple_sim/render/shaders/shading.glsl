@@ -62,12 +62,14 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     vec3 wrap = 0.6 * m.translucency * m.albedo;
     // what enters elsewhere and leaves here: more of it where the body is thin, and the deeper its colour the further
     float thin = exp(-4.0 * m.thickness);
-    float shadow = block_mean(key_visibility(position, flat_normal, m.lift), m.block);
+    float shadow[SHADOWS];
+    for (int i = 0; i < SHADOWS; ++i)
+        shadow[i] = block_mean(visibility(i, position, flat_normal, m.lift), m.block);
     vec3 direct = vec3(0.0), highlight = vec3(0.0), glow = vec3(0.0);
     for (int i = 0; i < int(counts.y); ++i) {
         vec3 light;
         vec3 radiance = incident(lights[i], position, light);
-        float n_l = dot(normal, light), visible = i == 0 ? shadow : 1.0;
+        float n_l = dot(normal, light), visible = i < SHADOWS ? shadow[i] : 1.0;
         vec3 halfway = normalize(view + light);
         vec3 diffuse = max(n_l + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
         direct += radiance * diffuse * mix(visible, 1.0, 0.35 * m.translucency);
