@@ -13,6 +13,7 @@ from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.gl import GLContext
 
 from .bounds import Tiles
+from .coarse import CoarseBackground
 from .color import SRGB8_ALPHA8
 from .floor import Floor
 from .owned import OwnedObjects
@@ -107,9 +108,11 @@ class Picture:
             "MIRROR": int(reflects),
         }
         levels = {f"{name}_LEVEL": level for name, level in _LEVELS.items()}
+        smooth = not (cut_out or tiled or reflects or options["SKYBOX"])
+        self._coarse = CoarseBackground(gl, ctx, size, {**options, **levels}) if smooth else None
         stages: tuple[tuple[str, str, str, dict[str, Any]], ...] = (
-            ("background", "view_vertex", "background_fragment", {"SHADOW": 0, **levels}),
-            ("shaded background", "view_vertex", "background_fragment", {"SHADOW": 1}),
+            ("background", "view_vertex", "background_fragment", {"SHADOW": 0, "COARSE": 0, **levels}),
+            ("shaded background", "view_vertex", "background_fragment", {"SHADOW": 1, "COARSE": 0}),
             ("solid", "view_vertex", "solid_fragment", {"LAYER": 0}),
             ("layer", "view_vertex", "solid_fragment", {"LAYER": 1}),
         )
@@ -150,6 +153,8 @@ class Picture:
         for unit, layer in enumerate(self._layers, start=_FIRST_UNIT):
             layer.use(unit)
         self._tiles.cover(boxes)
+        if self._coarse is not None:
+            self._coarse.light(ctx)
         self.frame.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
         ctx.depth_func = "1"
@@ -157,7 +162,10 @@ class Picture:
         if self._tiles.count:
             self._classify.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=self._tiles.count)
         ctx.depth_func = "<="
-        self._run("background", 0.0)
+        if self._coarse is None:
+            self._run("background", 0.0)
+        else:
+            self._coarse.fill()
         ctx.depth_func = "=="
         self.frame.depth_mask = False
         self._run("shaded background", _LEVELS["SHADED"])

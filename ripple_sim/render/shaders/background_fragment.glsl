@@ -1,6 +1,6 @@
 #version 430
 // The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW the pixels that
-// were marked, or that show solids, too.
+// were marked, or that show solids, too. With COARSE every pixel stands for a block of them.
 #include "frame.glsl"
 #include "ray.glsl"
 #include "samples.glsl"
@@ -24,6 +24,8 @@ layout(binding = 14) uniform sampler2D mirror;  // the scene as the floor reflec
 
 uniform float reflectance;
 #endif
+
+const float STEEPEST = 0.03;  // change from one block to the next that is still smooth
 
 // A skybox goes on under the horizon, which the floor hides.
 #if SKYBOX
@@ -61,7 +63,12 @@ void main()
     vec3 albedo = floor_albedo.rgb;
 #endif
     vec3 world = eye.xyz + at * way;
-    vec2 place = (plane - floor_map.xy) / (2.0 * floor_map.z) + 0.5, near = textureLod(floor_openness, place, 0.0).rg;
+    vec2 place = (plane - floor_map.xy) / (2.0 * floor_map.z) + 0.5;
+#if COARSE
+    vec2 near = texture(floor_openness, place).rg;
+#else
+    vec2 near = textureLod(floor_openness, place, 0.0).rg;
+#endif
 #if SHADOW
     // The filters of neighbouring pixels are turned differently: their mean has half the noise. It is taken where all
     // four pixels of a block are of this pass: what others have reckoned is undefined.
@@ -75,9 +82,11 @@ void main()
     }
 #else
     const float share = 1.0;
+    bool shaded = met && may_be_shaded(place, near);
+#if !COARSE
     // blocks of pixels go together, so that their shadows can be averaged
-    bool shaded = block_mean(met && may_be_shaded(place, near) ? 1.0 : 0.0) > 0.0;
-    gl_FragDepth = shaded ? SHADED_LEVEL : OPEN_LEVEL;
+    gl_FragDepth = block_mean(shaded ? 1.0 : 0.0) > 0.0 ? SHADED_LEVEL : OPEN_LEVEL;
+#endif
 #endif
 #if NEAR_LAMPS
     vec3 light = vec3(0.0), unshaded = vec3(0.0);
@@ -112,6 +121,13 @@ void main()
     // MuJoCo blends the reflection in by its share, whatever the angle
     shown = mix(shown, textureLod(mirror, 0.5 + 0.5 * screen, 0.0).rgb, reflectance * (1.0 - fade));
 #endif
+#if COARSE
+    float rim = beside_floor();
+    bool steep = any(greaterThan(fwidth(shown), vec3(STEEPEST)));
+    bool rough = shaded || steep || abs(rim) < 2.0 * fwidth(rim);
+    fragment = vec4(shown, rough ? 0.5 : met ? 1.0 : 0.0);
+#else
     fragment = share * vec4(dithered(shown), 1.0);
+#endif
 #endif
 }

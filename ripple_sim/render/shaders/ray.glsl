@@ -4,12 +4,16 @@ in vec3 way;
 in vec3 way_local;
 flat in vec3 eye_local;
 
-// Whether the ray meets the floor's upper side.
+// Negative where the ray meets the floor's upper side; changes evenly about the edges.
+float beside_floor()
+{
+    vec2 beside = abs(way_local.z * eye_local.xy + eye_local.z * way_local.xy) - way_local.z * vec2(floor_u.w, floor_v.w);
+    return max(max(beside.x, beside.y), 1e-6 * eye_local.z - way_local.z);
+}
+
 bool meets_floor()
 {
-    vec2 beside = abs(way_local.z * eye_local.xy + eye_local.z * way_local.xy);
-    return floor_origin.w > 0.0 && eye_local.z > 0.0 && way_local.z > 1e-6 * eye_local.z
-        && all(lessThan(beside, way_local.z * vec2(floor_u.w, floor_v.w)));
+    return floor_origin.w > 0.0 && eye_local.z > 0.0 && beside_floor() < 0.0;
 }
 
 // How far along the way the floor's plane lies.
