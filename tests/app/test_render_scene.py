@@ -243,6 +243,18 @@ def test_sites_hide_no_sky(gl):
     assert geom < none - 10
 
 
+def test_the_edges_of_a_finite_floor_are_smooth(gl):
+    """A white square in front of black: along its slanted edges lie pixels of all shades."""
+    floor = '<geom type="plane" size=".5 .5 .1" euler="0 0 20" rgba="1 1 1 1"/>'
+    sky = '<texture type="skybox" builtin="flat" rgb1="0 0 0" rgb2="0 0 0" width="16" height="96"/>'
+    frame = picture(gl, floor + SUN.format(0.0, "false"), asset=sky)[..., 0]
+    white = frame[60, 80]
+    edge = (frame > 0.2 * white) & (frame < 0.8 * white)
+    assert 40 < edge.sum() < 200
+    shares = np.histogram(frame[edge] / white, bins=3, range=(0.2, 0.8))[0]
+    assert shares.min() > 8
+
+
 def test_a_reflecting_floor_shows_the_ball_upside_down(gl):
     def frame(reflectance: float):
         asset = f'<material name="f" rgba=".4 .4 .4 1" reflectance="{reflectance}"/>'

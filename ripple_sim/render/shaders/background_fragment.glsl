@@ -56,7 +56,10 @@ void main()
     vec2 plane = eye_local.xy + at * way_local.xy;
     // the lamps stand near: a pool of light about the focus, and the background's colour beyond
     float away = length(vec3(plane - focus_local.xy, focus_local.z));
-    float fade = met ? smoothstep(floor_fade.x, floor_fade.y, away / eye.w) : 1.0;
+    // and less than whole pixels at its own edges
+    vec2 inside = vec2(floor_u.w, floor_v.w) - abs(plane), filled = clamp(inside / fwidth(inside), 0.0, 1.0);
+    float edge = 1.0 - min(filled.x, filled.y);
+    float fade = met ? max(smoothstep(floor_fade.x, floor_fade.y, away / eye.w), edge) : 1.0;
 #if IMAGE
     vec3 albedo = texture(floor_image, plane * tiling.xy + tiling.zw).rgb * tint;
 #else
@@ -115,7 +118,7 @@ void main()
     fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g + around.g, 1e-6)));
 #else
     vec3 direction = normalize(way);
-    vec3 far = sky_at(met ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);
+    vec3 far = sky_at(met && edge == 0.0 ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);
     vec3 shown = developed(mix(albedo * light, far, fade));
 #if MIRROR
     // MuJoCo blends the reflection in by its share, whatever the angle
