@@ -111,7 +111,7 @@ def spread(loads, probes, surface, radius):
     count, total = len(loads), loads.sum()
     if len(probes) == count:
         return probes, loads, radius, np.arange(count)
-    away = np.sqrt(((surface - probes) ** 2).sum(axis=1))
+    away = np.array([np.sqrt(squared_distance(surface, i, probes, i)) for i in range(len(probes))])
     # contact points lie a little outside of the surface, by up to their depth: so may the middles
     limit = away[:count].max() + radius / 10
     forces = np.zeros(len(probes))
@@ -126,7 +126,7 @@ def spread(loads, probes, surface, radius):
                 # where they do not touch between two contacts, the contacts keep their shares
                 forces[i] += share
                 forces[j] += share
-            size = max(size, np.sqrt(((probes[i] - probes[j]) ** 2).sum()))
+            size = max(size, np.sqrt(squared_distance(probes, i, probes, j)))
             row += 1
     touching = np.flatnonzero(forces)
     if len(touching) < len(probes):

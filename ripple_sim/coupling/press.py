@@ -174,5 +174,10 @@ def _in_world(position, rotation, patches, surface, texels):
     points, nearest = np.empty((bodies, 3)), np.empty(bodies, np.int64)
     for i in range(bodies):
         middle = patches.begins[i]
-        points[i], nearest[i] = position + (rotation * surface[middle]).sum(axis=1), texels[middle]
+        nearest[i] = texels[middle]
+        for k in range(3):
+            across = 0.0
+            for j in range(3):
+                across += rotation[k, j] * surface[middle, j]
+            points[i, k] = position[k] + across
     return points, nearest

@@ -165,17 +165,30 @@ def _smooth(body, felt, texels, forces, dt, scratch):
     body.age += dt
     if left > 0 and not body.owing:
         return texels, forces, forces, np.zeros(len(forces))
-    kept = (felt.forces != 0) | (felt.owed != 0)
-    before = felt.texels[kept]
-    count = len(before)
-    values = np.zeros((3, count + len(texels)))
-    values[0, :count], values[1, :count], values[2, count:] = felt.forces[kept], felt.owed[kept], forces
-    at, values = add_up_by(scratch, np.concatenate((before, texels)), values)
-    feels, owed, present = values[0], values[1], values[2]
-    if left > 0:
-        # what is owed from before is paid in even parts until the onset is over
-        paid = min(1.0, dt / left) * owed
-        return at, present + paid / dt, present, owed - paid
+    at, (feels, owed, present) = _joined(felt, texels, forces, scratch)
+    given = np.empty(len(at))
     pace = min(max(_FOLLOW / body.age, _SLOWEST), 0.5 / dt)
-    feels = feels + dt * (pace**2 * owed + 2 * pace * (present - feels))
-    return at, feels, feels, owed + dt * (present - feels)
+    for i in range(len(at)):
+        if left > 0:
+            # what is owed from before is paid in even parts until the onset is over
+            paid = min(1.0, dt / left) * owed[i]
+            given[i], feels[i], owed[i] = present[i] + paid / dt, present[i], owed[i] - paid
+        else:
+            feels[i] += dt * (pace**2 * owed[i] + 2 * pace * (present[i] - feels[i]))
+            given[i], owed[i] = feels[i], owed[i] + dt * (present[i] - feels[i])
+    return at, given, feels, owed
+
+
+@numba.njit(cache=True, nogil=True)
+def _joined(felt, texels, forces, scratch):
+    """Texels where something is felt, owed or pressing, and these three there, [3, k]."""
+    room = len(felt.texels) + len(texels)
+    at, values, count = np.empty(room, np.int64), np.zeros((3, room)), 0
+    for i in range(len(felt.texels)):
+        if felt.forces[i] != 0 or felt.owed[i] != 0:
+            at[count], values[0, count], values[1, count] = felt.texels[i], felt.forces[i], felt.owed[i]
+            count += 1
+    for i in range(len(texels)):
+        at[count], values[2, count] = texels[i], forces[i]
+        count += 1
+    return add_up_by(scratch, at[:count], values)
