@@ -13,7 +13,7 @@ from ripple_sim.solver.gl import GLContext, shared_context
 
 from .coupling.ripples import Ripples
 from .render import Camera, FixedCamera, Renderer, Surface
-from .render.materials import NO_IMAGE, mapping_of
+from .render.mapping import NO_IMAGE, mapping_of
 from .render.pieces import geom_piece
 from .scene.scene_file import CameraEntry
 from .viewpoint import viewpoint

@@ -15,7 +15,8 @@ from ripple_sim.solver.gl import GLContext
 
 from . import meshes
 from .instances import INSTANCE, Instances, ShapeLevels
-from .materials import Textures, look_of, mapping_of
+from .mapping import mapping_of
+from .materials import Textures, look_of
 from .meshes import Shape
 from .objects import ObjectTable
 from .occluders import Occluders

@@ -16,7 +16,8 @@ from .camera import orthographic
 from .color import linear
 from .frame import FrameUniforms
 from .lights import Light
-from .materials import FLAT_IMAGE, Textures, mapping_of, texture_pixels
+from .mapping import FLAT_IMAGE, mapping_of
+from .materials import Textures, texture_pixels
 from .owned import OwnedObjects
 from .pieces import geom_piece
 from .shadow import ShadowMaps

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from .materials import Mapping
+from .mapping import Mapping
 from .meshes import Shape
 from .owned import OwnedObjects
 from .pieces import Piece

@@ -18,7 +18,8 @@ from . import occlusion
 from .color import linear, srgb_texture
 from .field import UNDER_COLORS, FieldTexture
 from .looks import MODEL_LOOK, Look, find_look
-from .materials import CUBE_IMAGE, FLAT_IMAGE, NO_IMAGE, Mapping, Textures, look_of, mapping_of
+from .mapping import CUBE_IMAGE, FLAT_IMAGE, NO_IMAGE, Mapping, mapping_of
+from .materials import Textures, look_of
 from .meshes import corner_normals
 from .objects import ObjectTable
 from .owned import OwnedObjects

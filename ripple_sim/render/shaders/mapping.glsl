@@ -1,4 +1,4 @@
-// The picture on an object. MAPPING, as in materials.py: 0 none, 1 flat, 2 a cube's, or a flat one that is wrapped
+// The picture on an object. MAPPING, as in mapping.py: 0 none, 1 flat, 2 a cube's, or a flat one that is wrapped
 // round a box (3), a ball (4), a cylinder (5) or a capsule (6) of half size 1.
 #if MAPPING == 2
 layout(binding = 6) uniform samplerCube image;
