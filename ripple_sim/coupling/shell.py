@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import igl
 import mujoco
@@ -138,9 +139,7 @@ def _mesh_on_body(spec: mujoco.MjSpec, geom: str) -> Mesh:
     return dataclasses.replace(mesh, V=model.geom_pos[index] + mesh.V @ rotation.reshape(3, 3).T)
 
 
-def _thickness(
-    V: NDArray[np.float64], F: NDArray[np.int64], inward: NDArray[np.float64], start: float
-) -> NDArray[np.float64]:
+def _thickness(V: NDArray[np.float64], F: NDArray[np.int64], inward: NDArray[Any], start: float) -> NDArray[np.float64]:
     """Way from each vertex to the other side of a mesh [m], infinite where there is none."""
     scene = rtcore_scene.EmbreeScene()
     TriangleMesh(scene, V.astype(np.float32), F.astype(np.int32))

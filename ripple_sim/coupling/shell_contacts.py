@@ -1,4 +1,4 @@
-"""Contacts with shells: whole forces, in place of normal ones, along the true surface's normal."""
+"""Contacts with shells: the sum of whole forces, in place of that of normal ones."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ from .contacts import PYRAMIDAL, Contacts, by_target
 from .target import shells
 
 _TINY = np.finfo(np.float64).tiny
+# Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push sideways: corners of
+# tilted boxes push at up to 0.5.
+_SIDEWAYS = 0.1
 
 
 class ShellContacts:
@@ -22,8 +25,8 @@ class ShellContacts:
 
     Where a flat body gets at a triangle with its rim, MuJoCo pushes sideways, and the friction of such contacts pushes
     along the normal. These forces cancel in pairs, but not their amounts, which add up to many times the momentum that
-    is exchanged. So a pair presses with the sum of its whole forces along its mean normal: the true surface's at the
-    contacts, weighted with how much each of them presses along its own.
+    is exchanged. So a pair presses with the sum of its whole forces along its mean normal, to which the contacts that
+    push sideways add nothing. Each contact has a share as it presses along the true surface's normal.
 
     Parameters
     ----------
@@ -146,20 +149,24 @@ def _by_pair(geoms, elements, forces, frames, positions, dist, margins, first_no
     found, pairs, rows, begin = 0, 0, 0, 0
     while begin < count:
         target, other = divmod(pair[order[begin]], len(extents))
-        first, whole, mean, sum_of_weights = rows, np.zeros(3), np.zeros(3), 0.0
+        first, sum_of_weights = rows, 0.0
+        whole, mean, mean_of_faces = np.zeros(3), np.zeros(3), np.zeros(3)
         while begin < count and pair[order[begin]] == target * len(extents) + other:
             i, side = divmod(source[order[begin]], 2)
             begin += 1
             sign = 1.0 if side else -1.0
-            normal = -sign * frames[i, :3]
+            outward = -sign * frames[i, :3]
+            normal = outward
             # a plane touches vertices, which are no element, and its own normal is right
             if elements[i, side] >= 0:
                 normal = rotations[target].copy().reshape(3, 3) @ face_normals[first_normal[target] + elements[i, side]]
             whole += sign * forces[i]
+            if (outward * normal).sum() > _SIDEWAYS:
+                mean += (forces[i] * frames[i, :3]).sum() * outward
             weight = -sign * (forces[i] * normal).sum()
             if weight <= 0:
                 continue
-            mean += weight * normal
+            mean_of_faces += weight * normal
             sum_of_weights += weight
             # the other's surface, which has got in by a depth, and from there to as far outside of the target's own
             depth = margins[i] - dist[i]
@@ -167,8 +174,10 @@ def _by_pair(geoms, elements, forces, frames, positions, dist, margins, first_no
             points[rows] = positions[i] - sign * dist[i] / 2 * frames[i, :3] + outside * normal
             loads[rows], normals[rows] = weight, normal
             rows += 1
+        if not mean.any():
+            mean = mean_of_faces
         length = np.sqrt((mean**2).sum())
-        if length == 0 or -(whole * mean).sum() <= 0:
+        if rows == first or -(whole * mean).sum() <= 0:
             rows = first
             continue
         loads[first:rows] *= -(whole * mean).sum() / length / sum_of_weights
