@@ -127,8 +127,9 @@ void main()
 #if COARSE
     float rim = beside_floor();
     bool steep = any(greaterThan(fwidth(shown), vec3(STEEPEST)));
-    bool rough = shaded || steep || abs(rim) < 2.0 * fwidth(rim);
-    fragment = vec4(shown, rough ? 0.5 : met ? 1.0 : 0.0);
+    // shadows are marked with a margin: it is enough if the nearest blocks leave them out
+    bool rough = steep || abs(rim) < 2.0 * fwidth(rim);
+    fragment = vec4(shown, rough ? 0.5 : shaded ? 0.75 : met ? 1.0 : 0.0);
 #else
     fragment = share * vec4(dithered(shown), 1.0);
 #endif
