@@ -43,11 +43,6 @@ vec3 seen_through(vec3 position, vec3 normal, float thickness, float size, float
 }
 #endif
 
-int object_of(ivec2 pixel, int s)
-{
-    return int(texelFetch(paints, pixel, s).w * 65535.0 + 0.5);
-}
-
 // What a sample shows.
 struct Spot {
     int object;
@@ -62,13 +57,13 @@ Spot spot_at(ivec2 pixel, int s)
 {
     vec4 shape = texelFetch(shapes, pixel, s), paint = texelFetch(paints, pixel, s);
     Spot spot;
-    spot.object = int(paint.w * 65535.0 + 0.5);
+    spot.object = int(shape.z * 65535.0 + 0.5);
     spot.normal = unfolded(shape.xy);
-    vec2 red_green = parted(paint.x), blue_ink = parted(paint.y), baked = parted(paint.z);
+    vec2 red_green = parted(paint.z), blue_ink = parted(paint.w), baked = parted(shape.w);
     spot.color = vec3(red_green, blue_ink.x);
     spot.ink = blue_ink.y;
     Object object = objects[spot.object];
-    vec4 ripple = spline_at(relief, object.relief.y, object.relief.x, unfolded(shape.zw));
+    vec4 ripple = spline_at(relief, object.relief.y, object.relief.x, unfolded(paint.xy));
     ripple *= object.relief.y > 0.0 ? 1.0 : 0.0;
     spot.rippled = normalize(spot.normal - object.rotation * ripple.xyz);
     // troughs lie deeper than their surroundings: less light finds its way in
@@ -116,7 +111,7 @@ void main()
 #if LAYER
     int own = 0;
     for (int s = 0; s < SAMPLES; ++s)
-        own |= object_of(pixel, s) == layer ? 1 << s : 0;
+        own |= int(texelFetch(shapes, pixel, s).z * 65535.0 + 0.5) == layer ? 1 << s : 0;
     left &= own;
 #endif
     vec4 sum = vec4(0.0);
@@ -132,11 +127,11 @@ void main()
         spread = again ? spread : spread_of(spot, same);
         block = bvec2(block.x && same.x && !again, block.y && same.y && !again);
         // samples of the same surface share their light
-        vec2 normal = texelFetch(shapes, pixel, first).xy;
+        vec3 own = texelFetch(shapes, pixel, first).xyz;
         for (int s = 1; s < SAMPLES; ++s) {
-            bool joined = abs(eye_distance(texelFetch(depths, pixel, s).r) - at) < 0.01 * at && object_of(pixel, s) == spot.object
-                     && distance(texelFetch(shapes, pixel, s).xy, normal) < 0.06;
-            alike |= joined ? 1 << s : 0;
+            vec3 other = texelFetch(shapes, pixel, s).xyz;
+            bool near = abs(eye_distance(texelFetch(depths, pixel, s).r) - at) < 0.01 * at;
+            alike |= near && other.z == own.z && distance(other.xy, own.xy) < 0.06 ? 1 << s : 0;
         }
         alike &= left;
         left &= ~alike;
