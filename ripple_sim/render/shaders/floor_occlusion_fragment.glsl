@@ -13,7 +13,7 @@ in vec2 screen;
 out vec4 fragment;  // r: that share; g: 1 where a shadow may fall
 
 const int TAPS = 48;
-const int SHADOW_TAPS = 24;
+const int SHADOW_TAPS = 16;
 
 // Whether a light meets anything on its way to about a texel of the floor, which is as wide as `texel` [m].
 bool is_shaded(int lamp, vec3 world, float texel)
