@@ -22,8 +22,8 @@ _PACKAGE = "ripple_sim.render"
 _FIRST_UNIT = 8  # of the samples' textures, in shaders/samples.glsl
 _BEHIND_UNIT = 6
 # depths that stand for what a pixel shows: background out of reach of the shadow or within it, solids in some of its
-# samples or in all of them; exact in every depth buffer
-_LEVELS = {"OPEN": 1.0, "SHADED": 0.75, "MIXED": 0.5, "SOLID": 0.25}
+# samples or in all of them, an object of a layer; exact in every depth buffer
+_LEVELS = {"OPEN": 1.0, "SHADED": 0.75, "MIXED": 0.5, "SOLID": 0.25, "LAYER": 0.125}
 
 
 class Picture:
@@ -114,6 +114,7 @@ class Picture:
             ("background", "view_vertex", "background_fragment", {"SHADOW": 0, "COARSE": 0, **levels}),
             ("shaded background", "view_vertex", "background_fragment", {"SHADOW": 1, "COARSE": 0}),
             ("solid", "view_vertex", "solid_fragment", {"LAYER": 0}),
+            ("layer classes", "view_vertex", "classify_fragment", {"LAYER": 1, **levels}),
             ("layer", "view_vertex", "solid_fragment", {"LAYER": 1}),
         )
         self._passes = {
@@ -127,7 +128,7 @@ class Picture:
             if floor is not None and reflects:
                 program["reflectance"] = floor.reflectance
         self._tiles = Tiles(ctx, size)
-        classify = ctx.own(gl.program(_PACKAGE, "tiles_vertex", "classify_fragment", **{**options, **levels}))
+        classify = ctx.own(gl.program(_PACKAGE, "tiles_vertex", "classify_fragment", LAYER=0, **{**options, **levels}))
         classify["extent"] = self._tiles.extent
         self._classify = ctx.vertex_array(classify, [(self._tiles.buffer, "2f/i", "in_corner")])
 
@@ -203,11 +204,18 @@ class Picture:
         ctx.copy_framebuffer(self._behind_frame, self.frame)
         self._behind.build_mipmaps()
         self.frame.use()
-        ctx.enable_only(moderngl.BLEND)
+        ctx.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         self.frame.scissor = left, lower, right - left, upper - lower
         self._behind.use(_BEHIND_UNIT)
-        self._passes["layer"].program["layer"] = number
-        self._run("layer", 0.0)
+        for each in ("layer classes", "layer"):
+            self._passes[each].program["layer"] = number
+        ctx.depth_func = "1"
+        self._run("layer classes", 0.0)
+        ctx.depth_func = "=="
+        self.frame.depth_mask = False
+        self._run("layer", _LEVELS["LAYER"])
+        self.frame.depth_mask = True
+        ctx.depth_func = "<="
         self.frame.scissor = None
         ctx.disable(moderngl.BLEND)

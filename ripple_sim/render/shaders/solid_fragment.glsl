@@ -3,6 +3,7 @@
 #include "frame.glsl"
 #include "ray.glsl"
 #include "samples.glsl"
+#include "solid_samples.glsl"
 #include "studio.glsl"
 #include "development.glsl"
 #include "lights.glsl"
@@ -30,8 +31,6 @@ const float NEUTRAL = 0.62;     // albedo under paint
 const vec3 INK = vec3(0.09, 0.11, 0.16);
 
 #if LAYER
-uniform int layer;  // number of the only object that is drawn
-
 // The picture where a ray that is bent as in water leaves the body again, blurred where the body is turbid.
 vec3 seen_through(vec3 position, vec3 normal, float thickness, float size, float turbidity)
 {
@@ -107,13 +106,7 @@ vec4 lit_solid(Spot spot, vec3 position, float spread, bvec2 block)
 void main()
 {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    int left = covered(pixel, floor_depth());
-#if LAYER
-    int own = 0;
-    for (int s = 0; s < SAMPLES; ++s)
-        own |= int(texelFetch(shapes, pixel, s).z * 65535.0 + 0.5) == layer ? 1 << s : 0;
-    left &= own;
-#endif
+    int left = solid_samples(pixel);
     vec4 sum = vec4(0.0);
     float spread = 0.0, count = float(bitCount(left));
     // pixels that show as many samples are of the same pass: what others have reckoned is undefined
