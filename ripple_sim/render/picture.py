@@ -74,6 +74,7 @@ class Picture:
         width, height = size
         with gl as raw:
             limit = int(raw.info["GL_MAX_RENDERBUFFER_SIZE"])
+            widest = min(raw.info["GL_MAX_VIEWPORT_DIMS"])
             samples = min(samples, raw.max_samples)
         if not (1 <= width <= limit and 1 <= height <= limit):
             raise RippleError(
@@ -98,6 +99,7 @@ class Picture:
         self._behind.repeat_x = self._behind.repeat_y = False
         self._behind_frame = ctx.framebuffer([self._behind])
         self._cut_out = cut_out
+        self._reach = 2 if 2 * max(size) <= widest else 1
         tiled = floor is not None and floor.tiled
         reflects = floor is not None and floor.reflectance > 0.0 and not cut_out
         options = {
@@ -179,8 +181,15 @@ class Picture:
         ctx.depth_func = "<="
 
     def _run(self, name: str, level: float) -> None:
+        """Run a pass over the pixels of a level."""
+        width, height = self.frame.size
+        # The triangle over the frame lies within a viewport twice as large: where a driver clips it in two, the pixels
+        # along the cut would know nothing of their neighbours in the other half.
+        self.frame.viewport = (0, 0, self._reach * width, self._reach * height)
         self._passes[name].program["level"] = level
+        self._passes[name].program["reach"] = self._reach
         self._passes[name].render(moderngl.TRIANGLES, vertices=3)
+        self.frame.viewport = (0, 0, width, height)
 
     def add_layer(self, ctx: moderngl.Context, number: int, draw: Callable[[], None], box: NDArray[np.int64]) -> None:
         """Draw and light a single clear object over the picture.

@@ -5,15 +5,16 @@
 
 uniform float level;
 uniform vec2 span = vec2(1.0);  // of the target, in pictures
+uniform float reach = 1.0;      // of the viewport, in targets
 
 flat out vec3 focus_local;
 flat out vec3 around;  // ambient light on the open floor
 
 void main()
 {
-    vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
-    cast_ray((corner + 1.0) * span - 1.0);
+    vec2 corner = 4.0 * vec2(gl_VertexID == 1, gl_VertexID == 2);
+    cast_ray(corner * span - 1.0);
     focus_local = along_floor(focus.xyz - floor_origin.xyz);
     around = ambient(floor_normal.xyz, vec3(0.0));
-    gl_Position = vec4(corner, 2.0 * level - 1.0, 1.0);
+    gl_Position = vec4(corner / reach - 1.0, 2.0 * level - 1.0, 1.0);
 }
