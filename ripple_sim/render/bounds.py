@@ -49,6 +49,35 @@ def boxes_of(
     return boxes
 
 
+def balls_about(triangles: NDArray[np.float64], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Balls that each hold a share of some triangles, which lie close together.
+
+    Parameters
+    ----------
+    triangles : array, shape [m, 3, 3]
+        Corners [m].
+    count : int
+        The least number of balls, unless there are fewer triangles.
+
+    Returns
+    -------
+    centres, radii : array, shape [k, 3] and [k]
+        [m]
+    """
+    groups = [triangles]
+    while len(groups) < min(count, len(triangles)):
+        halves = []
+        for group in groups:
+            middles = group.mean(axis=1)
+            order = np.argsort(middles[:, np.ptp(middles, axis=0).argmax()], kind="stable")
+            halves += [group[half] for half in np.array_split(order, 2) if len(half)]
+        groups = halves
+    corners = [group.reshape(-1, 3) for group in groups]
+    centres = np.array([(each.min(axis=0) + each.max(axis=0)) / 2 for each in corners])
+    radii = [np.linalg.norm(each - centre, axis=1).max() for each, centre in zip(corners, centres, strict=True)]
+    return centres, np.array(radii)
+
+
 class Tiles:
     """The squares of the picture that any of some boxes touches, as instances for a shader.
 

@@ -191,7 +191,7 @@ class Picture:
         self._passes[name].render(moderngl.TRIANGLES, vertices=3)
         self.frame.viewport = (0, 0, width, height)
 
-    def add_layer(self, ctx: moderngl.Context, number: int, draw: Callable[[], None], box: NDArray[np.int64]) -> None:
+    def add_layer(self, ctx: moderngl.Context, number: int, draw: Callable[[], None], boxes: NDArray[np.int64]) -> None:
         """Draw and light a single clear object over the picture.
 
         Parameters
@@ -201,12 +201,14 @@ class Picture:
             In the table of objects.
         draw : callable
             Draws it into the samples.
-        box : int64 [4]
-            The part of the picture that it lies in; see `boxes_of`.
+        boxes : int64 [k, 4]
+            Where it may show; see `boxes_of`.
         """
-        left, lower, right, upper = (int(edge) for edge in box)
-        if left >= right or lower >= upper:
+        boxes = boxes[(boxes[:, :2] < boxes[:, 2:]).all(axis=1)]
+        if not len(boxes):
             return
+        left, lower = (int(edge) for edge in boxes[:, :2].min(axis=0))
+        right, upper = (int(edge) for edge in boxes[:, 2:].max(axis=0))
         self._samples.use()
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         draw()

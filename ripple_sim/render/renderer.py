@@ -219,8 +219,10 @@ class Renderer:
 
         frame = self._frame
         self._view_projection = frame.set_camera(pose, self.width / self.height)
-        self._balls = self._bounding_balls(data)
-        casters = self._casters(pose)
+        bodies = self._bodies.balls(data)
+        self._balls = _joined(bodies, self._bodies.planes(data), *(target.balls() for target in self._targets))
+        # a target's own ball does not change as it turns, so that no map is cut anew
+        casters = _near(pose, *_joined(bodies, *(target.ball() for target in self._targets)))
         centre, radius = _ball_about(*casters) if len(casters[1]) else (pose.focus, pose.distance)
         if self._floor is not None:
             self._floor.place(frame, data, centre, radius)
@@ -234,18 +236,6 @@ class Renderer:
             self._floor.shade(frame, casting, *casters)
         frame.set_vector("counts", [occluders, len(lighting.lights), exposure], len(casting))
         frame.bind()
-
-    def _bounding_balls(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Balls about all that is drawn: centres [k, 3] and radii [k], in metres; those of planes are infinite."""
-        balls = [self._bodies.balls(data), self._bodies.planes(data), *(target.ball() for target in self._targets)]
-        return np.concatenate([b[0] for b in balls]), np.concatenate([b[1] for b in balls])
-
-    def _casters(self, pose: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Balls about all that casts shadows near the camera's focus: centres [k, 3] and radii [k], in metres."""
-        centres, radii = self._balls
-        near = np.linalg.norm(centres - pose.focus, axis=1) - radii < _SHADOW_REACH * pose.distance
-        near &= np.isfinite(radii)
-        return centres[near], radii[near]
 
     def _draw_maps(self, ctx: moderngl.Context) -> None:
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
@@ -285,17 +275,28 @@ class Renderer:
 
     def _draw_clear(self, ctx: moderngl.Context, data: Any, pose: Pose) -> None:
         """Lay whatever the scene behind shows through over the picture, the furthest first."""
-        layers: list[tuple[NDArray[np.float64], float, int, Callable[[], None]]] = []
+        layers: list[tuple[NDArray[np.float64], NDArray[np.float64], int, Callable[[], None]]] = []
         for target in self._targets:
             if target.clear:
-                centres, radii = target.ball()
-                layers.append((centres[0], float(radii[0]), target.number, target.draw))
+                layers.append((*target.balls(), target.number, target.draw))
         for body in self._bodies.clear:
-            layers.append((*ball_of(self._model, data, body.piece), body.number, body.instances.draw))
-        layers.sort(key=lambda layer: -float(np.linalg.norm(layer[0] - pose.eye)))
-        for centre, radius, number, draw in layers:
-            box = boxes_of(centre[None], np.array([radius]), pose, (self.width, self.height))[0]
-            self._picture.add_layer(ctx, number, draw, box)
+            centre, radius = ball_of(self._model, data, body.piece)
+            layers.append((centre[None], np.array([radius]), body.number, body.instances.draw))
+        layers.sort(key=lambda layer: -float(np.linalg.norm(layer[0].mean(axis=0) - pose.eye)))
+        for centres, radii, number, draw in layers:
+            boxes = boxes_of(centres, radii, pose, (self.width, self.height))
+            self._picture.add_layer(ctx, number, draw, boxes)
+
+
+def _joined(*balls: tuple[NDArray, NDArray]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Centres [k, 3] and radii [k] of all balls in one list."""
+    return np.concatenate([centres for centres, _ in balls]), np.concatenate([radii for _, radii in balls])
+
+
+def _near(pose: Pose, centres: NDArray, radii: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Those balls that are near enough to the camera's focus to throw a shadow which shows."""
+    near = np.linalg.norm(centres - pose.focus, axis=1) - radii < _SHADOW_REACH * pose.distance
+    return centres[near], radii[near]
 
 
 def _ball_about(centres: NDArray[np.float64], radii: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:

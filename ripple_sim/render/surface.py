@@ -15,6 +15,7 @@ from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.gl import GLContext
 
 from . import occlusion
+from .bounds import balls_about
 from .color import linear, srgb_texture
 from .field import UNDER_COLORS, FieldTexture
 from .looks import MODEL_LOOK, Look, find_look
@@ -30,6 +31,7 @@ from .subdivision import subdivide
 _PIXELS = 4.0  # length of an edge where the target fills the frame's height
 _PIXELS_PER_FACE = 48  # of the frame
 _LEAST_FACES, _MOST_FACES = 20_000, 400_000
+_BALLS = 16  # that bound the mesh
 _NO_SHADOW = 0.75  # transparency from which on light goes through as if nothing were there
 _PACKAGE = "ripple_sim.render"
 # columns of the vertex attributes while the mesh is refined
@@ -126,6 +128,7 @@ class SurfaceMesh:
         )
         faces, vertices = _refined(surface, 2 * self.radius * _PIXELS / size[1], size[0] * size[1] // _PIXELS_PER_FACE)
         self.count = len(vertices)
+        self._balls = balls_about(vertices[:, _POSITION][faces], _BALLS)
         self._displace = ctx.own(gl.compute_shader(_PACKAGE, "displace"))
         self._program = ctx.own(
             gl.program(
@@ -180,7 +183,7 @@ class SurfaceMesh:
                 f"the relief of geom {self.geom} has shape {list(relief.shape)}; resolution {self.resolution} needs "
                 f"{list(shape)}: six faces padded by one texel, gradient and height"
             )
-        self._origin, self._highest = np.array(origin), float(np.abs(relief[..., 3]).max())
+        self._pose, self._highest = (np.array(rotation), np.array(origin)), float(np.abs(relief[..., 3]).max())
         self._table.set_relief(self.number, min(1.5 * self._highest, 0.05 * self.radius), rotation)
         self._reliefs.write(self._first_layer, relief)
         self._reliefs.bind()
@@ -207,8 +210,13 @@ class SurfaceMesh:
         self._field.set(field, limit)
 
     def ball(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Bounding ball of the displaced mesh in the world: centre [1, 3] and radius [1], in metres."""
-        return self._origin[None], np.array([self.radius + self._highest])
+        """Ball about the origin that holds the displaced mesh: centre [1, 3] in the world and radius [1], in metres."""
+        return self._pose[1][None], np.array([self.radius + self._highest])
+
+    def balls(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Balls in the world that together hold the displaced mesh: centres [k, 3] and radii [k], in metres."""
+        centres, radii = self._balls
+        return centres @ self._pose[0].T + self._pose[1], radii + self._highest
 
     def draw(self) -> None:
         """Draw into the geometry pass."""

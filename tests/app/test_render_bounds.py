@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.render.bounds import Tiles, boxes_of
+from ripple_sim.render.bounds import Tiles, balls_about, boxes_of
 from ripple_sim.render.camera import Pose, perspective, view_matrix
 
 SIZE = (200, 120)
@@ -87,3 +87,23 @@ def test_no_tiles_without_boxes() -> None:
     tiles = Tiles(Context(), SIZE)
     tiles.cover(np.zeros((0, 4), dtype=np.int64))
     assert tiles.count == 0
+
+
+def test_balls_about_triangles_hold_each_and_are_small() -> None:
+    random = np.random.default_rng(5)
+    angle = random.uniform(0, 2 * np.pi, 300)
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(300)], axis=1)
+    triangles = ring[:, None] + random.normal(size=(300, 3, 3)) * 0.02
+    centres, radii = balls_about(triangles, 16)
+    inside = np.linalg.norm(triangles[:, :, None] - centres, axis=3) <= radii + 1e-12
+    assert inside.all(axis=1).any(axis=1).all()
+    assert len(radii) == 16
+    assert radii.max() < 0.4
+
+
+def test_fewer_triangles_than_balls() -> None:
+    triangles = np.random.default_rng(6).normal(size=(3, 3, 3))
+    centres, radii = balls_about(triangles, 16)
+    middles = (triangles.min(axis=1) + triangles.max(axis=1)) / 2
+    np.testing.assert_allclose(np.sort(centres, axis=0), np.sort(middles, axis=0))
+    assert len(radii) == 3
