@@ -15,8 +15,8 @@ from .contacts import PYRAMIDAL, Contacts, by_target
 from .target import shells
 
 _TINY = np.finfo(np.float64).tiny
-# Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push sideways: corners of
-# tilted boxes push at up to 0.5.
+# Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push sideways: bodies that
+# hit an edge or a corner push at down to 0.5.
 _SIDEWAYS = 0.1
 
 
@@ -25,8 +25,8 @@ class ShellContacts:
 
     Where a flat body gets at a triangle with its rim, MuJoCo pushes sideways, and the friction of such contacts pushes
     along the normal. These forces cancel in pairs, but not their amounts, which add up to many times the momentum that
-    is exchanged. So a pair presses with the sum of its whole forces along its mean normal, to which the contacts that
-    push sideways add nothing. Each contact has a share as it presses along the true surface's normal.
+    is exchanged. So a pair presses with the sum of its whole forces along its mean normal. What pushes sideways has no
+    part in that normal, nor in where the pair presses.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def _by_pair(geoms, elements, forces, frames, positions, dist, margins, first_no
     while begin < count:
         target, other = divmod(pair[order[begin]], len(extents))
         first, sum_of_weights = rows, 0.0
-        whole, mean, mean_of_faces = np.zeros(3), np.zeros(3), np.zeros(3)
+        whole, mean = np.zeros(3), np.zeros(3)
         while begin < count and pair[order[begin]] == target * len(extents) + other:
             i, side = divmod(source[order[begin]], 2)
             begin += 1
@@ -161,12 +161,11 @@ def _by_pair(geoms, elements, forces, frames, positions, dist, margins, first_no
             if elements[i, side] >= 0:
                 normal = rotations[target].copy().reshape(3, 3) @ face_normals[first_normal[target] + elements[i, side]]
             whole += sign * forces[i]
-            if (outward * normal).sum() > _SIDEWAYS:
-                mean += (forces[i] * frames[i, :3]).sum() * outward
-            weight = -sign * (forces[i] * normal).sum()
-            if weight <= 0:
+            force, along = (forces[i] * frames[i, :3]).sum(), (outward * normal).sum()
+            if force <= 0 or along <= _SIDEWAYS:
                 continue
-            mean_of_faces += weight * normal
+            mean += force * outward
+            weight = force * along**2
             sum_of_weights += weight
             # the other's surface, which has got in by a depth, and from there to as far outside of the target's own
             depth = margins[i] - dist[i]
@@ -174,8 +173,6 @@ def _by_pair(geoms, elements, forces, frames, positions, dist, margins, first_no
             points[rows] = positions[i] - sign * dist[i] / 2 * frames[i, :3] + outside * normal
             loads[rows], normals[rows] = weight, normal
             rows += 1
-        if not mean.any():
-            mean = mean_of_faces
         length = np.sqrt((mean**2).sum())
         if rows == first or -(whole * mean).sum() <= 0:
             rows = first

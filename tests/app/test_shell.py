@@ -159,6 +159,48 @@ def run(spec: mujoco.MjSpec, targets: list[str], seconds: float) -> tuple[Ripple
     return ripples, impulses, data
 
 
+ROUND = {
+    "sphere": {"size": [0.05, 0, 0]},
+    "capsule": {"type": GEOM.mjGEOM_CAPSULE, "size": [0.03, 0.05, 0]},
+    "ellipsoid": {"type": GEOM.mjGEOM_ELLIPSOID, "size": [0.07, 0.06, 0.04]},
+    "cylinder": {"type": GEOM.mjGEOM_CYLINDER, "size": [0.05, 0.03, 0]},
+    "mesh": {"type": GEOM.mjGEOM_MESH, "meshname": "pebble"},
+}
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("body", ROUND)
+def test_bodies_in_any_pose_give_what_they_lose_on_their_side(body: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    spec = spec_of(limbed(0.04), "free" if seed % 2 else None, condim=1)
+    V, F = peanut(0.06)
+    pebble = 0.05 * V / np.linalg.norm(V, axis=1, keepdims=True)
+    spec.add_mesh(name="pebble", uservert=pebble.ravel(), userface=F.ravel())
+    spec.option.gravity = [0, 0, 0]
+    add_ball(spec, "body", [0, 0, 9], condim=1, **ROUND[body])
+    model = spec.compile()
+    data, joint = mujoco.MjData(model), model.joint(model.body("body").jntadr[0])
+    mujoco.mj_forward(model, data)
+    way, place, start = rng.standard_normal(3), joint.qposadr[0], joint.dofadr[0]
+    way /= np.linalg.norm(way)
+    data.qpos[place : place + 7] = [*(data.geom("target").xpos + 0.6 * way), *rng.standard_normal(4)]
+    data.qvel[start : start + 6] = [*(-2 * way + rng.uniform(-0.1, 0.1, 3)), *rng.uniform(-3, 3, 3)]
+    ripples = Ripples(model, {"target": Material(density=50)}, resolution=12, backend="cpu", conserve_volume=False)
+    atlas, given, lost = ripples["target"].atlas, 0.0, 0.0
+    while data.time < 0.5:
+        before = data.qvel[start : start + 3].copy()
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+        change = 0.2 * (data.qvel[start : start + 3] - before)
+        lost += float(np.linalg.norm(change))
+        for impulse in ripples.last_impulses:
+            given += impulse.impulse
+            assert data.geom("target").xmat.reshape(3, 3) @ atlas.normals[impulse.texel] @ change > 0
+    assert given > 0.1
+    assert given == pytest.approx(lost, rel=0.03)
+    assert -ripples["target"].momentum() == pytest.approx(given, rel=0.03)
+
+
 def test_impulses_lie_where_the_balls_are_nearest_to_the_true_surface() -> None:
     spec = spec_of(peanut(0.03))
     spec.option.gravity = [0, 0, 0]
