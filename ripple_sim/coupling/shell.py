@@ -82,7 +82,7 @@ def add_shell(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
 def remove_shell(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     """Let a geom collide itself again, if a flex does so in its place."""
     flex = spec.flex(geom.name)
-    if flex is not None:
+    if flex is not None and set(flex.vertbody) == {geom.parent.name}:
         geom.contype, geom.conaffinity = flex.contype, flex.conaffinity
         spec.delete(flex)
 
