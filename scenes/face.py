@@ -51,7 +51,7 @@ _LIPS = smooth_union(
 )
 
 
-def head(cell: float = 0.019) -> tuple[Array, NDArray[np.int64]]:
+def head(cell: float = 0.017) -> tuple[Array, NDArray[np.int64]]:
     """Model a head 0.75 m high that faces +x and stands on z = 0, vertices and triangles as `polygonise` gives them."""
     V, F = polygonise(_head_solid(), ((-0.4, -0.4, 0.1), (0.45, 0.4, 0.95)), cell)
     return V - [0.0, 0.0, _FOOT], F
@@ -70,8 +70,8 @@ def _head_solid() -> Sdf:
     solid = smooth_union(0.10, skull, jaw, mirrored(cheek))
     solid = smooth_union(0.05, solid, neck, nose, mirrored(brow))
     solid = smooth_union(0.04, solid, mirrored(ear))
-    solid = smooth_union(0.012, solid, mirrored(sphere(_EYE, _EYE_RADIUS)))
-    solid = smooth_union(0.012, solid, _LIPS)
+    solid = smooth_union(0.03, solid, mirrored(sphere(_EYE, _EYE_RADIUS)))
+    solid = smooth_union(0.02, solid, _LIPS)
     return smooth_intersection(0.03, solid, half_space((0.0, 0.0, -1.0), -_FOOT))
 
 
