@@ -11,6 +11,7 @@ from .owned import OwnedObjects
 _PACKAGE = "ripple_sim.render"
 _UNIT = 15  # of the texture, in shaders/interpolate_fragment.glsl
 _PIXELS = 4  # along an edge of a block
+_UNSURE = 0.002  # weight of a block that is not smooth from which on a pixel is left out
 
 
 class CoarseBackground:
@@ -37,7 +38,8 @@ class CoarseBackground:
         self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self._texture.repeat_x = self._texture.repeat_y = False
         self._target = ctx.framebuffer([self._texture])
-        light = ctx.own(gl.program(_PACKAGE, "view_vertex", "background_fragment", SHADOW=0, COARSE=1, **options))
+        options = {**options, "UNSURE": _UNSURE, "SHADOW": 0, "COARSE": 1}
+        light = ctx.own(gl.program(_PACKAGE, "view_vertex", "background_fragment", **options))
         fill = ctx.own(gl.program(_PACKAGE, "screen_vertex", "interpolate_fragment", **options))
         # the last blocks reach beyond the picture
         light["span"] = fill["span"] = blocks[0] * _PIXELS / size[0], blocks[1] * _PIXELS / size[1]

@@ -127,9 +127,9 @@ void main()
 #if COARSE
     float rim = beside_floor();
     bool steep = any(greaterThan(fwidth(shown), vec3(STEEPEST)));
-    // shadows are marked with a margin: it is enough if the nearest blocks leave them out
+    // shadows are marked with a margin: it is enough that the nearest blocks leave them out
     bool rough = steep || abs(rim) < 2.0 * fwidth(rim);
-    fragment = vec4(shown, rough ? 0.5 : shaded ? 0.75 : met ? 1.0 : 0.0);
+    fragment = vec4(shown, rough ? 0.5 : shaded ? 1.0 - 2.0 * UNSURE : met ? 1.0 : 0.0);
 #else
     fragment = share * vec4(dithered(shown), 1.0);
 #endif

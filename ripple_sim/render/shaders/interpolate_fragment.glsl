@@ -15,5 +15,5 @@ void main()
     vec4 shown = textureLod(coarse, (0.5 + 0.5 * screen) / span, 0.0);
     fragment = vec4(dithered(shown.rgb), 1.0);
     // blocks of pixels go together, so that their shadows can be averaged
-    gl_FragDepth = block_mean(min(shown.a, 1.0 - shown.a)) > 0.125 ? SHADED_LEVEL : OPEN_LEVEL;
+    gl_FragDepth = block_mean(min(shown.a, 1.0 - shown.a)) > UNSURE ? SHADED_LEVEL : OPEN_LEVEL;
 }
