@@ -106,7 +106,10 @@ def shell_warning(model: mujoco.MjModel, geom: int) -> str | None:
     weld = model.body_weldid[model.geom_bodyid]
     meets = ((types[geom] & affinities) | (affinities[geom] & types) != 0) & (weld != weld[geom])
     reasons = (
-        (model.geom_type == _GEOM.mjGEOM_BOX, "MuJoCo may throw boxes aside, though not box-shaped meshes"),
+        (
+            model.geom_type == _GEOM.mjGEOM_BOX,
+            "MuJoCo may throw boxes aside, and impulses be off by a tenth, though not with box-shaped meshes",
+        ),
         (
             model.geom_type == _GEOM.mjGEOM_SDF,
             f"SDF geoms sink {shell_thickness(model, flex):.2g} m into it before they are pushed out",
