@@ -56,7 +56,8 @@ Spot spot_at(ivec2 pixel, int s)
 {
     vec4 shape = texelFetch(shapes, pixel, s), paint = texelFetch(paints, pixel, s);
     Spot spot;
-    spot.object = int(shape.z * 65535.0 + 0.5);
+    // a sample without a surface, which helper invocations may meet, holds any number
+    spot.object = min(int(shape.z * 65535.0 + 0.5), objects.length() - 1);
     spot.normal = unfolded(shape.xy);
     vec2 red_green = parted(paint.z), blue_ink = parted(paint.w), baked = parted(shape.w);
     spot.color = vec3(red_green, blue_ink.x);
