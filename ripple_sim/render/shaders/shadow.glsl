@@ -77,11 +77,11 @@ float visibility(int lamp, vec3 position, vec3 normal, float lift)
     float blocker = lamp_distance(lamp, depth / max(blockers, 1.0));
     float penumbra = max(penumbra_of(lamp, blocker, to_lamp), 1.5 / of_width.z);
     float lit = 0.0;
-    taps = blockers > 0.0 && blockers < float(SEARCH_TAPS) ? FILTER_TAPS : 0;
+    taps = blockers > 0.0 ? FILTER_TAPS : 0;
     for (int i = 0; i < taps; ++i) {
         vec2 offset = penumbra * sqrt((float(i) + 0.5) / float(FILTER_TAPS)) * direction;
         direction = TURN * direction;
         lit += textureLod(shadow_test, vec3(in_maps(lamp, p.xy + offset), p.z + dot(slope, offset) - bias), 0.0);
     }
-    return taps > 0 ? lit / float(FILTER_TAPS) : 1.0 - blockers / float(SEARCH_TAPS);
+    return taps > 0 ? lit / float(FILTER_TAPS) : 1.0;
 }
