@@ -41,8 +41,8 @@ class Ripples:
     backend, operator, conserve_volume
         As for `WaveSolver`.
     two_way : bool
-        Let the moving surfaces push back on the bodies that touch them, through `data.xfrc_applied`. What others have
-        put there stays, as long as they add to it or set it before `step`.
+        Let the moving surfaces push back on the bodies that touch them or that they reach while risen, through
+        `data.xfrc_applied`. What others have put there stays, as long as they add to it or set it before `step`.
 
     Raises
     ------
