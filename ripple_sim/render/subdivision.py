@@ -2,8 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """Edges of a triangle mesh.
+
+    Attributes
+    ----------
+    ends : int64 [k, 2]
+        Vertices.
+    of_side : int64 [m, 3]
+        Which edge is the triangles' side from corner c to c + 1.
+    weld : int64 [k]
+        Equal for edges whose ends are the same but for their texture coordinates.
+    inner : bool [k]
+        Whether two triangles share the edge, and the normals at its ends.
+    """
+
+    ends: NDArray[np.int64]
+    of_side: NDArray[np.int64]
+    weld: NDArray[np.int64]
+    inner: NDArray[np.bool_]
 
 
 def subdivide(
@@ -15,7 +39,7 @@ def subdivide(
     normal: slice,
     max_length: float,
     max_faces: int,
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
     """Split edges until none is longer than `max_length` or the mesh has about `max_faces` triangles.
 
     A midpoint carries the mean of what its edge's ends carry. Between two triangles that share the normals at both ends
@@ -41,33 +65,44 @@ def subdivide(
 
     Returns
     -------
-    F, attributes
-        The finer mesh. The original vertices come first.
+    F, attributes, same
+        The finer mesh, as above. The original vertices come first.
     """
     F, attributes = np.asarray(F, dtype=np.int64), np.asarray(attributes, dtype=np.float64)
     same = np.asarray(same, dtype=np.int64)
     while len(F) < max_faces:
-        sides = np.stack([F, np.roll(F, -1, axis=1)], axis=2).reshape(-1, 2)
-        edges, edge_of_side = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
-        edge_of_side = edge_of_side.ravel()
-        length = _length(attributes[edges[:, 0], position] - attributes[edges[:, 1], position])
+        edges = edges_of(F, same)
+        length = _length(attributes[edges.ends[:, 0], position] - attributes[edges.ends[:, 1], position])
         marked = _longest(length, max_length, max_faces - len(F))
         if not marked.any():
             break
-        _, weld_of_side = np.unique(np.sort(same[sides], axis=1), axis=0, return_inverse=True)
-        weld_of_edge = np.empty(len(edges), dtype=np.int64)
-        weld_of_edge[edge_of_side] = weld_of_side.ravel()
-        inner = np.bincount(weld_of_side.ravel())[weld_of_edge] == 2
-        a, b = attributes[edges[marked, 0]], attributes[edges[marked, 1]]
-        middle = (a + b) / 2
-        middle[:, position] += inner[marked, None] * _bulge(a[:, position], b[:, position], a[:, normal], b[:, normal])
-        middle[:, normal] /= np.maximum(_length(middle[:, normal]), 1e-12)[:, None]
-        midpoint = np.full(len(edges), -1)
+        midpoint = np.full(len(marked), -1)
         midpoint[marked] = len(attributes) + np.arange(marked.sum())
-        same = np.concatenate([same, same.max() + 1 + weld_of_edge[marked]])
-        attributes = np.concatenate([attributes, middle])
-        F = _split(F, midpoint[edge_of_side.reshape(-1, 3)], attributes[:, position])
-    return F, attributes
+        same = np.concatenate([same, same.max() + 1 + edges.weld[marked]])
+        attributes = np.concatenate([attributes, midpoints(edges, attributes, position, normal)[marked]])
+        F = _split(F, midpoint[edges.of_side], attributes[:, position])
+    return F, attributes, same
+
+
+def edges_of(F: NDArray[np.int64], same: NDArray[np.int64]) -> Edges:
+    """Edges of triangles, [m, 3]; `same` as for `subdivide`."""
+    sides = np.stack([F, np.roll(F, -1, axis=1)], axis=2).reshape(-1, 2)
+    ends, edge_of_side = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
+    edge_of_side = edge_of_side.ravel()
+    _, weld_of_side = np.unique(np.sort(same[sides], axis=1), axis=0, return_inverse=True)
+    weld = np.empty(len(ends), dtype=np.int64)
+    weld[edge_of_side] = weld_of_side.ravel()
+    inner = np.bincount(weld_of_side.ravel())[weld] == 2
+    return Edges(ends, edge_of_side.reshape(-1, 3), weld, inner)
+
+
+def midpoints(edges: Edges, attributes: NDArray, position: slice, normal: slice) -> NDArray[np.float64]:
+    """What the midpoints of all edges carry, [k, ...]; see `subdivide`."""
+    a, b = attributes[edges.ends[:, 0]], attributes[edges.ends[:, 1]]
+    middle = (a + b) / 2
+    middle[:, position] += edges.inner[:, None] * _bulge(a[:, position], b[:, position], a[:, normal], b[:, normal])
+    middle[:, normal] /= np.maximum(_length(middle[:, normal]), 1e-12)[:, None]
+    return middle
 
 
 def _length(vectors: NDArray) -> NDArray[np.float64]:

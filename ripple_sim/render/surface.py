@@ -25,12 +25,14 @@ from .meshes import corner_normals
 from .objects import ObjectTable
 from .owned import OwnedObjects
 from .pieces import geom_piece
+from .refinement import Refinement
 from .reliefs import LAYERS, ReliefTextures
-from .subdivision import subdivide
+from .subdivision import Edges, edges_of, midpoints, subdivide
 
 _PIXELS = 4.0  # length of an edge where the target fills the frame's height
 _PIXELS_PER_FACE = 48  # of the frame
 _LEAST_FACES, _MOST_FACES = 20_000, 400_000
+_TOLERANCE = 0.15  # [pixels], likewise: an edge from which the waves depart further is split
 _BALLS = 16  # that bound the mesh
 _NO_SHADOW = 0.75  # transparency from which on light goes through as if nothing were there
 _PACKAGE = "ripple_sim.render"
@@ -82,6 +84,8 @@ class Surface:
 class SurfaceMesh:
     """A target on the GPU, cut into triangles of a few pixels so that silhouettes are round and displace smoothly.
 
+    Where waves are sharp, a frame has up to four triangles in place of one.
+
     Parameters
     ----------
     gl : GLContext
@@ -126,9 +130,20 @@ class SurfaceMesh:
         self.number = table.add(
             look, geom, size=self.radius, painted=shows_field, relief=(self._first_layer, self.resolution)
         )
-        faces, vertices = _refined(surface, 2 * self.radius * _PIXELS / size[1], size[0] * size[1] // _PIXELS_PER_FACE)
-        self.count = len(vertices)
-        self._balls = balls_about(vertices[:, _POSITION][faces], _BALLS)
+        pixel = 2 * self.radius / size[1]
+        faces, vertices, edges = _refined(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
+        middle = len(vertices) - len(edges.ends) + edges.of_side
+        self._balls = balls_about(vertices[:, _POSITION][np.concatenate([faces, middle])], _BALLS)
+        self._refinement = Refinement(
+            faces,
+            edges,
+            vertices[:, _POSITION],
+            vertices[:, _SPHERE],
+            self.resolution,
+            tolerance=_TOLERANCE * pixel,
+            min_length=1.5 * _PIXELS * pixel,
+        )
+        self._triangles: NDArray[np.int32] | None = None  # on the GPU
         self._displace = ctx.own(gl.compute_shader(_PACKAGE, "displace"))
         self._program = ctx.own(
             gl.program(
@@ -142,20 +157,21 @@ class SurfaceMesh:
         )
         depth = ctx.own(gl.program(_PACKAGE, "surface_depth_vertex", "depth_fragment"))
         self._rest = ctx.buffer(_packed(vertices, _POSITION, _DIRECTION, _SPHERE))
-        self._moved = ctx.buffer(reserve=16 * self.count)
+        self._moved = ctx.buffer(reserve=16 * len(vertices))
+        self._midpoints = ctx.buffer(reserve=4 * len(edges.ends), dynamic=True)
+        self._indices = ctx.buffer(reserve=4 * 12 * len(faces), dynamic=True)
         still = np.concatenate([vertices[:, _NORMAL], vertices[:, _SPHERE], vertices[:, _BAKED]], axis=1)
         still = np.concatenate([still, _mapped(vertices, mapping)], axis=1).astype("f4")
-        indices = ctx.buffer(faces.astype("i4").tobytes())
         self._solid = ctx.vertex_array(
             self._program,
             [
                 (self._moved, "4f", "in_moved"),
                 (ctx.buffer(still.tobytes()), "3f 3f 2f 3f", "in_normal", "in_sphere", "in_baked", "in_mapped"),
             ],
-            indices,
+            self._indices,
             skip_errors=True,
         )
-        self._depth = ctx.vertex_array(depth, [(self._moved, "4f", "in_moved")], indices)
+        self._depth = ctx.vertex_array(depth, [(self._moved, "4f", "in_moved")], self._indices)
         self._mapping = mapping
         self._image = None
         if mapping.kind != NO_IMAGE:
@@ -185,19 +201,28 @@ class SurfaceMesh:
             )
         self._pose, self._highest = (np.array(rotation), np.array(origin)), float(np.abs(relief[..., 3]).max())
         self._table.set_relief(self.number, min(1.5 * self._highest, 0.05 * self.radius), rotation)
+        triangles, middle = self._refinement(relief)
+        if triangles is not self._triangles:
+            self._indices.write(triangles)
+            self._triangles = triangles
+        if len(middle):
+            self._midpoints.write(middle)
+        self._index_count, count = triangles.size, self._refinement.base_count + len(middle)
         self._reliefs.write(self._first_layer, relief)
         self._reliefs.bind()
         self._rest.bind_to_storage_buffer(0)
         self._moved.bind_to_storage_buffer(1)
+        self._midpoints.bind_to_storage_buffer(2)
         self._rotation = tuple(rotation.T.ravel())
         self._displace["rotation"] = self._rotation
         self._displace["origin"] = tuple(origin)
-        self._displace["count"] = self.count
+        self._displace["count"] = count
+        self._displace["base_count"] = self._refinement.base_count
         self._displace["resolution"] = float(self.resolution)
         self._displace["geom"] = float(self.geom)
         self._displace["occluder_count"] = occluders
         self._displace["first_layer"] = float(self._first_layer)
-        self._displace.run(-(-self.count // 64))
+        self._displace.run(-(-count // 64))
         ctx.memory_barrier()
 
     def set_field(self, field: NDArray[np.float32], limit: float) -> None:
@@ -232,12 +257,12 @@ class SurfaceMesh:
             self._program["grid_spacing"] = float(self._grid)
         if self._field is not None or self._grid:
             self._program["resolution"] = float(self.resolution)
-        self._solid.render()
+        self._solid.render(vertices=self._index_count)
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth alone, under a matrix of 16 numbers, column by column."""
         self._depth.program["view_projection"] = view_projection
-        self._depth.render()
+        self._depth.render(vertices=self._index_count)
 
 
 def _appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[np.float64], Mapping]:
@@ -258,8 +283,13 @@ def _appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[
     return look, linear(surface.color or look.color), plain
 
 
-def _refined(surface: Surface, max_length: float, max_faces: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Triangles and vertex attributes (see the columns above), split where normals or texture coordinates jump."""
+def _refined(
+    surface: Surface, max_length: float, max_faces: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64], Edges]:
+    """Triangles, vertex attributes (see the columns above), split where normals or texture coordinates jump, and edges.
+
+    The last vertices are the edges' midpoints.
+    """
     V, F = np.asarray(surface.V, dtype=np.float64), np.asarray(surface.F, dtype=np.int64)
     smooth = np.zeros_like(V)
     smooth[F] = corner_normals(V, F, crease=180.0)
@@ -273,7 +303,7 @@ def _refined(surface: Surface, max_length: float, max_faces: int) -> tuple[NDArr
     attributes = np.concatenate(
         [V[vertex], smooth[vertex], surface.sphere[vertex], unique[:, 1:4], baked[vertex], unique[:, 4:]], axis=1
     )
-    faces, attributes = subdivide(
+    faces, attributes, same = subdivide(
         index.reshape(F.shape),
         attributes,
         same.ravel(),
@@ -282,9 +312,11 @@ def _refined(surface: Surface, max_length: float, max_faces: int) -> tuple[NDArr
         max_length=max_length,
         max_faces=int(np.clip(max_faces, _LEAST_FACES, _MOST_FACES)),
     )
+    edges = edges_of(faces, same)
+    attributes = np.concatenate([attributes, midpoints(edges, attributes, _POSITION, _NORMAL)])
     length = np.linalg.norm(attributes[:, _DIRECTION], axis=1, keepdims=True)
     attributes[:, _DIRECTION] /= np.maximum(length, 1e-12)
-    return faces, attributes
+    return faces, attributes, edges
 
 
 def _packed(vertices: NDArray[np.float64], *columns: slice) -> bytes:

@@ -270,7 +270,7 @@ def directed_edges(F) -> np.ndarray:
 def refine(V, F, normals, same=None, **limits):
     attributes = np.concatenate([V, normals, 2 * V], axis=1)
     same = np.arange(len(V)) if same is None else same
-    F, finer = subdivide(F, attributes, same, position=slice(0, 3), normal=slice(3, 6), **limits)
+    F, finer, _ = subdivide(F, attributes, same, position=slice(0, 3), normal=slice(3, 6), **limits)
     return F, finer, attributes
 
 

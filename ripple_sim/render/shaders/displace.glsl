@@ -9,10 +9,11 @@ layout(local_size_x = 64) in;
 struct Vertex { float position[3], direction[3], sphere[3]; };
 layout(std430, binding = 0) readonly buffer Rest { Vertex rest[]; };
 layout(std430, binding = 1) writeonly buffer Moved { vec4 moved[]; };
+layout(std430, binding = 2) readonly buffer Midpoints { int midpoints[]; };  // in use besides all vertices of the mesh
 
 uniform mat3 rotation;
 uniform vec3 origin;
-uniform int count;
+uniform int count, base_count;
 uniform float resolution;
 uniform float first_layer;
 uniform float geom;
@@ -23,6 +24,8 @@ void main()
     int i = int(gl_GlobalInvocationID.x);
     if (i >= count)
         return;
+    if (i >= base_count)
+        i = midpoints[i - base_count];
     Vertex v = rest[i];
     vec3 sphere = vec3(v.sphere[0], v.sphere[1], v.sphere[2]);
     float height = spline_at(relief, resolution, first_layer, sphere).w;
