@@ -28,7 +28,8 @@ from .pieces import ball_of, visible_geoms
 from .readback import Readback
 from .reliefs import ReliefTextures
 from .shadow import ShadowMaps
-from .surface import Surface, SurfaceMesh
+from .surface import Surface
+from .surface_mesh import SurfaceMesh
 from .undrawn import warn_of_undrawn
 
 LIGHTING = ("auto", "model", "studio")

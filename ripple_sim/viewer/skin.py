@@ -68,7 +68,7 @@ def _refined(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     unique, index = np.unique(corners, axis=0, return_inverse=True)
     vertex = unique[:, 0].astype(np.int64)
     attributes = np.concatenate([V[vertex], smooth[vertex], atlas.sphere[vertex], unique[:, 1:]], axis=1)
-    return subdivide(
+    faces, attributes, _ = subdivide(
         index.reshape(F.shape),
         attributes,
         np.arange(len(unique)),
@@ -77,6 +77,7 @@ def _refined(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         max_length=float(np.sqrt(atlas.areas.mean())),
         max_faces=MAX_TRIANGLES,
     )
+    return faces, attributes
 
 
 def _bilinear(directions: NDArray[np.float64], n: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
