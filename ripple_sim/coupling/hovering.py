@@ -40,16 +40,8 @@ class Hovering:
     def __init__(self, model: mujoco.MjModel, targets: Iterable[int]) -> None:
         self._model = model
         self._radii = FOOTPRINT * smallest_extents(model)
-        moves = model.body_weldid[model.geom_bodyid] > 0
-        bodies = [geom for geom in range(model.ngeom) if moves[geom] and int(model.geom_type[geom]) in _BODIES]
-        self._others = {
-            target: [
-                other
-                for other in bodies
-                if model.geom_bodyid[other] != model.geom_bodyid[target] and can_collide(model, target, other)
-            ]
-            for target in targets
-        }
+        bodies = (model.body_weldid[model.geom_bodyid] > 0) & np.isin(model.geom_type, _BODIES)
+        self._others = {target: np.flatnonzero(bodies & can_collide(model, target)).tolist() for target in targets}
 
     def reached(
         self, data: mujoco.MjData, waves: Mapping[int, WaveSolver], touching: Collection[tuple[int, int]]
@@ -94,6 +86,6 @@ class Hovering:
         if (point - place) @ normal >= height[texel]:
             return None
         where = footprint(atlas, place, min(self._radii[target], self._radii[other]))
-        shares = where.weights * (atlas.areas * waves.operator.carries).reshape(-1)[where.texels]
+        carried = atlas.areas.reshape(-1)[where.texels] * waves.operator.carries.reshape(-1)[where.texels]
         in_world = data.geom_xpos[target] + rotation @ place
-        return Touch(target, other, in_world, rotation @ normal, Load(where.texels, shares))
+        return Touch(target, other, in_world, rotation @ normal, Load(where.texels, where.weights * carried))

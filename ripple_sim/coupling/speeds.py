@@ -51,7 +51,7 @@ class SpeedCheck:
 
     def __init__(self, model: mujoco.MjModel, targets: list[int]) -> None:
         self._model = model
-        bodies, extents, solref = model.geom_bodyid, smallest_extents(model), model.geom_solref.copy()
+        extents, solref = smallest_extents(model), model.geom_solref.copy()
         sdf, cylinder = model.geom_type == _SDF, model.geom_type == _CYLINDER
         shell = np.zeros(model.ngeom, dtype=bool)
         for geom, flex in shells(model).items():
@@ -60,11 +60,8 @@ class SpeedCheck:
         pairs = [
             (target, other)
             for target in targets
-            for other in range(model.ngeom)
-            if np.isfinite(extents[other])
-            and bodies[other] != bodies[target]
-            and can_collide(model, target, other)
-            and (unchecked[target] or unchecked[other])
+            for other in np.flatnonzero(can_collide(model, target)).tolist()
+            if np.isfinite(extents[other]) and (unchecked[target] or unchecked[other])
         ]
         self._target, self._other = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
         self._limit = _SAFE * (extents[self._target] + extents[self._other])
@@ -117,10 +114,10 @@ class SpeedCheck:
         )
 
 
-def can_collide(model: mujoco.MjModel, first: int, second: int) -> bool:
-    """Whether MuJoCo's bit masks let two geoms, or the flexes that stand for them, collide."""
+def can_collide(model: mujoco.MjModel, geom: int) -> NDArray[np.bool_]:
+    """Which geoms, [ngeom], MuJoCo lets collide with one by their masks or their flexes'; none of the same body."""
     types, affinities = contact_masks(model)
-    return bool(types[first] & affinities[second] or types[second] & affinities[first])
+    return ((types[geom] & affinities | types & affinities[geom]) != 0) & (model.geom_bodyid != model.geom_bodyid[geom])
 
 
 def _stopping_time(solref: NDArray[np.float64], timestep: float) -> NDArray[np.float64]:
