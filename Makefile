@@ -19,7 +19,7 @@ $(STAMP): requirements.txt pyproject.toml .ci/setup .ci/egl.py
 	@touch $@
 
 # numba notices a changed kernel only by its own file, not by the files of the kernels that it calls.
-$(KERNELS): $(STAMP) $(wildcard solver/*.py solver/*/*.py ripple_sim/coupling/*.py)
+$(KERNELS): $(STAMP) $(shell find solver ripple_sim/coupling -name "*.py")
 	@find solver ripple_sim -name '*.nb[ic]' -delete
 	@touch $@
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from ripple_sim.cli.atlas_plot import plot_atlas
+from ripple_sim.figures.atlas_plot import plot_atlas
 from ripple_sim.scenes.shapes import LIMBED_FILE
 from ripple_sim.solver import Material, WaveSolver, build_atlas, load_mesh
-from ripple_sim.solver.atlas.sampling import sampling_matrix
+from ripple_sim.solver.texels.sampling import sampling_matrix
 
 
 def main() -> None:

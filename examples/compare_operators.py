@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw
 from ripple_sim.bench.accuracy import arrivals, sphere_modes
 from ripple_sim.bench.arrival import plane_arrival
 from ripple_sim.solver import WaveSolver, sphere_atlas
-from ripple_sim.solver.atlas.sampling import sampling_matrix
+from ripple_sim.solver.texels.sampling import sampling_matrix
 from ripple_sim.solver.waves.operator import OPERATORS
 
 SIZE, CAPTION, SMOOTH = 360, 76, 2

@@ -6,9 +6,9 @@ mocap bodies, and the ripples, to press on surfaces.
 
 import numpy as np
 
-from ripple_sim.job import render_video
 from ripple_sim.scene.scene import load_scene
 from ripple_sim.simulation import Simulation
+from ripple_sim.video.render_video import render_video
 
 FORCE = 12.0  # N
 TURNS = 0.4  # 1/s

@@ -6,15 +6,15 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .coupling.collidable import make_collidable
+    from .capture.ripple_renderer import Pictures
+    from .coupling.colliders.collidable import make_collidable
     from .coupling.ripples import Impulse, Ripples
     from .errors import RippleWarning
-    from .job import render_video
-    from .pictures import Pictures
     from .render import Camera
     from .scene.scene import load_scene
     from .simulation import Simulation
     from .solver import Material, RippleError
+    from .video.render_video import render_video
 
 __version__ = "0.1.0"
 __all__ = [
@@ -35,14 +35,14 @@ _HOMES = {
     "Camera": ".render",
     "Impulse": ".coupling.ripples",
     "Material": ".solver",
-    "Pictures": ".pictures",
+    "Pictures": ".capture.ripple_renderer",
     "RippleError": ".solver",
     "RippleWarning": ".errors",
     "Ripples": ".coupling.ripples",
     "Simulation": ".simulation",
     "load_scene": ".scene.scene",
-    "make_collidable": ".coupling.collidable",
-    "render_video": ".job",
+    "make_collidable": ".coupling.colliders.collidable",
+    "render_video": ".video.render_video",
 }
 
 

@@ -9,12 +9,12 @@ from collections.abc import Callable
 
 import mujoco
 
-from ripple_sim.solver import texture_map
+from ripple_sim.coupling.ripples import Impulse, Ripples
+from ripple_sim.scene.events import Script
+from ripple_sim.scene.scene import Scene
 
-from .coupling.ripples import Impulse, Ripples
 from .errors import SceneError, SimulationError
-from .scene.events import Script
-from .scene.scene import Scene
+from .solver import texture_map
 
 # More than this is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000

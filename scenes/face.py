@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ripple_sim.solver.whole_file import whole_file
+from ripple_sim.solver.atomic_file import whole_file
 
 from .implicit import (
     Array,

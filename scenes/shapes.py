@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.whole_file import whole_file
+from ripple_sim.solver.atomic_file import whole_file
 
 from .implicit import (
     Array,

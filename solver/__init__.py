@@ -9,23 +9,23 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .atlas.analytic import SphereAtlas, sphere_atlas
-    from .atlas.atlas import Atlas
-    from .atlas.atlas_file import load_atlas
-    from .atlas.build import build_atlas
-    from .atlas.maps import texture_map, vertex_map
     from .errors import AtlasError, GLError, MeshError, RippleError, SolverError, SphereMapError
     from .mesh.mesh import Mesh
     from .mesh.mesh_file import load_mesh
-    from .waves.absorber import absorbing_damping
+    from .texels.atlas import Atlas
+    from .texels.atlas_file import load_atlas
+    from .texels.build import build_atlas
+    from .texels.cube_map.sphere_atlas import SphereAtlas, sphere_atlas
+    from .texels.maps import texture_map, vertex_map
+    from .waves.absorbing import absorbing_damping
     from .waves.footprint import Footprint
+    from .waves.height_map import Relief
     from .waves.load import Load
     from .waves.material import Material
-    from .waves.relief import Relief
     from .waves.wave_solver import WaveSolver
 
 _HOME = {
-    "Atlas": "atlas.atlas",
+    "Atlas": "texels.atlas",
     "AtlasError": "errors",
     "Footprint": "waves.footprint",
     "GLError": "errors",
@@ -33,19 +33,19 @@ _HOME = {
     "Material": "waves.material",
     "Mesh": "mesh.mesh",
     "MeshError": "errors",
-    "Relief": "waves.relief",
+    "Relief": "waves.height_map",
     "RippleError": "errors",
     "SolverError": "errors",
-    "SphereAtlas": "atlas.analytic",
+    "SphereAtlas": "texels.cube_map.sphere_atlas",
     "SphereMapError": "errors",
     "WaveSolver": "waves.wave_solver",
-    "absorbing_damping": "waves.absorber",
-    "build_atlas": "atlas.build",
-    "load_atlas": "atlas.atlas_file",
+    "absorbing_damping": "waves.absorbing",
+    "build_atlas": "texels.build",
+    "load_atlas": "texels.atlas_file",
     "load_mesh": "mesh.mesh_file",
-    "sphere_atlas": "atlas.analytic",
-    "texture_map": "atlas.maps",
-    "vertex_map": "atlas.maps",
+    "sphere_atlas": "texels.cube_map.sphere_atlas",
+    "texture_map": "texels.maps",
+    "vertex_map": "texels.maps",
 }
 
 __all__ = [

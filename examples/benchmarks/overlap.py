@@ -17,11 +17,11 @@ from typing import TypeVar
 
 os.environ.setdefault("MUJOCO_GL", "disable")
 
-from ripple_sim.frames import FrameSource, run
-from ripple_sim.job import render_video
+from ripple_sim.capture.snapshot import FrameSource, run
+from ripple_sim.encode import open_writer
 from ripple_sim.scene.scene import load_scene
 from ripple_sim.simulation import Simulation
-from ripple_sim.video import open_writer
+from ripple_sim.video.render_video import render_video
 
 Result = TypeVar("Result")
 FPS = 60

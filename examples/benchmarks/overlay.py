@@ -15,12 +15,12 @@ os.environ.setdefault("MUJOCO_GL", "disable")
 
 import numpy as np
 
-from ripple_sim.overlay.film import Film
 from ripple_sim.overlay.notes import Notebook
-from ripple_sim.overlay.request import parse_request
+from ripple_sim.scene.overlays import parse_request
 from ripple_sim.scene.scene import load_scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.gl import shared_context
+from ripple_sim.video.film import Film
 
 KINDS = ([], ["height"], ["grid"], ["contacts"], ["time"], ["energy"], ["height", "contacts", "grid", "time", "energy"])
 RATE, START = 30, 1.0

@@ -15,12 +15,12 @@ from figure import FAINT, FOLDER, NAMES, TEXT, save, sheet
 from matplotlib.colors import ListedColormap
 
 from ripple_sim.bench.arrival import NEAREST, arrival_times, ideal_width, plane_arrival
-from ripple_sim.cli.atlas_views import AtlasPainter, View
-from ripple_sim.orientation import usual_up
+from ripple_sim.figures.atlas_views import AtlasPainter, View
 from ripple_sim.overlay.colormap import color_table, colors
+from ripple_sim.scene.up_axis import usual_up
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
-from ripple_sim.solver.atlas.cubemap import texel_directions
-from ripple_sim.solver.atlas.sampling import sampling_matrix
+from ripple_sim.solver.texels.cube_map.convention import texel_directions
+from ripple_sim.solver.texels.sampling import sampling_matrix
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
 VIEW = {"azimuth": 38.0, "elevation": 24.0}

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.special import j0
 
 from ripple_sim.solver import Atlas, WaveSolver
-from ripple_sim.solver.atlas.sampling import sampling_matrix
-from ripple_sim.solver.waves.distance import distance_from_point
+from ripple_sim.solver.texels.distance import distance_from_point
+from ripple_sim.solver.texels.sampling import sampling_matrix
 
 # Width of the bump in texels of an ideal even grid: wide enough to be carried, narrow beside the object's limbs.
 WIDTH = 4.0

@@ -9,14 +9,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.colliders.collidable import make_collidable
+from ripple_sim.coupling.colliders.tunnelling import SpeedCheck
+from ripple_sim.coupling.load.sources import Sources
+from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.scenes.implicit import ellipsoid, polygonise, smooth_intersection
 from ripple_sim.scenes.shapes import duck
 from ripple_sim.solver import Material
-
-from ..coupling.collidable import make_collidable
-from ..coupling.ripples import Ripples
-from ..coupling.sources import Sources
-from ..coupling.speeds import SpeedCheck
 
 Shape = tuple[NDArray[np.float64], NDArray[np.int64]]
 

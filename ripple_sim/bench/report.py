@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ripple_sim.cli.info import Info, collect
+from ripple_sim.diagnostics.info import Info, collect
 
 from .accuracy import arrivals, energy_drift, sphere_modes
 from .coupling import BODIES, coupling_cost

@@ -6,9 +6,9 @@ import moderngl
 import numpy as np
 from scipy.sparse import coo_array, diags_array
 
-from ripple_sim.solver.atlas.cubemap import padded_indices
-from ripple_sim.solver.atlas.padding import padded_addresses
 from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.texels.cube_map.convention import padded_indices
+from ripple_sim.solver.texels.halo import padded_addresses
 from ripple_sim.solver.waves.operator import WaveOperator
 
 # What one update must move: 4 link weights, gain, height and velocity in, height and velocity out, 4 bytes each.

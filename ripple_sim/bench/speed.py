@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from ripple_sim.solver import GLError, Material, sphere_atlas
-from ripple_sim.solver.waves.backend import Backend, make_backend
-from ripple_sim.solver.waves.backend_cpu import CPUBackend
+from ripple_sim.solver.waves.backends.backend import Backend, make_backend
+from ripple_sim.solver.waves.backends.cpu import CPUBackend
 from ripple_sim.solver.waves.operator import WaveOperator, build_operator
 
 from .rivals import Copy, PlainShader, SparseLeapfrog

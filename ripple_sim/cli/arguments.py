@@ -10,8 +10,8 @@ from typing import Annotated, Any
 from tyro.conf import arg
 from tyro.constructors import PrimitiveConstructorSpec
 
-from ..orientation import UP_AXES
-from ..overlay.comparison import BASELINES
+from ripple_sim.overlay.comparison import BASELINES
+from ripple_sim.scene.up_axis import UP_AXES
 
 
 def parse_size(word: str) -> tuple[int, int]:

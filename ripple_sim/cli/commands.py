@@ -36,9 +36,9 @@ from .completion_command import Completion
 from .view_command import View
 
 if TYPE_CHECKING:
-    from ..job import Summary
-    from ..scene.scene import Scene
-    from ..solver import Mesh
+    from ripple_sim.scene.scene import Scene
+    from ripple_sim.solver import Mesh
+    from ripple_sim.video.render_video import Summary
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -89,9 +89,9 @@ class _Video:
 
     def run(self) -> None:
         """Render the scene and print a summary."""
-        from ..overlay.comparison import compared_operators
-        from ..overlay.request import parse_request
-        from ..video import check_output, default_fps
+        from ripple_sim.encode import check_output, default_fps
+        from ripple_sim.overlay.comparison import compared_operators
+        from ripple_sim.scene.overlays import parse_request
 
         # Before anything that takes time.
         if self.overlay is not None:
@@ -107,10 +107,11 @@ class _Video:
             overlaid=bool(self.overlay) or self.compare is not None,
         )
 
-        from ..job import render_video
-        from ..solver.gl import select_device, shared_context
-        from ..solver.waves.backend import auto_backend
-        from ..viewpoint import through_camera
+        from ripple_sim.capture.viewpoint import through_camera
+        from ripple_sim.solver.gl import select_device, shared_context
+        from ripple_sim.solver.waves.backends.backend import auto_backend
+        from ripple_sim.video.render_video import render_video
+
         from .progress import frame_progress
 
         if self.device is not None:
@@ -153,7 +154,7 @@ class Render(_Video):
 
     def load(self) -> Scene:
         """Load the scene."""
-        from ..scene.scene import load_scene
+        from ripple_sim.scene.scene import load_scene
 
         return load_scene(self.scene)
 
@@ -177,7 +178,7 @@ class Drop(_Video):
 
     def load(self) -> Scene:
         """Build a scene round the mesh."""
-        from ..scene.drop import drop_scene
+        from ripple_sim.scene.drop import drop_scene
 
         return drop_scene(
             self.mesh, bodies=self.bodies, seed=self.seed, up=self.up, texture=self.texture, repair=self.repair
@@ -207,12 +208,13 @@ class Atlas:
 
     def run(self) -> None:
         """Build the atlas, save and draw it where that is asked for, and print its figures."""
-        from ..orientation import usual_up
-        from ..solver import build_atlas, load_mesh
+        from ripple_sim.scene.up_axis import usual_up
+        from ripple_sim.solver import build_atlas, load_mesh
+
         from .atlas_report import atlas_report, report_text
 
         if self.plot is not None:
-            from .atlas_plot import check_plot_path
+            from ripple_sim.figures.atlas_plot import check_plot_path
 
             check_plot_path(self.plot)  # before anything that takes time
         start = time.perf_counter()
@@ -223,7 +225,7 @@ class Atlas:
         if self.output is not None:
             atlas.save(self.output)
         if self.plot is not None:
-            from .atlas_plot import plot_atlas
+            from ripple_sim.figures.atlas_plot import plot_atlas
 
             begun = time.perf_counter()
             plot_atlas(
@@ -247,7 +249,7 @@ class Info:
 
     def run(self) -> None:
         """Print the report."""
-        from .info import as_text, collect
+        from ripple_sim.diagnostics.info import as_text, collect
 
         info = collect()
         print(json_format.dumps(dataclasses.asdict(info), indent=2) if self.json else as_text(info))
@@ -266,7 +268,7 @@ class Bench:
         """Measure and print; what is being measured is told on stderr."""
         import sys
 
-        from ..bench.report import as_text, measure
+        from ripple_sim.bench.report import as_text, measure
 
         report = measure(list(self.meshes), lambda stage: print(f"measuring {stage} ...", file=sys.stderr))
         print(json_format.dumps(report, indent=2) if self.json else as_text(report))

@@ -29,8 +29,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return command
     os.environ.setdefault("MUJOCO_GL", "disable")  # MuJoCo's own renderer would take the OpenGL context away
 
-    from ..errors import DisplayError, EncodingError
-    from ..solver.errors import GLError, RippleError
+    from ripple_sim.errors import DisplayError, EncodingError
+    from ripple_sim.solver.errors import GLError, RippleError
 
     end_in_good_order()
     try:

@@ -11,7 +11,7 @@ from tyro.conf import Positional, arg
 from .arguments import Count, Seed, Size, UpAxis
 
 if TYPE_CHECKING:
-    from ..viewer.window import Window
+    from ripple_sim.viewer.window import Window
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -48,31 +48,31 @@ class View:
 
     def run(self) -> None:
         """Show the scene until the user leaves."""
-        from ..viewer.display import check_display, display_problem
+        from ripple_sim.viewer.display import check_display, display_problem
 
         # what cannot work is told before anything that takes time
         if self.benchmark:
-            from ..viewer.desktop import benchmark
+            from ripple_sim.viewer.desktop import benchmark
 
             print(benchmark(self._window(off_screen=display_problem() is not None)))
         elif self.web:
-            from ..viewer.web import check_web, serve
+            from ripple_sim.viewer.web import check_web, serve
 
             check_web(self.port)
             serve(self._window(off_screen=True), self.port)
         else:
-            from ..viewer.desktop import run
+            from ripple_sim.viewer.desktop import run
 
             check_display()
             run(self._window(off_screen=False))
 
     def _window(self, off_screen: bool) -> Window:
-        from ..viewer.opening import open_scene
-        from ..viewer.session import Session
+        from ripple_sim.viewer.opening import open_scene
+        from ripple_sim.viewer.session import Session
 
         scene = open_scene(self.scene, bodies=self.bodies, seed=self.seed, up=self.up, repair=self.repair)
         session = Session(scene, resolution=self.resolution)
 
-        from ..viewer.window import Window
+        from ripple_sim.viewer.window import Window
 
         return Window(session, size=self.size, off_screen=off_screen, folder=self.folder)

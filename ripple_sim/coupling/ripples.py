@@ -10,15 +10,15 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.coupling.colliders.collidable import collides_as_hull, hull_warning, shell_warning
+from ripple_sim.coupling.colliders.tunnelling import SpeedCheck
+from ripple_sim.coupling.load.sources import Impulse, Sources
+from ripple_sim.coupling.model.target import find_target, shells
+from ripple_sim.coupling.two_way.push_back import PushBack
+from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Load, Material, WaveSolver
 
-from ..errors import RippleWarning, SceneError
-from .collidable import collides_as_hull, hull_warning, shell_warning
-from .pushback import PushBack
-from .sources import Impulse, Sources
-from .speeds import SpeedCheck
-from .surface import RippleSurface
-from .target import find_target, shells
+from .rippled_geom import RippleSurface
 
 __all__ = ["Impulse", "Ripples"]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..errors import SceneError
+from ripple_sim.errors import SceneError
 
 OWN = "fem"
 

@@ -8,8 +8,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..coupling.ripples import Impulse
-from ..simulation import Simulation
+from ripple_sim.coupling.ripples import Impulse
+from ripple_sim.simulation import Simulation
 
 MEMORY = 0.25  # time in which a mark fades to 1/e [s]; it holds the impulse of about this time
 _FADING, _FADED = 0.35, 0.08  # shares of its largest impulse at which a mark begins to vanish, and is gone

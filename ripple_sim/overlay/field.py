@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.atlas.padding import padded_addresses
+from ripple_sim.solver.texels.halo import padded_addresses
 
 
 def pad_field(field: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -8,11 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..simulation import Simulation
+from ripple_sim.scene.overlays import Request
+from ripple_sim.simulation import Simulation
+
 from .contacts import ContactMarks, Mark
 from .field import magnitude, pad_field
 from .history import History
-from .request import Request
 from .scale import Limit
 
 # Until more is seen the colours reach to this share of the targets' size, or to the speed that goes with it.

@@ -8,12 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.scene.overlays import FIELDS, Request
+
 from .chart import COLORS, Chart
 from .layout import Layout
 from .notes import Notes
 from .panels import arrow_key, color_bar, label
 from .patch import Patch
-from .request import FIELDS, Request
 
 
 class Painter:

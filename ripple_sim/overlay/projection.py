@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ..render.camera import Pose
+from ripple_sim.render.camera import Pose
 
 _SHOWN_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)
 _TOUCHING = 0.004  # what lies this share of the distance in front of a point does not hide it

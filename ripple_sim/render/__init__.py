@@ -1,8 +1,8 @@
 """Offscreen renderer: a MuJoCo model and its rippled targets, drawn headless into RGB frames."""
 
 from .camera import Camera, FixedCamera
-from .looks import LOOKS
 from .renderer import LIGHTING, Renderer
-from .surface import Surface
+from .surfaces.surface import Surface
+from .visuals.looks import LOOKS
 
 __all__ = ["LIGHTING", "LOOKS", "Camera", "FixedCamera", "Renderer", "Surface"]

@@ -10,27 +10,34 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
+from ripple_sim.render.gpu.object_table import ObjectTable
+from ripple_sim.render.gpu.readback import Readback
+from ripple_sim.render.gpu.resources import OwnedObjects
+from ripple_sim.render.passes.deferred import Picture
+from ripple_sim.render.passes.floor import Floor, find_floor
+from ripple_sim.render.passes.mirror import Mirror
+from ripple_sim.render.passes.screen_bounds import boxes_of
+from ripple_sim.render.passes.shadow import ShadowMaps
+from ripple_sim.render.surfaces.height_maps import ReliefTextures
+from ripple_sim.render.surfaces.surface import Surface
+from ripple_sim.render.surfaces.surface_mesh import SurfaceMesh
+from ripple_sim.render.visuals.geoms import Bodies
+from ripple_sim.render.visuals.lights import (
+    casting_lamps,
+    has_near_lamps,
+    is_lit,
+    model_lighting,
+    set_lighting,
+    studio_lighting,
+)
+from ripple_sim.render.visuals.materials import Textures
+from ripple_sim.render.visuals.unsupported import warn_of_undrawn
+from ripple_sim.render.visuals.visual import ball_of, visible_geoms
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.gl import GLContext
 
-from .bodies import Bodies
-from .bounds import boxes_of
 from .camera import Pose, Viewpoint
-from .floor import Floor, find_floor
-from .frame import FrameUniforms
-from .lights import casting_lamps, has_near_lamps, is_lit, model_lighting, set_lighting, studio_lighting
-from .materials import Textures
-from .mirror import Mirror
-from .objects import ObjectTable
-from .owned import OwnedObjects
-from .picture import Picture
-from .pieces import ball_of, visible_geoms
-from .readback import Readback
-from .reliefs import ReliefTextures
-from .shadow import ShadowMaps
-from .surface import Surface
-from .surface_mesh import SurfaceMesh
-from .undrawn import warn_of_undrawn
 
 LIGHTING = ("auto", "model", "studio")
 _SHADOW_REACH = 2.5  # what is further from the focus, in camera distances, casts no shadow

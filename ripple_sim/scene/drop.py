@@ -9,16 +9,16 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh, load_mesh
-from ripple_sim.solver.atlas.rays import downward_hits
+from ripple_sim.solver.texels.cube_map.rays import downward_hits
 
-from ..errors import SceneError
-from ..orientation import UP_AXES, usual_up
 from .events import Events
 from .mesh_picture import load_picture, mesh_picture
 from .motion import DropEntry
 from .scene import Edit, Scene
 from .scene_file import CameraEntry, MaterialEntry, RippleEntry
+from .up_axis import UP_AXES, usual_up
 
 SIZE = 1.0  # the target's longest edge of its bounding box [m]
 DURATION = 5.0

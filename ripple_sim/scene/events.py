@@ -10,8 +10,9 @@ import msgspec
 import mujoco
 import numpy as np
 
-from ..coupling.ripples import Ripples
-from ..errors import SceneError
+from ripple_sim.coupling.ripples import Ripples
+from ripple_sim.errors import SceneError
+
 from .motion import DropEntry, Motions, PlaceEntry, ThrowEntry, Vector, check_time
 
 

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import msgspec
 
+from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
-
-from ..errors import SceneError
 
 PRESETS = ("membrane", "jelly", "plate", "dent")
 

@@ -11,7 +11,7 @@ import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 
-from ..errors import RippleWarning, SceneError
+from ripple_sim.errors import RippleWarning, SceneError
 
 _SUFFIXES = (".png", ".jpg", ".jpeg")
 _SCENES = (".glb", ".gltf")

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
+from ripple_sim.errors import SceneError
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

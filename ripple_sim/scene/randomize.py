@@ -6,7 +6,7 @@ import msgspec
 import mujoco
 import numpy as np
 
-from ..errors import SceneError
+from ripple_sim.errors import SceneError
 
 _GEOM = mujoco.mjtGeom
 # half-sizes over the radius of the geom that a shape replaces

@@ -13,11 +13,12 @@ import msgspec
 import mujoco
 import numpy as np
 
-from ..coupling.target import find_target
-from ..errors import SceneError
-from ..overlay.request import parse_request
+from ripple_sim.coupling.model.target import find_target
+from ripple_sim.errors import SceneError
+
 from .events import Events, Script
 from .motion import DropEntry, ThrowEntry
+from .overlays import parse_request
 from .randomize import RandomEntry, randomize
 from .scene_file import CameraEntry, RippleEntry, parse_scene
 
@@ -171,8 +172,8 @@ def check_scene(scene: Scene) -> None:
         For an invalid material.
     """
     # the renderer is not needed for anything but the names of its looks and its cameras
-    from ..render import LIGHTING, LOOKS
-    from ..viewpoint import check_camera
+    from ripple_sim.capture.viewpoint import check_camera
+    from ripple_sim.render import LIGHTING, LOOKS
 
     if not scene.surfaces:
         raise SceneError(f"scene {scene.name!r} has no [[ripple]] surface; name at least one geom")

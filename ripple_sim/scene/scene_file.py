@@ -7,7 +7,8 @@ from typing import Any
 
 import msgspec
 
-from ..errors import SceneError
+from ripple_sim.errors import SceneError
+
 from .events import ChangeEntry, ControlEntry, MaterialChange, PokeEntry
 from .material_entry import MapEntry, MaterialEntry, PresetEntry
 from .motion import DropEntry, PlaceEntry, ThrowEntry, Vector

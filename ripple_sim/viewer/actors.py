@@ -9,8 +9,9 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from ..render.bodies import shape_of, sizes
-from ..render.pieces import geom_piece, visible_geoms
+from ripple_sim.render.visuals.geoms import shape_of, sizes
+from ripple_sim.render.visuals.visual import geom_piece, visible_geoms
+
 from .session import Session
 from .skin import Skin
 

@@ -6,7 +6,7 @@ import ctypes
 import os
 import sys
 
-from ..errors import DisplayError
+from ripple_sim.errors import DisplayError
 
 
 def check_display() -> None:

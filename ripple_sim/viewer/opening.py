@@ -9,12 +9,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from ripple_sim.coupling.model.target import find_target
+from ripple_sim.errors import SceneError
+from ripple_sim.scene.drop import drop_scene
+from ripple_sim.scene.scene import Scene, load_scene, shipped_scenes
 from ripple_sim.solver import Material
 
-from ..coupling.target import find_target
-from ..errors import SceneError
-from ..scene.drop import drop_scene
-from ..scene.scene import Scene, load_scene, shipped_scenes
 from .balls import add_balls
 
 BALLS = 6

@@ -11,10 +11,10 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.scene.scene import Scene
+from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError
 
-from ..scene.scene import Scene
-from ..simulation import Simulation
 from .balls import Balls
 from .opening import FLIGHT, poke_strength, surface_size
 from .skin import Skin

@@ -6,11 +6,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.surfaces.tessellation import subdivide
+from ripple_sim.render.visuals.primitives import corner_normals
 from ripple_sim.solver import Atlas, Relief
-from ripple_sim.solver.atlas.cubemap import face_coordinates
-
-from ..render.meshes import corner_normals
-from ..render.subdivision import subdivide
+from ripple_sim.solver.texels.cube_map.convention import face_coordinates
 
 # Triangles that software OpenGL draws 30 times a second beside the simulation, on two cores.
 MAX_TRIANGLES = 24_000

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ..errors import VideoError
-from ..video import FrameWriter, open_writer
+from ripple_sim.encode import FrameWriter, open_writer
+from ripple_sim.errors import VideoError
 
 
 class Takes:

@@ -9,7 +9,8 @@ import socket
 import time
 from typing import Any
 
-from ..errors import DisplayError
+from ripple_sim.errors import DisplayError
+
 from .controls import CONTROLS
 from .window import Window
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLogger, vtkUnsignedCharArray
 
+from ripple_sim.capture.viewpoint import viewpoint
+from ripple_sim.render.visuals.looks import find_look
 from ripple_sim.solver import RippleError
 
-from ..render.looks import find_look
-from ..viewpoint import viewpoint
 from .actors import BACKGROUND, HEIGHT, BodyActors, SkinActor
 from .camera import level, ray
 from .controls import CONTROLS, help_text

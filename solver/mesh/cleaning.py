@@ -9,7 +9,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..errors import MeshError
+from ripple_sim.solver.errors import MeshError
+
 from .topology import distinct, edges_of
 
 # Relative to the size of the mesh: above the round-off of a file in float32, far below any gap that is meant.

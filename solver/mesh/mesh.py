@@ -8,7 +8,8 @@ import functools
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import MeshError
+from ripple_sim.solver.errors import MeshError
+
 from .cleaning import merge_vertices, orient_outward, signed_volume
 from .topology import check_topology, distinct
 

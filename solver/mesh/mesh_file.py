@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from ..errors import MeshError
+from ripple_sim.solver.errors import MeshError
+
 from .mesh import Mesh
 from .ply_format import read_ply
 from .polygons import Soup

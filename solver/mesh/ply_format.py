@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import MeshError
+from ripple_sim.solver.errors import MeshError
+
 from .polygons import Soup, triangulate
 
 _TYPES = {

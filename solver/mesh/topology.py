@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ..errors import MeshError
+from ripple_sim.solver.errors import MeshError
 
 
 def check_topology(V: NDArray[np.float64], F: NDArray[np.int64], name: str) -> None:

@@ -16,7 +16,8 @@ import scipy.sparse as sparse
 from numpy.typing import NDArray
 from scipy.sparse.linalg import MatrixRankWarning, spsolve
 
-from ..errors import SphereMapError
+from ripple_sim.solver.errors import SphereMapError
+
 from .certificate import certify
 
 Complex = NDArray[np.complex128]

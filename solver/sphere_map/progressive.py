@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SphereMapError
+from ripple_sim.solver.errors import SphereMapError
+
 from .certificate import certify
 from .corner_table import CornerTable, corner_table, following, preceding
 from .decimation import decimate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atlas.atlas import Atlas
+from ripple_sim.solver.texels.atlas import Atlas
 
 
 def where_not_finite(atlas: Atlas, field: NDArray) -> str | None:

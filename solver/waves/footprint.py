@@ -10,10 +10,10 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..atlas.atlas import Atlas, check_points
-from ..atlas.cubemap import padded_indices
-from ..errors import SolverError
-from .distance import everywhere_infinite, march_from_point
+from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.texels.atlas import Atlas, check_points
+from ripple_sim.solver.texels.cube_map.convention import padded_indices
+from ripple_sim.solver.texels.distance import everywhere_infinite, march_from_point
 
 # Fewer texels across than this and the source would excite waves that the grid cannot carry.
 MIN_TEXELS = 2.0

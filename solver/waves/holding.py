@@ -7,9 +7,10 @@ import dataclasses
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..atlas.areas import smoothed
-from ..atlas.atlas import Atlas
-from ..errors import SolverError
+from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.texels.atlas import Atlas
+from ripple_sim.solver.texels.cube_map.areas import smoothed
+
 from .material import Material
 
 # Stiffness of the rim, in units of what a texel's neighbours have: a wave falls to 1/e within a texel.

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SolverError
+from ripple_sim.solver.errors import SolverError
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SolverError
+from ripple_sim.solver.errors import SolverError
 
 # name: unit, least value, whether the least value itself is excluded, whether infinity is allowed
 _LIMITS = {

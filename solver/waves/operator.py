@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ..atlas.atlas import Atlas
-from ..atlas.stencil import EAST, NORTH, agree_across_edges, link_lengths, pad, stiffness_stencil
-from ..errors import SolverError
+from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.texels.atlas import Atlas
+from ripple_sim.solver.texels.stencil import EAST, NORTH, agree_across_edges, link_lengths, pad, stiffness_stencil
+
 from .material import Material
 
 OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")

@@ -7,9 +7,10 @@ import numbers
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..atlas.atlas import Atlas
-from ..errors import SolverError
-from .backend import make_backend
+from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.texels.atlas import Atlas
+from ripple_sim.solver.waves.backends.backend import make_backend
+
 from .finite import where_not_finite
 from .footprint import Footprint, footprint
 from .load import Load

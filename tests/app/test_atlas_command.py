@@ -11,9 +11,9 @@ import trimesh
 from PIL import Image
 
 from ripple_sim.cli import main as cli
-from ripple_sim.cli.atlas_plot import plot_atlas
-from ripple_sim.cli.atlas_views import AtlasPainter, View, texel_stretch
-from ripple_sim.orientation import usual_up
+from ripple_sim.figures.atlas_plot import plot_atlas
+from ripple_sim.figures.atlas_views import AtlasPainter, View, texel_stretch
+from ripple_sim.scene.up_axis import usual_up
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, AtlasError, Mesh, build_atlas, sphere_atlas
 

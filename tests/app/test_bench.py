@@ -11,7 +11,7 @@ from ripple_sim.bench.report import as_text
 from ripple_sim.bench.rivals import PlainShader, SparseLeapfrog
 from ripple_sim.bench.table import POLYGONS, knobbly_body
 from ripple_sim.solver import GLError, Material, sphere_atlas
-from ripple_sim.solver.waves.backend import make_backend
+from ripple_sim.solver.waves.backends.backend import make_backend
 from ripple_sim.solver.waves.operator import build_operator
 
 

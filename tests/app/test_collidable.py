@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling import collidable
-from ripple_sim.coupling.collidable import hull_gap
+from ripple_sim.coupling.colliders import collidable
+from ripple_sim.coupling.colliders.collidable import hull_gap
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.scenes.shapes import limbed, peanut
 from ripple_sim.solver import Mesh, build_atlas

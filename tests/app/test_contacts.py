@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.contacts import Contacts, pressing_contacts, smallest_extents
+from ripple_sim.coupling.contacts.geom_contacts import Contacts, pressing_contacts, smallest_extents
 
 SHAPES = ('type="box" size="0.2 0.2 0.1"', 'type="sphere" size="0.15"', 'type="capsule" size="0.08 0.1"')
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, RippleError, Ripples
-from ripple_sim.coupling.contacts import pressing_contacts, smallest_extents
-from ripple_sim.coupling.patch import cluster
+from ripple_sim.coupling.contacts.geom_contacts import pressing_contacts, smallest_extents
+from ripple_sim.coupling.patches.clusters import cluster
 from ripple_sim.scenes.shapes import limbed
 
 GRAVITY = 9.81

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ripple_sim.capture.exposure import Exposures, disc_points
+from ripple_sim.capture.sensor import Sensor
+from ripple_sim.capture.shutter import Moments
+from ripple_sim.capture.snapshot import FrameSource, run
+from ripple_sim.capture.viewpoint import with_exposure
 from ripple_sim.errors import SceneError, VideoError
-from ripple_sim.exposure import Exposures, disc_points
-from ripple_sim.frames import FrameSource, run
-from ripple_sim.job import render_video
-from ripple_sim.moments import Moments
 from ripple_sim.scene.scene import Scene, load_scene
 from ripple_sim.scene.scene_file import CameraEntry
-from ripple_sim.sensor import Sensor
 from ripple_sim.simulation import Simulation
-from ripple_sim.viewpoint import with_exposure
+from ripple_sim.video.render_video import render_video
 
 FPS, WIDTH, HEIGHT, DISTANCE, FOVY, SPEED = 30, 240, 120, 2.0, 40.0, 18.0
 FOCAL_PIXELS = HEIGHT / 2 / np.tan(np.radians(FOVY) / 2)

@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 
 from ripple_sim.cli import main as cli
+from ripple_sim.encode import check_output, open_writer
 from ripple_sim.errors import VideoError
-from ripple_sim.job import render_video
 from ripple_sim.overlay.colormap import color_table
-from ripple_sim.render import Camera, Renderer, Surface, meshes
+from ripple_sim.render import Camera, Renderer, Surface
+from ripple_sim.render.visuals import primitives as meshes
 from ripple_sim.scene.scene import Scene, load_scene
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.video import check_output, open_writer
+from ripple_sim.video.render_video import render_video
 
 WIDTH, HEIGHT = 64, 48
 FRONT = Camera((0.0, 0.0, 0.0), 5.0, 70.0, -20.0, 40.0)

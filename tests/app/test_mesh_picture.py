@@ -8,8 +8,8 @@ import pytest
 import trimesh
 from PIL import Image
 
+from ripple_sim.capture.snapshot import FrameSource, run
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.frames import FrameSource, run
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.mesh_picture import mesh_picture
 from ripple_sim.scenes.shapes import peanut, write_obj

@@ -9,25 +9,26 @@ import mujoco
 import numpy as np
 import pytest
 
+from ripple_sim.capture.snapshot import FrameSource, run
 from ripple_sim.errors import SceneError
-from ripple_sim.frames import FrameSource, run
-from ripple_sim.job import render_video
 from ripple_sim.overlay.colormap import color_table, colors
 from ripple_sim.overlay.comparison import compared_operators
 from ripple_sim.overlay.contacts import MEMORY, ContactMarks, Mark
 from ripple_sim.overlay.field import pad_field
-from ripple_sim.overlay.film import Film
 from ripple_sim.overlay.layout import Layout
 from ripple_sim.overlay.marks import draw_marks, place_marks
 from ripple_sim.overlay.notes import Notebook
 from ripple_sim.overlay.projection import Projection
-from ripple_sim.overlay.request import NAMES, parse_request
-from ripple_sim.render import Camera, Renderer, Surface, meshes
+from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.camera import perspective, view_matrix
+from ripple_sim.render.visuals import primitives as meshes
+from ripple_sim.scene.overlays import NAMES, parse_request
 from ripple_sim.scene.scene import Scene, load_scene
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.atlas.cubemap import texel_directions
 from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.texels.cube_map.convention import texel_directions
+from ripple_sim.video.film import Film
+from ripple_sim.video.render_video import render_video
 
 MJCF = """<mujoco><option timestep="0.002"/><default><geom solref="0.01 0.3"/></default><worldbody>
 <geom name="floor" type="plane" size="2 2 1" pos="0 0 -0.3"/>

@@ -16,8 +16,8 @@ from ripple_sim.overlay.notes import Notes, Scale
 from ripple_sim.overlay.painter import Painter
 from ripple_sim.overlay.panels import arrow_key, color_bar, label
 from ripple_sim.overlay.patch import Patch, text_width
-from ripple_sim.overlay.request import NAMES, parse_request
 from ripple_sim.overlay.scale import number
+from ripple_sim.scene.overlays import NAMES, parse_request
 
 SIZES = [(320, 180), (640, 360), (720, 1280), (1280, 720), (3840, 2160)]
 

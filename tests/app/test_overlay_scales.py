@@ -11,8 +11,8 @@ from ripple_sim.overlay.colormap import SIZE, color_table, colors, lab_to_srgb
 from ripple_sim.overlay.comparison import compared_operators
 from ripple_sim.overlay.field import grid_spacing, magnitude, pad_field
 from ripple_sim.overlay.history import MOST_POINTS, History
-from ripple_sim.overlay.request import NAMES, Request, parse_request
 from ripple_sim.overlay.scale import Limit, number, readable, round_up
+from ripple_sim.scene.overlays import NAMES, Request, parse_request
 from ripple_sim.solver import Relief, sphere_atlas
 
 # Machado, Oliveira and Fernandes 2009, complete deuteranopia and protanopia, on linear RGB

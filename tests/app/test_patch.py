@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.patch import MAX_CONTACTS, cluster, probe, spread
+from ripple_sim.coupling.patches.clusters import MAX_CONTACTS, cluster, probe, spread
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas
 

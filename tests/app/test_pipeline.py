@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from ripple_sim.pipeline import Ahead
+from ripple_sim.video.prefetch import Ahead
 
 
 def test_items_come_in_order_from_another_thread():

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, Ripples
-from ripple_sim.coupling.contacts import Contacts
-from ripple_sim.coupling.footing import NO_FOOTPRINTS, Footprints, lay, used_before
-from ripple_sim.coupling.patch import probe, spread
-from ripple_sim.coupling.patches import Spots, find_patches, find_spots
-from ripple_sim.coupling.rest import BODY, NOTHING_FELT, Pressure, follow
+from ripple_sim.coupling.contacts.geom_contacts import Contacts
+from ripple_sim.coupling.load.footprint_cache import NO_FOOTPRINTS, Footprints, lay, used_before
+from ripple_sim.coupling.load.low_pass import BODY, NOTHING_FELT, Pressure, follow
+from ripple_sim.coupling.patches.clusters import probe, spread
+from ripple_sim.coupling.patches.contact_patches import Spots, find_patches, find_spots
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas
-from ripple_sim.solver.waves.distance import everywhere_infinite
+from ripple_sim.solver.texels.distance import everywhere_infinite
 from ripple_sim.solver.waves.footprint import footprint, texel_grid
 from ripple_sim.solver.waves.load import nowhere
 

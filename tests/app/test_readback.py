@@ -7,13 +7,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.job import render_video
 from ripple_sim.render import Camera, Renderer
-from ripple_sim.render.owned import OwnedObjects
-from ripple_sim.render.readback import Readback
+from ripple_sim.render.gpu.readback import Readback
+from ripple_sim.render.gpu.resources import OwnedObjects
 from ripple_sim.scene.scene import load_scene
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.video.render_video import render_video
 
 pytestmark = pytest.mark.usefixtures("opengl")
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from test_render import N, constant_relief, relief_of
 
-from ripple_sim.render import meshes
-from ripple_sim.render.refinement import Refinement
-from ripple_sim.render.subdivision import edges_of, midpoints
+from ripple_sim.render.surfaces.refinement import Refinement
+from ripple_sim.render.surfaces.tessellation import edges_of, midpoints
+from ripple_sim.render.visuals import primitives as meshes
 
 POSITION, NORMAL, SPHERE = slice(0, 3), slice(3, 6), slice(6, 9)
 

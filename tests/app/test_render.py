@@ -4,13 +4,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.render import LOOKS, Camera, Renderer, Surface, meshes
+from ripple_sim.render import LOOKS, Camera, Renderer, Surface
 from ripple_sim.render.camera import perspective, view_matrix
-from ripple_sim.render.subdivision import subdivide
+from ripple_sim.render.surfaces.tessellation import subdivide
+from ripple_sim.render.visuals import primitives as meshes
 from ripple_sim.solver import RippleError
-from ripple_sim.solver.atlas.cubemap import padded_indices, texel_directions
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.solver.texels.cube_map.convention import padded_indices, texel_directions
 
 N = 24
 SIZE = (240, 180)

@@ -4,7 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.render import Camera, Renderer, Surface, meshes, picture
+from ripple_sim.render import Camera, Renderer, Surface
+from ripple_sim.render.passes import deferred as picture
+from ripple_sim.render.visuals import primitives as meshes
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
 

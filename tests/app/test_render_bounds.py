@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.render.bounds import Tiles, balls_about, boxes_of
 from ripple_sim.render.camera import Pose, perspective, view_matrix
+from ripple_sim.render.passes.screen_bounds import Tiles, balls_about, boxes_of
 
 SIZE = (200, 120)
 

@@ -8,7 +8,8 @@ import pytest
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
-from ripple_sim.render import Camera, Renderer, Surface, meshes
+from ripple_sim.render import Camera, Renderer, Surface
+from ripple_sim.render.visuals import primitives as meshes
 from ripple_sim.solver import Relief, sphere_atlas
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import shared_context

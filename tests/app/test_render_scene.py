@@ -8,8 +8,9 @@ import pytest
 from scipy.ndimage import binary_erosion
 
 from ripple_sim.errors import RippleWarning
-from ripple_sim.render import Camera, Renderer, Surface, meshes
-from ripple_sim.render.lights import model_lighting
+from ripple_sim.render import Camera, Renderer, Surface
+from ripple_sim.render.visuals import primitives as meshes
+from ripple_sim.render.visuals.lights import model_lighting
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context

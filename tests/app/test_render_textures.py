@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from ripple_sim.render import Camera, Renderer, Surface, meshes
-from ripple_sim.render.mapping import FLAT_IMAGE, mapping_of
-from ripple_sim.render.materials import look_of
-from ripple_sim.render.pieces import geom_piece
+from ripple_sim.render import Camera, Renderer, Surface
+from ripple_sim.render.visuals import primitives as meshes
+from ripple_sim.render.visuals.materials import look_of
+from ripple_sim.render.visuals.texture_mapping import FLAT_IMAGE, mapping_of
+from ripple_sim.render.visuals.visual import geom_piece
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling.rest import BODY, NO_PRESSURE, NOTHING_FELT, ONSET, Pressure, follow
+from ripple_sim.coupling.load.low_pass import BODY, NO_PRESSURE, NOTHING_FELT, ONSET, Pressure, follow
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Load, WaveSolver, sphere_atlas
 from ripple_sim.solver.waves.footprint import footprint

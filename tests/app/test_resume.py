@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ripple_sim.encode import FrameWriter, open_writer
+from ripple_sim.encode.formats import FRAMES_IN_CLIP
 from ripple_sim.errors import EncodingError, SimulationError, VideoError
-from ripple_sim.job import render_video
 from ripple_sim.scene.scene import Scene, load_scene
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.video import FrameWriter, open_writer
-from ripple_sim.video.formats import FRAMES_IN_CLIP
+from ripple_sim.video.render_video import render_video
 
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
 FRAMES, SIZE, FPS = 2 * FRAMES_IN_CLIP + 10, (64, 48), 25

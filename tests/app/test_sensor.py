@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.sensor import Sensor
+from ripple_sim.capture.sensor import Sensor
 
 
 def shrink(picture: np.ndarray, factor: int) -> np.ndarray:

@@ -9,10 +9,10 @@ import pytest
 import trimesh
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling.shell import GAP_TOLERANCE, inset
-from ripple_sim.coupling.target import shell_thickness, shells
+from ripple_sim.coupling.colliders.flex_shell import GAP_TOLERANCE, inset
+from ripple_sim.coupling.model.target import shell_thickness, shells
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.render.undrawn import warn_of_undrawn
+from ripple_sim.render.visuals.unsupported import warn_of_undrawn
 from ripple_sim.scenes.shapes import limbed, peanut
 from ripple_sim.solver import Mesh
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ripple_sim.capture.snapshot import FrameSource, run
 from ripple_sim.errors import SceneError, SimulationError, VideoError
-from ripple_sim.frames import FrameSource, run
-from ripple_sim.job import render_video
 from ripple_sim.scene.scene import Scene, load_scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import shared_context
+from ripple_sim.video.render_video import render_video
 
 MJCF = """<mujoco><option timestep="0.002"/><default><geom solref="0.01 0.3"/></default><worldbody>
 <geom name="floor" type="plane" size="2 2 1" pos="0 0 -0.3"/>

@@ -8,8 +8,8 @@ import pytest
 import trimesh
 
 from ripple_sim import make_collidable
-from ripple_sim.coupling import speeds
-from ripple_sim.coupling.speeds import SpeedCheck
+from ripple_sim.coupling.colliders import tunnelling as speeds
+from ripple_sim.coupling.colliders.tunnelling import SpeedCheck
 from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import peanut
 

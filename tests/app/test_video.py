@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from ripple_sim.encode import FrameWriter, check_output, default_fps, open_writer
+from ripple_sim.encode.clip import Stream
+from ripple_sim.encode.formats import FORMATS, FRAMES_IN_CLIP, Format
 from ripple_sim.errors import EncodingError, VideoError
 from ripple_sim.solver.errors import RippleError
-from ripple_sim.video import FrameWriter, check_output, default_fps, open_writer
-from ripple_sim.video.clip import Stream
-from ripple_sim.video.formats import FORMATS, FRAMES_IN_CLIP, Format
 
 WIDTH, HEIGHT, FPS = 96, 64, 25
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]

@@ -11,7 +11,7 @@ import pytest
 
 from ripple_sim.solver import GLError, Material, WaveSolver, sphere_atlas
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.waves.backend import make_backend
+from ripple_sim.solver.waves.backends.backend import make_backend
 from ripple_sim.solver.waves.operator import build_operator
 
 
@@ -41,9 +41,9 @@ def test_two_hundred_solvers_leave_nothing_on_the_gpu(gl_backend: str) -> None:
 
 def test_a_shared_shader_is_compiled_once(gl_backend: str) -> None:
     gl = shared_context()
-    shaders = [gl.shared_compute_shader("ripple_sim.solver", name) for name in ("ring", "ring", "kick")]
+    shaders = [gl.shared_compute_shader("ripple_sim.solver.waves.backends", name) for name in ("ring", "ring", "kick")]
     assert shaders[0] is shaders[1] and shaders[0] is not shaders[2]
-    assert gl.compute_shader("ripple_sim.solver", "ring") is not shaders[0]
+    assert gl.compute_shader("ripple_sim.solver.waves.backends", "ring") is not shaders[0]
 
 
 def test_solvers_that_share_shaders_keep_their_own_coefficients(gl_backend: str) -> None:

@@ -5,9 +5,9 @@ import pytest
 import trimesh
 
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
-from ripple_sim.solver.atlas.areas import solid_angles
-from ripple_sim.solver.atlas.cubemap import cube_rotations, permute_texels
-from ripple_sim.solver.atlas.stencil import lumped_areas
+from ripple_sim.solver.texels.cube_map.areas import solid_angles
+from ripple_sim.solver.texels.cube_map.convention import cube_rotations, permute_texels
+from ripple_sim.solver.texels.stencil import lumped_areas
 
 
 @pytest.fixture(scope="module")

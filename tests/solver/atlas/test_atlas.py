@@ -9,10 +9,10 @@ import pytest
 import trimesh
 
 from ripple_sim.solver import Atlas, AtlasError, Mesh, SphereAtlas, build_atlas, load_atlas, sphere_atlas
-from ripple_sim.solver.atlas.atlas_file import FORMAT
-from ripple_sim.solver.atlas.cubemap import texel_directions
-from ripple_sim.solver.atlas.exhaustive_rays import cast_rays_exhaustively
-from ripple_sim.solver.atlas.rays import cast_rays
+from ripple_sim.solver.texels.atlas_file import FORMAT
+from ripple_sim.solver.texels.cube_map.convention import texel_directions
+from ripple_sim.solver.texels.cube_map.exhaustive_rays import cast_rays_exhaustively
+from ripple_sim.solver.texels.cube_map.rays import cast_rays
 
 
 def surface_points(atlas: Atlas, triangles: np.ndarray, barycentrics: np.ndarray) -> np.ndarray:
@@ -132,7 +132,7 @@ def test_damaged_files_are_refused(tmp_path: Path) -> None:
 
 def test_files_of_another_version_are_refused(animal: Atlas, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     animal.save(tmp_path / "atlas.npz")
-    monkeypatch.setattr("ripple_sim.solver.atlas.atlas_file.FORMAT", FORMAT + 1)
+    monkeypatch.setattr("ripple_sim.solver.texels.atlas_file.FORMAT", FORMAT + 1)
     with pytest.raises(AtlasError, match="another version"):
         load_atlas(tmp_path / "atlas.npz")
     with pytest.raises(AtlasError, match="does not exist"):

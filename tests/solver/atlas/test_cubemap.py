@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import AtlasError
-from ripple_sim.solver.atlas.cubemap import (
+from ripple_sim.solver.texels.cube_map.convention import (
     check_resolution,
     cube_rotations,
     face_coordinates,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import Atlas
-from ripple_sim.solver.atlas.cubemap import cube_rotations, face_coordinates, texel_directions
-from ripple_sim.solver.atlas.nearest import sphere_directions, texels_at
+from ripple_sim.solver.texels.cube_map.convention import cube_rotations, face_coordinates, texel_directions
+from ripple_sim.solver.texels.cube_map.nearest import sphere_directions, texels_at
 
 
 @pytest.mark.parametrize("n", [4, 7, 32])

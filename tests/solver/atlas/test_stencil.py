@@ -5,8 +5,8 @@ import pytest
 from scipy.sparse import coo_array
 
 from ripple_sim.solver import sphere_atlas
-from ripple_sim.solver.atlas.cubemap import padded_indices, texel_directions
-from ripple_sim.solver.atlas.stencil import _quad, link_lengths, lumped_areas, pad, stiffness_stencil
+from ripple_sim.solver.texels.cube_map.convention import padded_indices, texel_directions
+from ripple_sim.solver.texels.stencil import _quad, link_lengths, lumped_areas, pad, stiffness_stencil
 from ripple_sim.solver.waves.operator import stencil_sum
 
 

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from ripple_sim.solver import Atlas, Mesh, build_atlas
-from ripple_sim.solver.atlas.build import atlas_from_sphere_map
-from ripple_sim.solver.atlas.cubemap import FACE_NORMALS, FACE_U, FACE_V, padded_indices, texel_directions
+from ripple_sim.solver.texels.build import atlas_from_sphere_map
+from ripple_sim.solver.texels.cube_map.convention import FACE_NORMALS, FACE_U, FACE_V, padded_indices, texel_directions
 
 
 def ball(subdivisions: int, resolution: int) -> Atlas:

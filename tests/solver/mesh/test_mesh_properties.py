@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, MeshError, build_atlas, sphere_atlas
-from ripple_sim.solver.atlas.build import atlas_from_sphere_map
-from ripple_sim.solver.atlas.cubemap import FACE_NORMALS, FACE_U, FACE_V
 from ripple_sim.solver.mesh.repair import repaired
+from ripple_sim.solver.texels.build import atlas_from_sphere_map
+from ripple_sim.solver.texels.cube_map.convention import FACE_NORMALS, FACE_U, FACE_V
 
 BALL = trimesh.creation.icosphere(subdivisions=1)
 quick = settings(derandomize=True, max_examples=60, deadline=None, database=None)

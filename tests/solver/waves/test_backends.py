@@ -7,8 +7,8 @@ import pytest
 
 from ripple_sim.solver import Atlas, Material, WaveSolver, sphere_atlas
 from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.waves.backend import make_backend
-from ripple_sim.solver.waves.backend_cpu import CPUBackend
+from ripple_sim.solver.waves.backends.backend import make_backend
+from ripple_sim.solver.waves.backends.cpu import CPUBackend
 from ripple_sim.solver.waves.operator import build_operator
 
 STEPS = 1000

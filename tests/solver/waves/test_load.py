@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import Atlas, Load, Material, SolverError, WaveSolver, sphere_atlas
-from ripple_sim.solver.waves.distance import distance_from_point
+from ripple_sim.solver.texels.distance import distance_from_point
 from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
 

@@ -1,0 +1,1 @@
+"""From a running simulation to frames: snapshots, shutter, exposure, camera."""

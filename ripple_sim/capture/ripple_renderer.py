@@ -1,0 +1,103 @@
+"""Pictures of anybody's MuJoCo model with its ripples, one at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.coupling.ripples import Ripples
+from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
+from ripple_sim.render.visuals.texture_mapping import NO_IMAGE, mapping_of
+from ripple_sim.render.visuals.visual import geom_piece
+from ripple_sim.scene.scene_file import CameraEntry
+from ripple_sim.solver import Relief, WaveSolver
+from ripple_sim.solver.gl import GLContext, shared_context
+
+from .viewpoint import viewpoint
+
+
+class Pictures:
+    """Draws a model and its rippling surfaces, headless, as `mujoco.Renderer` draws a model.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    ripples : Ripples
+        The surfaces that are drawn as they ripple.
+    width, height : int
+        [pixels].
+    looks : mapping
+        Geom name to the look of its surface: rubber, jelly, clay and so on; rubber where nothing is said. Its colour is
+        that of the geom, where the model gives it a texture or a colour.
+    gl : GLContext, optional
+        By default the process's shared one.
+
+    Raises
+    ------
+    RippleError
+        For an unknown look, or if the driver cannot make pictures of this size.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        ripples: Ripples,
+        *,
+        width: int = 1280,
+        height: int = 720,
+        looks: Mapping[str, str] | None = None,
+        gl: GLContext | None = None,
+    ) -> None:
+        self._model, self._ripples = model, ripples
+        self._reliefs = {name: Relief(ripples[name].atlas) for name in ripples}
+        looks = looks or {}
+        surfaces = {
+            geom: surface_of(ripples[name], looks.get(name, "rubber"), _color(model, geom))
+            for name, geom in ripples.geom_ids.items()
+        }
+        self._renderer = Renderer(gl or shared_context(), model, surfaces, width=width, height=height)
+
+    def draw(self, data: mujoco.MjData, camera: Camera | FixedCamera | str | None = None) -> NDArray[np.uint8]:
+        """Draw the present state, uint8 [height, width, 3].
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+            After `mj_step` or `mj_forward`.
+        camera : Camera, FixedCamera or str, optional
+            A camera, or the name of one of the MJCF; by default MuJoCo's free camera, aimed at the model's middle.
+        """
+        if camera is None or isinstance(camera, str):
+            free = self._model.vis.global_
+            entry = CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)
+            camera = viewpoint(self._model, data, entry, data.time)
+        reliefs = {
+            self._ripples.geom_ids[name]: relief(self._ripples[name].height) for name, relief in self._reliefs.items()
+        }
+        return self._renderer.render(data, reliefs, camera)
+
+
+def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] | None = None) -> Surface:
+    """What the renderer needs to know of a rippling surface."""
+    atlas = waves.atlas
+    mesh = atlas.mesh
+    return Surface(
+        V=mesh.V,
+        F=mesh.F,
+        sphere=atlas.sphere,
+        resolution=atlas.resolution,
+        look=look,
+        color=color,
+        uv=mesh.uv if mesh.corner_uv is None else mesh.corner_uv,
+    )
+
+
+def _color(model: mujoco.MjModel, geom: int) -> tuple[float, float, float] | None:
+    """Colour of a geom, unless it is MuJoCo's grey or a texture."""
+    piece = geom_piece(model, geom)
+    red, green, blue = (float(x) for x in piece.rgba[:3])
+    plain = mapping_of(model, piece).kind == NO_IMAGE
+    return (red, green, blue) if plain and not red == green == blue == 0.5 else None

@@ -1,0 +1,1 @@
+"""How geoms collide with a target's true surface, and what can go wrong."""

@@ -1,0 +1,1 @@
+"""MuJoCo's contacts with targets: normal forces, and where they act."""

@@ -1,0 +1,1 @@
+"""From contact patches to forces on texels."""

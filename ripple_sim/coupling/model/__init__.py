@@ -1,0 +1,1 @@
+"""What a MuJoCo model says about its targets, computed once."""

@@ -1,0 +1,1 @@
+"""Contact patches: the areas on a target that geoms press."""

@@ -1,0 +1,1 @@
+"""How moving surfaces push back on bodies."""

@@ -1,0 +1,108 @@
+"""What this machine offers: versions, OpenGL driver, wave solver; and what to install if rendering cannot work."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.metadata
+import os
+import platform
+
+from ripple_sim.solver.errors import GLError
+from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.waves.backends.backend import auto_backend
+
+from .headless import find_problems
+
+PACKAGES = (
+    "ripple-sim",
+    "mujoco",
+    "numpy",
+    "scipy",
+    "numba",
+    "libigl",
+    "trimesh",
+    "embreex",
+    "moderngl",
+    "av",
+    "pyvista",
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class OpenGL:
+    """The driver that renders, as it names itself."""
+
+    renderer: str
+    vendor: str
+    version: str
+    software: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Info:
+    """What `ripple-sim info` reports.
+
+    Attributes
+    ----------
+    versions : dict
+        Version of ripple-sim, Python and each package that counts; None for one that is not installed.
+    system : str
+        Operating system and architecture.
+    processors : int
+    opengl : OpenGL or None
+        None if there is no usable context; `advice` then says what to install.
+    backend : str
+        The wave solver that "auto" takes: "gl" or "cpu".
+    advice : str
+        What keeps rendering from working, or from working faster, and what to do, a line each; "" if there is nothing.
+    """
+
+    versions: dict[str, str | None]
+    system: str
+    processors: int
+    opengl: OpenGL | None
+    backend: str
+    advice: str
+
+
+def collect() -> Info:
+    """Look at this machine. It never fails for want of OpenGL."""
+    opengl, failure = None, ""
+    try:
+        context = shared_context()
+    except GLError as error:
+        failure = str(error)
+    else:
+        opengl = OpenGL(context.renderer, context.vendor, context.version, context.software)
+    findings = find_problems(opengl.software if opengl else None)
+    return Info(
+        versions={"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
+        system=platform.platform(),
+        processors=os.cpu_count() or 1,
+        opengl=opengl,
+        backend=auto_backend(),
+        advice="\n".join(map(str, findings)) or failure,
+    )
+
+
+def as_text(info: Info) -> str:
+    """Lay the report out for reading."""
+    gl = info.opengl
+    where = "on the CPU" if info.backend == "cpu" else "on the GPU, in OpenGL compute shaders"
+    rows = {
+        **{name: version or "not installed" for name, version in info.versions.items()},
+        "system": f"{info.system}, {info.processors} processors",
+        "OpenGL": f"{gl.version}, {gl.vendor}" if gl else "none",
+        "renderer": f"{gl.renderer} ({'software' if gl.software else 'hardware'})" if gl else "none: no video here",
+        "waves": f"{info.backend} (auto: {where})",
+    }
+    width = max(map(len, rows))
+    lines = [f"{name:<{width}}  {value}" for name, value in rows.items()]
+    return "\n".join([*lines, *(["", info.advice] if info.advice else [])])
+
+
+def _version(name: str) -> str | None:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None

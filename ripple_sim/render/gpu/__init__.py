@@ -1,0 +1,1 @@
+"""Resources on the GPU: buffers, uniform blocks, textures, read-back."""

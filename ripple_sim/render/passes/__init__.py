@@ -1,0 +1,1 @@
+"""The passes of a frame: shadow maps, floor, G-buffer, deferred shading."""

@@ -1,0 +1,127 @@
+"""The shadow maps of the lamps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render.camera import orthographic, perspective
+from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
+from ripple_sim.render.gpu.resources import OwnedObjects
+from ripple_sim.render.visuals.lights import Light
+
+_SIZE = 1536
+_WIDEST = 0.022  # penumbra, as a share of the map
+_STEEPEST_FOV = 130.0  # [degrees]
+_REACH = 30.0  # how far behind the casters shadows fall, in their radius
+
+
+class ShadowMaps:
+    """Square depth maps, side by side, of the scene as the lamps see it.
+
+    Parameters
+    ----------
+    ctx : OwnedObjects
+    count : int
+        How many lamps may cast shadows, 1 to MAX_SHADOWS.
+    """
+
+    def __init__(self, ctx: OwnedObjects, count: int) -> None:
+        self._count = count
+        self._views: list[tuple[float, ...]] = []
+        self._depth = ctx.depth_texture((count * _SIZE, _SIZE))
+        self._depth.compare_func = ""
+        self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._target = ctx.framebuffer(depth_attachment=self._depth)
+        self._test = ctx.sampler(
+            texture=self._depth,
+            compare_func="<=",
+            filter=(moderngl.LINEAR, moderngl.LINEAR),
+            repeat_x=False,
+            repeat_y=False,
+        )
+
+    def fit(self, frame: FrameUniforms, lights: list[Light], centre: NDArray, radius: float) -> list[Light]:
+        """Aim the maps at a ball [m] that holds all casters, and fill the frame's shadows; return their lights.
+
+        Lights that cast shadows come first.
+        """
+        casting = [light for light in lights if light.shadow][: self._count]
+        self._views = []
+        for shadow, light in zip(frame.values["shadows"], casting, strict=False):
+            aim = _fit_far if light.position is None else _fit_near
+            matrix = aim(shadow, light, centre, radius)
+            to_map = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1]]) @ matrix
+            shadow["matrix"], shadow["planes"] = to_map.T, np.linalg.inv(to_map)
+            self._views.append(tuple(matrix.T.ravel()))
+        return casting
+
+    def draw(self, draw_depth: Callable[[tuple[float, ...]], None]) -> None:
+        """Draw all maps by a function that draws the casters' depth under a matrix of 16 numbers."""
+        for index, view in enumerate(self._views):
+            self._target.viewport = (index * _SIZE, 0, _SIZE, _SIZE)
+            self._target.use()
+            if index == 0:
+                self._target.clear(depth=1.0)
+            draw_depth(view)
+
+    def bind(self) -> None:
+        """Bind the maps for the shaders, once with and once without the depth test."""
+        self._depth.use(1)
+        self._test.use(1)
+        self._depth.use(2)
+
+
+def _fit_far(shadow: NDArray, light: Light, centre: NDArray, radius: float) -> NDArray[np.float64]:
+    """Cover the ball by a box that grows in coarse steps and moves by whole texels: shadow edges do not crawl.
+
+    It reaches behind the ball, where the shadows fall.
+    """
+    half_width = 2.0 ** (np.ceil(4 * np.log2(radius)) / 4)
+    texel = 2 * half_width / _SIZE
+    rotation = _axes(light.direction)
+    eye = rotation @ centre
+    eye[:2] = np.round(eye[:2] / texel) * texel
+    eye[2] += half_width
+    depth = (2 + _REACH) * half_width
+    shadow["depth"] = depth, 0, 0, 1
+    shadow["width"] = 2 * half_width, 0, _SIZE, 0
+    shadow["penumbra"] = light.size, 0, _WIDEST, 0
+    return orthographic(half_width, depth) @ _view(rotation, eye)
+
+
+def _fit_near(shadow: NDArray, light: Light, centre: NDArray, radius: float) -> NDArray[np.float64]:
+    """Cover the ball by the lamp's view of it, no wider than its beam."""
+    position: Any = light.position
+    away = float(np.linalg.norm(centre - position))
+    towards = light.direction if away < radius else (position - centre) / away
+    widest = np.radians(_STEEPEST_FOV / 2)
+    half = widest if away < 1.1 * radius else min(float(np.arcsin(radius / away)), widest)
+    half = np.ceil(half * 64) / 64
+    far = away + _REACH * radius
+    near = max(0.5 * (away - radius), 0.004 * far)
+    shadow["depth"] = 0, near * far, near - far, far
+    shadow["width"] = 0, 2 * np.tan(half), _SIZE, 0
+    shadow["penumbra"] = 0, light.size, _WIDEST, 0
+    rotation = _axes(towards)
+    return perspective(float(np.degrees(2 * half)), 1.0, near, far) @ _view(rotation, rotation @ position)
+
+
+def _axes(back: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows right, up and back of a view along -back."""
+    helper = [0.0, 0.0, 1.0] if abs(back[2]) < 0.999 else [0.0, 1.0, 0.0]
+    right = np.cross(helper, back)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(back, right), back])
+
+
+def _view(rotation: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
+    """World to eye coordinates; `eye` is the eye's place along the rows of `rotation`."""
+    view = np.eye(4)
+    view[:3, :3] = rotation
+    view[:3, 3] = -eye
+    return view

@@ -1,0 +1,1 @@
+"""Rippled surfaces: tessellation, height maps, appearance."""

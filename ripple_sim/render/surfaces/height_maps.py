@@ -1,0 +1,41 @@
+"""The reliefs of all targets on the GPU, where any pass can look them up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render.gpu.resources import OwnedObjects
+
+LAYERS = 6  # of one target: a face each
+_UNIT = 0  # of the texture, in shaders/relief.glsl
+
+
+class ReliefTextures:
+    """One texture with six layers a target. All layers are as wide as the widest relief; others fill a corner.
+
+    Parameters
+    ----------
+    ctx : OwnedObjects
+    resolutions : sequence of int
+        Texels N along an edge of each target's faces, without the ring of neighbours.
+    """
+
+    def __init__(self, ctx: OwnedObjects, resolutions: Sequence[int]) -> None:
+        width = max(resolutions, default=0) + 2
+        self._texture = ctx.texture_array((width, width, LAYERS * max(len(resolutions), 1)), 4, dtype="f4")
+        self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self._texture.repeat_x = self._texture.repeat_y = False
+
+    def write(self, first_layer: int, relief: NDArray[np.float32]) -> None:
+        """Take in a target's relief, [6, N + 2, N + 2, 4]."""
+        layers, height, width, _ = relief.shape
+        data = np.ascontiguousarray(relief, dtype=np.float32)
+        self._texture.write(data, viewport=(0, 0, first_layer, width, height, layers))
+
+    def bind(self) -> None:
+        """Bind the texture for the shaders."""
+        self._texture.use(_UNIT)

@@ -1,0 +1,1 @@
+"""What a MuJoCo model shows: geoms, sites, materials, textures, lights."""

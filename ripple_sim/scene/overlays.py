@@ -1,0 +1,73 @@
+"""Which overlays are wanted, as words: "height", "velocity=0.5", "contacts" and so on."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable
+
+from ripple_sim.errors import SceneError
+
+FIELDS = {"height": "m", "velocity": "m/s"}
+NAMES = (*FIELDS, "contacts", "grid", "time", "energy")
+
+
+@dataclasses.dataclass(frozen=True)
+class Request:
+    """Overlays that are drawn.
+
+    Attributes
+    ----------
+    field : str or None
+        "height" or "velocity": shown in colours on the targets, with a bar.
+    limit : float or None
+        Largest magnitude that the colours tell apart, in m or m/s; None: found and kept up while the video runs.
+    contacts, grid, time, energy : bool
+        Arrows of the impulses at the contact points; the texel grid; a clock; the waves' energy over time.
+    """
+
+    field: str | None = None
+    limit: float | None = None
+    contacts: bool = False
+    grid: bool = False
+    time: bool = False
+    energy: bool = False
+
+    def __bool__(self) -> bool:
+        return self != Request()
+
+
+def parse_request(words: Iterable[str]) -> Request:
+    """Read names of overlays; "height" and "velocity" may have a range, such as "height=0.02" [m, m/s].
+
+    Raises
+    ------
+    SceneError
+        For an unknown name, a range that is no positive number or stands where there is none, or both fields at once.
+    """
+    chosen: dict[str, float | None] = {}
+    for word in words:
+        name, given, value = word.strip().partition("=")
+        if name not in NAMES:
+            raise SceneError(f"there is no overlay {name!r}; valid are {', '.join(NAMES)}")
+        if given and name not in FIELDS:
+            raise SceneError(f"overlay {word.strip()!r}: {name} has no range; {' and '.join(FIELDS)} have")
+        chosen[name] = _positive(word, value, FIELDS[name]) if given else None
+    fields = [name for name in FIELDS if name in chosen]
+    if len(fields) > 1:
+        raise SceneError(f"overlays {' and '.join(fields)} would both colour the surface; choose one")
+    return Request(
+        field=fields[0] if fields else None,
+        limit=chosen[fields[0]] if fields else None,
+        **{name: name in chosen for name in NAMES if name not in FIELDS},
+    )
+
+
+def _positive(word: str, value: str, unit: str) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not (number > 0 and math.isfinite(number)):
+        raise SceneError(f"overlay {word.strip()!r}: the range must be a positive number [{unit}]")
+    return number

@@ -1,0 +1,229 @@
+"""The OpenGL context: created here, entered here, checked here, and nowhere else."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import importlib.resources
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import moderngl
+
+from ripple_sim.solver.errors import GLError
+
+from .fence import Fences
+
+_SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swr", "software")
+
+# The plain sonames first; the versioned ones are what runtime packages without -dev symlinks install.
+_LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
+
+
+class GLContext:
+    """One headless OpenGL 4.3 context on EGL, shared by the GPU wave solver and the renderer.
+
+    Use it as a context manager: entering makes the context current, frees what Python has let go of, and returns the
+    `moderngl.Context`; leaving the outermost block restores the previous context and raises `GLError` if the driver
+    recorded an error meanwhile.
+
+    Parameters
+    ----------
+    device : int, optional
+        EGL device index. By default the first device that yields a context.
+
+    Raises
+    ------
+    GLError
+        If no EGL device gives an OpenGL 4.3 core context; at entering, if the context was lost.
+    """
+
+    def __init__(self, device: int | None = None) -> None:
+        self._ctx = _create_context(device)
+        # objects may be collected in any thread, at any time; they are freed when the context is next entered
+        self._ctx.gc_mode = "context_gc"
+        self._handle = _current_context()
+        info = self._ctx.info
+        self.renderer: str = info["GL_RENDERER"]
+        self.vendor: str = info["GL_VENDOR"]
+        self.version: str = info["GL_VERSION"]
+        self._depth = 0
+        self._fences = Fences(_egl().eglGetProcAddress)
+        self._shared_shaders: dict[str, moderngl.ComputeShader] = {}
+
+    @property
+    def software(self) -> bool:
+        """Whether the driver renders on the CPU. EGL falls back to that without saying so."""
+        name = self.renderer.lower()
+        return any(word in name for word in _SOFTWARE_RENDERERS)
+
+    def __enter__(self) -> moderngl.Context:
+        if self._depth == 0:
+            self._ctx.__enter__()
+            if _current_context() != self._handle:
+                raise GLError(
+                    f"the OpenGL context on {self.renderer} is lost; something else in this process has ended EGL (a "
+                    "pyvista or VTK window does): run one of the two in a process of its own"
+                )
+            self._free()
+        self._depth += 1
+        return self._ctx
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, traceback: Any) -> None:
+        self._depth -= 1
+        if self._depth:
+            return
+        recorded = self._ctx.error
+        self._ctx.__exit__(kind, error, traceback)
+        if recorded == "GL_OUT_OF_MEMORY":
+            raise GLError(
+                f"{self.renderer} is out of memory: take a lower resolution or smaller frames, or backend 'cpu'"
+            ) from error
+        if isinstance(error, moderngl.Error):
+            raise GLError(f"OpenGL failed on {self.renderer}: {error}; see `ripple-sim info`") from error
+        if recorded != "GL_NO_ERROR" and error is None:
+            raise GLError(f"OpenGL reported {recorded} on {self.renderer}; see `ripple-sim info`")
+
+    def barrier(self) -> None:
+        """Let what follows see what compute shaders have written."""
+        with self as ctx:
+            ctx.memory_barrier()
+
+    def wait(self) -> None:
+        """Return when the driver has done all that it was told, and let other Python threads run meanwhile.
+
+        moderngl holds the interpreter's lock while it waits, in `finish` as well as in reading back.
+        """
+        with self:
+            self.wait_for(self.put_fence())
+
+    def put_fence(self) -> int:
+        """Mark the place behind all that the driver was told so far; wait for each mark once."""
+        with self:
+            return self._fences.put()
+
+    def wait_for(self, fence: int) -> None:
+        """Return when the driver has got to a fence, whatever it was told since; as `wait` does otherwise."""
+        with self:
+            self._fences.wait(fence)
+
+    def compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
+        """Compile `shaders/{name}.glsl` of `package` as a compute shader with `#define`s put in."""
+        return self._compute_shader(name, load_shader(package, name, **defines))
+
+    def shared_compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
+        """Compile a compute shader, or return the one that was compiled before: set all uniforms before each use."""
+        source = load_shader(package, name, **defines)
+        if source not in self._shared_shaders:
+            self._shared_shaders[source] = self._compute_shader(name, source)
+        return self._shared_shaders[source]
+
+    def program(self, package: str, vertex: str, fragment: str, **defines: object) -> moderngl.Program:
+        """Compile and link a vertex and a fragment shader from `shaders/` of `package`."""
+        vertex_source = load_shader(package, vertex, **defines)
+        fragment_source = load_shader(package, fragment, **defines)
+        with self as ctx:
+            return _compiled(
+                f"{vertex} + {fragment}",
+                lambda: ctx.program(vertex_shader=vertex_source, fragment_shader=fragment_source),
+            )
+
+    def _compute_shader(self, name: str, source: str) -> moderngl.ComputeShader:
+        with self as ctx:
+            return _compiled(name, lambda: ctx.compute_shader(source))
+
+    def _free(self) -> None:
+        """Free what Python has let go of; `moderngl.Context.gc` stumbles over what was released by hand."""
+        while self._ctx.objects:
+            collected = self._ctx.objects.popleft()
+            if hasattr(collected, "release"):
+                collected.release()
+
+
+def load_shader(package: str, name: str, **defines: object) -> str:
+    """Read a GLSL file, resolve its `#include "file.glsl"` lines, and put the defines behind `#version`."""
+    text = _read_shader(package, name)
+    head, _, body = text.partition("\n")
+    if not head.startswith("#version"):
+        raise GLError(f"shader {package}/shaders/{name}.glsl must start with #version, found {head!r}")
+    lines = "".join(f"#define {key} {value}\n" for key, value in defines.items())
+    return f"{head}\n{lines}{body}"
+
+
+def _read_shader(package: str, name: str) -> str:
+    path = importlib.resources.files(package) / "shaders" / f"{name}.glsl"
+    lines = []
+    for line in path.read_text().splitlines():
+        if line.startswith("#include"):
+            lines.append(_read_shader(package, line.split('"')[1].removesuffix(".glsl")))
+        else:
+            lines.append(line)
+    return "\n".join(lines) + "\n"
+
+
+def _compiled(name: str, compile_shader: Callable[[], Any]) -> Any:
+    try:
+        return compile_shader()
+    except moderngl.Error as error:
+        raise GLError(f"shader {name} does not compile: {error}") from error
+
+
+def _create_context(device: int | None) -> moderngl.Context:
+    devices = range(8) if device is None else [device]
+    reasons = []
+    for libraries in _LIBRARIES:
+        for index in devices:
+            try:
+                # moderngl's hints know nothing of the keywords that its backends take
+                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}
+                return moderngl.create_context(require=430, standalone=True, **settings)
+            except Exception as error:  # moderngl raises bare Exception here
+                reasons.append(str(error))
+                if "not loaded" in str(error):
+                    break
+    reason = reasons[-1] if reasons else "no device"
+    if device is not None:
+        raise GLError(f"no OpenGL 4.3 context on EGL device {device} ({reason}); devices are counted from 0")
+    raise GLError(
+        f"no OpenGL 4.3 context on any EGL device ({reason}); "
+        "install Mesa with: apt-get install libegl1 libgl1 libgl1-mesa-dri libegl-mesa0"
+    )
+
+
+def _current_context() -> int | None:
+    """Handle of the EGL context that is current in this thread; None if there is none."""
+    return _egl().eglGetCurrentContext()
+
+
+@functools.cache
+def _egl() -> ctypes.CDLL:
+    """The library that moderngl has loaded already."""
+    for libraries in _LIBRARIES:
+        with contextlib.suppress(OSError):
+            egl = ctypes.CDLL(libraries.get("libegl", "libEGL.so"))
+            egl.eglGetCurrentContext.restype = egl.eglGetProcAddress.restype = ctypes.c_void_p
+            return egl
+    raise GLError("the EGL library has vanished since the context was made; see `ripple-sim info`")
+
+
+_shared: dict[int | None, GLContext] = {}
+_selected: int | None = None
+_lock = threading.Lock()
+
+
+def select_device(device: int | None) -> None:
+    """Let `shared_context` mean this EGL device from now on; None: the first that yields a context."""
+    global _selected
+    with _lock:
+        _selected = device
+
+
+def shared_context(device: int | None = None) -> GLContext:
+    """Return the process-wide context of a device (by default the selected one), created at the first call."""
+    with _lock:
+        device = _selected if device is None else device
+        if device not in _shared:
+            _shared[device] = GLContext(device)
+        return _shared[device]

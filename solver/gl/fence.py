@@ -1,0 +1,50 @@
+"""Waiting for the GPU while other Python threads go on: by OpenGL's sync objects, which moderngl does not offer."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+
+from ripple_sim.solver.errors import GLError
+
+_COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
+_FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
+_TIMEOUT_EXPIRED, _FAILED = 0x911B, 0x911D
+_PATIENCE = 100_000_000  # [ns], after which Python looks whether the user has had enough
+
+
+class Fences:
+    """Makes and awaits fences in the context that is current, without holding the interpreter's lock.
+
+    Parameters
+    ----------
+    address : callable
+        Where the driver has an OpenGL function, by its name.
+    """
+
+    def __init__(self, address: Callable[[bytes], int]) -> None:
+        pointer, number, wide = ctypes.c_void_p, ctypes.c_uint, ctypes.c_uint64
+        self._create = ctypes.CFUNCTYPE(pointer, number, number)(address(b"glFenceSync"))
+        self._wait = ctypes.CFUNCTYPE(number, pointer, number, wide)(address(b"glClientWaitSync"))
+        self._delete = ctypes.CFUNCTYPE(None, pointer)(address(b"glDeleteSync"))
+
+    def put(self) -> int:
+        """Put a fence behind all that the driver was told so far, and return its handle."""
+        return self._create(_COMMANDS_COMPLETE, 0)
+
+    def wait(self, fence: int) -> None:
+        """Return when the driver has done all that it was told before the fence, and delete it.
+
+        Raises
+        ------
+        GLError
+            If the driver cannot tell.
+        """
+        try:
+            state = _TIMEOUT_EXPIRED
+            while state == _TIMEOUT_EXPIRED:
+                state = self._wait(fence, _FLUSH, _PATIENCE)
+        finally:
+            self._delete(fence)
+        if state == _FAILED:
+            raise GLError("OpenGL cannot wait for what it draws; see `ripple-sim info`")

@@ -1,0 +1,161 @@
+"""Distance along the surface, by fast marching over the texels."""
+
+from __future__ import annotations
+
+import functools
+import heapq
+import threading
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.texels.cube_map.convention import padded_indices
+
+from .atlas import Atlas
+
+
+def distance_from_point(
+    atlas: Atlas, center: int, point: NDArray[np.float64], limit: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Texels within `limit` [m] of a surface point, ascending, and their distances along the surface [m].
+
+    Parameters
+    ----------
+    center : int
+        Flat index of the texel nearest to the point.
+    point : [3]
+        [m].
+    """
+    index, positions = padded_indices(atlas.resolution), atlas.positions.reshape(-1, 3)
+    texels, distance = march_from_point(index, positions, center, point, limit, everywhere_infinite(len(positions)))
+    order = np.argsort(texels)
+    return texels[order], distance[order]
+
+
+def depth_in_region(atlas: Atlas, region: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Distance of every texel of a region to the texels outside of it [m], [6, N, N]; 0 outside, at most 8 % too long.
+
+    Infinite where there is no outside.
+    """
+    positions = atlas.positions.reshape(-1, 3)
+    outside = np.flatnonzero(~region)
+    distance = np.full(len(positions), np.inf)
+    distance[outside] = 0.0
+    if len(outside):
+        march(padded_indices(atlas.resolution), positions, outside, np.inf, distance)
+    return distance.reshape(region.shape)
+
+
+def everywhere_infinite(size: int) -> NDArray[np.float64]:
+    """Scratch that its users clean up: a footprint must not cost more on a larger grid. One for each thread."""
+    return _everywhere_infinite(size, threading.get_ident())
+
+
+@functools.lru_cache(maxsize=8)
+def _everywhere_infinite(size: int, thread: int) -> NDArray[np.float64]:
+    return np.full(size, np.inf)
+
+
+@numba.njit(cache=True, nogil=True)
+def _through(p, q, s, dp, dq):
+    """Distance at s of a point source that is dp from p and dq from q, unfolded into the plane of the triangle.
+
+    Infinite if the straight way does not cross the edge pq (Novotni and Klein 2002).
+    """
+    length2 = (q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2 + (q[2] - p[2]) ** 2
+    length = np.sqrt(length2)
+    if length == 0:
+        return np.inf
+    along = ((s[0] - p[0]) * (q[0] - p[0]) + (s[1] - p[1]) * (q[1] - p[1]) + (s[2] - p[2]) * (q[2] - p[2])) / length
+    ps2 = (s[0] - p[0]) ** 2 + (s[1] - p[1]) ** 2 + (s[2] - p[2]) ** 2
+    above = np.sqrt(max(ps2 - along * along, 0.0))
+    source_along = (dp * dp - dq * dq + length2) / (2 * length)
+    below2 = dp * dp - source_along * source_along
+    if below2 < 0:
+        return np.inf
+    below = np.sqrt(below2)
+    if above + below == 0:
+        return np.inf
+    crossing = source_along + (along - source_along) * below / (above + below)
+    if crossing < 0 or crossing > length:
+        return np.inf
+    return np.sqrt((along - source_along) ** 2 + (above + below) ** 2)
+
+
+@numba.njit(cache=True, nogil=True)
+def march(index, positions, seeds, limit, distance):
+    """Fast marching with point-source updates over the triangles of both triangulations of every quad.
+
+    `distance` holds the seeds' distances, and infinity elsewhere. Returns the texels within the limit in the order of
+    their distances, and those whose entry in `distance` was written.
+    """
+    n = index.shape[1] - 2
+    # the eight neighbours in order round a texel
+    ring_row = (0, 1, 1, 1, 0, -1, -1, -1)
+    ring_column = (1, 1, 0, -1, -1, -1, 0, 1)
+    around = np.empty(8, np.int64)
+    done = np.zeros(len(distance), np.bool_)
+    front = [(distance[seeds[0]], seeds[0])]
+    for t in seeds[1:]:
+        heapq.heappush(front, (distance[t], t))
+    order = [seeds[0]]
+    order.pop()
+    touched = list(seeds)
+    while len(front) > 0:
+        d, t = heapq.heappop(front)
+        if d > limit:
+            break
+        if done[t]:
+            continue
+        done[t] = True
+        order.append(t)
+        face, row, column = t // (n * n), t // n % n, t % n
+        for k in range(8):
+            around[k] = index[face, row + 1 + ring_row[k], column + 1 + ring_column[k]]
+        for k in range(8):
+            a = around[k]
+            if a < 0 or done[a]:
+                continue
+            dx, dy, dz = (
+                positions[a, 0] - positions[t, 0],
+                positions[a, 1] - positions[t, 1],
+                positions[a, 2] - positions[t, 2],
+            )
+            best = d + np.sqrt(dx * dx + dy * dy + dz * dz)
+            # triangles (t, b, a): b one step round the ring, or two where a is straight ahead (the other diagonal)
+            for turn in (-2, -1, 1, 2):
+                if (turn == 2 or turn == -2) and k % 2 == 1:
+                    continue
+                b = around[(k + turn) % 8]
+                if b >= 0 and distance[b] < np.inf:
+                    best = min(best, _through(positions[t], positions[b], positions[a], d, distance[b]))
+            if best < distance[a]:
+                if distance[a] == np.inf:
+                    touched.append(a)
+                distance[a] = best
+                heapq.heappush(front, (best, a))
+    return np.array(order), np.array(touched)
+
+
+@numba.njit(cache=True, nogil=True)
+def march_from_point(index, positions, center, point, limit, scratch):
+    """Texels within a distance along the surface of a point, nearest first, and their distances.
+
+    The nine texels round the point's nearest one are taken straight.
+    """
+    n = index.shape[1] - 2
+    face, row, column = center // (n * n), center // n % n, center % n
+    seeds = np.empty(9, np.int64)
+    count = 0
+    for i in range(3):
+        for j in range(3):
+            t = index[face, row + i, column + j]
+            if t >= 0:
+                seeds[count] = t
+                scratch[t] = np.sqrt(((positions[t] - point) ** 2).sum())
+                count += 1
+    texels, touched = march(index, positions, seeds[:count], limit, scratch)
+    distance = scratch[texels]
+    scratch[touched] = np.inf
+    return texels, distance

@@ -1,0 +1,124 @@
+"""Maps: a picture in the object's own texture coordinates, or an attribute of its vertices, carried onto the texels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image
+
+from ripple_sim.solver.errors import SolverError
+
+from .atlas import Atlas
+
+_CHANNELS = {"red": 0, "green": 1, "blue": 2, "alpha": 3}
+
+
+def vertex_map(atlas: Atlas, values: ArrayLike) -> NDArray[np.float64]:
+    """Interpolate an attribute of the mesh's vertices linearly to the texels.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    values : [vertex_count] or [vertex_count, k]
+
+    Returns
+    -------
+    float64 [6, N, N] or [6, N, N, k]
+
+    Raises
+    ------
+    SolverError
+        If there is not one value a vertex.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    if values.ndim not in (1, 2) or len(values) != len(atlas.mesh.V):
+        raise SolverError(f"vertex values have shape {values.shape}; valid is [{len(atlas.mesh.V)}], one a vertex")
+    return _interpolate(atlas, values[atlas.mesh.F])
+
+
+def texture_map(
+    atlas: Atlas,
+    picture: str | Path | ArrayLike,
+    low: float = 0.0,
+    high: float = 1.0,
+    channel: str = "luminance",
+) -> NDArray[np.float64]:
+    """Sample a picture in the object's own texture coordinates, once a texel.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        Of a mesh with texture coordinates.
+    picture : path, or array [height, width] or [height, width, channels]
+        Path of a PNG or any picture that Pillow reads, 8 or 16 bits; its numbers are taken as they are, without gamma.
+        Or an array of values from 0 to 1. It repeats beyond its borders; v = 0 is its lower edge.
+    low, high : float
+        What black and white stand for; in between is linear.
+    channel : str
+        "luminance" (mean of red, green and blue), "red", "green", "blue" or "alpha".
+
+    Returns
+    -------
+    float64 [6, N, N]
+        For any coefficient of `Material`.
+
+    Raises
+    ------
+    SolverError
+        If the mesh has no texture coordinates, the picture cannot be read, or it lacks the channel.
+    """
+    if atlas.mesh.corner_uv is None:
+        raise SolverError("the mesh has no texture coordinates for a picture; give it some, or use `vertex_map`")
+    values = _channel(_pixels(picture), channel)
+    return low + (high - low) * _bilinear(values, _interpolate(atlas, atlas.mesh.corner_uv))
+
+
+def _interpolate(atlas: Atlas, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values at the corners of the triangles [face_count, 3, ...], at the texels [6, N, N, ...]."""
+    return np.einsum("fijk,fijk...->fij...", atlas.barycentrics, corners[atlas.triangles])
+
+
+def _pixels(picture: str | Path | ArrayLike) -> NDArray[np.float64]:
+    """Values from 0 to 1, [height, width, channels]."""
+    if isinstance(picture, str | Path):
+        try:
+            with Image.open(picture) as image:
+                # palettes and the like have numbers that are no brightness
+                plain = image if image.mode in ("L", "LA", "RGB", "RGBA") or image.mode[0] == "I" else None
+                pixels = np.asarray(plain if plain is not None else image.convert("RGBA"))
+        except (OSError, ValueError) as error:
+            raise SolverError(f"picture {str(picture)!r} cannot be read: {error}") from error
+        largest = 255.0 if pixels.dtype == np.uint8 else 65535.0
+        pixels = pixels / largest
+    else:
+        pixels = np.asarray(picture, dtype=np.float64)
+    if pixels.ndim == 2:
+        pixels = pixels[..., None]
+    if pixels.ndim != 3 or 0 in pixels.shape or pixels.shape[2] > 4:
+        raise SolverError(f"picture has shape {pixels.shape}; valid is [height, width] with up to 4 channels")
+    return pixels
+
+
+def _channel(pixels: NDArray[np.float64], channel: str) -> NDArray[np.float64]:
+    channels = pixels.shape[2]
+    if channel == "luminance":
+        return pixels[..., : 3 if channels >= 3 else 1].mean(axis=2)
+    if channel not in _CHANNELS:
+        raise SolverError(f"channel {channel!r} does not exist; valid are 'luminance', {str(list(_CHANNELS))[1:-1]}")
+    place = channels - 1 if channel == "alpha" and channels in (2, 4) else _CHANNELS[channel]
+    if place >= channels:
+        raise SolverError(f"the picture has no channel {channel!r}, only {channels}; use 'luminance'")
+    return pixels[..., place]
+
+
+def _bilinear(values: NDArray[np.float64], uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    height, width = values.shape
+    x, y = uv[..., 0] * width - 0.5, (1 - uv[..., 1]) * height - 0.5
+    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    s, t = x - column, y - row
+    left, right, top, bottom = column % width, (column + 1) % width, row % height, (row + 1) % height
+    return (1 - t) * ((1 - s) * values[top, left] + s * values[top, right]) + t * (
+        (1 - s) * values[bottom, left] + s * values[bottom, right]
+    )
