@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-CHECKS = Path(__file__).with_name("viewer_window_checks.py")
+CHECKS = Path(__file__).with_name("window_checks.py")
 
 
 @pytest.fixture
