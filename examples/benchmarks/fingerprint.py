@@ -1,6 +1,6 @@
 """Fingerprints of every shipped scene: of its frames, and of its heights. A refactoring leaves both as they are.
 
-    python examples/benchmarks/fingerprint.py [SCENE ...] > before.txt
+python examples/benchmarks/fingerprint.py [SCENE ...] > before.txt
 """
 
 import hashlib

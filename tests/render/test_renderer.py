@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from sphere_reliefs import N, constant_relief, linear_relief, relief_of
 
 from ripple_sim.render import LOOKS, Camera, Renderer, Surface
 from ripple_sim.render.camera import perspective, view_matrix
@@ -11,9 +12,7 @@ from ripple_sim.render.visuals import primitives as meshes
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
-from ripple_sim.solver.texels.cube_map.convention import padded_indices, texel_directions
 
-N = 24
 SIZE = (240, 180)
 FRONT = Camera(lookat=(0.0, 0.0, 0.0), distance=4.0, azimuth=90.0, elevation=0.0, fovy=40.0)
 
@@ -47,28 +46,6 @@ def gl() -> GLContext:
         return shared_context()
     except GLError as error:
         pytest.skip(f"no OpenGL context: {error}")
-
-
-def relief_of(height, gradient) -> np.ndarray:
-    """Relief of functions of the unit vector, with the ring of neighbours filled in."""
-    directions = texel_directions(N)
-    texels = np.concatenate([gradient(directions), height(directions)[..., None]], axis=3)
-    index = padded_indices(N)
-    padded = texels.reshape(-1, 4)[np.maximum(index, 0)]
-    for row in (0, -1):
-        for column in (0, -1):
-            r, c = (1 if row == 0 else -2), (1 if column == 0 else -2)
-            padded[:, row, column] = (padded[:, r, c] + padded[:, r, column] + padded[:, row, c]) / 3
-    return padded.astype(np.float32)
-
-
-def constant_relief(height: float) -> np.ndarray:
-    return relief_of(lambda d: np.full(d.shape[:3], height), np.zeros_like)
-
-
-def linear_relief(slope: np.ndarray) -> np.ndarray:
-    """Height `slope . d` on the unit sphere: smooth everywhere, cube edges and corners included."""
-    return relief_of(lambda d: d @ slope, lambda d: slope - (d @ slope)[..., None] * d)
 
 
 def ball_surface(radius: float = 1.0, look: str = "clay") -> Surface:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_render import N, constant_relief, relief_of
+from sphere_reliefs import N, constant_relief, relief_of
 
 from ripple_sim.render.surfaces.refinement import Refinement
 from ripple_sim.render.surfaces.tessellation import edges_of, midpoints

@@ -1,0 +1,29 @@
+"""Reliefs of a sphere, by functions of the unit vector."""
+
+import numpy as np
+
+from ripple_sim.solver.texels.cube_map.convention import padded_indices, texel_directions
+
+N = 24
+
+
+def relief_of(height, gradient) -> np.ndarray:
+    """Relief of functions of the unit vector, with the ring of neighbours filled in."""
+    directions = texel_directions(N)
+    texels = np.concatenate([gradient(directions), height(directions)[..., None]], axis=3)
+    index = padded_indices(N)
+    padded = texels.reshape(-1, 4)[np.maximum(index, 0)]
+    for row in (0, -1):
+        for column in (0, -1):
+            r, c = (1 if row == 0 else -2), (1 if column == 0 else -2)
+            padded[:, row, column] = (padded[:, r, c] + padded[:, r, column] + padded[:, row, c]) / 3
+    return padded.astype(np.float32)
+
+
+def constant_relief(height: float) -> np.ndarray:
+    return relief_of(lambda d: np.full(d.shape[:3], height), np.zeros_like)
+
+
+def linear_relief(slope: np.ndarray) -> np.ndarray:
+    """Height `slope . d` on the unit sphere: smooth everywhere, cube edges and corners included."""
+    return relief_of(lambda d: d @ slope, lambda d: slope - (d @ slope)[..., None] * d)
