@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .texels.maps import texture_map, vertex_map
     from .waves.absorbing import absorbing_damping
     from .waves.footprint import Footprint
-    from .waves.height_map import Relief
+    from .waves.height_map import HeightMap
     from .waves.load import Load
     from .waves.material import Material
     from .waves.wave_solver import WaveSolver
@@ -33,7 +33,7 @@ _HOME = {
     "Material": "waves.material",
     "Mesh": "mesh.mesh",
     "MeshError": "errors",
-    "Relief": "waves.height_map",
+    "HeightMap": "waves.height_map",
     "RippleError": "errors",
     "SolverError": "errors",
     "SphereAtlas": "texels.cube_map.sphere_atlas",
@@ -53,11 +53,11 @@ __all__ = [
     "AtlasError",
     "Footprint",
     "GLError",
+    "HeightMap",
     "Load",
     "Material",
     "Mesh",
     "MeshError",
-    "Relief",
     "RippleError",
     "SolverError",
     "SphereAtlas",

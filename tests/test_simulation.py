@@ -61,7 +61,7 @@ def test_ripples_change_the_picture(scene: Scene) -> None:
     frames = FrameSource(simulation, width=160, height=90)
     *_, last = run(simulation, 11)
     rippled = frames.draw(last).astype(int)
-    flat = frames.draw(dataclasses.replace(last, reliefs={})).astype(int)
+    flat = frames.draw(dataclasses.replace(last, height_maps={})).astype(int)
     changed = (np.abs(rippled - flat).max(axis=-1) > 8).mean()
     assert 0.01 < changed < 0.5
 

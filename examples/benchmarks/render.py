@@ -66,7 +66,7 @@ def rippled(width: int, height: int, resolution: int, look: str) -> tuple[Callab
     import mujoco
 
     from ripple_sim.render import Camera, Renderer, Surface
-    from ripple_sim.solver import Mesh, Relief, build_atlas
+    from ripple_sim.solver import HeightMap, Mesh, build_atlas
     from ripple_sim.solver.gl import shared_context
 
     model = mujoco.MjModel.from_xml_string(mjcf(width, height))
@@ -79,10 +79,11 @@ def rippled(width: int, height: int, resolution: int, look: str) -> tuple[Callab
     print(gl.renderer)
     renderer = Renderer(gl, model, {target: surface}, width=width, height=height, samples=4)
     camera = Camera(LOOKAT, DISTANCE, AZIMUTH, ELEVATION)
-    reliefs = [
-        Relief(atlas)((0.008 * np.sin(40.0 * atlas.positions[..., 2] + phase)).astype(np.float32)) for phase in range(4)
+    height_maps = [
+        HeightMap(atlas)((0.008 * np.sin(40.0 * atlas.positions[..., 2] + phase)).astype(np.float32))
+        for phase in range(4)
     ]
-    return lambda i: renderer.render(data, {target: reliefs[i % len(reliefs)]}, camera), len(atlas.mesh.F)
+    return lambda i: renderer.render(data, {target: height_maps[i % len(height_maps)]}, camera), len(atlas.mesh.F)
 
 
 def cost(work: Callable[[], object]) -> tuple[float, float]:

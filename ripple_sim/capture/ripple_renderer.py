@@ -13,7 +13,7 @@ from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
 from ripple_sim.render.visuals.texture_mapping import NO_IMAGE, mapping_of
 from ripple_sim.render.visuals.visual import geom_piece
 from ripple_sim.scene.scene_file import CameraEntry
-from ripple_sim.solver import Relief, WaveSolver
+from ripple_sim.solver import HeightMap, WaveSolver
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .viewpoint import viewpoint
@@ -52,7 +52,7 @@ class Pictures:
         gl: GLContext | None = None,
     ) -> None:
         self._model, self._ripples = model, ripples
-        self._reliefs = {name: Relief(ripples[name].atlas) for name in ripples}
+        self._height_maps = {name: HeightMap(ripples[name].atlas) for name in ripples}
         looks = looks or {}
         surfaces = {
             geom: surface_of(ripples[name], looks.get(name, "rubber"), _color(model, geom))
@@ -74,10 +74,11 @@ class Pictures:
             free = self._model.vis.global_
             entry = CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)
             camera = viewpoint(self._model, data, entry, data.time)
-        reliefs = {
-            self._ripples.geom_ids[name]: relief(self._ripples[name].height) for name, relief in self._reliefs.items()
+        height_maps = {
+            self._ripples.geom_ids[name]: height_map(self._ripples[name].height)
+            for name, height_map in self._height_maps.items()
         }
-        return self._renderer.render(data, reliefs, camera)
+        return self._renderer.render(data, height_maps, camera)
 
 
 def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] | None = None) -> Surface:

@@ -15,7 +15,7 @@ from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
 from ripple_sim.render.camera import ThroughLens, Viewpoint
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver import Relief
+from ripple_sim.solver import HeightMap
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .exposure import Exposures
@@ -37,8 +37,8 @@ class Snapshot:
         Of the frame's exposures, from 0: that is the frame's own moment, at which the shutter opens.
     data : mujoco.MjData
         Copy of MuJoCo's state.
-    heights, reliefs : dict
-        By the geom's name: height [m], float32 [6, N, N], and what is drawn of it (see `Relief`).
+    heights, height_maps : dict
+        By the geom's name: height [m], float32 [6, N, N], and what is drawn of it (see `HeightMap`).
     impulses : list of Impulse
         All of the frame, up to its own moment.
     """
@@ -47,7 +47,7 @@ class Snapshot:
     exposure: int
     data: mujoco.MjData
     heights: dict[str, NDArray[np.float32]]
-    reliefs: dict[str, NDArray[np.float32]]
+    height_maps: dict[str, NDArray[np.float32]]
     impulses: list[Impulse]
 
     def digest(self) -> str:
@@ -72,7 +72,7 @@ def run(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterator[Snap
     """
     ring = itertools.cycle([mujoco.MjData(simulation.model) for _ in range(alive)])
     ripples = simulation.ripples
-    relief_of = {name: Relief(ripples[name].atlas) for name in ripples}
+    height_map_of = {name: HeightMap(ripples[name].atlas) for name in ripples}
     moments = Moments(simulation, Exposures.of(simulation.scene.camera).moments)
     for number in range(frames):
         if number:
@@ -82,8 +82,8 @@ def run(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterator[Snap
             if heights is not shown:
                 data, shown = next(ring), heights
                 mujoco.mj_copyData(data, simulation.model, state)
-                reliefs = {name: relief_of[name](height) for name, height in heights.items()}
-            yield Snapshot(number, exposure, data, heights, reliefs, impulses)
+                height_maps = {name: height_map_of[name](height) for name, height in heights.items()}
+            yield Snapshot(number, exposure, data, heights, height_maps, impulses)
 
 
 class FrameSource:
@@ -147,14 +147,14 @@ class FrameSource:
 
     def submit(self, state: Snapshot) -> None:
         """Draw a snapshot without waiting for it: `fetch` returns it, after those submitted before."""
-        reliefs = {self._geoms[name]: relief for name, relief in state.reliefs.items()}
+        height_maps = {self._geoms[name]: height_map for name, height_map in state.height_maps.items()}
         camera: Viewpoint = self.camera(state)
         lens = self._exposures.offsets[state.exposure]
         if lens.any():
             sim = self._simulation
             focus = focal_distance(sim.model, state.data, sim.scene.camera, camera.pose())
             camera = ThroughLens(camera, tuple(lens), focus)
-        self.renderer.submit(state.data, reliefs, camera, state.exposure)
+        self.renderer.submit(state.data, height_maps, camera, state.exposure)
 
     def fetch(self) -> NDArray | None:
         """Wait for the earliest submitted snapshot's picture, and return it as `draw` does."""

@@ -39,7 +39,7 @@ class Notes:
     time : float
         [s].
     fields : sequence of dict
-        By the geom's name what its colours show, float32 [6, N + 2, N + 2], padded as a relief.
+        By the geom's name what its colours show, float32 [6, N + 2, N + 2], padded as a height map.
     field_scale, mark_scale, energy_scale : Scale
     marks : sequence of list of Mark
     energies : sequence of (times [s], energies [J])

@@ -19,7 +19,7 @@ from ripple_sim.render.passes.floor import Floor, find_floor
 from ripple_sim.render.passes.mirror import Mirror
 from ripple_sim.render.passes.screen_bounds import boxes_of
 from ripple_sim.render.passes.shadow import ShadowMaps
-from ripple_sim.render.surfaces.height_maps import ReliefTextures
+from ripple_sim.render.surfaces.height_maps import HeightMapTextures
 from ripple_sim.render.surfaces.surface import Surface
 from ripple_sim.render.surfaces.surface_mesh import SurfaceMesh
 from ripple_sim.render.visuals.geoms import Bodies
@@ -101,9 +101,11 @@ class Renderer:
             self._open_floor = ctx.texture((1, 1), 2, np.ones(2, dtype=np.float16).tobytes(), dtype="f2")
             textures = Textures(ctx, model)
             self._sky = None if self._studio else textures.skybox()
-            self._reliefs = ReliefTextures(ctx, [surface.resolution for surface in targets.values()])
+            self._height_maps = HeightMapTextures(ctx, [surface.resolution for surface in targets.values()])
             self._targets = [
-                SurfaceMesh(gl, ctx, model, geom, surface, textures, self._table, self._reliefs, index, (width, height))
+                SurfaceMesh(
+                    gl, ctx, model, geom, surface, textures, self._table, self._height_maps, index, (width, height)
+                )
                 for index, (geom, surface) in enumerate(sorted(targets.items()))
             ]
             geoms = [geom for geom in visible_geoms(model) if geom not in targets]
@@ -144,7 +146,7 @@ class Renderer:
         geom : int
             Geom id of the target.
         field : float32 [6, N + 2, N + 2]
-            Padded by a ring of neighbour texels, as a relief.
+            Padded by a ring of neighbour texels, as a height map.
         limit : float
             The colours reach from -limit to limit.
         """
@@ -152,7 +154,7 @@ class Renderer:
             next(target for target in self._targets if target.geom == geom).set_field(field, limit)
 
     def render(
-        self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
+        self, data: Any, height_maps: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
     ) -> NDArray:
         """Draw one frame.
 
@@ -160,9 +162,9 @@ class Renderer:
         ----------
         data : mujoco.MjData
             Poses of the geoms, after `mj_forward` or `mj_step`.
-        reliefs : mapping
-            Geom id to relief, shape [6, N + 2, N + 2, 4]: gradient of the height (xyz, in the geom's frame) and height
-            [m] (w), each face padded by a ring of neighbour texels. A target without one is flat.
+        height_maps : mapping
+            Geom id to height map, shape [6, N + 2, N + 2, 4]: gradient of the height (xyz, in the geom's frame) and
+            height [m] (w), each face padded by a ring of neighbour texels. A target without one is flat.
         camera : Camera, FixedCamera or ThroughLens
         exposure : int
             Number of this picture among those whose mean is a frame: the noise of shadows differs from one to the next.
@@ -173,22 +175,22 @@ class Renderer:
             Top row first; a fresh array for every frame. uint8 in sRGB, alpha straight; or, of linear light, float16,
             with ITU-R BT.709's primaries, multiplied by alpha.
         """
-        self.submit(data, reliefs, camera, exposure)
+        self.submit(data, height_maps, camera, exposure)
         return self.fetch()
 
     def submit(
-        self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
+        self, data: Any, height_maps: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
     ) -> None:
         """Draw one frame as `render` does, without waiting for it: `fetch` returns it, after those submitted before."""
         with self._gl:
-            self._readback.submit(self.draw(data, reliefs, camera, exposure))
+            self._readback.submit(self.draw(data, height_maps, camera, exposure))
 
     def fetch(self) -> NDArray:
         """Wait for the earliest submitted frame, and return it as `render` does."""
         return self._readback.fetch()
 
     def draw(
-        self, data: Any, reliefs: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
+        self, data: Any, height_maps: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
     ) -> moderngl.Framebuffer:
         """Draw one frame as `render` does, and leave it on the GPU.
 
@@ -200,7 +202,7 @@ class Renderer:
         """
         pose = camera.pose()
         with self._gl as ctx:
-            self._update(ctx, data, reliefs, pose, exposure)
+            self._update(ctx, data, height_maps, pose, exposure)
             self._draw_maps(ctx)
             if self._mirror is not None and self._floor is not None:
                 self._mirror.draw(ctx, self._frame, pose, self._floor, self._balls, self._draw_solids, self._bind_maps)
@@ -214,13 +216,18 @@ class Renderer:
         return self._picture.frame
 
     def _update(
-        self, ctx: moderngl.Context, data: Any, reliefs: Mapping[int, NDArray[np.float32]], pose: Pose, exposure: int
+        self,
+        ctx: moderngl.Context,
+        data: Any,
+        height_maps: Mapping[int, NDArray[np.float32]],
+        pose: Pose,
+        exposure: int,
     ) -> None:
         """Bring everything on the GPU up to date."""
         occluders = self._bodies.occluders.bind(data, pose.focus)
         for target in self._targets:
             rotation = data.geom_xmat[target.geom].reshape(3, 3)
-            target.update(ctx, rotation, data.geom_xpos[target.geom], reliefs.get(target.geom), occluders)
+            target.update(ctx, rotation, data.geom_xpos[target.geom], height_maps.get(target.geom), occluders)
         pixels = self.height / (2 * np.tan(np.radians(pose.fovy) / 2))
         self._bodies.update(data, pose.position, pixels)
         self._table.bind()
@@ -270,7 +277,7 @@ class Renderer:
         self._bodies.draw_depth(view_projection, sites=False)
 
     def _bind_maps(self) -> None:
-        self._reliefs.bind()
+        self._height_maps.bind()
         self._shadows.bind()
         if self._floor is None:
             self._open_floor.use(3)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.render.surfaces.tessellation import subdivide
 from ripple_sim.render.visuals.primitives import corner_normals
-from ripple_sim.solver import Atlas, Relief
+from ripple_sim.solver import Atlas, HeightMap
 from ripple_sim.solver.texels.cube_map.convention import face_coordinates
 
 # Triangles that software OpenGL draws 30 times a second beside the simulation, on two cores.
@@ -45,15 +45,15 @@ class Skin:
             np.ascontiguousarray(vertices[:, columns], dtype=np.float32) for columns in (_POSITION, _DIRECTION, _NORMAL)
         )
         self._texels, self._weights = _bilinear(vertices[:, _SPHERE], atlas.resolution)
-        self._relief = Relief(atlas)
+        self._height_map = HeightMap(atlas)
         self.points, self.normals = self._rest.copy(), self._rest_normals.copy()
         self.height = np.zeros(len(vertices), np.float32)
 
     def update(self, height: NDArray[np.float32]) -> None:
         """Follow a height field, float32 [6, N, N], in metres."""
-        relief = self._relief(height).reshape(-1, 4)
+        height_map = self._height_map(height).reshape(-1, 4)
         _displace(
-            relief, self._texels, self._weights, self._rest, self._direction, self._rest_normals,
+            height_map, self._texels, self._weights, self._rest, self._direction, self._rest_normals,
             self.points, self.normals, self.height,
         )  # fmt: skip
 
@@ -80,9 +80,9 @@ def _refined(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
 
 
 def _bilinear(directions: NDArray[np.float64], n: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Addresses in a relief [6 (N + 2)^2] and weights of the four texels round each direction, [k, 4] both."""
+    """Addresses in a height map [6 (N + 2)^2] and weights of the four texels round each direction, [k, 4] both."""
     face, row, column = face_coordinates(directions, n)
-    # the relief has a ring of neighbours round each face
+    # the height map has a ring of neighbours round each face
     row, column = np.clip(row + 1, 0, n + 1), np.clip(column + 1, 0, n + 1)
     r, c = np.minimum(row.astype(np.int64), n), np.minimum(column.astype(np.int64), n)
     s, t = row - r, column - c
@@ -93,16 +93,16 @@ def _bilinear(directions: NDArray[np.float64], n: int) -> tuple[NDArray[np.int32
 
 
 @numba.njit(cache=True, nogil=True)
-def _displace(relief, texels, weights, rest, direction, rest_normals, points, normals, height):
+def _displace(height_map, texels, weights, rest, direction, rest_normals, points, normals, height):
     """Raise points by the height; a normal tips against the gradient, to first order in the height."""
     for i in range(len(texels)):
         gx = gy = gz = h = np.float32(0)
         for k in range(4):
             weight, texel = weights[i, k], texels[i, k]
-            gx += weight * relief[texel, 0]
-            gy += weight * relief[texel, 1]
-            gz += weight * relief[texel, 2]
-            h += weight * relief[texel, 3]
+            gx += weight * height_map[texel, 0]
+            gy += weight * height_map[texel, 1]
+            gz += weight * height_map[texel, 2]
+            h += weight * height_map[texel, 3]
         height[i] = h
         for k in range(3):
             points[i, k] = rest[i, k] + h * direction[i, k]

@@ -1,4 +1,4 @@
-"""The OpenGL context: created here, entered here, checked here, and nowhere else."""
+"""The OpenGL context: created here, entered here, checked here, and slot_scratch else."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def distance_from_point(
         [m].
     """
     index, positions = padded_indices(atlas.resolution), atlas.positions.reshape(-1, 3)
-    texels, distance = march_from_point(index, positions, center, point, limit, everywhere_infinite(len(positions)))
+    texels, distance = march_from_point(index, positions, center, point, limit, distance_scratch(len(positions)))
     order = np.argsort(texels)
     return texels[order], distance[order]
 
@@ -47,13 +47,13 @@ def depth_in_region(atlas: Atlas, region: NDArray[np.bool_]) -> NDArray[np.float
     return distance.reshape(region.shape)
 
 
-def everywhere_infinite(size: int) -> NDArray[np.float64]:
+def distance_scratch(size: int) -> NDArray[np.float64]:
     """Scratch that its users clean up: a footprint must not cost more on a larger grid. One for each thread."""
-    return _everywhere_infinite(size, threading.get_ident())
+    return _distance_scratch(size, threading.get_ident())
 
 
 @functools.lru_cache(maxsize=8)
-def _everywhere_infinite(size: int, thread: int) -> NDArray[np.float64]:
+def _distance_scratch(size: int, thread: int) -> NDArray[np.float64]:
     return np.full(size, np.inf)
 
 

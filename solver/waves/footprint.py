@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ripple_sim.solver.errors import SolverError
 from ripple_sim.solver.texels.atlas import Atlas, check_points
 from ripple_sim.solver.texels.cube_map.convention import padded_indices
-from ripple_sim.solver.texels.distance import everywhere_infinite, march_from_point
+from ripple_sim.solver.texels.distance import distance_scratch, march_from_point
 
 # Fewer texels across than this and the source would excite waves that the grid cannot carry.
 MIN_TEXELS = 2.0
@@ -80,7 +80,7 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
 
 def footprint_at(atlas: Atlas, point: NDArray[np.float64], center: int, radius: float) -> Footprint:
     """The footprint round a point of the surface whose nearest texel is known, see `Atlas.nearest`."""
-    texels, weights, radius = weigh(texel_grid(atlas), center, point, radius, everywhere_infinite(atlas.areas.size))
+    texels, weights, radius = weigh(texel_grid(atlas), center, point, radius, distance_scratch(atlas.areas.size))
     return Footprint(texels, weights, center, point, radius)
 
 
@@ -105,7 +105,7 @@ def texel_grid(atlas: Atlas) -> TexelGrid:
 
 @numba.njit(cache=True, nogil=True)
 def weigh(grid, center, point, radius, scratch):
-    """Texels, weights and radius of a footprint; `scratch` is `everywhere_infinite`."""
+    """Texels, weights and radius of a footprint; `scratch` is `distance_scratch`."""
     radius = max(radius, MIN_TEXELS * _spacing(grid, center))
     texels, distance, flat = _patch(grid, center, point, radius, scratch)
     if not flat:

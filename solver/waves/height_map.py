@@ -13,7 +13,7 @@ from ripple_sim.solver.texels.halo import padded_addresses
 _REGULARISATION = 1e-4
 
 
-class Relief:
+class HeightMap:
     """Turns a height field into a texture of gradient and height.
 
     The gradient at a texel is that of the quadratic that fits the eight neighbours' heights best, in the tangent plane:
@@ -31,7 +31,7 @@ class Relief:
         self._inside, self._ring, self._source = padded_addresses(n)
 
     def __call__(self, height: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Relief of a height field.
+        """HeightMap of a height field.
 
         Parameters
         ----------
@@ -50,14 +50,16 @@ class Relief:
         padded[:, 1:-1, 1:-1] = height
         heights = padded.reshape(-1)
         heights[self._ring] = heights[self._source]
-        relief = np.empty((6, n + 2, n + 2, 4), np.float32)
-        _differentiate(self._weights, padded, relief)
-        texels = relief.reshape(-1, 4)
+        height_map = np.empty((6, n + 2, n + 2, 4), np.float32)
+        _differentiate(self._weights, padded, height_map)
+        texels = height_map.reshape(-1, 4)
         texels[self._ring] = texels[self._source]
         for r, r_in, r_out in ((0, 1, 0), (n + 1, n, n + 1)):
             for c, c_in, c_out in ((0, 1, 0), (n + 1, n, n + 1)):
-                relief[:, r, c] = (relief[:, r_in, c_in] + relief[:, r_in, c_out] + relief[:, r_out, c_in]) / 3
-        return relief
+                height_map[:, r, c] = (
+                    height_map[:, r_in, c_in] + height_map[:, r_in, c_out] + height_map[:, r_out, c_in]
+                ) / 3
+        return height_map
 
 
 # the eight neighbours (row, column) in the order of the gradient weights
@@ -90,7 +92,7 @@ def _gradient_weights(atlas: Atlas) -> NDArray[np.float64]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _differentiate(weights, h, relief):
+def _differentiate(weights, h, height_map):
     n = h.shape[1] - 2
     for i in range(6 * n):
         f, r = i // n, i % n + 1
@@ -103,7 +105,7 @@ def _differentiate(weights, h, relief):
                 gx += g[k, 0] * step
                 gy += g[k, 1] * step
                 gz += g[k, 2] * step
-            relief[f, r, c, 0] = gx
-            relief[f, r, c, 1] = gy
-            relief[f, r, c, 2] = gz
-            relief[f, r, c, 3] = here
+            height_map[f, r, c, 0] = gx
+            height_map[f, r, c, 1] = gy
+            height_map[f, r, c, 2] = gz
+            height_map[f, r, c, 3] = here

@@ -57,17 +57,17 @@ class Load:
             raise SolverError(
                 f"texels go from {texels.min()} to {texels.max()}; valid are indices from 0 to {size - 1}"
             )
-        texels, (forces,) = add_up_by(nowhere(size), texels, self.forces[None])
+        texels, (forces,) = add_up_by(slot_scratch(size), texels, self.forces[None])
         return Load(texels, forces)
 
 
-def nowhere(size: int) -> NDArray[np.int64]:
+def slot_scratch(size: int) -> NDArray[np.int64]:
     """Scratch for `add_up_by`, which cleans it up: a sum must not cost more on a larger grid. One for each thread."""
-    return _nowhere(size, threading.get_ident())
+    return _slot_scratch(size, threading.get_ident())
 
 
 @functools.lru_cache(maxsize=8)
-def _nowhere(size: int, thread: int) -> NDArray[np.int64]:
+def _slot_scratch(size: int, thread: int) -> NDArray[np.int64]:
     return np.full(size, -1)
 
 

@@ -66,14 +66,14 @@ class WaveOperator:
         return np.ones(self.mass.shape, bool) if self.fixed is None else ~self.fixed
 
     @functools.cached_property
-    def carries(self) -> NDArray[np.bool_]:
+    def movable(self) -> NDArray[np.bool_]:
         """Texels that sources may move: free, and with something that pulls back. All, where nothing pulls anywhere."""
         n = self.mass.shape[1]
         pulled = (_row_sums(np.abs(self.stencil), n) > 0) | (self.stiffness > 0)
         if self.rigidity is not None:
             pulled |= self.rigidity > 0
-        carries = pulled & self.free
-        return carries if carries.any() else self.free
+        movable = pulled & self.free
+        return movable if movable.any() else self.free
 
     def elastic_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
         """-(K + L B L + M k) h [N], float64 [6, N, N]; what holds the clamped texels is left out."""
@@ -157,7 +157,7 @@ def step_coefficients(operator: WaveOperator, dt: float) -> StepCoefficients:
         gain=np.where(operator.free, span / operator.mass, 0).astype(np.float32),
         decay=number_or_field((1 - half) / (1 + half)),
         spring=number_or_field(span * operator.stiffness),
-        span=number_or_field(span * operator.carries),
+        span=number_or_field(span * operator.movable),
     )
 
 

@@ -65,7 +65,7 @@ class WaveSolver:
         self.time = 0.0
         self.substeps_taken = 0
         self._backend = make_backend(backend, self.operator)
-        self._carrying_mass = float(self.operator.mass[self.operator.carries].sum())
+        self._movable_mass = float(self.operator.mass[self.operator.movable].sum())
         self._substep = 0.0
         self._held = Load.none()
         self._uploaded = self._held
@@ -183,7 +183,7 @@ class WaveSolver:
     def add_pressure(self, pressure: ArrayLike) -> None:
         """Add a pressure field [Pa], a number or [6, N, N], positive inwards, that is held from now on."""
         field = self._field(np.broadcast_to(pressure, self.operator.mass.shape), "pressure")
-        force = (field * self.atlas.areas * self.operator.carries).reshape(-1)
+        force = (field * self.atlas.areas * self.operator.movable).reshape(-1)
         texels = np.flatnonzero(force)
         self._hold(Load(texels, force[texels]))
 
@@ -290,19 +290,19 @@ class WaveSolver:
 
     def _shares(self, where: Footprint) -> NDArray[np.float64]:
         """Share of a unit source that each texel of a footprint takes up, [k]."""
-        area, carries = self.atlas.areas.reshape(-1), self.operator.carries.reshape(-1)
-        return where.weights * area[where.texels] * carries[where.texels]
+        area, movable = self.atlas.areas.reshape(-1), self.operator.movable.reshape(-1)
+        return where.weights * area[where.texels] * movable[where.texels]
 
     def _counterpart(self, momentum: float) -> float:
         """What all carrying texels are given so that a source of this momentum has none in the end."""
-        return -float(momentum) / self._carrying_mass if self.conserve_volume and self._carrying_mass else 0.0
+        return -float(momentum) / self._movable_mass if self.conserve_volume and self._movable_mass else 0.0
 
     def _source(self, value: ArrayLike, name: str, weight: NDArray[np.float64]) -> NDArray[np.float32]:
         """A field that is added, without its weighted mean where volume is conserved."""
         field = self._field(value, name).astype(np.float64) * self.operator.free
-        carries = self.operator.carries
-        if self.conserve_volume and carries.any():
-            field -= carries * ((weight * field).sum() / weight[carries].sum())
+        movable = self.operator.movable
+        if self.conserve_volume and movable.any():
+            field -= movable * ((weight * field).sum() / weight[movable].sum())
         return field.astype(np.float32)
 
     def _field(self, value: ArrayLike, name: str) -> NDArray[np.float32]:

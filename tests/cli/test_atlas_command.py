@@ -93,7 +93,7 @@ def test_a_picture_is_written_and_is_not_blank(tmp_path, capsys, ball_file):
     [
         ("atlas.bmp", r"'atlas\.bmp'.*valid are \.png"),
         ("atlas", "valid are"),
-        ("nowhere/atlas.png", "folder that exists"),
+        ("slot_scratch/atlas.png", "folder that exists"),
     ],
 )
 def test_a_picture_that_cannot_be_written_is_refused_before_the_mesh_is_read(capsys, monkeypatch, tmp_path, path, said):
@@ -151,7 +151,7 @@ def test_neighbouring_faces_of_the_cross_belong_together():
     atlas = sphere_atlas(1.0, 16)
     smooth = (atlas.positions + 1) / 2
     cross = AtlasPainter(atlas, smooth).cross(32)[..., :3]
-    middle = cross[48, 4::8]  # along the belt, where colours go round the sphere and are nowhere far apart
+    middle = cross[48, 4::8]  # along the belt, where colours go round the sphere and are slot_scratch far apart
     assert np.abs(np.diff(middle, axis=0)).max() < 0.4
     # above and below the face -y
     np.testing.assert_allclose(cross[30, 48], cross[33, 48], atol=0.2)

@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter
 
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.visuals import primitives as meshes
-from ripple_sim.solver import Relief, sphere_atlas
+from ripple_sim.solver import HeightMap, sphere_atlas
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import shared_context
 
@@ -41,7 +41,7 @@ def displaced_ball(divisions: int) -> Surface:
     return Surface((1.0 + height(ball.shell))[:, None] * ball.shell, ball.faces, ball.shell, N, "rubber")
 
 
-def frame(surface, relief, factor):
+def frame(surface, height_map, factor):
     model = mujoco.MjModel.from_xml_string(SCENE)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -49,7 +49,7 @@ def frame(surface, relief, factor):
     camera = Camera((0.0, 0.0, 0.8), 4.5, 100.0, -25.0)
     size = {"width": factor * SIZE[0], "height": factor * SIZE[1]}
     with Renderer(shared_context(), model, {target: surface}, **size) as renderer:
-        return renderer.render(data, {target: relief} if relief is not None else {}, camera)
+        return renderer.render(data, {target: height_map} if height_map is not None else {}, camera)
 
 
 def shrunk(picture, factor):
@@ -97,9 +97,9 @@ def test_similarity_of_pictures():
 
 def test_a_frame_is_that_of_the_brute_force_reference(tmp_path):
     atlas = sphere_atlas(1.0, N)
-    relief = Relief(atlas)(height(atlas.positions).astype(np.float32))
+    height_map = HeightMap(atlas)(height(atlas.positions).astype(np.float32))
     ball = meshes.ball(24)
-    own = frame(Surface(ball.shell, ball.faces, ball.shell, N, "rubber"), relief, 1)
+    own = frame(Surface(ball.shell, ball.faces, ball.shell, N, "rubber"), height_map, 1)
     reference = shrunk(frame(displaced_ball(180), None, FINER), FINER)
     check(own, reference, 0.98, tmp_path)
     # the ripples do matter: without them the picture is another

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from sphere_reliefs import N, constant_relief, linear_relief, relief_of
+from sphere_height_maps import N, constant_height_map, height_map_of, linear_height_map
 
 from ripple_sim.render import LOOKS, Camera, Renderer, Surface
 from ripple_sim.render.camera import perspective, view_matrix
@@ -62,10 +62,10 @@ def make(gl, xml=LONE_BALL, surface=None, size=SIZE, **options):
     return renderer, data, target
 
 
-def silhouette(gl, surface, relief) -> np.ndarray:
+def silhouette(gl, surface, height_map) -> np.ndarray:
     """Pixels that a target covers: those that differ from a frame from which the target is far away."""
     renderer, data, target = make(gl, surface=surface)
-    frame = renderer.render(data, {target: relief}, FRONT).astype(int)
+    frame = renderer.render(data, {target: height_map}, FRONT).astype(int)
     data.geom_xpos[target] = [0.0, -50.0, 0.0]
     empty = renderer.render(data, {}, FRONT).astype(int)
     return np.abs(frame - empty).max(axis=2) > 4
@@ -73,7 +73,7 @@ def silhouette(gl, surface, relief) -> np.ndarray:
 
 def test_frame_has_the_asked_size_and_shows_every_kind_of_geom(gl):
     renderer, data, target = make(gl, SCENE)
-    frame = renderer.render(data, {target: constant_relief(0.0)}, Camera((0, 0, 0), 6.0, 90.0, -20.0))
+    frame = renderer.render(data, {target: constant_height_map(0.0)}, Camera((0, 0, 0), 6.0, 90.0, -20.0))
     assert frame.shape == (SIZE[1], SIZE[0], 3)
     assert frame.dtype == np.uint8
     assert frame.std() > 10
@@ -81,11 +81,11 @@ def test_frame_has_the_asked_size_and_shows_every_kind_of_geom(gl):
 
 def test_same_input_gives_the_same_frame(gl):
     camera = Camera((0, 0, 0), 6.0, 70.0, -20.0)
-    relief = linear_relief(np.array([0.05, 0.02, -0.03]))
+    height_map = linear_height_map(np.array([0.05, 0.02, -0.03]))
     frames = []
     for _ in range(2):
         renderer, data, target = make(gl, SCENE)
-        frames += [renderer.render(data, {target: relief}, camera) for _ in range(2)]
+        frames += [renderer.render(data, {target: height_map}, camera) for _ in range(2)]
     for frame in frames[1:]:
         np.testing.assert_array_equal(frame, frames[0])
 
@@ -94,14 +94,14 @@ def test_a_frame_is_not_overwritten_by_the_next(gl):
     renderer, data, target = make(gl)
     first = renderer.render(data, {}, FRONT)
     kept = first.copy()
-    renderer.render(data, {target: constant_relief(0.3)}, FRONT)
+    renderer.render(data, {target: constant_height_map(0.3)}, FRONT)
     np.testing.assert_array_equal(first, kept)
 
 
 def test_constant_height_looks_like_a_larger_sphere(gl):
-    raised = silhouette(gl, ball_surface(1.0), constant_relief(0.25))
-    larger = silhouette(gl, ball_surface(1.25), constant_relief(0.0))
-    plain = silhouette(gl, ball_surface(1.0), constant_relief(0.0))
+    raised = silhouette(gl, ball_surface(1.0), constant_height_map(0.25))
+    larger = silhouette(gl, ball_surface(1.25), constant_height_map(0.0))
+    plain = silhouette(gl, ball_surface(1.0), constant_height_map(0.0))
     assert (raised != larger).mean() < 1e-3
     # and both as large as perspective says: the cone that touches a ball of radius r at distance D
     for pixels, radius in ((raised, 1.25), (plain, 1.0)):
@@ -113,8 +113,8 @@ def test_constant_height_looks_like_a_larger_sphere(gl):
 def test_constant_height_shades_as_flat(gl):
     """With no gradient the shading normal stays the surface's, whatever the height."""
     renderer, data, target = make(gl)
-    flat = renderer.render(data, {target: constant_relief(0.0)}, FRONT).astype(int)
-    raised = renderer.render(data, {target: constant_relief(0.002)}, FRONT).astype(int)
+    flat = renderer.render(data, {target: constant_height_map(0.0)}, FRONT).astype(int)
+    raised = renderer.render(data, {target: constant_height_map(0.002)}, FRONT).astype(int)
     inner = np.s_[50:130, 80:160]
     assert flat[inner].std() > 5
     assert np.abs(flat[inner] - raised[inner]).max() <= 3
@@ -124,9 +124,9 @@ def test_a_slope_that_faces_the_lamp_is_brighter(gl):
     """The key light stands on the left. A height that grows to the right turns the surface towards it."""
     renderer, data, target = make(gl)
     slope = np.array([0.5, 0.0, 0.0])
-    tilted = relief_of(lambda d: np.zeros(d.shape[:3]), lambda d: slope - (d @ slope)[..., None] * d)
+    tilted = height_map_of(lambda d: np.zeros(d.shape[:3]), lambda d: slope - (d @ slope)[..., None] * d)
     middle = np.s_[80:100, 110:130]
-    flat, lit = (renderer.render(data, {target: r}, FRONT)[middle].mean() for r in (constant_relief(0.0), tilted))
+    flat, lit = (renderer.render(data, {target: r}, FRONT)[middle].mean() for r in (constant_height_map(0.0), tilted))
     assert lit > flat + 20
 
 
@@ -134,14 +134,14 @@ def test_a_slope_that_faces_the_lamp_is_brighter(gl):
 def test_ripples_run_on_across_cube_edges_and_corners(gl, direction):
     """Close up, neighbouring pixels differ no more at an edge or a corner of the cube than in a face's middle."""
     slope = np.array([0.11, -0.07, 0.05])
-    relief = linear_relief(slope)
+    height_map = linear_height_map(slope)
     renderer, data, target = make(gl, size=(160, 160), samples=0)
 
     def steps(d) -> float:
         d = np.array(d, dtype=float) / np.linalg.norm(d)
         azimuth, elevation = np.degrees(np.arctan2(-d[1], -d[0])), np.degrees(np.arcsin(-d[2]))
         camera = Camera(tuple(d), 0.8, azimuth, elevation, 30.0)
-        frame = renderer.render(data, {target: relief}, camera).astype(int)
+        frame = renderer.render(data, {target: height_map}, camera).astype(int)
         # second differences: a smooth gradient has none, a kink or a crack has
         bends = [np.abs(np.diff(frame, n=2, axis=axis)).max() for axis in (0, 1)]
         return max(bends)
@@ -303,9 +303,9 @@ def test_frame_sizes_that_the_driver_cannot_make_are_refused(gl, size):
         make(gl, size=size)
 
 
-def test_a_relief_of_another_resolution_is_refused(gl):
+def test_a_height_map_of_another_resolution_is_refused(gl):
     renderer, data, target = make(gl)
-    with pytest.raises(RippleError, match="relief"):
+    with pytest.raises(RippleError, match="height map"):
         renderer.render(data, {target: np.zeros((6, 8, 8, 4), dtype=np.float32)}, FRONT)
 
 

@@ -60,6 +60,6 @@ def test_unknown_keys_of_a_map_are_refused() -> None:
 
 def test_missing_picture_is_named() -> None:
     scene = load_scene("face")
-    entry = msgspec.structs.replace(scene.surfaces[0], material=MaterialEntry(speed=MapEntry("nowhere.png")))
-    with pytest.raises(SolverError, match=r"nowhere\.png.* cannot be read"):
+    entry = msgspec.structs.replace(scene.surfaces[0], material=MaterialEntry(speed=MapEntry("slot_scratch.png")))
+    with pytest.raises(SolverError, match=r"slot_scratch\.png.* cannot be read"):
         Simulation(dataclasses.replace(scene, surfaces=(entry,)), resolution=16, backend="cpu")

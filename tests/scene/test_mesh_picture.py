@@ -41,7 +41,7 @@ def textured_obj(path: Path, head: str = "", before_faces: str = "") -> Path:
 def test_the_picture_is_named_by_the_material_library(tmp_path):
     half_and_half(tmp_path / "coat of paint.png")
     (tmp_path / "p.mtl").write_text(
-        "newmtl other\nmap_Kd nowhere.png\nnewmtl skin\nKd 1 1 1\nmap_Kd coat of paint.png\n"
+        "newmtl other\nmap_Kd slot_scratch.png\nnewmtl skin\nKd 1 1 1\nmap_Kd coat of paint.png\n"
     )
     mesh = textured_obj(tmp_path / "p.obj", "mtllib p.mtl", "usemtl skin")
     picture = mesh_picture(mesh)

@@ -226,9 +226,9 @@ def test_a_recording_ends_with_the_window(closed: Window, tmp_path: Path) -> Non
 
 
 def test_an_unwritable_folder_is_told_and_the_window_goes_on(window: Window) -> None:
-    window._takes._folder = Path("/proc/nowhere")
+    window._takes._folder = Path("/proc/slot_scratch")
     press(window, "s")
-    assert "cannot write /proc/nowhere/sphere-1.png" in window.message
+    assert "cannot write /proc/slot_scratch/sphere-1.png" in window.message
     press(window, "v")
     assert "cannot write" in window.message
     assert window.tick()

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.contacts.geom_contacts import Contacts
 from ripple_sim.coupling.patches.contact_patches import Patches, find_patches, find_spots
 from ripple_sim.solver import Load, WaveSolver
-from ripple_sim.solver.texels.distance import everywhere_infinite
+from ripple_sim.solver.texels.distance import distance_scratch
 from ripple_sim.solver.waves.footprint import texel_grid
-from ripple_sim.solver.waves.load import nowhere
+from ripple_sim.solver.waves.load import slot_scratch
 
 from .footprint_cache import NO_FOOTPRINTS, Footprints, lay, used_before
 from .low_pass import BODY, NO_PRESSURE, NOTHING_FELT, Felt, Pressure, follow
@@ -77,7 +77,7 @@ class Press:
 
     def renew(self, waves: WaveSolver) -> None:
         """Go on with the new waves of the target: what is owed stays owed."""
-        self._carried = (waves.atlas.areas * waves.operator.carries).reshape(-1)
+        self._movable_area = (waves.atlas.areas * waves.operator.movable).reshape(-1)
         self._state = self._state._replace(known=NO_FOOTPRINTS)
 
     def press(
@@ -105,7 +105,7 @@ class Press:
         spots, rows, lost = _stand(self._state, contacts.others, patches, surface, texels, timestep / elapsed)
         if len(lost):
             spots.places[lost], spots.texels[lost] = self._atlas.nearest(spots.points[lost])
-        size = len(self._carried)
+        size = len(self._movable_area)
         self._state, given, pressure = _press(
             self._state,
             contacts.others,
@@ -113,10 +113,10 @@ class Press:
             spots,
             rows,
             self._grid,
-            self._carried,
+            self._movable_area,
             elapsed,
-            everywhere_infinite(size),
-            nowhere(size),
+            distance_scratch(size),
+            slot_scratch(size),
         )
         pressed = Pressed(contacts, position, rotation, patches, surface, texels, pressure)
         return Load(self._state.felt.texels, given), pressed
@@ -125,7 +125,7 @@ class Press:
         """Load over a time in which no body touches."""
         if self._state.over:
             return Load.none()
-        self._state, given = _release(self._state, elapsed, nowhere(len(self._carried)))
+        self._state, given = _release(self._state, elapsed, slot_scratch(len(self._movable_area)))
         return Load(self._state.felt.texels, given)
 
 

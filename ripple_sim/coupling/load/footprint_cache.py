@@ -109,7 +109,7 @@ def lay(known, spots, rows, grid, carried, scratch):
     carried : float64 [6 N N]
         Area of each texel that takes up pressure [m^2], 0 where nothing moves.
     scratch : float64 [6 N N]
-        See `everywhere_infinite`.
+        See `distance_scratch`.
     """
     count, room = len(rows), 2 * len(known.texels) + 1024
     bodies, points = np.empty(count, np.int64), np.empty((count, 3))

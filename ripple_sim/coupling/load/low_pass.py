@@ -96,7 +96,7 @@ def follow(states, felt, pressure, dt, scratch):
     dt : float
         Time step [s].
     scratch : int64 [6 N N]
-        See `nowhere`.
+        See `slot_scratch`.
 
     Returns
     -------

@@ -86,6 +86,6 @@ class Hovering:
         if (point - place) @ normal >= height[texel]:
             return None
         where = footprint(atlas, place, min(self._radii[target], self._radii[other]))
-        carried = atlas.areas.reshape(-1)[where.texels] * waves.operator.carries.reshape(-1)[where.texels]
+        carried = atlas.areas.reshape(-1)[where.texels] * waves.operator.movable.reshape(-1)[where.texels]
         in_world = data.geom_xpos[target] + rotation @ place
         return Touch(target, other, in_world, rotation @ normal, Load(where.texels, where.weights * carried))

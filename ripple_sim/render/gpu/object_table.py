@@ -11,7 +11,7 @@ from ripple_sim.render.visuals.looks import Look
 from .resources import OwnedObjects
 
 _ROW = np.dtype(
-    [("base", "f4", 4), ("volume", "f4", 4), ("place", "f4", 4), ("relief", "f4", 4), ("rotation", "f4", (3, 4))]
+    [("base", "f4", 4), ("volume", "f4", 4), ("place", "f4", 4), ("height_map", "f4", 4), ("rotation", "f4", (3, 4))]
 )
 
 
@@ -31,18 +31,18 @@ class ObjectTable:
         opacity: float = 1.0,
         size: float = 1.0,
         painted: bool = False,
-        relief: tuple[int, int] = (0, 0),
+        height_map: tuple[int, int] = (0, 0),
     ) -> int:
         """Append a row and return its number.
 
-        `size` [m] scales the way through clear bodies; `relief` gives the first layer of an object's relief and the
-        texels along an edge of its faces, 0 without one.
+        `size` [m] scales the way through clear bodies; `height_map` gives the first layer of an object's height map and
+        the texels along an edge of its faces, 0 without one.
         """
         row = np.zeros((), dtype=_ROW)
         row["base"] = look.roughness, look.metallic, look.sheen, look.coat
         row["volume"] = look.translucency, look.transparency, look.emission, opacity
         row["place"] = geom, size, 0.0, painted
-        row["relief"][:2] = relief
+        row["height_map"][:2] = height_map
         self._rows.append(row)
         return len(self._rows) - 1
 
@@ -50,8 +50,8 @@ class ObjectTable:
         """Set how high an object's bumps or edges stand off it [m]: they shall not shade each other."""
         self._rows[number]["place"][2] = lift
 
-    def set_relief(self, number: int, lift: float, rotation: NDArray[np.float64]) -> None:
-        """Set the height of an object's highest bump [m], and the rotation of its relief into the world."""
+    def set_height_map(self, number: int, lift: float, rotation: NDArray[np.float64]) -> None:
+        """Set the height of an object's highest bump [m], and the rotation of its height map into the world."""
         self.set_lift(number, lift)
         self._rows[number]["rotation"][:, :3] = rotation.T  # column by column
 

@@ -1,7 +1,7 @@
 // What a figure shows on a target: a scalar field in colours, and the texel grid.
-#include "relief.glsl"
+#include "height_map.glsl"
 
-layout(binding = 12) uniform sampler2DArray field;    // padded like the relief
+layout(binding = 12) uniform sampler2DArray field;    // padded like the height map
 layout(binding = 13) uniform sampler2D field_colors;  // sRGB, from the least to the greatest value
 
 uniform float field_limit;   // the colours reach from minus this to plus this
@@ -15,7 +15,7 @@ vec3 field_color(vec3 direction)
     return texture(field_colors, vec2((0.5 + (0.5 + 0.5 * value) * last) / (last + 1.0), 0.5)).rgb;
 }
 
-// Two axes of a face, and the one through its middle, of any vector; the order is that of `relief_position`.
+// Two axes of a face, and the one through its middle, of any vector; the order is that of `height_map_position`.
 vec3 seen_from(float face, vec3 d)
 {
     if (face < 2.0)
@@ -36,7 +36,7 @@ vec2 place_change(float face, vec3 direction, vec3 change)
 // Lines of a pixel's width between blocks of texels, stronger ones along the edges of the faces.
 float grid_ink(vec3 direction)
 {
-    vec3 where = relief_position(direction, resolution);
+    vec3 where = height_map_position(direction, resolution);
     vec2 place = where.xy - 1.0;
     // places jump where two faces meet, directions do not
     vec2 pixel = abs(place_change(where.z, direction, dFdx(direction)))

@@ -3,7 +3,7 @@
 // leave them: once a frame for all passes.
 layout(local_size_x = 64) in;
 
-#include "relief.glsl"
+#include "height_map.glsl"
 #include "occluders.glsl"
 
 struct Vertex { float position[3], direction[3], sphere[3]; };
@@ -28,7 +28,7 @@ void main()
         i = midpoints[i - base_count];
     Vertex v = rest[i];
     vec3 sphere = vec3(v.sphere[0], v.sphere[1], v.sphere[2]);
-    float height = spline_at(relief, resolution, first_layer, sphere).w;
+    float height = spline_at(height_map, resolution, first_layer, sphere).w;
     vec3 direction = vec3(v.direction[0], v.direction[1], v.direction[2]);
     vec3 world = rotation * (vec3(v.position[0], v.position[1], v.position[2]) + height * direction) + origin;
     moved[i] = vec4(world, openness_to_bodies(world, rotation * direction, geom, occluder_count));

@@ -1,7 +1,7 @@
 #include "geometry.glsl"
 
 layout(location = 0) out vec4 shape;  // normal without ripples, number of the object, openness with half the thickness
-layout(location = 1) out vec4 paint;  // where the relief is looked up; colour and ink, two shares a channel
+layout(location = 1) out vec4 paint;  // where the height map is looked up; colour and ink, two shares a channel
 
 // The colour is the square root of the albedo; `baked` holds the openness and half the thickness; `ink` is that of lines
 // on top.

@@ -10,7 +10,7 @@
 #include "shadow.glsl"
 #include "shading.glsl"
 #include "geometry.glsl"
-#include "relief.glsl"
+#include "height_map.glsl"
 
 layout(binding = 6) uniform sampler2D scene;  // the picture without the clear bodies
 
@@ -18,7 +18,7 @@ struct Object {
     vec4 base;    // roughness, metallic, sheen, coat
     vec4 volume;  // translucency, transparency, emission, opacity
     vec4 place;   // geom, size [m], height of its bumps [m], 1 where its paint goes over the light
-    vec4 relief;  // first layer, texels along an edge of a face; 0 without a relief
+    vec4 height_map;  // first layer, texels along an edge of a face; 0 without a height map
     mat3 rotation;
 };
 layout(std430, binding = 5) readonly buffer Objects { Object objects[]; };
@@ -63,8 +63,8 @@ Spot spot_at(ivec2 pixel, int s)
     spot.color = vec3(red_green, blue_ink.x);
     spot.ink = blue_ink.y;
     Object object = objects[spot.object];
-    vec4 ripple = spline_at(relief, object.relief.y, object.relief.x, unfolded(paint.xy));
-    ripple *= object.relief.y > 0.0 ? 1.0 : 0.0;
+    vec4 ripple = spline_at(height_map, object.height_map.y, object.height_map.x, unfolded(paint.xy));
+    ripple *= object.height_map.y > 0.0 ? 1.0 : 0.0;
     spot.rippled = normalize(spot.normal - object.rotation * ripple.xyz);
     // troughs lie deeper than their surroundings: less light finds its way in
     spot.openness = baked.x * (1.0 - 0.4 * smoothstep(0.0, 0.03, -ripple.w / object.place.y));
@@ -98,7 +98,7 @@ vec4 lit_solid(Spot spot, vec3 position, float spread, bvec2 block)
 #endif
     Material m = Material(painted ? vec3(NEUTRAL) : spot.color * spot.color, object.base.x, object.base.y, object.base.z,
                           object.base.w, object.volume.x, object.volume.y, object.volume.z, spot.thickness, behind,
-                          object.place.z, spot.openness, object.relief.y > 0.0 ? 0 : int(counts.x), block);
+                          object.place.z, spot.openness, object.height_map.y > 0.0 ? 0 : int(counts.x), block);
     vec3 shown = developed(shaded(m, position, spot.rippled, spot.normal, object.place.x, spread));
     float shade = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / FULL_LIGHT, DARKEST, 1.0);
     return vec4(mix(painted ? spot.color * shade : shown, INK, spot.ink), object.volume.w);

@@ -1,4 +1,4 @@
-"""The reliefs of all targets on the GPU, where any pass can look them up."""
+"""The height maps of all targets on the GPU, where any pass can look them up."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ripple_sim.render.gpu.resources import OwnedObjects
 
 LAYERS = 6  # of one target: a face each
-_UNIT = 0  # of the texture, in shaders/relief.glsl
+_UNIT = 0  # of the texture, in shaders/height map.glsl
 
 
-class ReliefTextures:
-    """One texture with six layers a target. All layers are as wide as the widest relief; others fill a corner.
+class HeightMapTextures:
+    """One texture with six layers a target. All layers are as wide as the widest height map; others fill a corner.
 
     Parameters
     ----------
@@ -30,10 +30,10 @@ class ReliefTextures:
         self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self._texture.repeat_x = self._texture.repeat_y = False
 
-    def write(self, first_layer: int, relief: NDArray[np.float32]) -> None:
-        """Take in a target's relief, [6, N + 2, N + 2, 4]."""
-        layers, height, width, _ = relief.shape
-        data = np.ascontiguousarray(relief, dtype=np.float32)
+    def write(self, first_layer: int, height_map: NDArray[np.float32]) -> None:
+        """Take in a target's height map, [6, N + 2, N + 2, 4]."""
+        layers, height, width, _ = height_map.shape
+        data = np.ascontiguousarray(height_map, dtype=np.float32)
         self._texture.write(data, viewport=(0, 0, first_layer, width, height, layers))
 
     def bind(self) -> None:

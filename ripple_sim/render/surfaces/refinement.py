@@ -12,7 +12,7 @@ from .tessellation import Edges
 
 
 class Refinement:
-    """Splits the edges of a mesh at their midpoints where a relief bends too much between their ends.
+    """Splits the edges of a mesh at their midpoints where a height map bends too much between their ends.
 
     Whether an edge is split depends on its length and the heights at its ends and its midpoint alone, so that triangles
     on both sides of it, and of a seam or a crease, agree: no gap opens.
@@ -26,9 +26,9 @@ class Refinement:
     positions : array, shape [n + k, 3]
         Of the vertices, and after them of the edges' midpoints [m].
     sphere : array, shape [n + k, 3]
-        Where the relief is looked up: directions from the cube's centre.
+        Where the height map is looked up: directions from the cube's centre.
     resolution : int
-        Texels N along an edge of the relief's faces.
+        Texels N along an edge of the height map's faces.
     tolerance : float
         How far the height at a midpoint may be from the mean of those at the ends [m].
     min_length : float
@@ -65,15 +65,15 @@ class Refinement:
         self._texel = np.column_stack([face, nearest]).astype(np.int32)
         self._offset = (place - nearest).astype(np.float32)
 
-    def __call__(self, relief: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Triangles [t, 3] for a relief [6, N + 2, N + 2, 4], and the midpoints [s] that they use, as vertices.
+    def __call__(self, height_map: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Triangles [t, 3] for a height map [6, N + 2, N + 2, 4], and the midpoints [s] that they use, as vertices.
 
         Where no edge is split, the triangles are the same array each time.
         """
         whole = self._faces, np.empty(0, np.int32)
-        if not len(self._long) or not relief[..., 3].any():
+        if not len(self._long) or not height_map[..., 3].any():
             return whole
-        split = self._long[_departing(_heights(relief, self._texel, self._offset), self._ends, self._tolerance)]
+        split = self._long[_departing(_heights(height_map, self._texel, self._offset), self._ends, self._tolerance)]
         if not len(split):
             return whole
         midpoint = np.full(len(self._length), -1, np.int32)
@@ -82,7 +82,7 @@ class Refinement:
 
 
 @numba.njit(cache=True, nogil=True)
-def _heights(relief, texel, offset):
+def _heights(height_map, texel, offset):
     """The quadratic B-spline of the shaders."""
     height = np.empty(len(texel), np.float32)
     half = np.float32(0.5)
@@ -93,7 +93,7 @@ def _heights(relief, texel, offset):
         middle = np.float32(0.75) - t * t
         line = np.empty(3, np.float32)
         for k in range(3):
-            across = relief[face, row + k]
+            across = height_map[face, row + k]
             line[k] = left * across[column, 3] + middle * across[column + 1, 3] + right * across[column + 2, 3]
         height[i] = half * (half - s) ** 2 * line[0] + (np.float32(0.75) - s * s) * line[1]
         height[i] += half * (half + s) ** 2 * line[2]

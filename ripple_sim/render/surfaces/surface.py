@@ -33,9 +33,9 @@ class Surface:
     F : array, shape [m, 3]
         Triangles, counter-clockwise from outside.
     sphere : array, shape [n, 3]
-        Unit vectors: where the relief is looked up.
+        Unit vectors: where the height map is looked up.
     resolution : int
-        Texels N per edge of the relief's faces.
+        Texels N per edge of the height map's faces.
     look : str
         Name of one of `LOOKS`; "model" takes colour, texture and gloss from the geom's MuJoCo material.
     color : tuple, optional

@@ -16,7 +16,7 @@ from ripple_sim.render.visuals.texture_mapping import CUBE_IMAGE, NO_IMAGE
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.gl import GLContext
 
-from .height_maps import LAYERS, ReliefTextures
+from .height_maps import LAYERS, HeightMapTextures
 from .refinement import Refinement
 from .scalar_field import FieldTexture
 from .surface import Surface, appearance, load_image
@@ -47,10 +47,10 @@ class SurfaceMesh:
         Of the model.
     table : ObjectTable
         Takes a row for the target.
-    reliefs : ReliefTextures
-        Takes the target's relief.
+    height_maps : HeightMapTextures
+        Takes the target's height map.
     index : int
-        Of the target among those that have a relief there.
+        Of the target among those that have a height map there.
     size : (width, height)
         Of the frame [pixels].
     """
@@ -64,7 +64,7 @@ class SurfaceMesh:
         surface: Surface,
         textures: Textures,
         table: ObjectTable,
-        reliefs: ReliefTextures,
+        height_maps: HeightMapTextures,
         index: int,
         size: tuple[int, int],
     ) -> None:
@@ -75,9 +75,9 @@ class SurfaceMesh:
         self.clear = look.transparency > 0.0
         self.shades = look.transparency < _NO_SHADOW
         self.radius = float(np.linalg.norm(surface.V, axis=1).max())
-        self._table, self._reliefs, self._first_layer = table, reliefs, LAYERS * index
+        self._table, self._height_maps, self._first_layer = table, height_maps, LAYERS * index
         self.number = table.add(
-            look, geom, size=self.radius, painted=shows_field, relief=(self._first_layer, self.resolution)
+            look, geom, size=self.radius, painted=shows_field, height_map=(self._first_layer, self.resolution)
         )
         pixel = 2 * self.radius / size[1]
         faces, vertices, edges = refined(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
@@ -136,29 +136,29 @@ class SurfaceMesh:
         ctx: moderngl.Context,
         rotation: NDArray[np.float64],
         origin: NDArray[np.float64],
-        relief: NDArray[np.float32] | None,
+        height_map: NDArray[np.float32] | None,
         occluders: int,
     ) -> None:
-        """Take in a relief (none: flat) and put the displaced vertices where the geom is, among the bound occluders."""
+        """Take in a height map (none: flat) and put the displaced vertices where the geom is."""
         shape = (6, self.resolution + 2, self.resolution + 2, 4)
-        if relief is None:
-            relief = np.zeros(shape, dtype=np.float32)
-        if relief.shape != shape:
+        if height_map is None:
+            height_map = np.zeros(shape, dtype=np.float32)
+        if height_map.shape != shape:
             raise RippleError(
-                f"the relief of geom {self.geom} has shape {list(relief.shape)}; resolution {self.resolution} needs "
-                f"{list(shape)}: six faces padded by one texel, gradient and height"
+                f"the height map of geom {self.geom} has shape {list(height_map.shape)}; resolution {self.resolution} "
+                f"needs {list(shape)}: six faces padded by one texel, gradient and height"
             )
-        self._pose, self._highest = (np.array(rotation), np.array(origin)), float(np.abs(relief[..., 3]).max())
-        self._table.set_relief(self.number, min(1.5 * self._highest, 0.05 * self.radius), rotation)
-        triangles, middle = self._refinement(relief)
+        self._pose, self._highest = (np.array(rotation), np.array(origin)), float(np.abs(height_map[..., 3]).max())
+        self._table.set_height_map(self.number, min(1.5 * self._highest, 0.05 * self.radius), rotation)
+        triangles, middle = self._refinement(height_map)
         if triangles is not self._triangles:
             self._indices.write(triangles)
             self._triangles = triangles
         if len(middle):
             self._midpoints.write(middle)
         self._index_count, count = triangles.size, self._refinement.base_count + len(middle)
-        self._reliefs.write(self._first_layer, relief)
-        self._reliefs.bind()
+        self._height_maps.write(self._first_layer, height_map)
+        self._height_maps.bind()
         self._rest.bind_to_storage_buffer(0)
         self._moved.bind_to_storage_buffer(1)
         self._midpoints.bind_to_storage_buffer(2)
@@ -175,7 +175,7 @@ class SurfaceMesh:
         ctx.memory_barrier()
 
     def set_field(self, field: NDArray[np.float32], limit: float) -> None:
-        """Take in the scalar field that is shown, [6, N + 2, N + 2], padded like a relief.
+        """Take in the scalar field that is shown, [6, N + 2, N + 2], padded like a height map.
 
         The colours reach from -limit to limit. The surface must have `field_colors`.
         """

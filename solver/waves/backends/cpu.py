@@ -60,7 +60,7 @@ class CPUBackend:
         if thread_count is None:
             thread_count = threads.available() if n >= _LARGE else 1
         self._threads = thread_count if plain else 1
-        self._carries = number_or_field(operator.carries)
+        self._movable = number_or_field(operator.movable)
         self._shift = self._prepared_dt = 0.0
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
@@ -131,7 +131,7 @@ class CPUBackend:
 
     def _drift(self, dt: float) -> None:
         if dt or self._shift:
-            kernels.drift(self._h, self._v, self._carries, np.float32(self._shift), np.float32(dt))
+            kernels.drift(self._h, self._v, self._movable, np.float32(self._shift), np.float32(dt))
         self._shift = 0.0
 
     def _prepare(self, dt: float) -> StepCoefficients:

@@ -32,7 +32,7 @@ class GLBackend:
         self._viscous = self._laplace = self._dent = self._extra = None
         self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
         self._stencil = fields.upload_stencil(operator.stencil)
-        self._carries = fields.upload(operator.carries)
+        self._movable = fields.upload(operator.movable)
         self._kicks, self._forces = TexelList(self._gl), TexelList(self._gl)
         if operator.viscous_stencil is not None:
             self._viscous = fields.upload_stencil(operator.viscous_stencil)
@@ -132,7 +132,7 @@ class GLBackend:
             self._kick_texels(self._kicks, 0.0)
         if dt or self._shift:
             self._drift["dt"], self._drift["shift"] = dt, self._shift
-            self._bind(self._h, self._v, self._carries)
+            self._bind(self._h, self._v, self._movable)
             self._run_list(self._drift, self._fields.eights)
         self._shift = 0.0
 

@@ -49,13 +49,13 @@ def kick(h, v, texels, kicks, dt):
 
 
 @numba.njit(cache=True, nogil=True)
-def drift(h, v, carries, shift, dt):
+def drift(h, v, movable, shift, dt):
     """Add the shift to v where waves are carried, then dt v to h."""
     n = h.shape[1] - 2
     for i in range(6 * n):
         f, r = i // n, i % n + 1
         for c in range(1, n + 1):
-            v[f, r, c] += shift * _in(_row(carries, f, r - 1), c - 1)
+            v[f, r, c] += shift * _in(_row(movable, f, r - 1), c - 1)
             h[f, r, c] += dt * v[f, r, c]
 
 

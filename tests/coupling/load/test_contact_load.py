@@ -12,9 +12,9 @@ from ripple_sim.coupling.patches.clusters import probe, spread
 from ripple_sim.coupling.patches.contact_patches import Spots, find_patches, find_spots
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas
-from ripple_sim.solver.texels.distance import everywhere_infinite
+from ripple_sim.solver.texels.distance import distance_scratch
 from ripple_sim.solver.waves.footprint import footprint, texel_grid
-from ripple_sim.solver.waves.load import nowhere
+from ripple_sim.solver.waves.load import slot_scratch
 
 RADII, CONVEX = np.array([0.5, 0.04, 0.06, 0.03, 0.05]), np.array([True, True, False, True, True])
 
@@ -80,7 +80,7 @@ def laid(atlas: Atlas, known: Footprints, spots: Spots, here: list[int]) -> tupl
     states["here"][here] = True
     rows, lost = used_before(known, spots, states)
     assert not len(lost), "all places are known"
-    carried, scratch = atlas.areas.reshape(-1), everywhere_infinite(atlas.areas.size)
+    carried, scratch = atlas.areas.reshape(-1), distance_scratch(atlas.areas.size)
     return lay(known, spots, rows, texel_grid(atlas), carried, scratch), rows
 
 
@@ -128,12 +128,12 @@ def test_bodies_are_smoothed_each_for_itself() -> None:
         texels = [rng.permutation(8) + 10 * g for g in present]
         forces = [rng.exponential(1.0, 8) for _ in present]
         pressure = pressure_of(present, texels, forces)
-        felt, given, over = follow(states, felt, pressure, dt, nowhere(size))
+        felt, given, over = follow(states, felt, pressure, dt, slot_scratch(size))
         together, apart = np.bincount(felt.texels, given, size), np.zeros(size)
         for g in range(1, 4):
             mine = slice(present.index(g), present.index(g) + 1) if g in present else slice(0, 0)
             mine = pressure_of(present[mine], texels[mine], forces[mine])
-            own, out, _ = follow(alone[g][0], alone[g][1], mine, dt, nowhere(size))
+            own, out, _ = follow(alone[g][0], alone[g][1], mine, dt, slot_scratch(size))
             alone[g] = alone[g][0], own
             apart += np.bincount(own.texels, out, size)
         np.testing.assert_array_equal(together, apart)

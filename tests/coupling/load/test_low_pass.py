@@ -9,7 +9,7 @@ from ripple_sim.coupling.load.low_pass import BODY, NO_PRESSURE, NOTHING_FELT, O
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Load, WaveSolver, sphere_atlas
 from ripple_sim.solver.waves.footprint import footprint
-from ripple_sim.solver.waves.load import nowhere
+from ripple_sim.solver.waves.load import slot_scratch
 
 GRAVITY = 9.81
 TARGETS = {
@@ -109,7 +109,7 @@ class Pressing:
         )
 
     def follow(self, pressure: Pressure) -> Load:
-        scratch = nowhere(self.atlas.areas.size)
+        scratch = slot_scratch(self.atlas.areas.size)
         self.felt, given, self.over = follow(self.states, self.felt, pressure, self.dt, scratch)
         return Load(self.felt.texels, given)
 

@@ -47,7 +47,7 @@ def test_the_interpolated_background_is_that_of_each_pixel(gl, monkeypatch, ligh
     assert np.abs(interpolated - exact).max() <= 3
 
 
-def test_reliefs_of_different_resolutions_stay_apart(gl):
+def test_height_maps_of_different_resolutions_stay_apart(gl):
     """Targets that swell each by its own height cover what balls of these radii cover."""
     xml = """<mujoco><worldbody>
         <geom type="sphere" size=".5" pos="-.8 0 0"/><geom type="sphere" size=".5" pos=".8 0 0"/>
@@ -63,12 +63,12 @@ def test_reliefs_of_different_resolutions_stay_apart(gl):
             geom: Surface(radii[geom] * ball.shell, ball.faces, ball.shell, resolutions[geom], "clay")
             for geom in range(2)
         }
-        reliefs = {
+        height_maps = {
             geom: np.full((6, n + 2, n + 2, 4), [0, 0, 0, swell[geom]], dtype=np.float32)
             for geom, n in enumerate(resolutions)
         }
         with Renderer(gl, model, surfaces, width=SIZE[0], height=SIZE[1]) as renderer:
-            return renderer.render(data, reliefs, Camera((0, 0, 0), 4.0, 90.0, 0.0)).astype(int)
+            return renderer.render(data, height_maps, Camera((0, 0, 0), 4.0, 90.0, 0.0)).astype(int)
 
     swollen, larger = frame([0.5, 0.5], heights), frame([0.5 + h for h in heights], (0.0, 0.0))
     assert (np.abs(swollen - larger).max(axis=2) > 24).mean() < 2e-3

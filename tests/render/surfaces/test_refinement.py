@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sphere_reliefs import N, constant_relief, relief_of
+from sphere_height_maps import N, constant_height_map, height_map_of
 
 from ripple_sim.render.surfaces.refinement import Refinement
 from ripple_sim.render.surfaces.tessellation import edges_of, midpoints
@@ -33,16 +33,16 @@ def pit(width, depth=0.1):
     def height(d):
         return -depth * np.exp(-((np.linalg.norm(d - [0.0, 0.6, 0.8], axis=-1) / width) ** 2))
 
-    return relief_of(height, np.zeros_like)
+    return height_map_of(height, np.zeros_like)
 
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("min_length", [0.0, 0.13])
-def test_no_gap_opens_for_any_relief(seed, min_length):
+def test_no_gap_opens_for_any_height_map(seed, min_length):
     rng = np.random.default_rng(seed)
     heights = rng.normal(0.0, 0.01, (6, N, N)) * (rng.random((6, N, N)) < 0.1 * (seed + 1))
     refine, vertices, F = ball(0.001, min_length)
-    triangles, used = refine(relief_of(lambda d: heights, np.zeros_like))
+    triangles, used = refine(height_map_of(lambda d: heights, np.zeros_like))
     assert len(F) < len(triangles) < 4 * len(F)
     closed = geometric(vertices, triangles)
     sides = np.concatenate([closed[:, [0, 1]], closed[:, [1, 2]], closed[:, [2, 0]]])
@@ -58,7 +58,7 @@ def test_no_gap_opens_for_any_relief(seed, min_length):
 def test_a_still_or_lifted_surface_has_the_triangles_of_its_mesh():
     refine, _, F = ball(1e-5)
     for height in (0.0, 0.3):
-        triangles, used = refine(constant_relief(height))
+        triangles, used = refine(constant_height_map(height))
         np.testing.assert_array_equal(triangles, F)
         assert len(used) == 0
 
@@ -86,13 +86,13 @@ def test_edges_are_split_where_waves_depart_from_them():
 
     tolerance = 1.2e-3
     refine, vertices, _ = ball(tolerance)
-    _, used = refine(relief_of(height, np.zeros_like))
+    _, used = refine(height_map_of(height, np.zeros_like))
     base = refine.base_count
     ends = edges_of(np.arange(base).reshape(-1, 3), np.arange(base)).ends
     at = height(vertices[:, SPHERE] / np.linalg.norm(vertices[:, SPHERE], axis=1, keepdims=True))
     departure = np.abs(at[base:] - at[ends].mean(axis=1))
     split = np.isin(base + np.arange(len(ends)), used)
-    # along the cube's edges grid lines kink, and the spline of so coarse a relief is further from the wave
+    # along the cube's edges grid lines kink, and the spline of so coarse a height map is further from the wave
     across = np.sort(np.abs(vertices[base:, SPHERE]), axis=1)
     inside = across[:, 1] < 0.8 * across[:, 2]
     assert departure[inside & split].min() > 0.8 * tolerance
@@ -100,7 +100,7 @@ def test_edges_are_split_where_waves_depart_from_them():
     assert 0.1 < split[inside].mean() < 0.9
 
 
-def test_same_relief_gives_the_same_triangles():
+def test_same_height_map_gives_the_same_triangles():
     first, _, _ = ball(0.002)
     second, _, _ = ball(0.002)
     for _ in range(2):

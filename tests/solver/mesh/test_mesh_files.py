@@ -283,7 +283,7 @@ def test_folders_and_missing_files_are_named(tmp_path: Path) -> None:
     assert "is a folder" in refusal(tmp_path / "folder.obj")
     assert "does not exist" in refusal(tmp_path / "missing.obj")
     assert "does not exist" in refusal(tmp_path / "missing" / "deep.obj")
-    (tmp_path / "dangling.obj").symlink_to(tmp_path / "nowhere.obj")
+    (tmp_path / "dangling.obj").symlink_to(tmp_path / "slot_scratch.obj")
     assert "does not exist" in refusal(tmp_path / "dangling.obj")
     assert "cannot be read" in refusal(tmp_path / ("long" * 100 + ".obj"))
 

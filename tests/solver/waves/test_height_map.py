@@ -1,8 +1,8 @@
-"""The relief: second-order gradients everywhere, continuous over the cube's edges and corners."""
+"""The height map: second-order gradients everywhere, continuous over the cube's edges and corners."""
 
 import numpy as np
 
-from ripple_sim.solver import Relief, sphere_atlas
+from ripple_sim.solver import HeightMap, sphere_atlas
 
 
 def field_and_gradient(d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -17,9 +17,9 @@ def test_gradient_converges_at_second_order_also_at_the_cubes_edges() -> None:
     for n in (16, 32, 64):
         atlas = sphere_atlas(1.0, n)
         h, gradient = field_and_gradient(atlas.positions)
-        relief = Relief(atlas)(h.astype(np.float32))[:, 1:-1, 1:-1]
-        np.testing.assert_array_equal(relief[..., 3], h.astype(np.float32))
-        errors.append(np.linalg.norm(relief[..., :3] - gradient, axis=-1).max())
+        height_map = HeightMap(atlas)(h.astype(np.float32))[:, 1:-1, 1:-1]
+        np.testing.assert_array_equal(height_map[..., 3], h.astype(np.float32))
+        errors.append(np.linalg.norm(height_map[..., :3] - gradient, axis=-1).max())
     assert np.log2(errors[0] / errors[1]) > 1.8
     assert np.log2(errors[1] / errors[2]) > 1.8
 
@@ -28,12 +28,12 @@ def test_ring_makes_interpolation_continuous() -> None:
     n = 12
     atlas = sphere_atlas(1.0, n)
     h, _ = field_and_gradient(atlas.positions)
-    relief = Relief(atlas)(h.astype(np.float32))
+    height_map = HeightMap(atlas)(h.astype(np.float32))
     # where three faces meet, each face's bilinear value at the cube's corner is the mean of the same three texels
     corners = {}
     for face in range(6):
         for r, c in ((0, 0), (0, n), (n, 0), (n, n)):
-            cell = relief[face, r : r + 2, c : c + 2].reshape(4, 4)
+            cell = height_map[face, r : r + 2, c : c + 2].reshape(4, 4)
             value = tuple(np.round(cell.mean(axis=0), 5))
             corners.setdefault(value, []).append(face)
     assert len(corners) == 8

@@ -83,7 +83,7 @@ def test_threads_change_no_bit(feature: str) -> None:
     atlas = sphere_atlas(1.0, 20)
     operator = build_operator(atlas, FEATURES[feature](atlas), "fem")
     start = np.random.default_rng(3).standard_normal(atlas.areas.shape).astype(np.float32)
-    loaded = np.flatnonzero(operator.carries)[:40]
+    loaded = np.flatnonzero(operator.movable)[:40]
 
     def run(threads: int) -> bytes:
         backend = CPUBackend(operator, threads)

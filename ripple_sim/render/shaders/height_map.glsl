@@ -1,8 +1,8 @@
-// The reliefs of all targets: gradient (xyz) and height (w) on six faces each with a ring of neighbour texels.
-layout(binding = 0) uniform sampler2DArray relief;
+// The height maps of all targets: gradient (xyz) and height (w) on six faces each with a ring of neighbour texels.
+layout(binding = 0) uniform sampler2DArray height_map;
 
 // Face and position, in texels of the padded face, that a direction from the cube's centre meets.
-vec3 relief_position(vec3 d, float resolution)
+vec3 height_map_position(vec3 d, float resolution)
 {
     vec3 size = abs(d);
     float face, u, v, main;
@@ -31,7 +31,7 @@ vec3 relief_position(vec3 d, float resolution)
 vec4 spline_at(sampler2DArray faces, float resolution, float first_layer, vec3 direction)
 {
     float width = float(textureSize(faces, 0).x);
-    vec3 position = relief_position(direction, resolution);
+    vec3 position = height_map_position(direction, resolution);
     position.z += first_layer;
     vec2 texel = floor(position.xy);
     vec2 t = position.xy - texel - 0.5;

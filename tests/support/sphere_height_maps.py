@@ -1,4 +1,4 @@
-"""Reliefs of a sphere, by functions of the unit vector."""
+"""Height maps of a sphere, by functions of the unit vector."""
 
 import numpy as np
 
@@ -7,8 +7,8 @@ from ripple_sim.solver.texels.cube_map.convention import padded_indices, texel_d
 N = 24
 
 
-def relief_of(height, gradient) -> np.ndarray:
-    """Relief of functions of the unit vector, with the ring of neighbours filled in."""
+def height_map_of(height, gradient) -> np.ndarray:
+    """HeightMap of functions of the unit vector, with the ring of neighbours filled in."""
     directions = texel_directions(N)
     texels = np.concatenate([gradient(directions), height(directions)[..., None]], axis=3)
     index = padded_indices(N)
@@ -20,10 +20,10 @@ def relief_of(height, gradient) -> np.ndarray:
     return padded.astype(np.float32)
 
 
-def constant_relief(height: float) -> np.ndarray:
-    return relief_of(lambda d: np.full(d.shape[:3], height), np.zeros_like)
+def constant_height_map(height: float) -> np.ndarray:
+    return height_map_of(lambda d: np.full(d.shape[:3], height), np.zeros_like)
 
 
-def linear_relief(slope: np.ndarray) -> np.ndarray:
+def linear_height_map(slope: np.ndarray) -> np.ndarray:
     """Height `slope . d` on the unit sphere: smooth everywhere, cube edges and corners included."""
-    return relief_of(lambda d: d @ slope, lambda d: slope - (d @ slope)[..., None] * d)
+    return height_map_of(lambda d: d @ slope, lambda d: slope - (d @ slope)[..., None] * d)

@@ -1,0 +1,28 @@
+"""Compiled loops: every numba kernel of the project is declared by `@kernel`.
+
+A kernel has hints for whoever reads it (numba takes its types from the call), and its docstring gives shapes and
+units. Arrays that belong together travel as one NamedTuple. Each thread runs kernels without the interpreter's lock.
+There is no fast-math unless a kernel asks for it: the same input gives the same output, bit for bit. Compiled kernels
+are kept on disk. Numba notices a change of a kernel's own file only: delete the *.nbi files after editing one that others call.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Floats: TypeAlias = NDArray[np.float64]
+Floats32: TypeAlias = NDArray[np.float32]
+Ints: TypeAlias = NDArray[np.int64]
+Ints32: TypeAlias = NDArray[np.int32]
+Bools: TypeAlias = NDArray[np.bool_]
+
+
+def kernel(function: Callable | None = None, **options: Any) -> Any:
+    """Compile a function at its first call: `@kernel`, or `@kernel(inline="always")` with options of `numba.njit`."""
+    compiler = numba.njit(cache=True, nogil=True, error_model="numpy", **options)
+    return compiler if function is None else compiler(function)
