@@ -13,8 +13,8 @@ from PIL import Image, ImageDraw
 from ripple_sim.bench.accuracy import arrivals, sphere_modes
 from ripple_sim.bench.arrival import plane_arrival
 from ripple_sim.solver import WaveSolver, sphere_atlas
+from ripple_sim.solver.operator.assembly import OPERATORS
 from ripple_sim.solver.texels.sampling import sampling_matrix
-from ripple_sim.solver.waves.operator import OPERATORS
 
 SIZE, CAPTION, SMOOTH = 360, 76, 2
 RESOLUTION, TIME, WIDTH, SOURCE = 96, 0.8, 0.09, np.array([0.45, 0.25, 0.86])

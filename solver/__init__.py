@@ -1,4 +1,4 @@
-"""Surface waves on genus-0 meshes: mesh -> sphere map -> atlas -> operator -> waves. Knows nothing of MuJoCo.
+"""Surface waves on meshes: mesh -> layout -> atlas -> operator -> waves. Knows nothing of MuJoCo.
 
 The public names load their modules when they are first used, so that importing this package is quick.
 """
@@ -9,19 +9,22 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .atlas.build import build_atlas
+    from .atlas.load import load_atlas
+    from .cube_map.sphere_atlas import SphereAtlas, sphere_atlas
     from .errors import AtlasError, GLError, MeshError, RippleError, SolverError, SphereMapError
     from .mesh.mesh import Mesh
     from .mesh.mesh_file import load_mesh
+    from .operator.absorbing import absorbing_damping
+    from .operator.material import Material
     from .texels.atlas import Atlas
-    from .texels.atlas_file import load_atlas
-    from .texels.build import build_atlas
-    from .texels.cube_map.sphere_atlas import SphereAtlas, sphere_atlas
     from .texels.maps import texture_map, vertex_map
-    from .waves.absorbing import absorbing_damping
+    from .texels.texel_atlas import texel_atlas
+    from .texels.texel_mesh import TexelMesh
+    from .texels.topology import TexelTopology, glue
     from .waves.footprint import Footprint
     from .waves.height_map import HeightMap
     from .waves.load import Load
-    from .waves.material import Material
     from .waves.wave_solver import WaveSolver
 
 _HOME = {
@@ -30,20 +33,24 @@ _HOME = {
     "Footprint": "waves.footprint",
     "GLError": "errors",
     "Load": "waves.load",
-    "Material": "waves.material",
+    "Material": "operator.material",
     "Mesh": "mesh.mesh",
     "MeshError": "errors",
     "HeightMap": "waves.height_map",
     "RippleError": "errors",
     "SolverError": "errors",
-    "SphereAtlas": "texels.cube_map.sphere_atlas",
+    "SphereAtlas": "cube_map.sphere_atlas",
     "SphereMapError": "errors",
+    "TexelMesh": "texels.texel_mesh",
+    "TexelTopology": "texels.topology",
     "WaveSolver": "waves.wave_solver",
-    "absorbing_damping": "waves.absorbing",
-    "build_atlas": "texels.build",
-    "load_atlas": "texels.atlas_file",
+    "absorbing_damping": "operator.absorbing",
+    "build_atlas": "atlas.build",
+    "glue": "texels.topology",
+    "load_atlas": "atlas.load",
     "load_mesh": "mesh.mesh_file",
-    "sphere_atlas": "texels.cube_map.sphere_atlas",
+    "sphere_atlas": "cube_map.sphere_atlas",
+    "texel_atlas": "texels.texel_atlas",
     "texture_map": "texels.maps",
     "vertex_map": "texels.maps",
 }
@@ -62,12 +69,16 @@ __all__ = [
     "SolverError",
     "SphereAtlas",
     "SphereMapError",
+    "TexelMesh",
+    "TexelTopology",
     "WaveSolver",
     "absorbing_damping",
     "build_atlas",
+    "glue",
     "load_atlas",
     "load_mesh",
     "sphere_atlas",
+    "texel_atlas",
     "texture_map",
     "vertex_map",
 ]

@@ -3,7 +3,8 @@
 A kernel has hints for whoever reads it (numba takes its types from the call), and its docstring gives shapes and
 units. Arrays that belong together travel as one NamedTuple. Each thread runs kernels without the interpreter's lock.
 There is no fast-math unless a kernel asks for it: the same input gives the same output, bit for bit. Compiled kernels
-are kept on disk. Numba notices a change of a kernel's own file only: delete the *.nbi files after editing one that others call.
+are kept on disk. Numba notices a change of a kernel's own file only: delete the *.nbi files after editing one that
+others call.
 """
 
 from __future__ import annotations

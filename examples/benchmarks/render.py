@@ -80,7 +80,7 @@ def rippled(width: int, height: int, resolution: int, look: str) -> tuple[Callab
     renderer = Renderer(gl, model, {target: surface}, width=width, height=height, samples=4)
     camera = Camera(LOOKAT, DISTANCE, AZIMUTH, ELEVATION)
     height_maps = [
-        HeightMap(atlas)((0.008 * np.sin(40.0 * atlas.positions[..., 2] + phase)).astype(np.float32))
+        HeightMap(atlas.texels)((0.008 * np.sin(40.0 * atlas.positions[..., 2] + phase)).astype(np.float32))
         for phase in range(4)
     ]
     return lambda i: renderer.render(data, {target: height_maps[i % len(height_maps)]}, camera), len(atlas.mesh.F)

@@ -16,7 +16,7 @@ from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.events import Events, PokeEntry
 from ripple_sim.scenes.shapes import LIMBED_FILE
 from ripple_sim.solver import Material, build_atlas, load_mesh
-from ripple_sim.solver.waves.operator import build_operator
+from ripple_sim.solver.operator.assembly import build_operator
 
 TIMES, SIZE = [0.25, 0.5], (1000, 420)
 BASELINES = {"uncorrected": "figure_6", "paper": "figure_7"}

@@ -19,7 +19,7 @@ from ripple_sim.figures.atlas_views import AtlasPainter, View
 from ripple_sim.overlay.colormap import color_table, colors
 from ripple_sim.scene.up_axis import usual_up
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
-from ripple_sim.solver.texels.cube_map.convention import texel_directions
+from ripple_sim.solver.cube_map.convention import texel_directions
 from ripple_sim.solver.texels.sampling import sampling_matrix
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"

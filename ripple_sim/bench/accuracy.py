@@ -10,7 +10,7 @@ import numpy as np
 
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Mesh, WaveSolver, build_atlas, load_mesh, sphere_atlas
-from ripple_sim.solver.waves.operator import OPERATORS
+from ripple_sim.solver.operator.assembly import OPERATORS
 
 from .arrival import ArrivalError, arrival_error, spread_sources
 

@@ -6,10 +6,10 @@ import moderngl
 import numpy as np
 from scipy.sparse import coo_array, diags_array
 
+from ripple_sim.solver.cube_map.convention import padded_indices
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.texels.cube_map.convention import padded_indices
+from ripple_sim.solver.operator.wave_operator import WaveOperator
 from ripple_sim.solver.texels.halo import padded_addresses
-from ripple_sim.solver.waves.operator import WaveOperator
 
 # What one update must move: 4 link weights, gain, height and velocity in, height and velocity out, 4 bytes each.
 BYTES_PER_UPDATE = 36

@@ -9,9 +9,10 @@ from typing import Protocol
 import numpy as np
 
 from ripple_sim.solver import GLError, Material, sphere_atlas
-from ripple_sim.solver.waves.backends.backend import Backend, make_backend
-from ripple_sim.solver.waves.backends.cpu import CPUBackend
-from ripple_sim.solver.waves.operator import WaveOperator, build_operator
+from ripple_sim.solver.backends.backend import Backend, make_backend
+from ripple_sim.solver.backends.cpu import CPUBackend
+from ripple_sim.solver.operator.assembly import build_operator
+from ripple_sim.solver.operator.wave_operator import WaveOperator
 
 from .rivals import Copy, PlainShader, SparseLeapfrog
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from ripple_sim.solver import Material, Mesh, build_atlas
-from ripple_sim.solver.texels.build import atlas_from_sphere_map
-from ripple_sim.solver.waves.backends.backend import make_backend
-from ripple_sim.solver.waves.operator import build_operator
+from ripple_sim.solver.atlas.build import atlas_from_sphere_map
+from ripple_sim.solver.backends.backend import make_backend
+from ripple_sim.solver.operator.assembly import build_operator
 
 RESOLUTIONS = (20, 28, 40, 56, 128, 256, 512)
 POLYGONS = (2_700, 5_700, 10_700, 21_300)

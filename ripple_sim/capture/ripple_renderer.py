@@ -52,7 +52,7 @@ class Pictures:
         gl: GLContext | None = None,
     ) -> None:
         self._model, self._ripples = model, ripples
-        self._height_maps = {name: HeightMap(ripples[name].atlas) for name in ripples}
+        self._height_maps = {name: HeightMap(ripples[name].atlas.texels) for name in ripples}
         looks = looks or {}
         surfaces = {
             geom: surface_of(ripples[name], looks.get(name, "rubber"), _color(model, geom))

@@ -72,7 +72,7 @@ def run(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterator[Snap
     """
     ring = itertools.cycle([mujoco.MjData(simulation.model) for _ in range(alive)])
     ripples = simulation.ripples
-    height_map_of = {name: HeightMap(ripples[name].atlas) for name in ripples}
+    height_map_of = {name: HeightMap(ripples[name].atlas.texels) for name in ripples}
     moments = Moments(simulation, Exposures.of(simulation.scene.camera).moments)
     for number in range(frames):
         if number:

@@ -108,8 +108,8 @@ class _Video:
         )
 
         from ripple_sim.capture.viewpoint import through_camera
+        from ripple_sim.solver.backends.backend import auto_backend
         from ripple_sim.solver.gl import select_device, shared_context
-        from ripple_sim.solver.waves.backends.backend import auto_backend
         from ripple_sim.video.render_video import render_video
 
         from .progress import frame_progress

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.model.target import target_atlas
 from ripple_sim.solver import Material, SolverError, WaveSolver
+from ripple_sim.solver.operator.holding import hold
 from ripple_sim.solver.waves.footprint import footprint
-from ripple_sim.solver.waves.holding import hold
 
 
 class RippleSurface:

@@ -7,9 +7,9 @@ import importlib.metadata
 import os
 import platform
 
+from ripple_sim.solver.backends.backend import auto_backend
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.waves.backends.backend import auto_backend
 
 from .headless import find_problems
 

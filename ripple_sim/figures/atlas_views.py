@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ripple_sim.render.surfaces.ambient_occlusion import bake
 from ripple_sim.render.visuals.primitives import corner_normals
 from ripple_sim.solver import Atlas
-from ripple_sim.solver.texels.cube_map.convention import face_coordinates, texel_directions
+from ripple_sim.solver.cube_map.convention import face_coordinates, texel_directions
 from ripple_sim.solver.texels.stencil import lumped_areas
 
 # The belt of four faces from left to right with the one in the middle of the cross second, and those over and under it.

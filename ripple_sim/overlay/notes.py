@@ -12,7 +12,7 @@ from ripple_sim.scene.overlays import Request
 from ripple_sim.simulation import Simulation
 
 from .contacts import ContactMarks, Mark
-from .field import magnitude, pad_field
+from .field import magnitude
 from .history import History
 from .scale import Limit
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh, load_mesh
-from ripple_sim.solver.texels.cube_map.rays import downward_hits
+from ripple_sim.solver.mesh.vertical_rays import downward_hits
 
 from .events import Events
 from .mesh_picture import load_picture, mesh_picture

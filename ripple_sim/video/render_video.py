@@ -18,8 +18,8 @@ from ripple_sim.overlay.comparison import compared_operators
 from ripple_sim.scene.overlays import parse_request
 from ripple_sim.scene.scene import MAX_DURATION, Scene
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver.backends.backend import auto_backend
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.waves.backends.backend import auto_backend
 
 from .film import Film, Shot
 from .prefetch import Ahead

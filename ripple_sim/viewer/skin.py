@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ripple_sim.render.surfaces.tessellation import subdivide
 from ripple_sim.render.visuals.primitives import corner_normals
 from ripple_sim.solver import Atlas, HeightMap
-from ripple_sim.solver.texels.cube_map.convention import face_coordinates
+from ripple_sim.solver.cube_map.convention import face_coordinates
 
 # Triangles that software OpenGL draws 30 times a second beside the simulation, on two cores.
 MAX_TRIANGLES = 24_000
@@ -45,7 +45,7 @@ class Skin:
             np.ascontiguousarray(vertices[:, columns], dtype=np.float32) for columns in (_POSITION, _DIRECTION, _NORMAL)
         )
         self._texels, self._weights = _bilinear(vertices[:, _SPHERE], atlas.resolution)
-        self._height_map = HeightMap(atlas)
+        self._height_map = HeightMap(atlas.texels)
         self.points, self.normals = self._rest.copy(), self._rest_normals.copy()
         self.height = np.zeros(len(vertices), np.float32)
 

@@ -1,4 +1,4 @@
-"""The atlas: six faces of texels, each knowing the surface point it stands for."""
+"""The atlas: a texel mesh on the surface of a mesh, each texel knowing the surface point it stands for."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.texels.cube_map.areas import texel_areas
-from ripple_sim.solver.texels.cube_map.convention import face_coordinates, padded_indices
-from ripple_sim.solver.texels.cube_map.nearest import sphere_directions, texels_at
-from ripple_sim.solver.texels.cube_map.texture_coordinates import TextureCoordinates, texture_coordinates
 
-from .quality import atlas_quality
+from .atlas_file import write_atlas_file
+from .chart_map import ChartMap, TextureCoordinates
+from .quality import texel_quality
+from .texel_mesh import TexelMesh
 
 # [m]. Squares of what is farther away overflow on the way to the nearest surface point.
 _FARTHEST = 1e100
@@ -26,54 +25,74 @@ _FARTHEST = 1e100
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Atlas:
-    """Cube-map atlas of a closed genus-0 surface.
+    """Charts of texels on the surface of a mesh.
 
-    Make one with `build_atlas`, `sphere_atlas` or `load_atlas`.
+    Make one with `build_atlas`, `sphere_atlas`, `texel_atlas` or `load_atlas`.
 
     Attributes
     ----------
     mesh : Mesh
         The surface.
-    sphere : float64 [vertex_count, 3]
-        Sphere map: one unit vector a vertex.
-    positions, normals : float64 [6, N, N, 3]
-        Surface point [m] and outward unit normal of every texel.
-    triangles : int64 [6, N, N]
+    texels : TexelMesh
+        C charts of n x n texels.
+    chart_map : ChartMap
+        The way from a point of the mesh to its place on the charts.
+    triangles : int64 [C, n, n]
         Triangle of the mesh in which the texel lies.
-    barycentrics : float64 [6, N, N, 3]
+    barycentrics : float64 [C, n, n, 3]
         Where in that triangle.
     timings : dict
         Seconds per stage of the construction.
     """
 
     mesh: Mesh
-    sphere: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    normals: NDArray[np.float64]
+    texels: TexelMesh
+    chart_map: ChartMap
     triangles: NDArray[np.int64]
     barycentrics: NDArray[np.float64]
     timings: dict[str, float] = dataclasses.field(default_factory=dict)
 
     @property
+    def layout(self) -> str:
+        """How the mesh got its charts: "cube"."""
+        return self.chart_map.layout
+
+    @property
+    def sphere(self) -> NDArray[np.float64]:
+        """Sphere map: one unit vector a vertex, float64 [vertex_count, 3]; the cube layout alone has one.
+
+        Raises
+        ------
+        AtlasError
+            For another layout.
+        """
+        sphere = getattr(self.chart_map, "sphere", None)
+        if sphere is None:
+            raise AtlasError(f"an atlas of layout {self.layout!r} has no sphere map; that of layout 'cube' does")
+        return sphere
+
+    @property
     def resolution(self) -> int:
-        """Texels along a face's edge, N."""
-        return self.positions.shape[1]
+        """Texels along a chart's side, N."""
+        return self.texels.resolution
 
-    @functools.cached_property
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Surface point of every texel [m], [C, N, N, 3]."""
+        return self.texels.positions
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """Outward unit normal of every texel, [C, N, N, 3]."""
+        return self.texels.normals
+
+    @property
     def areas(self) -> NDArray[np.float64]:
-        """Area of the surface that belongs to each texel [m^2], shape [6, N, N]; the mass of its waves sits there."""
-        return texel_areas(self.mesh, self.sphere, self.positions, self.triangles, self.barycentrics)
-
-    @functools.cached_property
-    def padded_positions(self) -> NDArray[np.float64]:
-        """Positions [m] with the ring of neighbours, shape [6, N + 2, N + 2, 3]; NaN at the ring's corners."""
-        index = padded_indices(self.resolution)
-        padded = self.positions.reshape(-1, 3)[index]
-        padded[index < 0] = np.nan
-        return padded
+        """Area of the surface that belongs to each texel [m^2], [C, N, N]; the mass of its waves sits there."""
+        return self.texels.areas
 
     def project(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Closest surface points [m] and their directions on the unit sphere, each of shape [k, 3].
+        """Closest surface points [m], [k, 3], and their map coordinates, [k, d]; see `ChartMap`.
 
         Raises
         ------
@@ -82,31 +101,34 @@ class Atlas:
         """
         points = check_points(points)
         _, triangle, closest = self._tree.squared_distance(self.mesh.V, self.mesh.F, points)
-        return closest, sphere_directions(self.mesh.V, self.mesh.F, self.sphere, triangle, closest)
+        return closest, self.chart_map.coordinates(self.mesh, triangle, closest)
 
     def locate(self, points: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Face, row and column of the surface points nearest to the given points [m].
+        """Chart, row and column of the surface points nearest to the given points [m].
 
         Row and column are in texel units, 0.0 at the centre of the first texel. Each result has shape [k].
         """
-        _, directions = self.project(points)
-        return face_coordinates(directions, self.resolution)
+        return self.chart_map.chart_points(self.project(points)[1], self.resolution)
 
     def nearest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest surface points [m], [k, 3], and the flat index of the texel nearest to each in the atlas, [k]."""
-        closest, directions = self.project(points)
-        return closest, texels_at(directions, self.resolution)
+        closest, coordinates = self.project(points)
+        return closest, self.chart_map.nearest_texels(coordinates, self.texels.topology)
 
     def nearest_texel(self, points: ArrayLike) -> NDArray[np.int64]:
-        """Flat index (face N + row) N + column of the texel nearest in the atlas to each point, shape [k]."""
+        """Flat index (chart N + row) N + column of the texel nearest in the atlas to each point, shape [k]."""
         return self.nearest(points)[1]
 
+    def stiffness(self, speed: float | NDArray[np.float64] = 1.0) -> Any:
+        """The operator c^2 grad . grad as a symmetric SciPy CSR matrix [T, T]; see `TexelMesh.stiffness`."""
+        return self.texels.stiffness(speed)
+
     def texture_coordinates(self) -> TextureCoordinates:
-        """Face and place in the atlas at every corner of every triangle, those cut that cross an edge of the cube.
+        """Chart and place in it at every corner of every triangle, those cut that cross the border of a chart.
 
         The object's own texture coordinates, `mesh.uv` and `mesh.corner_uv`, stay as they are.
         """
-        return texture_coordinates(self)
+        return self.chart_map.texture_coordinates(self.mesh)
 
     def quality(self) -> dict[str, float]:
         """Figures of merit of the atlas.
@@ -114,18 +136,37 @@ class Atlas:
         Returns
         -------
         dict
-            `flipped` triangles, `solid_angle` [sr] (4 pi for a bijection), area-weighted stretch quantiles `q001`,
-            `q01`, `q50`, `q99`, `q999`, `starved` share of the area whose texels are over 4 times too wide, `edge_min`
-            and `edge_max` [m], `coverage` (texel area over mesh area: 1 but for limbs that fall between the texels),
-            `spanned` (area of the mesh of texel centres over mesh area: it cuts creases short too).
+            Of the cube layout: `flipped` triangles, `solid_angle` [sr] (4 pi for a bijection), area-weighted stretch
+            quantiles `q001`, `q01`, `q50`, `q99`, `q999`, `starved` share of the area whose texels are over 4 times too
+            wide. Of every layout: `edge_min` and `edge_max` [m], `coverage` (texel area over mesh area: 1 but for limbs
+            that fall between the texels), `spanned` (area of the mesh of texel centres over mesh area: it cuts creases
+            short too).
         """
-        return atlas_quality(self)
+        return {**self.chart_map.quality(self.mesh), **texel_quality(self.texels, self.mesh)}
 
     def save(self, path: str | Path) -> None:
-        """Write the atlas to one file, which `load_atlas` reads. The file appears whole or not at all."""
-        from .atlas_file import save_atlas
+        """Write the atlas to one file, which `load_atlas` reads. The file appears whole or not at all.
 
-        save_atlas(self, path)
+        Raises
+        ------
+        AtlasError
+            If the file cannot be written.
+        """
+        mesh, texels = self.mesh, self.texels
+        arrays = {
+            "kind": np.array([type(self).__name__, self.layout]),
+            "glued": texels.topology.glued,
+            "V": mesh.V,
+            "F": mesh.F,
+            "positions": texels.positions,
+            "normals": texels.normals,
+            "areas": texels.areas,
+            "triangles": self.triangles,
+            "barycentrics": self.barycentrics,
+            **self.chart_map.arrays(),
+        }
+        optional = {"uv": mesh.uv, "corner_uv": mesh.corner_uv, "beyond": texels.beyond}
+        write_atlas_file(Path(path), arrays | {name: each for name, each in optional.items() if each is not None})
 
     @functools.cached_property
     def _tree(self) -> Any:

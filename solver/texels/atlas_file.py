@@ -5,70 +5,52 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.solver.atomic_file import whole_file
 from ripple_sim.solver.errors import AtlasError
-from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.texels.cube_map.sphere_atlas import SphereAtlas
 
 from .array_file import read_arrays, write_arrays
-from .atlas import Atlas
 
-# Raise it when the sphere map or the file's layout changes: older files are then rebuilt.
-FORMAT = 8
-_FIELDS = ("sphere", "positions", "normals", "triangles", "barycentrics")
-_INDICES = ("F", "triangles")  # in 32 bits
+# Raise it when the sphere map or the file's contents change: older files are then rebuilt.
+FORMAT = 9
+ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
+
+_NEEDED = {"V", "F", "kind", "format", "glued", "positions", "normals", "areas", "triangles", "barycentrics"}
+_INDICES = {"F", "triangles", "glued", "charts"}  # in 32 bits
 
 
-def save_atlas(atlas: Atlas, path: str | Path) -> None:
-    """Write an atlas; the file appears whole or not at all.
+def write_atlas_file(path: Path, arrays: dict[str, NDArray]) -> None:
+    """Write an atlas's arrays; the file appears whole or not at all.
 
     Raises
     ------
     AtlasError
         If the file cannot be written.
     """
-    path = Path(path)
-    arrays = {name: getattr(atlas, name) for name in _FIELDS} | {"V": atlas.mesh.V, "F": atlas.mesh.F}
-    if atlas.mesh.corner_uv is not None:
-        arrays |= {"uv": atlas.mesh.uv, "corner_uv": atlas.mesh.corner_uv}
-    arrays |= {name: arrays[name].astype(np.int32) for name in _INDICES}
-    arrays |= {"kind": np.array([type(atlas).__name__]), "format": np.array([FORMAT])}
+    small = {name: arrays[name].astype(np.int32) for name in _INDICES & arrays.keys()}
     try:
         with whole_file(path) as unfinished, unfinished.open("wb") as file:
-            write_arrays(file, arrays)
+            write_arrays(file, {**arrays, **small, "format": np.array([FORMAT])})
     except OSError as error:
         raise AtlasError(f"atlas file {str(path)!r} cannot be written: {error.strerror or error}") from error
 
 
-def load_atlas(path: str | Path) -> Atlas:
-    """Read an atlas written by `Atlas.save`.
+def read_atlas_file(path: Path) -> dict[str, NDArray]:
+    """Read the arrays of an atlas.
 
     Raises
     ------
     AtlasError
         If the file is missing, truncated, changed, or not an atlas of this version.
     """
-    path = Path(path)
     if not path.is_file():
-        problem = "is no file" if path.exists() else "does not exist"
+        problem = "is not a file" if path.exists() else "does not exist"
         raise AtlasError(f"atlas file {str(path)!r} {problem}; make one with `ripple-sim atlas MESH -o FILE`")
-    advice = "make it again with `ripple-sim atlas MESH -o FILE`"
     try:
         arrays = read_arrays(path)
     except (OSError, ValueError) as error:
-        raise AtlasError(f"atlas file {str(path)!r} is damaged or no atlas ({error}); {advice}") from error
-    missing = {"V", "F", "kind", "format", *_FIELDS} - arrays.keys()
-    if missing or arrays["format"].tolist() != [FORMAT]:
-        raise AtlasError(f"atlas file {str(path)!r} is no atlas or of another version; {advice}")
-    arrays |= {name: arrays[name].astype(np.int64) for name in _INDICES}
-    mesh = Mesh(arrays["V"], arrays["F"], arrays.get("uv"), arrays.get("corner_uv"))
-    kind = SphereAtlas if arrays["kind"].tolist() == [SphereAtlas.__name__] else Atlas
-    return kind(
-        mesh=mesh,
-        sphere=arrays["sphere"],
-        positions=arrays["positions"],
-        normals=arrays["normals"],
-        triangles=arrays["triangles"],
-        barycentrics=arrays["barycentrics"],
-    )
+        raise AtlasError(f"atlas file {str(path)!r} is damaged or not an atlas ({error}); {ADVICE}") from error
+    if _NEEDED - arrays.keys() or arrays["format"].tolist() != [FORMAT]:
+        raise AtlasError(f"atlas file {str(path)!r} is not an atlas, or of another version; {ADVICE}")
+    return arrays | {name: arrays[name].astype(np.int64) for name in _INDICES & arrays.keys()}

@@ -6,17 +6,16 @@ import functools
 import heapq
 import threading
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.texels.cube_map.convention import padded_indices
+from ripple_sim.solver.kernel import Floats, Ints, kernel
 
-from .atlas import Atlas
+from .texel_mesh import TexelMesh
 
 
 def distance_from_point(
-    atlas: Atlas, center: int, point: NDArray[np.float64], limit: float
+    texels: TexelMesh, center: int, point: NDArray[np.float64], limit: float
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Texels within `limit` [m] of a surface point, ascending, and their distances along the surface [m].
 
@@ -27,23 +26,24 @@ def distance_from_point(
     point : [3]
         [m].
     """
-    index, positions = padded_indices(atlas.resolution), atlas.positions.reshape(-1, 3)
-    texels, distance = march_from_point(index, positions, center, point, limit, distance_scratch(len(positions)))
-    order = np.argsort(texels)
-    return texels[order], distance[order]
+    grid = texels.grid
+    scratch = distance_scratch(len(grid.positions))
+    reached, distance = march_from_point(grid.halo, grid.positions, center, point, limit, scratch)
+    order = np.argsort(reached)
+    return reached[order], distance[order]
 
 
-def depth_in_region(atlas: Atlas, region: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Distance of every texel of a region to the texels outside of it [m], [6, N, N]; 0 outside, at most 8 % too long.
+def depth_in_region(texels: TexelMesh, region: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Distance of every texel of a region to the texels outside of it [m], [C, n, n]; 0 outside, at most 8 % too long.
 
     Infinite where there is no outside.
     """
-    positions = atlas.positions.reshape(-1, 3)
+    grid = texels.grid
     outside = np.flatnonzero(~region)
-    distance = np.full(len(positions), np.inf)
+    distance = np.full(len(grid.positions), np.inf)
     distance[outside] = 0.0
     if len(outside):
-        march(padded_indices(atlas.resolution), positions, outside, np.inf, distance)
+        march(grid.halo, grid.positions, outside, np.inf, distance)
     return distance.reshape(region.shape)
 
 
@@ -57,8 +57,8 @@ def _distance_scratch(size: int, thread: int) -> NDArray[np.float64]:
     return np.full(size, np.inf)
 
 
-@numba.njit(cache=True, nogil=True)
-def _through(p, q, s, dp, dq):
+@kernel
+def _through(p: Floats, q: Floats, s: Floats, dp: float, dq: float) -> float:
     """Distance at s of a point source that is dp from p and dq from q, unfolded into the plane of the triangle.
 
     Infinite if the straight way does not cross the edge pq (Novotni and Klein 2002).
@@ -83,14 +83,14 @@ def _through(p, q, s, dp, dq):
     return np.sqrt((along - source_along) ** 2 + (above + below) ** 2)
 
 
-@numba.njit(cache=True, nogil=True)
-def march(index, positions, seeds, limit, distance):
+@kernel
+def march(halo: Ints, positions: Floats, seeds: Ints, limit: float, distance: Floats) -> tuple[Ints, Ints]:
     """Fast marching with point-source updates over the triangles of both triangulations of every quad.
 
     `distance` holds the seeds' distances, and infinity elsewhere. Returns the texels within the limit in the order of
     their distances, and those whose entry in `distance` was written.
     """
-    n = index.shape[1] - 2
+    n = halo.shape[1] - 2
     # the eight neighbours in order round a texel
     ring_row = (0, 1, 1, 1, 0, -1, -1, -1)
     ring_column = (1, 1, 0, -1, -1, -1, 0, 1)
@@ -110,9 +110,9 @@ def march(index, positions, seeds, limit, distance):
             continue
         done[t] = True
         order.append(t)
-        face, row, column = t // (n * n), t // n % n, t % n
+        chart, row, column = t // (n * n), t // n % n, t % n
         for k in range(8):
-            around[k] = index[face, row + 1 + ring_row[k], column + 1 + ring_column[k]]
+            around[k] = halo[chart, row + 1 + ring_row[k], column + 1 + ring_column[k]]
         for k in range(8):
             a = around[k]
             if a < 0 or done[a]:
@@ -138,24 +138,27 @@ def march(index, positions, seeds, limit, distance):
     return np.array(order), np.array(touched)
 
 
-@numba.njit(cache=True, nogil=True)
-def march_from_point(index, positions, center, point, limit, scratch):
+@kernel
+def march_from_point(
+    halo: Ints, positions: Floats, center: int, point: Floats, limit: float, scratch: Floats
+) -> tuple[Ints, Floats]:
     """Texels within a distance along the surface of a point, nearest first, and their distances.
 
     The nine texels round the point's nearest one are taken straight.
     """
-    n = index.shape[1] - 2
-    face, row, column = center // (n * n), center // n % n, center % n
+    n = halo.shape[1] - 2
+    chart, row, column = center // (n * n), center // n % n, center % n
     seeds = np.empty(9, np.int64)
     count = 0
     for i in range(3):
         for j in range(3):
-            t = index[face, row + i, column + j]
-            if t >= 0:
+            t = halo[chart, row + i, column + j]
+            # beyond a rim the halo shows the texel beside it once more
+            if t >= 0 and scratch[t] == np.inf:
                 seeds[count] = t
                 scratch[t] = np.sqrt(((positions[t] - point) ** 2).sum())
                 count += 1
-    texels, touched = march(index, positions, seeds[:count], limit, scratch)
+    texels, touched = march(halo, positions, seeds[:count], limit, scratch)
     distance = scratch[texels]
     scratch[touched] = np.inf
     return texels, distance

@@ -25,7 +25,7 @@ def vertex_map(atlas: Atlas, values: ArrayLike) -> NDArray[np.float64]:
 
     Returns
     -------
-    float64 [6, N, N] or [6, N, N, k]
+    float64 [C, n, n] or [C, n, n, k]
 
     Raises
     ------
@@ -61,7 +61,7 @@ def texture_map(
 
     Returns
     -------
-    float64 [6, N, N]
+    float64 [C, n, n]
         For any coefficient of `Material`.
 
     Raises
@@ -76,7 +76,7 @@ def texture_map(
 
 
 def _interpolate(atlas: Atlas, corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values at the corners of the triangles [face_count, 3, ...], at the texels [6, N, N, ...]."""
+    """Values at the corners of the triangles [face_count, 3, ...], at the texels [C, n, n, ...]."""
     return np.einsum("fijk,fijk...->fij...", atlas.barycentrics, corners[atlas.triangles])
 
 

@@ -1,4 +1,4 @@
-"""Fields between the texels: bilinear interpolation on the cube."""
+"""Fields between the texels: bilinear interpolation on charts with halo."""
 
 from __future__ import annotations
 
@@ -6,26 +6,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ripple_sim.solver.texels.cube_map.convention import face_coordinates, padded_indices
+from .topology import TexelTopology
 
 
-def sampling_matrix(directions: NDArray[np.float64], resolution: int) -> csr_array:
-    """Matrix that takes a flattened field [6 N^2] to its values in directions [k, 3] from the cube's centre.
+def sampling_matrix(
+    topology: TexelTopology, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
+) -> csr_array:
+    """Matrix that takes a flattened field [C n^2] to its values at chart points, each [k]; see `Atlas.locate`.
 
-    Directions of surface points come from `Atlas.project`. At the cube's corners, where only three texels meet, the
-    weights of the fourth are shared out.
+    In a corner where other than four charts meet the weight of the texel that is missing is shared out.
     """
-    n = resolution
-    index = padded_indices(n)
-    face, row, column = face_coordinates(directions, n)
     r, c = np.floor(row).astype(np.int64), np.floor(column).astype(np.int64)
     s, t = row - r, column - c
     texels, weights = [], []
     for i, j, weight in ((0, 0, (1 - s) * (1 - t)), (0, 1, (1 - s) * t), (1, 0, s * (1 - t)), (1, 1, s * t)):
-        texel = index[face, r + 1 + i, c + 1 + j]
+        texel = topology.halo[chart, r + 1 + i, c + 1 + j]
         texels.append(np.maximum(texel, 0))
         weights.append(np.where(texel < 0, 0, weight))
     share = np.array(weights)
     share /= share.sum(axis=0)
-    rows = np.tile(np.arange(len(face)), 4)
-    return csr_array((share.ravel(), (rows, np.concatenate(texels))), shape=(len(face), 6 * n * n))
+    rows = np.tile(np.arange(len(chart)), 4)
+    return csr_array((share.ravel(), (rows, np.concatenate(texels))), shape=(len(chart), topology.texel_count))

@@ -1,254 +1,295 @@
-"""Finite elements on the texel grid: stiffness weights and lumped areas of the closed quad mesh of texel centres.
+"""The symmetric nine-point stencil of a texel mesh: stiffness weights and lumped areas, assembled cell by cell.
 
-Vertices are the texel centres. Cells are the quads between four texels, also across the 12 cube edges, and one triangle
-at each of the 8 cube corners. Together they give a symmetric 9-point stencil. Only real-space coordinates enter.
+Vertices are the texel centres. Cells are the quads between four texels, also across glued sides, a triangle in each
+corner of three charts, and a polygon in corners of five and more. Only real-space coordinates enter. Between the last
+texels and a rim lies a strip of half a texel: its heights are those of the texels beside it, the natural boundary.
 
-A quad takes its gradient from its two diagonals (one-point integration), and a little stiffness against the one pattern
-that this does not see, the hourglass + - + - (Flanagan and Belytschko 1981). That pattern is a second derivative: its
-stiffness is free. It decides whether short waves lag behind or run ahead, and follows from the quad's shape. Linear
-triangles give it far too much in a sheared quad: there waves ran ahead, by 3 % in the median over the elephant at
-N = 96.
-
-Layout. Fields are padded faces [6, N + 2, N + 2] (`cubemap.padded_indices`). A stencil is [6, 4, N + 1, N + 1]: the
-weights of the links of padded cell (r, c) to the east (r, c)-(r, c + 1), north (r, c)-(r + 1, c), north-east
-(r, c)-(r + 1, c + 1), and its other diagonal (r, c + 1)-(r + 1, c). A link that crosses a cube edge stands on both
-faces, with the same value to the last bit.
+Layout. A stencil's weights are [C, 4, n + 1, n + 1]: those of the links of place (r, c) of a chart with halo to the
+east (r, c)-(r, c + 1), north (r, c)-(r + 1, c), north-east (r, c)-(r + 1, c + 1), and its other diagonal
+(r, c + 1)-(r + 1, c). A link that crosses a glued side stands on both charts, with the same value to the last bit.
 """
 
 from __future__ import annotations
 
-import numba
+import dataclasses
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.texels.cube_map.convention import padded_indices
+from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 
-EAST, NORTH, NORTHEAST, NORTHWEST = range(4)
-
-# Stiffness of a square against the hourglass. At 1 waves lag along its sides as much as they lead along its diagonals,
-# 1/2 makes the 5-point stencil, 1/3 an isotropic one, 1/4 allows the longest time step.
-_HOURGLASS = 0.4
-
-# Elongated quads take up to this share of the hourglass stiffness that would begin to shorten their own time step.
-_SHARE = 0.75
-
-# A cell folded to a line would ask for an infinitely short time step: least area, in units of a square's as large.
-_LEAST_AREA = 0.02
+from .cells import polygon, quad, triangle
+from .irregular import IrregularLinks, gather_links
+from .links import CrossingLinks, mean_of_copies
+from .topology import TRIANGLE, TexelTopology
 
 
-def pad(field: NDArray) -> NDArray:
-    """Surround each face of [6, N, N, ...] by its neighbours' texels; the corners of the ring become 0."""
-    n = field.shape[1]
-    index = padded_indices(n)
-    padded = field.reshape(6 * n * n, *field.shape[3:])[index]
-    padded[index < 0] = 0
-    return padded
+@dataclasses.dataclass(frozen=True, eq=False)
+class Stencil:
+    """Link weights w of a symmetric operator: the sum over links of w (h_j - h_i) is its value at texel i.
+
+    Attributes
+    ----------
+    topology : TexelTopology
+    weights : float64 [C, 4, n + 1, n + 1]
+        Of the nine-point stencil, see the module.
+    irregular : IrregularLinks or None
+        What the nine-point stencil does not hold.
+    """
+
+    topology: TexelTopology
+    weights: NDArray[np.float64]
+    irregular: IrregularLinks | None = None
+
+    def __call__(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sum over the links of w (h_j - h_i) at every texel of a field, float64 [C, n, n]."""
+        result = np.empty(self.topology.shape)
+        _gather(self.weights, self.topology.with_halo(field), result)
+        if self.irregular is not None:
+            gather_links(self.irregular, field.reshape(-1), result.reshape(-1))
+        return result
+
+    def absolute_sums(self) -> NDArray[np.float64]:
+        """Sum of |w| over the links that meet in each texel, [C, n, n]."""
+        sums = np.empty(self.topology.shape)
+        _sum_absolute(self.weights, sums)
+        if self.irregular is not None:
+            sums.reshape(-1)[self.irregular.texels] += np.add.reduceat(
+                np.abs(self.irregular.weights), self.irregular.begins[:-1]
+            )
+        return sums
 
 
-def lumped_areas(positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Area of the texel mesh that belongs to each texel [m^2], [6, N, N]."""
-    n = positions.shape[1]
-    even, areas = np.ones((6, n + 2, n + 2)), np.zeros((6, n, n))
-    _assemble(pad(positions), even, even, np.zeros((6, 4, n + 1, n + 1)), areas)
-    return areas
+class _Cells(NamedTuple):
+    """What the assembly reads, each with halo: positions, coefficients, softening, halo table, rims, corners."""
+
+    positions: Floats
+    coefficient: Floats
+    softening: Floats
+    halo: Ints
+    rim: Bools
+    valence: Ints
+
+
+def lumped_areas(topology: TexelTopology, halo_positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Area of the texel mesh that belongs to each texel [m^2], [C, n, n]; for the positions see `TexelMesh`."""
+    return _assembled(topology, halo_positions, None, None)[1]
 
 
 def stiffness_stencil(
-    positions: NDArray[np.float64], coefficient: NDArray[np.float64], softening: NDArray[np.float64] | None = None
-) -> NDArray[np.float64]:
+    topology: TexelTopology,
+    halo_positions: NDArray[np.float64],
+    coefficient: NDArray[np.float64],
+    softening: NDArray[np.float64] | None = None,
+) -> Stencil:
     """Stiffness weights of -div(coefficient grad).
 
     Parameters
     ----------
-    positions : [6, N, N, 3]
-        Texel positions [m].
-    coefficient : [6, N, N]
+    topology : TexelTopology
+    halo_positions : [C, n + 2, n + 2, 3]
+        Texel positions with halo [m], see `TexelMesh`.
+    coefficient : [C, n, n]
         Averaged harmonically over the corners of every cell, as media in series: the operator stays symmetric, and a
         region where it is 0 is cut off at its edge.
-    softening : [6, N, N], optional
+    softening : [C, n, n], optional
         Factors up to 1: the stiffness of every cell is multiplied by the least of those at its corners.
 
     Returns
     -------
-    float64 [6, 4, N + 1, N + 1]
-        Link weights; sum over links of weight (h_j - h_i) is the area integral of div(coefficient grad h).
+    Stencil
+        Its value at a texel is the area integral of div(coefficient grad h).
     """
-    n = positions.shape[1]
-    weights = np.zeros((6, 4, n + 1, n + 1))
-    soft = np.ones((6, n, n)) if softening is None else softening
-    _assemble(pad(positions), pad(coefficient), pad(soft), weights, np.zeros((6, n, n)))
-    return agree_across_edges(weights)
+    weights = _assembled(topology, halo_positions, coefficient, softening)[0]
+    weights = mean_of_copies(topology, weights)
+    if not topology.polygons:
+        return Stencil(topology, weights)
+    soft = np.ones(topology.shape) if softening is None else softening
+    return _with_polygons(topology, halo_positions, coefficient.reshape(-1), soft.reshape(-1), weights)
 
 
-def link_lengths(positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Real-space length of every link [m], in stencil layout; infinite where no link exists."""
-    index = padded_indices(positions.shape[1])
-    padded = pad(positions)
-    lengths = np.full((6, 4, len(index[0]) - 1, len(index[0]) - 1), np.inf)
-    for link, (a, b) in enumerate(_link_ends()):
-        exists = _link_exists(index, a, b)
-        lengths[:, link][exists] = np.linalg.norm(padded[a] - padded[b], axis=-1)[exists]
-    return agree_across_edges(lengths)
+def _assembled(
+    topology: TexelTopology,
+    halo_positions: NDArray[np.float64],
+    coefficient: NDArray[np.float64] | None,
+    softening: NDArray[np.float64] | None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weights [C, 4, n + 1, n + 1], each copy of a link with what its own chart sees, and areas [C, n, n]."""
+    charts, n, _ = topology.shape
+    weights, areas = np.zeros((charts, 4, n + 1, n + 1)), np.zeros((charts, n, n))
+    ones = np.ones(topology.halo.shape)
+    k, s = (ones if field is None else topology.with_halo(field) for field in (coefficient, softening))
+    _assemble(_Cells(halo_positions, k, s, topology.halo, topology.rim, topology.valence), weights, areas)
+    if topology.polygons:
+        points = _texel_positions(halo_positions)
+        for texels in topology.polygons:
+            areas.reshape(-1)[texels] += polygon(points[texels])[1]
+    return weights, areas
 
 
-def _link_ends() -> tuple[tuple[tuple[slice, ...], tuple[slice, ...]], ...]:
-    """For every link direction, the slices of a padded field that hold the links' two ends."""
-    every, low, high = slice(None), slice(None, -1), slice(1, None)
-    return (
-        ((every, low, low), (every, low, high)),
-        ((every, low, low), (every, high, low)),
-        ((every, low, low), (every, high, high)),
-        ((every, low, high), (every, high, low)),
-    )
+def _texel_positions(halo_positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    return halo_positions[:, 1:-1, 1:-1].reshape(-1, 3)
 
 
-def _own_cells(n: int) -> NDArray[np.bool_]:
-    own = np.zeros((6, n + 2, n + 2), dtype=bool)
-    own[:, 1:-1, 1:-1] = True
-    return own
+def _with_polygons(
+    topology: TexelTopology,
+    halo_positions: NDArray[np.float64],
+    coefficient: NDArray[np.float64],
+    softening: NDArray[np.float64],
+    weights: NDArray[np.float64],
+) -> Stencil:
+    """Add the polygons' links: their sides to the stencil, their diagonals beside it."""
+    points, crossing = _texel_positions(halo_positions), CrossingLinks.of(topology)
+    ends, values = [], []
+    for texels in topology.polygons:
+        k = coefficient[texels]
+        conductance = len(k) / (1 / k).sum() if k.all() else 0.0
+        first, second = np.triu_indices(len(texels), 1)
+        links = conductance * softening[texels].min() * polygon(points[texels])[0][first, second]
+        pairs = np.stack([texels[first], texels[second]], axis=1)
+        beside = crossing.add(weights, pairs, links)
+        ends.append(pairs[beside])
+        values.append(links[beside])
+    return Stencil(topology, weights, IrregularLinks.of(np.concatenate(ends), np.concatenate(values)))
 
 
-def _link_exists(index: NDArray, a: tuple[slice, ...], b: tuple[slice, ...]) -> NDArray[np.bool_]:
-    own = _own_cells(index.shape[1] - 2)
-    return (index[a] >= 0) & (index[b] >= 0) & (own[a] | own[b])
-
-
-def agree_across_edges(weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give both copies of every link that crosses a cube edge their mean; clear entries that are no links."""
-    n = weights.shape[2] - 1
-    index, own = padded_indices(n), _own_cells(n)
-    keys, places = [], []
-    for link, (a, b) in enumerate(_link_ends()):
-        exists = _link_exists(index, a, b)
-        weights[:, link][~exists & np.isfinite(weights[:, link])] = 0
-        crossing = exists & (own[a] != own[b])
-        low, high = np.minimum(index[a], index[b])[crossing], np.maximum(index[a], index[b])[crossing]
-        keys.append(low * (6 * n * n) + high)
-        face, row, column = np.nonzero(crossing)
-        places.append(np.stack([face, np.full_like(face, link), row, column]))
-    place = tuple(np.concatenate(places, axis=1))
-    _, pair = np.unique(np.concatenate(keys), return_inverse=True)
-    weights[place] = (np.bincount(pair, weights[place]) / np.bincount(pair))[pair]
-    return weights
-
-
-@numba.njit(inline="always")
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@numba.njit(inline="always")
-def _cross_length(a, b):
-    x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-    return np.sqrt(x * x + y * y + z * z)
-
-
-@numba.njit(inline="always")
-def _between(a, b):
-    return (b[0] - a[0], b[1] - a[1], b[2] - a[2])
-
-
-@numba.njit(cache=True)
-def _quad_area(sw, se, nw, ne):
-    """Area of a quad that need not be flat: that of its smaller triangulation.
-
-    The flat area p x q / 2 misses what a fold holds, the other triangulation spans it twice.
-    """
-    south, west, north, east = _between(sw, se), _between(sw, nw), _between(ne, nw), _between(ne, se)
-    rising = _cross_length(south, east) + _cross_length(north, west)
-    falling = _cross_length(south, west) + _cross_length(north, east)
-    return min(rising, falling) / 2
-
-
-@numba.njit(cache=True)
-def _hourglass(pp, qq, pq, area):
-    """Hourglass stiffness of a quad of given area whose diagonals p and q have the products pp, qq and pq.
-
-    In a parallelogram with the squared sides a >= b, the product d of its sides and the area J, a wave of wave number k
-    has omega^2 = k^2 - k^4 (a + b) / 16 + k^4 H (J^2 + 3 d^2) / 8 J in the mean over its directions, to leading order:
-    waves are in time on average at H = (a + b) J / 2 (J^2 + 3 d^2). Its time step begins to shorten at
-    H = (a^2 - d^2) / 4 a J.
-    """
-    both_sides = (pp + qq) / 2
-    a, d = (both_sides + abs(pq)) / 2, (pp - qq) / 4
-    in_time = both_sides * area / (2 * (area * area + 3 * d * d))
-    free = (a * a - d * d) / (4 * a * area)
-    return min(in_time, max(_SHARE * free, _HOURGLASS * 2 * area / both_sides))
-
-
-@numba.njit(cache=True)
-def _quad(sw, se, nw, ne):
-    """Weights of a quad's links: south and north side, west and east side, diagonal sw-ne, diagonal se-nw; its area.
-
-    With diagonals p, q and u_p, u_q the differences along them, area |gradient|^2 is
-    (|q|^2 u_p^2 - 2 p.q u_p u_q + |p|^2 u_q^2) / 2 |p x q|, and 2 u_p u_q is the sum of squared differences along west
-    and east, less that along south and north.
-    """
-    p, q = _between(sw, ne), _between(se, nw)
-    pp, qq, pq, cross = _dot(p, p), _dot(q, q), _dot(p, q), _cross_length(p, q)
-    if pp + qq == 0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
-    twice = 2 * max(cross, _LEAST_AREA / 2 * (pp + qq))
-    hourglass = _hourglass(pp, qq, pq, twice / 4)
-    return (
-        pq / twice + hourglass,
-        hourglass - pq / twice,
-        qq / twice - hourglass,
-        pp / twice - hourglass,
-        _quad_area(sw, se, nw, ne),
-    )
-
-
-@numba.njit(cache=True)
-def _triangle(a, b, c):
-    """Cotangent weights of the links bc, ca, ab, and the area of a triangle (Pinkall and Polthier 1993)."""
-    ab, ac, bc = _between(a, b), _between(a, c), _between(b, c)
-    double_area = _cross_length(ab, ac)
-    longest = max(_dot(ab, ab), _dot(ac, ac), _dot(bc, bc))
-    if longest == 0:
-        return 0.0, 0.0, 0.0, 0.0
-    twice = 2 * max(double_area, _LEAST_AREA * longest)
-    return _dot(ab, ac) / twice, -_dot(ab, bc) / twice, _dot(ac, bc) / twice, double_area / 2
-
-
-@numba.njit(cache=True)
-def _assemble(x, k, s, weights, areas):
-    """Add up the cells of the padded positions x with padded coefficients k, softened by the padded factors s."""
-    n = x.shape[1] - 2
-    # one cell wider than the stencil: links inside the ring are collected too and left behind
+@kernel
+def _assemble(cells: _Cells, weights: Floats, areas: Floats) -> None:
+    """Add up the cells of each chart with halo: weights [C, 4, n + 1, n + 1], areas [C, n, n]."""
+    n = areas.shape[1]
+    # one place wider than the stencil: links inside the halo are collected too and left behind
     link = np.zeros((4, n + 2, n + 2))
     area = np.zeros((n + 2, n + 2))
-    for f in range(6):
+    for chart in range(len(areas)):
         link[:] = 0
         area[:] = 0
+        x, k, s = cells.positions[chart], cells.coefficient[chart], cells.softening[chart]
+        halo, rim = cells.halo[chart], cells.rim[chart]
         for r in range(n + 1):
             for c in range(n + 1):
-                if (r == 0 or r == n) and (c == 0 or c == n):
-                    # cube corner: the padded corner does not exist; one triangle of the other three
-                    r0, r1 = (1, 0) if r == 0 else (n, n + 1)
-                    c0, c1 = (1, 0) if c == 0 else (n, n + 1)
-                    _, vertical, horizontal, whole = _triangle(x[f, r0, c0], x[f, r0, c1], x[f, r1, c0])
-                    a, b, d = k[f, r0, c0], k[f, r0, c1], k[f, r1, c0]
-                    conductance = 3 / (1 / a + 1 / b + 1 / d) if a * b * d > 0 else 0.0
-                    conductance *= min(s[f, r0, c0], s[f, r0, c1], s[f, r1, c0])
-                    area[r0, c0] += whole / 3
-                    link[1, r, c0] += conductance * vertical
-                    link[0, r0, c] += conductance * horizontal
-                    continue
-                south_north, west_east, rising, falling, whole = _quad(
-                    x[f, r, c], x[f, r, c + 1], x[f, r + 1, c], x[f, r + 1, c + 1]
-                )
-                a, b, d, e = k[f, r, c], k[f, r, c + 1], k[f, r + 1, c], k[f, r + 1, c + 1]
-                conductance = 4 / (1 / a + 1 / b + 1 / d + 1 / e) if a * b * d * e > 0 else 0.0
-                conductance *= min(s[f, r, c], s[f, r, c + 1], s[f, r + 1, c], s[f, r + 1, c + 1])
-                link[0, r, c] += conductance * south_north
-                link[0, r + 1, c] += conductance * south_north
-                link[1, r, c] += conductance * west_east
-                link[1, r, c + 1] += conductance * west_east
-                link[2, r, c] += conductance * rising
-                link[3, r, c] += conductance * falling
-                for i in range(2):
-                    for j in range(2):
-                        area[r + i, c + j] += whole / 4
-        weights[f] = link[:, : n + 1, : n + 1]
-        areas[f] = area[1 : n + 1, 1 : n + 1]
+                if halo[r, c] >= 0 and halo[r, c + 1] >= 0 and halo[r + 1, c] >= 0 and halo[r + 1, c + 1] >= 0:
+                    if rim[r, c] or rim[r, c + 1] or rim[r + 1, c] or rim[r + 1, c + 1]:
+                        _add_strip(x, k, s, rim, halo, r, c, (link, area))
+                    else:
+                        _add_quad(x, k, s, r, c, link, area)
+                elif cells.valence[chart, _corner(r, c)] == TRIANGLE:
+                    _add_triangle(x, k, s, r, c, link, area)
+        weights[chart] = link[:, : n + 1, : n + 1]
+        areas[chart] = area[1 : n + 1, 1 : n + 1]
+
+
+@kernel(inline="always")
+def _corner(r: int, c: int) -> int:
+    """Number of the corner of a chart in which a cell lies."""
+    if r == 0:
+        return 0 if c == 0 else 1
+    return 3 if c == 0 else 2
+
+
+@kernel
+def _conductance(k: Floats, s: Floats, r: int, c: int) -> float:
+    """Harmonic mean of the coefficients at the corners of a cell, softened by the least factor."""
+    a, b, d, e = k[r, c], k[r, c + 1], k[r + 1, c], k[r + 1, c + 1]
+    conductance = 4 / (1 / a + 1 / b + 1 / d + 1 / e) if a * b * d * e > 0 else 0.0
+    return conductance * min(s[r, c], s[r, c + 1], s[r + 1, c], s[r + 1, c + 1])
+
+
+@kernel
+def _add_quad(x: Floats, k: Floats, s: Floats, r: int, c: int, link: Floats, area: Floats) -> None:
+    south_north, west_east, rising, falling, whole = quad(x[r, c], x[r, c + 1], x[r + 1, c], x[r + 1, c + 1])
+    conductance = _conductance(k, s, r, c)
+    link[0, r, c] += conductance * south_north
+    link[0, r + 1, c] += conductance * south_north
+    link[1, r, c] += conductance * west_east
+    link[1, r, c + 1] += conductance * west_east
+    link[2, r, c] += conductance * rising
+    link[3, r, c] += conductance * falling
+    for i in range(2):
+        for j in range(2):
+            area[r + i, c + j] += whole / 4
+
+
+@kernel
+def _add_triangle(x: Floats, k: Floats, s: Floats, r: int, c: int, link: Floats, area: Floats) -> None:
+    """The cell in a corner of three charts: the halo's corner does not exist; a triangle of the other three."""
+    # the chart's own texel is at r0, c0
+    r0, r1 = (1, 0) if r == 0 else (r, r + 1)
+    c0, c1 = (1, 0) if c == 0 else (c, c + 1)
+    _, vertical, horizontal, whole = triangle(x[r0, c0], x[r0, c1], x[r1, c0])
+    a, b, d = k[r0, c0], k[r0, c1], k[r1, c0]
+    conductance = 3 / (1 / a + 1 / b + 1 / d) if a * b * d > 0 else 0.0
+    conductance *= min(s[r0, c0], s[r0, c1], s[r1, c0])
+    area[r0, c0] += whole / 3
+    link[1, r, c0] += conductance * vertical
+    link[0, r0, c] += conductance * horizontal
+
+
+@kernel
+def _add_strip(
+    x: Floats, k: Floats, s: Floats, rim: Bools, halo: Ints, r: int, c: int, sums: tuple[Floats, Floats]
+) -> None:
+    """A cell at a rim: each of its corners beyond the rim moves as the texel beside it.
+
+    Nothing is known of a strip where the rim has no positions.
+    """
+    link, area = sums
+    south_north, west_east, rising, falling, whole = quad(x[r, c], x[r, c + 1], x[r + 1, c], x[r + 1, c + 1])
+    if not np.isfinite(whole):
+        return
+    conductance = _conductance(k, s, r, c)
+    # corners are numbered 0 to 3 by row and column; `moves` is the texel of the cell with which each of them moves
+    moves = np.empty(4, np.int64)
+    for i in range(4):
+        moves[i] = i
+        for j in range(4):
+            own = not rim[r + j // 2, c + j % 2]
+            if rim[r + i // 2, c + i % 2] and own and halo[r + j // 2, c + j % 2] == halo[r + i // 2, c + i % 2]:
+                moves[i] = j
+        area[r + moves[i] // 2, c + moves[i] % 2] += whole / 4
+    for i, j, weight in (
+        (0, 1, south_north), (2, 3, south_north), (0, 2, west_east), (1, 3, west_east), (0, 3, rising), (1, 2, falling)
+    ):  # fmt: skip
+        a, b = min(moves[i], moves[j]), max(moves[i], moves[j])
+        if a == b:
+            continue
+        if b - a == 2:
+            link[1, r, c + a] += conductance * weight
+        elif b - a == 3:
+            link[2, r, c] += conductance * weight
+        elif a == 1:
+            link[3, r, c] += conductance * weight
+        else:
+            link[0, r + a // 2, c] += conductance * weight
+
+
+# link, the place from which it starts relative to the texel, and its other end
+_SIDES = ((0, 0, 0, 0, 1), (0, 0, -1, 0, -1), (1, 0, 0, 1, 0), (1, -1, 0, -1, 0))
+_DIAGONALS = ((2, 0, 0, 1, 1), (2, -1, -1, -1, -1), (3, -1, 0, -1, 1), (3, 0, -1, 1, -1))
+
+
+@kernel
+def _gather(w: Floats, h: Floats, out: Floats) -> None:
+    """Sum of weight (h_j - h_i) over the stencil; h has a halo."""
+    n = out.shape[1]
+    for f in range(len(out)):
+        for r in range(1, n + 1):
+            for c in range(1, n + 1):
+                total = 0.0
+                for links in (_SIDES, _DIAGONALS):
+                    for link, i, j, dr, dc in links:
+                        total += w[f, link, r + i, c + j] * (h[f, r + dr, c + dc] - h[f, r, c])
+                out[f, r - 1, c - 1] = total
+
+
+@kernel
+def _sum_absolute(w: Floats, out: Floats) -> None:
+    n = out.shape[1]
+    for f in range(len(out)):
+        for r in range(1, n + 1):
+            for c in range(1, n + 1):
+                total = 0.0
+                for links in (_SIDES, _DIAGONALS):
+                    for link, i, j, _, _ in links:
+                        total += abs(w[f, link, r + i, c + j])
+                out[f, r - 1, c - 1] = total

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import numbers
-from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.kernel import Floats, Ints, kernel
 from ripple_sim.solver.texels.atlas import Atlas, check_points
-from ripple_sim.solver.texels.cube_map.convention import padded_indices
 from ripple_sim.solver.texels.distance import distance_scratch, march_from_point
+from ripple_sim.solver.texels.texel_mesh import TexelGrid
 
 # Fewer texels across than this and the source would excite waves that the grid cannot carry.
 MIN_TEXELS = 2.0
@@ -30,7 +29,7 @@ class Footprint:
     Attributes
     ----------
     texels : int64 [k]
-        Flat texel indices (face N + row) N + column, each once.
+        Flat texel indices (chart n + row) n + column, each once.
     weights : float64 [k]
         Density [1/m^2] with sum(area weight) = 1.
     center : int
@@ -80,31 +79,12 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
 
 def footprint_at(atlas: Atlas, point: NDArray[np.float64], center: int, radius: float) -> Footprint:
     """The footprint round a point of the surface whose nearest texel is known, see `Atlas.nearest`."""
-    texels, weights, radius = weigh(texel_grid(atlas), center, point, radius, distance_scratch(atlas.areas.size))
+    texels, weights, radius = weigh(atlas.texels.grid, center, point, radius, distance_scratch(atlas.areas.size))
     return Footprint(texels, weights, center, point, radius)
 
 
-class TexelGrid(NamedTuple):
-    """What `weigh` asks of an atlas: its `padded_indices`, and places, normals and areas by flat texel index."""
-
-    padded: NDArray[np.int64]
-    positions: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    areas: NDArray[np.float64]
-
-
-def texel_grid(atlas: Atlas) -> TexelGrid:
-    """An atlas as compiled code reads it."""
-    return TexelGrid(
-        padded_indices(atlas.resolution),
-        atlas.positions.reshape(-1, 3),
-        atlas.normals.reshape(-1, 3),
-        atlas.areas.reshape(-1),
-    )
-
-
-@numba.njit(cache=True, nogil=True)
-def weigh(grid, center, point, radius, scratch):
+@kernel
+def weigh(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats, float]:
     """Texels, weights and radius of a footprint; `scratch` is `distance_scratch`."""
     radius = max(radius, MIN_TEXELS * _spacing(grid, center))
     texels, distance, flat = _patch(grid, center, point, radius, scratch)
@@ -121,29 +101,29 @@ def weigh(grid, center, point, radius, scratch):
     return texels[:kept], weights[:kept] / total, radius
 
 
-@numba.njit(cache=True, nogil=True)
-def _spacing(grid, center):
+@kernel
+def _spacing(grid: TexelGrid, center: int) -> float:
     """Greatest distance from a texel to the four beside it."""
-    index, positions = grid.padded, grid.positions
-    n = index.shape[1] - 2
-    face, row, column = center // (n * n), center // n % n, center % n
+    halo, positions = grid.halo, grid.positions
+    n = halo.shape[1] - 2
+    chart, row, column = center // (n * n), center // n % n, center % n
     greatest = 0.0
     for down, right in ((0, 1), (1, 0), (1, 2), (2, 1)):
-        t = index[face, row + down, column + right]
+        t = halo[chart, row + down, column + right]
         if t >= 0:
             greatest = max(greatest, np.sqrt(((positions[t] - positions[center]) ** 2).sum()))
     return greatest
 
 
-@numba.njit(cache=True, nogil=True)
-def _patch(grid, center, point, radius, scratch):
+@kernel
+def _patch(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats, bool]:
     """Texels that hang together within a straight distance of a point, their distances, and whether they lie flat.
 
     Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph over the plane there
     whose slope makes no way along it longer than 1.05 times the straight one.
     """
-    index, positions, normals = grid.padded, grid.positions, grid.normals
-    n = index.shape[1] - 2
+    halo, positions, normals = grid.halo, grid.positions, grid.normals
+    n = halo.shape[1] - 2
     room = 256
     texels = np.empty(room, np.int64)
     count, done, flat = 1, 0, True
@@ -163,10 +143,10 @@ def _patch(grid, center, point, radius, scratch):
             longer = np.empty(room, np.int64)
             longer[:count] = texels[:count]
             texels = longer
-        face, row, column = t // (n * n), t // n % n, t % n
+        chart, row, column = t // (n * n), t // n % n, t % n
         for i in range(3):
             for j in range(3):
-                a = index[face, row + i, column + j]
+                a = halo[chart, row + i, column + j]
                 if a >= 0 and scratch[a] == np.inf:
                     x, y, z = positions[a, 0] - point[0], positions[a, 1] - point[1], positions[a, 2] - point[2]
                     scratch[a] = np.sqrt(x * x + y * y + z * z)
@@ -178,10 +158,10 @@ def _patch(grid, center, point, radius, scratch):
     return texels, distance, flat
 
 
-@numba.njit(cache=True, nogil=True)
-def _blended(grid, center, point, radius, scratch):
+@kernel
+def _blended(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats]:
     """Texels within a little more than the radius along the surface, and the distances that count."""
-    texels, distance = march_from_point(grid.padded, grid.positions, center, point, 1.1 * radius, scratch)
+    texels, distance = march_from_point(grid.halo, grid.positions, center, point, 1.1 * radius, scratch)
     for i in range(len(texels)):
         straight = np.sqrt(((grid.positions[texels[i]] - point) ** 2).sum())
         if straight > 0:

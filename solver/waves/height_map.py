@@ -1,13 +1,13 @@
-"""What a renderer needs of the waves: the height and its surface gradient at every texel, padded for interpolation."""
+"""What a renderer needs of the waves: height and surface gradient of every texel, with a halo for interpolation."""
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.texels.halo import padded_addresses
+from ripple_sim.solver.kernel import Floats32, kernel
+from ripple_sim.solver.texels.halo import fill_halo
+from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
 # Weight of the second-order terms' regularisation, relative to the squared distances that they multiply.
 _REGULARISATION = 1e-4
@@ -17,48 +17,37 @@ class HeightMap:
     """Turns a height field into a texture of gradient and height.
 
     The gradient at a texel is that of the quadratic that fits the eight neighbours' heights best, in the tangent plane:
-    second-order accurate also where grid lines kink at the cube's edges and corners, so that shading shows no edge.
+    second-order accurate also where grid lines kink at the borders and corners of charts, so that shading shows none.
 
     Parameters
     ----------
-    atlas : Atlas
+    texels : TexelMesh
     """
 
-    def __init__(self, atlas: Atlas) -> None:
-        n = atlas.resolution
-        self._n = n
-        self._weights = _gradient_weights(atlas).astype(np.float32)
-        self._inside, self._ring, self._source = padded_addresses(n)
+    def __init__(self, texels: TexelMesh) -> None:
+        self._topology = texels.topology
+        self._weights = _gradient_weights(texels).astype(np.float32)
 
     def __call__(self, height: NDArray[np.float32]) -> NDArray[np.float32]:
-        """HeightMap of a height field.
+        """Height map of a height field.
 
         Parameters
         ----------
-        height : float32 [6, N, N]
+        height : float32 [C, n, n]
             [m].
 
         Returns
         -------
-        float32 [6, N + 2, N + 2, 4]
+        float32 [C, n + 2, n + 2, 4]
             Gradient of the height in the frame of the mesh (tangent to the surface, dimensionless), and the height
-            [m]. The ring holds the neighbours' texels; its corners hold the mean of the three texels that meet there,
-            which makes bilinear interpolation continuous all over the cube.
+            [m]. For the halo see `fill_halo`.
         """
-        n = self._n
-        padded = np.zeros((6, n + 2, n + 2), np.float32)
-        padded[:, 1:-1, 1:-1] = height
-        heights = padded.reshape(-1)
-        heights[self._ring] = heights[self._source]
-        height_map = np.empty((6, n + 2, n + 2, 4), np.float32)
-        _differentiate(self._weights, padded, height_map)
-        texels = height_map.reshape(-1, 4)
-        texels[self._ring] = texels[self._source]
-        for r, r_in, r_out in ((0, 1, 0), (n + 1, n, n + 1)):
-            for c, c_in, c_out in ((0, 1, 0), (n + 1, n, n + 1)):
-                height_map[:, r, c] = (
-                    height_map[:, r_in, c_in] + height_map[:, r_in, c_out] + height_map[:, r_out, c_in]
-                ) / 3
+        around = np.zeros(self._topology.halo.shape, np.float32)
+        around[:, 1:-1, 1:-1] = height
+        fill_halo(self._topology, around)
+        height_map = np.empty((*around.shape, 4), np.float32)
+        _differentiate(self._weights, around, height_map)
+        fill_halo(self._topology, height_map)
         return height_map
 
 
@@ -66,17 +55,19 @@ class HeightMap:
 _AROUND = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 
 
-def _gradient_weights(atlas: Atlas) -> NDArray[np.float64]:
-    """Vectors g with gradient = sum over the 8 neighbours of g (h_j - h_i), shape [6 N^2, 8, 3] in [1/m]."""
-    n = atlas.resolution
-    padded = atlas.padded_positions
-    center = atlas.positions.reshape(-1, 3)
-    normal = atlas.normals.reshape(-1, 3)
+def _gradient_weights(texels: TexelMesh) -> NDArray[np.float64]:
+    """Vectors g with gradient = sum over the 8 neighbours of g (h_j - h_i), shape [C n^2, 8, 3] in [1/m]."""
+    n = texels.resolution
+    around = texels.halo_positions.copy()
+    # beyond a rim the halo repeats heights: nothing is known there
+    around[texels.topology.rim] = np.nan
+    center = texels.positions.reshape(-1, 3)
+    normal = texels.normals.reshape(-1, 3)
     tangent = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     bitangent = np.cross(normal, tangent)
     offset = np.stack(
-        [padded[:, 1 + r : n + 1 + r, 1 + c : n + 1 + c].reshape(-1, 3) - center for r, c in _AROUND], axis=1
+        [around[:, 1 + r : n + 1 + r, 1 + c : n + 1 + c].reshape(-1, 3) - center for r, c in _AROUND], axis=1
     )
     exists = np.isfinite(offset[..., :1])
     offset = np.where(exists, offset, 0.0)
@@ -91,10 +82,11 @@ def _gradient_weights(atlas: Atlas) -> NDArray[np.float64]:
     return fit[:, 0, :, None] * tangent[:, None, :] + fit[:, 1, :, None] * bitangent[:, None, :]
 
 
-@numba.njit(cache=True, nogil=True)
-def _differentiate(weights, h, height_map):
+@kernel
+def _differentiate(weights: Floats32, h: Floats32, height_map: Floats32) -> None:
+    """Fill in gradient and height, [C, n + 2, n + 2, 4], of the texels of a field with halo, [C, n + 2, n + 2]."""
     n = h.shape[1] - 2
-    for i in range(6 * n):
+    for i in range(len(h) * n):
         f, r = i // n, i % n + 1
         for c in range(1, n + 1):
             g = weights[i * n + c - 1]

@@ -21,7 +21,7 @@ class Load:
     Attributes
     ----------
     texels : int64 [k]
-        Flat texel indices (face N + row) N + column; a texel may stand there more than once.
+        Flat texel indices (chart n + row) n + column; a texel may stand there more than once.
     forces : float64 [k]
         [N], positive inwards.
     """

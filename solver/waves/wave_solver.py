@@ -7,15 +7,15 @@ import numbers
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.solver.backends.backend import make_backend
 from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.operator.assembly import build_operator
+from ripple_sim.solver.operator.material import Material
 from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.waves.backends.backend import make_backend
 
 from .finite import where_not_finite
 from .footprint import Footprint, footprint
 from .load import Load
-from .material import Material
-from .operator import build_operator
 
 # A step that needs more is a mistake in a unit, and would seem to hang.
 _MOST_SUBSTEPS = 1_000_000
@@ -78,7 +78,7 @@ class WaveSolver:
 
     @property
     def height(self) -> NDArray[np.float32]:
-        """Displacement along the outward normal [m], float32 [6, N, N]: a copy; assign to change it.
+        """Displacement along the outward normal [m], float32 [C, n, n]: a copy; assign to change it.
 
         `waves.height = field` and `waves.height += field` work, also with one number; `waves.height[0] = x` changes the
         copy only.
@@ -95,12 +95,12 @@ class WaveSolver:
 
     @property
     def dent(self) -> NDArray[np.float32]:
-        """The part of the height that stays [m], float32 [6, N, N]; 0 unless the material yields."""
+        """The part of the height that stays [m], float32 [C, n, n]; 0 unless the material yields."""
         return self._backend.dent()
 
     @property
     def velocity(self) -> NDArray[np.float32]:
-        """Rate of the height [m/s], float32 [6, N, N]: a copy; assign to change it, as with `height`."""
+        """Rate of the height [m/s], float32 [C, n, n]: a copy; assign to change it, as with `height`."""
         return self._backend.velocity()
 
     @velocity.setter
@@ -109,7 +109,7 @@ class WaveSolver:
 
     @property
     def pressure(self) -> NDArray[np.float64]:
-        """Pressure held over `step` [Pa], positive inwards, float64 [6, N, N]; assign to change it, 0 to end it.
+        """Pressure held over `step` [Pa], positive inwards, float64 [C, n, n]; assign to change it, 0 to end it.
 
         A copy; it holds the forces of `add_force` as well.
         """
@@ -181,20 +181,20 @@ class WaveSolver:
         return where
 
     def add_pressure(self, pressure: ArrayLike) -> None:
-        """Add a pressure field [Pa], a number or [6, N, N], positive inwards, that is held from now on."""
+        """Add a pressure field [Pa], a number or [C, n, n], positive inwards, that is held from now on."""
         field = self._field(np.broadcast_to(pressure, self.operator.mass.shape), "pressure")
         force = (field * self.atlas.areas * self.operator.movable).reshape(-1)
         texels = np.flatnonzero(force)
         self._hold(Load(texels, force[texels]))
 
     def add_height(self, height: ArrayLike) -> None:
-        """Raise the surface by a field [m], [6, N, N]; where volume is conserved its mean over the area is removed."""
+        """Raise the surface by a field [m], [C, n, n]; where volume is conserved its mean over the area is removed."""
         field = self._source(height, "height", self.atlas.areas)
         dent = self._backend.dent()
         self._backend.set_height(self._backend.height() - dent + field, dent)
 
     def add_velocity(self, velocity: ArrayLike) -> None:
-        """Add a field [m/s], [6, N, N], to the velocity; where volume is conserved its net momentum is removed."""
+        """Add a field [m/s], [C, n, n], to the velocity; where volume is conserved its net momentum is removed."""
         field = self._source(velocity, "velocity", self.operator.mass)
         self._backend.set_velocity(self._backend.velocity() + field)
 

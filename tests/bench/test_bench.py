@@ -11,8 +11,8 @@ from ripple_sim.bench.report import as_text
 from ripple_sim.bench.rivals import PlainShader, SparseLeapfrog
 from ripple_sim.bench.table import POLYGONS, knobbly_body
 from ripple_sim.solver import GLError, Material, sphere_atlas
-from ripple_sim.solver.waves.backends.backend import make_backend
-from ripple_sim.solver.waves.operator import build_operator
+from ripple_sim.solver.backends.backend import make_backend
+from ripple_sim.solver.operator.assembly import build_operator
 
 
 def test_sparse_matrix_gives_the_same_waves() -> None:

@@ -46,7 +46,7 @@ def texels_apart(ripples: Ripples, geom: str, texel: tuple[int, int, int], point
     atlas = ripples[geom].atlas
     face, row, column = texel
     center = atlas.positions[texel]
-    block = atlas.padded_positions[face, row : row + 3, column : column + 3]
+    block = atlas.texels.halo_positions[face, row : row + 3, column : column + 3]
     width = np.nanmax(np.linalg.norm(block - center, axis=-1))
     return float(np.linalg.norm(center - point) / width)
 

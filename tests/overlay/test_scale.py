@@ -174,7 +174,7 @@ def test_history_is_bounded_and_keeps_the_peaks(frames: int) -> None:
 def test_padding_is_that_of_a_height_map() -> None:
     atlas = sphere_atlas(1.0, 12)
     field = np.random.default_rng(0).standard_normal((6, 12, 12)).astype(np.float32)
-    np.testing.assert_allclose(pad_field(field), HeightMap(atlas)(field)[..., 3], rtol=1e-6)
+    np.testing.assert_allclose(pad_field(field), HeightMap(atlas.texels)(field)[..., 3], rtol=1e-6)
 
 
 def test_magnitude_is_that_of_waves_where_they_are() -> None:

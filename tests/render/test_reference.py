@@ -97,7 +97,7 @@ def test_similarity_of_pictures():
 
 def test_a_frame_is_that_of_the_brute_force_reference(tmp_path):
     atlas = sphere_atlas(1.0, N)
-    height_map = HeightMap(atlas)(height(atlas.positions).astype(np.float32))
+    height_map = HeightMap(atlas.texels)(height(atlas.positions).astype(np.float32))
     ball = meshes.ball(24)
     own = frame(Surface(ball.shell, ball.faces, ball.shell, N, "rubber"), height_map, 1)
     reference = shrunk(frame(displaced_ball(180), None, FINER), FINER)

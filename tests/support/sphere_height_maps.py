@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ripple_sim.solver.texels.cube_map.convention import padded_indices, texel_directions
+from ripple_sim.solver.cube_map.convention import cube_topology, texel_directions
 
 N = 24
 
@@ -11,7 +11,7 @@ def height_map_of(height, gradient) -> np.ndarray:
     """HeightMap of functions of the unit vector, with the ring of neighbours filled in."""
     directions = texel_directions(N)
     texels = np.concatenate([gradient(directions), height(directions)[..., None]], axis=3)
-    index = padded_indices(N)
+    index = cube_topology(N).halo
     padded = texels.reshape(-1, 4)[np.maximum(index, 0)]
     for row in (0, -1):
         for column in (0, -1):

@@ -25,8 +25,8 @@ from ripple_sim.render.visuals import primitives as meshes
 from ripple_sim.scene.overlays import NAMES, parse_request
 from ripple_sim.scene.scene import Scene, load_scene
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver.cube_map.convention import texel_directions
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.texels.cube_map.convention import texel_directions
 from ripple_sim.video.film import Film
 from ripple_sim.video.render_video import render_video
 

@@ -13,7 +13,6 @@ from ripple_sim.coupling.contacts.geom_contacts import Contacts
 from ripple_sim.coupling.patches.contact_patches import Patches, find_patches, find_spots
 from ripple_sim.solver import Load, WaveSolver
 from ripple_sim.solver.texels.distance import distance_scratch
-from ripple_sim.solver.waves.footprint import texel_grid
 from ripple_sim.solver.waves.load import slot_scratch
 
 from .footprint_cache import NO_FOOTPRINTS, Footprints, lay, used_before
@@ -71,7 +70,7 @@ class Press:
     """
 
     def __init__(self, waves: WaveSolver, radii: NDArray[np.float64], convex: NDArray[np.bool_]) -> None:
-        self._atlas, self._grid, self._radii, self._convex = waves.atlas, texel_grid(waves.atlas), radii, convex
+        self._atlas, self._grid, self._radii, self._convex = waves.atlas, waves.atlas.texels.grid, radii, convex
         self._state = _State(NO_FOOTPRINTS, np.zeros(len(radii), BODY), NOTHING_FELT, True)
         self.renew(waves)
 

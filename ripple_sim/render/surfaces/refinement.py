@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.texels.cube_map.convention import face_coordinates
+from ripple_sim.solver.cube_map.convention import cube_chart_points
 
 from .tessellation import Edges
 
@@ -58,7 +58,7 @@ class Refinement:
         self._long = np.flatnonzero(self._length >= min_length).astype(np.int32)
         ends, index = np.unique(edges.ends[self._long], return_inverse=True)
         self._ends = index.reshape(-1, 2).astype(np.int32)
-        face, row, column = face_coordinates(sphere[np.concatenate([ends, self.base_count + self._long])], resolution)
+        face, row, column = cube_chart_points(sphere[np.concatenate([ends, self.base_count + self._long])], resolution)
         place = np.stack([row, column], axis=1)
         nearest = np.clip(np.floor(place + 0.5), 0, resolution - 1)
         # the first of the 3 x 3 texels about each place, in a padded face, and how far it is off the centre of these

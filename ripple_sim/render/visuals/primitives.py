@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.texels.cube_map.convention import FACE_NORMALS, FACE_U, FACE_V
+from ripple_sim.solver.cube_map.convention import CHART_NORMALS, CHART_U, CHART_V
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def _cube_grid(line: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     lattice = np.concatenate(
         [
             last * normal + a[:, None] * u + b[:, None] * v
-            for normal, u, v in zip(FACE_NORMALS, FACE_U, FACE_V, strict=True)
+            for normal, u, v in zip(CHART_NORMALS, CHART_U, CHART_V, strict=True)
         ]
     )
     corner = (np.arange(last)[:, None] * len(line) + np.arange(last)).ravel()

@@ -13,7 +13,7 @@ from ripple_sim.coupling.patches.contact_patches import Spots, find_patches, fin
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas
 from ripple_sim.solver.texels.distance import distance_scratch
-from ripple_sim.solver.waves.footprint import footprint, texel_grid
+from ripple_sim.solver.waves.footprint import footprint
 from ripple_sim.solver.waves.load import slot_scratch
 
 RADII, CONVEX = np.array([0.5, 0.04, 0.06, 0.03, 0.05]), np.array([True, True, False, True, True])
@@ -81,7 +81,7 @@ def laid(atlas: Atlas, known: Footprints, spots: Spots, here: list[int]) -> tupl
     rows, lost = used_before(known, spots, states)
     assert not len(lost), "all places are known"
     carried, scratch = atlas.areas.reshape(-1), distance_scratch(atlas.areas.size)
-    return lay(known, spots, rows, texel_grid(atlas), carried, scratch), rows
+    return lay(known, spots, rows, atlas.texels.grid, carried, scratch), rows
 
 
 def test_footprints_are_used_again_where_a_spot_stays_and_kept_while_its_body_is_here() -> None:

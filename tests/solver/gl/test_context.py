@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import GLError, Material, WaveSolver, sphere_atlas
+from ripple_sim.solver.backends.backend import make_backend
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.waves.backends.backend import make_backend
-from ripple_sim.solver.waves.operator import build_operator
+from ripple_sim.solver.operator.assembly import build_operator
 
 
 def resident_bytes() -> int:
@@ -24,7 +24,7 @@ def resident_bytes() -> int:
 def test_two_hundred_solvers_leave_nothing_on_the_gpu(gl_backend: str) -> None:
     material = Material(speed=1.0, viscosity=1e-3, bending=1e-4)
     operator = build_operator(sphere_atlas(1.0, 64), material, "fem")
-    one = 3 * operator.stencil.nbytes // 2  # its three stencils alone
+    one = 3 * operator.stencil.weights.nbytes // 2  # its three stencils alone
 
     def use_some(count: int) -> None:
         for _ in range(count):
@@ -41,9 +41,9 @@ def test_two_hundred_solvers_leave_nothing_on_the_gpu(gl_backend: str) -> None:
 
 def test_a_shared_shader_is_compiled_once(gl_backend: str) -> None:
     gl = shared_context()
-    shaders = [gl.shared_compute_shader("ripple_sim.solver.waves.backends", name) for name in ("ring", "ring", "kick")]
+    shaders = [gl.shared_compute_shader("ripple_sim.solver.backends", name) for name in ("halo", "halo", "kick")]
     assert shaders[0] is shaders[1] and shaders[0] is not shaders[2]
-    assert gl.compute_shader("ripple_sim.solver.waves.backends", "ring") is not shaders[0]
+    assert gl.compute_shader("ripple_sim.solver.backends", "halo") is not shaders[0]
 
 
 def test_solvers_that_share_shaders_keep_their_own_coefficients(gl_backend: str) -> None:

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, MeshError, build_atlas, sphere_atlas
+from ripple_sim.solver.atlas.build import atlas_from_sphere_map
+from ripple_sim.solver.cube_map.convention import CHART_NORMALS, CHART_U, CHART_V
 from ripple_sim.solver.mesh.repair import repaired
-from ripple_sim.solver.texels.build import atlas_from_sphere_map
-from ripple_sim.solver.texels.cube_map.convention import FACE_NORMALS, FACE_U, FACE_V
 
 BALL = trimesh.creation.icosphere(subdivisions=1)
 quick = settings(derandomize=True, max_examples=60, deadline=None, database=None)
@@ -192,7 +192,7 @@ def test_located_points_lie_in_their_face(direction) -> None:
     _, [onto] = atlas.project(direction)
     face, row, column = (x[0] for x in atlas.locate(direction))
     a, b = np.tan(np.pi / 4 * ((2 * np.array([column, row]) + 1) / 8 - 1))
-    back = FACE_NORMALS[face] + a * FACE_U[face] + b * FACE_V[face]
+    back = CHART_NORMALS[face] + a * CHART_U[face] + b * CHART_V[face]
     np.testing.assert_allclose(back / np.linalg.norm(back), onto, atol=1e-12)
     assert max(abs(a), abs(b)) <= 1 + 1e-12
 

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from ripple_sim.solver import Mesh, WaveSolver, build_atlas
+from ripple_sim.solver.atlas.build import atlas_from_sphere_map
 from ripple_sim.solver.sphere_map import certify, orientation, progressive_sphere_map, stretch_quantiles
-from ripple_sim.solver.texels.build import atlas_from_sphere_map
 
 SEEDS = st.integers(0, 2**32 - 1)
 EXAMPLES = settings(max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])

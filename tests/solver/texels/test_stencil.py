@@ -5,9 +5,10 @@ import pytest
 from scipy.sparse import coo_array
 
 from ripple_sim.solver import sphere_atlas
-from ripple_sim.solver.texels.cube_map.convention import padded_indices, texel_directions
-from ripple_sim.solver.texels.stencil import _quad, link_lengths, lumped_areas, pad, stiffness_stencil
-from ripple_sim.solver.waves.operator import stencil_sum
+from ripple_sim.solver.cube_map.convention import cube_topology, texel_directions
+from ripple_sim.solver.texels.cells import quad
+from ripple_sim.solver.texels.links import link_lengths
+from ripple_sim.solver.texels.texel_mesh import TexelMesh, stiffness_matrix
 
 
 def element(corners: np.ndarray) -> tuple[np.ndarray, float]:
@@ -46,7 +47,7 @@ def brute_force_laplacian(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """Stiffness matrix and lumped areas, cell by cell."""
     n = positions.shape[1]
     x = positions.reshape(-1, 3)
-    index = padded_indices(n)
+    index = cube_topology(n).halo
     cells = {}
     for face in range(6):
         for r in range(n + 1):
@@ -64,26 +65,27 @@ def brute_force_laplacian(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 @pytest.fixture(scope="module")
-def bumpy() -> np.ndarray:
-    """Texel positions of a star-shaped body without any symmetry."""
+def bumpy() -> TexelMesh:
+    """Star-shaped body without any symmetry."""
     d = texel_directions(6)
     rng = np.random.default_rng(3)
-    return d * (1 + 0.3 * np.sin(d @ rng.uniform(1, 3, 3))[..., None]) * [1.0, 0.7, 1.3]
+    return TexelMesh.of(cube_topology(6), d * (1 + 0.3 * np.sin(d @ rng.uniform(1, 3, 3))[..., None]) * [1.0, 0.7, 1.3])
 
 
-def test_stencil_equals_brute_force_assembly(bumpy: np.ndarray) -> None:
-    stiffness, areas = brute_force_laplacian(bumpy)
+def test_stencil_equals_brute_force_assembly(bumpy: TexelMesh) -> None:
+    stiffness, areas = brute_force_laplacian(bumpy.positions)
     h = np.random.default_rng(0).standard_normal((6, 6, 6))
-    stencil = stiffness_stencil(bumpy, np.ones((6, 6, 6)))
-    np.testing.assert_allclose(stencil_sum(stencil, pad(h)).ravel(), stiffness @ h.ravel(), atol=1e-12)
-    np.testing.assert_allclose(lumped_areas(bumpy).ravel(), areas, rtol=1e-12)
+    stencil = bumpy.stencil(np.ones((6, 6, 6)))
+    np.testing.assert_allclose(stencil(h).ravel(), stiffness @ h.ravel(), atol=1e-12)
+    np.testing.assert_allclose(bumpy.stiffness().toarray(), -stiffness, atol=1e-12)
+    np.testing.assert_allclose(bumpy.areas.ravel(), areas, rtol=1e-12)
 
 
-def test_operator_is_symmetric_to_the_last_bit(bumpy: np.ndarray) -> None:
-    n = bumpy.shape[1]
+def test_operator_is_symmetric_to_the_last_bit(bumpy: TexelMesh) -> None:
+    n = bumpy.resolution
     rng = np.random.default_rng(1)
-    stencil = stiffness_stencil(bumpy, rng.uniform(0.1, 2, (6, n, n))).astype(np.float32)
-    index = padded_indices(n)
+    stencil = bumpy.stencil(rng.uniform(0.1, 2, (6, n, n))).weights.astype(np.float32)
+    index = cube_topology(n).halo
     rows, columns, values = [], [], []
     for link, (a, b) in enumerate(
         [
@@ -109,33 +111,30 @@ def test_operator_is_symmetric_to_the_last_bit(bumpy: np.ndarray) -> None:
     assert valence.max() == 8
 
 
-def test_stiffness_is_positive_but_for_the_constant(bumpy: np.ndarray) -> None:
-    n = bumpy.shape[1]
+def test_stiffness_is_positive_but_for_the_constant(bumpy: TexelMesh) -> None:
+    n = bumpy.resolution
     rng = np.random.default_rng(7)
     # far from smooth: texels that lie anywhere
-    stencil = stiffness_stencil(bumpy + 0.2 * rng.standard_normal(bumpy.shape), np.ones((6, n, n)))
-    basis = np.eye(6 * n * n).reshape(-1, 6, n, n)
-    matrix = -np.array([stencil_sum(stencil, pad(field)).ravel() for field in basis])
-    values = np.linalg.eigvalsh(matrix)
+    texels = bumpy.with_positions(bumpy.positions + 0.2 * rng.standard_normal((6, n, n, 3)))
+    values = np.linalg.eigvalsh(stiffness_matrix(texels.stencil(np.ones((6, n, n)))).toarray())
     assert abs(values[0]) < 1e-10
     assert values[1] > 1e-3
 
 
-def test_constant_field_feels_no_force(bumpy: np.ndarray) -> None:
-    stencil = stiffness_stencil(bumpy, np.full((6, 6, 6), 2.0))
-    force = stencil_sum(stencil, pad(np.full((6, 6, 6), 5.0)))
+def test_constant_field_feels_no_force(bumpy: TexelMesh) -> None:
+    force = bumpy.stencil(np.full((6, 6, 6), 2.0))(np.full((6, 6, 6), 5.0))
     assert np.abs(force).max() == 0
 
 
 def test_sphere_area_converges_at_second_order() -> None:
-    error = [4 * np.pi - lumped_areas(texel_directions(n)).sum() for n in (8, 16, 32, 64)]
+    error = [4 * np.pi - TexelMesh.of(cube_topology(n), texel_directions(n)).areas.sum() for n in (8, 16, 32, 64)]
     orders = np.log2(np.array(error[:-1]) / error[1:])
     assert (orders > 1.95).all()
 
 
 def test_link_lengths_are_distances_between_neighbours() -> None:
     atlas = sphere_atlas(2.0, 12)
-    lengths = link_lengths(atlas.positions)[:, :2]
+    lengths = link_lengths(atlas.texels.topology, atlas.texels.halo_positions)[:, :2]
     ideal = 2.0 * np.pi / 2 / 12
     finite = lengths[np.isfinite(lengths) & (lengths > 0)] / ideal
     # equiangular cells are as wide as ideal ones on a face's middle lines and narrowest beside the cube's edges
@@ -147,7 +146,7 @@ def test_link_lengths_are_distances_between_neighbours() -> None:
 def test_waves_over_sheared_quads_are_in_time_in_the_mean_over_their_directions(long: float, angle: float) -> None:
     east = np.array([long, 0.0, 0.0])
     north = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
-    sides_ew, sides_ns, rising, falling, area = _quad(0 * east, east, north, east + north)
+    sides_ew, sides_ns, rising, falling, area = quad(0 * east, east, north, east + north)
     direction = np.linspace(0, np.pi, 180, endpoint=False)
     errors = []
     for k in (0.2, 0.1):
@@ -165,16 +164,16 @@ def test_waves_over_sheared_quads_are_in_time_in_the_mean_over_their_directions(
     assert errors[1] < errors[0] / 14
 
 
-def test_softened_cells_are_as_stiff_as_their_softest_corner(bumpy: np.ndarray) -> None:
-    n = bumpy.shape[1]
+def test_softened_cells_are_as_stiff_as_their_softest_corner(bumpy: TexelMesh) -> None:
+    n = bumpy.resolution
     even = np.ones((6, n, n))
     factors = even.copy()
     factors[0, 2, 3] = 0.25
-    stiff, soft = stiffness_stencil(bumpy, even), stiffness_stencil(bumpy, even, factors)
+    stiff, soft = bumpy.stencil(even), bumpy.stencil(even, factors)
     h = np.zeros((6, n, n))
     h[0, 2, 3] = 1.0
-    np.testing.assert_allclose(stencil_sum(soft, pad(h))[0, 2, 3], 0.25 * stencil_sum(stiff, pad(h))[0, 2, 3])
+    np.testing.assert_allclose(soft(h)[0, 2, 3], 0.25 * stiff(h)[0, 2, 3])
     h = np.random.default_rng(2).standard_normal((6, n, n))
-    changed = stencil_sum(soft, pad(h)) != stencil_sum(stiff, pad(h))
+    changed = soft(h) != stiff(h)
     assert changed[0, 1:4, 2:5].all()
     assert changed.sum() == 9

@@ -17,7 +17,7 @@ def test_gradient_converges_at_second_order_also_at_the_cubes_edges() -> None:
     for n in (16, 32, 64):
         atlas = sphere_atlas(1.0, n)
         h, gradient = field_and_gradient(atlas.positions)
-        height_map = HeightMap(atlas)(h.astype(np.float32))[:, 1:-1, 1:-1]
+        height_map = HeightMap(atlas.texels)(h.astype(np.float32))[:, 1:-1, 1:-1]
         np.testing.assert_array_equal(height_map[..., 3], h.astype(np.float32))
         errors.append(np.linalg.norm(height_map[..., :3] - gradient, axis=-1).max())
     assert np.log2(errors[0] / errors[1]) > 1.8
@@ -28,7 +28,7 @@ def test_ring_makes_interpolation_continuous() -> None:
     n = 12
     atlas = sphere_atlas(1.0, n)
     h, _ = field_and_gradient(atlas.positions)
-    height_map = HeightMap(atlas)(h.astype(np.float32))
+    height_map = HeightMap(atlas.texels)(h.astype(np.float32))
     # where three faces meet, each face's bilinear value at the cube's corner is the mean of the same three texels
     corners = {}
     for face in range(6):

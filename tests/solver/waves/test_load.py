@@ -93,7 +93,7 @@ def test_footprint_measures_straight_where_it_is_flat_and_along_the_surface_wher
     for vertex in rng.integers(0, len(animal.mesh.V), 40):
         (point,), (center,) = animal.nearest(animal.mesh.V[vertex])
         where = footprint_at(animal, point, int(center), 0.08)
-        texels, along = distance_from_point(animal, int(center), point, 3 * where.radius)
+        texels, along = distance_from_point(animal.texels, int(center), point, 3 * where.radius)
         distance = dict(zip(texels.tolist(), along, strict=True))
         height = (where.weights / where.weights.max()) ** (1 / 3)
         used = where.radius * np.sqrt(1 - np.minimum(1, height * (1 - (min(distance.values()) / where.radius) ** 2)))

@@ -102,7 +102,7 @@ def test_what_is_not_finite_is_reported_with_place_and_time(backend: str) -> Non
     height[2, 5, 9] = np.nan
     waves._backend.set_height(height)
     place = atlas.positions[2, 5, 9]
-    expected = rf"face 2, row 5, column 9, \({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}\) m .* time 0\.6 s"
+    expected = rf"chart 2, row 5, column 9, \({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}\) m .* time 0\.6 s"
     with pytest.raises(SolverError, match=expected):
         waves.step(0.1)
         _ = waves.height

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import Atlas, Mesh, WaveSolver, build_atlas, sphere_atlas
-from ripple_sim.solver.texels.cube_map.convention import cube_rotations, permute_texels
+from ripple_sim.solver.cube_map.convention import cube_rotations, permute_texels
 
 MIRROR = np.diag([1.0, 1.0, -1.0])
 ALL_48 = np.concatenate([cube_rotations(), cube_rotations() @ MIRROR])
@@ -70,11 +70,11 @@ def test_rotated_impulse_on_a_fine_mesh_of_a_sphere(ball_mesh: Mesh) -> None:
 
 def sample(atlas: Atlas, field: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Bilinear samples of a field at surface points."""
-    from ripple_sim.solver.texels.cube_map.convention import padded_indices
+    from ripple_sim.solver.cube_map.convention import cube_topology
 
     n = atlas.resolution
     face, row, column = atlas.locate(points)
-    index = padded_indices(n)
+    index = cube_topology(n).halo
     padded = field.reshape(-1)[index]
     for r, c, a, b in ((0, 0, 1, 1), (0, -1, 1, -2), (-1, 0, -2, 1), (-1, -1, -2, -2)):
         padded[:, r, c] = (padded[:, a, b] + padded[:, r, b] + padded[:, a, c]) / 3

@@ -1,0 +1,1 @@
+"""From a mesh to its atlas: the layouts, the cache, the files."""

@@ -1,0 +1,63 @@
+"""Backends: who computes the waves."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.errors import GLError, SolverError
+from ripple_sim.solver.operator.wave_operator import WaveOperator
+
+BACKENDS = ("auto", "gl", "cpu")
+
+
+class Backend(Protocol):
+    """What a backend does: hold height and velocity as float32, kick texels, and take leapfrog substeps."""
+
+    name: str
+
+    def height(self) -> NDArray[np.float32]: ...  # noqa: D102
+    def velocity(self) -> NDArray[np.float32]: ...  # noqa: D102
+    def dent(self) -> NDArray[np.float32]: ...  # noqa: D102
+    def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None: ...  # noqa: D102
+    def set_velocity(self, velocity: NDArray[np.float32]) -> None: ...  # noqa: D102
+    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: float) -> None: ...  # noqa: D102
+    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: float) -> None: ...  # noqa: D102
+    def advance(self, substeps: int, dt: float) -> None: ...  # noqa: D102
+    def wait(self) -> None: ...  # noqa: D102
+    def finite(self) -> bool: ...  # noqa: D102
+
+
+def make_backend(name: str, operator: WaveOperator) -> Backend:
+    """Backend by name; "auto" takes GL where the driver is hardware, else the CPU.
+
+    Raises
+    ------
+    SolverError
+        For an unknown name.
+    GLError
+        If "gl" is asked for and no context can be made.
+    """
+    if name not in BACKENDS:
+        raise SolverError(f"backend {name!r} does not exist; valid are {', '.join(map(repr, BACKENDS))}")
+    if name == "auto":
+        name = auto_backend()
+    if name == "gl":
+        from .gl import GLBackend
+
+        return GLBackend(operator)
+    from .cpu import CPUBackend
+
+    return CPUBackend(operator)
+
+
+def auto_backend() -> str:
+    """What "auto" means on this machine: "gl" or "cpu"."""
+    from ripple_sim.solver.gl import shared_context
+
+    try:
+        return "cpu" if shared_context().software else "gl"
+    except GLError:
+        return "cpu"

@@ -1,0 +1,235 @@
+"""GPU backend: the same leapfrog update as compute shaders, one file a stage in `shaders/`."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.solver.operator.step_coefficients import step_coefficients
+from ripple_sim.solver.operator.wave_operator import WaveOperator
+
+from .gl_fields import EIGHT, FieldLayout, LinkBuffers, TexelList
+
+# Rows that one thread walks up, and threads of a group, in eights of columns and in blocks of rows (block.glsl). A
+# software driver has few threads and reads on where the last row ended; a GPU wants many.
+_SOFTWARE_BLOCK, _HARDWARE_BLOCK = (64, (8, 1)), (4, (8, 8))
+
+# Threads of a group that works through a list.
+_LIST_GROUP = 64
+
+
+class GLBackend:
+    """Height and velocity in float32 storage buffers; see `backends.Backend`."""
+
+    name = "gl"
+
+    def __init__(self, operator: WaveOperator, gl: GLContext | None = None) -> None:
+        self._gl = gl if gl is not None else shared_context()
+        self._operator = operator
+        self._fields = fields = FieldLayout(self._gl, operator.topology)
+        self._rows, self._group = _SOFTWARE_BLOCK if self._gl.software else _HARDWARE_BLOCK
+        self._viscous = self._laplace = self._dent = self._extra = None
+        self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
+        self._stencil = fields.upload_stencil(operator.stencil)
+        self._movable = fields.upload(operator.movable)
+        self._kicks, self._forces = TexelList(self._gl), TexelList(self._gl)
+        if operator.viscous_stencil is not None:
+            self._viscous = fields.upload_stencil(operator.viscous_stencil)
+            self._viscous_links = LinkBuffers(self._gl, fields, operator.viscous_stencil, np.ones_like(operator.mass))
+        if operator.laplace_stencil is not None and operator.rigidity is not None:
+            self._laplace = fields.upload_stencil(operator.laplace_stencil)
+            self._rigidity, self._moment = fields.upload(operator.rigidity), fields.zeros()
+            self._moment_links, self._bending_links = (
+                LinkBuffers(self._gl, fields, operator.laplace_stencil, factors)
+                for factors in (operator.rigidity, -np.ones_like(operator.mass))
+            )
+        if self._viscous or self._laplace:
+            self._extra = fields.zeros()
+        if operator.yield_height is not None:
+            self._dent, self._yield = fields.zeros(), fields.upload(operator.yield_height)
+        self._compile()
+        self._shift = self._prepared_dt = 0.0
+        self._waiting: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = []
+        self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
+
+    def height(self) -> NDArray[np.float32]:
+        """Copy of the height [m], [C, n, n]."""
+        height = self._fields.read(self._h)
+        return height if self._dent is None else height + self.dent()
+
+    def dent(self) -> NDArray[np.float32]:
+        """The part of the height that stays [m], [C, n, n]."""
+        return np.zeros(self._operator.mass.shape, np.float32) if self._dent is None else self._fields.read(self._dent)
+
+    def velocity(self) -> NDArray[np.float32]:
+        """Copy of the velocity [m/s], [C, n, n]."""
+        with self._gl:
+            self._start(0.0)
+        return self._fields.read(self._v)
+
+    def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
+        """Replace the elastic height, and what stays of it: nothing, unless given."""
+        self._fields.write(self._h, height)
+        if self._dent is not None:
+            self._fields.write(self._dent, np.zeros_like(height) if dent is None else dent)
+
+    def set_velocity(self, velocity: NDArray[np.float32]) -> None:
+        """Replace the velocity."""
+        self._fields.write(self._v, velocity)
+        self._waiting, self._shift = [], 0.0
+
+    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: float) -> None:
+        """Add velocities [m/s] to some texels, and one to all that carry waves.
+
+        They are gathered here, and travel together when the next step or look at the velocity needs them.
+        """
+        self._waiting.append((texels, velocities))
+        self._shift += everywhere
+
+    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: float) -> None:
+        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all that carry waves, until the next call."""
+        self._loaded, self._load_forces, self._acceleration = texels, forces, everywhere
+        self._load_is_new = True
+
+    def advance(self, substeps: int, dt: float) -> None:
+        """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
+        with self._gl:
+            kick_drift = self._prepare(dt)
+            self._start(dt / 2)
+            self._flow()
+            for step in range(substeps):
+                drift = dt if step < substeps - 1 else dt / 2
+                self._fill_halo(self._h)
+                self._gather_extra_forces()
+                kick_drift["dt"] = drift
+                self._bind(self._h, self._v, self._h_next, self._stencil, self._coefficients, self._extra)
+                self._run_blocks(kick_drift)
+                self._kick_irregular(drift)
+                self._h, self._h_next = self._h_next, self._h
+                self._kick_texels(self._forces, drift)
+                self._flow()
+
+    def wait(self) -> None:
+        """Return when all steps are done."""
+        self._gl.wait()
+
+    def finite(self) -> bool:
+        """Whether all heights are finite, as far as it is known without waiting for the GPU: it is not."""
+        return True
+
+    def _compile(self) -> None:
+        self._drift, self._halo, self._kick = (self._shader(name) for name in ("drift", "halo", "kick"))
+        if self._viscous:
+            self._apply_viscous = self._block_shader("apply")
+        if self._laplace:
+            self._apply_rigidity = self._block_shader("apply", FACTOR=1)
+            self._subtract_laplace = self._block_shader("apply", SUBTRACT=1, **({"ADD": 1} if self._viscous else {}))
+        self._irregular_kick, self._irregular_apply = (self._shader("irregular", KICK=kick) for kick in (1, 0))
+        if self._dent:
+            self._yielding = self._shader("flow")
+
+    def _start(self, dt: float) -> None:
+        """Hand out the kicks that wait, and drift."""
+        if self._waiting:
+            texels, where = np.unique(np.concatenate([each[0] for each in self._waiting]), return_inverse=True)
+            kicks = np.bincount(where, np.concatenate([each[1] for each in self._waiting]))
+            self._kicks.set(self._fields.texels[texels], kicks)
+            self._waiting = []
+            self._kick_texels(self._kicks, 0.0)
+        if dt or self._shift:
+            self._drift["dt"], self._drift["shift"] = dt, self._shift
+            self._bind(self._h, self._v, self._movable)
+            self._run_list(self._drift, self._fields.eights)
+        self._shift = 0.0
+
+    def _flow(self) -> None:
+        if self._dent is not None:
+            self._bind(self._h, self._dent, self._yield)
+            self._run_list(self._yielding, self._fields.eights)
+
+    def _gather_extra_forces(self) -> None:
+        """Forces beside tension and stiffness: viscous, and of bending."""
+        if self._viscous and self._extra:
+            self._fill_halo(self._v)
+            self._bind(self._v, self._extra, None, self._viscous)
+            self._run_blocks(self._apply_viscous)
+            self._apply_irregular(self._viscous_links, self._v, self._extra)
+        if self._laplace and self._extra:
+            self._bind(self._h, self._moment, None, self._laplace, self._rigidity)
+            self._run_blocks(self._apply_rigidity)
+            self._apply_irregular(self._moment_links, self._h, self._moment)
+            self._fill_halo(self._moment)
+            self._bind(self._moment, self._extra, None, self._laplace)
+            self._run_blocks(self._subtract_laplace)
+            self._apply_irregular(self._bending_links, self._moment, self._extra)
+
+    def _apply_irregular(self, links: LinkBuffers, field: moderngl.Buffer, result: moderngl.Buffer) -> None:
+        if links.count:
+            self._irregular_apply["count"] = links.count
+            self._bind(field, result, None, links.texels, links.links)
+            self._run_list(self._irregular_apply, links.count)
+
+    def _kick_irregular(self, dt: float) -> None:
+        """What the irregular links add to a substep."""
+        if self._links.count:
+            self._irregular_kick["count"], self._irregular_kick["dt"] = self._links.count, dt
+            self._bind(self._h, self._v, self._h_next, self._links.texels, self._links.links)
+            self._run_list(self._irregular_kick, self._links.count)
+
+    def _prepare(self, dt: float) -> moderngl.ComputeShader:
+        """Compile the kick for this material; upload its coefficients once a step length, and the load once."""
+        new_length = self._prepared_dt != dt
+        if new_length:
+            self._step = k = step_coefficients(self._operator, dt)
+            self._maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
+            self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
+            self._links = LinkBuffers(self._gl, self._fields, self._operator.stencil, k.gain)
+            self._prepared_dt = dt
+        k = self._step
+        if new_length or self._load_is_new:
+            kicks = k.gain.reshape(-1)[self._loaded] * self._load_forces.astype(np.float32)
+            self._forces.set(self._fields.texels[self._loaded], kicks)
+            self._load_is_new = False
+        defines = {"EXTRA": self._extra, "MAPS": self._maps}
+        kick_drift = self._block_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
+        kick_drift["acceleration"] = self._acceleration
+        if not self._maps:
+            kick_drift["decay"], kick_drift["spring"], kick_drift["span"] = k.decay, k.spring, k.span
+        return kick_drift
+
+    def _shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
+        return self._gl.shared_compute_shader("ripple_sim.solver.backends", name, **defines)
+
+    def _block_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
+        fields, (columns, rows) = self._fields, self._group
+        strips = {"N": fields.n, "WIDTH": fields.width, "STRIDE": fields.stride, "FIELD": fields.eights}
+        block = {"ROWS": self._rows, "GROUP_COLUMNS": columns, "GROUP_ROWS": rows}
+        return self._shader(name, **strips, **block, **defines)
+
+    def _kick_texels(self, kicks: TexelList, dt: float) -> None:
+        if kicks.count:
+            self._kick["count"], self._kick["dt"] = kicks.count, dt
+            self._bind(self._h, self._v, kicks.places, kicks.values)
+            self._run_list(self._kick, kicks.count)
+
+    def _fill_halo(self, field: moderngl.Buffer) -> None:
+        self._bind(field, self._fields.halo_pairs)
+        self._halo["count"] = self._fields.halo_count
+        self._run_list(self._halo, self._fields.halo_count)
+
+    def _bind(self, *buffers: moderngl.Buffer | None) -> None:
+        for binding, buffer in enumerate(buffers):
+            if buffer is not None:
+                buffer.bind_to_storage_buffer(binding)
+
+    def _run_blocks(self, shader: moderngl.ComputeShader) -> None:
+        columns, rows = self._group
+        fields = self._fields
+        shader.run(-(-fields.width // (EIGHT * columns)), -(-fields.n // (self._rows * rows)), fields.strips)
+        self._gl.barrier()
+
+    def _run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
+        shader.run(-(-count // _LIST_GROUP))
+        self._gl.barrier()

@@ -1,0 +1,93 @@
+"""From an atlas and a material to the wave operator: finite elements, or a baseline to compare them with."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.texels.atlas import Atlas
+from ripple_sim.solver.texels.links import EAST, LINK_ENDS, NORTH, link_lengths, mean_of_copies
+from ripple_sim.solver.texels.stencil import Stencil
+from ripple_sim.solver.texels.texel_mesh import TexelMesh
+
+from .material import Material
+from .wave_operator import WaveOperator
+
+OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
+
+# No texel may be this much faster (by the sum of its weights over its area) than this share of all texels.
+_FASTER, _BULK = 1.2, 0.99
+
+
+def build_operator(atlas: Atlas, material: Material, kind: str) -> WaveOperator:
+    """Assemble the operator of a material on an atlas.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    material : Material
+    kind : str
+        "fem": symmetric, second-order accurate finite elements. The others are baselines for comparison:
+        "paper": (c/d)^2 (h_j - h_i) over 4 neighbours at real distances d (Kira, Nakayama, Fujishiro, with the printed
+        (d/s)^2 put right); "uncorrected": the same with one mean distance everywhere (their figure 6a);
+        "dynamic-paint": the same sum at real distances over 8 neighbours, as Blender's Dynamic Paint takes it.
+
+    Raises
+    ------
+    SolverError
+        For an unknown kind or a material of another resolution.
+    """
+    if kind not in OPERATORS:
+        raise SolverError(f"operator {kind!r} does not exist; valid are {', '.join(map(repr, OPERATORS))}")
+    field = {each.name: material.texels(each.name, atlas.areas.shape) for each in dataclasses.fields(material)}
+    density, area = field["density"], atlas.areas
+    if kind == "fem":
+        assemble = functools.partial(atlas.texels.stencil, softening=softening(atlas.texels))
+    else:
+        # these formulas give accelerations without masses: one area for all keeps the units, one density as well
+        area, density = np.full_like(area, area.mean()), np.full_like(density, density.mean())
+        assemble = functools.partial(_difference_stencil, atlas.texels, kind, area[0, 0, 0])
+    # what is rigid is not dragged along by its neighbours either
+    moves = (field["speed"] > 0) | (field["stiffness"] > 0) | (field["bending"] > 0)
+    if moves.any():
+        field["viscosity"] *= moves
+    viscous, bends, yields = field["viscosity"].any(), field["bending"].any(), np.isfinite(field["yield_height"]).any()
+    return WaveOperator(
+        stencil=assemble(density * field["speed"] ** 2),
+        mass=density * area,
+        damping=field["damping"],
+        stiffness=field["stiffness"],
+        viscous_stencil=assemble(density * field["viscosity"]) if viscous else None,
+        laplace_stencil=assemble(np.ones_like(area)) if bends else None,
+        rigidity=density * field["bending"] / area if bends else None,
+        yield_height=field["yield_height"] if yields else None,
+        fixed=field["fixed"] if field["fixed"].any() else None,
+    )
+
+
+def softening(texels: TexelMesh) -> NDArray[np.float64]:
+    """Factors that slow those few texels down that would set the time step for all others, [C, n, n].
+
+    Where the texel mesh crosses a crease, single texels are needles. Waves are through them in no time, even slowed
+    down. Smooth surfaces that the texels resolve have none: on the sphere all factors are 1.
+    """
+    rate = texels.stencil(np.ones_like(texels.areas)).absolute_sums() / texels.areas
+    return np.minimum(1, _FASTER * np.quantile(rate, _BULK) / rate)
+
+
+def _difference_stencil(texels: TexelMesh, kind: str, area: float, coefficient: NDArray[np.float64]) -> Stencil:
+    """Link weights area coefficient / distance^2 of the baselines, which know no links beyond the nine points."""
+    lengths = link_lengths(texels.topology, texels.halo_positions)
+    if kind != "dynamic-paint":
+        lengths[:, [link for link in range(4) if link not in (EAST, NORTH)]] = np.inf
+    if kind == "uncorrected":
+        finite = np.isfinite(lengths)
+        lengths[finite] = lengths[finite].mean()
+    lengths[lengths == 0] = np.inf
+    c = texels.topology.with_halo(coefficient)
+    means = np.stack([(c[a] + c[b]) / 2 for a, b in LINK_ENDS], axis=1)
+    return Stencil(texels.topology, mean_of_copies(texels.topology, area * means / lengths**2))

@@ -1,0 +1,209 @@
+"""What the surface is made of: the coefficients of the wave equation, as numbers, as maps, and as presets."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ripple_sim.solver.errors import SolverError
+
+# name: unit, least value, whether the least value itself is excluded, whether infinity is allowed
+_LIMITS = {
+    "speed": ("m/s", 0.0, False, False),
+    "damping": ("1/s", 0.0, False, False),
+    "stiffness": ("1/s^2", 0.0, False, False),
+    "viscosity": ("m^2/s", 0.0, False, False),
+    "density": ("kg/m^2", 0.0, True, False),
+    "bending": ("m^4/s^2", 0.0, False, False),
+    "yield_height": ("m", 0.0, True, True),
+}
+
+# Beyond any physical value, and small enough that nothing overflows on the way to the time step.
+_HIGHEST = 1e12
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Material:
+    """Coefficients of the wave equation; each is a number or one value a texel, shape [C, n, n].
+
+    sigma h_tt = div(sigma c^2 grad h) - lap(sigma b lap h) - sigma zeta h_t - sigma k h + div(sigma nu grad h_t) - p,
+    with p the pressure from outside. A wave of wave number q has omega^2 = c^2 q^2 + b q^4 + k - (zeta + nu q^2)^2 / 4
+    and dies as exp(-(zeta + nu q^2) t / 2).
+
+    Attributes
+    ----------
+    speed : c [m/s]
+        Wave speed of tension. Where it is 0 nothing propagates: waves bounce off as from a free rim, and a region
+        without tension, bending and stiffness is rigid, so that sources do not move it.
+    damping : zeta [1/s]
+        The amplitude of every wave falls as exp(-zeta t / 2).
+    stiffness : k [1/s^2]
+        Pull back to the undeformed surface, for each kg/m^2; a lone texel would swing at sqrt(k).
+    viscosity : nu [m^2/s]
+        Damps a wave of wave number q as exp(-nu q^2 t / 2): short ripples first.
+    density : sigma [kg/m^2]
+        Mass that takes part in the motion, for each area. An impulse J raises the momentum of the surface by J.
+    bending : b [m^4/s^2]
+        Resistance of a plate to being bent, rigidity over density: omega = sqrt(b) q^2, short ripples run ahead.
+    yield_height : [m]
+        What is deformed beyond it stays (see `dent`). Infinite: fully elastic.
+    fixed : bool
+        Where True, the surface is clamped: its height stays 0 and waves come back inverted.
+    """
+
+    speed: float | ArrayLike = 1.0
+    damping: float | ArrayLike = 0.0
+    stiffness: float | ArrayLike = 0.0
+    viscosity: float | ArrayLike = 0.0
+    density: float | ArrayLike = 1.0
+    bending: float | ArrayLike = 0.0
+    yield_height: float | ArrayLike = np.inf
+    fixed: bool | ArrayLike = False
+
+    @classmethod
+    def membrane(cls, tension: float = 1.0, density: float = 1.0, damping: float = 0.0) -> Material:
+        """Stretched skin: omega = c q with c = sqrt(tension / density), the same for all wave lengths.
+
+        Parameters
+        ----------
+        tension : [N/m]
+        density : [kg/m^2]
+        damping : [1/s]
+        """
+        _require_positive(tension=(tension, "N/m"), density=(density, "kg/m^2"))
+        return cls(speed=(tension / density) ** 0.5, density=density, damping=damping)
+
+    @classmethod
+    def jelly(
+        cls, modulus: float = 500.0, viscosity: float = 2.0, thickness: float = 0.1, density: float = 1000.0
+    ) -> Material:
+        """Soft layer on a rigid core: it wobbles at its own frequency and settles.
+
+        The first thickness mode h sin(pi z / 2 d) of a Kelvin-Voigt layer of thickness d, held at its base and free at
+        its surface, carries waves along the layer with c^2 = G / rho, k = c^2 (pi / 2 d)^2, nu = eta / rho,
+        zeta = nu (pi / 2 d)^2 and half of the layer's mass, sigma = rho d / 2 (Achenbach 1973, chapter 6, for layers;
+        the modulus becomes G + eta d/dt).
+
+        Parameters
+        ----------
+        modulus : G [Pa]
+            Shear modulus; gelatine has 100 to 10,000.
+        viscosity : eta [Pa s]
+        thickness : d [m]
+        density : rho [kg/m^3]
+        """
+        _require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))
+        across = (np.pi / 2 / thickness) ** 2
+        return cls(
+            speed=(modulus / density) ** 0.5,
+            stiffness=modulus / density * across,
+            viscosity=viscosity / density,
+            damping=viscosity / density * across,
+            density=density * thickness / 2,
+        )
+
+    @classmethod
+    def plate(
+        cls,
+        modulus: float = 1e6,
+        thickness: float = 0.01,
+        density: float = 1000.0,
+        poisson: float = 0.3,
+        damping: float = 0.0,
+    ) -> Material:
+        """Thin elastic shell that resists bending only: omega = sqrt(D / sigma) q^2, dispersive.
+
+        Kirchhoff's plate: rigidity D = E d^3 / 12 (1 - nu^2), sigma = rho d. The surface's own curvature is left out.
+
+        Parameters
+        ----------
+        modulus : E [Pa]
+        thickness : d [m]
+        density : rho [kg/m^3]
+        poisson : nu
+            From 0 up to 0.5.
+        damping : [1/s]
+        """
+        _require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))
+        if not 0 <= poisson <= 0.5:
+            raise SolverError(f"plate poisson is {poisson!r}; valid is a number from 0 to 0.5")
+        rigidity = modulus * thickness**3 / (12 * (1 - poisson**2))
+        surface_density = density * thickness
+        return cls(speed=0.0, bending=rigidity / surface_density, density=surface_density, damping=damping)
+
+    @classmethod
+    def dent(
+        cls,
+        yield_height: float,
+        stiffness: float = 1000.0,
+        speed: float = 1.0,
+        damping: float = 1.0,
+        density: float = 1.0,
+    ) -> Material:
+        """Ideally plastic ground: what goes beyond the yield height stays.
+
+        Height is elastic plus permanent. Waves act on the elastic part, which never exceeds the yield height: while it
+        stands at the limit the ground flows under the constant resistance sigma k yield_height, and the flow is
+        permanent. A uniform push at velocity v leaves (v^2 / k - yield_height^2) / (2 yield_height).
+
+        Parameters
+        ----------
+        yield_height : [m]
+        stiffness : k [1/s^2]
+        speed : c [m/s]
+        damping : zeta [1/s]
+        density : sigma [kg/m^2]
+        """
+        return cls(speed=speed, damping=damping, stiffness=stiffness, density=density, yield_height=yield_height)
+
+    def __post_init__(self) -> None:
+        for name, (unit, low, strict, endless) in _LIMITS.items():
+            value = _numbers(name, getattr(self, name))
+            small = (value <= low) | (value < 1 / _HIGHEST) if strict else value < low
+            wrong = small | np.isnan(value) | ((value > _HIGHEST) & ~(np.isinf(value) & endless))
+            if wrong.any():
+                worst = value.flat[np.argmax(wrong)]
+                bound = f"greater than {low:g}" if strict else f"{low:g} or greater"
+                raise SolverError(
+                    f"material {name} is {worst:g} {unit}; valid is a finite number, {bound}, up to {_HIGHEST:g}"
+                    f"{', or infinity' if endless else ''}"
+                )
+            _check_shape(name, value)
+        fixed = np.asarray(self.fixed)
+        if fixed.dtype != bool:
+            raise SolverError(f"material fixed has type {fixed.dtype}; valid is bool: a mask [C, n, n], or False")
+        _check_shape("fixed", fixed)
+
+    def texels(self, name: str, shape: tuple[int, int, int]) -> NDArray:
+        """One coefficient at every texel, [C, n, n], float64 (bool for `fixed`).
+
+        Raises
+        ------
+        SolverError
+            If the coefficient was given for another atlas.
+        """
+        value = np.asarray(getattr(self, name), dtype=bool if name == "fixed" else np.float64)
+        if value.ndim and value.shape != shape:
+            raise SolverError(f"material {name} has shape {value.shape}, the atlas needs a number or {shape}")
+        return np.array(np.broadcast_to(value, shape))
+
+
+def _numbers(name: str, value: object) -> NDArray[np.float64]:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise SolverError(f"material {name} is {value!r}; valid is a number or an array of numbers") from error
+
+
+def _check_shape(name: str, value: NDArray) -> None:
+    charts = value.ndim == 3 and value.shape[1] == value.shape[2]
+    if value.ndim != 0 and not charts:
+        raise SolverError(f"material {name} has shape {value.shape}; valid is a number or [C, n, n], one value a texel")
+
+
+def _require_positive(**values: tuple[float, str]) -> None:
+    for name, (value, unit) in values.items():
+        if not 0 < value < np.inf:
+            raise SolverError(f"{name} is {value!r} {unit}; valid is a finite number greater than 0")

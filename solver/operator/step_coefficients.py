@@ -1,0 +1,49 @@
+"""The coefficients of one substep of a wave operator."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .wave_operator import WaveOperator
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StepCoefficients:
+    """The kick of a step dt: v = decay v + gain force - spring h.
+
+    Damping is implicit (centred): decay = (1 - zeta dt/2) / (1 + zeta dt/2).
+
+    Attributes
+    ----------
+    gain : float32 [C, n, n]
+        [s/kg]; 0 where the surface is clamped.
+    decay, spring, span : float32 or float32 [C, n, n]
+        One number where a coefficient is uniform, which saves the kernel's reads. The spring is in 1/s; the span [s] is
+        how long an acceleration that acts everywhere counts: 0 where sources move nothing.
+    """
+
+    gain: NDArray[np.float32]
+    decay: NDArray[np.float32] | np.float32
+    spring: NDArray[np.float32] | np.float32
+    span: NDArray[np.float32] | np.float32
+
+
+def step_coefficients(operator: WaveOperator, dt: float) -> StepCoefficients:
+    """Coefficients of the kick of one substep of dt [s]."""
+    half = operator.damping * (dt / 2)
+    span = dt / (1 + half)
+    return StepCoefficients(
+        gain=np.where(operator.free, span / operator.mass, 0).astype(np.float32),
+        decay=number_or_field((1 - half) / (1 + half)),
+        spring=number_or_field(span * operator.stiffness),
+        span=number_or_field(span * operator.movable),
+    )
+
+
+def number_or_field(field: NDArray) -> NDArray[np.float32] | np.float32:
+    """One float32 number where a field has one value, else the field as float32."""
+    first = field.flat[0]
+    return np.float32(first) if (field == first).all() else field.astype(np.float32)

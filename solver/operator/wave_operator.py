@@ -1,0 +1,125 @@
+"""The discrete wave operator: stencil weights, masses, and the largest time step they allow."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from ripple_sim.solver.texels.stencil import Stencil
+from ripple_sim.solver.texels.topology import TexelTopology
+
+# Share of the theoretical stability limit that is used: round-off in float32 must not cross it.
+SAFETY = 0.99
+
+# On smaller charts Gershgorin's bound is as good.
+_LANCZOS_FROM = 6
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class WaveOperator:
+    """M h_tt = -(K + L B L) h - M zeta h_t - M k h - D h_t on the texels; stencils give K, L and D.
+
+    Attributes
+    ----------
+    stencil : Stencil
+        Link weights of K [kg/s^2].
+    mass : float64 [C, n, n]
+        sigma A [kg].
+    damping, stiffness : float64 [C, n, n]
+        zeta [1/s] and k [1/s^2].
+    viscous_stencil : Stencil or None
+        Link weights of D [kg/s]; None without viscosity.
+    laplace_stencil : Stencil or None
+        Link weights of L, which gives the area integral of the Laplacian; None without bending.
+    rigidity : float64 [C, n, n] or None
+        B = sigma b / A [kg/s^2]: L B L is the bi-Laplacian's symmetric form, B L h a plate's moments.
+    yield_height : float64 [C, n, n] or None
+        [m]; None where everything is elastic.
+    fixed : bool [C, n, n]
+        Texels that are clamped.
+    """
+
+    stencil: Stencil
+    mass: NDArray[np.float64]
+    damping: NDArray[np.float64]
+    stiffness: NDArray[np.float64]
+    viscous_stencil: Stencil | None = None
+    laplace_stencil: Stencil | None = None
+    rigidity: NDArray[np.float64] | None = None
+    yield_height: NDArray[np.float64] | None = None
+    fixed: NDArray[np.bool_] | None = None
+
+    @property
+    def topology(self) -> TexelTopology:
+        """How the charts hang together."""
+        return self.stencil.topology
+
+    @functools.cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Texels that are not clamped, [C, n, n]."""
+        return np.ones(self.mass.shape, bool) if self.fixed is None else ~self.fixed
+
+    @functools.cached_property
+    def movable(self) -> NDArray[np.bool_]:
+        """Texels that sources may move: free, and with something that pulls back. All, where nothing pulls anywhere."""
+        pulled = (self.stencil.absolute_sums() > 0) | (self.stiffness > 0)
+        if self.rigidity is not None:
+            pulled |= self.rigidity > 0
+        movable = pulled & self.free
+        return movable if movable.any() else self.free
+
+    def elastic_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
+        """-(K + L B L + M k) h [N], float64 [C, n, n]; what holds the clamped texels is left out."""
+        return self._tension_force(height) - self.mass * self.stiffness * height
+
+    @functools.cached_property
+    def stable_timestep(self) -> float:
+        """Largest stable step of the leapfrog scheme [s], from the operator's largest eigenvalues.
+
+        A mode with omega^2 = lambda + k and viscous rate mu is stable if dt^2 omega^2 + 2 dt mu <= 4. Infinite if
+        nothing moves.
+        """
+        bound = self._rate_bound(self.stencil)
+        if self.laplace_stencil is not None and self.rigidity is not None:
+            bending = self._rate_bound(self.laplace_stencil)
+            bound += bending * float((self.rigidity * self.mass).max()) * bending
+        wave = self._largest_eigenvalue(self._tension_force, bound) + self.stiffness.max()
+        viscous = 0.0
+        if self.viscous_stencil is not None:
+            viscous = self._largest_eigenvalue(self.viscous_stencil, self._rate_bound(self.viscous_stencil))
+        # the positive root, written so that nothing cancels
+        rate = viscous + np.sqrt(viscous**2 + 4 * wave)
+        return np.inf if rate == 0 else float(SAFETY * 4 / rate)
+
+    def _tension_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
+        force = self.stencil(height)
+        if self.laplace_stencil is not None and self.rigidity is not None:
+            force -= self.laplace_stencil(self.rigidity * self.laplace_stencil(height))
+        return force
+
+    def _rate_bound(self, stencil: Stencil) -> float:
+        """Gershgorin's bound of the largest eigenvalue of M^-1 K."""
+        return float((stencil.absolute_sums() * 2 / self.mass).max())
+
+    def _largest_eigenvalue(self, force: Callable[[NDArray[np.float64]], NDArray[np.float64]], bound: float) -> float:
+        """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
+
+        A bound that is always safe caps the estimate.
+        """
+        if bound == 0 or self.mass.shape[1] < _LANCZOS_FROM:
+            return bound
+        weight = self.free / np.sqrt(self.mass)
+
+        def multiply(x: NDArray) -> NDArray:
+            return -(force(x.reshape(weight.shape) * weight) * weight).ravel()
+
+        size = self.mass.size
+        start = np.random.default_rng(0).standard_normal(size)
+        matrix = LinearOperator((size, size), matvec=multiply, dtype=np.float64)
+        value = eigsh(matrix, k=1, which="LA", v0=start, tol=2e-3, return_eigenvectors=False, maxiter=size)
+        return float(np.clip(1.005 * value[0], 0, bound))

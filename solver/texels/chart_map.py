@@ -1,0 +1,88 @@
+"""The way from a point of the mesh to its place on the charts, which each layout knows in its own manner."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.mesh.mesh import Mesh
+
+from .topology import TexelTopology
+
+
+class ChartMap(Protocol):
+    """Maps the triangles of a mesh to charts.
+
+    Within a triangle everything is linear in *map coordinates*, of which only the layout knows the meaning: directions
+    on the sphere, or rows and columns.
+    """
+
+    @property
+    def layout(self) -> str:
+        """Name of the layout."""
+
+    def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Map coordinates [k, d] of points [k, 3] [m] that lie on triangles [k]."""
+
+    def chart_points(
+        self, coordinates: NDArray[np.float64], resolution: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Chart, row and column, each [k], of map coordinates; 0.0 is the centre of the first texel."""
+
+    def nearest_texels(self, coordinates: NDArray[np.float64], topology: TexelTopology) -> NDArray[np.int64]:
+        """Flat index of the texel in which map coordinates lie, [k]."""
+
+    def texture_coordinates(self, mesh: Mesh) -> TextureCoordinates:
+        """The triangles of the mesh, cut so that each piece lies in one chart."""
+
+    def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Place [k, ..., 2] in charts [k], 0 to 1, of map coordinates [k, ..., d] that belong to them."""
+
+    def quality(self, mesh: Mesh) -> dict[str, float]:
+        """Figures of merit of the map itself; see `Atlas.quality`."""
+
+    def arrays(self) -> dict[str, NDArray]:
+        """What has to be stored to make the chart map again."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TextureCoordinates:
+    """The triangles of a mesh, cut where they cross the border of a chart, with coordinates into the atlas.
+
+    Attributes
+    ----------
+    triangle : int64 [piece_count]
+        Triangle of the mesh of which each piece is a part, in ascending order. Most are not cut: one piece, the whole.
+    barycentrics : float64 [piece_count, 3, 3]
+        Where in that triangle the piece's three corners lie, in the winding of the mesh.
+    chart : int64 [piece_count]
+        Chart of the atlas, the layer of a texture array.
+    coordinates : float64 [piece_count, 3, d]
+        Map coordinates of the corners; see `ChartMap`.
+    uv : float64 [piece_count, 3, 2]
+        Place in the chart at each corner, 0 to 1: (column + 1/2) / n and (row + 1/2) / n, whatever the resolution n.
+        In a layer with a halo of one texel it is at (1 + n uv) / (n + 2).
+    """
+
+    triangle: NDArray[np.int64]
+    barycentrics: NDArray[np.float64]
+    chart: NDArray[np.int64]
+    coordinates: NDArray[np.float64]
+    uv: NDArray[np.float64]
+
+    def carry(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the pieces' corners of what is linear in each triangle of the mesh.
+
+        Parameters
+        ----------
+        corner_values : [face_count, 3, ...]
+            Values at the corners of the mesh's triangles, such as `mesh.V[mesh.F]` or `mesh.corner_uv`.
+
+        Returns
+        -------
+        [piece_count, 3, ...]
+        """
+        return np.einsum("pij,pj...->pi...", self.barycentrics, np.asarray(corner_values)[self.triangle])

@@ -1,0 +1,88 @@
+"""A chart map that is linear in each triangle: its corners lie at rows and columns of one chart."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.mesh.mesh import Mesh
+
+from .chart_map import TextureCoordinates
+from .topology import TexelTopology
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LinearChartMap:
+    """Triangles laid out on charts; map coordinates are chart, row and column. See `ChartMap`.
+
+    Attributes
+    ----------
+    charts : int64 [face_count]
+        Chart of each triangle.
+    corners : float64 [face_count, 3, 2]
+        Row and column of its corners, from -0.5 to n - 0.5.
+    resolution : int
+        Texels along a chart's side, n.
+    """
+
+    charts: NDArray[np.int64]
+    corners: NDArray[np.float64]
+    resolution: int
+
+    @property
+    def layout(self) -> str:
+        """Name of the layout."""
+        return "given"
+
+    def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Chart, row and column, [k, 3], of points [k, 3] [m] that lie on triangles [k]."""
+        weights = _barycentrics(mesh.V[mesh.F[triangles]], points)
+        places = np.einsum("kc,kcj->kj", weights, self.corners[triangles])
+        return np.concatenate([self.charts[triangles, None], places], axis=1)
+
+    def chart_points(
+        self, coordinates: NDArray[np.float64], resolution: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Chart, row and column, each [k]."""
+        return coordinates[:, 0].astype(np.int64), coordinates[:, 1], coordinates[:, 2]
+
+    def nearest_texels(self, coordinates: NDArray[np.float64], topology: TexelTopology) -> NDArray[np.int64]:
+        """Flat index of the texel in which each place lies, [k]."""
+        n = topology.shape[1]
+        chart, row, column = np.rint(coordinates).astype(np.int64).T
+        return (chart * n + row.clip(0, n - 1)) * n + column.clip(0, n - 1)
+
+    def texture_coordinates(self, mesh: Mesh) -> TextureCoordinates:
+        """The triangles as they are: each lies in one chart."""
+        count = len(self.charts)
+        chart = np.broadcast_to(self.charts[:, None, None], (count, 3, 1))
+        coordinates = np.concatenate([chart, self.corners], axis=2)
+        whole = np.tile(np.eye(3), (count, 1, 1))
+        return TextureCoordinates(np.arange(count), whole, self.charts, coordinates, self.uv(coordinates, self.charts))
+
+    def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Place [k, ..., 2] in the charts, 0 to 1, of map coordinates [k, ..., 3]."""
+        return np.clip((coordinates[..., [2, 1]] + 0.5) / self.resolution, 0.0, 1.0)
+
+    def quality(self, mesh: Mesh) -> dict[str, float]:
+        """None: whoever laid the triangles out knows."""
+        return {}
+
+    def arrays(self) -> dict[str, NDArray]:
+        """Charts and corners of the triangles."""
+        return {"charts": self.charts, "corners": self.corners}
+
+
+def _barycentrics(corners: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Barycentric coordinates [k, 3], not negative, of points [k, 3] in triangles [k, 3, 3]."""
+    u, v, p = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
+    uu, uv, vv, pu, pv = (np.einsum("ij,ij->i", a, b) for a, b in ((u, u), (u, v), (v, v), (p, u), (p, v)))
+    area = uu * vv - uv * uv
+    # a triangle without area has no barycentrics: its middle is as good as any point of it
+    flat = area <= 0
+    scale = np.where(flat, 1.0, area)
+    s = np.where(flat, 1 / 3, np.clip((vv * pu - uv * pv) / scale, 0.0, 1.0))
+    t = np.where(flat, 1 / 3, np.clip((uu * pv - uv * pu) / scale, 0.0, 1.0 - s))
+    return np.stack([1 - s - t, s, t], axis=1)

@@ -1,0 +1,158 @@
+"""Texture coordinates into the atlas: every triangle in one face's [0, 1], sampling agrees with direct evaluation."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from ripple_sim.solver import Atlas, Mesh, build_atlas
+from ripple_sim.solver.atlas.build import atlas_from_sphere_map
+from ripple_sim.solver.cube_map.convention import CHART_NORMALS, CHART_U, CHART_V, cube_topology, texel_directions
+
+
+def ball(subdivisions: int, resolution: int) -> Atlas:
+    """A turned icosphere, so that its triangles cross the cube's edges anyhow, mapped onto itself."""
+    solid = trimesh.creation.icosphere(subdivisions=subdivisions)
+    turned = solid.vertices @ trimesh.transformations.rotation_matrix(0.7, [1, 2, 3])[:3, :3].T
+    mesh = Mesh.from_arrays(turned, solid.faces)
+    return atlas_from_sphere_map(mesh, mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), resolution)
+
+
+def smooth(directions: np.ndarray) -> np.ndarray:
+    x, y, z = np.moveaxis(directions, -1, 0)
+    return np.sin(2 * x + y) + x * y * z + 0.5 * z**2
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def direction_at(face: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """The direction that a place in a face stands for, by the definition of the equiangular cube map."""
+    a, b = np.tan(np.pi / 4 * (2 * uv - 1)).T
+    return unit(CHART_NORMALS[face] + a[:, None] * CHART_U[face] + b[:, None] * CHART_V[face])
+
+
+def sample(field: np.ndarray, face: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Bilinear interpolation in six padded layers, as a GPU does it."""
+    n = field.shape[1]
+    index = cube_topology(n).halo
+    padded = field.reshape(-1)[index]
+    for r, r_in in ((0, 1), (n + 1, n)):
+        for c, c_in in ((0, 1), (n + 1, n)):
+            padded[:, r, c] = (padded[:, r_in, c_in] + padded[:, r, c_in] + padded[:, r_in, c]) / 3
+    column, row = (uv * n + 0.5).T
+    j, i = np.floor(column).astype(int).clip(0, n), np.floor(row).astype(int).clip(0, n)
+    s, t = column - j, row - i
+    return (
+        (1 - t) * ((1 - s) * padded[face, i, j] + s * padded[face, i, j + 1])
+        + t * ((1 - s) * padded[face, i + 1, j] + s * padded[face, i + 1, j + 1])
+    )  # fmt: skip
+
+
+def interior_points(atlas: Atlas, seed: int):
+    """One random point inside each piece: its face, interpolated coordinates, and true direction."""
+    coordinates = atlas.texture_coordinates()
+    weights = np.random.default_rng(seed).dirichlet(np.ones(3), size=len(coordinates.chart))
+    uv = np.einsum("pi,pij->pj", weights, coordinates.uv)
+    corners = coordinates.carry(atlas.sphere[atlas.mesh.F])
+    return coordinates.chart, uv, unit(np.einsum("pi,pij->pj", weights, corners))
+
+
+def test_pieces_make_up_every_triangle_in_its_winding() -> None:
+    atlas = ball(2, 8)
+    coordinates = atlas.texture_coordinates()
+    share = np.linalg.det(coordinates.barycentrics)
+    assert (share > 0).all()
+    np.testing.assert_allclose(np.bincount(coordinates.triangle, share), 1, atol=1e-10)
+    assert (coordinates.barycentrics >= 0).all()
+    np.testing.assert_allclose(coordinates.barycentrics.sum(axis=2), 1)
+    assert (np.diff(coordinates.triangle) >= 0).all()
+    corners = coordinates.carry(atlas.mesh.V[atlas.mesh.F])
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    assert area == pytest.approx(atlas.mesh.area)
+
+
+def test_every_corner_of_the_mesh_has_exact_coordinates(animal: Atlas) -> None:
+    coordinates = animal.texture_coordinates()
+    at_corner = coordinates.barycentrics.max(axis=2) == 1
+    corner = coordinates.barycentrics.argmax(axis=2)
+    found = {(t, k) for t, ks, here in zip(coordinates.triangle, corner, at_corner, strict=True) for k in ks[here]}
+    assert len(found) == animal.mesh.F.size
+    assert coordinates.uv.min() >= 0
+    assert coordinates.uv.max() <= 1
+    directions = unit(coordinates.carry(animal.sphere[animal.mesh.F]))
+    for k in range(3):
+        np.testing.assert_allclose(direction_at(coordinates.chart, coordinates.uv[:, k]), directions[:, k], atol=1e-11)
+
+
+def test_triangles_are_cut_exactly_where_they_cross_a_cube_edge(animal: Atlas) -> None:
+    coordinates = animal.texture_coordinates()
+    pieces = np.bincount(coordinates.triangle)
+    corners = animal.sphere[animal.mesh.F]
+    axis = np.abs(corners).argmax(axis=2)
+    sign = np.sign(np.take_along_axis(corners, axis[..., None], axis=2))[..., 0]
+    one_face = (axis == axis[:, :1]).all(axis=1) & (sign == sign[:, :1]).all(axis=1)
+    assert (pieces[one_face] == 1).all()
+    assert (pieces[~one_face] > 1).all()
+    assert 0 < (~one_face).sum() < len(pieces) / 4
+
+
+def test_interpolated_coordinates_converge_at_second_order() -> None:
+    errors = []
+    for subdivisions in (3, 4, 5):
+        face, uv, directions = interior_points(ball(subdivisions, 8), 0)
+        distance = np.linalg.norm(direction_at(face, uv) - directions, axis=1)
+        assert distance.max() < 0.01
+        errors.append(np.sqrt((distance**2).mean()))
+    assert errors[0] / errors[1] == pytest.approx(4, abs=0.4)
+    assert errors[1] / errors[2] == pytest.approx(4, abs=0.4)
+
+
+def test_sampling_a_padded_texture_agrees_with_the_field_itself() -> None:
+    atlas = ball(5, 64)
+    face, uv, directions = interior_points(atlas, 1)
+    texture = smooth(texel_directions(64))
+    error = np.abs(sample(texture, face, uv) - smooth(directions))
+    texel = np.pi / 2 / 64
+    near_edge = np.abs(2 * uv - 1).max(axis=1) > 1 - 1 / 64
+    # bilinear interpolation is of second order; along cube edges the grid lines kink, which leaves a share of a texel
+    assert error[~near_edge].max() < 2 * texel**2
+    assert error.max() < texel
+    corners = atlas.texture_coordinates()
+    at_vertices = sample(texture, np.repeat(corners.chart, 3), corners.uv.reshape(-1, 2))
+    assert np.abs(at_vertices - smooth(unit(corners.carry(atlas.sphere[atlas.mesh.F]))).ravel()).max() < texel
+
+
+def test_a_sampled_texture_has_no_seam() -> None:
+    atlas = ball(3, 16)
+    coordinates = atlas.texture_coordinates()
+    texture = np.random.default_rng(2).standard_normal((6, 16, 16))
+    values = sample(texture, np.repeat(coordinates.chart, 3), coordinates.uv.reshape(-1, 2))
+    directions = unit(coordinates.carry(atlas.sphere[atlas.mesh.F])).reshape(-1, 3)
+    _, first, same = np.unique(directions.round(9) + 0.0, axis=0, return_index=True, return_inverse=True)
+    np.testing.assert_allclose(values, values[first][same.reshape(-1)], atol=1e-6)
+    faces = np.repeat(coordinates.chart, 3)
+    assert (faces != faces[first][same.reshape(-1)]).sum() > 100  # on edges, where the question arises
+
+
+def test_triangles_as_large_as_a_quarter_of_the_sphere_are_cut() -> None:
+    V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    atlas = build_atlas(Mesh.from_arrays(V, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]), 8, cache=False)
+    coordinates = atlas.texture_coordinates()
+    assert set(coordinates.chart) == set(range(6))
+    np.testing.assert_allclose(np.bincount(coordinates.triangle, np.linalg.det(coordinates.barycentrics)), 1)
+
+
+def test_the_objects_own_coordinates_are_carried_along_and_stay() -> None:
+    solid = trimesh.creation.icosphere(subdivisions=2)
+    own = np.random.default_rng(3).uniform(size=(len(solid.faces), 3, 2))
+    mesh = Mesh.from_arrays(solid.vertices, solid.faces, own)
+    atlas = atlas_from_sphere_map(mesh, mesh.V, 8)
+    coordinates = atlas.texture_coordinates()
+    np.testing.assert_array_equal(mesh.corner_uv, own)
+    carried = coordinates.carry(mesh.corner_uv)
+    whole = (coordinates.barycentrics == np.eye(3)).all(axis=(1, 2))
+    np.testing.assert_array_equal(carried[whole], own[coordinates.triangle[whole]])
+    low, high = own.min(axis=1)[coordinates.triangle], own.max(axis=1)[coordinates.triangle]
+    assert (carried >= low[:, None] - 1e-12).all()
+    assert (carried <= high[:, None] + 1e-12).all()

@@ -1,0 +1,77 @@
+"""Small texel meshes made by hand, whose waves are known."""
+
+import numpy as np
+
+from ripple_sim.solver import TexelMesh, TexelTopology, glue
+
+RIM = (-1, -1)
+
+
+def _corners_to_places(corners: np.ndarray, topology: TexelTopology) -> np.ndarray:
+    """Positions with halo of flat charts with the given corners [C, 4, 3].
+
+    Beyond a rim lies the point of the rim that is nearest to the texel: there the waves' natural boundary is exact.
+    """
+    n = topology.shape[1]
+    u = ((np.arange(n + 2) - 0.5) / n).clip(0, 1)
+    s, t = u[None, None, :, None], u[None, :, None, None]
+    a, b, c, d = (corners[:, k, None, None] for k in range(4))
+    places = (1 - s) * (1 - t) * a + s * (1 - t) * b + s * t * c + (1 - s) * t * d
+    for side, (rim, texel) in enumerate(
+        (((0, slice(1, -1)), (1, slice(1, -1))), ((slice(1, -1), -1), (slice(1, -1), -2)),
+         ((-1, slice(1, -1)), (-2, slice(1, -1))), ((slice(1, -1), 0), (slice(1, -1), 1)))
+    ):  # fmt: skip
+        along = corners[:, (side + 1) % 4] - corners[:, side]
+        along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        offset = places[:, *texel] - corners[:, side, None]
+        places[:, *rim] = corners[:, side, None] + np.einsum("cij,cj->ci", offset, along)[..., None] * along[:, None]
+    texels = places[:, 1:-1, 1:-1].reshape(-1, 3)
+    shown = ~topology.own & ~topology.rim & (topology.halo >= 0)
+    places[shown] = texels[topology.halo[shown]]
+    # beyond a rim and a glued side lies the rim's point beside the neighbour's corner texel
+    for chart, corner in np.argwhere(topology.valence == 0):
+        row, column = ((0, 0), (0, -1), (-1, -1), (-1, 0))[corner]
+        other, r, c = np.unravel_index(topology.halo[chart, row, column], topology.shape)
+        if topology.rim[chart, row, column] and other != chart:
+            out_r, out_c = (0 if x == 0 else n + 1 for x in (r, c))
+            along_rows = topology.rim[other, out_r, c + 1]
+            places[chart, row, column] = places[other, out_r, c + 1] if along_rows else places[other, r + 1, out_c]
+    return places
+
+
+def flat_charts(corners, glued, n: int) -> TexelMesh:
+    """Flat charts in space by their corners [C, 4, 3], counter-clockwise, cell-centred: the surface ends at the rim."""
+    topology = glue(np.array(glued), n)
+    places = _corners_to_places(np.asarray(corners, dtype=np.float64), topology)
+    return TexelMesh.of(topology, places[:, 1:-1, 1:-1], beyond=places)
+
+
+def square(n: int) -> TexelMesh:
+    """Unit square with free edges: one chart."""
+    return flat_charts([[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]], [[RIM] * 4], n)
+
+
+def polygon(sides: int, n: int) -> TexelMesh:
+    """Regular polygon with free edges, cut into charts from its centre: that many meet there."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    tips = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    middles = (tips + np.roll(tips, -1, axis=0)) / 2
+    centre = np.zeros_like(tips)
+    corners = np.stack([centre, middles, np.roll(tips, -1, axis=0), np.roll(middles, -1, axis=0)], axis=1)
+    glued = [[((i - 1) % sides, 3), RIM, RIM, ((i + 1) % sides, 0)] for i in range(sides)]
+    return flat_charts(corners, glued, n)
+
+
+def flat_torus(n: int) -> TexelMesh:
+    """Unit square whose opposite sides are one: a chart that is glued to itself."""
+    topology = glue(np.array([[(0, 2), (0, 3), (0, 0), (0, 1)]]), n)
+    place = (np.arange(n + 2) - 0.5) / n
+    x, y = np.meshgrid(place, place)
+    places = np.stack([x, y, 0 * x], axis=-1)[None]
+    return TexelMesh.of(topology, places[:, 1:-1, 1:-1], beyond=places)
+
+
+def two_squares(n: int) -> TexelMesh:
+    """Two unit squares, one above the other, that have nothing to do with each other."""
+    lower = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    return flat_charts([lower, lower + np.array([0, 0, 1])], [[RIM] * 4] * 2, n)
