@@ -13,7 +13,10 @@ from ripple_sim.solver.waves.backends.backend import Backend, make_backend
 from ripple_sim.solver.waves.backends.cpu import CPUBackend
 from ripple_sim.solver.waves.operator import WaveOperator, build_operator
 
-from .rivals import Copy, PlainShader, SparseLeapfrog
+from .rivals.memory_stream import MemoryStream
+from .rivals.naive_loop import NaiveLoop
+from .rivals.plain_shader import PlainShader
+from .rivals.sparse_leapfrog import SparseLeapfrog
 
 _ROUNDS = 7
 _SECONDS_A_TURN = 0.04
@@ -55,21 +58,33 @@ def updates_per_second(contestants: Mapping[str, Advances], texels: int) -> dict
     return {name: texels / seconds for name, seconds in best.items()}
 
 
-def cpu_speed(resolution: int) -> dict[str, float]:
-    """CPU backend as it is and in one thread, against a memory copy and a sparse matrix, which have one thread."""
+def cpu_speed(resolution: int) -> dict[str, float | int]:
+    """CPU backend against rivals of as many threads, and against the naive loop as it is fastest.
+
+    "cpu" is the backend as the solver takes it, "cpu 1" in one thread; likewise "stream", the memory bound. "naive" is
+    the faster of the naive loop in one thread, "naive 1", and in the threads of `numba.prange`, "naive prange". SciPy
+    has one thread. Rates are texel updates a second.
+    """
     operator = _operator(resolution)
-    texels = operator.mass.size
+    texels, backend = operator.mass.size, CPUBackend(operator)
     contestants: dict[str, Advances] = {
-        "cpu": CPUBackend(operator),
-        "one thread": CPUBackend(operator, 1),
-        "copy": Copy(texels),
+        "cpu": backend,
+        "cpu 1": CPUBackend(operator, 1),
+        "naive 1": NaiveLoop(operator),
+        "naive prange": NaiveLoop(operator, parallel=True),
+        "stream": MemoryStream(texels, backend.thread_count),
+        "stream 1": MemoryStream(texels),
         "scipy": SparseLeapfrog(operator),
     }
     rates = updates_per_second(contestants, texels)
-    return rates | {
-        "of copy": rates["one thread"] / rates["copy"],
-        "over scipy": rates["cpu"] / rates["scipy"],
-        "one thread over scipy": rates["one thread"] / rates["scipy"],
+    naive = max(rates["naive 1"], rates["naive prange"])
+    return {"threads": backend.thread_count, **rates} | {
+        "naive": naive,
+        "over naive": rates["cpu"] / naive,
+        "one thread over naive": rates["cpu 1"] / rates["naive 1"],
+        "of stream": rates["cpu"] / rates["stream"],
+        "one thread of stream": rates["cpu 1"] / rates["stream 1"],
+        "one thread over scipy": rates["cpu 1"] / rates["scipy"],
     }
 
 
