@@ -1,8 +1,8 @@
 """Which module of the project imports which, read from the source tree (nothing is imported for it).
 
-Folders stand where they are installed: solver/ is ripple_sim.solver, scenes/ is ripple_sim.scenes. An import of a public
-name, such as `from ripple_sim.solver import Material`, counts as one of the module that the name comes from. The
-`__init__` files, which only hand such names on, are no modules here.
+Folders stand where they are installed: solver/ is ripple_sim.solver, scenes/ is ripple_sim.scenes. An import of a
+public name, such as `from ripple_sim.solver import Material`, counts as one of the module that the name comes from.
+The `__init__` files, which only hand such names on, are not counted as modules.
 """
 
 import ast
@@ -83,7 +83,7 @@ def _home(name: str, trees: dict[str, ast.Module], public: dict[str, str]) -> st
     return None
 
 
-def grouped(modules: dict[str, Module], group: "dict[str, str]") -> dict[str, set[str]]:
+def grouped(modules: dict[str, Module], group: dict[str, str]) -> dict[str, set[str]]:
     """Imports between groups of modules, given the group of each module; a group does not import itself."""
     arrows: dict[str, set[str]] = {each: set() for each in group.values()}
     for name, module in modules.items():
