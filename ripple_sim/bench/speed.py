@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Mapping
 from typing import Protocol
@@ -18,7 +19,7 @@ from .rivals.naive_loop import NaiveLoop
 from .rivals.plain_shader import PlainShader
 from .rivals.sparse_leapfrog import SparseLeapfrog
 
-_ROUNDS = 7
+_ROUNDS = 15
 _SECONDS_A_TURN = 0.04
 
 
@@ -40,8 +41,31 @@ class Waited:
         self._backend.wait()
 
 
-def updates_per_second(contestants: Mapping[str, Advances], texels: int) -> dict[str, float]:
-    """Texel updates a second of each, the best of several turns taken in rotation."""
+@dataclasses.dataclass(frozen=True)
+class Race:
+    """Turns that contestants took in rotation.
+
+    Attributes
+    ----------
+    texels : int
+    seconds : dict
+        Seconds a substep of each contestant, round by round.
+    """
+
+    texels: int
+    seconds: dict[str, list[float]]
+
+    def rates(self) -> dict[str, float]:
+        """Texel updates a second of each contestant: the median over the rounds, since load comes and goes."""
+        return {name: self.texels / float(np.median(turns)) for name, turns in self.seconds.items()}
+
+    def ratio(self, contestant: str, rival: str) -> float:
+        """How many times as fast as its rival a contestant is: the median of that over the rounds."""
+        return float(np.median(np.divide(self.seconds[rival], self.seconds[contestant])))
+
+
+def race(contestants: Mapping[str, Advances], texels: int, rounds: int = _ROUNDS) -> Race:
+    """Let contestants take turns, so that a busy machine slows all alike."""
     dt = 1e-6
     counts = {}
     for name, contestant in contestants.items():
@@ -49,13 +73,13 @@ def updates_per_second(contestants: Mapping[str, Advances], texels: int) -> dict
         start = time.perf_counter()
         contestant.advance(2, dt)
         counts[name] = max(2, int(_SECONDS_A_TURN / (time.perf_counter() - start) * 2))
-    best = dict.fromkeys(contestants, np.inf)
-    for _ in range(_ROUNDS):
+    seconds: dict[str, list[float]] = {name: [] for name in contestants}
+    for _ in range(rounds):
         for name, contestant in contestants.items():
             start = time.perf_counter()
             contestant.advance(counts[name], dt)
-            best[name] = min(best[name], (time.perf_counter() - start) / counts[name])
-    return {name: texels / seconds for name, seconds in best.items()}
+            seconds[name].append((time.perf_counter() - start) / counts[name])
+    return Race(texels, seconds)
 
 
 def cpu_speed(resolution: int) -> dict[str, float | int]:
@@ -63,7 +87,7 @@ def cpu_speed(resolution: int) -> dict[str, float | int]:
 
     "cpu" is the backend as the solver takes it, "cpu 1" in one thread; likewise "stream", the memory bound. "naive" is
     the faster of the naive loop in one thread, "naive 1", and in the threads of `numba.prange`, "naive prange". SciPy
-    has one thread. Rates are texel updates a second.
+    has one thread. Rates are texel updates a second, and ratios those of `Race`.
     """
     operator = _operator(resolution)
     texels, backend = operator.mass.size, CPUBackend(operator)
@@ -76,15 +100,16 @@ def cpu_speed(resolution: int) -> dict[str, float | int]:
         "stream 1": MemoryStream(texels),
         "scipy": SparseLeapfrog(operator),
     }
-    rates = updates_per_second(contestants, texels)
-    naive = max(rates["naive 1"], rates["naive prange"])
+    run = race(contestants, texels)
+    rates = run.rates()
+    naive = max("naive 1", "naive prange", key=lambda name: rates[name])
     return {"threads": backend.thread_count, **rates} | {
-        "naive": naive,
-        "over naive": rates["cpu"] / naive,
-        "one thread over naive": rates["cpu 1"] / rates["naive 1"],
-        "of stream": rates["cpu"] / rates["stream"],
-        "one thread of stream": rates["cpu 1"] / rates["stream 1"],
-        "one thread over scipy": rates["cpu 1"] / rates["scipy"],
+        "naive": rates[naive],
+        "over naive": run.ratio("cpu", naive),
+        "one thread over naive": run.ratio("cpu 1", "naive 1"),
+        "of stream": run.ratio("cpu", "stream"),
+        "one thread of stream": run.ratio("cpu 1", "stream 1"),
+        "one thread over scipy": run.ratio("cpu 1", "scipy"),
     }
 
 
@@ -95,8 +120,8 @@ def gl_speed(resolution: int) -> dict[str, float] | None:
         contestants: dict[str, Advances] = {"gl": Waited(make_backend("gl", operator)), "plain": PlainShader(operator)}
     except GLError:
         return None
-    rates = updates_per_second(contestants, operator.mass.size)
-    return rates | {"over plain": rates["gl"] / rates["plain"]}
+    run = race(contestants, operator.mass.size)
+    return run.rates() | {"over plain": run.ratio("gl", "plain")}
 
 
 def _operator(resolution: int) -> WaveOperator:

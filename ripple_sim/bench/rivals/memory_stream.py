@@ -13,6 +13,10 @@ from ripple_sim.solver.kernel import Floats32, kernel
 # it writes: velocity and the next height.
 READS, WRITES = 7, 2
 
+# Floats of a page of memory. A store and a load at the same place of a page are taken for a conflict: each stream
+# begins elsewhere in its page, as in the solver.
+_PAGE = 1024
+
 # The compiler makes vector code of short slices, as the solver's kernel has them.
 _SLICE = 1024
 
@@ -34,9 +38,11 @@ class MemoryStream:
     """Streams the bytes of a substep through memory, each thread its own share; no thread waits for another."""
 
     def __init__(self, texels: int, threads: int = 1) -> None:
+        count = len(Streams._fields)
+        pitch = -(-texels // _PAGE) * _PAGE + _PAGE // count
         # filled, since untouched pages are all one page, which a cache holds
-        memory = [np.full(texels, 1e-3, np.float32) for _ in Streams._fields]
-        self.streams = Streams(*memory)
+        memory = np.full((count, pitch), 1e-3, np.float32)
+        self.streams = Streams(*memory[:, :texels])
         self._shares = np.linspace(0, texels, threads + 1).astype(np.int64)
         self._pool = ThreadPoolExecutor(threads)
 
