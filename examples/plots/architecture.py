@@ -48,8 +48,7 @@ class Drawing:
     """Boxes, their words, and the arrows between them, in inches."""
 
     def __init__(self, arrows: dict[str, set[str]]) -> None:
-        reduced = without_detours(arrows)
-        self._layout = Layout(reduced, layers(reduced))
+        self._layout = Layout(arrows, layers(arrows))
         x = {node: place * (WIDTH + GAP) for node, place in self._layout.x.items()}
         left, right = min(x.values()) - WIDTH / 2, max(x.values()) + WIDTH / 2
         top = len(self._layout.rows) * (HEIGHT + RISE) - RISE
@@ -73,10 +72,9 @@ class Drawing:
                 facecolor=SOLVER if in_solver else SIDE, edgecolor=INK if in_solver else "#b98b3e", zorder=3,
             )
         )  # fmt: skip
-        shown = name.removeprefix("ripple_sim.").replace(".", "/")
         sentence, inside = description(name)
         left = {"ha": "left", "va": "top", "zorder": 4}
-        axes.text(x + 0.09, y + HEIGHT - 0.07, shown, fontsize=10.5, fontweight="bold", color=TEXT, **left)
+        axes.text(x + 0.09, y + HEIGHT - 0.07, short(name), fontsize=10.5, fontweight="bold", color=TEXT, **left)
         lines = textwrap.wrap(sentence, 39, max_lines=2 if inside else 4, placeholder=" ...")
         axes.text(x + 0.09, y + HEIGHT - 0.28, "\n".join(lines), fontsize=7.6, color=TEXT, linespacing=1.2, **left)
         if inside:
@@ -112,13 +110,30 @@ class Drawing:
         return self._x[node] + step * (ends.index(towards) - (len(ends) - 1) / 2)
 
 
-def make(folder: Path) -> Path:
+def arrows() -> dict[str, set[str]]:
+    """Which package imports which, without detours and without what is open to all."""
     modules = read()
     rooms = {name: room(name) for name in modules if room(name) not in (*COMMON, ENTRY)}
-    arrows = grouped(modules, rooms)
-    if found := cycles(arrows):
-        raise SystemExit(f"packages import one another in a circle, which has no layers: {found}")
-    drawing = Drawing(arrows)
+    found = grouped(modules, rooms)
+    if circles := cycles(found):
+        raise SystemExit(f"packages import one another in a circle, which has no layers: {circles}")
+    return without_detours(found)
+
+
+def summary(arrows: dict[str, set[str]]) -> list[str]:
+    """The arrows in words, which the drawing carries as its description."""
+    return [f"{short(a)} to {short(b)}" for a, ends in sorted(arrows.items()) for b in sorted(ends)]
+
+
+def short(name: str) -> str:
+    """A package as it stands in the listing."""
+    return name.removeprefix("ripple_sim.").replace(".", "/")
+
+
+def make(folder: Path) -> Path:
+    """Draw a PNG, whose path is returned, and an SVG beside it."""
+    imports = arrows()
+    drawing = Drawing(imports)
     margin, head, foot = 0.35, 1.15, 0.75
     width, height = drawing.width + 2 * margin, drawing.height + head + foot
     figure: Figure = sheet(width, height, "The packages", SUBTITLE)
@@ -129,13 +144,13 @@ def make(folder: Path) -> Path:
     drawing.draw(axes)
     for artist in axes.get_children():
         artist.set_clip_on(False)
-    common = ", ".join(sorted(name.removeprefix("ripple_sim.").replace(".", "/") for name in COMMON if name in modules))
+    common = ", ".join(map(short, COMMON))
     figure.text(0.35 / width, 0.3 / height, f"open to all, without an arrow: {common}", fontsize=9, color=FAINT)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "architecture.png"
     figure.savefig(path)
     with mpl.rc_context({"svg.hashsalt": "architecture", "svg.fonttype": "path"}):
-        figure.savefig(path.with_suffix(".svg"), metadata={"Date": None})
+        figure.savefig(path.with_suffix(".svg"), metadata={"Date": None, "Description": ", ".join(summary(imports))})
     return path
 
 

@@ -114,7 +114,8 @@ def _count(arrows: dict[str, set[str]]) -> int:
 
 
 def _named(found: list[list[str]]) -> str:
-    return "; ".join(" - ".join(_short(name) for name in each) for each in found) or "none"
+    names = "; ".join(" - ".join(_short(name) for name in each) for each in found)
+    return f"{len(found)}: {names}" if found else "none"
 
 
 def _short(name: str) -> str:

@@ -71,7 +71,7 @@ def test_measures_of_the_small_tree(plots, root: Path) -> None:
     assert measures["most parameters"] == "2 (simulation.run)"
     assert measures["rooms, arrows between them"] == "4, 3"
     assert measures["arrows between modules"] == "5"
-    assert measures["cycles of modules"] == "coupling.load - coupling.ripples"
+    assert measures["cycles of modules"] == "1: coupling.load - coupling.ripples"
     assert measures["tests / code"] == "0.36"
     assert measures["code that stands twice, 40 tokens or more"] == "0.0 %"
 
