@@ -109,7 +109,8 @@ class Layout:
             for row in self.rows:
                 wanted = [self._wanted(node, x) for node in row]
                 gaps = np.cumsum([0.0, *(self._gap(a, b) for a, b in itertools.pairwise(row))])
-                x.update(zip(row, _increasing(np.array(wanted) - gaps) + gaps, strict=True))
+                firm = np.array([4.0 if isinstance(node, tuple) else 1.0 for node in row])
+                x.update(zip(row, _increasing(np.array(wanted) - gaps, firm) + gaps, strict=True))
         return x
 
     def _wanted(self, node: Node, x: dict[Node, float]) -> float:
@@ -124,12 +125,12 @@ class Layout:
         return sum(width) / 2
 
 
-def _increasing(wanted: np.ndarray) -> np.ndarray:
-    """The nearest sequence, by least squares, that never decreases (pooled adjacent violators)."""
-    pools: list[list[float]] = []
-    for value in wanted:
-        pools.append([value, 1])
+def _increasing(wanted: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """The nearest sequence, by weighted least squares, that never decreases (pooled adjacent violators)."""
+    pools: list[tuple[float, float, int]] = []  # mean, weight, length
+    for value, weight in zip(wanted, weights, strict=True):
+        pools.append((value, weight, 1))
         while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
-            (a, m), (b, n) = pools[-2:]
-            pools[-2:] = [[(a * m + b * n) / (m + n), m + n]]
-    return np.concatenate([np.full(int(count), mean) for mean, count in pools])
+            (a, m, j), (b, n, k) = pools[-2:]
+            pools[-2:] = [((a * m + b * n) / (m + n), m + n, j + k)]
+    return np.concatenate([np.full(length, mean) for mean, _, length in pools])

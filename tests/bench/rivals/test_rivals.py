@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ripple_sim.bench.rivals.memory_stream import READS, WRITES, MemoryStream
 from ripple_sim.bench.rivals.naive_loop import NaiveLoop
 from ripple_sim.bench.rivals.plain_shader import PlainShader
 from ripple_sim.bench.rivals.sparse_leapfrog import SparseLeapfrog
@@ -50,27 +49,3 @@ def test_rival_follows_the_backend(name: str, operator: WaveOperator) -> None:
     height, velocity = rival.state()
     assert np.abs(height - dt / 2 * velocity - solver.height()).max() < ROUND_OFF * np.abs(start).max()
     assert np.abs(velocity - solver.velocity()).max() < ROUND_OFF * np.abs(velocity).max()
-
-
-@pytest.mark.parametrize("threads", [1, 2, 3])
-def test_stream_passes_once_over_every_texel_each_substep(threads: int) -> None:
-    stream = MemoryStream(5000, threads)
-    s = stream.streams
-    s.velocity[:], s.height[:] = np.arange(5000), 1.0
-    for links, value in zip((s.east, s.north, s.northeast, s.northwest), (1.0, 2.0, 3.0, 4.0), strict=True):
-        links[:] = value
-    s.gain[:] = 0.5
-    stream.advance(3, 0.25)
-    kicked = np.arange(5000) + 3 * 0.25 * 0.5 * (1 + 2 + 3 + 4)
-    assert np.allclose(s.velocity, kicked)
-    assert np.allclose(s.next_height, 1 + 0.25 * kicked)
-
-
-def test_stream_has_the_bytes_of_a_substep(operator: WaveOperator) -> None:
-    """Read are 4 link weights, gain, height and velocity (28 bytes); written are velocity and next height (8 bytes)."""
-    texels = operator.mass.size
-    stencil = operator.stencil[..., 1:, 1:]  # one weight of each direction a texel
-    fields = [stencil, operator.mass, operator.mass, operator.mass]
-    assert sum(each.size for each in fields) == READS * texels
-    streams = MemoryStream(texels).streams
-    assert [each.nbytes for each in streams] == [4 * texels] * (READS + WRITES - 1)  # the velocity is both
