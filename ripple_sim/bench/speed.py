@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ripple_sim.solver import GLError, Material, sphere_atlas
+from ripple_sim.solver.waves.backends import threads
 from ripple_sim.solver.waves.backends.backend import Backend, make_backend
 from ripple_sim.solver.waves.backends.cpu import CPUBackend
 from ripple_sim.solver.waves.operator import WaveOperator, build_operator
@@ -85,7 +86,8 @@ def race(contestants: Mapping[str, Advances], texels: int, rounds: int = _ROUNDS
 def cpu_speed(resolution: int) -> dict[str, float | int]:
     """CPU backend against rivals of as many threads, and against the naive loop as it is fastest.
 
-    "cpu" is the backend as the solver takes it, "cpu 1" in one thread; likewise "stream", the memory bound. "naive" is
+    "cpu" is the backend as the solver takes it, "cpu 1" in one thread, "cpu all" in as many as the machine has cores;
+    likewise "stream", the memory bound. "naive" is
     the faster of the naive loop in one thread, "naive 1", and in the threads of `numba.prange`, "naive prange". SciPy
     has one thread. Rates are texel updates a second, and ratios those of `Race`.
     """
@@ -94,6 +96,7 @@ def cpu_speed(resolution: int) -> dict[str, float | int]:
     contestants: dict[str, Advances] = {
         "cpu": backend,
         "cpu 1": CPUBackend(operator, 1),
+        "cpu all": CPUBackend(operator, threads.available()),
         "naive 1": NaiveLoop(operator),
         "naive prange": NaiveLoop(operator, parallel=True),
         "stream": MemoryStream(texels, backend.thread_count),
@@ -107,6 +110,7 @@ def cpu_speed(resolution: int) -> dict[str, float | int]:
         "naive": rates[naive],
         "over naive": run.ratio("cpu", naive),
         "one thread over naive": run.ratio("cpu 1", "naive 1"),
+        "all threads over naive": run.ratio("cpu all", "naive prange"),
         "of stream": run.ratio("cpu", "stream"),
         "one thread of stream": run.ratio("cpu 1", "stream 1"),
         "one thread over scipy": run.ratio("cpu 1", "scipy"),
