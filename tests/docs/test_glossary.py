@@ -62,8 +62,14 @@ RETIRED = {
 ALLOWED = [
     ("solver/sphere_map/", "ring", "the one-ring of a vertex"),
     ("solver/sphere_map/", "carried", "area of collapsed vertices, which the kept ones stand for"),
-    ("solver/sphere_map/", "ahead", "conjugate gradients: the step ahead"),
-    ("ripple_sim/cli/completion_command.py", "shell", "bash, zsh, fish"),
+    ("solver/sphere_map/", "ahead", "a trial step of the descent"),
+    ("solver/sphere_map/", "folded", "a triangle that the map turns over"),
+    ("solver/mesh/", "folded", "a polygon that turns over"),
+    ("solver/", "piece", "part of a triangle, cut at the edges of the cube"),
+    ("solver/", "pieces", "parts of a triangle"),
+    ("ripple_sim/cli/", "shell", "bash, zsh, fish"),
+    ("ripple_sim/viewer/", "press", "a key or a button"),
+    ("ripple_sim/viewer/", "pressed", "a key or a button"),
 ]
 
 
