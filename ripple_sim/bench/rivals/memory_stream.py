@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -43,22 +45,21 @@ class MemoryStream:
         # filled, since untouched pages are all one page, which a cache holds
         memory = np.full((count, pitch), 1e-3, np.float32)
         self.streams = Streams(*memory[:, :texels])
-        self._shares = np.linspace(0, texels, threads + 1).astype(np.int64)
+        bounds = np.linspace(0, texels, threads + 1).astype(np.int64)
+        self._shares = list(itertools.pairwise(bounds))
         self._pool = ThreadPoolExecutor(threads)
 
     def advance(self, substeps: int, dt: float) -> None:
-        """Read and write every stream once a substep."""
-        starts, stops = self._shares[:-1], self._shares[1:]
-        passes = [
-            self._pool.submit(_stream, self.streams, start, stop, substeps, np.float32(dt))
-            for start, stop in zip(starts, stops, strict=True)
-        ]
-        for each in passes:
-            each.result()
+        """Read and write every stream once a substep; this thread takes the first share itself."""
+        passes = functools.partial(_stream, self.streams, substeps, np.float32(dt))
+        helpers = [self._pool.submit(passes, *share) for share in self._shares[1:]]
+        passes(*self._shares[0])
+        for helper in helpers:
+            helper.result()
 
 
 @kernel
-def _stream(s: Streams, first: int, last: int, substeps: int, dt: np.float32) -> None:
+def _stream(s: Streams, substeps: int, dt: np.float32, first: int, last: int) -> None:
     """Kick and drift the texels from `first` to `last` by the sum of their weights."""
     for _ in range(substeps):
         for start in range(first, last, _SLICE):
