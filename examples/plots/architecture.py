@@ -2,13 +2,15 @@
 
     python examples/plots/architecture.py
 
-writes out/plots/architecture.svg and .png; with --docs it replaces docs/pictures/architecture.svg.
+writes out/plots/architecture.svg and .png; with --docs it replaces docs/pictures/architecture.svg. A red arrow closes a
+circle of imports.
 """
 
 import argparse
 import ast
 import itertools
 import textwrap
+from collections import Counter
 from pathlib import Path
 
 import matplotlib as mpl
@@ -30,7 +32,7 @@ COMMON = ("ripple_sim.solver.errors", "ripple_sim.solver.kernel", "ripple_sim.so
 ENTRY = "ripple_sim.__main__"
 
 WIDTH, HEIGHT, GAP, RISE = 2.5, 0.92, 0.3, 0.42  # of a box, between boxes, between layers [inches]
-INK, SOLVER, SIDE = "#1f5fa8", "#e9f1f9", "#fbf6ee"
+INK, SOLVER, SIDE, WRONG = "#1f5fa8", "#e9f1f9", "#fbf6ee", "#c03020"
 
 
 def description(name: str) -> tuple[str, list[str]]:
@@ -62,6 +64,13 @@ class Drawing:
         for node in self._x:
             if isinstance(node, str):
                 self._box(axes, node)
+
+    def draw_wrong_way(self, axes: Axes, importer: str, imported: str) -> None:
+        """An arrow that points upwards, and closes a circle."""
+        start = self._x[importer] + WIDTH / 2, self._y[importer]
+        end = self._x[imported] + WIDTH / 2, self._y[imported]
+        style = {"arrowstyle": "-|>", "connectionstyle": "arc3,rad=0.4", "color": WRONG, "linewidth": 1.6}
+        axes.annotate("", end, start, arrowprops=style, zorder=5)
 
     def _box(self, axes: Axes, name: str) -> None:
         x, y = self._x[name] - WIDTH / 2, self._y[name] - HEIGHT / 2
@@ -110,14 +119,22 @@ class Drawing:
         return self._x[node] + step * (ends.index(towards) - (len(ends) - 1) / 2)
 
 
-def arrows() -> dict[str, set[str]]:
-    """Which package imports which, without detours and without what is open to all."""
+def arrows() -> tuple[dict[str, set[str]], list[tuple[str, str]]]:
+    """Which package imports which, without detours and without what is open to all; and imports that close a circle."""
     modules = read()
     rooms = {name: room(name) for name in modules if room(name) not in (*COMMON, ENTRY)}
     found = grouped(modules, rooms)
-    if circles := cycles(found):
-        raise SystemExit(f"packages import one another in a circle, which has no layers: {circles}")
-    return without_detours(found)
+    closing = []
+    while circles := cycles(found):
+        # the thinnest arrow of the circle is the one that goes the wrong way
+        thickness = Counter(
+            (rooms.get(name), rooms.get(other)) for name, each in modules.items() for other in each.imports
+        )
+        pairs = [(a, b) for a in circles[0] for b in found[a] if b in circles[0]]
+        wrong = min(pairs, key=lambda pair: (thickness[pair], pair))
+        found[wrong[0]].discard(wrong[1])
+        closing.append(wrong)
+    return without_detours(found), closing
 
 
 def summary(arrows: dict[str, set[str]]) -> list[str]:
@@ -132,7 +149,7 @@ def short(name: str) -> str:
 
 def make(folder: Path) -> Path:
     """Draw a PNG, whose path is returned, and an SVG beside it."""
-    imports = arrows()
+    imports, closing = arrows()
     drawing = Drawing(imports)
     margin, head, foot = 0.35, 1.15, 0.75
     width, height = drawing.width + 2 * margin, drawing.height + head + foot
@@ -142,6 +159,8 @@ def make(folder: Path) -> Path:
     axes.set_ylim(0, drawing.height)
     axes.set_axis_off()
     drawing.draw(axes)
+    for pair in closing:
+        drawing.draw_wrong_way(axes, *pair)
     for artist in axes.get_children():
         artist.set_clip_on(False)
     common = ", ".join(map(short, COMMON))
