@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.colliders.collidable import make_collidable
-from ripple_sim.coupling.colliders.tunnelling import SpeedCheck
-from ripple_sim.coupling.load.sources import Sources
+from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
+from ripple_sim.coupling.load.contact_loads import ContactLoads
+from ripple_sim.coupling.model.coupled_model import CoupledModel
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.scenes.implicit import ellipsoid, polygonise, smooth_intersection
 from ripple_sim.scenes.shapes import duck
@@ -96,15 +97,16 @@ def _run(model: mujoco.MjModel, seconds: float, resolution: int) -> tuple[NDArra
     data, geom, dt = mujoco.MjData(model), model.geom("target").id, model.opt.timestep
     material = Material(speed=0.6, damping=1.0, density=200.0)
     waves = Ripples(model, {"target": material}, resolution=resolution, backend="cpu")["target"]
-    sources, check_speeds = Sources(model, {geom: waves}), SpeedCheck(model, [geom])
+    coupled = CoupledModel(model)
+    contact_loads, check_tunnelling = ContactLoads(coupled, {geom: waves}), TunnellingCheck(coupled, [geom])
     times, pairs = [], 0
     for _ in range(round(seconds / dt)):
         start = time.thread_time()
         mujoco.mj_step(model, data)
         moved = time.thread_time()
-        check_speeds(data)
-        loads = sources.loads(data, dt)
-        pairs += len(sources.impulses)
+        check_tunnelling(data)
+        loads = contact_loads.loads(data, dt)
+        pairs += len(contact_loads.impulses)
         loaded = time.thread_time()
         waves.step(dt, load=loads[geom])
         times.append((moved - start, loaded - moved, time.thread_time() - loaded))
