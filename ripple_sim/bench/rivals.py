@@ -78,8 +78,8 @@ class PlainShader:
             self._gain = ctx.buffer((1 / operator.mass).astype(np.float32).tobytes())
             self._pairs = ctx.buffer(np.stack([ring, source], axis=1).astype(np.int32).tobytes())
         self._count = len(ring)
-        self._update = self._gl.compute_shader("ripple_sim.bench", "plain_update", N=n)
-        self._ring = self._gl.compute_shader("ripple_sim.bench", "plain_ring")
+        self._update = self._gl.compute_shader("ripple_sim.bench.shaders", "plain_update", N=n)
+        self._ring = self._gl.compute_shader("ripple_sim.bench.shaders", "plain_ring")
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take substeps, and wait for them."""

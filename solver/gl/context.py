@@ -1,11 +1,10 @@
-"""The OpenGL context: created here, entered here, checked here, and slot_scratch else."""
+"""The OpenGL context: created here, entered here, checked here, and nowhere else."""
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
 import functools
-import importlib.resources
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -14,9 +13,9 @@ import moderngl
 
 from ripple_sim.solver.errors import GLError
 
+from .drivers import is_software
 from .fence import Fences
-
-_SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swr", "software")
+from .shader import load_shader
 
 # The plain sonames first; the versioned ones are what runtime packages without -dev symlinks install.
 _LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
@@ -56,8 +55,7 @@ class GLContext:
     @property
     def software(self) -> bool:
         """Whether the driver renders on the CPU. EGL falls back to that without saying so."""
-        name = self.renderer.lower()
-        return any(word in name for word in _SOFTWARE_RENDERERS)
+        return is_software(self.renderer)
 
     def __enter__(self) -> moderngl.Context:
         if self._depth == 0:
@@ -110,7 +108,7 @@ class GLContext:
             self._fences.wait(fence)
 
     def compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
-        """Compile `shaders/{name}.glsl` of `package` as a compute shader with `#define`s put in."""
+        """Compile `{name}.glsl` below `package` as a compute shader; see `load_shader`."""
         return self._compute_shader(name, load_shader(package, name, **defines))
 
     def shared_compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
@@ -121,7 +119,7 @@ class GLContext:
         return self._shared_shaders[source]
 
     def program(self, package: str, vertex: str, fragment: str, **defines: object) -> moderngl.Program:
-        """Compile and link a vertex and a fragment shader from `shaders/` of `package`."""
+        """Compile and link a vertex and a fragment shader from below `package`; see `load_shader`."""
         vertex_source = load_shader(package, vertex, **defines)
         fragment_source = load_shader(package, fragment, **defines)
         with self as ctx:
@@ -140,27 +138,6 @@ class GLContext:
             collected = self._ctx.objects.popleft()
             if hasattr(collected, "release"):
                 collected.release()
-
-
-def load_shader(package: str, name: str, **defines: object) -> str:
-    """Read a GLSL file, resolve its `#include "file.glsl"` lines, and put the defines behind `#version`."""
-    text = _read_shader(package, name)
-    head, _, body = text.partition("\n")
-    if not head.startswith("#version"):
-        raise GLError(f"shader {package}/shaders/{name}.glsl must start with #version, found {head!r}")
-    lines = "".join(f"#define {key} {value}\n" for key, value in defines.items())
-    return f"{head}\n{lines}{body}"
-
-
-def _read_shader(package: str, name: str) -> str:
-    path = importlib.resources.files(package) / "shaders" / f"{name}.glsl"
-    lines = []
-    for line in path.read_text().splitlines():
-        if line.startswith("#include"):
-            lines.append(_read_shader(package, line.split('"')[1].removesuffix(".glsl")))
-        else:
-            lines.append(line)
-    return "\n".join(lines) + "\n"
 
 
 def _compiled(name: str, compile_shader: Callable[[], Any]) -> Any:

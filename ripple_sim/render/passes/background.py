@@ -38,8 +38,8 @@ class CoarseBackground:
         self._texture.repeat_x = self._texture.repeat_y = False
         self._target = ctx.framebuffer([self._texture])
         options = {**options, "UNSURE": _UNSURE, "SHADOW": 0, "COARSE": 1}
-        light = ctx.own(gl.program(_PACKAGE, "view_vertex", "background_fragment", **options))
-        fill = ctx.own(gl.program(_PACKAGE, "screen_vertex", "interpolate_fragment", **options))
+        light = ctx.own(gl.program(_PACKAGE, "glsl/view_vertex", "passes/background_fragment", **options))
+        fill = ctx.own(gl.program(_PACKAGE, "glsl/screen_vertex", "passes/background_fill_fragment", **options))
         # the last blocks reach beyond the picture
         light["span"] = fill["span"] = blocks[0] * _PIXELS / size[0], blocks[1] * _PIXELS / size[1]
         self._light, self._fill = ctx.vertex_array(light, []), ctx.vertex_array(fill, [])

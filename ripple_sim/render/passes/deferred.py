@@ -113,11 +113,11 @@ class Picture:
         smooth = not (cut_out or tiled or reflects or options["SKYBOX"])
         self._coarse = CoarseBackground(gl, ctx, size, {**options, **levels}) if smooth else None
         stages: tuple[tuple[str, str, str, dict[str, Any]], ...] = (
-            ("background", "view_vertex", "background_fragment", {"SHADOW": 0, "COARSE": 0, **levels}),
-            ("shaded background", "view_vertex", "background_fragment", {"SHADOW": 1, "COARSE": 0}),
-            ("solid", "view_vertex", "solid_fragment", {"LAYER": 0}),
-            ("layer classes", "view_vertex", "classify_fragment", {"LAYER": 1, **levels}),
-            ("layer", "view_vertex", "solid_fragment", {"LAYER": 1}),
+            ("background", "glsl/view_vertex", "passes/background_fragment", {"SHADOW": 0, "COARSE": 0, **levels}),
+            ("shaded background", "glsl/view_vertex", "passes/background_fragment", {"SHADOW": 1, "COARSE": 0}),
+            ("solid", "glsl/view_vertex", "passes/deferred_fragment", {"LAYER": 0}),
+            ("layer classes", "glsl/view_vertex", "passes/classify_fragment", {"LAYER": 1, **levels}),
+            ("layer", "glsl/view_vertex", "passes/deferred_fragment", {"LAYER": 1}),
         )
         self._passes = {
             name: ctx.vertex_array(ctx.own(gl.program(_PACKAGE, vertex, fragment, **{**options, **more})), [])
@@ -130,7 +130,9 @@ class Picture:
             if floor is not None and reflects:
                 program["reflectance"] = floor.reflectance
         self._tiles = Tiles(ctx, size)
-        classify = ctx.own(gl.program(_PACKAGE, "tiles_vertex", "classify_fragment", LAYER=0, **{**options, **levels}))
+        classify = ctx.own(
+            gl.program(_PACKAGE, "passes/tiles_vertex", "passes/classify_fragment", LAYER=0, **{**options, **levels})
+        )
         classify["extent"] = self._tiles.extent
         self._classify = ctx.vertex_array(classify, [(self._tiles.buffer, "2f/i", "in_corner")])
 

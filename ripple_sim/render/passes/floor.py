@@ -72,7 +72,7 @@ class Floor:
         self._half = np.where(half > 0, half, _ENDLESS)
         options = {"NEAR_LAMPS": 1, "SHADOWS": shadows}
         self._occlude = ctx.vertex_array(
-            ctx.own(gl.program(_PACKAGE, "screen_vertex", "floor_occlusion_fragment", **options)), []
+            ctx.own(gl.program(_PACKAGE, "glsl/screen_vertex", "passes/floor_occlusion_fragment", **options)), []
         )
         self._ceiling = ctx.depth_texture((_CEILING_SIZE, _CEILING_SIZE))
         self._ceiling.compare_func = ""

@@ -93,18 +93,18 @@ class SurfaceMesh:
             min_length=1.5 * _PIXELS * pixel,
         )
         self._triangles: NDArray[np.int32] | None = None  # on the GPU
-        self._displace = ctx.own(gl.compute_shader(_PACKAGE, "displace"))
+        self._displace = ctx.own(gl.compute_shader(_PACKAGE, "surfaces/displace"))
         self._program = ctx.own(
             gl.program(
                 _PACKAGE,
-                "surface_geometry_vertex",
-                "surface_geometry_fragment",
+                "surfaces/surface_vertex",
+                "surfaces/surface_fragment",
                 MAPPING=mapping.kind,
                 FIELD=int(shows_field),
                 GRID=int(surface.grid > 0),
             )
         )
-        depth = ctx.own(gl.program(_PACKAGE, "surface_depth_vertex", "depth_fragment"))
+        depth = ctx.own(gl.program(_PACKAGE, "surfaces/surface_depth_vertex", "glsl/depth_fragment"))
         self._rest = ctx.buffer(packed(vertices, POSITION, DIRECTION, SPHERE))
         self._moved = ctx.buffer(reserve=16 * len(vertices))
         self._midpoints = ctx.buffer(reserve=4 * len(edges.ends), dynamic=True)

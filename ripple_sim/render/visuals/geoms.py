@@ -87,7 +87,7 @@ class Bodies:
         self._gl, self._ctx, self._model, self._textures, self._table = gl, ctx, model, textures, table
         self._shapes: dict[str, ShapeLevels] = {}
         self._programs: dict[tuple[int, bool], moderngl.Program] = {}
-        self._depth = ctx.own(gl.program(_PACKAGE, "body_depth_vertex", "depth_fragment"))
+        self._depth = ctx.own(gl.program(_PACKAGE, "visuals/geom_depth_vertex", "glsl/depth_fragment"))
         pieces = [geom_piece(model, geom) for geom in geoms] + [site_piece(model, i) for i in visible_sites(model)]
         shaped = [(piece, shape) for piece in pieces if (shape := shape_of(model, piece)) is not None]
         solid = [piece.index for piece, _ in shaped if not piece.site and piece.kind != _GEOM.mjGEOM_PLANE]
@@ -148,7 +148,7 @@ class Bodies:
         if variant not in self._programs:
             options = {"MAPPING": mapping.kind, "OWN": int(mapping.own)}
             self._programs[variant] = self._ctx.own(
-                self._gl.program(_PACKAGE, "body_geometry_vertex", "body_geometry_fragment", **options)
+                self._gl.program(_PACKAGE, "visuals/geom_vertex", "visuals/geom_fragment", **options)
             )
         records = np.zeros(len(members), dtype=INSTANCE)
         for record, (piece, number), own in zip(records, members, mappings, strict=True):

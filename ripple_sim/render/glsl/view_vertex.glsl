@@ -1,7 +1,7 @@
 #version 430
 // One triangle over the whole target, at a given depth, and what is the same all over the floor.
-#include "ray_cast.glsl"
-#include "studio.glsl"
+#include "glsl/ray_cast.glsl"
+#include "visuals/environment.glsl"
 
 uniform float level;
 uniform vec2 span = vec2(1.0);  // of the target, in pictures

@@ -1,10 +1,10 @@
 #version 430
 // Which pixels show solids, wholly or in part, as a depth: each of the next passes then runs over its own pixels alone.
 // With LAYER which ones show an object.
-#include "frame.glsl"
-#include "ray.glsl"
-#include "samples.glsl"
-#include "solid_samples.glsl"
+#include "gpu/frame_uniforms.glsl"
+#include "glsl/ray.glsl"
+#include "gpu/g_buffer_read.glsl"
+#include "passes/solid_samples.glsl"
 
 out vec4 fragment;
 

@@ -1,6 +1,6 @@
 #version 430
 // Squares of the target.
-#include "ray_cast.glsl"
+#include "glsl/ray_cast.glsl"
 
 in vec2 in_corner;  // the square's lower left
 

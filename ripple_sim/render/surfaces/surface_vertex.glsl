@@ -1,5 +1,5 @@
 #version 430
-#include "frame.glsl"
+#include "gpu/frame_uniforms.glsl"
 
 in vec4 in_moved;  // w: share of the sky that the bodies near by leave
 in vec3 in_normal;

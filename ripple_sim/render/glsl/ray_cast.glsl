@@ -1,5 +1,5 @@
 // Rays from the eye through the picture. What changes evenly over it is reckoned at the corners of what is drawn.
-#include "frame.glsl"
+#include "gpu/frame_uniforms.glsl"
 
 out vec2 screen;          // place in the picture, from -1 to 1
 out vec3 way;             // one metre along the camera's axis

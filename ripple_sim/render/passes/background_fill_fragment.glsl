@@ -1,7 +1,7 @@
 #version 430
 // The background from a coarse picture of it; pixels where that is not smooth are marked as a depth.
-#include "development.glsl"
-#include "block.glsl"
+#include "glsl/tone_mapping.glsl"
+#include "glsl/pixel_block.glsl"
 
 layout(binding = 15) uniform sampler2D coarse;  // a: 1 where the floor is smooth, 0 where the sky is, between where neither
 

@@ -3,8 +3,8 @@
 // leave them: once a frame for all passes.
 layout(local_size_x = 64) in;
 
-#include "height_map.glsl"
-#include "occluders.glsl"
+#include "surfaces/height_maps.glsl"
+#include "visuals/occluders.glsl"
 
 struct Vertex { float position[3], direction[3], sphere[3]; };
 layout(std430, binding = 0) readonly buffer Rest { Vertex rest[]; };

@@ -1,5 +1,5 @@
 // What a figure shows on a target: a scalar field in colours, and the texel grid.
-#include "height_map.glsl"
+#include "surfaces/height_maps.glsl"
 
 layout(binding = 12) uniform sampler2DArray field;    // padded like the height map
 layout(binding = 13) uniform sampler2D field_colors;  // sRGB, from the least to the greatest value

@@ -1,6 +1,6 @@
 #version 430
-#include "geometry_write.glsl"
-#include "mapping.glsl"
+#include "gpu/g_buffer_write.glsl"
+#include "visuals/texture_mapping.glsl"
 
 in vec3 normal;
 in vec3 mapped;

@@ -1,9 +1,9 @@
 #version 430
 // Share of the sky that a point of the floor sees, from the height of what hangs above it: the form factor of
 // horizontal patches at height h and horizontal distance d, h^2 / (pi (h^2 + d^2)^2) per unit area.
-#include "frame.glsl"
-#include "development.glsl"
-#include "shadow.glsl"
+#include "gpu/frame_uniforms.glsl"
+#include "glsl/tone_mapping.glsl"
+#include "passes/shadow.glsl"
 
 layout(binding = 3) uniform sampler2D ceiling;  // 0 at the floor, 1 at the top
 

@@ -1,5 +1,5 @@
 #version 430
-#include "frame.glsl"
+#include "gpu/frame_uniforms.glsl"
 
 in vec3 in_core;
 in vec3 in_shell;

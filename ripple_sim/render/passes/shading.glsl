@@ -1,5 +1,5 @@
 // How a solid surface answers the light.
-#include "occluders.glsl"
+#include "visuals/occluders.glsl"
 
 layout(binding = 3) uniform sampler2D floor_openness;
 

@@ -1,16 +1,16 @@
 #version 430
 // Pixels that show solids, wholly or in part: every surface that is visible in a pixel is lit once.
-#include "frame.glsl"
-#include "ray.glsl"
-#include "samples.glsl"
-#include "solid_samples.glsl"
-#include "studio.glsl"
-#include "development.glsl"
-#include "lights.glsl"
-#include "shadow.glsl"
-#include "shading.glsl"
-#include "geometry.glsl"
-#include "height_map.glsl"
+#include "gpu/frame_uniforms.glsl"
+#include "glsl/ray.glsl"
+#include "gpu/g_buffer_read.glsl"
+#include "passes/solid_samples.glsl"
+#include "visuals/environment.glsl"
+#include "glsl/tone_mapping.glsl"
+#include "visuals/lights.glsl"
+#include "passes/shadow.glsl"
+#include "passes/shading.glsl"
+#include "gpu/g_buffer.glsl"
+#include "surfaces/height_maps.glsl"
 
 layout(binding = 6) uniform sampler2D scene;  // the picture without the clear bodies
 

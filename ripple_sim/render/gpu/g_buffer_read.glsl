@@ -10,7 +10,7 @@ layout(binding = 8) uniform BUFFER depths;
 layout(binding = 9) uniform BUFFER shapes;
 layout(binding = 10) uniform BUFFER paints;
 
-#include "block.glsl"
+#include "glsl/pixel_block.glsl"
 
 // Whether the pixel's block of 2 x 2 lies within the picture.
 bool block_inside(ivec2 pixel)

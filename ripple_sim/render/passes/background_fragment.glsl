@@ -1,13 +1,13 @@
 #version 430
 // The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW the pixels that
 // were marked, or that show solids, too. With COARSE every pixel stands for a block of them.
-#include "frame.glsl"
-#include "ray.glsl"
-#include "samples.glsl"
-#include "studio.glsl"
-#include "development.glsl"
-#include "lights.glsl"
-#include "shadow.glsl"
+#include "gpu/frame_uniforms.glsl"
+#include "glsl/ray.glsl"
+#include "gpu/g_buffer_read.glsl"
+#include "visuals/environment.glsl"
+#include "glsl/tone_mapping.glsl"
+#include "visuals/lights.glsl"
+#include "passes/shadow.glsl"
 
 layout(binding = 3) uniform sampler2D floor_openness;
 layout(binding = 5) uniform sampler2D floor_image;

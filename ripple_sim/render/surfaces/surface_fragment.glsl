@@ -1,7 +1,7 @@
 #version 430
-#include "geometry_write.glsl"
-#include "mapping.glsl"
-#include "annotation.glsl"
+#include "gpu/g_buffer_write.glsl"
+#include "visuals/texture_mapping.glsl"
+#include "surfaces/annotation.glsl"
 
 uniform vec4 color;  // linear; w: number of the object
 uniform vec4 tiling;

@@ -1,4 +1,4 @@
-#include "geometry.glsl"
+#include "gpu/g_buffer.glsl"
 
 layout(location = 0) out vec4 shape;  // normal without ripples, number of the object, openness with half the thickness
 layout(location = 1) out vec4 paint;  // where the height map is looked up; colour and ink, two shares a channel
