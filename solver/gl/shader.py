@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.resources
-from importlib.resources.abc import Traversable
 
 from ripple_sim.solver.errors import GLError
 
@@ -17,7 +16,8 @@ def load_shader(package: str, name: str, **defines: object) -> str:
         The package below which the shader and whatever it includes lie.
     name : str
         Path of the file below the package, without `.glsl`: "passes/classify_fragment". A line
-        `#include "gpu/frame_uniforms.glsl"` is replaced by that file, its path likewise relative to the package.
+        `#include "gpu/frame_uniforms.glsl"` is replaced by that file, its path likewise relative to the package; a
+        file that was included before is not included again.
     **defines
         Constants, written as `#define NAME value`.
 
@@ -26,7 +26,7 @@ def load_shader(package: str, name: str, **defines: object) -> str:
     GLError
         If a file is missing, or the shader does not start with `#version`.
     """
-    text = _read(package, importlib.resources.files(package), f"{name}.glsl")
+    text = _read(package, f"{name}.glsl", set())
     head, _, body = text.partition("\n")
     if not head.startswith("#version"):
         raise GLError(f"shader {name}.glsl of {package} must start with #version, found {head!r}")
@@ -34,11 +34,15 @@ def load_shader(package: str, name: str, **defines: object) -> str:
     return f"{head}\n{lines}{body}"
 
 
-def _read(package: str, root: Traversable, path: str) -> str:
-    file = root.joinpath(*path.split("/"))
+def _read(package: str, path: str, seen: set[str]) -> str:
+    """Text of a file with what it includes, unless it has been seen."""
+    if path in seen:
+        return ""
+    seen.add(path)
+    file = importlib.resources.files(package).joinpath(*path.split("/"))
     if not file.is_file():
         raise GLError(f"package {package} has no shader {path}")
     lines = []
     for line in file.read_text().splitlines():
-        lines.append(_read(package, root, line.split('"')[1]) if line.startswith("#include") else line)
+        lines.append(_read(package, line.split('"')[1], seen) if line.startswith("#include") else line)
     return "\n".join(lines) + "\n"

@@ -7,7 +7,8 @@ import pytest
 from ripple_sim.capture.viewpoint import check_camera, focal_distance, viewpoint
 from ripple_sim.errors import SceneError
 from ripple_sim.render import Camera
-from ripple_sim.render.camera import ThroughLens, perspective, view_matrix
+from ripple_sim.render.camera import ThroughLens
+from ripple_sim.render.projection import perspective, view_matrix
 from ripple_sim.scene.scene_file import CameraEntry
 
 MJCF = """<mujoco><worldbody>

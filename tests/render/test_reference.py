@@ -47,8 +47,8 @@ def frame(surface, height_map, factor):
     mujoco.mj_forward(model, data)
     target = model.geom("target").id
     camera = Camera((0.0, 0.0, 0.8), 4.5, 100.0, -25.0)
-    size = {"width": factor * SIZE[0], "height": factor * SIZE[1]}
-    with Renderer(shared_context(), model, {target: surface}, **size) as renderer:
+    size = (factor * SIZE[0], factor * SIZE[1])
+    with Renderer(shared_context(), model, {target: surface}, size=size) as renderer:
         return renderer.render(data, {target: height_map} if height_map is not None else {}, camera)
 
 

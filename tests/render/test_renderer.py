@@ -6,9 +6,10 @@ import pytest
 from sphere_height_maps import N, constant_height_map, height_map_of, linear_height_map
 
 from ripple_sim.render import LOOKS, Camera, Renderer, Surface
-from ripple_sim.render.camera import perspective, view_matrix
-from ripple_sim.render.surfaces.tessellation import subdivide
+from ripple_sim.render.projection import perspective, view_matrix
+from ripple_sim.render.surfaces.tessellation import tessellate
 from ripple_sim.render.visuals import primitives as meshes
+from ripple_sim.render.visuals.corners import corner_normals, triangle_normals
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
@@ -58,7 +59,7 @@ def make(gl, xml=LONE_BALL, surface=None, size=SIZE, **options):
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     target = model.geom("target").id
-    renderer = Renderer(gl, model, {target: surface or ball_surface()}, width=size[0], height=size[1], **options)
+    renderer = Renderer(gl, model, {target: surface or ball_surface()}, size=size, **options)
     return renderer, data, target
 
 
@@ -235,9 +236,9 @@ def test_normals_are_smooth_below_the_crease_angle_and_sharp_above():
     big = np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1) > 1.0
     welded, index = np.unique(np.round(V, 6), axis=0, return_inverse=True)
     F = index.ravel()[F[big]]
-    sharp = meshes.corner_normals(welded, F, crease=45.0)
+    sharp = corner_normals(welded, F, crease=45.0)
     np.testing.assert_allclose(np.abs(sharp).max(axis=2), 1.0, atol=1e-12)
-    smooth = meshes.corner_normals(welded, F, crease=180.0)
+    smooth = corner_normals(welded, F, crease=180.0)
     np.testing.assert_allclose(smooth, welded[F] / np.sqrt(3), atol=1e-12)
 
 
@@ -248,7 +249,7 @@ def directed_edges(F) -> np.ndarray:
 def refine(V, F, normals, same=None, **limits):
     attributes = np.concatenate([V, normals, 2 * V], axis=1)
     same = np.arange(len(V)) if same is None else same
-    F, finer, _ = subdivide(F, attributes, same, position=slice(0, 3), normal=slice(3, 6), **limits)
+    F, finer, _ = tessellate(F, attributes, same, position=slice(0, 3), normal=slice(3, 6), **limits)
     return F, finer, attributes
 
 
@@ -270,7 +271,7 @@ def test_subdivision_keeps_creases_and_flat_faces_as_they_are():
     V, F = cube.positions(np.ones(3), np.full(3, 1e-9)), cube.faces
     large = np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1) > 1.0
     corners = V[F[large]].reshape(-1, 3).round(6)
-    normals = np.repeat(meshes.triangle_normals(V, F[large]), 3, axis=0)
+    normals = np.repeat(triangle_normals(V, F[large]), 3, axis=0)
     fine, finer, _ = refine(corners, np.arange(len(corners)).reshape(-1, 3), normals, max_length=0.3, max_faces=5000)
     np.testing.assert_allclose(np.abs(finer[:, :3]).max(axis=1), 1.0, atol=1e-12)
     cross = np.cross(finer[fine[:, 1], :3] - finer[fine[:, 0], :3], finer[fine[:, 2], :3] - finer[fine[:, 0], :3])

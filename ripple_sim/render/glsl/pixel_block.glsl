@@ -1,4 +1,4 @@
-// Mean over a block of 2 x 2 pixels, or over that part of it which lies to the given sides.
+// Mean over a block of 2 x 2 pixels, or over the part of it that lies to the given sides.
 float block_mean(float value, bvec2 sides)
 {
     vec2 side = 1.0 - 2.0 * vec2(ivec2(gl_FragCoord.xy) & 1);

@@ -1,8 +1,8 @@
-// Rays from the eye through the picture. What changes evenly over it is reckoned at the corners of what is drawn.
+// Rays from the eye through the frame. What varies linearly over the frame is computed at the corners of what is drawn.
 #include "gpu/frame_uniforms.glsl"
 
-out vec2 screen;          // place in the picture, from -1 to 1
-out vec3 way;             // one metre along the camera's axis
+out vec2 screen;          // position in the frame, from -1 to 1
+out vec3 way;             // along the ray, one metre along the camera's axis
 out vec3 way_local;       // the same along the floor's axes, and down to it
 flat out vec3 eye_local;  // along the floor's axes from its origin, and up
 

@@ -1,5 +1,5 @@
 #version 430
-// One triangle over the whole target, at a given depth.
+// One triangle over the whole framebuffer, at a given depth.
 uniform float level;
 
 out vec2 screen;

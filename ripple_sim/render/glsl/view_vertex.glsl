@@ -1,11 +1,11 @@
 #version 430
-// One triangle over the whole target, at a given depth, and what is the same all over the floor.
+// One triangle over the whole framebuffer, at a given depth, with its rays and what is the same all over the floor.
 #include "glsl/ray_cast.glsl"
 #include "visuals/environment.glsl"
 
 uniform float level;
-uniform vec2 span = vec2(1.0);  // of the target, in pictures
-uniform float reach = 1.0;      // of the viewport, in targets
+uniform vec2 span = vec2(1.0);  // of the framebuffer, in frames
+uniform float reach = 1.0;      // of the viewport, in framebuffers
 
 flat out vec3 focus_local;
 flat out vec3 around;  // ambient light on the open floor

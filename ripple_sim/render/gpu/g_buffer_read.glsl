@@ -1,4 +1,7 @@
-// The samples of the geometry pass.
+// The G-buffer, sample by sample.
+#include "gpu/g_buffer.glsl"
+#include "glsl/pixel_block.glsl"
+
 #if SAMPLES > 1
 #define BUFFER sampler2DMS
 #define BASE_LEVEL
@@ -6,19 +9,17 @@
 #define BUFFER sampler2D
 #define BASE_LEVEL , 0
 #endif
-layout(binding = 8) uniform BUFFER depths;
-layout(binding = 9) uniform BUFFER shapes;
-layout(binding = 10) uniform BUFFER paints;
+layout(binding = DEPTHS_UNIT) uniform BUFFER depths;
+layout(binding = NORMALS_UNIT) uniform BUFFER normals;
+layout(binding = COLORS_UNIT) uniform BUFFER colors;
 
-#include "glsl/pixel_block.glsl"
-
-// Whether the pixel's block of 2 x 2 lies within the picture.
+// Whether the pixel's block of 2 x 2 lies within the frame.
 bool block_inside(ivec2 pixel)
 {
     return all(lessThan(pixel | 1, textureSize(depths BASE_LEVEL)));
 }
 
-// Samples, as bits, that a surface in front of the floor covers, whose depth is given.
+// Samples, as bits, covered by a surface in front of the floor, whose depth is given.
 int covered(ivec2 pixel, float floor_depth)
 {
     float limit = min(floor_depth, 0.99999994);

@@ -1,32 +1,32 @@
-// How a solid surface answers the light.
+// How a solid surface reflects light: GGX highlights with Schlick's Fresnel term over a diffuse, translucent base, under
+// a clear coat.
+#include "glsl/pixel_block.glsl"
+#include "passes/floor_map.glsl"
+#include "passes/shadow.glsl"
+#include "visuals/environment.glsl"
+#include "visuals/lights.glsl"
 #include "visuals/occluders.glsl"
-
-layout(binding = 3) uniform sampler2D floor_openness;
 
 struct Material {
     vec3 albedo;
     float roughness, metallic, sheen, coat, translucency, transparency, emission;
-    float thickness;  // of the body under the surface, 0 to about 1
-    vec3 behind;      // radiance of what is seen through the body
-    float lift;       // height of bumps that the shading normal accounts for [m]
-    float openness;   // share of the sky that the body itself leaves free, and its neighbours where `occluders` is 0
+    float thickness;    // of the object under the surface, 0 to about 1
+    vec3 behind;        // radiance of what is seen through the object
+    float shadow_bias;  // height of bumps that the shading normal accounts for [m]
+    float visibility;   // ambient visibility that the object itself leaves, and its neighbours where `occluders` is 0
     int occluders;
-    bvec2 block;      // neighbours in the block of 2 x 2 pixels that share their shadows with this one
+    bvec2 block;        // neighbours in the block of 2 x 2 pixels that share their shadows with this one
 };
 
-// Where a point of the floor lies in its map.
-vec2 floor_place(vec3 world)
-{
-    vec3 local = world - floor_origin.xyz;
-    return (vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)) - floor_map.xy) / (2.0 * floor_map.z) + 0.5;
-}
-
-// Light that the floor sends up to a point; bodies close above it shade it.
+// Light that the floor reflects up to a point; what is close above the floor shades it.
 vec3 floor_bounce(vec3 position)
 {
-    float open = textureLod(floor_openness, floor_place(position), 3.0).r;
+    vec3 local = position - floor_origin.xyz;
+    vec2 place = floor_map_position(vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)));
+    float open = textureLod(floor_visibility, place, 3.0).r;
     vec3 lit = floor_albedo.rgb * (floor_light.rgb * 0.7 * open * open + sky.rgb * 0.5 * open);
-    lit = mix(lit, vec3(dot(lit, vec3(0.2126, 0.7152, 0.0722))), 0.5);  // a coloured floor shall not stain all that is on it
+    // less saturated: a coloured floor would stain everything
+    lit = mix(lit, vec3(dot(lit, vec3(0.2126, 0.7152, 0.0722))), 0.5);
     return floor_origin.w > 0.0 ? lit : sky.rgb * 0.8;
 }
 
@@ -50,7 +50,7 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     vec3 reflected = reflect(-view, normal);
     float n_v = clamp(dot(normal, view), 0.1, 1.0);
 
-    float open = m.openness * openness_to_bodies(position, flat_normal, own_geom, m.occluders);
+    float open = m.visibility * occluder_visibility(position, flat_normal, own_geom, m.occluders);
     vec3 bounce = floor_bounce(position);
     float height = max(dot(position - floor_origin.xyz, floor_normal.xyz), 0.0);
     vec3 mirrored = 1.7 * floor_bounce(position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2));
@@ -58,13 +58,13 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     float rough = sqrt(clamp(m.roughness * m.roughness + spread, 0.004, 1.0));
     vec3 f0 = mix(vec3(0.04), m.albedo, m.metallic);
 
-    // translucent bodies let light of their own colour wrap round their edges
+    // in translucent objects light of their own colour wraps round the edges
     vec3 wrap = 0.6 * m.translucency * m.albedo;
-    // what enters elsewhere and leaves here: more of it where the body is thin, and the deeper its colour the further
+    // light that enters elsewhere and leaves here: more of it where the object is thin
     float thin = exp(-4.0 * m.thickness);
     float shadow[SHADOWS];
     for (int i = 0; i < SHADOWS; ++i)
-        shadow[i] = block_mean(visibility(i, position, flat_normal, m.lift), m.block);
+        shadow[i] = block_mean(light_visibility(i, position, flat_normal, m.shadow_bias), m.block);
     vec3 direct = vec3(0.0), highlight = vec3(0.0), glow = vec3(0.0);
     for (int i = 0; i < int(counts.y); ++i) {
         vec3 light;
@@ -80,11 +80,11 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     }
     vec3 around = ambient(normal, bounce) * open;
     around *= mix(vec3(1.0), m.albedo / max(max(m.albedo.r, m.albedo.g), max(m.albedo.b, 1e-3)), 0.8 * m.translucency);
-    // light bounces between walls of a coloured body: occlusion is less deep and more saturated
+    // light bounces between coloured walls: occlusion is less deep and more saturated
     around *= mix(m.albedo * (1.0 - open) + open, vec3(1.0), open);
     vec3 base = m.albedo * (direct + around) * (1.0 - m.metallic) + m.translucency * m.albedo * glow;
     base += m.emission * m.albedo;
-    // clear bodies show what is behind them, bent as water bends and tinted by the way through
+    // transparent objects show what is behind them, refracted, and tinted by their thickness
     base = mix(base, m.behind * pow(m.albedo, vec3(0.15 + 0.8 * m.thickness)), m.transparency);
     base += m.sheen * m.albedo * around * pow(1.0 - n_v, 3.0);
 

@@ -1,8 +1,8 @@
 #version 430
-// Squares of the target.
+// Square tiles of the framebuffer, as instances.
 #include "glsl/ray_cast.glsl"
 
-in vec2 in_corner;  // the square's lower left
+in vec2 in_corner;  // the tile's lower left
 
 uniform vec2 extent;
 

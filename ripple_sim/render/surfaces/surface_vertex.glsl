@@ -1,7 +1,7 @@
 #version 430
 #include "gpu/frame_uniforms.glsl"
 
-in vec4 in_moved;  // w: share of the sky that the bodies near by leave
+in vec4 in_moved;  // displaced, in the world [m]; w: ambient visibility that nearby geoms leave
 in vec3 in_normal;
 in vec3 in_sphere;
 in vec2 in_baked;

@@ -9,6 +9,6 @@ flat in vec4 tiling;
 
 void main()
 {
-    vec3 albedo = painted(color.rgb, mapped, tiling);
-    store(normal, normal, sqrt(albedo), color.w, vec2(1.0), 0.0);
+    vec3 albedo = textured(color.rgb, mapped, tiling);
+    write_g_buffer(normal, normal, sqrt(albedo), color.w, vec2(1.0), 0.0);
 }

@@ -11,8 +11,8 @@ in vec3 in_origin;
 in vec3 in_core_size;
 in vec3 in_shell_size;
 in vec4 in_color;    // linear; w: number of the object
-in vec4 in_mapping;  // coordinates a metre; w: and along z outside the core
-in vec4 in_tiling;   // scale and offset of the place in a flat picture
+in vec4 in_mapping;  // texture coordinates a metre; w: and along z outside the core
+in vec4 in_tiling;   // scale and offset of the position in a flat texture
 
 out vec3 normal;
 out vec3 mapped;

@@ -1,8 +1,8 @@
-// Bodies near by, as capsules.
-layout(std430, binding = 4) readonly buffer Occluders { vec4 occluders[]; };  // pairs: end a, radius; end b, geom
+// Nearby geoms, approximated by capsules.
+layout(std430, binding = OCCLUDERS_BINDING) readonly buffer Occluders { vec4 occluders[]; };  // end a, radius; end b, geom
 
-// Share of the hemisphere about the normal that other bodies, taken as capsules, cover.
-float openness_to_bodies(vec3 position, vec3 normal, float own_geom, int count)
+// Ambient visibility about a normal: the share of the hemisphere that other geoms leave free.
+float occluder_visibility(vec3 position, vec3 normal, float own_geom, int count)
 {
     float open = 1.0;
     for (int i = 0; i < count; ++i) {

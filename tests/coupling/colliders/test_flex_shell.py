@@ -12,7 +12,7 @@ from ripple_sim import Material, Ripples, make_collidable
 from ripple_sim.coupling.colliders.flex_shell import GAP_TOLERANCE, inset
 from ripple_sim.coupling.model.target import shell_thickness, shells
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.render.visuals.unsupported import warn_of_undrawn
+from ripple_sim.render.visuals.unsupported import warn_of_unsupported
 from ripple_sim.scenes.shapes import limbed, peanut
 from ripple_sim.solver import Mesh
 
@@ -297,11 +297,11 @@ def test_flexes_that_stand_for_geoms_are_not_missed_in_the_picture() -> None:
     spec = spec_of(peanut(0.06))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warn_of_undrawn(spec.compile())
+        warn_of_unsupported(spec.compile())
     V, F = peanut(0.06)
     spec.add_flex(name="other", dim=2, vertbody=["base"], vert=V.ravel(), elem=F.ravel())
     with pytest.warns(RippleWarning, match="has 1 flexes"):
-        warn_of_undrawn(spec.compile())
+        warn_of_unsupported(spec.compile())
 
 
 def test_what_a_flex_meets_badly_is_warned_of_by_name() -> None:

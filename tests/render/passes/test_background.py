@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.passes import deferred as picture
+from ripple_sim.render.passes import deferred
 from ripple_sim.render.visuals import primitives as meshes
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
@@ -31,7 +31,7 @@ def frame_of(gl: GLContext, light: str, floor: str, camera: Camera) -> np.ndarra
     </worldbody></mujoco>""")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    with Renderer(gl, model, {}, width=SIZE[0], height=SIZE[1]) as renderer:
+    with Renderer(gl, model, {}, size=SIZE) as renderer:
         return renderer.render(data, {}, camera).astype(int)
 
 
@@ -41,7 +41,7 @@ def frame_of(gl: GLContext, light: str, floor: str, camera: Camera) -> np.ndarra
 def test_the_interpolated_background_is_that_of_each_pixel(gl, monkeypatch, light, floor, elevation):
     camera = Camera((0, 0, 0.2), 3.0, 70.0, elevation)
     interpolated = frame_of(gl, light, floor, camera)
-    monkeypatch.setattr(picture, "CoarseBackground", lambda *_: None)
+    monkeypatch.setattr(deferred, "CoarseBackground", lambda *_: None)
     exact = frame_of(gl, light, floor, camera)
     assert exact.std() > 5
     assert np.abs(interpolated - exact).max() <= 3
@@ -67,7 +67,7 @@ def test_height_maps_of_different_resolutions_stay_apart(gl):
             geom: np.full((6, n + 2, n + 2, 4), [0, 0, 0, swell[geom]], dtype=np.float32)
             for geom, n in enumerate(resolutions)
         }
-        with Renderer(gl, model, surfaces, width=SIZE[0], height=SIZE[1]) as renderer:
+        with Renderer(gl, model, surfaces, size=SIZE) as renderer:
             return renderer.render(data, height_maps, Camera((0, 0, 0), 4.0, 90.0, 0.0)).astype(int)
 
     swollen, larger = frame([0.5, 0.5], heights), frame([0.5 + h for h in heights], (0.0, 0.0))

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from ripple_sim.render.camera import Pose, perspective, view_matrix
-from ripple_sim.render.passes.screen_bounds import Tiles, balls_about, boxes_of
+from ripple_sim.render.bounds import Balls, balls_about
+from ripple_sim.render.camera import Pose
+from ripple_sim.render.passes.screen_bounds import boxes_of
+from ripple_sim.render.passes.tiles import Tiles
+from ripple_sim.render.projection import perspective, view_matrix
 
 SIZE = (200, 120)
 
@@ -30,7 +33,7 @@ def test_box_holds_the_ball(lens: tuple[float, float]) -> None:
     centres = camera.eye + local @ camera.rotation.T
     directions = random.normal(size=(500, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    for centre, radius, box in zip(centres, radii, boxes_of(centres, radii, camera, SIZE), strict=True):
+    for centre, radius, box in zip(centres, radii, boxes_of(Balls(centres, radii), camera, SIZE), strict=True):
         shown = np.clip(pixels(centre + radius * directions, camera), 0, SIZE)
         assert (shown >= box[:2]).all() and (shown <= box[2:]).all()
 
@@ -38,7 +41,7 @@ def test_box_holds_the_ball(lens: tuple[float, float]) -> None:
 def test_box_of_a_small_ball_is_tight() -> None:
     camera = pose(3)
     centre = camera.eye - 3.0 * camera.rotation[:, 2]
-    (box,) = boxes_of(centre[None], np.array([0.1]), camera, SIZE)
+    (box,) = boxes_of(Balls(centre[None], np.array([0.1])), camera, SIZE)
     middle, radius = np.array(SIZE) / 2, 0.1 / 3.0 * SIZE[1] / (2 * np.tan(np.radians(25.0)))
     np.testing.assert_allclose(box, [*(middle - radius), *(middle + radius)], atol=1.3)
 
@@ -47,7 +50,7 @@ def test_whole_picture_for_a_ball_about_the_eye_or_without_end_and_none_for_one_
     camera = pose(4)
     behind = camera.eye + 2.0 * camera.rotation[:, 2]
     centres = np.stack([camera.eye, camera.eye + camera.rotation[:, 0], behind])
-    boxes = boxes_of(centres, np.array([0.5, np.inf, 0.5]), camera, SIZE)
+    boxes = boxes_of(Balls(centres, np.array([0.5, np.inf, 0.5])), camera, SIZE)
     np.testing.assert_array_equal(boxes[:2], [[0, 0, *SIZE]] * 2)
     assert (boxes[2, :2] == boxes[2, 2:]).all()
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sphere_height_maps import N, constant_height_map, height_map_of
 
-from ripple_sim.render.surfaces.refinement import Refinement
+from ripple_sim.render.surfaces.adaptive_tessellation import AdaptiveTessellation
 from ripple_sim.render.surfaces.tessellation import edges_of, midpoints
 from ripple_sim.render.visuals import primitives as meshes
 
@@ -20,7 +20,8 @@ def ball(tolerance, min_length=0.0):
     attributes, F = np.concatenate([V, V, V], axis=1), np.arange(len(V)).reshape(-1, 3)
     edges = edges_of(F, same.ravel())
     vertices = np.concatenate([attributes, midpoints(edges, attributes, POSITION, NORMAL)])
-    return Refinement(F, edges, vertices[:, POSITION], vertices[:, SPHERE], N, tolerance, min_length), vertices, F
+    adaptive = AdaptiveTessellation(F, edges, vertices[:, POSITION], vertices[:, SPHERE], N, tolerance, min_length)
+    return adaptive, vertices, F
 
 
 def geometric(vertices, triangles):

@@ -11,6 +11,7 @@ from ripple_sim.errors import RippleWarning
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.visuals import primitives as meshes
 from ripple_sim.render.visuals.lights import model_lighting
+from ripple_sim.render.visuals.meshes import height_field
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
@@ -34,7 +35,7 @@ def picture(gl, body, *, asset="", visual="", camera=ABOVE, targets=None, size=S
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     surfaces = {model.geom(name).id: surface for name, surface in (targets or {}).items()}
-    with Renderer(gl, model, surfaces, width=size[0], height=size[1], **options) as renderer:
+    with Renderer(gl, model, surfaces, size=size, **options) as renderer:
         return renderer.render(data, {}, camera).astype(int)
 
 
@@ -198,7 +199,7 @@ def test_height_field_stands_as_high_as_it_says():
       <asset><hfield name="h" nrow="3" ncol="4" size="2 1 .5 .1"/></asset>
       <worldbody><geom type="hfield" hfield="h"/></worldbody></mujoco>""")
     model.hfield_data[:] = np.linspace(0, 1, 12)
-    shape = meshes.height_field(model, 0)
+    shape = height_field(model, 0)
     np.testing.assert_allclose(shape.shell.min(axis=0), [-2, -1, -0.1])
     np.testing.assert_allclose(shape.shell.max(axis=0), [2, 1, 0.5])
     top = shape.shell[shape.shell[:, 2] > -0.05]
@@ -312,15 +313,15 @@ def test_what_is_not_drawn_is_said_once(gl):
     tendon = '<tendon><spatial><site site="s"/><site site="w"/></spatial></tendon>'
     xml = f"<mujoco><worldbody>{body}</worldbody>{tendon}</mujoco>"
     with pytest.warns(RippleWarning, match="1 tendons"):
-        Renderer(gl, mujoco.MjModel.from_xml_string(xml), {}, width=32, height=24).close()
+        Renderer(gl, mujoco.MjModel.from_xml_string(xml), {}, size=(32, 24)).close()
 
 
 def test_fifty_renderers_leave_nothing_behind(gl):
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{FLOOR}{BALL}</worldbody></mujoco>")
 
     def make() -> int:
-        renderer = Renderer(gl, model, {}, width=16, height=12, samples=0)
-        made = list(renderer._owned._made)
+        renderer = Renderer(gl, model, {}, size=(16, 12), samples=0)
+        made = list(renderer._resources._created)
         del renderer
         gc.collect()
         with gl:

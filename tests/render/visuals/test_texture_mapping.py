@@ -10,10 +10,12 @@ import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.visuals import primitives as meshes
+from ripple_sim.render.gpu.contract import MappingKind
+from ripple_sim.render.visuals import primitives
 from ripple_sim.render.visuals.materials import look_of
-from ripple_sim.render.visuals.texture_mapping import FLAT_IMAGE, mapping_of
-from ripple_sim.render.visuals.visual import geom_piece
+from ripple_sim.render.visuals.meshes import mesh_asset
+from ripple_sim.render.visuals.texture_mapping import mapping_of
+from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
 
@@ -51,7 +53,7 @@ def names(gl, model, places, camera=FROM_X, targets=None) -> str:
     """Names of the colours at places of the picture, x to the right and y upwards from its middle, in pixels."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    with Renderer(gl, model, targets or {}, width=SIZE, height=SIZE, lighting="studio") as renderer:
+    with Renderer(gl, model, targets or {}, size=(SIZE, SIZE), lighting="studio") as renderer:
         frame = renderer.render(data, {}, camera).astype(float)
     found = ""
     for x, y in places:
@@ -117,7 +119,7 @@ def test_a_cube_picture_is_stretched_over_a_primitive_or_with_texuniform_is_not(
 @pytest.mark.parametrize(("shape", "look"), [("sphere", "model"), ("capsule", "model"), ("sphere", "rubber")])
 def test_a_target_wears_the_picture_as_a_body_does(gl, shape, look):
     model = painted(f'<geom type="{shape}" size=".4 .2" material="m"/>')
-    ball = meshes.ball(12)
+    ball = primitives.ball(12)
     V = 0.4 * ball.shell + (np.sign(ball.shell) * [0, 0, 0.2] if shape == "capsule" else 0.0)
     places = [*corners(5), *corners(12)]
     surface = Surface(V, ball.faces, ball.shell, 8, look)
@@ -146,9 +148,9 @@ def test_the_colour_of_the_geom_or_else_of_the_material_multiplies_the_picture(g
 def test_a_mesh_keeps_its_texture_coordinates():
     mesh = '<mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1" texcoord="0 0 1 0 0 1 1 1" face="0 2 1 0 1 3 0 3 2 1 2 3"/>'
     model = painted('<geom type="mesh" mesh="m" material="m"/>', 'texrepeat="3 2"', asset=mesh)
-    mapping = mapping_of(model, geom_piece(model, 0))
-    assert (mapping.kind, mapping.own, mapping.tiling) == (FLAT_IMAGE, True, (3.0, 2.0, 0.0, 0.0))
-    shape = meshes.mesh_asset(model, 0)
+    mapping = mapping_of(model, geom_visual(model, 0))
+    assert (mapping.kind, mapping.own, mapping.tiling) == (MappingKind.FLAT_IMAGE, True, (3.0, 2.0, 0.0, 0.0))
+    shape = mesh_asset(model, 0)
     assert {tuple(uv) for uv in shape.uv} == {(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)}
 
 
@@ -211,7 +213,7 @@ def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
     for model, theirs, variant in zip(models, np.load(tmp_path / "theirs.npy"), variants, strict=True):
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
-        with Renderer(gl, model, {}, width=320, height=240, lighting="studio") as renderer:
+        with Renderer(gl, model, {}, size=(320, 240), lighting="studio") as renderer:
             ours = renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 4.2, 70.0, -50.0, 45.0))
         theirs_shows, ours_shows = colours(theirs), colours(ours)
         # away from edges, where they show a clear colour
@@ -227,7 +229,7 @@ def test_a_material_answers_light_as_it_says():
     """Roughness is taken where it is given; otherwise more shininess is less of it. Reflectance is a coat."""
 
     def look(attributes: str):
-        return look_of(model := painted('<geom size=".1" material="m"/>', attributes), geom_piece(model, 0))
+        return look_of(model := painted('<geom size=".1" material="m"/>', attributes), geom_visual(model, 0))
 
     assert look('roughness="0.3" metallic="1" shininess="0.9"').roughness == pytest.approx(0.3)
     assert look('roughness="0.3" metallic="1"').metallic == 1.0

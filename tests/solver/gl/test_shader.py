@@ -18,7 +18,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.delitem(sys.modules, "some_shaders", raising=False)
     files = {
-        "passes/one.glsl": '#version 430\n#include "shared/outer.glsl"\nvoid main() {}\n',
+        "passes/one.glsl": '#version 430\n#include "shared/outer.glsl"\n#include "shared/inner.glsl"\nvoid main() {}\n',
         "shared/outer.glsl": '#include "shared/inner.glsl"\n// outer\n',
         "shared/inner.glsl": "// inner\n",
         "passes/lost.glsl": '#version 430\n#include "shared/none.glsl"\n',
@@ -29,9 +29,9 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "some_shaders"
 
 
-def test_includes_and_defines_are_put_in(package: str) -> None:
+def test_includes_are_put_in_once_and_defines_at_the_top(package: str) -> None:
     text = load_shader(package, "passes/one", N=8, HALF=0.5)
-    assert text == "#version 430\n#define N 8\n#define HALF 0.5\n// inner\n\n// outer\n\nvoid main() {}\n"
+    assert text == "#version 430\n#define N 8\n#define HALF 0.5\n// inner\n\n// outer\n\n\nvoid main() {}\n"
 
 
 def test_a_missing_file_is_named(package: str) -> None:

@@ -1,21 +1,21 @@
-"""Which triangles a frame needs: those of a mesh, halved along every edge from which the waves depart."""
+"""Adaptive tessellation: for each frame, triangles are split at the edges from which the waves depart."""
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver.kernel import Bools, Floats, Floats32, Ints32, kernel
 from ripple_sim.solver.texels.cube_map.convention import face_coordinates
 
 from .tessellation import Edges
 
 
-class Refinement:
+class AdaptiveTessellation:
     """Splits the edges of a mesh at their midpoints where a height map bends too much between their ends.
 
-    Whether an edge is split depends on its length and the heights at its ends and its midpoint alone, so that triangles
-    on both sides of it, and of a seam or a crease, agree: no gap opens.
+    Whether an edge is split depends only on its length and the heights at its ends and midpoint, so that the triangles
+    on both sides of it agree, across seams and creases, too: no gap opens.
 
     Parameters
     ----------
@@ -24,20 +24,20 @@ class Refinement:
     edges : Edges
         Of the triangles, k of them.
     positions : array, shape [n + k, 3]
-        Of the vertices, and after them of the edges' midpoints [m].
+        Of the vertices, followed by the edges' midpoints [m].
     sphere : array, shape [n + k, 3]
         Where the height map is looked up: directions from the cube's centre.
     resolution : int
         Texels N along an edge of the height map's faces.
     tolerance : float
-        How far the height at a midpoint may be from the mean of those at the ends [m].
+        How far the height at a midpoint may differ from the mean of those at the ends [m].
     min_length : float
         Shorter edges stay whole [m].
 
     Attributes
     ----------
     base_count : int
-        Number n of the vertices that are no midpoints.
+        Number n of vertices, without midpoints.
     """
 
     def __init__(
@@ -61,12 +61,12 @@ class Refinement:
         face, row, column = face_coordinates(sphere[np.concatenate([ends, self.base_count + self._long])], resolution)
         place = np.stack([row, column], axis=1)
         nearest = np.clip(np.floor(place + 0.5), 0, resolution - 1)
-        # the first of the 3 x 3 texels about each place, in a padded face, and how far it is off the centre of these
+        # the first of the 3 x 3 texels about each point, in a face with its halo, and how far off the centre it is
         self._texel = np.column_stack([face, nearest]).astype(np.int32)
         self._offset = (place - nearest).astype(np.float32)
 
     def __call__(self, height_map: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Triangles [t, 3] for a height map [6, N + 2, N + 2, 4], and the midpoints [s] that they use, as vertices.
+        """Triangles [t, 3] for a height map [6, N + 2, N + 2, 4], and the midpoints [s], as vertices, that they use.
 
         Where no edge is split, the triangles are the same array each time.
         """
@@ -81,9 +81,9 @@ class Refinement:
         return _triangles(self._faces, self._sides, midpoint, self._length), used
 
 
-@numba.njit(cache=True, nogil=True)
-def _heights(height_map, texel, offset):
-    """The quadratic B-spline of the shaders."""
+@kernel
+def _heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Floats32:
+    """Heights [k] by the quadratic B-spline of spline.glsl: at offsets [k, 2] in texels [k, 3] (face, row, column)."""
     height = np.empty(len(texel), np.float32)
     half = np.float32(0.5)
     for i in range(len(texel)):
@@ -100,9 +100,9 @@ def _heights(height_map, texel, offset):
     return height
 
 
-@numba.njit(cache=True, nogil=True)
-def _departing(height, ends, tolerance):
-    """Which edges' midpoints, the last of the heights, are off the mean of their ends."""
+@kernel
+def _departing(height: Floats32, ends: Ints32, tolerance: np.float32) -> Bools:
+    """Which edges' midpoints, the last k of the heights, are off the mean of their ends [k, 2]."""
     departing = np.empty(len(ends), np.bool_)
     first = len(height) - len(ends)
     for i in range(len(ends)):
@@ -111,9 +111,9 @@ def _departing(height, ends, tolerance):
     return departing
 
 
-@numba.njit(cache=True, nogil=True)
-def _triangles(faces, sides, midpoint, length):
-    """Cut every triangle into 1 to 4 by its midpoints."""
+@kernel
+def _triangles(faces: Ints32, sides: Ints32, midpoint: Ints32, length: Floats) -> Ints32:
+    """Cut every triangle [m, 3] into 1 to 4 by the midpoints of its sides [m, 3], -1: none; lengths are the edges'."""
     triangles = np.empty((4 * len(faces), 3), np.int32)
     count = 0
     for face in range(len(faces)):

@@ -1,15 +1,15 @@
 #version 430
-// Vertices of a target, displaced along their smooth normals and put into the world, and how much sky the bodies near by
+// Vertices of a target, displaced along their smooth normals, in the world, and the ambient visibility that nearby geoms
 // leave them: once a frame for all passes.
-layout(local_size_x = 64) in;
+layout(local_size_x = VERTEX_GROUP) in;
 
 #include "surfaces/height_maps.glsl"
 #include "visuals/occluders.glsl"
 
 struct Vertex { float position[3], direction[3], sphere[3]; };
-layout(std430, binding = 0) readonly buffer Rest { Vertex rest[]; };
-layout(std430, binding = 1) writeonly buffer Moved { vec4 moved[]; };
-layout(std430, binding = 2) readonly buffer Midpoints { int midpoints[]; };  // in use besides all vertices of the mesh
+layout(std430, binding = REST_VERTICES_BINDING) readonly buffer RestVertices { Vertex rest[]; };
+layout(std430, binding = MOVED_VERTICES_BINDING) writeonly buffer MovedVertices { vec4 moved[]; };
+layout(std430, binding = MIDPOINTS_BINDING) readonly buffer Midpoints { int midpoints[]; };  // used by this frame
 
 uniform mat3 rotation;
 uniform vec3 origin;
@@ -28,8 +28,8 @@ void main()
         i = midpoints[i - base_count];
     Vertex v = rest[i];
     vec3 sphere = vec3(v.sphere[0], v.sphere[1], v.sphere[2]);
-    float height = spline_at(height_map, resolution, first_layer, sphere).w;
+    float height = spline_at(height_maps, resolution, first_layer, sphere).w;
     vec3 direction = vec3(v.direction[0], v.direction[1], v.direction[2]);
     vec3 world = rotation * (vec3(v.position[0], v.position[1], v.position[2]) + height * direction) + origin;
-    moved[i] = vec4(world, openness_to_bodies(world, rotation * direction, geom, occluder_count));
+    moved[i] = vec4(world, occluder_visibility(world, rotation * direction, geom, occluder_count));
 }
