@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
-import functools
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -14,11 +11,9 @@ import moderngl
 from ripple_sim.solver.errors import GLError
 
 from .drivers import is_software
+from .egl import create_context, current_context, load_egl
 from .fence import Fences
 from .shader import load_shader
-
-# The plain sonames first; the versioned ones are what runtime packages without -dev symlinks install.
-_LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
 
 
 class GLContext:
@@ -40,16 +35,16 @@ class GLContext:
     """
 
     def __init__(self, device: int | None = None) -> None:
-        self._ctx = _create_context(device)
+        self._ctx = create_context(device)
         # objects may be collected in any thread, at any time; they are freed when the context is next entered
         self._ctx.gc_mode = "context_gc"
-        self._handle = _current_context()
+        self._handle = current_context()
         info = self._ctx.info
         self.renderer: str = info["GL_RENDERER"]
         self.vendor: str = info["GL_VENDOR"]
         self.version: str = info["GL_VERSION"]
         self._depth = 0
-        self._fences = Fences(_egl().eglGetProcAddress)
+        self._fences = Fences(load_egl().eglGetProcAddress)
         self._shared_shaders: dict[str, moderngl.ComputeShader] = {}
 
     @property
@@ -60,7 +55,7 @@ class GLContext:
     def __enter__(self) -> moderngl.Context:
         if self._depth == 0:
             self._ctx.__enter__()
-            if _current_context() != self._handle:
+            if current_context() != self._handle:
                 raise GLError(
                     f"the OpenGL context on {self.renderer} is lost; something else in this process has ended EGL (a "
                     "pyvista or VTK window does): run one of the two in a process of its own"
@@ -145,44 +140,6 @@ def _compiled(name: str, compile_shader: Callable[[], Any]) -> Any:
         return compile_shader()
     except moderngl.Error as error:
         raise GLError(f"shader {name} does not compile: {error}") from error
-
-
-def _create_context(device: int | None) -> moderngl.Context:
-    devices = range(8) if device is None else [device]
-    reasons = []
-    for libraries in _LIBRARIES:
-        for index in devices:
-            try:
-                # moderngl's hints know nothing of the keywords that its backends take
-                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}
-                return moderngl.create_context(require=430, standalone=True, **settings)
-            except Exception as error:  # moderngl raises bare Exception here
-                reasons.append(str(error))
-                if "not loaded" in str(error):
-                    break
-    reason = reasons[-1] if reasons else "no device"
-    if device is not None:
-        raise GLError(f"no OpenGL 4.3 context on EGL device {device} ({reason}); devices are counted from 0")
-    raise GLError(
-        f"no OpenGL 4.3 context on any EGL device ({reason}); "
-        "install Mesa with: apt-get install libegl1 libgl1 libgl1-mesa-dri libegl-mesa0"
-    )
-
-
-def _current_context() -> int | None:
-    """Handle of the EGL context that is current in this thread; None if there is none."""
-    return _egl().eglGetCurrentContext()
-
-
-@functools.cache
-def _egl() -> ctypes.CDLL:
-    """The library that moderngl has loaded already."""
-    for libraries in _LIBRARIES:
-        with contextlib.suppress(OSError):
-            egl = ctypes.CDLL(libraries.get("libegl", "libEGL.so"))
-            egl.eglGetCurrentContext.restype = egl.eglGetProcAddress.restype = ctypes.c_void_p
-            return egl
-    raise GLError("the EGL library has vanished since the context was made; see `ripple-sim info`")
 
 
 _shared: dict[int | None, GLContext] = {}

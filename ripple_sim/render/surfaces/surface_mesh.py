@@ -7,18 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.bounds import Balls, balls_about
-from ripple_sim.render.gpu.contract import MappingKind
 from ripple_sim.render.visuals.assets import Assets
-from ripple_sim.render.visuals.texture_mapping import Mapping
 from ripple_sim.solver.errors import RippleError
 
 from .adaptive_tessellation import AdaptiveTessellation
 from .displacement import Displacement, Place
-from .heatmap import HeatmapTexture
 from .height_maps import LAYERS, HeightMapTextures
-from .surface import Surface, appearance, load_image
+from .surface import Surface, appearance
+from .surface_drawing import Paint, SurfaceDrawing
 from .tessellation import Edges
-from .vertices import BAKED, NORMAL, POSITION, SPHERE, mapped_coordinates, surface_vertices
+from .vertices import POSITION, SPHERE, surface_vertices
 
 _PIXELS = 4.0  # length of an edge where the target fills the frame's height
 _PIXELS_PER_FACE = 48  # of the frame
@@ -90,32 +88,8 @@ class SurfaceMesh:
             first_layer=self._first_layer,
         )
         self._indices = assets.resources.buffer(reserve=4 * 12 * len(faces), dynamic=True)
-        self._make_programs(assets, surface, vertices, mapping)
-        self._mapping, self._grid, self._color = mapping, surface.grid, (*rgb, float(self.number))
-
-    def _make_programs(self, assets: Assets, surface: Surface, vertices: NDArray, mapping: Mapping) -> None:
-        resources = assets.resources
-        options = {
-            "MAPPING": mapping.kind,
-            "HEATMAP": int(surface.heatmap_colors is not None),
-            "GRID": int(surface.grid > 0),
-        }
-        self._program = resources.program("surfaces/surface_vertex", "surfaces/surface_fragment", **options)
-        depth = resources.program("surfaces/surface_depth_vertex", "glsl/depth_fragment")
-        still = np.concatenate([vertices[:, NORMAL], vertices[:, SPHERE], vertices[:, BAKED]], axis=1)
-        still = np.concatenate([still, mapped_coordinates(vertices, mapping)], axis=1).astype("f4")
-        moved = (self._displacement.moved, "4f", "in_moved")
-        names = ("in_normal", "in_sphere", "in_baked", "in_mapped")
-        attributes = (resources.buffer(still.tobytes()), "3f 3f 2f 3f", *names)
-        self._solid = resources.vertex_array(self._program, [moved, attributes], self._indices, skip_errors=True)
-        self._depth = resources.vertex_array(depth, [moved], self._indices)
-        self._image: moderngl.Texture | moderngl.TextureCube | None = None
-        if mapping.kind != MappingKind.NO_IMAGE:
-            modelled = mapping.texture >= 0
-            self._image = assets.textures.get(mapping.texture) if modelled else load_image(resources, surface)
-        self._heatmap = None
-        if surface.heatmap_colors is not None:
-            self._heatmap = HeatmapTexture(resources, self.resolution, surface.heatmap_colors)
+        paint = Paint(surface, mapping, (*rgb, float(self.number)))
+        self._drawing = SurfaceDrawing(assets, paint, vertices, self._displacement.moved, self._indices)
 
     def update(self, ctx: moderngl.Context, place: Place, height_map: NDArray[np.float32] | None) -> None:
         """Displace the vertices by a height map [6, N + 2, N + 2, 4] (none: flat) where the geom is.
@@ -153,9 +127,9 @@ class SurfaceMesh:
         RippleError
             If the surface has no heatmap, the shape is another, or the limit is not a positive, finite number.
         """
-        if self._heatmap is None:
+        if not self._drawing.has_heatmap:
             raise RippleError(f"geom {self.geom} has no heatmap; give its `Surface` heatmap_colors")
-        self._heatmap.set(values, limit)
+        self._drawing.set_heatmap(values, limit)
 
     def ball(self) -> Balls:
         """Ball about the geom's origin that contains the displaced mesh; it stays the same as the geom turns."""
@@ -168,24 +142,11 @@ class SurfaceMesh:
 
     def draw(self) -> None:
         """Draw into the G-buffer."""
-        if self._image is not None:
-            self._image.use(self._mapping.unit)
-        if self._mapping.kind not in (MappingKind.NO_IMAGE, MappingKind.CUBE_IMAGE):
-            self._program["tiling"] = self._mapping.tiling
-        self._program["rotation"] = tuple(self._pose[0].T.ravel())
-        self._program["color"] = self._color
-        if self._heatmap is not None:
-            self._heatmap.use(self._program)
-        if self._grid:
-            self._program["grid_spacing"] = float(self._grid)
-        if self._heatmap is not None or self._grid:
-            self._program["resolution"] = float(self.resolution)
-        self._solid.render(vertices=self._index_count)
+        self._drawing.draw(self._pose[0], self._index_count)
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth only, under a matrix of 16 numbers, column by column."""
-        self._depth.program["view_projection"] = view_projection
-        self._depth.render(vertices=self._index_count)
+        self._drawing.draw_depth(view_projection, self._index_count)
 
 
 def _adaptive(faces: NDArray, edges: Edges, vertices: NDArray, resolution: int, pixel: float) -> AdaptiveTessellation:

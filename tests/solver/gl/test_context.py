@@ -103,19 +103,19 @@ def test_lost_context_is_reported() -> None:
     script = """
         import ctypes, sys
         from ripple_sim.solver import GLError, WaveSolver, sphere_atlas
-        from ripple_sim.solver.gl import context as gl
+        from ripple_sim.solver.gl import egl, shared_context
         try:
             waves = WaveSolver(sphere_atlas(1.0, 8), backend="gl")
         except GLError:
             sys.exit(77)
-        egl = gl._egl()
-        for function in (egl.eglGetCurrentDisplay, egl.eglGetPlatformDisplay):
+        library = egl.load_egl()
+        for function in (library.eglGetCurrentDisplay, library.eglGetPlatformDisplay):
             function.restype = ctypes.c_void_p
-        with gl.shared_context():
-            display = egl.eglGetCurrentDisplay()
+        with shared_context():
+            display = library.eglGetCurrentDisplay()
         none = ctypes.c_void_p(None)
-        egl.eglMakeCurrent(ctypes.c_void_p(display), none, none, none)
-        egl.eglTerminate(ctypes.c_void_p(display))
+        library.eglMakeCurrent(ctypes.c_void_p(display), none, none, none)
+        library.eglTerminate(ctypes.c_void_p(display))
         try:
             waves.height
         except GLError as error:
