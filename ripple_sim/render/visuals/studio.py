@@ -15,7 +15,7 @@ _KEY_TANGENT = 0.10
 _KEY_AZIMUTH, _KEY_ELEVATION = 92.0, 44.0
 # soft boxes: azimuth from the camera's forward axis (left is positive) and elevation [degrees], half width and half
 # height over distance, radiance
-_SOFT_BOXES = (
+SOFT_BOX_LIGHTS = (
     (100.0, 46.0, 0.26, 0.34, (7.5, 7.2, 6.8)),
     (-68.0, 28.0, 0.16, 0.75, (4.2, 4.7, 5.4)),
     (10.0, 66.0, 0.65, 0.20, (3.6, 3.7, 3.8)),
@@ -67,7 +67,7 @@ def set_lighting(
 
 def _set_soft_boxes(frame: FrameUniforms, pose: Pose, strength: float) -> None:
     """Set the soft boxes, which turn with the camera, at a share of their brightness."""
-    for index, (azimuth, elevation, half_width, half_height, radiance) in enumerate(_SOFT_BOXES):
+    for index, (azimuth, elevation, half_width, half_height, radiance) in enumerate(SOFT_BOX_LIGHTS):
         normal = _direction(pose, azimuth, elevation)
         tangent = np.cross([0.0, 0.0, 1.0], normal)
         frame.values["soft_box_normal"][index] = [*normal, half_width]
