@@ -28,8 +28,8 @@ class PlainShader:
             self._gain = ctx.buffer((1 / operator.mass).astype(np.float32).tobytes())
             self._pairs = ctx.buffer(np.stack([halo, source], axis=1).astype(np.int32).tobytes())
         self._count = len(halo)
-        self._update = self._gl.compute_shader("ripple_sim.bench", "plain_update", N=n)
-        self._halo = self._gl.compute_shader("ripple_sim.bench", "plain_halo")
+        self._update = self._gl.compute_shader("ripple_sim.bench.shaders", "plain_update", N=n)
+        self._halo = self._gl.compute_shader("ripple_sim.bench.shaders", "plain_halo")
 
     def set_height(self, height: Floats32) -> None:
         """Replace the height [m], [6, N, N]."""
