@@ -15,7 +15,6 @@ import trimesh
 from ripple_sim.figures.atlas_plot import plot_atlas
 from ripple_sim.scenes.shapes import LIMBED_FILE
 from ripple_sim.solver import Material, WaveSolver, build_atlas, load_mesh
-from ripple_sim.solver.texels.sampling import sampling_matrix
 
 
 def main() -> None:
@@ -28,7 +27,7 @@ def main() -> None:
     waves.add_height(0.03 * size * np.exp(-((atlas.positions - top) ** 2).sum(axis=-1) / (0.06 * size) ** 2))
     waves.step(0.25)
 
-    height = sampling_matrix(atlas.sphere, atlas.resolution) @ waves.height.ravel()  # texels to vertices
+    height = atlas.sampling_matrix(atlas.mesh.V) @ waves.height.ravel()  # texels to vertices
     Path("out").mkdir(exist_ok=True)
     displaced = trimesh.Trimesh(mesh.V + height[:, None] * mesh.vertex_normals, mesh.F, process=False)
     displaced.vertex_attributes["height"] = height.astype(np.float32)

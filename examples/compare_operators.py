@@ -14,7 +14,6 @@ from ripple_sim.bench.accuracy import arrivals, sphere_modes
 from ripple_sim.bench.arrival import plane_arrival
 from ripple_sim.solver import WaveSolver, sphere_atlas
 from ripple_sim.solver.operator.assembly import OPERATORS
-from ripple_sim.solver.texels.sampling import sampling_matrix
 
 SIZE, CAPTION, SMOOTH = 360, 76, 2
 RESOLUTION, TIME, WIDTH, SOURCE = 96, 0.8, 0.09, np.array([0.45, 0.25, 0.86])
@@ -45,7 +44,7 @@ def view(operator: str) -> Image.Image:
     seen = x**2 + y**2 < 1
     z = np.sqrt(np.maximum(1 - x**2 - y**2, 0))
     directions = (x[..., None] * right + y[..., None] * up + z[..., None] * source)[seen]
-    height = sampling_matrix(directions, RESOLUTION) @ waves.height.ravel()
+    height = waves.atlas.sampling_matrix(directions) @ waves.height.ravel()
     strength = np.clip(np.abs(height) / FULL, 0, 1)[:, None]
     pixels = np.full((size, size, 3), 255.0)
     shade = 0.55 + 0.45 * z[seen][:, None]

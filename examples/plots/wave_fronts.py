@@ -14,12 +14,13 @@ import numpy as np
 from figure import FAINT, FOLDER, NAMES, TEXT, save, sheet
 from matplotlib.colors import ListedColormap
 
-from ripple_sim.bench.arrival import NEAREST, arrival_times, ideal_width, plane_arrival
+from ripple_sim.bench.arrival import arrival_times, ideal_width
+from ripple_sim.bench.plane_wave import NEAREST, plane_arrival
 from ripple_sim.figures.atlas_views import AtlasPainter, View
 from ripple_sim.overlay.colormap import color_table, colors
 from ripple_sim.scene.up_axis import usual_up
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
-from ripple_sim.solver.cube_map.convention import texel_directions
+from ripple_sim.solver.cube_map.convention import cube_chart_points, texel_directions
 from ripple_sim.solver.texels.sampling import sampling_matrix
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
@@ -36,9 +37,12 @@ class FrontPainter(AtlasPainter):
         super().__init__(atlas, np.ones((*distance.shape, 3)))
         self._fields = np.stack([distance.ravel(), gone.ravel()], axis=1)
         self._resolution, self._spacing, self._nearest = atlas.resolution, spacing, nearest
+        self._topology = atlas.texels.topology
 
     def paint(self, directions: np.ndarray) -> np.ndarray:
-        distance, gone = (sampling_matrix(directions, self._resolution) @ self._fields).T
+        distance, gone = (
+            sampling_matrix(self._topology, *cube_chart_points(directions, self._resolution)) @ self._fields
+        ).T
         far = distance > self._nearest
         painted = colors(np.where(far, gone / np.maximum(distance, 1e-9) - 1, 0), LIMIT) / 255
         # the gradient of a distance is 1: lines between two of its values have one width

@@ -14,10 +14,9 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from ripple_sim.render.surfaces.ambient_occlusion import bake
-from ripple_sim.render.visuals.primitives import corner_normals
-from ripple_sim.solver import Atlas
-from ripple_sim.solver.cube_map.convention import face_coordinates, texel_directions
-from ripple_sim.solver.texels.stencil import lumped_areas
+from ripple_sim.render.visuals.corners import corner_normals
+from ripple_sim.solver import Atlas, sphere_atlas
+from ripple_sim.solver.cube_map.convention import cube_chart_points
 
 # The belt of four faces from left to right with the one in the middle of the cross second, and those over and under it.
 BELT, ABOVE, BELOW = (1, 3, 0, 2), 4, 5
@@ -55,7 +54,7 @@ class View:
 
 def texel_stretch(atlas: Atlas) -> NDArray[np.float64]:
     """Stretch at every texel: sqrt(real area over area on the sphere), the real area scaled to 4 pi, [6, N, N]."""
-    sphere = lumped_areas(texel_directions(atlas.resolution))
+    sphere = sphere_atlas(1.0, atlas.resolution).areas
     return np.sqrt((atlas.areas / atlas.areas.sum()) / (sphere / sphere.sum()))
 
 
@@ -99,7 +98,7 @@ class AtlasPainter:
         local = np.stack([x.ravel()[seen], y.ravel()[seen]], axis=1)
         local = np.column_stack([local, np.sqrt(1 - (local**2).sum(axis=1))])
         directions = local @ view.axes
-        colors = self._grid(*face_coordinates(directions, self._atlas.resolution))
+        colors = self._grid(*cube_chart_points(directions, self._atlas.resolution))
         return _picture(x.shape, seen, self._lit(colors, directions, np.ones(len(seen)), view))
 
     def cross(self, size: int) -> NDArray[np.float64]:
@@ -118,7 +117,7 @@ class AtlasPainter:
 
     def paint(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Colours [k, 3] of the surface in directions [k, 3] from the cube's centre; override it to paint others."""
-        return self._grid(*face_coordinates(directions, self._atlas.resolution), self._widths)
+        return self._grid(*cube_chart_points(directions, self._atlas.resolution), self._widths)
 
     @functools.cached_property
     def _vertices(self) -> NDArray[np.float64]:
@@ -143,7 +142,7 @@ class AtlasPainter:
     @functools.cached_property
     def _widths(self) -> NDArray[np.float64]:
         """Width of rows and of columns on the surface, in units of an even spread's, [2, 6, N, N]."""
-        padded, areas = self._atlas.padded_positions, self._atlas.areas
+        padded, areas = self._atlas.texels.halo_positions, self._atlas.areas
         along_columns = np.linalg.norm(padded[:, 1:-1, 2:] - padded[:, 1:-1, :-2], axis=-1) / 2
         along_rows = np.linalg.norm(padded[:, 2:, 1:-1] - padded[:, :-2, 1:-1], axis=-1) / 2
         even = np.sqrt(areas.mean())

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.scene.overlays import Request
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver.texels.halo import with_filled_halo
 
 from .contacts import ContactMarks, Mark
 from .field import magnitude
@@ -101,7 +102,11 @@ class Notebook:
 
     def _fields(self, simulation: Simulation) -> dict[str, NDArray[np.float32]]:
         ripples = simulation.ripples
-        return {name: pad_field(getattr(ripples[name], self._request.field or "")) for name in ripples}
+        shown = self._request.field or ""
+        return {
+            name: with_filled_halo(ripples[name].atlas.texels.topology, getattr(ripples[name], shown))
+            for name in ripples
+        }
 
     def _least_limit(self) -> float:
         ripples = self._simulations[0].ripples

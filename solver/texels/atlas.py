@@ -17,6 +17,7 @@ from ripple_sim.solver.mesh.mesh import Mesh
 from .atlas_file import write_atlas_file
 from .chart_map import ChartMap, TextureCoordinates
 from .quality import texel_quality
+from .sampling import sampling_matrix
 from .texel_mesh import TexelMesh
 
 # [m]. Squares of what is farther away overflow on the way to the nearest surface point.
@@ -118,6 +119,10 @@ class Atlas:
     def nearest_texel(self, points: ArrayLike) -> NDArray[np.int64]:
         """Flat index (chart N + row) N + column of the texel nearest in the atlas to each point, shape [k]."""
         return self.nearest(points)[1]
+
+    def sampling_matrix(self, points: ArrayLike) -> Any:
+        """SciPy CSR matrix [k, T] that takes a flattened field to its values at the surface points nearest to others."""
+        return sampling_matrix(self.texels.topology, *self.locate(points))
 
     def stiffness(self, speed: float | NDArray[np.float64] = 1.0) -> Any:
         """The operator c^2 grad . grad as a symmetric SciPy CSR matrix [T, T]; see `TexelMesh.stiffness`."""

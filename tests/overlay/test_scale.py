@@ -9,11 +9,12 @@ from ripple_sim.cli.main import main
 from ripple_sim.errors import SceneError
 from ripple_sim.overlay.colormap import SIZE, color_table, colors, lab_to_srgb
 from ripple_sim.overlay.comparison import compared_operators
-from ripple_sim.overlay.field import grid_spacing, magnitude, pad_field
+from ripple_sim.overlay.field import grid_spacing, magnitude
 from ripple_sim.overlay.history import MOST_POINTS, History
 from ripple_sim.overlay.scale import Limit, number, readable, round_up
 from ripple_sim.scene.overlays import NAMES, Request, parse_request
 from ripple_sim.solver import HeightMap, sphere_atlas
+from ripple_sim.solver.texels.halo import with_filled_halo
 
 # Machado, Oliveira and Fernandes 2009, complete deuteranopia and protanopia, on linear RGB
 DEUTAN = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])
@@ -174,7 +175,9 @@ def test_history_is_bounded_and_keeps_the_peaks(frames: int) -> None:
 def test_padding_is_that_of_a_height_map() -> None:
     atlas = sphere_atlas(1.0, 12)
     field = np.random.default_rng(0).standard_normal((6, 12, 12)).astype(np.float32)
-    np.testing.assert_allclose(pad_field(field), HeightMap(atlas.texels)(field)[..., 3], rtol=1e-6)
+    np.testing.assert_allclose(
+        with_filled_halo(atlas.texels.topology, field), HeightMap(atlas.texels)(field)[..., 3], rtol=1e-6
+    )
 
 
 def test_magnitude_is_that_of_waves_where_they_are() -> None:

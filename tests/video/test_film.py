@@ -14,19 +14,19 @@ from ripple_sim.errors import SceneError
 from ripple_sim.overlay.colormap import color_table, colors
 from ripple_sim.overlay.comparison import compared_operators
 from ripple_sim.overlay.contacts import MEMORY, ContactMarks, Mark
-from ripple_sim.overlay.field import pad_field
 from ripple_sim.overlay.layout import Layout
 from ripple_sim.overlay.marks import draw_marks, place_marks
 from ripple_sim.overlay.notes import Notebook
 from ripple_sim.overlay.projection import Projection
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.camera import perspective, view_matrix
+from ripple_sim.render.projection import perspective, view_matrix
 from ripple_sim.render.visuals import primitives as meshes
 from ripple_sim.scene.overlays import NAMES, parse_request
 from ripple_sim.scene.scene import Scene, load_scene
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.cube_map.convention import texel_directions
+from ripple_sim.solver.cube_map.convention import cube_topology, texel_directions
 from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.texels.halo import with_filled_halo
 from ripple_sim.video.film import Film
 from ripple_sim.video.render_video import render_video
 
@@ -82,9 +82,9 @@ def ball_with_field(field: np.ndarray, limit: float) -> np.ndarray:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     ball = meshes.ball(16)
-    surface = Surface(ball.shell, ball.faces, ball.shell, N, "metal", field_colors=color_table())
-    renderer = Renderer(shared_context(), model, {0: surface}, width=200, height=200)
-    renderer.set_field(0, pad_field(field), limit)
+    surface = Surface(ball.shell, ball.faces, ball.shell, N, "metal", heatmap_colors=color_table())
+    renderer = Renderer(shared_context(), model, {0: surface}, size=(200, 200))
+    renderer.set_heatmap(0, with_filled_halo(cube_topology(field.shape[1]), field), limit)
     return renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0, 40.0))
 
 
