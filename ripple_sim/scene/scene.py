@@ -13,7 +13,7 @@ import msgspec
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.model.target import find_target
+from ripple_sim.coupling.model.geoms import find_target
 from ripple_sim.errors import SceneError
 
 from .events import Events, Script

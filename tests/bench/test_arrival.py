@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from ripple_sim.bench.arrival import arrival_error, arrival_times, ideal_width, plane_arrival, spread_sources
+from ripple_sim.bench.arrival import arrival_error, arrival_times, ideal_width, spread_sources
+from ripple_sim.bench.plane_wave import plane_arrival
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas, load_mesh, sphere_atlas
 
-MESHES = Path(__file__).parents[4] / "shared" / "meshes" / "good"
+MESHES = Path(__file__).parents[3] / "shared" / "meshes" / "good"
 
 
 def test_front_on_a_sphere_arrives_at_the_distance() -> None:

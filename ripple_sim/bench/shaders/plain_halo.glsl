@@ -1,8 +1,8 @@
 #version 430
-// Copy the neighbours' border texels into the ring round each face.
+// Copy the neighbours' border texels into the halo round each chart.
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) buffer Field { float x[]; };
-layout(std430, binding = 1) readonly buffer Pairs { ivec2 pairs[]; };  // (place in the ring, texel it shows)
+layout(std430, binding = 1) readonly buffer Pairs { ivec2 pairs[]; };  // (place in the halo, texel it shows)
 uniform int count;
 
 void main() {

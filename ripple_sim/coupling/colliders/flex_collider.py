@@ -1,4 +1,4 @@
-"""Shells: rigid flexes that collide in place of mesh geoms."""
+"""Flex colliders: rigid flexes of triangles, made so that mesh geoms collide through them."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.model.target import target_mesh
+from ripple_sim.coupling.model.target_mesh import target_mesh
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh
 
-# A collision surface this share of the target's size off the true one is seen: bodies stop in mid-air.
+# A collision surface off the true one by this share of the target's size shows: bodies stop in mid-air.
 GAP_TOLERANCE = 0.02
-# Thicknesses over the mesh's size, of which the first that stays within the tolerance is taken, or else the last one.
+# Thicknesses over the mesh's size: the first within the tolerance is taken, or else the last.
 _THICKNESSES = (0.05, 0.04, 0.03, 0.02)
-# At sharp corners vertices move by this many thicknesses at most; those of a cube need 1.73.
+# Vertices at sharp corners move by this many thicknesses at most; those of a cube need 1.73.
 _SHARPEST = 2.0
-# Share of the weight of a mesh's own planes, for directions that they leave open.
+# Weight of the isotropic term over that of the triangles' planes: it settles the directions that they leave open.
 _ROUNDING = 1e-3
-# Opposite sides of a thin part stay apart by a tenth of it.
-_REACH = 0.45
+# Vertices move by this share of the local thickness at most, so that opposite sides of a thin part stay apart.
+_DEEPEST = 0.45
 
 _SETTINGS = ("contype", "conaffinity", "condim", "priority", "solmix", "gap")
 _LISTS = ("friction", "solref", "solimp")
 
 
-def add_shell(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
-    """Let a mesh geom collide through a rigid flex of its triangles, of the same name; itself it no longer does.
+def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
+    """Let a mesh geom collide through a rigid flex of its triangles, of the same name, and no longer by itself.
 
-    MuJoCo's contacts with a triangle are right as long as nothing gets through it: then they push along the shortest
-    way between the two. What has got through is pushed out through the nearest side: a flat body, where a triangle lies
-    under its rim, sideways. So the triangles lie inside of the surface, and a contact margin as thick holds bodies off:
-    outside they meet the true surface. Sharp edges are rounded, and thin parts thickened; the shell is as thick as it
-    can be (2 to 5 % of the mesh's size) without either being off by more than 2 %.
+    MuJoCo's contacts with a triangle are right as long as nothing penetrates it: they push along the shortest line
+    between the two. A geom that has penetrated is pushed out through the nearest side, which is sideways for a flat
+    geom with a triangle under its rim. So the triangles lie inside the surface, and a contact margin of the same
+    thickness holds other geoms off: they meet the true surface. Sharp edges become rounded and thin parts thicker; the
+    flex is as thick as possible (2 to 5 % of the mesh's size) without putting either off by more than 2 %.
 
     Parameters
     ----------
@@ -49,14 +49,14 @@ def add_shell(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     Raises
     ------
     SceneError
-        If the specification cannot be compiled as it stands, or drops geoms that do not collide.
+        If the specification does not compile as it is, or discards geoms that do not collide.
     MeshError
         If the mesh is not a closed genus-0 surface.
     """
     if spec.compiler.discardvisual:
         raise SceneError(
-            f"geom {geom.name!r} cannot collide through a flex, since the compiler's discardvisual would then discard "
-            "it; set spec.compiler.discardvisual = False"
+            f"geom {geom.name!r} cannot collide through a flex: with discardvisual the compiler would discard the "
+            "geom; set spec.compiler.discardvisual = False"
         )
     body = geom.parent
     body.name = body.name or f"body of {geom.name}"
@@ -70,7 +70,7 @@ def add_shell(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
         elem=mesh.F.ravel().astype(np.int32),
         radius=0.0,
         margin=geom.margin + thickness,
-        # a group that MuJoCo's own viewer leaves out
+        # MuJoCo's own viewer does not show this group
         group=3,
         **{name: getattr(geom, name) for name in _SETTINGS},
         **{name: np.array(getattr(geom, name)) for name in _LISTS},
@@ -78,8 +78,8 @@ def add_shell(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     geom.contype = geom.conaffinity = 0
 
 
-def remove_shell(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
-    """Let a geom collide itself again, if a flex does so in its place."""
+def remove_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
+    """Remove the flex collider of a geom, if it has one, and let the geom collide by itself again."""
     flex = spec.flex(geom.name)
     if flex is not None and set(flex.vertbody) == {geom.parent.name}:
         geom.contype, geom.conaffinity = flex.contype, flex.conaffinity
@@ -87,7 +87,7 @@ def remove_shell(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
 
 
 def _core(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
-    """Vertices inside of a mesh [m], and how thick a shell round them comes near its surface [m]."""
+    """Vertices of the flex inside a mesh [m], [n, 3], and the margin that reaches from them to its surface [m]."""
     size = float(np.ptp(mesh.V, axis=0).max())
     points = np.concatenate([mesh.V, mesh.V[mesh.F].mean(axis=1)])
     for share in _THICKNESSES:
@@ -100,10 +100,10 @@ def _core(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
 
 
 def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
-    """Vertices moved so far inwards that the planes of their triangles lie deeper by a length [m].
+    """Vertices [m], [n, 3], moved inwards until the planes of their triangles lie deeper by `depth` [m].
 
-    Where more than three planes meet, the squared distances that are left are least, weighted with the corners'
-    angles. Parts too thin for that keep a tenth of their thickness.
+    Where more than three planes meet, the remaining squared distances, weighted by the corners' angles, are least.
+    Parts too thin for that keep a tenth of their thickness.
     """
     V, F = mesh.V, mesh.F
     corners = V[F]
@@ -120,7 +120,7 @@ def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
     outward = (1 + _ROUNDING) * np.linalg.solve(squares, sums[:, :, None])[:, :, 0]
     length = np.maximum(np.linalg.norm(outward, axis=1), np.finfo(np.float64).tiny)
     outward /= length[:, None]
-    moved = np.minimum(depth * np.minimum(length, _SHARPEST), _REACH * _thickness(V, F, -outward, 1e-3 * depth))
+    moved = np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * _thickness(V, F, -outward, 1e-3 * depth))
     return V - moved[:, None] * outward
 
 
@@ -130,7 +130,7 @@ def _mesh_on_body(spec: mujoco.MjSpec, geom: str) -> Mesh:
         model = spec.copy().compile()
     except ValueError as error:
         raise SceneError(
-            f"geom {geom!r} gets its flex from the compiled mesh, but the specification does not compile: {error}"
+            f"the flex of geom {geom!r} is made from its compiled mesh, but the specification does not compile: {error}"
         ) from error
     index = model.geom(geom).id
     mesh, rotation = target_mesh(model, index), np.zeros(9)
@@ -139,7 +139,7 @@ def _mesh_on_body(spec: mujoco.MjSpec, geom: str) -> Mesh:
 
 
 def _thickness(V: NDArray[np.float64], F: NDArray[np.int64], inward: NDArray[Any], start: float) -> NDArray[np.float64]:
-    """Way from each vertex to the other side of a mesh [m], infinite where there is none."""
+    """Distance from each vertex inwards to the other side of a mesh [m], [n]; infinite where there is none."""
     scene = rtcore_scene.EmbreeScene()
     TriangleMesh(scene, V.astype(np.float32), F.astype(np.int32))
     hit = scene.run((V + start * inward).astype(np.float32), inward.astype(np.float32), output=1)
