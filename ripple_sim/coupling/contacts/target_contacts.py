@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.kernel import Bools, Floats, Ints, Ints32, kernel
 
 
 class TargetContacts(NamedTuple):
@@ -88,14 +88,14 @@ class Pairs(NamedTuple):
 
 
 @kernel
-def group_by_pair(geoms: Ints, address: Ints, is_target: np.ndarray) -> Pairs:
+def group_by_pair(geoms: Ints, address: Ints32, is_target: Bools) -> Pairs:
     """Group the contacts that bear on targets.
 
     Parameters
     ----------
     geoms : int64 [ncon, 2]
         Geom ids, -1 for a flex that stands for no geom.
-    address : int64 [ncon]
+    address : int32 [ncon]
         Their rows in the constraint solver. A contact without one (excluded, or in the margin only) carries no force.
     is_target : bool [ngeom]
     """
