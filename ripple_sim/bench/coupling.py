@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 
 import mujoco
 import numpy as np
@@ -23,8 +23,8 @@ Shape = tuple[NDArray[np.float64], NDArray[np.int64]]
 BODIES = 30
 RESOLUTION = 128
 SECONDS = 1.0  # all have hit, and those that can lie still do
+ROUNDS = 3
 
-_ROUNDS = 3
 _GEOM = mujoco.mjtGeom
 _SHAPES = (
     (_GEOM.mjGEOM_SPHERE, (0.06, 0, 0)),
@@ -47,7 +47,11 @@ TARGETS: dict[str, Callable[[], Shape]] = {"duck": duck, "dish": dish}
 
 
 def coupling_cost(
-    targets: Iterable[str] = TARGETS, seconds: float = SECONDS, bodies: int = BODIES, resolution: int = RESOLUTION
+    targets: Mapping[str, Callable[[], Shape]] = TARGETS,
+    seconds: float = SECONDS,
+    bodies: int = BODIES,
+    resolution: int = RESOLUTION,
+    rounds: int = ROUNDS,
 ) -> dict[str, dict[str, float]]:
     """Seconds a step of `mj_step`, of the coupling (from contacts to loads on texels), and of the waves, by target.
 
@@ -56,12 +60,12 @@ def coupling_cost(
     shortest time of each step is what the step costs.
     """
     table = {}
-    for name in targets:
-        model = rain(TARGETS[name](), bodies)
-        rounds = [_run(model, seconds, resolution) for _ in range(_ROUNDS)]
-        physics, coupling, waves = np.min([times for times, _ in rounds], axis=0).mean(axis=0)
+    for name, shape in targets.items():
+        model = rain(shape(), bodies)
+        runs = [_run(model, seconds, resolution) for _ in range(rounds)]
+        physics, coupling, waves = np.min([times for times, _ in runs], axis=0).mean(axis=0)
         table[name] = {
-            "touching": rounds[0][1],
+            "touching": runs[0][1],
             "mj_step [s]": float(physics),
             "coupling [s]": float(coupling),
             "waves [s]": float(waves),

@@ -157,7 +157,7 @@ class Film:
             if self._request.field and shot.exposure == 0:
                 geoms = self.simulations[number].ripples.geom_ids
                 for name, field in shot.notes.fields[number].items():
-                    source.renderer.set_field(geoms[name], field, shot.notes.field_scale.value)
+                    source.renderer.set_heatmap(geoms[name], field, shot.notes.field_scale.value)
             source.submit(snapshot)
         self._submitted.append(shot)
         self.seconds += time.perf_counter() - start
@@ -198,7 +198,7 @@ class Film:
         """A target with what the request asks for."""
         return dataclasses.replace(
             surface,
-            field_colors=color_table() if self._request.field else None,
+            heatmap_colors=color_table() if self._request.field else None,
             grid=grid_spacing(surface.resolution) if self._request.grid else 0,
         )
 

@@ -16,6 +16,7 @@ from vtkmodules.vtkCommonCore import vtkLogger, vtkUnsignedCharArray
 from ripple_sim.capture.viewpoint import viewpoint
 from ripple_sim.render.visuals.looks import find_look
 from ripple_sim.solver import RippleError
+from ripple_sim.solver.gl import is_software
 
 from .actors import BACKGROUND, HEIGHT, BodyActors, SkinActor
 from .camera import level, ray
@@ -32,7 +33,6 @@ _REACH = 4.0
 # The status line is written anew this often [s]: text is slow to draw.
 _STATUS_EVERY = 0.25
 _MULTISAMPLES = 8
-_SOFTWARE = ("llvmpipe", "softpipe", "swrast")
 
 
 class Window:
@@ -114,7 +114,7 @@ class Window:
     def open(self) -> None:
         """Show the window."""
         self.plotter.show(interactive_update=True, auto_close=False, interactive=False)
-        if not any(word in self.gl_renderer for word in _SOFTWARE):
+        if not is_software(self.gl_renderer):
             self.plotter.render_window.SetMultiSamples(_MULTISAMPLES)
         # the loop draws, once a frame; sliders and the camera would draw at every movement of the pointer
         self.plotter.iren.interactor.EnableRenderOff()

@@ -7,7 +7,7 @@ from mujoco_models import mesh_spec
 
 from ripple_sim.coupling.model.flex_colliders import find_flex_colliders
 from ripple_sim.errors import RippleWarning
-from ripple_sim.render.visuals.unsupported import warn_of_undrawn
+from ripple_sim.render.visuals.unsupported import warn_of_unsupported
 from ripple_sim.scenes.shapes import peanut
 
 
@@ -28,8 +28,8 @@ def test_flexes_that_stand_for_geoms_are_not_missed_in_the_picture() -> None:
     spec = mesh_spec(peanut(0.06))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warn_of_undrawn(spec.compile())
+        warn_of_unsupported(spec.compile())
     V, F = peanut(0.06)
     spec.add_flex(name="other", dim=2, vertbody=["base"], vert=V.ravel(), elem=F.ravel())
     with pytest.warns(RippleWarning, match="has 1 flexes"):
-        warn_of_undrawn(spec.compile())
+        warn_of_unsupported(spec.compile())
