@@ -64,13 +64,13 @@ class Simulation:
         self._reset_bodies()
         self.ripples = Ripples(
             self.model,
-            {entry.geom: entry.material.material() for entry in scene.surfaces},
-            resolution={entry.geom: resolution or entry.resolution for entry in scene.surfaces},
+            {entry.geom: entry.material.material() for entry in scene.targets},
+            resolution={entry.geom: resolution or entry.resolution for entry in scene.targets},
             backend=backend,
             operator=operator,
             two_way=scene.two_way,
         )
-        for entry in scene.surfaces:
+        for entry in scene.targets:
             atlas = self.ripples[entry.geom].atlas
             maps = {
                 name: texture_map(atlas, each.map, each.low, each.high, each.channel)
@@ -91,7 +91,7 @@ class Simulation:
     @property
     def backend(self) -> str:
         """Backend of the wave solvers."""
-        return self.ripples[self.scene.surfaces[0].geom].backend
+        return self.ripples[self.scene.targets[0].geom].backend
 
     @property
     def substeps_taken(self) -> int:

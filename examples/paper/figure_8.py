@@ -12,7 +12,8 @@ from page import Part
 from PIL import Image
 from stills import strip
 
-from ripple_sim.scene.scene import Scene, load_scene
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import MapEntry, MaterialEntry
 
 TIMES, SIZE = [0.25, 0.4, 0.6, 0.8], (400, 400)
@@ -28,7 +29,7 @@ def half(path: Path) -> None:
 
 def scene_with(material: MaterialEntry) -> Scene:
     scene = load_scene("face")
-    return dataclasses.replace(scene, surfaces=(msgspec.structs.replace(scene.surfaces[0], material=material),))
+    return dataclasses.replace(scene, targets=(msgspec.structs.replace(scene.targets[0], material=material),))
 
 
 def make(folder: Path) -> Part:

@@ -2,94 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import TYPE_CHECKING, Any
-
-import msgspec
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.errors import SceneError
 from ripple_sim.render import Camera, FixedCamera
 from ripple_sim.render.camera import Pose
-from ripple_sim.scene.scene_file import CameraEntry
+from ripple_sim.scene.camera import CameraEntry
 
-if TYPE_CHECKING:
-    from ripple_sim.scene.scene import Scene
-
-MAX_EXPOSURES = 1024
 _NEAREST = 0.02  # focal distance, in camera distances: there the picture begins
-
-
-def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:
-    """Make sure that the model has what the camera names, and that a frame can be exposed as it says.
-
-    Raises
-    ------
-    SceneError
-    """
-    for name, kind, count, missing in (
-        (entry.name, mujoco.mjtObj.mjOBJ_CAMERA, model.ncam, "camera {!r}; its cameras are"),
-        (entry.track, mujoco.mjtObj.mjOBJ_BODY, model.nbody, "body {!r} for the camera to track; its bodies are"),
-    ):
-        if name is not None and mujoco.mj_name2id(model, kind, name) < 0:
-            raise SceneError(f"the model has no {missing.format(name)} {_names(model, kind, count)}")
-    body, geom = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_GEOM
-    if isinstance(entry.focus, str) and all(mujoco.mj_name2id(model, kind, entry.focus) < 0 for kind in (body, geom)):
-        raise SceneError(
-            f"the model has nothing {entry.focus!r} for the camera to focus on; its bodies are "
-            f"{_names(model, body, model.nbody)}; its geoms are {_names(model, geom, model.ngeom)}"
-        )
-    for name, value, valid, right in (
-        ("shutter angle", entry.shutter, "0 to 360 degrees", 0 <= entry.shutter <= 360),
-        ("aperture", entry.aperture, "0 m or more", 0 <= entry.aperture < np.inf),
-        ("focus", entry.focus, "more than 0 m", not isinstance(entry.focus, float) or 0 < entry.focus < np.inf),
-        ("number of exposures", entry.exposures, f"1 to {MAX_EXPOSURES}", 1 <= entry.exposures <= MAX_EXPOSURES),
-    ):
-        if not right:
-            raise SceneError(f"the camera's {name} is {value!r}; valid is {valid}")
-
-
-def _names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> str:
-    return ", ".join(name for i in range(count) if (name := mujoco.mj_id2name(model, kind, i))) or "none"
-
-
-def through_camera(scene: Scene, name: str) -> Scene:
-    """The scene seen through a camera of its model.
-
-    Raises
-    ------
-    SceneError
-        If the model has no such camera.
-    """
-    camera = CameraEntry(name=name)
-    check_camera(scene.model, camera)
-    return dataclasses.replace(scene, camera=camera)
-
-
-def with_exposure(scene: Scene, **changes: Any) -> Scene:
-    """The scene with other values of its camera's shutter, aperture, focus and exposures; None leaves one as it is.
-
-    Raises
-    ------
-    SceneError
-        If one is invalid, or would do nothing.
-    """
-    given = {name: value for name, value in changes.items() if value is not None}
-    try:
-        camera = msgspec.convert({**msgspec.structs.asdict(scene.camera), **given}, CameraEntry)
-    except msgspec.ValidationError as error:
-        raise SceneError(f"camera: {str(error).replace('`$.', '`')}") from error
-    check_camera(scene.model, camera)
-    if "focus" in given and not camera.aperture:
-        raise SceneError("a focus needs a lens: give the camera an aperture of more than 0 m, such as 0.05")
-    if given.get("exposures", 1) > 1 and not (camera.shutter or camera.aperture):
-        raise SceneError(
-            f"all {camera.exposures} exposures would be the same: give the camera a shutter angle, such as 180 degrees,"
-            " an aperture, such as 0.05 m, or both"
-        )
-    return dataclasses.replace(scene, camera=camera)
 
 
 def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, time: float) -> Camera | FixedCamera:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from ripple_sim.errors import VideoError
 
-_JOB, _STATES, _FRAMES, _WHOLE = "job.json", "states.txt", "frames", "whole"
+_SETTINGS, _STATES, _FRAMES, _WHOLE = "settings.json", "states.txt", "frames", "whole"
 _STATE = re.compile(r"(\d+) ([0-9a-f]+);")  # with an end, since a killed process may have cut it off
 
 
@@ -51,7 +51,7 @@ class Part:
     """
 
     def __init__(
-        self, video: Path, *, suffix: str, length: int, job: Mapping[str, str | int | float], resume: bool
+        self, video: Path, *, suffix: str, length: int, settings: Mapping[str, str | int | float], resume: bool
     ) -> None:
         self.video = video
         self.folder = video.with_name(video.name + ".part")
@@ -61,13 +61,13 @@ class Part:
         self._lock = os.open(self.folder, os.O_RDONLY)
         try:
             self._claim()
-            old = self._read_job() if resume else None
+            old = self._read_settings() if resume else None
             if old is None:
                 self._clear()
                 self._segments.mkdir()
-                self._write_job(job)
+                self._write_settings(settings)
             else:
-                self._compare(old, json.loads(json.dumps(job)))
+                self._compare(old, json.loads(json.dumps(settings)))
                 self._drop_unfinished()
             self._states = self._read_states()
         except BaseException:
@@ -145,7 +145,7 @@ class Part:
         strangers = sorted(
             entry.name
             for entry in self.folder.iterdir()
-            if entry.name.lstrip(".") not in (_JOB, _STATES, _FRAMES, _WHOLE)
+            if entry.name.lstrip(".") not in (_SETTINGS, _STATES, _FRAMES, _WHOLE)
         )
         if strangers:
             raise VideoError(
@@ -154,7 +154,7 @@ class Part:
             )
 
     def _clear(self) -> None:
-        (self.folder / _JOB).unlink(missing_ok=True)  # first: without it nothing goes on from the rest
+        (self.folder / _SETTINGS).unlink(missing_ok=True)  # first: without it nothing goes on from the rest
         for entry in self.folder.iterdir():
             shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
 
@@ -162,15 +162,15 @@ class Part:
         self.unfinished.unlink(missing_ok=True)
         self.whole.unlink(missing_ok=True)
 
-    def _read_job(self) -> dict[str, object] | None:
-        path = self.folder / _JOB
+    def _read_settings(self) -> dict[str, object] | None:
+        path = self.folder / _SETTINGS
         return json.loads(path.read_text()) if path.exists() else None
 
-    def _write_job(self, job: Mapping[str, object]) -> None:
+    def _write_settings(self, settings: Mapping[str, object]) -> None:
         # last: while it is missing there is nothing to go on from
-        unfinished = self.folder / f".{_JOB}"
-        unfinished.write_text(json.dumps(job, indent=1))
-        move(unfinished, self.folder / _JOB)
+        unfinished = self.folder / f".{_SETTINGS}"
+        unfinished.write_text(json.dumps(settings, indent=1))
+        move(unfinished, self.folder / _SETTINGS)
 
     def _compare(self, old: Mapping[str, object], new: Mapping[str, object]) -> None:
         for name in sorted({*old, *new}):

@@ -37,7 +37,7 @@ def open_writer(
     fps: int,
     transparent: bool = False,
     frame_format: str = "png",
-    job: Mapping[str, str | int | float] | None = None,
+    settings: Mapping[str, str | int | float] | None = None,
     resume: bool = False,
 ) -> FrameWriter:
     """Start a video, or go on with one; the ending of `path` chooses its format.
@@ -77,11 +77,11 @@ def open_writer(
     check_output(path, width, height, fps, transparent=transparent, frame_format=frame_format)
     video = FORMATS[video_format(path, frame_format)]
     try:
-        part = Part(path, suffix=video.suffix, length=video.length, job=job or {}, resume=resume)
+        part = Part(path, suffix=video.suffix, length=video.length, settings=settings or {}, resume=resume)
     except OSError as error:
         raise EncodingError(f"cannot write the video {path}: {error.strerror}") from error
     shape = (height, width, 4 if transparent else 3)
-    return FrameWriter(part, video, Stream(width, height, fps), shape, resumable=job is not None)
+    return FrameWriter(part, video, Stream(width, height, fps), shape, resumable=settings is not None)
 
 
 class FrameWriter:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_POINTS = 1024  # more than a chart has columns of pixels, save on very large frames
+MOST_POINTS = 1024  # more than the energy plot has columns of pixels, save on very large frames
 
 
 class History:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrows import HEAD_WIDTH, RIM, draw_arrow
-from .contacts import Mark
+from .contact_marks import Mark
 from .layout import Layout
-from .patch import Patch
 from .projection import Projection
+from .sprite import Sprite
 
 _LONGEST = 1.5  # times the scale's arrow; a scale that glides to its new end is behind for a moment
 _HIDDEN = 0.3  # opacity of what stands behind something
@@ -65,6 +65,6 @@ def draw_marks(frame: NDArray[np.uint8], marks: Sequence[PlacedMark], layout: La
         low = np.floor(np.maximum(np.minimum(tip, tail) - reach, 0)).astype(int)
         high = np.ceil(np.minimum(np.maximum(tip, tail) + reach, frame.shape[1::-1])).astype(int)
         if (low < high).all():
-            patch = Patch(int(high[0] - low[0]), int(high[1] - low[1]))
-            draw_arrow(patch, tip - low, tail - low, thickness, opacity)
-            patch.over(frame, int(low[0]), int(low[1]))
+            sprite = Sprite(int(high[0] - low[0]), int(high[1] - low[1]))
+            draw_arrow(sprite, tip - low, tail - low, thickness, opacity)
+            sprite.over(frame, int(low[0]), int(low[1]))

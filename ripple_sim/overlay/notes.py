@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ripple_sim.scene.overlays import Request
 from ripple_sim.simulation import Simulation
 
-from .contacts import ContactMarks, Mark
-from .field import magnitude, pad_field
+from .contact_marks import ContactMarks, Mark
+from .heatmap import heatmap_texels, magnitude
 from .history import History
 from .scale import Limit
 
@@ -38,17 +38,17 @@ class Notes:
     ----------
     time : float
         [s].
-    fields : sequence of dict
-        By the geom's name what its colours show, float32 [6, N + 2, N + 2], padded as a height map.
-    field_scale, mark_scale, energy_scale : Scale
+    heatmaps : sequence of dict
+        By the geom's name: what its colours show, float32 [6, N + 2, N + 2], with halo.
+    heatmap_scale, mark_scale, energy_scale : Scale
     marks : sequence of list of Mark
     energies : sequence of (times [s], energies [J])
         From the beginning.
     """
 
     time: float
-    fields: Sequence[dict[str, NDArray[np.float32]]]
-    field_scale: Scale
+    heatmaps: Sequence[dict[str, NDArray[np.float32]]]
+    heatmap_scale: Scale
     marks: Sequence[list[Mark]]
     mark_scale: Scale
     energies: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
@@ -71,7 +71,7 @@ class Notebook:
 
     def __init__(self, request: Request, simulations: Sequence[Simulation], frames: int, rate: float) -> None:
         self._request, self._simulations, self._dt = request, simulations, 1 / rate
-        self._field_limit = Limit(self._least_limit(), request.limit, _MEMORY)
+        self._heatmap_limit = Limit(self._least_limit(), request.limit, _MEMORY)
         self._mark_limit, self._energy_limit = Limit(), Limit()
         self._marks = [ContactMarks(simulation, self._dt) for simulation in simulations]
         self._energies = [History(frames) for _ in simulations]
@@ -79,17 +79,17 @@ class Notebook:
     def follow(self) -> Notes:
         """Take in the frame that the simulations have just made. Call it for every frame, drawn or not."""
         request = self._request
-        fields = [self._fields(simulation) for simulation in self._simulations] if request.field else []
+        heatmaps = [self._heatmaps(simulation) for simulation in self._simulations] if request.heatmap else []
         marks = [gatherer.follow() for gatherer in self._marks] if request.contacts else []
         if request.energy:
             for history, simulation in zip(self._energies, self._simulations, strict=True):
                 history.add(sum(simulation.ripples[name].energy() for name in simulation.ripples))
-        magnitudes = [magnitude(field) for run in fields for field in run.values()]
+        magnitudes = [magnitude(heatmap) for run in heatmaps for heatmap in run.values()]
         curves = [history.curve() for history in self._energies]
         return Notes(
             time=float(self._simulations[0].data.time),
-            fields=fields,
-            field_scale=self._scale(self._field_limit, magnitudes),
+            heatmaps=heatmaps,
+            heatmap_scale=self._scale(self._heatmap_limit, magnitudes),
             marks=marks,
             mark_scale=self._scale(self._mark_limit, [mark.impulse for run in marks for mark in run]),
             energies=[(frames * self._dt, values) for frames, values in curves],
@@ -99,13 +99,13 @@ class Notebook:
     def _scale(self, limit: Limit, magnitudes: Sequence[float]) -> Scale:
         return Scale(limit.follow(max(magnitudes, default=0.0), self._dt), limit.goal)
 
-    def _fields(self, simulation: Simulation) -> dict[str, NDArray[np.float32]]:
+    def _heatmaps(self, simulation: Simulation) -> dict[str, NDArray[np.float32]]:
         ripples = simulation.ripples
-        return {name: pad_field(getattr(ripples[name], self._request.field or "")) for name in ripples}
+        return {name: heatmap_texels(getattr(ripples[name], self._request.heatmap or "")) for name in ripples}
 
     def _least_limit(self) -> float:
         ripples = self._simulations[0].ripples
         sizes = [float(np.ptp(ripples[name].atlas.mesh.V, axis=0).max()) for name in ripples]
-        if self._request.field != "velocity":
+        if self._request.heatmap != "velocity":
             return _LEAST * max(sizes)
         return _LEAST * max(float(np.max(ripples[name].material.speed)) for name in ripples)

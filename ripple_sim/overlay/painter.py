@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.scene.overlays import FIELDS, Request
+from ripple_sim.scene.overlays import HEATMAPS, Request
 
-from .chart import COLORS, Chart
+from .energy_plot import COLORS, EnergyPlot
 from .layout import Layout
 from .notes import Notes
 from .panels import arrow_key, color_bar, label
-from .patch import Patch
+from .sprite import Sprite
 
 
 class Painter:
@@ -43,7 +43,7 @@ class Painter:
         titles: Sequence[tuple[str, str]] = (),
     ) -> None:
         self._request, self._layout, self._titles = request, layout, titles
-        self._chart = Chart(self._layout, "wave energy", "J", duration, [title for title, _ in titles])
+        self._energy_plot = EnergyPlot(self._layout, "wave energy", "J", duration, [title for title, _ in titles])
         self._spacing = spacing
         self._decimals = 2 if duration < 100 else 1
         # a title leaves room for the clock on the seam
@@ -60,10 +60,10 @@ class Painter:
         for corner, panels in self._panels(notes).items():
             self._stack(frame, corner, panels)
 
-    def _panels(self, notes: Notes) -> dict[str, list[Patch]]:
+    def _panels(self, notes: Notes) -> dict[str, list[Sprite]]:
         """Panels by corner, those nearest to the frame's border first."""
         request, layout, em = self._request, self._layout, self._layout.em
-        corners: dict[str, list[Patch]] = {
+        corners: dict[str, list[Sprite]] = {
             name: [] for name in ("top left", "top", "top right", "bottom left", "bottom right")
         }
         for corner, title, color in zip(("top left", "top right"), self._titles, COLORS, strict=False):
@@ -80,18 +80,18 @@ class Painter:
         if request.contacts and notes.mark_scale.value > 0:
             scale = notes.mark_scale
             corners["top right"].append(self._key(layout, scale.value, scale.goal))
-        if request.field:
-            scale = notes.field_scale
-            bar = self._bar(layout, request.field, FIELDS[request.field], scale.value, scale.goal)
+        if request.heatmap:
+            scale = notes.heatmap_scale
+            bar = self._bar(layout, request.heatmap, HEATMAPS[request.heatmap], scale.value, scale.goal)
             corners["bottom left"].append(bar)
         if request.energy:
             scale = notes.energy_scale
-            corners["bottom right"].append(self._chart.draw(notes.energies, scale.value, scale.goal))
+            corners["bottom right"].append(self._energy_plot.draw(notes.energies, scale.value, scale.goal))
         return corners
 
-    def _stack(self, frame: NDArray[np.uint8], corner: str, panels: Sequence[Patch]) -> None:
+    def _stack(self, frame: NDArray[np.uint8], corner: str, panels: Sequence[Sprite]) -> None:
         offset = 0
-        for patch in panels:
-            left, top = self._layout.place(corner, patch.width, patch.height)
-            patch.over(frame, left, top + (offset if "top" in corner else -offset))
-            offset += patch.height + self._layout.margin // 2
+        for sprite in panels:
+            left, top = self._layout.place(corner, sprite.width, sprite.height)
+            sprite.over(frame, left, top + (offset if "top" in corner else -offset))
+            offset += sprite.height + self._layout.margin // 2

@@ -13,11 +13,13 @@ from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh, load_mesh
 from ripple_sim.solver.texels.cube_map.rays import downward_hits
 
+from .camera import CameraEntry
 from .events import Events
+from .load_scene import Edit
 from .mesh_picture import load_picture, mesh_picture
 from .motion import DropEntry
-from .scene import Edit, Scene
-from .scene_file import CameraEntry, MaterialEntry, RippleEntry
+from .scene import Scene
+from .scene_file import MaterialEntry, RippleEntry
 from .up_axis import UP_AXES, usual_up
 
 SIZE = 1.0  # the target's longest edge of its bounding box [m]
@@ -98,7 +100,7 @@ def drop_scene(
     return Scene(
         name=Path(mesh_path).stem,
         model=model,
-        surfaces=(
+        targets=(
             RippleEntry(
                 geom="target",
                 resolution=128,

@@ -9,6 +9,7 @@ import msgspec
 
 from ripple_sim.errors import SceneError
 
+from .camera import CameraEntry
 from .events import ChangeEntry, ControlEntry, MaterialChange, PokeEntry
 from .material_entry import MapEntry, MaterialEntry, PresetEntry
 from .motion import DropEntry, PlaceEntry, ThrowEntry, Vector
@@ -43,33 +44,6 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
         """The same with the pictures' paths made relative to a folder."""
         still_map = None if self.still_map is None else str(folder / self.still_map)
         return msgspec.structs.replace(self, material=self.material.located(folder), still_map=still_map)
-
-
-class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[camera]`: a camera of the MJCF by name, or MuJoCo's free camera (metres, degrees).
-
-    With `orbit` it goes round by so many degrees a second. With `track` it follows a body: the free camera moves along
-    with the body's centre of mass, from which `lookat` then counts; a named one turns to it.
-
-    A frame is the mean of so many `exposures`, where `shutter` or `aperture` is not 0. `shutter` is the shutter angle
-    [degrees]: 360 leaves the shutter open from one frame to the next, 180, usual in film, half of that time. `aperture`
-    is the diameter of the lens [m]; an f-number would need a focal length, which MuJoCo's cameras do not have. `focus`
-    is what is sharp: a distance along the camera's axis [m], a body or a geom by its name, which the camera then keeps
-    sharp, or a point in the world [m]; by default it is what the camera looks at.
-    """
-
-    name: str | None = None
-    track: str | None = None
-    lookat: Vector | None = None
-    distance: float | None = None
-    azimuth: float = 90.0
-    elevation: float = -20.0
-    fovy: float = 45.0
-    orbit: float = 0.0
-    shutter: float = 0.0
-    aperture: float = 0.0
-    focus: float | str | Vector | None = None
-    exposures: int = 32
 
 
 class SceneFile(msgspec.Struct, forbid_unknown_fields=True):

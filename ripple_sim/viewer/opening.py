@@ -12,7 +12,8 @@ import numpy as np
 from ripple_sim.coupling.model.target import find_target
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
-from ripple_sim.scene.scene import Scene, load_scene, shipped_scenes
+from ripple_sim.scene.load_scene import load_scene, shipped_scenes
+from ripple_sim.scene.scene import Scene
 from ripple_sim.solver import Material
 
 from .balls import add_balls
@@ -93,7 +94,7 @@ def open_scene(
         )
     scene = load()
     size = surface_size(scene)
-    impulse = poke_strength(scene.surfaces[0].material.material(), size).impulse
+    impulse = poke_strength(scene.targets[0].material.material(), size).impulse
     # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of a poke
     mass = impulse / (1.5 * _THROW * size / FLIGHT)
 
@@ -107,5 +108,5 @@ def open_scene(
 
 def surface_size(scene: Scene) -> float:
     """Longest extent of the smallest rippling surface [m]."""
-    geoms = [find_target(scene.model, entry.geom) for entry in scene.surfaces]
+    geoms = [find_target(scene.model, entry.geom) for entry in scene.targets]
     return float(2 * scene.model.geom_aabb[geoms, 3:].max(axis=1).min())

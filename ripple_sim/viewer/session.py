@@ -83,7 +83,7 @@ class Session:
         self.skins = {name: Skin(self.simulation.ripples[name].atlas) for name in self.simulation.ripples}
         self._rays = {name: self._ray_scene(name) for name in self.simulation.ripples}
         self._size = surface_size(scene)
-        self._strength = poke_strength(scene.surfaces[0].material.material(), self._size)
+        self._strength = poke_strength(scene.targets[0].material.material(), self._size)
         self.poke_impulse = self._strength.impulse
         self.operator = OPERATORS[0]
         self.paused = False
@@ -106,7 +106,7 @@ class Session:
 
     def material(self, name: str) -> float:
         """Coefficient of the first surface's material, one of `SLIDERS`; where it is a map, its largest value."""
-        waves = self.simulation.ripples[self.simulation.scene.surfaces[0].geom]
+        waves = self.simulation.ripples[self.simulation.scene.targets[0].geom]
         return self._material.get(name, float(np.max(getattr(waves.material, name))))
 
     def advance(self) -> bool:
@@ -200,7 +200,7 @@ class Session:
         if hit is not None:
             reach = hit.distance
         else:
-            middle, _ = self._pose(self.simulation.scene.surfaces[0].geom)
+            middle, _ = self._pose(self.simulation.scene.targets[0].geom)
             reach = max(float((middle - start) @ along / (along @ along)), 0.0)
         return self._balls.throw(self.simulation.data, start, start + reach * along, FLIGHT)
 

@@ -18,12 +18,12 @@ from ripple_sim.render.visuals.looks import find_look
 from ripple_sim.solver import RippleError
 
 from .actors import BACKGROUND, HEIGHT, BodyActors, SkinActor
-from .camera import level, ray
 from .controls import CONTROLS, help_text
+from .orbit import level, ray
+from .recorder import Recorder
 from .session import OPERATORS, Session
 from .shadows import Shadows, find_floor
 from .sliders import add_sliders
-from .takes import Takes
 
 # A click that moves the pointer by more than this turns the camera and pokes nothing [pixels].
 _STILL = 4
@@ -74,7 +74,7 @@ class Window:
         self.message = ""
         self.seconds_drawing = 0.0
         scene = session.simulation.scene
-        self._takes = Takes(Path(folder), scene.name, session.fps)
+        self._recorder = Recorder(Path(folder), scene.name, session.fps)
         self._colored = True
         self._drawn = False
         self._updates, self._since, self._rate = 0, time.perf_counter(), math.nan
@@ -92,7 +92,7 @@ class Window:
         pose = viewpoint(session.simulation.model, data, scene.camera, 0.0).pose()
         self._skins = {
             entry.geom: SkinActor(self.plotter, session.skins[entry.geom], entry.color or find_look(entry.look).color)
-            for entry in scene.surfaces
+            for entry in scene.targets
         }
         self._bodies = BodyActors(self.plotter, session, pose.focus, _REACH * pose.distance)
         floor = find_floor(session.simulation.model, data)
@@ -124,7 +124,7 @@ class Window:
         """Close the window and finish a video."""
         self.closed = True
         try:
-            self._takes.stop()
+            self._recorder.stop()
         finally:
             self.plotter.close()
 
@@ -210,17 +210,17 @@ class Window:
         """Write a picture."""
         self._draw()
         try:
-            self._say(f"wrote {self._takes.save(self.picture())}")
+            self._say(f"wrote {self._recorder.save(self.picture())}")
         except RippleError as error:
             self._say(str(error))
 
     def record(self) -> None:
         """Begin a video, or end it."""
         try:
-            if self._takes.recording:
-                self._say(f"wrote {self._takes.stop()}")
+            if self._recorder.recording:
+                self._say(f"wrote {self._recorder.stop()}")
             else:
-                self._say(f"recording {self._takes.start(self.picture())}")
+                self._say(f"recording {self._recorder.start(self.picture())}")
         except RippleError as error:
             self._say(str(error))
 
@@ -237,7 +237,7 @@ class Window:
         """Time, operator, what is going on; and what happened last in a second line."""
         session = self.session
         state = "paused" if session.paused else f"{self._rate:.0f} updates/s" if self._rate > 0 else ""
-        recording = "   recording" if self._takes.recording else ""
+        recording = "   recording" if self._recorder.recording else ""
         return f"{session.time:.2f} s   operator {session.operator}   {state}{recording}\n{self.message}"
 
     def hide_texts(self) -> None:
@@ -270,9 +270,9 @@ class Window:
         self.render()
         self._drawn = True
         self.seconds_drawing += time.perf_counter() - now
-        if self._takes.recording:
+        if self._recorder.recording:
             try:
-                if not self._takes.add(self.picture()):
+                if not self._recorder.add(self.picture()):
                     self._say("the window has changed its size: the recording has ended")
             except RippleError as error:
                 self._say(str(error))

@@ -9,15 +9,18 @@ import pytest
 from PIL import Image
 
 from ripple_sim.capture.exposure import Exposures, disc_points
+from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.sensor import Sensor
-from ripple_sim.capture.shutter import Moments
-from ripple_sim.capture.snapshot import FrameSource, run
-from ripple_sim.capture.viewpoint import with_exposure
+from ripple_sim.capture.shutter import ShutterTimes
+from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.errors import SceneError, VideoError
-from ripple_sim.scene.scene import Scene, load_scene
-from ripple_sim.scene.scene_file import CameraEntry
+from ripple_sim.scene.camera import CameraEntry
+from ripple_sim.scene.camera_override import with_exposure
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
-from ripple_sim.video.render_video import render_video
+from ripple_sim.video.options import VideoOptions
+from ripple_sim.video.render_video import Progress, render_video
 
 FPS, WIDTH, HEIGHT, DISTANCE, FOVY, SPEED = 30, 240, 120, 2.0, 40.0, 18.0
 FOCAL_PIXELS = HEIGHT / 2 / np.tan(np.radians(FOVY) / 2)
@@ -64,7 +67,7 @@ def bead(depth: float, alpha: float = 1.0) -> str:
 def last_frame(scene: Scene, frames: int = 1, **options: Any) -> np.ndarray:
     simulation = Simulation(scene, fps=FPS, backend="cpu")
     source = FrameSource(simulation, width=WIDTH, height=HEIGHT, **options)
-    pictures = [picture for state in run(simulation, frames) if (picture := source.draw(state)) is not None]
+    pictures = [picture for state in snapshots(simulation, frames) if (picture := source.render(state)) is not None]
     assert len(pictures) == frames
     return pictures[-1]
 
@@ -97,7 +100,7 @@ def test_exposures_of_a_camera():
     assert len(Exposures.of(CameraEntry())) == 1
     assert not Exposures.of(CameraEntry(shutter=180.0, aperture=0.1, exposures=1)).offsets.any()
     exposures = Exposures.of(CameraEntry(shutter=180.0, aperture=0.1, exposures=40))
-    np.testing.assert_allclose(exposures.moments, np.arange(40) / 80)
+    np.testing.assert_allclose(exposures.times, np.arange(40) / 80)
     # whatever part of the time is looked at, the eye has been all over the lens
     for begin in range(0, 40, 10):
         part = exposures.offsets[begin : begin + 10]
@@ -129,20 +132,20 @@ def test_the_sensor_averages_codes_and_linear_light_alike(channels):
     np.testing.assert_allclose(frame[..., 3:] / 255, mean[..., 3:], atol=2e-3)
 
 
-def test_moments_lie_on_the_way_and_do_not_change_what_happens(make_scene):
+def test_states_within_a_step_are_interpolated_and_do_not_change_the_motion(make_scene):
     poke = '[[poke]]\ngeom = "egg"\ntime = 0.02\npoint = [0.0, 0.0, 0.05]\nimpulse = 1e-4\nradius = 0.02\n'
     scene = make_scene(script=THROW + poke)
     whole, parts = (Simulation(scene, fps=FPS, backend="cpu") for _ in range(2))
     steps, dt = whole.steps_per_frame, whole.model.opt.timestep
     times = np.array([0, 0.5, 1, 1.25, steps - 0.5, steps])
-    moments = Moments(parts, times / steps)
+    shutter_times = ShutterTimes(parts, times / steps)
     for number in range(3):
         begin, start, heights = whole.data.time, whole.data.body("shot").xpos[1], [whole.ripples["egg"].height]
         for _ in range(steps):
             whole.step()
             heights.append(whole.ripples["egg"].height)
         whole.advance_frame()
-        for time, (data, shown) in zip(times, moments, strict=True):
+        for time, (data, shown) in zip(times, shutter_times, strict=True):
             assert data.time == pytest.approx(begin + time * dt, abs=1e-12)
             if number:  # in frame 0 it stands still until the first step
                 assert data.body("shot").xpos[1] == pytest.approx(start - SPEED * time * dt, abs=1e-9)
@@ -226,7 +229,7 @@ def test_shadows_of_many_exposures_are_smoother(make_scene):
 def test_overlays_are_laid_over_the_mean(make_scene, tmp_path):
     def render(name: str, **options: Any) -> np.ndarray:
         path = tmp_path / name
-        render_video(make_scene(), path, size=(WIDTH, HEIGHT), fps=FPS, duration=2 / FPS, **options)
+        render_video(make_scene(), path, VideoOptions(size=(WIDTH, HEIGHT), fps=FPS, duration=2 / FPS, **options))
         return np.asarray(Image.open(path / "frame_00001.png")).astype(int)
 
     blur = {"shutter": 180.0, "exposures": 8}
@@ -240,11 +243,16 @@ def test_overlays_are_laid_over_the_mean(make_scene, tmp_path):
 
 @pytest.mark.usefixtures("opengl")
 def test_a_blurred_video_is_resumed_to_the_same_one(make_scene, tmp_path):
-    def render(name: str, **options: Any) -> list[bytes]:
+    def render(name: str, progress: Progress | None = None, **options: Any) -> list[bytes]:
         blur = {"shutter": 180.0, "aperture": 0.05, "focus": "shot", "exposures": 3}
         extra = {"supersample": 2, "transparent": True, "compare": "paper", "slow_motion": 2.0}
         options = {**blur, **extra, **options}
-        render_video(make_scene(), tmp_path / name, size=(80, 40), fps=FPS, duration=0.1, **options)
+        render_video(
+            make_scene(),
+            tmp_path / name,
+            VideoOptions(size=(80, 40), fps=FPS, duration=0.1, **options),
+            progress=progress,
+        )
         return [path.read_bytes() for path in sorted((tmp_path / name).iterdir())]
 
     def interrupt(done: int, total: int) -> None:

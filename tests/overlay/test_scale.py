@@ -9,7 +9,7 @@ from ripple_sim.cli.main import main
 from ripple_sim.errors import SceneError
 from ripple_sim.overlay.colormap import SIZE, color_table, colors, lab_to_srgb
 from ripple_sim.overlay.comparison import compared_operators
-from ripple_sim.overlay.field import grid_spacing, magnitude, pad_field
+from ripple_sim.overlay.heatmap import grid_spacing, heatmap_texels, magnitude
 from ripple_sim.overlay.history import MOST_POINTS, History
 from ripple_sim.overlay.scale import Limit, number, readable, round_up
 from ripple_sim.scene.overlays import NAMES, Request, parse_request
@@ -38,7 +38,7 @@ def lab(rgb: np.ndarray) -> np.ndarray:
 def test_request_takes_every_name_and_ranges() -> None:
     request = parse_request([" height=0.02", "contacts", "grid", "time", "energy "])
     assert request == Request("height", 0.02, True, True, True, True)
-    assert parse_request(["velocity"]) == Request(field="velocity")
+    assert parse_request(["velocity"]) == Request(heatmap="velocity")
     assert not parse_request([])
     assert parse_request(["time"])
 
@@ -174,7 +174,7 @@ def test_history_is_bounded_and_keeps_the_peaks(frames: int) -> None:
 def test_padding_is_that_of_a_height_map() -> None:
     atlas = sphere_atlas(1.0, 12)
     field = np.random.default_rng(0).standard_normal((6, 12, 12)).astype(np.float32)
-    np.testing.assert_allclose(pad_field(field), HeightMap(atlas)(field)[..., 3], rtol=1e-6)
+    np.testing.assert_allclose(heatmap_texels(field), HeightMap(atlas)(field)[..., 3], rtol=1e-6)
 
 
 def test_magnitude_is_that_of_waves_where_they_are() -> None:

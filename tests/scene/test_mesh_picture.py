@@ -8,7 +8,8 @@ import pytest
 import trimesh
 from PIL import Image
 
-from ripple_sim.capture.snapshot import FrameSource, run
+from ripple_sim.capture.frame_source import FrameSource
+from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.mesh_picture import mesh_picture
@@ -86,7 +87,7 @@ def test_a_dropped_on_mesh_wears_its_picture(tmp_path, named):
         source = FrameSource(simulation, width=96, height=72, gl=shared_context())
     except GLError as error:
         pytest.skip(f"no OpenGL context: {error}")
-    frame = source.draw(next(iter(run(simulation, 1)))).astype(int)
+    frame = source.render(next(iter(snapshots(simulation, 1)))).astype(int)
     redder = frame[..., 0] - frame[..., 2]
     rows = np.arange(72)[:, None]
     assert (redder > 60).sum() > 100

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError, SimulationError
-from ripple_sim.scene.scene import Scene, load_scene
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene import Scene
 from ripple_sim.scenes.shapes import peanut, write_obj
 from ripple_sim.solver import SolverError, sphere_atlas
 from ripple_sim.viewer.balls import Balls, add_balls
@@ -330,7 +331,7 @@ def test_meshes_and_scene_files_can_be_opened_and_mistakes_are_named(tmp_path: P
 
 
 def test_a_suggested_poke_scales_with_size_and_density() -> None:
-    material = load_scene("sphere").surfaces[0].material.material()
+    material = load_scene("sphere").targets[0].material.material()
     one, two = poke_strength(material, 1.0), poke_strength(material, 2.0)
     assert two.radius == pytest.approx(2 * one.radius)
     assert two.impulse > 4 * one.impulse

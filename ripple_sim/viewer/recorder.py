@@ -12,7 +12,7 @@ from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.errors import VideoError
 
 
-class Takes:
+class Recorder:
     """Writes screenshots and one video at a time.
 
     Parameters

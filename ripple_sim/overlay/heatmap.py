@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver.texels.halo import padded_addresses
 
 
-def pad_field(field: NDArray[np.float32]) -> NDArray[np.float32]:
+def heatmap_texels(field: NDArray[np.float32]) -> NDArray[np.float32]:
     """Surround the faces of a field [6, N, N] by their neighbours' texels, and the mean of three at the corners.
 
     Returns float32 [6, N + 2, N + 2], as the renderer takes it: interpolated, it is continuous all over the cube.

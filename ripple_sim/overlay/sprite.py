@@ -1,4 +1,4 @@
-"""`Patch`: a small picture with transparency that is drawn once and laid over many frames."""
+"""`Sprite`: a small picture with transparency that is drawn once and laid over many frames."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SUPERSAMPLING = 8
 _CORNERS = {"left": 0.0, "middle": 0.5, "right": 1.0}
 
 
-class Patch:
+class Sprite:
     """Shapes and type with smooth edges on a transparent ground.
 
     Coordinates are in pixels from the upper left corner, x to the right and y down; whole numbers lie between pixels.
@@ -36,9 +36,9 @@ class Patch:
         self._color = np.zeros((height, width, 3), np.float32)  # times alpha
         self._alpha = np.zeros((height, width, 1), np.float32)
 
-    def copy(self) -> Patch:
-        """A patch of its own with the same content."""
-        other = Patch(self.width, self.height)
+    def copy(self) -> Sprite:
+        """A sprite of its own with the same content."""
+        other = Sprite(self.width, self.height)
         other._color, other._alpha = self._color.copy(), self._alpha.copy()
         return other
 
@@ -71,7 +71,7 @@ class Patch:
         self.fill(np.clip(radius + 0.5 - np.hypot(across, down[:, None]), 0, 1), color)
 
     def panel(self, radius: float, opacity: float) -> None:
-        """Fill the whole patch with paper, its corners rounded."""
+        """Fill the whole sprite with paper, its corners rounded."""
         size = (0, 0, _SUPERSAMPLING * self.width - 1, _SUPERSAMPLING * self.height - 1)
         self.fill(self._drawn(lambda draw, k: draw.rounded_rectangle(size, k * radius, 255)), PAPER, opacity)
 
@@ -83,7 +83,7 @@ class Patch:
         self.fill(np.asarray(mask, dtype=np.float32) / 255, color)
 
     def over(self, frame: NDArray[np.uint8], left: int, top: int) -> None:
-        """Lay the patch over a frame in place; what does not fit is cut off.
+        """Lay the sprite over a frame in place; what does not fit is cut off.
 
         The frame is uint8 [height, width, 3], or [height, width, 4] with straight alpha.
         """
