@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import msgspec
 import mujoco
@@ -13,6 +12,7 @@ import numpy as np
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
 
+from .material_entry import MaterialChange, given_fields
 from .motion import DropEntry, Motions, PlaceEntry, ThrowEntry, Vector, check_time
 
 
@@ -28,20 +28,6 @@ class PokeEntry(msgspec.Struct, forbid_unknown_fields=True):
     point: Vector
     impulse: float
     radius: float = 0.0
-
-
-class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
-    """`[change.material]`: the coefficients that change; the others stay as they are."""
-
-    speed: float | None = None
-    damping: float | None = None
-    stiffness: float | None = None
-    viscosity: float | None = None
-    density: float | None = None
-
-    def changes(self) -> dict[str, Any]:
-        """The coefficients that were given."""
-        return {name: value for name, value in msgspec.structs.asdict(self).items() if value is not None}
 
 
 class ChangeEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -108,7 +94,7 @@ class Script:
                 point = ripples.to_geom(event.geom, event.point)
                 ripples[event.geom].add_impulse(point, event.impulse, event.radius)
             else:
-                ripples.change_material(event.geom, **event.material.changes())
+                ripples.change_material(event.geom, **given_fields(event.material))
 
 
 def _check_target(verb: str, geom: str, time: float, targets: Sequence[str]) -> None:

@@ -10,8 +10,8 @@ import msgspec
 from ripple_sim.errors import SceneError
 
 from .camera import CameraEntry
-from .events import ChangeEntry, ControlEntry, MaterialChange, PokeEntry
-from .material_entry import MapEntry, MaterialEntry, PresetEntry
+from .events import ChangeEntry, ControlEntry, PokeEntry
+from .material_entry import MapEntry, MaterialChange, MaterialEntry, PresetEntry
 from .motion import DropEntry, PlaceEntry, ThrowEntry, Vector
 from .randomize import RandomEntry
 

@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Literal
 
-
 Backend = Literal["auto", "gl", "cpu"]
 
 

@@ -16,7 +16,6 @@ from ripple_sim.scene.mesh_picture import mesh_picture
 from ripple_sim.scenes.shapes import peanut, write_obj
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import GLError
-from ripple_sim.solver.gl import shared_context
 
 RED, BLUE = (230, 20, 20), (20, 20, 230)
 
@@ -84,7 +83,7 @@ def test_a_dropped_on_mesh_wears_its_picture(tmp_path, named):
     assert model.mat_texid[model.geom("target").matid[0], mujoco.mjtTextureRole.mjTEXROLE_RGB] == 0
     simulation = Simulation(scene, fps=10, resolution=16, backend="cpu")
     try:
-        source = FrameSource(simulation, width=96, height=72, gl=shared_context())
+        source = FrameSource(simulation, width=96, height=72)
     except GLError as error:
         pytest.skip(f"no OpenGL context: {error}")
     frame = source.render(next(iter(snapshots(simulation, 1)))).astype(int)
