@@ -1,4 +1,4 @@
-"""A scene's script: what happens to bodies and surfaces at given times."""
+"""A scene's script: timed events of bodies and surfaces."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .motion import DropEntry, Motions, PlaceEntry, ThrowEntry, Vector, check_ti
 
 
 class PokeEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[poke]]`: press on a rippling geom for an instant.
+    """`[[poke]]`: an instantaneous push on a rippling geom.
 
     At a point [m] in the frame of the geom's body (the world, for a fixed target), with an impulse [N s], positive
     inwards, spread over a radius [m], at a time [s].
@@ -31,7 +31,7 @@ class PokeEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class ChangeEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[change]]`: another material for a rippling geom, from a time [s] on."""
+    """`[[change]]`: change the material of a rippling geom at a time [s]."""
 
     geom: str
     time: float
@@ -39,7 +39,7 @@ class ChangeEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class ControlEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[control]]`: set an actuator's control from a time [s] on, in the actuator's own unit."""
+    """`[[control]]`: set an actuator's control at a time [s], in the actuator's own unit."""
 
     actuator: str
     time: float
@@ -48,7 +48,7 @@ class ControlEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclasses.dataclass(frozen=True)
 class Events:
-    """All that is to happen."""
+    """All events of a scene."""
 
     drop: Sequence[DropEntry] = ()
     throw: Sequence[ThrowEntry] = ()
@@ -64,7 +64,7 @@ class Script:
     Raises
     ------
     SceneError
-        If an event names a body or a geom that is not there, or has an invalid time, impulse or radius.
+        If an event names a missing body or geom, or has an invalid time, impulse or radius.
     """
 
     def __init__(self, model: mujoco.MjModel, events: Events, targets: Sequence[str]) -> None:
@@ -83,7 +83,7 @@ class Script:
         self._surface_events = sorted(surface_events, key=lambda event: event.time)
 
     def apply(self, data: mujoco.MjData, ripples: Ripples) -> None:
-        """Do what is due."""
+        """Carry out the events that are due."""
         self._motions.apply(data)
         while self._controls and self._controls[0][0].time <= data.time + 1e-9:
             entry, actuator = self._controls.pop(0)

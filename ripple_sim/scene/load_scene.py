@@ -94,7 +94,7 @@ def _scene_path(name_or_path: str) -> Path:
 
 
 def _shifted(entries: Sequence[Moved], shifts: dict[str, np.ndarray]) -> tuple[Moved, ...]:
-    """The entries, with their positions moved as far as their bodies were."""
+    """The entries, with their positions shifted like their bodies."""
     return tuple(
         msgspec.structs.replace(entry, position=tuple(float(x) for x in np.add(entry.position, shifts[entry.body])))
         if entry.position is not None and entry.body in shifts
@@ -106,7 +106,7 @@ def _shifted(entries: Sequence[Moved], shifts: dict[str, np.ndarray]) -> tuple[M
 def load_model(
     path: Path, random: RandomEntry | None = None, edit: Edit | None = None
 ) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
-    """Compile an MJCF file, and tell how far each of its bodies was shifted at random [m].
+    """Compile an MJCF file; also return how far each of its bodies was shifted at random [m].
 
     Raises
     ------
@@ -114,7 +114,7 @@ def load_model(
         If the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the randomisation is invalid.
     """
     if not path.is_file():
-        problem = "is no file" if path.exists() else "does not exist"
+        problem = "is not a file" if path.exists() else "does not exist"
         raise SceneError(f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file")
     try:
         if random is None and edit is None:

@@ -26,9 +26,9 @@ class Scene:
     duration : float
         [s].
     events : Events
-        What happens to bodies and surfaces at given times.
+        Timed events of bodies and surfaces.
     two_way : bool
-        Whether moving surfaces push back on the bodies that touch them.
+        Whether rippling surfaces push back on the bodies that touch them.
     overlay : tuple of str
         Overlays of the frames, see `parse_request`.
     lighting : str

@@ -1,4 +1,4 @@
-"""The TOML file of a scene: its tables, and strict reading of them."""
+"""The TOML file of a scene: its tables, read strictly."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ Color = tuple[float, float, float]
 
 
 class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[ripple.still]]`: a disc of the surface that carries no waves, round a point [m] of the geom's body's frame."""
+    """`[[ripple.still]]`: a disc of the surface without waves, around a point [m] in the frame of the geom's body."""
 
     point: Vector
     radius: float
 
 
 class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[ripple]]`: one surface that carries waves, and how it looks.
+    """`[[ripple]]`: one target, its material and its look.
 
-    `color` (sRGB, 0 to 1) takes the place of the look's own colour, or of the texture of the geom's material, if it has
-    one. `still_map` is the path of a picture in the mesh's own texture coordinates: no waves run where it is black.
+    `color` (sRGB, 0 to 1) replaces the look's own colour, or the texture of the geom's material. `still_map` is the
+    path of an image in the mesh's own texture coordinates: there are no waves where it is black.
     """
 
     geom: str
@@ -41,7 +41,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     still_map: str | None = None
 
     def located(self, folder: Path) -> RippleEntry:
-        """The same with the pictures' paths made relative to a folder."""
+        """The same with the images' paths made relative to a folder."""
         still_map = None if self.still_map is None else str(folder / self.still_map)
         return msgspec.structs.replace(self, material=self.material.located(folder), still_map=still_map)
 
@@ -49,10 +49,9 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
 class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
     """The whole TOML file.
 
-    `overlay` names what is drawn over the pictures: "height" or "velocity" in colours (with the end of the colours in m
-    or m/s where it shall be fixed, such as "height=0.02"), "contacts", "grid", "time", "energy". `lighting` is "model"
-    for the MJCF's lamps and skybox, "studio" for a photo studio in their place, or "auto": the studio where the MJCF
-    sets no lamp.
+    `overlay` names the overlays: "height" or "velocity" as a heatmap (with a fixed end of the colours in m or m/s as in
+    "height=0.02"), "contacts", "grid", "time", "energy". `lighting` is "model" for the MJCF's lamps and skybox,
+    "studio" for a photo studio instead, or "auto": the studio if the MJCF has no lamp.
     """
 
     model: str
@@ -87,12 +86,12 @@ def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
         raise SceneError(f"scene file {origin!r}: {str(error).replace('`$.', '`')}") from error
 
 
-# Metres, seconds, newtons, degrees: nothing that a scene means is larger, and squares of it do not overflow.
+# Metres, seconds, newtons, degrees: no sensible scene has larger numbers, and their squares do not overflow.
 _LARGEST = 1e12
 
 
 def _check_numbers(value: Any, place: str, origin: str) -> None:
-    """Refuse NaN, infinity and absurdly large numbers wherever they stand."""
+    """Refuse NaN, infinity and absurdly large numbers anywhere."""
     if isinstance(value, dict):
         for key, inner in value.items():
             _check_numbers(inner, f"{place}.{key}" if place else key, origin)

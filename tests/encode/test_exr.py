@@ -177,9 +177,9 @@ def test_overlays_and_comparisons_are_refused_whoever_asks_for_them(scene: Scene
     frames = ["-o", str(tmp_path / "frames"), "--frame-format", "exr"]
     for option in (["--overlay", "time"], ["--compare", "paper"]):
         assert cli.main(["render", "missing", *frames, *option]) == 2
-        assert "linear light, over which overlays" in capsys.readouterr().err
+        assert "linear light, without overlays" in capsys.readouterr().err
     (tmp_path / "scene.toml").write_text('overlay = ["time"]\n' + TOML)
-    with pytest.raises(VideoError, match="linear light, over which overlays"):
+    with pytest.raises(VideoError, match="linear light, without overlays"):
         render_video(load_scene(tmp_path / "scene.toml"), tmp_path / "frames", VideoOptions(**OPTIONS))
     assert not (tmp_path / "frames").exists()
 
