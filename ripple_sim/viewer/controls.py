@@ -7,7 +7,7 @@ import dataclasses
 
 @dataclasses.dataclass(frozen=True)
 class Control:
-    """A key, the method of `Window` that it calls, and what that does, in few words."""
+    """A key, the method of `Actions` that it calls, and what that does, in few words."""
 
     key: str
     action: str

@@ -57,9 +57,9 @@ def benchmark(window: Window, updates: int = 60, tries: int = 3) -> Benchmark:
     width, height = window.plotter.render_window.GetSize()
     trials = []
     for _ in range(tries):
-        window.reset()
-        window.poke_at(width // 2, height // 2)
-        window.throw()
+        window.actions.reset()
+        window.actions.poke_at(width // 2, height // 2)
+        window.actions.throw()
         start, processor, drawing = time.perf_counter(), time.process_time(), window.seconds_drawing
         for _ in range(updates):
             window.tick()

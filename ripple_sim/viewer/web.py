@@ -114,7 +114,7 @@ class _Page:
                             html.Button(
                                 f"{control.label} ({control.key})",
                                 id=control.action,
-                                click=getattr(window, control.action),
+                                click=getattr(window.actions, control.action),
                             )
                 with html.Div(id="picture", style=f"height: {height}px"):
                     self._view = vtk.VtkRemoteView(

@@ -159,7 +159,7 @@ def test_keys_change_operator_and_colours_and_hide_the_help(window: Window) -> N
 
 def test_every_control_does_something_and_other_keys_do_nothing(window: Window) -> None:
     for control in CONTROLS:
-        assert callable(getattr(window, control.action))
+        assert callable(getattr(window.actions, control.action))
     for key in ("w", "e", "p", "3", "f", "j", "Escape"):
         press(window, key)
     assert not window.closed
@@ -218,7 +218,7 @@ def test_a_recording_is_a_video_of_the_frames(window: Window, tmp_path: Path) ->
 def test_a_recording_ends_with_the_window(closed: Window, tmp_path: Path) -> None:
     closed.open()
     closed.tick()
-    closed.record()
+    closed.actions.record()
     closed.tick()
     closed.close()
     assert (tmp_path / "sphere-1.mp4").stat().st_size > 0
@@ -226,9 +226,9 @@ def test_a_recording_ends_with_the_window(closed: Window, tmp_path: Path) -> Non
 
 
 def test_an_unwritable_folder_is_told_and_the_window_goes_on(window: Window) -> None:
-    window._recorder._folder = Path("/proc/slot_scratch")
+    window.recorder._folder = Path("/proc/nowhere")
     press(window, "s")
-    assert "cannot write /proc/slot_scratch/sphere-1.png" in window.message
+    assert "cannot write /proc/nowhere/sphere-1.png" in window.message
     press(window, "v")
     assert "cannot write" in window.message
     assert window.tick()
@@ -246,7 +246,7 @@ def test_what_becomes_unstable_is_told_and_can_be_reset(window: Window) -> None:
 
 
 def test_arrays_are_changed_in_place(window: Window) -> None:
-    actor = window._skins["sphere"]
+    actor = window.stage.skins["sphere"]
     places = [actor._mesh.GetPoints().GetData().GetVoidPointer(0), actor._mesh.GetPolys().GetMTime()]
     drag(window, MIDDLE)
     window.tick()
@@ -281,11 +281,11 @@ def test_shadows_darken_as_bodies_come_down(window: Window) -> None:
     session = window.session
     model, data = session.simulation.model, session.simulation.data
     ball = model.geom("ball").id
-    shadow = window._shadows._actors[ball]
+    shadow = window.stage.shadows._actors[ball]
     darkness = []
     for height in (1.5, 0.3, 0.07):
         data.geom_xpos[ball] = 1.0, 0.5, height
-        window._shadows.update()
+        window.stage.shadows.update()
         darkness.append(shadow.prop.opacity if shadow.GetVisibility() else 0.0)
     assert 0 == darkness[0] < darkness[1] < darkness[2]
     np.testing.assert_allclose(shadow.GetCenter(), [1.0, 0.5, 0.0], atol=2e-3)
