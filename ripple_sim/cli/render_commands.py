@@ -73,7 +73,7 @@ class Drop(_VideoCommand):
     bodies: Count = 12
     """Number of falling bodies."""
     seed: Seed = 0
-    """Seed for the bodies' shapes and places; the same seed gives the same video."""
+    """Seed for the bodies' places and sizes; the same seed gives the same video."""
     up: UpAxis = None
     """Axis of the mesh that points up."""
     texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None

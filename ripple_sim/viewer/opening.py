@@ -1,4 +1,4 @@
-"""What is to be viewed: a scene or a mesh, with balls to throw at it."""
+"""Opening a scene or a mesh in the viewer, with balls to throw at it."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from .balls import add_balls
 
 BALLS = 6
 
-# Shares of a surface's size: a ball's radius, a poke's radius, and how far a poke presses the surface in.
+# Relative to a surface's size: a ball's radius, a poke's radius, and a poke's depth.
 _BALL, _POKE, _DEPTH = 0.06, 0.06, 0.025
-# Time of flight of a thrown ball [s], and how far it comes meanwhile, in sizes of the surface.
+# Time of flight of a thrown ball [s], and the distance it covers, in sizes of the surface.
 FLIGHT = 0.5
 _THROW = 3.0
 
 
 @dataclasses.dataclass(frozen=True)
 class Strength:
-    """Impulses that suit a surface.
+    """A poke.
 
     Attributes
     ----------
     radius : float
         Footprint radius of a poke [m].
     impulse : float
-        That presses the surface in by some per cent of its size [N s].
+        Presses the surface in by a few per cent of its size [N s].
     """
 
     radius: float
@@ -44,7 +44,7 @@ class Strength:
 
 
 def poke_strength(material: Material, size: float) -> Strength:
-    """Poke that suits a surface of a size [m].
+    """A suitable poke for a surface of a size [m].
 
     The footprint (1 - (d / r)^2)^3 has its peak at 4 / (pi r^2), so an impulse J sets its middle moving at
     4 J / (pi r^2 sigma); it swings back at about omega^2 = (2 c / r)^2 + k.
@@ -54,7 +54,7 @@ def poke_strength(material: Material, size: float) -> Strength:
         float(np.max(value)) for value in (material.speed, material.stiffness, material.density)
     )
     omega = np.hypot(2 * speed / radius, np.sqrt(stiffness))
-    # nothing pulls a rigid surface back; then a second is as good a time as any
+    # nothing pulls a surface without stiffness back: it then gets a second
     return Strength(radius, _DEPTH * size * density * np.pi * radius**2 / 4 * max(float(omega), 1.0))
 
 
@@ -66,7 +66,7 @@ def open_scene(
     up: str | None = None,
     repair: bool = False,
 ) -> Scene:
-    """Scene of a name, a TOML file or a mesh file, with balls to throw.
+    """Scene by name, TOML file or mesh file, with balls to throw.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def open_scene(
     mass = impulse / (1.5 * _THROW * size / FLIGHT)
 
     def edit(spec: mujoco.MjSpec) -> None:
-        # parked balls are no part of what a camera should see
+        # parked balls must not widen the camera's view
         spec.stat.extent, spec.stat.center = scene.model.stat.extent, scene.model.stat.center
         add_balls(spec, BALLS, _BALL * size, mass)
 

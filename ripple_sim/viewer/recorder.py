@@ -1,4 +1,4 @@
-"""Pictures and videos of a window, numbered so that none is overwritten."""
+"""Screenshots and videos of a window, numbered so that none is overwritten."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Recorder:
         return self._writer is not None
 
     def save(self, picture: NDArray[np.uint8]) -> Path:
-        """Write a picture, uint8 [height, width, 3], and return its path.
+        """Write a frame to an image, uint8 [height, width, 3], and return its path.
 
         Raises
         ------
@@ -49,7 +49,7 @@ class Recorder:
         return path
 
     def start(self, picture: NDArray[np.uint8]) -> Path:
-        """Begin a video of pictures of this size; an odd row or column is left out. Return its path.
+        """Begin a video of frames of this size; an odd row or column is left out. Return its path.
 
         Raises
         ------
@@ -63,12 +63,12 @@ class Recorder:
         return path
 
     def add(self, picture: NDArray[np.uint8]) -> bool:
-        """Add a frame; a window that has changed its size ends the video. Return whether it goes on.
+        """Add a frame, or end the video if the window has changed its size. Return whether it goes on.
 
         Raises
         ------
         EncodingError
-            If it cannot be written on; the video is over then.
+            If it cannot be written; the video has then ended.
         """
         frame = _even(picture)
         if self._writer is None or frame.shape != self._shape:

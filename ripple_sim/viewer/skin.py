@@ -1,4 +1,4 @@
-"""The skin of a rippling surface: a fine triangle mesh whose points and normals follow the waves, changed in place."""
+"""The skin of a target: a fine triangle mesh whose points and normals follow the waves, changed in place."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ripple_sim.render.visuals.primitives import corner_normals
 from ripple_sim.solver import Atlas, HeightMap
 from ripple_sim.solver.texels.cube_map.convention import face_coordinates
 
-# Triangles that software OpenGL draws 30 times a second beside the simulation, on two cores.
+# Software OpenGL draws this many triangles 30 times a second beside the simulation, on two cores.
 MAX_TRIANGLES = 24_000
 
 # columns of the vertex attributes while the mesh is refined
@@ -19,7 +19,7 @@ _POSITION, _DIRECTION, _SPHERE, _NORMAL = slice(0, 3), slice(3, 6), slice(6, 9),
 
 
 class Skin:
-    """A surface, refined about to its texels and displaced by their heights.
+    """A surface, tessellated to about its texels and displaced by their heights.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def _refined(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
 def _bilinear(directions: NDArray[np.float64], n: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Addresses in a height map [6 (N + 2)^2] and weights of the four texels round each direction, [k, 4] both."""
     face, row, column = face_coordinates(directions, n)
-    # the height map has a ring of neighbours round each face
+    # the height map has a halo around each chart
     row, column = np.clip(row + 1, 0, n + 1), np.clip(column + 1, 0, n + 1)
     r, c = np.minimum(row.astype(np.int64), n), np.minimum(column.astype(np.int64), n)
     s, t = row - r, column - c

@@ -11,8 +11,9 @@ import trimesh
 from PIL import Image
 
 from ripple_sim.cli import main as cli
+from ripple_sim.figures.atlas_painter import AtlasPainter, texel_stretch
 from ripple_sim.figures.atlas_plot import plot_atlas
-from ripple_sim.figures.atlas_views import AtlasPainter, View, texel_stretch
+from ripple_sim.figures.view import View
 from ripple_sim.scene.up_axis import usual_up
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, AtlasError, Mesh, build_atlas, sphere_atlas
@@ -73,7 +74,7 @@ def test_the_plain_report_says_the_same(capsys, ball_file):
     out = capsys.readouterr().out
     assert re.search(r"^size +4 x .* m$", out, re.MULTILINE)
     assert re.search(r"^area +4\d\.\d+ m\^2$", out, re.MULTILINE)
-    assert len(re.findall(r"^mended +1 ", out, re.MULTILINE)) == 3
+    assert len(re.findall(r"^repaired +1 ", out, re.MULTILINE)) == 3
     assert re.search(r"^sphere map time +\d+\.\d{3} s$", out, re.MULTILINE)
 
 
