@@ -1,4 +1,4 @@
-"""Where the camera of a scene stands at a given time, free or fixed, orbiting or tracking; and what it focuses on."""
+"""Viewpoint of a scene's camera at a given time, free or fixed, orbiting or tracking; and its focal distance."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from ripple_sim.render import Camera, FixedCamera
 from ripple_sim.render.camera import Pose
 from ripple_sim.scene.camera import CameraEntry
 
-_NEAREST = 0.02  # focal distance, in camera distances: there the picture begins
+_NEAREST = 0.02  # least focal distance, in camera distances: the near plane
 
 
 def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, time: float) -> Camera | FixedCamera:
     """Camera of a scene at a time [s].
 
     A camera named in the MJCF is taken as it stands in `data` (it may ride on a body). Otherwise MuJoCo's free camera,
-    aimed at the model's middle where the scene says nothing else. With `orbit` either goes round by so many degrees a
-    second; with `track` the free camera moves along with a body's centre of mass, and the named one turns to it.
+    aimed at the model's middle where the scene says nothing else. With `orbit` either circles by that many degrees a
+    second; with `track` the free camera moves along with a body's centre of mass, and the named one turns towards it.
     """
     tracked = None if entry.track is None else data.subtree_com[model.body(entry.track).id]
     if entry.name is not None:
@@ -39,7 +39,7 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, ti
 
 
 def focal_distance(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, pose: Pose) -> float:
-    """How far in front of a camera of a scene lies the plane of what is sharp, along its axis [m]."""
+    """Distance of the plane in focus from a scene's camera, along its axis [m]."""
     if entry.focus is None:
         return pose.distance
     if isinstance(entry.focus, float):
@@ -53,11 +53,11 @@ def focal_distance(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntr
 
 
 def _aimed(camera: FixedCamera, target: NDArray[np.float64]) -> FixedCamera:
-    """The camera turned, upright, to a point [m] from where it stands."""
+    """The camera turned in place, upright, towards a point [m]."""
     back = camera.position - target
     distance = float(np.linalg.norm(back))
     right = np.cross([0.0, 0.0, 1.0], back)
-    if distance == 0 or not right.any():  # it stands in the point, or straight above or below
+    if distance == 0 or not right.any():  # at the point itself, or exactly above or below it
         return camera
     right /= np.linalg.norm(right)
     back = back / distance
@@ -65,7 +65,7 @@ def _aimed(camera: FixedCamera, target: NDArray[np.float64]) -> FixedCamera:
 
 
 def _turned(camera: FixedCamera, angle: float) -> FixedCamera:
-    """The camera turned round the vertical through the point that it looks at [rad]."""
+    """The camera turned by an angle [rad] around the vertical through its aim."""
     turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
     focus = camera.pose().focus
     return FixedCamera(focus + turn @ (camera.position - focus), turn @ camera.rotation, camera.distance, camera.fovy)

@@ -1,4 +1,4 @@
-"""The shape of an arrow with a light rim and smooth edges."""
+"""Arrows with a light rim and smooth edges."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def draw_arrow(sprite: Sprite, tip: ArrayLike, tail: ArrayLike, thickness: float
     thickness : float
         Of the shaft [pixels].
     opacity : [k]
-        0 to 1, at equal distances from the tip to the tail.
+        0 to 1, at equal distances from tip to tail.
     """
     tip, opacity = np.asarray(tip, dtype=np.float64), np.asarray(opacity, dtype=np.float64)
     way = np.asarray(tail, dtype=np.float64) - tip

@@ -1,4 +1,4 @@
-"""The plot of energy over time, which grows while the video runs."""
+"""The plot of energy over time, which grows during the video."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class EnergyPlot:
     duration : float
         [s].
     names : sequence of str
-        Of the curves where there are several.
+        Of several curves.
     """
 
     def __init__(self, layout: Layout, title: str, unit: str, duration: float, names: Sequence[str] = ()) -> None:
@@ -41,7 +41,7 @@ class EnergyPlot:
         self._axes: tuple[tuple[float, float], Sprite] | None = None
 
     def draw(self, curves: Sequence[Curve], limit: float, goal: float) -> Sprite:
-        """Draw curves up to the present; values from 0 to `limit`, with numbers at half and whole of `goal`."""
+        """Draw curves up to the present, from 0 to `limit`, with labels at half and whole of `goal`."""
         if self._axes is None or self._axes[0] != (limit, goal):
             self._axes = (limit, goal), self._draw_axes(limit, goal)
         sprite = self._axes[1].copy()
@@ -76,7 +76,7 @@ class EnergyPlot:
         x = float(self._width - round(0.7 * self._em))
         titles = text_width(f"{self._title} {self._unit}", self._em) + self._em
         if sum(text_width(name, size) + 0.9 * self._em for name in self._names) > x - titles:
-            return  # too narrow; the runs' titles have the curves' colours, too
+            return  # too narrow; the runs' titles have the curves' colours anyway
         for color, name in reversed(list(zip(COLORS, self._names, strict=False))):
             sprite.text(x, 1.4 * self._em, name, size, color, "right")
             x -= text_width(name, size) + 0.9 * self._em

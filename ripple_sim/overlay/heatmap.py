@@ -1,4 +1,4 @@
-"""A scalar field on the texels, made ready to be shown."""
+"""Heatmaps: a scalar field on the texels, prepared for the renderer."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from ripple_sim.solver.texels.halo import padded_addresses
 
 
 def heatmap_texels(field: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Surround the faces of a field [6, N, N] by their neighbours' texels, and the mean of three at the corners.
+    """Give the charts of a field [6, N, N] their halo of neighbours' texels, with the mean of three at the corners.
 
-    Returns float32 [6, N + 2, N + 2], as the renderer takes it: interpolated, it is continuous all over the cube.
+    Returns float32 [6, N + 2, N + 2], as the renderer takes it: interpolated, it is continuous across charts.
     """
     n = field.shape[1]
     padded = np.zeros((6, n + 2, n + 2), np.float32)
@@ -26,9 +26,9 @@ def heatmap_texels(field: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def magnitude(field: NDArray[np.float32]) -> float:
-    """Mean magnitude of a padded field, each value with its own magnitude as weight: how high waves are where they are.
+    """Mean magnitude of a field with halo, weighted by the magnitude itself: how high the waves are.
 
-    A calm surface round the first small ring does not count, nor do a few texels in the dent under a contact for much.
+    The calm surface around a small wave does not count, and the few texels in the dent under a contact count little.
     """
     inside = np.abs(field[:, 1:-1, 1:-1]).ravel()
     total = float(inside.sum(dtype=np.float64))
@@ -36,5 +36,5 @@ def magnitude(field: NDArray[np.float32]) -> float:
 
 
 def grid_spacing(resolution: int) -> int:
-    """Texels between the lines of a grid: a power of two that leaves 16 to 31 cells along a face, or all there are."""
+    """Texels between grid lines: a power of two that leaves 16 to 31 cells along a chart, or one texel per cell."""
     return 1 << max(0, (resolution // 16).bit_length() - 1)

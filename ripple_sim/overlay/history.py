@@ -9,7 +9,7 @@ MOST_POINTS = 1024  # more than the energy plot has columns of pixels, save on v
 
 
 class History:
-    """One value a frame, thinned out to at most `MOST_POINTS` as they come: of several frames the largest is kept.
+    """One value per frame, thinned to at most `MOST_POINTS`: of several frames the largest is kept.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What overlays need to know of running simulations, gathered frame by frame."""
+"""The content of the overlays, gathered from running simulations frame by frame."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from .heatmap import heatmap_texels, magnitude
 from .history import History
 from .scale import Limit
 
-# Until more is seen the colours reach to this share of the targets' size, or to the speed that goes with it.
+# The colours end at this share of the targets' size, or of their wave speed, until higher waves come.
 _LEAST = 1e-3
-# A contact's first dent is much deeper than the waves that it sends out, but short [s].
+# A contact's first dent is much deeper than its waves, but brief [s].
 _MEMORY = 0.25
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Scale:
-    """Where a scale ends at present, and the round number where it will stand still."""
+    """The present end of a scale, and the round number that it approaches."""
 
     value: float
     goal: float
@@ -32,7 +32,7 @@ class Scale:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Notes:
-    """What is shown beside the picture of one frame; each sequence has one item for each run.
+    """The overlays' content for one frame; each sequence has one item per run.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Notes:
 
 
 class Notebook:
-    """Follows simulations that run in step, as the overlays that are asked for need it.
+    """Follows simulations that run in step, as far as the requested overlays need it.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Notebook:
         self._energies = [History(frames) for _ in simulations]
 
     def follow(self) -> Notes:
-        """Take in the frame that the simulations have just made. Call it for every frame, drawn or not."""
+        """Take in the simulations' present frame. Call it for every frame, rendered or not."""
         request = self._request
         heatmaps = [self._heatmaps(simulation) for simulation in self._simulations] if request.heatmap else []
         marks = [gatherer.follow() for gatherer in self._marks] if request.contacts else []

@@ -1,4 +1,4 @@
-"""Lays panels over finished frames: each has its corner, and those of a corner stand under one another."""
+"""Draws panels over finished frames, stacked in the corners."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .sprite import Sprite
 
 
 class Painter:
-    """Draws the panels that a request asks for.
+    """Draws the requested panels.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Painter:
     spacing : int
         Texels between the lines of the grid, where all targets have the same; 0 where they differ.
     titles : sequence of (str, str)
-        Names of the runs and a word about each, where there are two side by side.
+        Names of two runs side by side, and a remark about each.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Painter:
         self._decimals = 2 if duration < 100 else 1
         # a title leaves room for the clock on the seam
         self._title_width = layout.width / 2 - 2 * layout.margin - 4.5 * layout.em
-        # what stands still is drawn once
+        # static panels are drawn once
         self._label = functools.lru_cache(maxsize=8)(label)
         self._bar = functools.lru_cache(maxsize=1)(color_bar)
         self._key = functools.lru_cache(maxsize=1)(arrow_key)

@@ -22,7 +22,7 @@ def panel(width: int, height: int, em: int) -> Sprite:
 
 
 def label(text: str, em: int, detail: str = "", color: Color = INK) -> Sprite:
-    """One line of text, and a fainter one after it."""
+    """One line of text, followed by a fainter detail."""
     pad, small = round(_PADDING * em), round(0.85 * em)
     middle = text_width(text, em) + (0.6 * em if detail else 0)
     sprite = panel(round(2 * pad + middle + text_width(detail, small)), round(1.9 * em), em)
@@ -33,9 +33,9 @@ def label(text: str, em: int, detail: str = "", color: Color = INK) -> Sprite:
 
 
 def color_bar(layout: Layout, name: str, unit: str, limit: float, goal: float) -> Sprite:
-    """A bar of the colours from -limit to limit, whose pointed ends stand for what is beyond.
+    """A colour bar from -limit to limit, with pointed ends for values beyond.
 
-    Numbers stand at zero and at half and whole of `goal`, as far as the bar reaches.
+    Labels are at zero and at half and whole of `goal`, within the bar.
     """
     em = layout.em
     pad, small = round(_PADDING * em), round(0.85 * em)
@@ -63,7 +63,7 @@ def color_bar(layout: Layout, name: str, unit: str, limit: float, goal: float) -
 
 
 def arrow_key(layout: Layout, scale: float, goal: float) -> Sprite:
-    """The arrow of the impulse `goal` / 2 [N s], as long as it is in the scene under `scale`, and its number."""
+    """The arrow of the impulse `goal` / 2 [N s], as long as in the scene under `scale`, and its value."""
     em = layout.em
     pad, gap = round(_PADDING * em), 0.7 * em
     factor, unit = readable(goal / 2, "N s")

@@ -1,4 +1,4 @@
-"""What decides the pixels of a video: the scene with all its files, and the software that simulates and draws it."""
+"""Fingerprints of a scene with all its files, and of the software that simulates and renders it."""
 
 from __future__ import annotations
 
