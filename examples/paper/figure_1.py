@@ -16,7 +16,7 @@ def make(folder: Path) -> Part:
     return Part(
         "Figure 1: a ball hits a face",
         "The ball is a rigid body of MuJoCo; its contact force presses on the forehead. "
-        "The waves run round the eyes, where a picture says that no waves run.",
+        "The waves go around the eyes, which an image excludes.",
         [(file, "The scene `face` at 0.2, 0.35, 0.5 and 0.8 s.")],
     )
 

@@ -43,8 +43,8 @@ def make(folder: Path) -> Part:
         pictures.append((file, f"As {name}, from {low:g} to {high:g}, at {', '.join(map(str, TIMES))} s."))
     return Part(
         "Figure 8: speed and damping from a texture",
-        "A picture in the object's own texture coordinates is sampled once a texel. "
-        "Waves run slower, or die sooner, on one half.",
+        "An image in the object's own texture coordinates is sampled once per texel. "
+        "Waves travel slower, or decay faster, on one half.",
         pictures,
     )
 

@@ -49,7 +49,7 @@ def make(folder: Path) -> Part:
         "Figures 6 and 7: corrected and uncorrected",
         "A ring that starts on the back should stay a circle along the surface. Without real-space distances it "
         "follows the texels; with the paper's formula its speed still depends on the shape of the texels; with finite "
-        "elements on the texels it does not. The correction is made before the first step; all steps cost the same.",
+        "elements on the texels it does not. The correction is part of the set-up; all steps cost the same.",
         pictures,
         rows,
     )
