@@ -29,12 +29,13 @@ class _VideoCommand(VideoArguments):
 
     def run(self) -> None:
         """Render the scene and print a summary."""
-        from ripple_sim.video.render_video import check_options, render_video
+        from ripple_sim.video.settings import check_options
 
         check_options(self.options(), self.output)  # before anything that takes time
 
         from ripple_sim.scene.camera_override import through_camera
         from ripple_sim.solver.gl import select_device, shared_context
+        from ripple_sim.video.render_video import render_video
         from ripple_sim.video.settings import settled
 
         from .progress import frame_progress

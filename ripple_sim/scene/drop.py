@@ -13,7 +13,7 @@ from ripple_sim.solver import Mesh, load_mesh
 from .camera import CameraEntry
 from .drop_model import drop_model
 from .events import Events
-from .load_scene import Edit
+from .load_scene import Edit, refusal_of
 from .material_entry import MaterialEntry
 from .paint import paint_target
 from .scene import Scene
@@ -42,7 +42,6 @@ def drop_scene(
     Parameters
     ----------
     mesh_path : path
-        Any closed genus-0 mesh.
     bodies : int
         How many drop, 0 to 100, over the first 3.5 seconds.
     seed : int
@@ -52,20 +51,18 @@ def drop_scene(
     look : str
         Of the target.
     texture : path, optional
-        Image in the mesh's own texture coordinates, in place of the look's colour. By default the one that the file
-        names (an OBJ's material library, a GLB), or NAME_texture.png beside it.
+        Image in the mesh's own texture coordinates, in place of the look's colour; by default see `mesh_image`.
     repair : bool
         Repair an open or non-manifold mesh (needs the package pymeshfix).
     edit : callable, optional
-        Called with the model's specification (`mujoco.MjSpec`) before it is compiled, to change it in place.
+        Changes the model's specification in place, before it is compiled.
 
     Raises
     ------
     MeshError
-        If the mesh cannot be read or is not closed and of genus 0.
+        If the mesh cannot be read, or is not closed and of genus 0.
     SceneError
-        For an invalid number of bodies or axis, if MuJoCo refuses the mesh, for a texture that cannot be read, or a
-        mesh without texture coordinates.
+        For an invalid number of bodies, axis or texture, or if MuJoCo refuses the mesh.
     """
     if not 0 <= bodies <= 100:
         raise SceneError(f"the number of bodies is {bodies}; valid is 0 to 100")
@@ -74,15 +71,12 @@ def drop_scene(
         raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
     mesh = load_mesh(mesh_path, repair=repair)
     V = _standing(mesh, up)
-    rng = np.random.default_rng(seed)
-    spec, drops = drop_model(V, mesh.F, bodies, rng)
+    spec, drops = drop_model(V, mesh.F, bodies, np.random.default_rng(seed))
     paint_target(spec, mesh, mesh_path, texture)
     if edit is not None:
         edit(spec)
-    try:
+    with refusal_of(f"the mesh {str(mesh_path)!r}"):
         model = spec.compile()
-    except ValueError as error:
-        raise SceneError(f"MuJoCo refuses the mesh {str(mesh_path)!r}: {' '.join(str(error).split())}") from error
     return Scene(
         name=Path(mesh_path).stem,
         model=model,

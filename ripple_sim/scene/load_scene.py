@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.resources
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -116,7 +117,7 @@ def load_model(
     if not path.is_file():
         problem = "is not a file" if path.exists() else "does not exist"
         raise SceneError(f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file")
-    try:
+    with refusal_of(repr(str(path))):
         if random is None and edit is None:
             return mujoco.MjModel.from_xml_path(str(path)), {}
         spec = mujoco.MjSpec.from_file(str(path))
@@ -124,6 +125,12 @@ def load_model(
         if edit is not None:
             edit(spec)
         return spec.compile(), shifts
+
+
+@contextlib.contextmanager
+def refusal_of(name: str) -> Iterator[None]:
+    """Turn MuJoCo's refusal of a model, by its name in messages, into a `SceneError` with MuJoCo's reason."""
+    try:
+        yield
     except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise SceneError(f"MuJoCo refuses {str(path)!r}: {reason}") from error
+        raise SceneError(f"MuJoCo refuses {name}: {' '.join(str(error).split())}") from error

@@ -9,19 +9,17 @@ from pathlib import Path
 
 import mujoco
 
-from ripple_sim.encode import FrameWriter, check_output, default_fps, open_writer
-from ripple_sim.errors import SceneError
+from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.overlay.comparison import compared_operators
 from ripple_sim.scene.camera_override import with_exposure
-from ripple_sim.scene.overlays import parse_request
-from ripple_sim.scene.scene import MAX_DURATION, Scene
+from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .film import Film
 from .options import VideoOptions
 from .prefetch import Prefetch
-from .settings import render_settings, settled
+from .settings import EXPOSURE, check_options, frame_count, render_settings, settled
 from .shot import Shot
 from .summary import Summary
 
@@ -30,8 +28,6 @@ _WAITING = 2
 
 # The simulation's state is fingerprinted every so many frames, to be compared when a render is resumed.
 _CHECKED = 16
-
-MAX_SLOW_MOTION = 1000
 
 Progress = Callable[[int, int], None]
 
@@ -73,14 +69,8 @@ def render_video(
     output = Path(output)
     options = settled(options, scene, output)
     check_options(options, output)
-    scene = with_exposure(
-        scene,
-        shutter=options.shutter,
-        aperture=options.aperture,
-        focus=options.focus,
-        exposures=options.exposures,
-    )
-    frames, gl = _frame_count(options), shared_context()
+    scene = with_exposure(scene, **{name: getattr(options, name) for name in EXPOSURE})
+    frames, gl = frame_count(options), shared_context()
     with open_writer(
         output,
         width=options.size[0],
@@ -92,39 +82,24 @@ def render_video(
         resume=options.resume,
     ) as writer:
         resumed_at = writer.frames
-        simulations = [
-            Simulation(
-                scene,
-                fps=options.rate,
-                resolution=options.resolution,
-                backend=options.backend,
-                operator=operator,
-                on_step=on_step,
-            )
-            for operator in compared_operators(options.compare)
-        ]
-        film = Film(simulations, options, frames)
+        film = Film(_simulations(scene, options, on_step), options, frames)
         ready = _write_frames(film, writer, frames, gl, progress)
     return Summary.of(film, writer, gl, resumed_at=resumed_at, started=start, ready=ready)
 
 
-def check_options(options: VideoOptions, output: Path) -> None:
-    """Make sure, before anything that takes time, that a video with these options can be written to `output`.
-
-    Raises
-    ------
-    RippleError
-    """
-    parse_request(options.overlay or ())
-    operators = compared_operators(options.compare)
-    check_output(
-        output,
-        *options.size,
-        default_fps(output) if options.fps is None else options.fps,
-        transparent=options.transparent,
-        frame_format=options.frame_format,
-        overlaid=bool(options.overlay) or len(operators) > 1,
-    )
+def _simulations(scene: Scene, options: VideoOptions, on_step: Callable[[Simulation], None] | None) -> list[Simulation]:
+    """One simulation for each of the wave operators that are shown."""
+    return [
+        Simulation(
+            scene,
+            fps=options.rate,
+            resolution=options.resolution,
+            backend=options.backend,
+            operator=operator,
+            on_step=on_step,
+        )
+        for operator in compared_operators(options.compare)
+    ]
 
 
 def _write_frames(film: Film, writer: FrameWriter, frames: int, gl: GLContext, progress: Progress | None) -> float:
@@ -154,13 +129,3 @@ def _missing(shots: Iterable[Shot], writer: FrameWriter, progress: Progress | No
             yield shot
         elif progress is not None and shot.exposure == 0:
             progress(shot.number + 1, frames)
-
-
-def _frame_count(options: VideoOptions) -> int:
-    """Frames of a video with settled options."""
-    duration, slow_motion = options.duration or 0.0, options.slow_motion
-    if not 0 < duration < MAX_DURATION:
-        raise SceneError(f"duration is {options.duration!r} s; valid is a positive number, less than {MAX_DURATION}")
-    if not 0 < slow_motion <= MAX_SLOW_MOTION:
-        raise SceneError(f"slow motion is {slow_motion!r}; valid is a positive number up to {MAX_SLOW_MOTION}")
-    return max(1, round(duration * (options.fps or 0) * slow_motion))

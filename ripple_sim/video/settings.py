@@ -1,4 +1,4 @@
-"""Options settled for one render, and the settings by which an interrupted render is known again."""
+"""Options checked and settled for one render, and the settings that tell whether an interrupted one can continue."""
 
 from __future__ import annotations
 
@@ -7,14 +7,21 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import cast
 
-from ripple_sim.encode import default_fps
+from ripple_sim.encode import check_output, default_fps
+from ripple_sim.errors import SceneError
 from ripple_sim.overlay.comparison import compared_operators
-from ripple_sim.scene.scene import Scene
+from ripple_sim.scene.overlays import parse_request
+from ripple_sim.scene.scene import MAX_DURATION, Scene
 from ripple_sim.solver.gl import GLContext
 from ripple_sim.solver.waves.backends.backend import auto_backend
 
 from .options import Backend, VideoOptions
 from .provenance import provenance
+
+MAX_SLOW_MOTION = 1000
+
+# Options that replace those of the scene's camera, by the same names.
+EXPOSURE = ("shutter", "aperture", "focus", "exposures")
 
 
 def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
@@ -70,3 +77,38 @@ def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLCont
         **provenance(scene, gl),
         **({"the version of OpenEXR": version("OpenEXR")} if options.linear else {}),
     }
+
+
+def check_options(options: VideoOptions, output: Path) -> None:
+    """Make sure, before anything that takes time, that a video with these options can be written to `output`.
+
+    Raises
+    ------
+    RippleError
+    """
+    parse_request(options.overlay or ())
+    operators = compared_operators(options.compare)
+    check_output(
+        output,
+        *options.size,
+        default_fps(output) if options.fps is None else options.fps,
+        transparent=options.transparent,
+        frame_format=options.frame_format,
+        overlaid=bool(options.overlay) or len(operators) > 1,
+    )
+
+
+def frame_count(options: VideoOptions) -> int:
+    """Frames of a video with settled options.
+
+    Raises
+    ------
+    SceneError
+        If the duration or the slow motion is out of range.
+    """
+    duration, slow_motion = options.duration or 0.0, options.slow_motion
+    if not 0 < duration < MAX_DURATION:
+        raise SceneError(f"duration is {options.duration!r} s; valid is a positive number, less than {MAX_DURATION}")
+    if not 0 < slow_motion <= MAX_SLOW_MOTION:
+        raise SceneError(f"slow motion is {slow_motion!r}; valid is a positive number up to {MAX_SLOW_MOTION}")
+    return max(1, round(duration * (options.fps or 0) * slow_motion))
