@@ -314,7 +314,7 @@ def test_a_video_without_frames_is_refused(tmp_path):
         ("clip.mp4", (1280, 720), 0, "rate is 0.*1 to 240"),
         ("clip.mp4", (1280, 720), 1000, "rate is 1000.*1 to 240"),
         ("clip.gif", (1280, 720), 60, "GIF.*60.*1 to 50"),
-        ("a_file", (1280, 720), 60, "no folder"),
+        ("a_file", (1280, 720), 60, "is not a folder"),
         ("a_folder.mp4", (1280, 720), 60, "is a folder"),
         ("photos", (1280, 720), 60, r"other files \(me\.jpg\)"),
     ],
