@@ -10,7 +10,7 @@ from ripple_sim.overlay.scale import number
 from ripple_sim.overlay.sprite import Sprite
 
 
-def test_patch_covers_in_proportion() -> None:
+def test_sprite_covers_in_proportion() -> None:
     sprite = Sprite(10, 6)
     sprite.box(2.25, 1.0, 5.5, 2.5, (255, 255, 255))
     frame = np.zeros((6, 10, 3), np.uint8)
@@ -20,7 +20,7 @@ def test_patch_covers_in_proportion() -> None:
     assert frame[3:].max() == 0
 
 
-def test_patch_over_a_transparent_frame() -> None:
+def test_sprite_over_a_transparent_frame() -> None:
     sprite = Sprite(3, 1)
     sprite.box(0, 0, 3, 1, (200, 100, 0), 0.5)
     frame = np.zeros((1, 3, 4), np.uint8)
@@ -33,7 +33,7 @@ def test_patch_over_a_transparent_frame() -> None:
 
 
 @pytest.mark.parametrize("place", [(-6, -3), (95, 45), (200, 10), (40, -60)])
-def test_patch_over_the_border_is_cut(place: tuple[int, int]) -> None:
+def test_sprite_over_the_border_is_cut(place: tuple[int, int]) -> None:
     sprite = Sprite(12, 8)
     sprite.box(0, 0, 12, 8, (200, 100, 50))
     frame = np.zeros((50, 100, 3), np.uint8)
