@@ -58,7 +58,7 @@ def screen(size: int, half_width: float) -> tuple[NDArray[np.float64], NDArray[n
 
 
 def antialiased(shape: tuple[int, ...], seen: NDArray[np.int64], colors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """RGBA picture, averaged over the oversampling, of colours [k, 3] at the pixels `seen`."""
+    """RGBA image, averaged over the oversampling, of colours [k, 3] at the pixels `seen`."""
     fine = np.zeros((shape[0] * shape[1], 4))
     fine[seen, :3], fine[seen, 3] = colors, 1.0
     k = OVERSAMPLING

@@ -14,15 +14,15 @@ def heatmap_texels(field: NDArray[np.float32]) -> NDArray[np.float32]:
     Returns float32 [6, N + 2, N + 2], as the renderer takes it: interpolated, it is continuous across charts.
     """
     n = field.shape[1]
-    padded = np.zeros((6, n + 2, n + 2), np.float32)
-    padded[:, 1:-1, 1:-1] = field
-    _, ring, source = padded_addresses(n)
-    padded.reshape(-1)[ring] = padded.reshape(-1)[source]
+    texels = np.zeros((6, n + 2, n + 2), np.float32)
+    texels[:, 1:-1, 1:-1] = field
+    _, halo, source = padded_addresses(n)
+    texels.reshape(-1)[halo] = texels.reshape(-1)[source]
     for row, inner_row in ((0, 1), (-1, -2)):
         for column, inner_column in ((0, 1), (-1, -2)):
-            corner = padded[:, inner_row, inner_column] + padded[:, inner_row, column] + padded[:, row, inner_column]
-            padded[:, row, column] = corner / 3
-    return padded
+            corner = texels[:, inner_row, inner_column] + texels[:, inner_row, column] + texels[:, row, inner_column]
+            texels[:, row, column] = corner / 3
+    return texels
 
 
 def magnitude(field: NDArray[np.float32]) -> float:

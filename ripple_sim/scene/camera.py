@@ -19,7 +19,7 @@ class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
     With `orbit` it circles by that many degrees a second. With `track` it follows a body: the free camera moves along
     with the body's centre of mass, from which `lookat` then counts; a named camera turns towards it.
 
-    A frame is the mean of `exposures` pictures where `shutter` or `aperture` is not 0. `shutter` is the shutter angle
+    A frame is the mean of `exposures` images where `shutter` or `aperture` is not 0. `shutter` is the shutter angle
     [degrees]: 360 leaves the shutter open from one frame to the next, 180, usual in film, half of that time. `aperture`
     is the diameter of the lens [m]; an f-number would need a focal length, which MuJoCo's cameras do not have. `focus`
     is a distance along the camera's axis [m], the name of a body or a geom, which then stays sharp, or a point in the

@@ -69,7 +69,7 @@ class Actions:
         """Write an image."""
         self._canvas.draw()
         try:
-            self._canvas.say(f"wrote {self._canvas.recorder.save(self._canvas.picture())}")
+            self._canvas.say(f"wrote {self._canvas.recorder.save(self._canvas.pixels())}")
         except RippleError as error:
             self._canvas.say(str(error))
 
@@ -80,7 +80,7 @@ class Actions:
             if recorder.recording:
                 self._canvas.say(f"wrote {recorder.stop()}")
             else:
-                self._canvas.say(f"recording {recorder.start(self._canvas.picture())}")
+                self._canvas.say(f"recording {recorder.start(self._canvas.pixels())}")
         except RippleError as error:
             self._canvas.say(str(error))
 

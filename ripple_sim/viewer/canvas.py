@@ -81,7 +81,7 @@ class Canvas:
         self.render: Callable[[], object] = self.plotter.render_window.Render
         self.update()
 
-    def picture(self) -> NDArray[np.uint8]:
+    def pixels(self) -> NDArray[np.uint8]:
         """The latest frame, uint8 [height, width, 3]."""
         window, pixels = self.plotter.render_window, vtkUnsignedCharArray()
         width, height = window.GetSize()
@@ -138,7 +138,7 @@ class Canvas:
         self.seconds_drawing += time.perf_counter() - now
         if self.recorder.recording:
             try:
-                if not self.recorder.add(self.picture()):
+                if not self.recorder.add(self.pixels()):
                     self.say("the window has changed its size: the recording has ended")
             except RippleError as error:
                 self.say(str(error))
