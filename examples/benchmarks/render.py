@@ -77,7 +77,7 @@ def rippled(width: int, height: int, resolution: int, look: str) -> tuple[Callab
     surface = Surface(atlas.mesh.V, atlas.mesh.F, atlas.sphere, resolution, look)
     gl = shared_context()
     print(gl.renderer)
-    renderer = Renderer(gl, model, {target: surface}, width=width, height=height, samples=4)
+    renderer = Renderer(gl, model, {target: surface}, size=(width, height), samples=4)
     camera = Camera(LOOKAT, DISTANCE, AZIMUTH, ELEVATION)
     height_maps = [
         HeightMap(atlas)((0.008 * np.sin(40.0 * atlas.positions[..., 2] + phase)).astype(np.float32))

@@ -14,7 +14,8 @@ import numpy as np
 from figure import FAINT, FOLDER, NAMES, TEXT, save, sheet
 from matplotlib.colors import ListedColormap
 
-from ripple_sim.bench.arrival import NEAREST, arrival_times, ideal_width, plane_arrival
+from ripple_sim.bench.arrival import arrival_times, ideal_width
+from ripple_sim.bench.plane_wave import NEAREST, plane_arrival
 from ripple_sim.figures.atlas_painter import AtlasPainter
 from ripple_sim.figures.view import View
 from ripple_sim.overlay.colormap import color_table, colors

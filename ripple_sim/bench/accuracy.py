@@ -1,18 +1,11 @@
-"""How exact the operators are, where theory is exact: a mode of the sphere, energy, and times of arrival."""
+"""How exact the operators are, where theory is exact: a mode of the sphere, and energy."""
 
 from __future__ import annotations
 
-import dataclasses
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
-from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver import Mesh, WaveSolver, build_atlas, load_mesh, sphere_atlas
+from ripple_sim.solver import WaveSolver, sphere_atlas
 from ripple_sim.solver.waves.operator import OPERATORS
-
-from .arrival import ArrivalError, arrival_error, spread_sources
 
 
 def sphere_mode_error(resolution: int, operator: str = "fem") -> float:
@@ -57,21 +50,3 @@ def energy_drift(resolution: int = 64, steps: int = 10_000) -> dict[str, float]:
         "trend": float(trend),
         "momentum_change": abs(waves.momentum() - momentum),
     }
-
-
-def arrivals(meshes: list[Path], resolution: int = 96, sources: int = 3) -> dict[str, dict[str, dict[str, float]]]:
-    """Errors of arrival of all operators on the project's own test body and on given meshes, mean over the sources."""
-    bodies = {"limbed": Mesh.from_arrays(*limbed())} | {path.stem: load_mesh(path) for path in meshes}
-    table: dict[str, dict[str, dict[str, float]]] = {}
-    for name, mesh in bodies.items():
-        atlas = build_atlas(mesh, resolution)
-        points = spread_sources(atlas, sources)
-        table[name] = {
-            operator: _mean([arrival_error(atlas, vertex, operator) for vertex in points]) for operator in OPERATORS
-        }
-    return table
-
-
-def _mean(errors: list[ArrivalError]) -> dict[str, Any]:
-    rows = [dataclasses.asdict(error) for error in errors]
-    return {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.colliders.collidable import make_collidable
-from ripple_sim.coupling.colliders.tunnelling import SpeedCheck
-from ripple_sim.coupling.load.sources import Sources
+from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
+from ripple_sim.coupling.load.contact_loads import ContactLoads
+from ripple_sim.coupling.model.coupled_model import CoupledModel
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.scenes.implicit import ellipsoid, polygonise, smooth_intersection
 from ripple_sim.scenes.shapes import duck
@@ -22,8 +23,8 @@ Shape = tuple[NDArray[np.float64], NDArray[np.int64]]
 BODIES = 30
 RESOLUTION = 128
 SECONDS = 1.0  # all have hit, and those that can lie still do
+ROUNDS = 3
 
-_ROUNDS = 3
 _GEOM = mujoco.mjtGeom
 _SHAPES = (
     (_GEOM.mjGEOM_SPHERE, (0.06, 0, 0)),
@@ -46,7 +47,11 @@ TARGETS: dict[str, Callable[[], Shape]] = {"duck": duck, "dish": dish}
 
 
 def coupling_cost(
-    targets: Iterable[str] = TARGETS, seconds: float = SECONDS, bodies: int = BODIES, resolution: int = RESOLUTION
+    targets: Mapping[str, Callable[[], Shape]] = TARGETS,
+    seconds: float = SECONDS,
+    bodies: int = BODIES,
+    resolution: int = RESOLUTION,
+    rounds: int = ROUNDS,
 ) -> dict[str, dict[str, float]]:
     """Seconds a step of `mj_step`, of the coupling (from contacts to loads on texels), and of the waves, by target.
 
@@ -55,12 +60,12 @@ def coupling_cost(
     shortest time of each step is what the step costs.
     """
     table = {}
-    for name in targets:
-        model = rain(TARGETS[name](), bodies)
-        rounds = [_run(model, seconds, resolution) for _ in range(_ROUNDS)]
-        physics, coupling, waves = np.min([times for times, _ in rounds], axis=0).mean(axis=0)
+    for name, shape in targets.items():
+        model = rain(shape(), bodies)
+        runs = [_run(model, seconds, resolution) for _ in range(rounds)]
+        physics, coupling, waves = np.min([times for times, _ in runs], axis=0).mean(axis=0)
         table[name] = {
-            "touching": rounds[0][1],
+            "touching": runs[0][1],
             "mj_step [s]": float(physics),
             "coupling [s]": float(coupling),
             "waves [s]": float(waves),
@@ -92,15 +97,16 @@ def _run(model: mujoco.MjModel, seconds: float, resolution: int) -> tuple[NDArra
     data, geom, dt = mujoco.MjData(model), model.geom("target").id, model.opt.timestep
     material = Material(speed=0.6, damping=1.0, density=200.0)
     waves = Ripples(model, {"target": material}, resolution=resolution, backend="cpu")["target"]
-    sources, check_speeds = Sources(model, {geom: waves}), SpeedCheck(model, [geom])
+    coupled = CoupledModel(model)
+    contact_loads, check_tunnelling = ContactLoads(coupled, {geom: waves}), TunnellingCheck(coupled, [geom])
     times, pairs = [], 0
     for _ in range(round(seconds / dt)):
         start = time.thread_time()
         mujoco.mj_step(model, data)
         moved = time.thread_time()
-        check_speeds(data)
-        loads = sources.loads(data, dt)
-        pairs += len(sources.impulses)
+        check_tunnelling(data)
+        loads = contact_loads.loads(data, dt)
+        pairs += len(contact_loads.impulses)
         loaded = time.thread_time()
         waves.step(dt, load=loads[geom])
         times.append((moved - start, loaded - moved, time.thread_time() - loaded))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Mapping
 from typing import Protocol
@@ -9,13 +10,17 @@ from typing import Protocol
 import numpy as np
 
 from ripple_sim.solver import GLError, Material, sphere_atlas
+from ripple_sim.solver.waves.backends import threads
 from ripple_sim.solver.waves.backends.backend import Backend, make_backend
 from ripple_sim.solver.waves.backends.cpu import CPUBackend
 from ripple_sim.solver.waves.operator import WaveOperator, build_operator
 
-from .rivals import Copy, PlainShader, SparseLeapfrog
+from .rivals.memory_stream import MemoryStream
+from .rivals.naive_loop import NaiveLoop
+from .rivals.plain_shader import PlainShader
+from .rivals.sparse_leapfrog import SparseLeapfrog
 
-_ROUNDS = 7
+_ROUNDS = 15
 _SECONDS_A_TURN = 0.04
 
 
@@ -37,8 +42,31 @@ class Waited:
         self._backend.wait()
 
 
-def updates_per_second(contestants: Mapping[str, Advances], texels: int) -> dict[str, float]:
-    """Texel updates a second of each, the best of several turns taken in rotation."""
+@dataclasses.dataclass(frozen=True)
+class Race:
+    """Turns that contestants took in rotation.
+
+    Attributes
+    ----------
+    texels : int
+    seconds : dict
+        Seconds a substep of each contestant, round by round.
+    """
+
+    texels: int
+    seconds: dict[str, list[float]]
+
+    def rates(self) -> dict[str, float]:
+        """Texel updates a second of each contestant: the median over the rounds, since load comes and goes."""
+        return {name: self.texels / float(np.median(turns)) for name, turns in self.seconds.items()}
+
+    def ratio(self, contestant: str, rival: str) -> float:
+        """How many times as fast as its rival a contestant is: the median of that over the rounds."""
+        return float(np.median(np.divide(self.seconds[rival], self.seconds[contestant])))
+
+
+def race(contestants: Mapping[str, Advances], texels: int, rounds: int = _ROUNDS) -> Race:
+    """Let contestants take turns, so that a busy machine slows all alike."""
     dt = 1e-6
     counts = {}
     for name, contestant in contestants.items():
@@ -46,30 +74,46 @@ def updates_per_second(contestants: Mapping[str, Advances], texels: int) -> dict
         start = time.perf_counter()
         contestant.advance(2, dt)
         counts[name] = max(2, int(_SECONDS_A_TURN / (time.perf_counter() - start) * 2))
-    best = dict.fromkeys(contestants, np.inf)
-    for _ in range(_ROUNDS):
+    seconds: dict[str, list[float]] = {name: [] for name in contestants}
+    for _ in range(rounds):
         for name, contestant in contestants.items():
             start = time.perf_counter()
             contestant.advance(counts[name], dt)
-            best[name] = min(best[name], (time.perf_counter() - start) / counts[name])
-    return {name: texels / seconds for name, seconds in best.items()}
+            seconds[name].append((time.perf_counter() - start) / counts[name])
+    return Race(texels, seconds)
 
 
-def cpu_speed(resolution: int) -> dict[str, float]:
-    """CPU backend as it is and in one thread, against a memory copy and a sparse matrix, which have one thread."""
+def cpu_speed(resolution: int) -> dict[str, float | int]:
+    """CPU backend against rivals of as many threads, and against the naive loop as it is fastest.
+
+    "cpu" is the backend as the solver takes it, "cpu 1" in one thread, "cpu all" in as many as the machine has cores;
+    likewise "stream", the memory bound. "naive" is
+    the faster of the naive loop in one thread, "naive 1", and in the threads of `numba.prange`, "naive prange". SciPy
+    has one thread. Rates are texel updates a second, and ratios those of `Race`.
+    """
     operator = _operator(resolution)
-    texels = operator.mass.size
+    texels, backend = operator.mass.size, CPUBackend(operator)
     contestants: dict[str, Advances] = {
-        "cpu": CPUBackend(operator),
-        "one thread": CPUBackend(operator, 1),
-        "copy": Copy(texels),
+        "cpu": backend,
+        "cpu 1": CPUBackend(operator, 1),
+        "cpu all": CPUBackend(operator, threads.available()),
+        "naive 1": NaiveLoop(operator),
+        "naive prange": NaiveLoop(operator, parallel=True),
+        "stream": MemoryStream(texels, backend.thread_count),
+        "stream 1": MemoryStream(texels),
         "scipy": SparseLeapfrog(operator),
     }
-    rates = updates_per_second(contestants, texels)
-    return rates | {
-        "of copy": rates["one thread"] / rates["copy"],
-        "over scipy": rates["cpu"] / rates["scipy"],
-        "one thread over scipy": rates["one thread"] / rates["scipy"],
+    run = race(contestants, texels)
+    rates = run.rates()
+    naive = max("naive 1", "naive prange", key=lambda name: rates[name])
+    return {"threads": backend.thread_count, **rates} | {
+        "naive": rates[naive],
+        "over naive": run.ratio("cpu", naive),
+        "one thread over naive": run.ratio("cpu 1", "naive 1"),
+        "all threads over naive": run.ratio("cpu all", "naive prange"),
+        "of stream": run.ratio("cpu", "stream"),
+        "one thread of stream": run.ratio("cpu 1", "stream 1"),
+        "one thread over scipy": run.ratio("cpu 1", "scipy"),
     }
 
 
@@ -80,8 +124,8 @@ def gl_speed(resolution: int) -> dict[str, float] | None:
         contestants: dict[str, Advances] = {"gl": Waited(make_backend("gl", operator)), "plain": PlainShader(operator)}
     except GLError:
         return None
-    rates = updates_per_second(contestants, operator.mass.size)
-    return rates | {"over plain": rates["gl"] / rates["plain"]}
+    run = race(contestants, operator.mass.size)
+    return run.rates() | {"over plain": run.ratio("gl", "plain")}
 
 
 def _operator(resolution: int) -> WaveOperator:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
-from ripple_sim.render.visuals.texture_mapping import NO_IMAGE, mapping_of
-from ripple_sim.render.visuals.visual import geom_piece
+from ripple_sim.render.gpu.contract import MappingKind
+from ripple_sim.render.visuals.texture_mapping import mapping_of
+from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.scene.camera import CameraEntry
 from ripple_sim.solver import HeightMap, WaveSolver
 from ripple_sim.solver.gl import GLContext, shared_context
@@ -58,7 +59,7 @@ class RippleRenderer:
             geom: surface_of(ripples[name], looks.get(name, "rubber"), _color(model, geom))
             for name, geom in ripples.geom_ids.items()
         }
-        self._renderer = Renderer(gl or shared_context(), model, surfaces, width=width, height=height)
+        self._renderer = Renderer(gl or shared_context(), model, surfaces, size=(width, height))
 
     def render(self, data: mujoco.MjData, camera: Camera | FixedCamera | str | None = None) -> NDArray[np.uint8]:
         """Render the present state to pixels, uint8 [height, width, 3].
@@ -98,7 +99,7 @@ def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] |
 
 def _color(model: mujoco.MjModel, geom: int) -> tuple[float, float, float] | None:
     """Colour of a geom, unless it is MuJoCo's grey or a texture."""
-    piece = geom_piece(model, geom)
-    red, green, blue = (float(x) for x in piece.rgba[:3])
-    plain = mapping_of(model, piece).kind == NO_IMAGE
+    visual = geom_visual(model, geom)
+    red, green, blue = (float(x) for x in visual.rgba[:3])
+    plain = mapping_of(model, visual).kind == MappingKind.NO_IMAGE
     return (red, green, blue) if plain and not red == green == blue == 0.5 else None

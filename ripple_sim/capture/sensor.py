@@ -5,16 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.color import linear_to_srgb, srgb_to_linear
 from ripple_sim.solver.kernel import Floats32, kernel
 
-# sRGB, IEC 61966-2-1. Fine enough that every one of the 256 values has entries of its own, also the darkest.
+# Steps of the table from linear light to sRGB: enough that each of the 256 values has entries, the darkest too.
 _FINE = 1 << 14
-_CODES = np.arange(256) / 255
-_LINEAR = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4).astype(np.float32)
-_LIGHT = np.arange(_FINE + 1) / _FINE
-_SRGB = np.rint(255 * np.where(_LIGHT <= 0.0031308, 12.92 * _LIGHT, 1.055 * _LIGHT ** (1 / 2.4) - 0.055)).astype(
-    np.uint8
-)
+_LINEAR = srgb_to_linear(np.arange(256) / 255).astype(np.float32)
+_SRGB = np.rint(255 * linear_to_srgb(np.arange(_FINE + 1) / _FINE)).astype(np.uint8)
 
 
 class Sensor:

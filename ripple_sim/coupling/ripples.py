@@ -1,4 +1,4 @@
-"""From contact forces to waves: `Ripples` adds rippling surfaces to anybody's MuJoCo loop."""
+"""`Ripples` adds rippling surfaces to anybody's MuJoCo loop: contact forces become waves."""
 
 from __future__ import annotations
 
@@ -10,15 +10,19 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.coupling.colliders.collidable import collides_as_hull, hull_warning, shell_warning
-from ripple_sim.coupling.colliders.tunnelling import SpeedCheck
-from ripple_sim.coupling.load.sources import Impulse, Sources
-from ripple_sim.coupling.model.target import find_target, shells
+from ripple_sim.coupling.colliders.collision_warnings import collision_warning
+from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
+from ripple_sim.coupling.load.contact_loads import ContactLoads
+from ripple_sim.coupling.load.contact_record import Impulse
+from ripple_sim.coupling.model.coupled_model import CoupledModel
+from ripple_sim.coupling.model.geoms import find_target
 from ripple_sim.coupling.two_way.push_back import PushBack
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Load, Material, WaveSolver
 
-from .rippled_geom import RippleSurface
+from .arguments import check_arguments, integrator_warning
+from .clock import StepClock
+from .target import Target
 
 __all__ = ["Impulse", "Ripples"]
 
@@ -33,21 +37,21 @@ class Ripples:
     model : mujoco.MjModel
     materials : mapping
         Geom name to its `Material`. Geoms of type mesh, sdf, sphere, ellipsoid, capsule, cylinder and box can ripple.
-        Note that MuJoCo collides a mesh geom as its convex hull; type="sdf" collides as the true surface, and so does
-        a rigid flex of the same name on the same body, which then stands for the geom; see `make_collidable`. Impulses
-        are exact with every integrator but RK4.
+        Note that MuJoCo collides a mesh geom as its convex hull. A geom of type="sdf" collides as the true surface, and
+        so does a mesh geom with a rigid flex of the same name on the same body, which collides in its place; see
+        `make_collidable`. Impulses are exact with every integrator but RK4.
     resolution : int or mapping
-        Texels along an edge of the atlas's faces, for all targets or by geom name.
+        Texels along an edge of the atlas's charts, for all targets or by geom name.
     backend, operator, conserve_volume
         As for `WaveSolver`.
     two_way : bool
-        Let the moving surfaces push back on the bodies that touch them or that they reach while risen, through
-        `data.xfrc_applied`. What others have put there stays, as long as they add to it or set it before `step`.
+        Let the moving surfaces push back on the bodies that touch them or are within reach of them while risen, through
+        `data.xfrc_applied`. Forces of others stay there, as long as they are added or are set before `step`.
 
     Raises
     ------
     SceneError
-        For an unknown geom or one that cannot ripple, or where there is no material or resolution for it.
+        For an unknown geom or one that cannot ripple, or a geom without a material or resolution.
     RippleError
         If a geom's mesh is not a closed genus-0 surface, or a wave parameter is invalid.
     """
@@ -63,71 +67,71 @@ class Ripples:
         conserve_volume: bool = True,
         two_way: bool = False,
     ) -> None:
+        check_arguments(model, materials, resolution)
         self.model = model
+        coupled = CoupledModel(model)
         options = {"backend": backend, "operator": operator, "conserve_volume": conserve_volume}
-        _check_arguments(model, materials, resolution)
-        self._geoms = {name: find_target(model, name) for name in materials}
-        self._surfaces: dict[str, RippleSurface] = {}
-        for name, geom in self._geoms.items():
+        geoms = {name: find_target(model, name) for name in materials}
+        self._targets: dict[str, Target] = {}
+        for name, geom in geoms.items():
             n = resolution[name] if isinstance(resolution, Mapping) else resolution
-            self._surfaces[name] = RippleSurface(model, geom, materials[name], n, options)
-            self._warn_of_collisions(name)
-        self._waves = {geom: self._surfaces[name].waves for name, geom in self._geoms.items()}
-        _warn_of_integrator(model)
-        self._sources = Sources(model, self._waves)
-        self._check_speeds = SpeedCheck(model, list(self._waves))
-        self._push_back = PushBack(model, self._waves) if two_way else None
-        self._time: float | None = None
+            self._targets[name] = Target(model, geom, materials[name], n, options)
+            _warn(collision_warning(coupled, geom, self._targets[name].waves.atlas))
+        _warn(integrator_warning(model))
+        # shared with the steps below, which see new waves as soon as they are in here
+        self._waves = {target.geom: target.waves for target in self._targets.values()}
+        self._loads = ContactLoads(coupled, self._waves)
+        self._check_tunnelling = TunnellingCheck(coupled, list(self._waves))
+        self._push_back = PushBack(coupled, self._waves) if two_way else None
+        self._clock = StepClock()
 
     def __getitem__(self, name: str) -> WaveSolver:
         """Waves of a geom, by name."""
-        return self._surface(name).waves
+        return self._target(name).waves
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._geoms)
+        return iter(self._targets)
 
     def __len__(self) -> int:
-        return len(self._geoms)
+        return len(self._targets)
 
     @property
     def geom_ids(self) -> dict[str, int]:
-        """Geom id of every rippling geom, by name."""
-        return dict(self._geoms)
+        """Geom id of every target, by name."""
+        return {name: target.geom for name, target in self._targets.items()}
 
     @property
     def last_impulses(self) -> list[Impulse]:
-        """What was given to the surfaces in the latest step, one record for each pair of geoms."""
-        return self._sources.impulses
+        """The impulses given to the surfaces in the latest step, one record for each pair of geoms."""
+        return self._loads.impulses
 
     def step(self, data: mujoco.MjData) -> None:
-        """Let the contact forces of the physics step just made press on the surfaces; advance the waves to `data.time`.
+        """Apply the contact forces of the latest physics step to the surfaces, and advance the waves to `data.time`.
 
         The forces and poses in `data` after `mj_step` are those at the beginning of that step, over which MuJoCo holds
         the forces: each contact gives normal force times time step. If time has gone backwards (the simulation was
         reset) the waves are reset too; if it stands still, nothing happens.
         """
-        elapsed = self._elapsed(data)
+        elapsed, set_back = self._clock.elapsed(data.time, self.model.opt.timestep)
+        if set_back:
+            self._flatten()
         if elapsed == 0:
-            self._sources.skip()
+            self._loads.skip()
             return
-        self._check_speeds(data)
-        loads = self._sources.loads(data, elapsed)
+        self._check_tunnelling(data)
+        loads = self._loads.loads(data, elapsed)
         if self._push_back is not None:
             for geom, load in self._push_back.withdraw(data):
                 loads[geom] = Load.together([loads[geom], load])
         for geom, waves in self._waves.items():
             waves.step(elapsed, load=loads[geom])
         if self._push_back is not None:
-            self._push_back.apply(data, self._sources.touches, self._waves)
+            self._push_back.apply(data, self._loads.touches, self._waves)
 
     def reset(self) -> None:
-        """Flatten all surfaces."""
-        self._time = None
-        self._sources.clear()
-        if self._push_back is not None:
-            self._push_back.forget()
-        for waves in self._waves.values():
-            waves.reset()
+        """Flatten all surfaces, and let time begin anew."""
+        self._clock.reset()
+        self._flatten()
 
     def change_material(self, name: str, **coefficients: Any) -> None:
         """Change coefficients of a geom's material, by their names in `Material`; height and velocity stay.
@@ -139,11 +143,11 @@ class Ripples:
         SolverError
             For an unknown or invalid coefficient.
         """
-        self._surface(name).change_material(**coefficients)
-        self._renew(name)
+        self._target(name).change_material(**coefficients)
+        self._waves_changed(name)
 
     def make_rigid(self, name: str, point: ArrayLike, radius: float) -> None:
-        """Let a disc of a geom's surface carry no waves: they go round it, and what hits it moves nothing.
+        """Hold a disc of a geom's surface still: waves go round it, and contacts there move nothing.
 
         Parameters
         ----------
@@ -154,100 +158,64 @@ class Ripples:
         radius : float
             Along the surface [m].
         """
-        self._surface(name).make_rigid(point, radius)
-        self._renew(name)
+        self._target(name).make_rigid(point, radius)
+        self._waves_changed(name)
 
     def hold(self, name: str, region: ArrayLike) -> None:
-        """Let a region of a geom's surface carry no waves, as `make_rigid` does with a disc.
+        """Hold a region of a geom's surface still, as `make_rigid` does with a disc.
 
         Parameters
         ----------
         name : str
             Geom.
-        region : bool or float [6, N, N]
-            What is held; from 0 to 1, where only a share of a texel is.
+        region : bool or float [C, n, n]
+            The texels to hold; from 0 to 1 for a share of a texel.
 
         Raises
         ------
         SolverError
-            If the region is of another shape, or holds numbers that are not from 0 to 1.
+            If the region has another shape, or numbers that are not from 0 to 1.
         """
-        self._surface(name).hold(region)
-        self._renew(name)
+        self._target(name).hold(region)
+        self._waves_changed(name)
 
     def change_operator(self, operator: str) -> None:
-        """Take another wave operator on all surfaces, by its name in `WaveSolver`; height and velocity stay.
+        """Change the wave operator on all surfaces, by its name in `WaveSolver`; height and velocity stay.
 
         Raises
         ------
         SolverError
             For an unknown operator.
         """
-        for name in self:
-            self._surfaces[name].change_operator(operator)
-            self._renew(name)
+        for name, target in self._targets.items():
+            target.change_operator(operator)
+            self._waves_changed(name)
 
     def to_geom(self, name: str, point: ArrayLike) -> NDArray[np.float64]:
         """Carry a point [m] from the frame of a geom's body to that of the geom, which MuJoCo chooses for meshes."""
-        return self._surface(name).to_geom(point)
+        return self._target(name).to_geom(point)
 
-    def _surface(self, name: str) -> RippleSurface:
-        if name not in self._surfaces:
+    def _target(self, name: str) -> Target:
+        if name not in self._targets:
             raise SceneError(
-                f"geom {name!r} does not ripple; the rippling geoms are {', '.join(map(repr, self._geoms))}"
+                f"geom {name!r} does not ripple; the rippling geoms are {', '.join(map(repr, self._targets))}"
             )
-        return self._surfaces[name]
+        return self._targets[name]
 
-    def _renew(self, name: str) -> None:
-        """Let everybody know of a surface's new waves."""
-        geom = self._geoms[name]
-        self._waves[geom] = self._surfaces[name].waves
-        self._sources.renew(geom)
+    def _waves_changed(self, name: str) -> None:
+        """Hand a target's new waves to everybody."""
+        target = self._targets[name]
+        self._waves[target.geom] = target.waves
+        self._loads.waves_changed(target.geom)
 
-    def _elapsed(self, data: mujoco.MjData) -> float:
-        """Time since the last step [s]; the first step, and the first after the time was set back, count as one."""
-        timestep = self.model.opt.timestep
-        elapsed = timestep if self._time is None else data.time - self._time
-        if elapsed < 0:
-            self.reset()
-            elapsed = timestep
-        self._time = data.time
-        # a step that is as long as the last one to the last bit spares the solver new coefficients
-        steps = round(elapsed / timestep)
-        return steps * timestep if abs(elapsed - steps * timestep) < 1e-6 * timestep else elapsed
-
-    def _warn_of_collisions(self, name: str) -> None:
-        message, geom = None, self._geoms[name]
-        if geom in shells(self.model):
-            message = shell_warning(self.model, geom)
-        elif collides_as_hull(self.model, geom):
-            message = hull_warning(name, self._surfaces[name].waves.atlas)
-        if message is not None:
-            warnings.warn(message, RippleWarning, stacklevel=3)
+    def _flatten(self) -> None:
+        self._loads.clear()
+        if self._push_back is not None:
+            self._push_back.forget()
+        for waves in self._waves.values():
+            waves.reset()
 
 
-def _check_arguments(
-    model: mujoco.MjModel, materials: Mapping[str, Material], resolution: int | Mapping[str, int]
-) -> None:
-    if not isinstance(model, mujoco.MjModel):
-        raise SceneError(f"model is {type(model).__name__}; valid is a compiled mujoco.MjModel")
-    if not isinstance(materials, Mapping):
-        raise SceneError(f"materials is {type(materials).__name__}; valid is a mapping of geom names to Material")
-    for name in materials:
-        if not isinstance(materials[name], Material):
-            raise SceneError(f"material of geom {name!r} is {materials[name]!r}; valid is a Material")
-        if isinstance(resolution, Mapping) and name not in resolution:
-            raise SceneError(
-                f"resolution has no entry for geom {name!r}; it has {', '.join(map(repr, resolution)) or 'none'}: "
-                "give every rippling geom one, or one number for all"
-            )
-
-
-def _warn_of_integrator(model: mujoco.MjModel) -> None:
-    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-        warnings.warn(
-            "the integrator RK4 averages four contact forces in each step, of which MuJoCo keeps only the last: "
-            'impulses are off by some per cent; use integrator="implicitfast", or a short time step',
-            RippleWarning,
-            stacklevel=3,
-        )
+def _warn(message: str | None) -> None:
+    if message is not None:
+        warnings.warn(message, RippleWarning, stacklevel=3)

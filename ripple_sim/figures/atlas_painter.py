@@ -13,7 +13,7 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from ripple_sim.render.surfaces.ambient_occlusion import bake
-from ripple_sim.render.visuals.primitives import corner_normals
+from ripple_sim.render.visuals.corners import corner_normals
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.texels.cube_map.convention import face_coordinates, texel_directions
 from ripple_sim.solver.texels.stencil import lumped_areas

@@ -11,6 +11,8 @@ import functools
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.render.color import linear_to_srgb
+
 SIZE = 513  # odd: zero has a colour of its own
 
 # lightness, chroma at equal distances from zero; hues of the two arms [degrees]
@@ -44,7 +46,7 @@ def lab_to_srgb(lab: NDArray[np.float64]) -> NDArray[np.float64]:
     f = (lab[..., :1] + 16) / 116 + np.stack([lab[..., 1] / 500, np.zeros(lab.shape[:-1]), -lab[..., 2] / 200], axis=-1)
     xyz = _WHITE * np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29))
     rgb = xyz @ _XYZ_TO_RGB.T
-    return np.where(rgb <= 0.0031308, 12.92 * rgb, 1.055 * np.maximum(rgb, 0.0031308) ** (1 / 2.4) - 0.055)
+    return linear_to_srgb(rgb)
 
 
 def _arm(hue_near: float, hue_end: float) -> NDArray[np.float64]:

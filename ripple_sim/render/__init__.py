@@ -1,7 +1,8 @@
 """Offscreen renderer: a MuJoCo model and its rippled targets, drawn headless into RGB frames."""
 
 from .camera import Camera, FixedCamera
-from .renderer import LIGHTING, Renderer
+from .renderer import Renderer
+from .scene_light import LIGHTING
 from .surfaces.surface import Surface
 from .visuals.looks import LOOKS
 

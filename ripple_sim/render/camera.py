@@ -1,4 +1,4 @@
-"""Where the picture is taken from: MuJoCo's free camera, a camera fixed in the model, or a point of its lens."""
+"""Cameras: MuJoCo's free camera, a camera fixed in the model, or a point of its lens."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ripple_sim.solver.errors import RippleError
 
@@ -17,10 +17,10 @@ from ripple_sim.solver.errors import RippleError
 class Pose:
     """A camera in the world.
 
-    `rotation` has the columns right, up and backwards (OpenGL and MuJoCo alike: it looks along -z), `distance` [m] is
-    how far away lies what the camera is about, and `fovy` the vertical field of view [degrees]. The eye may stand
-    beside the camera's position, at a point of the `lens` (to the right, up) [m]: what lies in the plane at the
-    `focal_distance` [m] then stays where it is in the picture.
+    `rotation` has the columns right, up and backwards (a camera looks along -z, as in OpenGL and MuJoCo), `distance` is
+    that of the focus, the point that the camera is about [m], and `fovy` the vertical field of view [degrees]. The eye
+    may be off the camera's position, at a point of the `lens` (to the right, up) [m]: points of the plane at the
+    `focal_distance` [m] then stay where they are in the frame.
     """
 
     position: NDArray[np.float64]
@@ -32,17 +32,17 @@ class Pose:
 
     @property
     def eye(self) -> NDArray[np.float64]:
-        """The point that the picture is seen from [m], shape [3]."""
+        """Where rays start [m], shape [3]."""
         return self.position + self.rotation[:, :2] @ self.lens
 
     @property
     def shear(self) -> NDArray[np.float64]:
-        """Where the ray through the middle of the picture goes: to the right and up, one metre in front of the eye."""
+        """How far the ray through the middle of the frame goes right and up, a metre in front of the eye."""
         return -np.divide(self.lens, self.focal_distance)
 
     @property
     def focus(self) -> NDArray[np.float64]:
-        """The point that the camera is about [m], shape [3]."""
+        """Point that the camera is about [m], shape [3]."""
         return self.position - self.distance * self.rotation[:, 2]
 
 
@@ -55,7 +55,7 @@ class Viewpoint(Protocol):
 
 @dataclass(frozen=True)
 class Camera:
-    """MuJoCo's free camera: it looks at a point from a distance [m] under an azimuth and an elevation [degrees].
+    """MuJoCo's free camera: looks at a point from a distance [m], at an azimuth and an elevation [degrees].
 
     At azimuth 0 it looks along +x, at 90 along +y; a negative elevation looks down.
     """
@@ -86,7 +86,7 @@ class Camera:
 
     @staticmethod
     def from_mjcf(model: Any, data: Any, name: str) -> FixedCamera:
-        """Return the camera called `name` of a MuJoCo model, as it stands in `data`.
+        """Return the camera called `name` of a MuJoCo model, as posed in `data`.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class FixedCamera:
 
 @dataclass(frozen=True)
 class ThroughLens:
-    """A camera whose eye stands at a point of its lens (to the right, up) [m], focused on a distance [m]."""
+    """A camera whose eye is at a point of its lens (to the right, up) [m], focused on a distance [m]."""
 
     camera: Viewpoint
     lens: tuple[float, float]
@@ -130,36 +130,3 @@ class ThroughLens:
     def pose(self) -> Pose:
         """Return position and axes in the world."""
         return dataclasses.replace(self.camera.pose(), lens=self.lens, focal_distance=self.focal_distance)
-
-
-def view_matrix(pose: Pose) -> NDArray[np.float64]:
-    """World to eye coordinates, shape [4, 4], for column vectors."""
-    view = np.eye(4)
-    view[:3, :3] = pose.rotation.T
-    view[:3, 3] = -pose.rotation.T @ pose.eye
-    return view
-
-
-def perspective(
-    fovy: float, aspect: float, near: float, far: float, shear: ArrayLike = (0.0, 0.0)
-) -> NDArray[np.float64]:
-    """Eye to clip coordinates in OpenGL's convention, shape [4, 4], for column vectors.
-
-    `fovy` in degrees; `aspect` is width over height; `near` and `far` in metres; for `shear` see `Pose`.
-    """
-    scale = 1.0 / np.tan(np.radians(fovy) / 2)
-    projection = np.zeros((4, 4))
-    projection[0, 0] = scale / aspect
-    projection[1, 1] = scale
-    projection[:2, 2] = np.multiply([scale / aspect, scale], shear)
-    projection[2, 2] = (near + far) / (near - far)
-    projection[2, 3] = 2 * near * far / (near - far)
-    projection[3, 2] = -1.0
-    return projection
-
-
-def orthographic(half_width: float, depth: float) -> NDArray[np.float64]:
-    """Eye to clip coordinates of a square box from 0 to `depth` [m] in front of the eye, shape [4, 4]."""
-    return np.diag([1 / half_width, 1 / half_width, -2 / depth, 1.0]) + np.array(
-        [[0.0] * 4, [0.0] * 4, [0.0, 0.0, 0.0, -1.0], [0.0] * 4]
-    )

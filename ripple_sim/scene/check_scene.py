@@ -6,7 +6,7 @@ from pathlib import Path
 
 import mujoco
 
-from ripple_sim.coupling.model.target import find_target
+from ripple_sim.coupling.model.geoms import find_target
 from ripple_sim.errors import SceneError
 
 from .camera import check_camera

@@ -117,7 +117,7 @@ class Film:
             if self._request.heatmap and shot.exposure == 0:
                 geoms = self.simulations[number].ripples.geom_ids
                 for name, heatmap in shot.notes.heatmaps[number].items():
-                    source.renderer.set_field(geoms[name], heatmap, shot.notes.heatmap_scale.value)
+                    source.renderer.set_heatmap(geoms[name], heatmap, shot.notes.heatmap_scale.value)
             source.submit(snapshot)
         self._submitted.append(shot)
         self.seconds += time.perf_counter() - start
@@ -158,7 +158,7 @@ class Film:
         """A target's surface with the heatmap and the grid that the request asks for."""
         return dataclasses.replace(
             surface,
-            field_colors=color_table() if self._request.heatmap else None,
+            heatmap_colors=color_table() if self._request.heatmap else None,
             grid=grid_spacing(surface.resolution) if self._request.grid else 0,
         )
 

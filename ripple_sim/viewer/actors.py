@@ -9,8 +9,8 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from ripple_sim.render.visuals.geoms import shape_of, sizes
-from ripple_sim.render.visuals.visual import geom_piece, visible_geoms
+from ripple_sim.render.visuals.shapes import shape_of, sizes
+from ripple_sim.render.visuals.visual import geom_visual, visible_geoms
 
 from .floor import add_floor, is_endless
 from .session import Session
@@ -44,7 +44,7 @@ class BodyActors:
         for geom in visible_geoms(model):
             if geom in session.simulation.ripples.geom_ids.values():
                 continue
-            rgba = geom_piece(model, geom).rgba
+            rgba = geom_visual(model, geom).rgba
             if is_endless(model, geom, reach):
                 position, rotation = self._pose(geom)
                 self._actors[geom] = add_floor(plotter, (middle - position) @ rotation, reach, rgba)
@@ -127,7 +127,7 @@ _SHADING: dict[str, Any] = {"ambient": 0.32, "diffuse": 0.75, "specular": 0.3, "
 
 def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
     """Surface of a geom in its frame [m], with normals; None for types that cannot be drawn."""
-    piece = geom_piece(model, geom)
+    piece = geom_visual(model, geom)
     found = shape_of(model, piece)
     if found is None:
         return None

@@ -9,7 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.model.target import find_target
+from ripple_sim.coupling.model.geoms import find_target
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.load_scene import load_scene, shipped_scenes

@@ -7,17 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.surfaces.tessellation import subdivide
-from ripple_sim.render.visuals.primitives import corner_normals
+from ripple_sim.render.surfaces.vertices import DIRECTION, NORMAL, POSITION, SPHERE, tessellated
+from ripple_sim.render.visuals.corners import smooth_normals
 from ripple_sim.solver import Atlas, HeightMap
 from ripple_sim.solver.kernel import Floats32, Ints32, kernel
 from ripple_sim.solver.texels.cube_map.convention import face_coordinates
 
 # Software OpenGL draws this many triangles 30 times a second beside the simulation, on two cores.
 MAX_TRIANGLES = 24_000
-
-# columns of the vertex attributes while the mesh is refined
-_POSITION, _DIRECTION, _SPHERE, _NORMAL = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 
 
 class Skin:
@@ -40,13 +37,21 @@ class Skin:
     """
 
     def __init__(self, atlas: Atlas) -> None:
-        self.F, vertices = _refined(atlas)
-        for columns in (_DIRECTION, _NORMAL):  # those of midpoints are means
+        mesh = atlas.mesh
+        self.F, vertices, _ = tessellated(
+            mesh.V,
+            mesh.F,
+            atlas.sphere,
+            smooth=smooth_normals(mesh.V, mesh.F),
+            max_length=float(np.sqrt(atlas.areas.mean())),
+            max_faces=MAX_TRIANGLES,
+        )
+        for columns in (DIRECTION, NORMAL):  # those of midpoints are means
             vertices[:, columns] /= np.linalg.norm(vertices[:, columns], axis=1, keepdims=True)
         rest, direction, normals = (
-            np.ascontiguousarray(vertices[:, columns], dtype=np.float32) for columns in (_POSITION, _DIRECTION, _NORMAL)
+            np.ascontiguousarray(vertices[:, columns], dtype=np.float32) for columns in (POSITION, DIRECTION, NORMAL)
         )
-        self._rest = _Rest(rest, direction, normals, *_bilinear(vertices[:, _SPHERE], atlas.resolution))
+        self._rest = _Rest(rest, direction, normals, *_bilinear(vertices[:, SPHERE], atlas.resolution))
         self._height_map = HeightMap(atlas)
         self.points, self.normals = rest.copy(), normals.copy()
         self.height = np.zeros(len(vertices), np.float32)
@@ -55,27 +60,6 @@ class Skin:
         """Follow a height field, float32 [6, N, N], in metres."""
         height_map = self._height_map(height).reshape(-1, 4)
         _displace(height_map, self._rest, self.points, self.normals, self.height)
-
-
-def _refined(atlas: Atlas) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Triangles and vertex attributes (see the columns above), with vertices split where normals jump."""
-    V, F = atlas.mesh.V, atlas.mesh.F
-    smooth = np.zeros_like(V)
-    smooth[F] = corner_normals(V, F, crease=180.0)
-    corners = np.concatenate([F[:, :, None], corner_normals(V, F)], axis=2).reshape(-1, 4)
-    unique, index = np.unique(corners, axis=0, return_inverse=True)
-    vertex = unique[:, 0].astype(np.int64)
-    attributes = np.concatenate([V[vertex], smooth[vertex], atlas.sphere[vertex], unique[:, 1:]], axis=1)
-    faces, attributes, _ = subdivide(
-        index.reshape(F.shape),
-        attributes,
-        np.arange(len(unique)),
-        position=_POSITION,
-        normal=_NORMAL,
-        max_length=float(np.sqrt(atlas.areas.mean())),
-        max_faces=MAX_TRIANGLES,
-    )
-    return faces, attributes
 
 
 def _bilinear(directions: NDArray[np.float64], n: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

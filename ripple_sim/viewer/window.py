@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ripple_sim.solver import RippleError
+from ripple_sim.solver.gl import is_software
 
 from .actions import Actions
 from .canvas import Canvas
@@ -14,7 +15,6 @@ from .session import Session
 from .sliders import add_sliders
 
 _MULTISAMPLES = 8
-_SOFTWARE = ("llvmpipe", "softpipe", "swrast")
 
 
 class Window(Canvas):
@@ -49,7 +49,7 @@ class Window(Canvas):
     def open(self) -> None:
         """Show the window."""
         self.plotter.show(interactive_update=True, auto_close=False, interactive=False)
-        if not any(word in self.gl_renderer for word in _SOFTWARE):
+        if not is_software(self.gl_renderer):
             self.plotter.render_window.SetMultiSamples(_MULTISAMPLES)
         # the loop draws, once a frame; sliders and the camera would draw at every movement of the pointer
         self.plotter.iren.interactor.EnableRenderOff()

@@ -1,11 +1,7 @@
-"""The OpenGL context: created here, entered here, checked here, and slot_scratch else."""
+"""The OpenGL context: created here, entered here, checked here, and nowhere else."""
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
-import functools
-import importlib.resources
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -14,12 +10,10 @@ import moderngl
 
 from ripple_sim.solver.errors import GLError
 
+from .drivers import is_software
+from .egl import create_context, current_context, load_egl
 from .fence import Fences
-
-_SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swr", "software")
-
-# The plain sonames first; the versioned ones are what runtime packages without -dev symlinks install.
-_LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
+from .shader import load_shader
 
 
 class GLContext:
@@ -41,28 +35,27 @@ class GLContext:
     """
 
     def __init__(self, device: int | None = None) -> None:
-        self._ctx = _create_context(device)
+        self._ctx = create_context(device)
         # objects may be collected in any thread, at any time; they are freed when the context is next entered
         self._ctx.gc_mode = "context_gc"
-        self._handle = _current_context()
+        self._handle = current_context()
         info = self._ctx.info
         self.renderer: str = info["GL_RENDERER"]
         self.vendor: str = info["GL_VENDOR"]
         self.version: str = info["GL_VERSION"]
         self._depth = 0
-        self._fences = Fences(_egl().eglGetProcAddress)
+        self._fences = Fences(load_egl().eglGetProcAddress)
         self._shared_shaders: dict[str, moderngl.ComputeShader] = {}
 
     @property
     def software(self) -> bool:
         """Whether the driver renders on the CPU. EGL falls back to that without saying so."""
-        name = self.renderer.lower()
-        return any(word in name for word in _SOFTWARE_RENDERERS)
+        return is_software(self.renderer)
 
     def __enter__(self) -> moderngl.Context:
         if self._depth == 0:
             self._ctx.__enter__()
-            if _current_context() != self._handle:
+            if current_context() != self._handle:
                 raise GLError(
                     f"the OpenGL context on {self.renderer} is lost; something else in this process has ended EGL (a "
                     "pyvista or VTK window does): run one of the two in a process of its own"
@@ -110,7 +103,7 @@ class GLContext:
             self._fences.wait(fence)
 
     def compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
-        """Compile `shaders/{name}.glsl` of `package` as a compute shader with `#define`s put in."""
+        """Compile `{name}.glsl` below `package` as a compute shader; see `load_shader`."""
         return self._compute_shader(name, load_shader(package, name, **defines))
 
     def shared_compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
@@ -121,7 +114,7 @@ class GLContext:
         return self._shared_shaders[source]
 
     def program(self, package: str, vertex: str, fragment: str, **defines: object) -> moderngl.Program:
-        """Compile and link a vertex and a fragment shader from `shaders/` of `package`."""
+        """Compile and link a vertex and a fragment shader from below `package`; see `load_shader`."""
         vertex_source = load_shader(package, vertex, **defines)
         fragment_source = load_shader(package, fragment, **defines)
         with self as ctx:
@@ -142,70 +135,11 @@ class GLContext:
                 collected.release()
 
 
-def load_shader(package: str, name: str, **defines: object) -> str:
-    """Read a GLSL file, resolve its `#include "file.glsl"` lines, and put the defines behind `#version`."""
-    text = _read_shader(package, name)
-    head, _, body = text.partition("\n")
-    if not head.startswith("#version"):
-        raise GLError(f"shader {package}/shaders/{name}.glsl must start with #version, found {head!r}")
-    lines = "".join(f"#define {key} {value}\n" for key, value in defines.items())
-    return f"{head}\n{lines}{body}"
-
-
-def _read_shader(package: str, name: str) -> str:
-    path = importlib.resources.files(package) / "shaders" / f"{name}.glsl"
-    lines = []
-    for line in path.read_text().splitlines():
-        if line.startswith("#include"):
-            lines.append(_read_shader(package, line.split('"')[1].removesuffix(".glsl")))
-        else:
-            lines.append(line)
-    return "\n".join(lines) + "\n"
-
-
 def _compiled(name: str, compile_shader: Callable[[], Any]) -> Any:
     try:
         return compile_shader()
     except moderngl.Error as error:
         raise GLError(f"shader {name} does not compile: {error}") from error
-
-
-def _create_context(device: int | None) -> moderngl.Context:
-    devices = range(8) if device is None else [device]
-    reasons = []
-    for libraries in _LIBRARIES:
-        for index in devices:
-            try:
-                # moderngl's hints know nothing of the keywords that its backends take
-                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}
-                return moderngl.create_context(require=430, standalone=True, **settings)
-            except Exception as error:  # moderngl raises bare Exception here
-                reasons.append(str(error))
-                if "not loaded" in str(error):
-                    break
-    reason = reasons[-1] if reasons else "no device"
-    if device is not None:
-        raise GLError(f"no OpenGL 4.3 context on EGL device {device} ({reason}); devices are counted from 0")
-    raise GLError(
-        f"no OpenGL 4.3 context on any EGL device ({reason}); "
-        "install Mesa with: apt-get install libegl1 libgl1 libgl1-mesa-dri libegl-mesa0"
-    )
-
-
-def _current_context() -> int | None:
-    """Handle of the EGL context that is current in this thread; None if there is none."""
-    return _egl().eglGetCurrentContext()
-
-
-@functools.cache
-def _egl() -> ctypes.CDLL:
-    """The library that moderngl has loaded already."""
-    for libraries in _LIBRARIES:
-        with contextlib.suppress(OSError):
-            egl = ctypes.CDLL(libraries.get("libegl", "libEGL.so"))
-            egl.eglGetCurrentContext.restype = egl.eglGetProcAddress.restype = ctypes.c_void_p
-            return egl
-    raise GLError("the EGL library has vanished since the context was made; see `ripple-sim info`")
 
 
 _shared: dict[int | None, GLContext] = {}

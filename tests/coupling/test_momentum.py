@@ -5,6 +5,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from mujoco_models import mesh_asset
 
 from ripple_sim import Material, Ripples, make_collidable
 from ripple_sim.errors import RippleWarning
@@ -34,11 +35,6 @@ TARGETS = {
 }
 # contact springs of 200 rad/s that throw back with about this share of the speed
 SOLREF = {0.0: "0.02 1", 0.5: "0.023 0.215", 0.9: "0.149 0.0335"}
-
-
-def mesh_asset(name: str, V: np.ndarray, F: np.ndarray) -> str:
-    vertices = " ".join(f"{x:.5g}" for x in V.ravel())
-    return f'<mesh name="{name}" vertex="{vertices}" face="{" ".join(map(str, F.ravel()))}"/>'
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +91,7 @@ def drop(
 def test_impulses_are_the_bodys_change_of_momentum(assets: str, target: str, body: str, restitution: float) -> None:
     given, change, surface, _ = drop(assets, target, body, restitution)
     assert given == pytest.approx(change, rel=0.03)
-    # a body that stays is owed a little; one that has bounced off is owed nothing
+    # there is a little deficit under a body that stays, and none under one that has bounced off
     assert surface == pytest.approx(-given, rel=0.03 if restitution == 0 else 1e-5)
 
 

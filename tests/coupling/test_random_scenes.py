@@ -5,6 +5,7 @@ import dataclasses
 import mujoco
 import numpy as np
 import pytest
+from mujoco_models import mesh_asset, vector
 
 from ripple_sim import Material, Ripples
 from ripple_sim.scenes.shapes import limbed, peanut
@@ -54,14 +55,7 @@ def assets() -> str:
     V, F = peanut(0.06)
     egg = 0.3 * V / np.linalg.norm(V, axis=1, keepdims=True) * [1.0, 0.8, 0.7]
     meshes = {"animal": limbed(0.05), "peanut": (V, F), "egg": (egg, F), "small egg": (0.2 * egg, F)}
-    return "".join(
-        f'<mesh name="{name}" vertex="{vector(V.ravel())}" face="{" ".join(map(str, F.ravel()))}"/>'
-        for name, (V, F) in meshes.items()
-    )
-
-
-def vector(values: np.ndarray) -> str:
-    return " ".join(f"{x:.6g}" for x in values)
+    return "".join(mesh_asset(name, *mesh) for name, mesh in meshes.items())
 
 
 def scene(assets: str, rng: np.random.Generator, kind: str, mount: str) -> mujoco.MjModel:

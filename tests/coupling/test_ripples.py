@@ -4,28 +4,11 @@ import igl
 import mujoco
 import numpy as np
 import pytest
+from mujoco_models import BALL, limbed_asset, model_of
 
-from ripple_sim import Material, RippleError, Ripples
-from ripple_sim.coupling.contacts.geom_contacts import pressing_contacts, smallest_extents
-from ripple_sim.coupling.patches.clusters import cluster
-from ripple_sim.scenes.shapes import limbed
+from ripple_sim import Material, Ripples
 
 GRAVITY = 9.81
-
-
-def model_of(worldbody: str, asset: str = "", option: str = "") -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(
-        f"""<mujoco><compiler angle="degree"/>
-        <option timestep="0.001" sdf_initpoints="10" {option}/>
-        <default><geom solref="0.01 0.3"/></default>
-        <asset>{asset}</asset><worldbody>{worldbody}</worldbody></mujoco>"""
-    )
-
-
-def limbed_asset(transform: str = "") -> str:
-    V, F = limbed(0.03)
-    vertices = " ".join(f"{x:.6g}" for x in V.ravel())
-    return f'<mesh name="limbed" vertex="{vertices}" face="{" ".join(map(str, F.ravel()))}" {transform}/>'
 
 
 def impulses(model: mujoco.MjModel, geom: str, seconds: float, **options):
@@ -49,9 +32,6 @@ def texels_apart(ripples: Ripples, geom: str, texel: tuple[int, int, int], point
     block = atlas.padded_positions[face, row : row + 3, column : column + 3]
     width = np.nanmax(np.linalg.norm(block - center, axis=-1))
     return float(np.linalg.norm(center - point) / width)
-
-
-BALL = '<body name="ball" pos="{}"><freejoint/><geom name="ball" type="sphere" size="0.05" mass="0.3"/></body>'
 
 
 def test_ball_on_a_sphere_hits_the_texel_under_it() -> None:
@@ -225,27 +205,6 @@ def test_two_targets_that_touch_both_ripple() -> None:
     assert all(ripples[name].height.any() for name in ripples)
 
 
-def test_contact_that_only_says_how_hard_to_stop_a_body_presses_where_it_is() -> None:
-    """MuJoCo's speculative contacts have a made-up overlap of metres, which must not carry their points away."""
-    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0.1 0 0.53"))
-    data = mujoco.MjData(model)
-    mujoco.mj_step(model, data)
-    is_target, extents = np.array([True, False]), smallest_extents(model)
-    [before] = pressing_contacts(model, data, is_target, extents).values()
-    data.contact.dist[:] = -7.0
-    [after] = pressing_contacts(model, data, is_target, extents).values()
-    np.testing.assert_array_equal(after.forces, before.forces)
-    assert np.linalg.norm(after.points - before.points) < 1.5 * 0.05
-
-
-def test_far_contacts_of_one_pair_stay_apart_and_add_up() -> None:
-    points = np.array([[0, 0, 0], [0.01, 0, 0], [1.0, 0, 0]])
-    forces = np.array([1.0, 3.0, 2.0])
-    middles, totals = cluster(points, forces, 0.05)
-    np.testing.assert_allclose(totals, [4.0, 2.0])
-    np.testing.assert_allclose(middles, [[0.0075, 0, 0], [1, 0, 0]])
-
-
 def test_reset_of_the_simulation_resets_the_waves() -> None:
     model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 0.6"))
     ripples, data, record = impulses(model, "target", 0.2, resolution=16)
@@ -267,40 +226,6 @@ def test_waves_keep_pace_with_the_clock() -> None:
     assert ripples["target"].time == pytest.approx(data.time)
 
 
-@pytest.mark.parametrize(
-    ("geom", "message"),
-    [("nothing", "named geoms are 'target', 'ball'"), ("floor", "plane, which cannot ripple")],
-)
-def test_geoms_that_cannot_ripple_are_refused_by_name(geom: str, message: str) -> None:
-    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
-    if geom == "floor":
-        model = model_of('<geom name="floor" type="plane" size="1 1 1"/>' + BALL.format("0 0 2"))
-    with pytest.raises(RippleError, match=message):
-        Ripples(model, {geom: Material()}, resolution=8)
-
-
-def test_unknown_key_lists_the_rippling_geoms() -> None:
-    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
-    with pytest.raises(RippleError, match="'target'"):
-        Ripples(model, {"target": Material()}, resolution=8, backend="cpu")["ball"]
-
-
-@pytest.mark.parametrize(
-    ("materials", "options", "message"),
-    [
-        ({"target": 1.0}, {}, "material of geom 'target' is 1.0; valid is a Material"),
-        (["target"], {}, "materials is list; valid is a mapping of geom names to Material"),
-        ({"target": Material()}, {"resolution": {}}, "resolution has no entry for geom 'target'; it has none"),
-        ({"target": Material()}, {"resolution": {"ball": 8}}, "it has 'ball'"),
-        ({"target": Material()}, {"resolution": "fine"}, "resolution is 'fine'"),
-    ],
-)
-def test_arguments_of_a_wrong_kind_are_named(materials, options: dict, message: str) -> None:
-    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
-    with pytest.raises(RippleError, match=message):
-        Ripples(model, materials, backend="cpu", **options)
-
-
 def test_second_step_at_the_same_time_does_nothing() -> None:
     model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 0.549"))
     data = mujoco.MjData(model)
@@ -317,26 +242,6 @@ def test_second_step_at_the_same_time_does_nothing() -> None:
     assert ripples["target"].time == pytest.approx(data.time)
 
 
-def test_material_may_change_under_a_body_at_rest() -> None:
-    """What the surface has not got yet of a long contact is not lost."""
-    momenta = []
-    for change in (False, True):
-        model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 0.6"))
-        data = mujoco.MjData(model)
-        ripples = Ripples(
-            model, {"target": Material(density=50.0)}, resolution=16, backend="cpu", conserve_volume=False
-        )
-        for step in range(800):
-            mujoco.mj_step(model, data)
-            ripples.step(data)
-            if change and step == 300:
-                ripples.change_material("target", speed=2.0)
-        momenta.append(ripples["target"].momentum())
-    assert momenta[1] == pytest.approx(momenta[0], rel=1e-4)
-    with pytest.raises(RippleError, match="no coefficient 'sped'; valid are speed, damping"):
-        ripples.change_material("target", sped=1.0)
-
-
 def test_the_same_scene_gives_the_same_bits() -> None:
     heights = []
     for _ in range(2):
@@ -345,23 +250,3 @@ def test_the_same_scene_gives_the_same_bits() -> None:
         assert record
         heights.append(ripples["target"].height)
     np.testing.assert_array_equal(heights[0], heights[1])
-
-
-@pytest.mark.parametrize(
-    ("kind", "size", "volume", "half_extents"),
-    [
-        ("box", (0.2, 0.3, 0.1), 8 * 0.006, (0.2, 0.3, 0.1)),
-        ("capsule", (0.1, 0.2), np.pi * 0.01 * (0.4 + 0.4 / 3), (0.1, 0.1, 0.3)),
-        ("cylinder", (0.2, 0.1), 2 * np.pi * 0.004, (0.2, 0.2, 0.1)),
-        ("ellipsoid", (0.3, 0.2, 0.1), 4 / 3 * np.pi * 0.006, (0.3, 0.2, 0.1)),
-    ],
-)
-def test_primitives_ripple_on_their_own_surface(
-    kind: str, size: tuple[float, ...], volume: float, half_extents: tuple[float, ...]
-) -> None:
-    numbers = " ".join(map(str, size))
-    model = model_of(f'<geom name="target" type="{kind}" size="{numbers}"/>' + BALL.format("0 0 2"))
-    mesh = Ripples(model, {"target": Material()}, resolution=24, backend="cpu")["target"].atlas.mesh
-    assert mesh.volume == pytest.approx(volume, rel=0.005)
-    np.testing.assert_allclose(mesh.V.max(axis=0), half_extents, rtol=0.01)
-    np.testing.assert_allclose(mesh.V.min(axis=0), np.negative(half_extents), rtol=0.01)

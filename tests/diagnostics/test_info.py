@@ -8,6 +8,7 @@ from ripple_sim.cli import main as cli
 from ripple_sim.diagnostics import info
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import context as gl
+from ripple_sim.solver.gl import egl
 from ripple_sim.solver.waves.backends import backend
 
 
@@ -15,7 +16,7 @@ from ripple_sim.solver.waves.backends import backend
 def no_egl(monkeypatch):
     """Let every EGL library be missing, as on a machine without Mesa."""
     monkeypatch.setattr(gl, "_shared", {})
-    monkeypatch.setattr(gl, "_LIBRARIES", ({"libegl": "libEGL-missing.so", "libgl": "libGL-missing.so"},))
+    monkeypatch.setattr(egl, "_LIBRARIES", ({"libegl": "libEGL-missing.so", "libgl": "libGL-missing.so"},))
 
 
 def report(capsys) -> dict:

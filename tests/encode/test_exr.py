@@ -78,7 +78,7 @@ def render(bodies: str = BODIES, asset: str = "", **options) -> np.ndarray:
     model = mujoco.MjModel.from_xml_string(f"<mujoco>{asset}<worldbody>{bodies}</worldbody></mujoco>")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    with Renderer(shared_context(), model, {}, width=120, height=90, **options) as renderer:
+    with Renderer(shared_context(), model, {}, size=(120, 90), **options) as renderer:
         return renderer.render(data, {}, FRONT)
 
 
@@ -274,7 +274,7 @@ def test_linear_frames_of_the_same_scene_are_the_same() -> None:
 def test_fields_and_grids_are_refused_in_linear_light() -> None:
     model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom size="1"/></worldbody></mujoco>')
     ball = meshes.ball(8)
-    for paint in ({"field_colors": color_table()}, {"grid": 4}):
+    for paint in ({"heatmap_colors": color_table()}, {"grid": 4}):
         surface = Surface(ball.shell, ball.faces, ball.shell, 8, "clay", **paint)
         with pytest.raises(RippleError, match="linear=False"):
-            Renderer(shared_context(), model, {0: surface}, width=32, height=32, linear=True)
+            Renderer(shared_context(), model, {0: surface}, size=(32, 32), linear=True)

@@ -21,7 +21,7 @@ from ripple_sim.overlay.marks import draw_marks, place_marks
 from ripple_sim.overlay.notes import Notebook
 from ripple_sim.overlay.projection import Projection
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.camera import perspective, view_matrix
+from ripple_sim.render.projection import perspective, view_matrix
 from ripple_sim.render.visuals import primitives as meshes
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.overlays import NAMES, parse_request
@@ -82,9 +82,9 @@ def ball_with_field(field: np.ndarray, limit: float) -> np.ndarray:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     ball = meshes.ball(16)
-    surface = Surface(ball.shell, ball.faces, ball.shell, N, "metal", field_colors=color_table())
-    renderer = Renderer(shared_context(), model, {0: surface}, width=200, height=200)
-    renderer.set_field(0, heatmap_texels(field), limit)
+    surface = Surface(ball.shell, ball.faces, ball.shell, N, "metal", heatmap_colors=color_table())
+    renderer = Renderer(shared_context(), model, {0: surface}, size=(200, 200))
+    renderer.set_heatmap(0, heatmap_texels(field), limit)
     return renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0, 40.0))
 
 

@@ -1,5 +1,5 @@
 #version 430
-// The plain way: one thread a texel, everything in storage buffers. v += gain force, then h_next = h + dt v.
+// The plain way: one thread a texel, everything in storage buffers. v += dt gain force, then h_next = h + dt v.
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer Height { float h[]; };
 layout(std430, binding = 1) buffer Velocity { float v[]; };
@@ -20,7 +20,7 @@ void main() {
         + w[n] * (h[p + PADDED] - here) + w[n - CELLS] * (h[p - PADDED] - here)
         + w[ne] * (h[p + PADDED + 1] - here) + w[ne - CELLS - 1] * (h[p - PADDED - 1] - here)
         + w[nw - CELLS] * (h[p - PADDED + 1] - here) + w[nw - 1] * (h[p + PADDED - 1] - here);
-    float kicked = v[p] + gain[(t.z * N + t.y) * N + t.x] * force;
+    float kicked = v[p] + dt * gain[(t.z * N + t.y) * N + t.x] * force;
     v[p] = kicked;
     h_next[p] = here + dt * kicked;
 }

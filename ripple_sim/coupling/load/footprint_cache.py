@@ -1,29 +1,29 @@
-"""The footprints under the bodies that press on a target, used again while their points stay."""
+"""The footprint cache: footprints under the geoms on a target, reused while their points stay."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from ripple_sim.coupling.patches.clusters import squared_distance
-from ripple_sim.solver.waves.footprint import weigh
+from ripple_sim.coupling.patches.contact_patches import LoadPoints
+from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.waves.footprint import TexelGrid, weigh
 
-# A footprint is used again while its point moves by less than this share of a texel.
+# A footprint is reused while its point moves by less than this share of a texel.
 _SAME_PLACE = 0.3
 
 
-class Footprints(NamedTuple):
-    """Footprints, packed; those of a body stand together.
+class FootprintCache(NamedTuple):
+    """Footprints, packed; those of a geom stand together.
 
     Attributes
     ----------
-    bodies : int64 [s]
-        Geom ids of the bodies.
+    geoms : int64 [s]
+        Geom ids.
     points : float64 [s, 3]
-        Where the spots were when the footprints were made [m].
+        Where the load points were when the footprints were made [m].
     radii : float64 [s]
         As they were asked for [m].
     tolerances : float64 [s]
@@ -33,19 +33,19 @@ class Footprints(NamedTuple):
     texels : int64 [t]
         Flat texel indices.
     shares : float64 [t]
-        Of a unit source. They add up to 1 within a footprint, or less where the surface does not move.
+        Of a unit force. They add up to 1 within a footprint, or to less where the surface is not movable.
     """
 
-    bodies: NDArray[np.int64]
-    points: NDArray[np.float64]
-    radii: NDArray[np.float64]
-    tolerances: NDArray[np.float64]
-    begins: NDArray[np.int64]
-    texels: NDArray[np.int64]
-    shares: NDArray[np.float64]
+    geoms: Ints
+    points: Floats
+    radii: Floats
+    tolerances: Floats
+    begins: Ints
+    texels: Ints
+    shares: Floats
 
 
-NO_FOOTPRINTS = Footprints(
+EMPTY_CACHE = FootprintCache(
     np.zeros(0, np.int64),
     np.zeros((0, 3)),
     np.zeros(0),
@@ -56,95 +56,100 @@ NO_FOOTPRINTS = Footprints(
 )
 
 
-@numba.njit(cache=True, nogil=True)
-def used_before(known, spots, states):
-    """Rows of the known footprints that serve again.
+@kernel
+def reusable(cache: FootprintCache, points: LoadPoints, states: np.ndarray) -> tuple[Ints, Ints]:
+    """Rows of the footprints that serve again.
 
     Parameters
     ----------
-    known : Footprints
-    spots : Spots
-        Where bodies touch now.
-    states : BODY [ngeom]
+    cache : FootprintCache
+    points : LoadPoints
+        Where geoms touch now.
+    states : CONTACT_STATE [ngeom]
 
     Returns
     -------
     rows : int64 [n + kept]
-        One for each spot, -1 where none serves, and then those of bodies that have lost touch but have not left.
+        One for each load point, -1 where none serves, and then those of geoms that have lost touch but are still
+        active.
     lost : int64 [l]
-        Spots that none serves, and whose places on the surface are not known either.
+        Load points that no footprint serves, and whose places on the surface are not known either.
     """
-    n, count = len(spots.bodies), len(spots.bodies)
-    rows, touching = np.full(n + len(known.bodies), -1), np.zeros(len(states), np.bool_)
+    n, count = len(points.geoms), len(points.geoms)
+    rows, touching = np.full(n + len(cache.geoms), -1), np.zeros(len(states), np.bool_)
     first = 0
-    for spot in range(n):
-        body = spots.bodies[spot]
-        if not touching[body]:
-            touching[body] = True
-            first = _first_row(known, body)
+    for i in range(n):
+        geom = points.geoms[i]
+        if not touching[geom]:
+            touching[geom] = True
+            first = _first_row(cache, geom)
         row = first
-        while rows[spot] < 0 and row < len(known.bodies) and known.bodies[row] == body:
-            moved = np.sqrt(squared_distance(known.points, row, spots.points, spot))
-            if max(moved, abs(known.radii[row] - spots.radii[spot])) <= known.tolerances[row]:
-                rows[spot] = row
+        while rows[i] < 0 and row < len(cache.geoms) and cache.geoms[row] == geom:
+            moved = np.sqrt(squared_distance(cache.points, row, points.points, i))
+            if max(moved, abs(cache.radii[row] - points.radii[i])) <= cache.tolerances[row]:
+                rows[i] = row
             row += 1
-    for row in range(len(known.bodies)):
-        if states[known.bodies[row]].here and not touching[known.bodies[row]]:
+    for row in range(len(cache.geoms)):
+        if states[cache.geoms[row]].active and not touching[cache.geoms[row]]:
             rows[count] = row
             count += 1
-    return rows[:count], np.flatnonzero((rows[:n] < 0) & (spots.texels < 0))
+    return rows[:count], np.flatnonzero((rows[:n] < 0) & (points.texels < 0))
 
 
-@numba.njit(cache=True, nogil=True)
-def lay(known, spots, rows, grid, carried, scratch):
-    """Footprints by the rows that `used_before` gives, made at the spots' places where none serves.
+@kernel
+def rebuild(
+    cache: FootprintCache, points: LoadPoints, rows: Ints, grid: TexelGrid, movable_area: Floats, scratch: Floats
+) -> FootprintCache:
+    """Footprints by the rows from `reusable`, made at the places of the load points where none serves.
 
     Parameters
     ----------
-    known : Footprints
-    spots : Spots
+    cache : FootprintCache
+    points : LoadPoints
     rows : int64 [s]
     grid : TexelGrid
         Of the target's atlas.
-    carried : float64 [6 N N]
-        Area of each texel that takes up pressure [m^2], 0 where nothing moves.
-    scratch : float64 [6 N N]
+    movable_area : float64 [C n n]
+        Area of each texel that loads move [m^2], 0 where nothing moves.
+    scratch : float64 [C n n]
         See `distance_scratch`.
     """
-    count, room = len(rows), 2 * len(known.texels) + 1024
-    bodies, points = np.empty(count, np.int64), np.empty((count, 3))
+    count, room = len(rows), 2 * len(cache.texels) + 1024
+    geoms, places = np.empty(count, np.int64), np.empty((count, 3))
     radii, tolerances = np.empty(count), np.empty(count)
     begins, all_texels, all_shares = np.zeros(count + 1, np.int64), np.empty(room, np.int64), np.empty(room)
     for i in range(count):
         j = rows[i]
         if j >= 0:
-            bodies[i], points[i], radii[i] = known.bodies[j], known.points[j], known.radii[j]
-            tolerances[i], old = known.tolerances[j], slice(known.begins[j], known.begins[j + 1])
-            texels, shares = known.texels[old], known.shares[old]
+            geoms[i], places[i], radii[i] = cache.geoms[j], cache.points[j], cache.radii[j]
+            tolerances[i], old = cache.tolerances[j], slice(cache.begins[j], cache.begins[j + 1])
+            texels, shares = cache.texels[old], cache.shares[old]
         else:
-            bodies[i], points[i], radii[i] = spots.bodies[i], spots.points[i], spots.radii[i]
-            tolerances[i] = _SAME_PLACE * np.sqrt(grid.areas[spots.texels[i]])
-            texels, weights, _ = weigh(grid, spots.texels[i], spots.places[i], radii[i], scratch)
-            shares = weights * carried[texels]
+            geoms[i], places[i], radii[i] = points.geoms[i], points.points[i], points.radii[i]
+            tolerances[i] = _SAME_PLACE * np.sqrt(grid.areas[points.texels[i]])
+            texels, weights, _ = weigh(grid, points.texels[i], points.places[i], radii[i], scratch)
+            shares = weights * movable_area[texels]
         begins[i + 1] = begins[i] + len(texels)
         while begins[i + 1] > len(all_texels):
-            all_texels, all_shares = _longer(all_texels), _longer(all_shares)
+            all_texels, all_shares = _doubled(all_texels), _doubled(all_shares)
         new = slice(begins[i], begins[i + 1])
         all_texels[new], all_shares[new] = texels, shares
     end = begins[count]
-    return Footprints(bodies, points, radii, tolerances, begins, all_texels[:end], all_shares[:end])
+    return FootprintCache(geoms, places, radii, tolerances, begins, all_texels[:end], all_shares[:end])
 
 
-@numba.njit(cache=True, nogil=True)
-def _first_row(known, body):
+@kernel
+def _first_row(cache: FootprintCache, geom: int) -> int:
+    """First footprint of a geom in the cache, or the number of all."""
     row = 0
-    while row < len(known.bodies) and known.bodies[row] != body:
+    while row < len(cache.geoms) and cache.geoms[row] != geom:
         row += 1
     return row
 
 
-@numba.njit(cache=True, nogil=True)
-def _longer(array):
+@kernel
+def _doubled(array: np.ndarray) -> np.ndarray:
+    """An array with room for twice as many entries."""
     longer = np.empty(2 * len(array), array.dtype)
     longer[: len(array)] = array
     return longer

@@ -1,1 +1,1 @@
-"""Contact patches: the areas on a target that geoms press."""
+"""Contact patches: the areas on a target over which geoms touch it."""

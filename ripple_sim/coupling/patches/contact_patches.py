@@ -1,55 +1,61 @@
-"""The patches of all bodies that press on one target, packed: compiled code goes through them in one call."""
+"""The contact patches of all geoms on one target, packed: compiled code goes through them in one call."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
-from numpy.typing import NDArray
 
-from .clusters import MAX_CONTACTS, probe, spread
+from ripple_sim.coupling.contacts.target_contacts import TargetContacts
+from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
+
+from .clusters import MAX_CLUSTERS
+from .load_points import find_probes, spread
+from .pose import Pose, in_frame
 
 
 class Patches(NamedTuple):
-    """Where bodies may press on a target, before its surface is asked.
+    """Where geoms may load a target, before its surface is asked.
 
     Attributes
     ----------
+    geoms : int64 [p]
+        Geom ids, ascending.
     forces : float64 [p]
-        Normal force of each body [N].
+        Normal force of each geom [N].
     radii : float64 [p]
         Footprint radius of a single contact with it [m].
     begins : int64 [p + 1]
-        The points of body i are those from begins[i] to begins[i + 1].
+        The points of geom i are those from begins[i] to begins[i + 1].
     probes : int64 [p]
-        Where the probes of body i begin among them: what is before is the force-weighted middle of its contacts. Where
-        there is but one corner, that is the middle.
+        Where the probes of geom i begin among them: the point before is the force-weighted middle of its contacts. With
+        a single corner, that is the middle.
     corners : int64 [p]
         How many of the probes are corners.
     points : float64 [m, 3]
         In the target's frame [m].
-    loads : float64 [m]
+    corner_forces : float64 [m]
         Forces at the corners [N], 0 at all other points.
     """
 
-    forces: NDArray[np.float64]
-    radii: NDArray[np.float64]
-    begins: NDArray[np.int64]
-    probes: NDArray[np.int64]
-    corners: NDArray[np.int64]
-    points: NDArray[np.float64]
-    loads: NDArray[np.float64]
+    geoms: Ints
+    forces: Floats
+    radii: Floats
+    begins: Ints
+    probes: Ints
+    corners: Ints
+    points: Floats
+    corner_forces: Floats
 
 
-class Spots(NamedTuple):
-    """Points at which bodies press on a target, 36 of each body at most.
+class LoadPoints(NamedTuple):
+    """Points that carry the forces of the patches, 36 a geom at most.
 
     Attributes
     ----------
     begins : int64 [p + 1]
-        The spots of body i are those from begins[i] to begins[i + 1].
-    bodies : int64 [n]
+        The points of patch i are those from begins[i] to begins[i + 1].
+    geoms : int64 [n]
         The geom id of each.
     points : float64 [n, 3]
         Near the surface, in the target's frame [m].
@@ -63,83 +69,79 @@ class Spots(NamedTuple):
         Flat indices of the texels nearest to them, -1 where they are not known yet.
     """
 
-    begins: NDArray[np.int64]
-    bodies: NDArray[np.int64]
-    points: NDArray[np.float64]
-    forces: NDArray[np.float64]
-    radii: NDArray[np.float64]
-    places: NDArray[np.float64]
-    texels: NDArray[np.int64]
+    begins: Ints
+    geoms: Ints
+    points: Floats
+    forces: Floats
+    radii: Floats
+    places: Floats
+    texels: Ints
 
 
-@numba.njit(cache=True, nogil=True)
-def find_patches(contacts, position, rotation, radii, convex):
-    """Patches of a target's `Contacts`.
+@kernel
+def find_patches(contacts: TargetContacts, pose: Pose, radii: Floats, convex: Bools) -> Patches:
+    """Patches of a target's contacts.
 
     Parameters
     ----------
-    contacts : Contacts
-    position : float64 [3]
-        Of the target in the world [m].
-    rotation : float64 [3, 3]
-        From the target's frame to the world.
+    contacts : TargetContacts
+    pose : Pose
+        Of the target.
     radii : float64 [ngeom]
-        Footprint radius of each geom [m]: the smaller one of a pair counts.
+        Footprint radius of each geom [m]: of a pair the smaller one counts.
     convex : bool [ngeom]
     """
-    bodies = len(contacts.others)
-    most = bodies * (1 + MAX_CONTACTS * (MAX_CONTACTS + 1) // 2)
-    forces, used, points, loads = np.zeros(bodies), np.empty(bodies), np.empty((most, 3)), np.zeros(most)
-    begins, probes, corners = np.zeros(bodies + 1, np.int64), np.empty(bodies, np.int64), np.empty(bodies, np.int64)
-    for i in range(bodies):
+    count = len(contacts.others)
+    most = count * (1 + MAX_CLUSTERS * (MAX_CLUSTERS + 1) // 2)
+    forces, used, points, corner_forces = np.zeros(count), np.empty(count), np.empty((most, 3)), np.zeros(most)
+    begins, probes, corners = np.zeros(count + 1, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
+    for i in range(count):
         first, last = contacts.begins[i], contacts.begins[i + 1]
-        local, pressing = _carried(contacts.points[first:last], position, rotation), contacts.forces[first:last]
+        local, pushing = in_frame(contacts.points[first:last], pose), contacts.forces[first:last]
         middle = np.zeros(3)
         for j in range(len(local)):
-            forces[i] += pressing[j]
-            middle += pressing[j] * local[j]
+            forces[i] += pushing[j]
+            middle += pushing[j] * local[j]
         used[i] = min(radii[contacts.target], radii[contacts.others[i]])
-        at_corners, found = probe(local, pressing, used[i], convex[contacts.others[i]])
+        at_corners, found = find_probes(local, pushing, used[i], convex[contacts.others[i]])
         corners[i] = len(at_corners)
         points[begins[i]] = middle / forces[i]
         probes[i] = row = begins[i] + 1 if corners[i] > 1 else begins[i]
         begins[i + 1] = row + len(found)
         points[row : begins[i + 1]] = found
-        loads[row : row + corners[i]] = at_corners
-    return Patches(forces, used, begins, probes, corners, points[: begins[bodies]], loads[: begins[bodies]])
+        corner_forces[row : row + corners[i]] = at_corners
+    end = begins[count]
+    return Patches(contacts.others, forces, used, begins, probes, corners, points[:end], corner_forces[:end])
 
 
-@numba.njit(cache=True, nogil=True)
-def find_spots(others, patches, surface, texels, share):
-    """Where bodies press, told from the surface points [m, 3] and texels [m] nearest to the points of their patches.
+@kernel
+def find_load_points(patches: Patches, surface: Floats, texels: Ints, share: float) -> LoadPoints:
+    """Points that carry the forces of the patches, multiplied by a share.
 
-    `others` [p] are the geom ids of the bodies; the forces are multiplied by a share.
+    Parameters
+    ----------
+    patches : Patches
+    surface : float64 [m, 3]
+        Surface points nearest to those of the patches [m].
+    texels : int64 [m]
+        Flat indices of the texels nearest to them.
+    share : float
     """
-    most, begins = len(patches.points), np.zeros(len(others) + 1, np.int64)
-    bodies, points, forces, radii = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most), np.empty(most)
+    most, begins = len(patches.points), np.zeros(len(patches.geoms) + 1, np.int64)
+    geoms, points, forces, radii = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most), np.empty(most)
     places, nearest = np.empty((most, 3)), np.full(most, -1)
-    for i in range(len(others)):
+    for i in range(len(patches.geoms)):
         first, last = patches.probes[i], patches.begins[i + 1]
-        loads = share * patches.loads[first : first + patches.corners[i]]
-        at, pressing, radius, rows = spread(loads, patches.points[first:last], surface[first:last], patches.radii[i])
+        at_corners = share * patches.corner_forces[first : first + patches.corners[i]]
+        at, pushing, radius, rows = spread(
+            at_corners, patches.points[first:last], surface[first:last], patches.radii[i]
+        )
         row = begins[i]
-        begins[i + 1] = row + len(pressing)
-        for j in range(len(pressing)):
-            bodies[row + j], points[row + j] = others[i], at[j]
-            forces[row + j], radii[row + j] = pressing[j], radius
+        begins[i + 1] = row + len(pushing)
+        for j in range(len(pushing)):
+            geoms[row + j], points[row + j] = patches.geoms[i], at[j]
+            forces[row + j], radii[row + j] = pushing[j], radius
             if rows[j] >= 0:
                 places[row + j], nearest[row + j] = surface[first + rows[j]], texels[first + rows[j]]
     n = begins[-1]
-    return Spots(begins, bodies[:n], points[:n], forces[:n], radii[:n], places[:n], nearest[:n])
-
-
-@numba.njit(cache=True, nogil=True)
-def _carried(points, position, rotation):
-    """Points in the world [k, 3], carried into a frame."""
-    local = np.empty_like(points)
-    for i in range(len(points)):
-        for k in range(3):
-            local[i, k] = 0.0
-            for j in range(3):
-                local[i, k] += (points[i, j] - position[j]) * rotation[j, k]
-    return local
+    return LoadPoints(begins, geoms[:n], points[:n], forces[:n], radii[:n], places[:n], nearest[:n])

@@ -1,4 +1,4 @@
-"""Support points: which point of a convex geom lies farthest in a direction."""
+"""Support points: the point of a convex geom that lies farthest in a direction."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 _GEOM = mujoco.mjtGeom
 
-# A face or an edge whose slope against the plane is less than this is taken to lie flat: its middle is the point.
+# A side or an edge whose slope against the plane is less than this counts as flat: its middle is the point.
 _FLAT = 0.02
 
 
 def support_point(model: mujoco.MjModel, geom: int, direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Point [m], shape [3], of a geom that lies farthest in a direction: its middle where a whole face does.
+    """Point [m], shape [3], of a geom that lies farthest in a direction: the middle of a side where a whole side does.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def support_point(model: mujoco.MjModel, geom: int, direction: NDArray[np.float6
     geom : int
         A sphere, ellipsoid, capsule, cylinder or box; of a mesh or sdf geom the convex hull counts.
     direction : float64 [3]
-        Unit vector, in the frame of the geom as the result.
+        Unit vector in the frame of the geom, as is the result.
     """
     size = model.geom_size[geom]
     match model.geom_type[geom]:

@@ -1,1 +1,1 @@
-"""Resources on the GPU: buffers, uniform blocks, textures, read-back."""
+"""The GPU's resources: the contract with the shaders, uniform block, G-buffer, textures, read-back."""

@@ -1,48 +1,41 @@
-"""The way back to memory: a ring of pixel buffers, so that a frame comes back while later ones are drawn."""
+"""Read-back: a ring of pixel buffers, so that a frame is copied to memory while later ones are drawn."""
 
 from __future__ import annotations
 
 from collections import deque
 
 import moderngl
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.frame_format import FrameFormat
 from ripple_sim.solver.errors import RippleError
-from ripple_sim.solver.gl import GLContext
+from ripple_sim.solver.kernel import kernel
 
-from .resources import OwnedObjects
+from .resources import Resources
 
 
 class Readback:
     """Frames on their way from the GPU, first in, first out.
 
-    The ring grows to as many buffers as frames are on their way at a time.
+    There are as many buffers as frames were ever on their way at a time.
 
     Parameters
     ----------
-    gl : GLContext
-    ctx : OwnedObjects
-    size : (width, height)
-        [pixels].
-    alpha : bool
-        Whether opacity is kept.
-    linear : bool
-        Whether frames are linear light: they then come back as they are.
+    resources : Resources
+    frame_format : FrameFormat
     """
 
-    def __init__(
-        self, gl: GLContext, ctx: OwnedObjects, size: tuple[int, int], *, alpha: bool, linear: bool = False
-    ) -> None:
-        self._gl, self._ctx, self._alpha, self._linear = gl, ctx, alpha, linear
+    def __init__(self, resources: Resources, frame_format: FrameFormat) -> None:
+        self._gl, self._resources, self._format = resources.gl, resources, frame_format
+        width, height = frame_format.size
         # always four channels: drivers copy those as they are, and convert any other number on the processor
-        self._pixels = np.empty((size[1], size[0], 4), np.uint16 if linear else np.uint8)
+        self._pixels = np.empty((height, width, 4), np.uint16 if frame_format.linear else np.uint8)
         self._free: list[moderngl.Buffer] = []
         self._pending: deque[tuple[moderngl.Buffer, int]] = deque()
 
     def submit(self, frame: moderngl.Framebuffer) -> None:
-        """Have a frame copied as soon as it is drawn; the next one may be drawn over it.
+        """Copy a frame as soon as it is drawn; the next one may be drawn over it.
 
         Parameters
         ----------
@@ -50,10 +43,11 @@ class Readback:
             RGBA8, or RGBA16F of linear light; bottom row first, multiplied by alpha.
         """
         with self._gl:
-            if self._gl.software:  # it would draw the frame in the next call, and keep other Python threads waiting
+            if self._gl.software:  # which would draw the frame in the next call, holding the interpreter's lock
                 self._gl.wait()
-            buffer = self._free.pop() if self._free else self._ctx.buffer(reserve=self._pixels.nbytes, dynamic=True)
-            frame.read_into(buffer, components=4, alignment=1, dtype="f2" if self._linear else "f1")
+            size = self._pixels.nbytes
+            buffer = self._free.pop() if self._free else self._resources.buffer(reserve=size, dynamic=True)
+            frame.read_into(buffer, components=4, alignment=1, dtype=self._format.dtype)
             self._pending.append((buffer, self._gl.put_fence()))
 
     def fetch(self) -> NDArray:
@@ -77,18 +71,18 @@ class Readback:
             self._gl.wait_for(fence)
             buffer.read_into(self._pixels)
         self._free.append(buffer)
-        frame = np.empty((*self._pixels.shape[:2], 4 if self._alpha else 3), self._pixels.dtype)
-        _turn(self._pixels, frame)
-        if self._linear:
+        frame = np.empty((*self._pixels.shape[:2], 4 if self._format.alpha else 3), self._pixels.dtype)
+        _flip(self._pixels, frame)
+        if self._format.linear:
             return frame.view(np.float16)
-        if self._alpha:
-            _straighten(frame)
+        if self._format.alpha:
+            _unpremultiply(frame)
         return frame
 
 
-@numba.njit(cache=True, nogil=True)
-def _turn(pixels, frame):
-    """Copy as many channels as the frame has, the last row first."""
+@kernel
+def _flip(pixels: NDArray, frame: NDArray) -> None:
+    """Copy pixels [height, width, 4] to a frame [height, width, 3 or 4], the last row first."""
     height, width, channels = frame.shape
     for row in range(height):
         source, target = pixels[height - 1 - row], frame[row]
@@ -97,9 +91,9 @@ def _turn(pixels, frame):
                 target[column, channel] = source[column, channel]
 
 
-@numba.njit(cache=True, nogil=True)
-def _straighten(frame):
-    """Divide colours by alpha."""
+@kernel
+def _unpremultiply(frame: NDArray[np.uint8]) -> None:
+    """Divide the colours of a frame [height, width, 4] by alpha."""
     for row in range(frame.shape[0]):
         for column in range(frame.shape[1]):
             alpha = np.float32(max(frame[row, column, 3], 1)) / np.float32(255)

@@ -6,50 +6,66 @@ import contextlib
 import weakref
 from typing import Any
 
+import moderngl
+
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext
 
+from .contract import DEFINES
 
-class OwnedObjects:
-    """A context that remembers what it makes, so that all of it can be released at once.
+_PACKAGE = "ripple_sim.render"
 
-    It has the methods of `moderngl.Context` that make something (`buffer`, `texture`, ...). What still lives when the
-    owner goes out of use is released then.
+
+class Resources:
+    """Creates objects on the GPU and releases all of them at once, at the latest when their owner is collected.
+
+    It has the methods of `moderngl.Context` that create something (`buffer`, `texture`, ...).
 
     Parameters
     ----------
     gl : GLContext
     owner : object
         Whoever uses the objects.
+
+    Attributes
+    ----------
+    gl : GLContext
     """
 
     def __init__(self, gl: GLContext, owner: object) -> None:
-        self._gl = gl
-        self._made: list[Any] = []
-        self._finalizer = weakref.finalize(owner, _release, gl, self._made)
+        self.gl = gl
+        self._created: list[Any] = []
+        self._finalizer = weakref.finalize(owner, _release, gl, self._created)
         self._finalizer.atexit = False
 
     def __getattr__(self, name: str) -> Any:
-        def make(*arguments: Any, **options: Any) -> Any:
-            with self._gl as ctx:
-                return self.own(getattr(ctx, name)(*arguments, **options))
+        def create(*arguments: Any, **options: Any) -> Any:
+            with self.gl as ctx:
+                return self._own(getattr(ctx, name)(*arguments, **options))
 
-        return make
+        return create
 
-    def own(self, made: Any) -> Any:
-        """Remember an object that was made elsewhere, and return it."""
-        self._made.append(made)
-        return made
+    def program(self, vertex: str, fragment: str, **options: object) -> moderngl.Program:
+        """Program of two of the renderer's shaders, by their paths; `options` are defines beside the contract."""
+        return self._own(self.gl.program(_PACKAGE, vertex, fragment, **DEFINES, **options))
+
+    def compute_shader(self, name: str, **options: object) -> moderngl.ComputeShader:
+        """One of the renderer's compute shaders, likewise."""
+        return self._own(self.gl.compute_shader(_PACKAGE, name, **DEFINES, **options))
 
     def release(self) -> None:
         """Release everything; a second time does nothing."""
         self._finalizer()
 
+    def _own(self, created: Any) -> Any:
+        self._created.append(created)
+        return created
 
-def _release(gl: GLContext, made: list[Any]) -> None:
-    with contextlib.suppress(GLError), gl as ctx:  # of a lost context nothing is left to release
+
+def _release(gl: GLContext, created: list[Any]) -> None:
+    with contextlib.suppress(GLError), gl as ctx:  # nothing is left of a lost context
         # a deleted framebuffer must not stay bound
         ctx.detect_framebuffer(0).use()
-        for each in reversed(made):
+        for each in reversed(created):
             each.release()
-        made.clear()
+        created.clear()

@@ -1,56 +1,52 @@
-"""The background where it is smooth: lit for blocks of pixels, and interpolated."""
+"""The background where it is smooth: shaded once for blocks of pixels, and interpolated."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import moderngl
 
-from ripple_sim.render.gpu.resources import OwnedObjects
-from ripple_sim.solver.gl import GLContext
+from ripple_sim.render.gpu.contract import Unit
+from ripple_sim.render.gpu.resources import Resources
 
-_PACKAGE = "ripple_sim.render"
-_UNIT = 15  # of the texture, in shaders/interpolate_fragment.glsl
 _PIXELS = 4  # along an edge of a block
-_UNSURE = 0.002  # weight of a block that is not smooth from which on a pixel is left out
+_UNSURE = 0.002  # weight of a block that is not smooth from which a pixel is left out
 
 
 class CoarseBackground:
-    """Floor and sky in a fraction of the picture's resolution, and how to fill the picture from it.
+    """Floor and sky at a fraction of the frame's resolution, from which the frame is filled.
 
-    Pixels near an edge, a shadow or anything else that is not smooth are left out and marked: they want a pass of their
-    own.
+    Pixels near an edge, a shadow or anything else that is not smooth are left out and marked for another pass.
 
     Parameters
     ----------
-    gl : GLContext
-    ctx : OwnedObjects
+    resources : Resources
     size : (width, height)
-        Of the picture [pixels].
-    options : dict
-        As for the shaders of `Picture`, the depths of its levels among them.
+        Of the frame [pixels].
+    options : mapping
+        Defines as for the shaders of `DeferredShading`.
     """
 
-    def __init__(
-        self, gl: GLContext, ctx: OwnedObjects, size: tuple[int, int], options: dict[str, int | float]
-    ) -> None:
+    def __init__(self, resources: Resources, size: tuple[int, int], options: Mapping[str, object]) -> None:
         blocks = -(-size[0] // _PIXELS), -(-size[1] // _PIXELS)
-        self._texture = ctx.texture(blocks, 4, dtype="f2")
+        self._texture = resources.texture(blocks, 4, dtype="f2")
         self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self._texture.repeat_x = self._texture.repeat_y = False
-        self._target = ctx.framebuffer([self._texture])
+        self._framebuffer = resources.framebuffer([self._texture])
         options = {**options, "UNSURE": _UNSURE, "SHADOW": 0, "COARSE": 1}
-        light = ctx.own(gl.program(_PACKAGE, "view_vertex", "background_fragment", **options))
-        fill = ctx.own(gl.program(_PACKAGE, "screen_vertex", "interpolate_fragment", **options))
-        # the last blocks reach beyond the picture
-        light["span"] = fill["span"] = blocks[0] * _PIXELS / size[0], blocks[1] * _PIXELS / size[1]
-        self._light, self._fill = ctx.vertex_array(light, []), ctx.vertex_array(fill, [])
+        shade = resources.program("glsl/view_vertex", "passes/background_fragment", **options)
+        fill = resources.program("glsl/screen_vertex", "passes/background_fill_fragment", **options)
+        # the last blocks extend beyond the frame
+        shade["span"] = fill["span"] = blocks[0] * _PIXELS / size[0], blocks[1] * _PIXELS / size[1]
+        self._shade, self._fill = resources.vertex_array(shade, []), resources.vertex_array(fill, [])
 
-    def light(self, ctx: moderngl.Context) -> None:
-        """Light the blocks."""
-        self._target.use()
+    def shade(self, ctx: moderngl.Context) -> None:
+        """Shade the blocks."""
+        self._framebuffer.use()
         ctx.enable_only(moderngl.NOTHING)
-        self._light.render(moderngl.TRIANGLES, vertices=3)
+        self._shade.render(moderngl.TRIANGLES, vertices=3)
 
     def fill(self) -> None:
-        """Fill the framebuffer that is in use, where its depth lets it through; mark as a depth what is left out."""
-        self._texture.use(_UNIT)
+        """Fill the framebuffer in use where its depth permits; pixels that are left out are marked as a depth."""
+        self._texture.use(Unit.COARSE_BACKGROUND)
         self._fill.render(moderngl.TRIANGLES, vertices=3)

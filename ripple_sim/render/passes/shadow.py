@@ -1,4 +1,4 @@
-"""The shadow maps of the lamps."""
+"""Shadow maps of the lights."""
 
 from __future__ import annotations
 
@@ -9,35 +9,36 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import orthographic, perspective
+from ripple_sim.render.gpu.contract import Unit
 from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
-from ripple_sim.render.gpu.resources import OwnedObjects
+from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.projection import orthographic, perspective
 from ripple_sim.render.visuals.lights import Light
 
 _SIZE = 1536
 _WIDEST = 0.022  # penumbra, as a share of the map
 _STEEPEST_FOV = 130.0  # [degrees]
-_REACH = 30.0  # how far behind the casters shadows fall, in their radius
+_REACH = 30.0  # how far behind the casters shadows fall, in radii of the casters' ball
 
 
 class ShadowMaps:
-    """Square depth maps, side by side, of the scene as the lamps see it.
+    """Square depth maps, side by side, of the scene as the lights see it.
 
     Parameters
     ----------
-    ctx : OwnedObjects
+    resources : Resources
     count : int
-        How many lamps may cast shadows, 1 to MAX_SHADOWS.
+        How many lights may cast shadows, 1 to MAX_SHADOWS.
     """
 
-    def __init__(self, ctx: OwnedObjects, count: int) -> None:
+    def __init__(self, resources: Resources, count: int) -> None:
         self._count = count
         self._views: list[tuple[float, ...]] = []
-        self._depth = ctx.depth_texture((count * _SIZE, _SIZE))
+        self._depth = resources.depth_texture((count * _SIZE, _SIZE))
         self._depth.compare_func = ""
         self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._target = ctx.framebuffer(depth_attachment=self._depth)
-        self._test = ctx.sampler(
+        self._target = resources.framebuffer(depth_attachment=self._depth)
+        self._test = resources.sampler(
             texture=self._depth,
             compare_func="<=",
             filter=(moderngl.LINEAR, moderngl.LINEAR),
@@ -46,10 +47,7 @@ class ShadowMaps:
         )
 
     def fit(self, frame: FrameUniforms, lights: list[Light], centre: NDArray, radius: float) -> list[Light]:
-        """Aim the maps at a ball [m] that holds all casters, and fill the frame's shadows; return their lights.
-
-        Lights that cast shadows come first.
-        """
+        """Aim the maps at a ball [m] that contains all casters, set the frame's shadows, and return their lights."""
         casting = [light for light in lights if light.shadow][: self._count]
         self._views = []
         for shadow, light in zip(frame.values["shadows"], casting, strict=False):
@@ -61,7 +59,7 @@ class ShadowMaps:
         return casting
 
     def draw(self, draw_depth: Callable[[tuple[float, ...]], None]) -> None:
-        """Draw all maps by a function that draws the casters' depth under a matrix of 16 numbers."""
+        """Draw all maps; `draw_depth` draws the casters' depth under a matrix of 16 numbers."""
         for index, view in enumerate(self._views):
             self._target.viewport = (index * _SIZE, 0, _SIZE, _SIZE)
             self._target.use()
@@ -71,15 +69,15 @@ class ShadowMaps:
 
     def bind(self) -> None:
         """Bind the maps for the shaders, once with and once without the depth test."""
-        self._depth.use(1)
-        self._test.use(1)
-        self._depth.use(2)
+        self._depth.use(Unit.SHADOW_TEST)
+        self._test.use(Unit.SHADOW_TEST)
+        self._depth.use(Unit.SHADOW_MAPS)
 
 
 def _fit_far(shadow: NDArray, light: Light, centre: NDArray, radius: float) -> NDArray[np.float64]:
-    """Cover the ball by a box that grows in coarse steps and moves by whole texels: shadow edges do not crawl.
+    """Fit a box to the ball; it grows in coarse steps and moves by whole texels, so that shadow edges do not crawl.
 
-    It reaches behind the ball, where the shadows fall.
+    It extends behind the ball, where the shadows fall.
     """
     half_width = 2.0 ** (np.ceil(4 * np.log2(radius)) / 4)
     texel = 2 * half_width / _SIZE
@@ -95,7 +93,7 @@ def _fit_far(shadow: NDArray, light: Light, centre: NDArray, radius: float) -> N
 
 
 def _fit_near(shadow: NDArray, light: Light, centre: NDArray, radius: float) -> NDArray[np.float64]:
-    """Cover the ball by the lamp's view of it, no wider than its beam."""
+    """Fit the light's view to the ball, no wider than its beam."""
     position: Any = light.position
     away = float(np.linalg.norm(centre - position))
     towards = light.direction if away < radius else (position - centre) / away
@@ -120,7 +118,7 @@ def _axes(back: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _view(rotation: NDArray[np.float64], eye: NDArray[np.float64]) -> NDArray[np.float64]:
-    """World to eye coordinates; `eye` is the eye's place along the rows of `rotation`."""
+    """World to eye coordinates; `eye` is the eye's position along the rows of `rotation`."""
     view = np.eye(4)
     view[:3, :3] = rotation
     view[:3, 3] = -eye

@@ -1,4 +1,4 @@
-"""How open a mesh's surface is to its surroundings, and how thick it is: baked once with rays."""
+"""Ambient occlusion and thickness of a mesh, baked once with rays."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def bake(V: NDArray, F: NDArray, normals: NDArray) -> tuple[NDArray[np.float64],
 
     Returns
     -------
-    openness : array, shape [n]
-        Share of the outer hemisphere from which light arrives, 0 to 1.
+    visibility : array, shape [n]
+        Ambient visibility, 1 - occlusion: share of the outer hemisphere from which light arrives.
     thickness : array, shape [n]
         Mean length of the inner rays over the mesh's bounding radius.
     """
@@ -32,12 +32,12 @@ def bake(V: NDArray, F: NDArray, normals: NDArray) -> tuple[NDArray[np.float64],
         return np.minimum(hits / radius, 4.0).reshape(len(V), count)
 
     # nearby walls hide the light, those further than a radius away reflect some themselves
-    openness = np.minimum(distances(1.0), 1.0).mean(axis=1)
-    return _smoothed(openness, F), _smoothed(distances(-1.0).mean(axis=1), F)
+    visibility = np.minimum(distances(1.0), 1.0).mean(axis=1)
+    return _smoothed(visibility, F), _smoothed(distances(-1.0).mean(axis=1), F)
 
 
 def _hemisphere(normals: NDArray, count: int) -> NDArray[np.float64]:
-    """Spiral of cosine-distributed directions about every normal, turned differently at every vertex."""
+    """Cosine-distributed directions on a spiral about every normal, turned differently at every vertex."""
     index = np.arange(count) + 0.5
     golden = np.pi * (3 - np.sqrt(5))
     turn = index * golden + (np.arange(len(normals)) * golden)[:, None]

@@ -1,4 +1,4 @@
-"""What is drawn as a target: its geometry, its look, and the picture that it wears."""
+"""The surface of a target as it is drawn: geometry, look and texture."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ripple_sim.render.gpu.color import linear, srgb_texture
-from ripple_sim.render.gpu.resources import OwnedObjects
+from ripple_sim.render.color import srgb_to_linear
+from ripple_sim.render.gpu.contract import MappingKind
+from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.gpu.textures import srgb_texture
 from ripple_sim.render.visuals.looks import MODEL_LOOK, Look, find_look
 from ripple_sim.render.visuals.materials import look_of
-from ripple_sim.render.visuals.texture_mapping import FLAT_IMAGE, NO_IMAGE, Mapping, mapping_of
-from ripple_sim.render.visuals.visual import geom_piece
+from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of
+from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.solver.errors import RippleError
 
-from .scalar_field import UNDER_COLORS
+from .heatmap import UNDER_HEATMAP
 
 
 @dataclass(frozen=True)
@@ -41,12 +43,11 @@ class Surface:
     color : tuple, optional
         sRGB, 0 to 1. By default the texture of the geom's MuJoCo material, if it has one, or else the look's own.
     uv, image : optional
-        Texture coordinates, shape [n, 2] or per corner [m, 3, 2], and the picture that they index.
-    field_colors : array of uint8, shape [k, 3], optional
-        sRGB, from the least to the greatest value of a scalar field that is drawn in place of the look; see
-        `SurfaceMesh.set_field`.
+        Texture coordinates, shape [n, 2] or per corner [m, 3, 2], and the file of the texture.
+    heatmap_colors : array of uint8, shape [k, 3], optional
+        sRGB, from the least to the greatest value of a heatmap that replaces the look; see `Renderer.set_heatmap`.
     grid : int
-        Texels between the lines of a grid that is drawn on the surface; 0: none.
+        Texels between the lines of a grid on the surface; 0: no grid.
     """
 
     V: NDArray[np.float64]
@@ -57,32 +58,32 @@ class Surface:
     color: tuple[float, float, float] | None = None
     uv: NDArray[np.float64] | None = None
     image: Path | str | None = None
-    field_colors: NDArray[np.uint8] | None = None
+    heatmap_colors: NDArray[np.uint8] | None = None
     grid: int = 0
 
 
 def appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[np.float64], Mapping]:
-    """Look, linear colour under the picture, and how the picture lies on the surface."""
-    plain, piece = Mapping(), geom_piece(model, geom)
-    if surface.field_colors is not None:
-        return UNDER_COLORS, np.ones(3), plain
-    look, mapping = find_look(surface.look), mapping_of(model, piece)
+    """Look, linear colour under the texture, and how the texture lies on the surface."""
+    plain, visual = Mapping(), geom_visual(model, geom)
+    if surface.heatmap_colors is not None:
+        return UNDER_HEATMAP, np.ones(3), plain
+    look, mapping = find_look(surface.look), mapping_of(model, visual)
     if mapping.own and surface.uv is None:
         mapping = plain
     if surface.look == MODEL_LOOK:
-        rgb = piece.color if surface.color is None else linear(surface.color)
-        return look_of(model, piece), rgb, mapping
+        rgb = visual.color if surface.color is None else srgb_to_linear(surface.color)
+        return look_of(model, visual), rgb, mapping
     if surface.image is not None and surface.uv is not None:
-        return look, np.ones(3), Mapping(FLAT_IMAGE, own=True)
-    if surface.color is None and mapping.kind != NO_IMAGE:
-        return look, piece.color, mapping
-    return look, linear(surface.color or look.color), plain
+        return look, np.ones(3), Mapping(MappingKind.FLAT_IMAGE, own=True)
+    if surface.color is None and mapping.kind != MappingKind.NO_IMAGE:
+        return look, visual.color, mapping
+    return look, srgb_to_linear(surface.color or look.color), plain
 
 
-def load_image(ctx: OwnedObjects, surface: Surface) -> moderngl.Texture:
-    """Put the picture of a surface on the GPU, or raise `RippleError` if it cannot be read."""
+def load_image(resources: Resources, surface: Surface) -> moderngl.Texture:
+    """Upload the texture of a surface, or raise `RippleError` if its file cannot be read."""
     try:
-        picture = Image.open(str(surface.image)).convert("RGB")
+        image = Image.open(str(surface.image)).convert("RGB")
     except OSError as error:
         raise RippleError(f"texture image {surface.image} cannot be read: {error}") from error
-    return srgb_texture(ctx, np.asarray(picture))
+    return srgb_texture(resources, np.asarray(image))

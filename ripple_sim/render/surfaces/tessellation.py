@@ -1,4 +1,4 @@
-"""Split long edges of a triangle mesh at their midpoints, without opening gaps; what is smooth gets rounder."""
+"""Static tessellation: long edges of a mesh are split at their midpoints; smooth surfaces get rounder."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class Edges:
     ends : int64 [k, 2]
         Vertices.
     of_side : int64 [m, 3]
-        Which edge is the triangles' side from corner c to c + 1.
+        Edge of each triangle's side from corner c to c + 1.
     weld : int64 [k]
-        Equal for edges whose ends are the same but for their texture coordinates.
+        Equal for edges whose ends differ in their texture coordinates at most.
     inner : bool [k]
         Whether two triangles share the edge, and the normals at its ends.
     """
@@ -30,7 +30,7 @@ class Edges:
     inner: NDArray[np.bool_]
 
 
-def subdivide(
+def tessellate(
     F: NDArray,
     attributes: NDArray,
     same: NDArray,
@@ -42,20 +42,19 @@ def subdivide(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
     """Split edges until none is longer than `max_length` or the mesh has about `max_faces` triangles.
 
-    A midpoint carries the mean of what its edge's ends carry. Between two triangles that share the normals at both ends
-    of their edge it also bulges out to where the surface with these normals would be (half the way to the mean of the
-    midpoint's projections onto the ends' tangent planes, after Boubekeur and Alexa, Phong Tessellation, 2008; half is
-    exact on a sphere to second order). Creases and open edges stay straight.
+    A midpoint has the mean of its ends' attributes. Between two triangles that share the normals at both ends of their
+    edge it also bulges out to where a surface with these normals would be: half the way to the mean of its projections
+    onto the ends' tangent planes (Boubekeur and Alexa, Phong Tessellation, 2008); half is exact on a sphere to second
+    order. Creases and open edges stay straight. No gaps open.
 
     Parameters
     ----------
     F : array, shape [m, 3]
         Triangles.
     attributes : array, shape [n, k]
-        What the vertices carry.
+        Of the vertices.
     same : array, shape [n]
-        Whole numbers, equal for vertices that differ in nothing but their texture coordinates: a seam of those is no
-        crease.
+        Whole numbers, equal for vertices that differ in their texture coordinates at most: a seam is no crease.
     position, normal : slice
         The three columns of `attributes` that hold the position [m] and the unit normal.
     max_length : float
@@ -85,7 +84,7 @@ def subdivide(
 
 
 def edges_of(F: NDArray[np.int64], same: NDArray[np.int64]) -> Edges:
-    """Edges of triangles, [m, 3]; `same` as for `subdivide`."""
+    """Edges of triangles, [m, 3]; `same` as for `tessellate`."""
     sides = np.stack([F, np.roll(F, -1, axis=1)], axis=2).reshape(-1, 2)
     ends, edge_of_side = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
     edge_of_side = edge_of_side.ravel()
@@ -97,7 +96,7 @@ def edges_of(F: NDArray[np.int64], same: NDArray[np.int64]) -> Edges:
 
 
 def midpoints(edges: Edges, attributes: NDArray, position: slice, normal: slice) -> NDArray[np.float64]:
-    """What the midpoints of all edges carry, [k, ...]; see `subdivide`."""
+    """Attributes of the midpoints of all edges, [k, ...]; see `tessellate`."""
     a, b = attributes[edges.ends[:, 0]], attributes[edges.ends[:, 1]]
     middle = (a + b) / 2
     middle[:, position] += edges.inner[:, None] * _bulge(a[:, position], b[:, position], a[:, normal], b[:, normal])

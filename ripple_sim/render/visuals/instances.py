@@ -1,4 +1,4 @@
-"""Many geoms of one shape in one draw call, as finely cut as the picture needs."""
+"""Many geoms of one shape in one draw call, as finely tessellated as the frame needs."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.resources import OwnedObjects
+from ripple_sim.render.gpu.contract import Unit
+from ripple_sim.render.gpu.resources import Resources
 
 from .primitives import Shape
-from .texture_mapping import Mapping
-from .visual import Piece
+from .visual import Visual
 
 INSTANCE = np.dtype(
     [
@@ -30,28 +30,28 @@ INSTANCE = np.dtype(
 _GEOM = mujoco.mjtGeom
 _ROUND = (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_CAPSULE, _GEOM.mjGEOM_CYLINDER)
 _LEVELS = (4, 6, 8, 11, 15, 22)  # segments to a right angle
-_CLEARANCE = 3.0  # of shadows above the edges, in their sagitta: where light grazes, one is not enough
-_FLATNESS = 0.25  # how far the edges of a round shape may stand off its surface [pixels]
+_BIAS = 3.0  # of shadows, in sagittas of the edges: where light grazes, one is not enough
+_FLATNESS = 0.25  # how far the edges of a round shape may be off its surface [pixels]
 
 
 class ShapeLevels:
     """A shape at several levels of detail, each uploaded at its first use."""
 
-    def __init__(self, ctx: OwnedObjects, make: Callable[[int], Shape]) -> None:
-        self._ctx, self._make = ctx, make
-        self._made: dict[int, tuple[moderngl.Buffer, moderngl.Buffer]] = {}
+    def __init__(self, resources: Resources, make: Callable[[int], Shape]) -> None:
+        self._resources, self._make = resources, make
+        self._uploaded: dict[int, tuple[moderngl.Buffer, moderngl.Buffer]] = {}
 
     def level(self, segments: int) -> tuple[moderngl.Buffer, moderngl.Buffer]:
         """Vertices (core, shell, normal, texture coordinates) and indices."""
-        if segments not in self._made:
+        if segments not in self._uploaded:
             shape = self._make(segments)
             uv = np.zeros((len(shape.core), 2)) if shape.uv is None else shape.uv
             vertices = np.concatenate([shape.core, shape.shell, shape.normals, uv], axis=1)
-            self._made[segments] = (
-                self._ctx.buffer(vertices.astype("f4").tobytes()),
-                self._ctx.buffer(shape.faces.astype("i4").tobytes()),
+            self._uploaded[segments] = (
+                self._resources.buffer(vertices.astype("f4").tobytes()),
+                self._resources.buffer(shape.faces.astype("i4").tobytes()),
             )
-        return self._made[segments]
+        return self._uploaded[segments]
 
 
 class Instances:
@@ -59,16 +59,15 @@ class Instances:
 
     Parameters
     ----------
-    ctx : OwnedObjects
+    resources : Resources
     shape : ShapeLevels
     programs : tuple
-        For the geometry pass and for depth alone.
-    pieces : list of Piece
+        For the G-buffer and for depth only.
+    visuals : list of Visual
         Either geoms or sites.
     records : array of INSTANCE
-        What does not change; poses are filled in by `update`.
-    mapping : Mapping
-    texture : texture, optional
+        `update` fills in the poses.
+    image : (Unit, texture), optional
 
     Attributes
     ----------
@@ -76,30 +75,29 @@ class Instances:
         Whether they are sites.
     numbers : list of int
         In the table of objects.
-    lifts : float array
-        How far above each one's surface shadows must be looked up so that its edges do not shade it [m].
+    shadow_biases : float64 [k]
+        How far above the surface shadows must be looked up so that its edges do not shade it [m].
     """
 
     def __init__(
         self,
-        ctx: OwnedObjects,
+        resources: Resources,
         shape: ShapeLevels,
         programs: tuple[moderngl.Program, moderngl.Program],
-        pieces: list[Piece],
+        visuals: list[Visual],
         records: NDArray,
-        mapping: Mapping,
-        texture: moderngl.Texture | moderngl.TextureCube | None,
+        image: tuple[Unit, moderngl.Texture | moderngl.TextureCube] | None,
     ) -> None:
-        self._ctx, self._shape, self._programs = ctx, shape, programs
-        self.sites = pieces[0].site
-        self._round = pieces[0].kind in _ROUND
-        self._indices = np.array([piece.index for piece in pieces], dtype=np.int64)
+        self._resources, self._shape, self._programs = resources, shape, programs
+        self.sites = visuals[0].site
+        self._round = visuals[0].kind in _ROUND
+        self._indices = np.array([visual.index for visual in visuals], dtype=np.int64)
         self.numbers = [int(number) for number in records["color"][:, 3]]
-        self._records, self._mapping, self._texture = records, mapping, texture
-        self._buffer = ctx.buffer(reserve=records.nbytes, dynamic=True)
+        self._records, self._image = records, image
+        self._buffer = resources.buffer(reserve=records.nbytes, dynamic=True)
         self._arrays: dict[int, tuple[moderngl.VertexArray, moderngl.VertexArray]] = {}
         self._segments = _LEVELS[-1]
-        self.lifts = np.zeros(len(pieces))
+        self.shadow_biases = np.zeros(len(visuals))
 
     def update(self, data: Any, eye: NDArray[np.float64], pixels: float) -> None:
         """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""
@@ -115,16 +113,17 @@ class Instances:
         needed = np.pi / 4 / np.sqrt(2 * min(_FLATNESS / max(largest, 1e-9), 1.0))
         self._segments = next((n for n in _LEVELS if n >= needed), _LEVELS[-1])
         if self._round:
-            self.lifts = _CLEARANCE * radius * (1.0 - np.cos(np.pi / 4 / self._segments))
+            self.shadow_biases = _BIAS * radius * (1.0 - np.cos(np.pi / 4 / self._segments))
 
     def draw(self) -> None:
-        """Draw into the geometry pass."""
-        if self._texture is not None:
-            self._texture.use(self._mapping.unit)
+        """Draw into the G-buffer."""
+        if self._image is not None:
+            unit, texture = self._image
+            texture.use(unit)
         self._array()[0].render(instances=len(self._records))
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the depth alone, under a matrix of 16 numbers, column by column."""
+        """Draw the depth only, under a matrix of 16 numbers, column by column."""
         self._programs[1]["view_projection"] = view_projection
         self._array()[1].render(instances=len(self._records))
 
@@ -135,9 +134,9 @@ class Instances:
                 (vertices, "3f 3f 3f 2f", "in_core", "in_shell", "in_normal", "in_uv"),
                 (self._buffer, "9f 3f 3f 3f 4f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
             ]
-            # programs that do not use all of them have them optimised away
+            # what a program does not use is optimised away
             first, second = (
-                self._ctx.vertex_array(program, content, indices, skip_errors=True) for program in self._programs
+                self._resources.vertex_array(program, content, indices, skip_errors=True) for program in self._programs
             )
             self._arrays[self._segments] = first, second
         return self._arrays[self._segments]

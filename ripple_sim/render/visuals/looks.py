@@ -1,4 +1,4 @@
-"""Named looks of a target's surface."""
+"""Looks: named sets of parameters for the surface of a target."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Look:
     Attributes
     ----------
     color : tuple
-        sRGB, 0 to 1; used where the surface brings no colour of its own.
+        sRGB, 0 to 1; used where the surface has no colour of its own.
     roughness : float
         Of the microfacet distribution, 0 (mirror) to 1.
     metallic : float
@@ -27,7 +27,7 @@ class Look:
     coat : float
         Strength of a clear, smooth coat above the base layer, 0 to 1.
     translucency : float
-        Share of the light that goes into the body and comes out elsewhere, 0 to 1.
+        Share of the light that enters the object and leaves it elsewhere, 0 to 1.
     transparency : float
         Share of the base layer through which the surroundings are seen, refracted, 0 to 1.
     emission : float

@@ -1,4 +1,4 @@
-"""MuJoCo's materials and textures, as the shaders want them."""
+"""MuJoCo's materials and textures, in the shaders' terms."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.color import SRGB8_ALPHA8, linear, srgb_texture
-from ripple_sim.render.gpu.resources import OwnedObjects
+from ripple_sim.render.color import srgb_to_linear
+from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.gpu.textures import srgb_cube, srgb_texture
 
 from .looks import Look
-from .visual import Piece
+from .visual import Visual
 
 
-def look_of(model: Any, piece: Piece) -> Look:
-    """How a piece's material answers light; MuJoCo's shininess stands for roughness where the material gives none."""
-    red, green, blue = (float(x) for x in piece.color)
+def look_of(model: Any, visual: Visual) -> Look:
+    """Look of a visual's material; roughness is derived from MuJoCo's shininess where the material gives none."""
+    red, green, blue = (float(x) for x in visual.color)
     rgb = red, green, blue
-    material = piece.material
+    material = visual.material
     if material < 0:
         return Look(color=rgb, roughness=0.42, coat=0.2)
     roughness, metallic = float(model.mat_roughness[material]), float(model.mat_metallic[material])
@@ -37,39 +38,35 @@ def look_of(model: Any, piece: Piece) -> Look:
 
 
 class Textures:
-    """The textures of a model on the GPU, each made at its first use."""
+    """The textures of a model on the GPU, each uploaded at its first use."""
 
-    def __init__(self, ctx: OwnedObjects, model: Any) -> None:
-        self._ctx, self._model = ctx, model
-        self._made: dict[int, moderngl.Texture | moderngl.TextureCube] = {}
+    def __init__(self, resources: Resources, model: Any) -> None:
+        self._resources, self._model = resources, model
+        self._uploaded: dict[int, moderngl.Texture | moderngl.TextureCube] = {}
 
     def get(self, texture: int) -> moderngl.Texture | moderngl.TextureCube:
         """Return the texture of an id; it reads as linear light."""
-        if texture not in self._made:
+        if texture not in self._uploaded:
             pixels = texture_pixels(self._model, texture)
             flat = self._model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
-            self._made[texture] = srgb_texture(self._ctx, pixels) if flat else self._cube(pixels)
-        return self._made[texture]
+            self._uploaded[texture] = srgb_texture(self._resources, pixels) if flat else self._cube(pixels)
+        return self._uploaded[texture]
 
     def skybox(self) -> tuple[moderngl.TextureCube, NDArray[np.float64]] | None:
         """Return the model's skybox and its mean linear colour, or None."""
         for texture in range(self._model.ntex):
             if self._model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
                 pixels = texture_pixels(self._model, texture)
-                self._made[texture] = cube = self._cube(pixels)
-                return cube, linear(pixels[::4, ::4] / 255.0).mean(axis=(0, 1))
+                self._uploaded[texture] = cube = self._cube(pixels)
+                return cube, srgb_to_linear(pixels[::4, ::4] / 255.0).mean(axis=(0, 1))
         return None
 
     def _cube(self, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:
-        """Make a cube map of six faces below one another."""
+        """Cube map of faces below one another."""
         size = pixels.shape[1]
-        if pixels.shape[0] != 6 * size:  # one picture for all faces
+        if pixels.shape[0] != 6 * size:  # one image for all faces
             pixels = np.concatenate([pixels[:size]] * 6)
-        opaque = np.concatenate([pixels, np.full((*pixels.shape[:2], 1), 255, dtype=np.uint8)], axis=2)
-        cube = self._ctx.texture_cube((size, size), 4, opaque.tobytes(), internal_format=SRGB8_ALPHA8)
-        cube.build_mipmaps()
-        cube.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-        return cube
+        return srgb_cube(self._resources, pixels)
 
 
 def texture_pixels(model: Any, texture: int) -> NDArray[np.uint8]:

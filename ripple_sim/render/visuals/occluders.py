@@ -1,4 +1,4 @@
-"""The bodies near the camera's focus as capsules: what shades its neighbours where they come close."""
+"""Ambient occlusion between geoms: those near the camera's focus, approximated by capsules."""
 
 from __future__ import annotations
 
@@ -7,33 +7,40 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.resources import OwnedObjects
-
-_MOST = 16
+from ripple_sim.render.bounds import Balls
+from ripple_sim.render.gpu.contract import MAX_OCCLUDERS, Binding
+from ripple_sim.render.gpu.resources import Resources
 
 
 class Occluders:
-    """Capsules of about each geom's size."""
+    """Capsules of about each geom's size.
 
-    def __init__(self, ctx: OwnedObjects, model: Any, geoms: NDArray[np.int64]) -> None:
+    Parameters
+    ----------
+    resources : Resources
+    model : mujoco.MjModel
+    geoms : int64 [k]
+    """
+
+    def __init__(self, resources: Resources, model: Any, geoms: NDArray[np.int64]) -> None:
         self._geoms = geoms
         self._centre, self._half_axis, self._radius = _capsules(model, geoms)
         self._bounds = np.linalg.norm(model.geom_aabb[geoms, 3:], axis=1)
-        self._buffer = ctx.buffer(reserve=32 * _MOST, dynamic=True)
+        self._buffer = resources.buffer(reserve=32 * MAX_OCCLUDERS, dynamic=True)
 
-    def balls(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Bounding balls of the bodies: centres [k, 3] and radii [k], in metres."""
-        return self._middles(data)[1], self._bounds
+    def balls(self, data: Any) -> Balls:
+        """Bounding balls of the geoms."""
+        return Balls(self._middles(data)[1], self._bounds)
 
     def bind(self, data: Any, focus: NDArray[np.float64]) -> int:
-        """Bind the capsules nearest to a point; return how many there are."""
+        """Bind the capsules nearest to a point [m]; return how many there are."""
         rotation, middle = self._middles(data)
         axis = np.einsum("gij,gj->gi", rotation, self._half_axis)
         away = np.linalg.norm(middle - focus, axis=1)
         nearest = np.argsort(away, kind="stable")
-        # whichever leaves the list next has faded away before
-        limit = away[nearest[_MOST]] if len(nearest) > _MOST else np.inf
-        nearest = nearest[:_MOST]
+        # capsules fade out before they leave the list
+        limit = away[nearest[MAX_OCCLUDERS]] if len(nearest) > MAX_OCCLUDERS else np.inf
+        nearest = nearest[:MAX_OCCLUDERS]
         fade = np.clip(4 * (1 - away[nearest] / limit), 0.0, 1.0)
         packed = np.zeros((len(nearest), 2, 4), dtype=np.float32)
         packed[:, 0, :3] = (middle - axis)[nearest]
@@ -41,7 +48,7 @@ class Occluders:
         packed[:, 0, 3] = self._radius[nearest] * fade
         packed[:, 1, 3] = self._geoms[nearest]
         self._buffer.write(packed.tobytes())
-        self._buffer.bind_to_storage_buffer(4)
+        self._buffer.bind_to_storage_buffer(Binding.OCCLUDERS)
         return len(nearest)
 
     def _middles(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,19 +1,20 @@
-"""Tessellated primitives, and vertex normals.
+"""Tessellated primitives.
 
 Every MuJoCo primitive is the Minkowski sum of a box-like core and a ball-like shell: a point of it is
-`core * core_size + shell * shell_size`, component by component. A sphere has no core, a capsule's
-core is a segment, a box's is a box; boxes and cylinders get a small round shell, so that their edges catch the light.
+`core * core_size + shell * shell_size`, component by component. A sphere has no core, a
+capsule's is a segment, a box's a box; boxes and cylinders get a small round shell: edges that catch the light.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.texels.cube_map.convention import FACE_NORMALS, FACE_U, FACE_V
+
+from .corners import normalized
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Shape:
     """A triangle mesh whose vertices scale with two sizes.
 
     `core`, `shell` and `normals` have shape [n, 3], `faces` shape [m, 3]; `uv`, shape [n, 2], are texture coordinates
-    where the mesh brings any.
+    where the mesh has any.
     """
 
     core: NDArray[np.float64]
@@ -36,19 +37,19 @@ class Shape:
 
 
 def ball(divisions: int) -> Shape:
-    """Make a unit sphere: a cube of `divisions` squares an edge, blown up with equal angles. Also ellipsoids."""
+    """Unit sphere: a cube of `divisions` squares an edge, projected at equal angles. Also for ellipsoids."""
     points, faces = _cube_grid(np.linspace(-1.0, 1.0, divisions + 1))
-    directions = _normalized(np.tan(np.pi / 4 * points))
+    directions = normalized(np.tan(np.pi / 4 * points))
     return Shape(np.zeros_like(directions), directions, directions, faces)
 
 
 def box(divisions: int) -> Shape:
     """Box with half sizes core + shell and round edges of `divisions` segments."""
-    # a face's grid line is flat between -1 and 1 and bends round the edges outside; the edge's middle is at 1.5
+    # a face's grid line is straight between -1 and 1 and bends round the edges beyond; an edge's middle is at 1.5
     bend = np.linspace(0.0, 0.5, divisions + 1)[1:]
     points, faces = _cube_grid(np.concatenate([-1 - bend[::-1], [-1.0, 1.0], 1 + bend]))
     core = np.clip(points, -1.0, 1.0)
-    directions = _normalized(np.tan(np.pi / 2 * (points - core)))
+    directions = normalized(np.tan(np.pi / 2 * (points - core)))
     return Shape(core, directions, directions, faces)
 
 
@@ -69,97 +70,14 @@ def cylinder(sides: int, rings: int) -> Shape:
 
 
 def sheet() -> Shape:
-    """Square of half size 1 that faces up and can be seen from there only."""
+    """Square of half size 1, visible from above only."""
     core = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
     up = np.tile([0.0, 0.0, 1.0], (4, 1))
     return Shape(core, up, up, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-def creased(V: NDArray, F: NDArray, corner_uv: NDArray | None = None) -> Shape:
-    """Mesh of a fixed size, its vertices split where normals or texture coordinates [m, 3, 2] jump."""
-    uv = np.zeros((*F.shape, 2)) if corner_uv is None else corner_uv
-    corners = np.concatenate([F[:, :, None], corner_normals(V, F), uv], axis=2).reshape(-1, 6)
-    unique, index = np.unique(corners, axis=0, return_inverse=True)
-    positions = V[unique[:, 0].astype(np.int64)]
-    faces = index.reshape(F.shape)
-    return Shape(
-        np.zeros_like(positions), positions, unique[:, 1:4], faces, None if corner_uv is None else unique[:, 4:]
-    )
-
-
-def mesh_asset(model: Any, mesh: int) -> Shape:
-    """Mesh of a MuJoCo model in its geom's frame."""
-    first, first_face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
-    faces = slice(first_face, first_face + model.mesh_facenum[mesh])
-    V = np.asarray(model.mesh_vert[first : first + model.mesh_vertnum[mesh]], dtype=np.float64)
-    F = np.asarray(model.mesh_face[faces], dtype=np.int64)
-    start = model.mesh_texcoordadr[mesh]
-    if start < 0:
-        return creased(V, F)
-    uv = np.asarray(model.mesh_texcoord[start : start + model.mesh_texcoordnum[mesh]], dtype=np.float64)
-    return creased(V, F, uv[model.mesh_facetexcoord[faces]])
-
-
-def height_field(model: Any, hfield: int) -> Shape:
-    """Height field of a MuJoCo model with its walls, in its geom's frame."""
-    rows, columns = int(model.hfield_nrow[hfield]), int(model.hfield_ncol[hfield])
-    half_x, half_y, top, bottom = (float(x) for x in model.hfield_size[hfield])
-    start = model.hfield_adr[hfield]
-    height = top * np.asarray(model.hfield_data[start : start + rows * columns], dtype=np.float64).reshape(
-        rows, columns
-    )
-    x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
-    ground = np.stack([x, y, height], axis=2).reshape(-1, 3)
-    index = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
-    F = [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
-    # round the rim, counter-clockwise from above
-    rim = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
-    foot = len(ground) + np.arange(len(rim))
-    after, foot_after = np.roll(rim, -1), np.roll(foot, -1)
-    F += [np.stack([rim, foot, foot_after], axis=1), np.stack([rim, foot_after, after], axis=1)]
-    return creased(np.concatenate([ground, ground[rim] * [1, 1, 0] - [0, 0, bottom]]), np.concatenate(F))
-
-
-def corner_normals(V: NDArray, F: NDArray, crease: float = 45.0) -> NDArray[np.float64]:
-    """Angle-weighted unit normals of every triangle's corners, shape [m, 3, 3].
-
-    Triangles that meet a corner's triangle under more than `crease` degrees do not count, so sharp edges stay sharp;
-    180 gives one smooth normal a vertex.
-    """
-    triangle = triangle_normals(V, F)
-    weighted = (_corner_angles(V, F)[:, :, None] * triangle[:, None, :]).reshape(-1, 3)
-    # every ordered pair of corners that share a vertex
-    corners = np.argsort(F.ravel(), kind="stable")
-    degree = np.bincount(F.ravel(), minlength=len(V))
-    count = degree[F.ravel()[corners]]
-    one = np.repeat(np.arange(len(corners)), count)
-    start = np.repeat((np.cumsum(degree) - degree)[F.ravel()[corners]], count)
-    other = start + np.arange(len(one)) - np.repeat(np.cumsum(count) - count, count)
-    one, other = corners[one], corners[other]
-    close = np.einsum("ij,ij->i", triangle[one // 3], triangle[other // 3]) >= np.cos(np.radians(crease)) - 1e-9
-    normals = np.zeros_like(weighted)
-    np.add.at(normals, one[close], weighted[other[close]])
-    return _normalized(normals).reshape(len(F), 3, 3)
-
-
-def triangle_normals(V: NDArray, F: NDArray) -> NDArray[np.float64]:
-    """Return unit normals of the triangles, shape [m, 3]; zero where a triangle has no area."""
-    return _normalized(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]))
-
-
-def _corner_angles(V: NDArray, F: NDArray) -> NDArray[np.float64]:
-    sides = _normalized(V[np.roll(F, -1, axis=1)] - V[F])
-    return np.arccos(np.clip(np.einsum("fkj,fkj->fk", sides, -np.roll(sides, 1, axis=1)), -1.0, 1.0))
-
-
-def _normalized(vectors: NDArray) -> NDArray[np.float64]:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(length > 0, length, 1.0)
-
-
 def _cube_grid(line: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices and outward triangles of a cube whose faces carry the grid line x line; edges are welded.
+    """Vertices and outward triangles of a cube with the grid line x line on each face; edges are welded.
 
     Vertices are welded by whole numbers: a coordinate is the entry of `line` at (lattice + last) / 2.
     """
@@ -180,7 +98,7 @@ def _cube_grid(line: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 
 def _revolved(core_r: NDArray, core_z: NDArray, shell_r: NDArray, shell_z: NDArray, sides: int) -> Shape:
-    """Revolve a profile that runs from the lower pole to the upper one about z; the poles are single vertices."""
+    """Revolve a profile, from the lower pole to the upper one, about z; the poles are single vertices."""
     turn = 2 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(sides)], axis=1)
     axis = np.array([0.0, 0.0, 1.0])
@@ -199,5 +117,5 @@ def _revolved(core_r: NDArray, core_z: NDArray, shell_r: NDArray, shell_z: NDArr
         a, b, c, d = index[lower], after[lower], after[lower + 1], index[lower + 1]
         faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
     faces.append(np.stack([index[-1], after[-1], np.full(sides, top)], axis=1))
-    shell = _normalized(rings(shell_r, shell_z))
+    shell = normalized(rings(shell_r, shell_z))
     return Shape(rings(core_r, core_z), shell, shell, np.concatenate(faces))

@@ -1,4 +1,4 @@
-"""How MuJoCo's pictures lie on geoms and sites."""
+"""How MuJoCo's textures lie on geoms and sites."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from .visual import Piece
+from ripple_sim.render.gpu.contract import MappingKind, Unit
+
+from .visual import Visual
 
 _GEOM = mujoco.mjtGeom
 _MESHES = (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF)
 _ROLES = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
 
-# MAPPING of the geometry shaders: no picture, one by coordinates, a cube's, and flat ones wrapped round a primitive
-NO_IMAGE, FLAT_IMAGE, CUBE_IMAGE, BOX_IMAGE, BALL_IMAGE, CYLINDER_IMAGE, CAPSULE_IMAGE = range(7)
 _WRAPPED = {
-    _GEOM.mjGEOM_BOX: BOX_IMAGE,
-    _GEOM.mjGEOM_SPHERE: BALL_IMAGE,
-    _GEOM.mjGEOM_ELLIPSOID: BALL_IMAGE,
-    _GEOM.mjGEOM_CYLINDER: CYLINDER_IMAGE,
-    _GEOM.mjGEOM_CAPSULE: CAPSULE_IMAGE,
+    _GEOM.mjGEOM_BOX: MappingKind.BOX_IMAGE,
+    _GEOM.mjGEOM_SPHERE: MappingKind.BALL_IMAGE,
+    _GEOM.mjGEOM_ELLIPSOID: MappingKind.BALL_IMAGE,
+    _GEOM.mjGEOM_CYLINDER: MappingKind.CYLINDER_IMAGE,
+    _GEOM.mjGEOM_CAPSULE: MappingKind.CAPSULE_IMAGE,
 }
 
 _Tiling = tuple[float, float, float, float]
@@ -30,30 +30,29 @@ _Tiling = tuple[float, float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Mapping:
-    """How a picture lies on a piece.
+    """How a texture lies on a visual.
 
-    A point of the piece becomes coordinates, the shader makes a place in a flat picture of them (see
-    shaders/mapping.glsl) or the direction in a cube, and `tiling` scales and shifts that place.
+    A point of the visual becomes coordinates. Of these the shader (texture_mapping.glsl) makes a position in a flat
+    texture, which `tiling` scales and shifts, or a direction in a cube map.
 
     Attributes
     ----------
-    kind : int
-        One of the kinds above.
+    kind : MappingKind
     texture : int
         Id of the texture, -1 without.
     scale : float64 [3]
-        Coordinates a metre along the piece's axes; primitives reach from -1 to 1.
+        Coordinates a metre along the visual's axes; primitives extend from -1 to 1.
     own : bool
-        The mesh's own texture coordinates are taken instead.
+        Whether the mesh's own texture coordinates are used instead.
     tiling : tuple of 4 floats
-        Scale and offset of a place in a flat picture.
+        Scale and offset of a position in a flat texture.
     straight : float
-        Half length of a capsule without its ends [m], 0 for all else.
+        Half length of a capsule without its ends [m], 0 for everything else.
     stretch : float
-        By how much more coordinates grow along z at a capsule's ends, which reach from 1 to 2.
+        How much faster coordinates grow along z at a capsule's ends, which extend from 1 to 2.
     """
 
-    kind: int = NO_IMAGE
+    kind: MappingKind = MappingKind.NO_IMAGE
     texture: int = -1
     scale: NDArray[np.float64] = field(default_factory=lambda: np.ones(3))
     own: bool = False
@@ -62,12 +61,12 @@ class Mapping:
     stretch: float = 1.0
 
     @property
-    def unit(self) -> int:
-        """Texture unit that the geometry shaders read the picture from."""
-        return 6 if self.kind == CUBE_IMAGE else 5
+    def unit(self) -> Unit:
+        """Texture unit that shaders read the texture from."""
+        return Unit.CUBE_IMAGE if self.kind == MappingKind.CUBE_IMAGE else Unit.FLAT_IMAGE
 
     def at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Coordinates [n, 3] of points [n, 3] of the piece in its frame [m]."""
+        """Coordinates [n, 3] of points [n, 3] of the visual, in its frame [m]."""
         coordinates = points * self.scale
         if self.straight > 0.0:
             beyond = points[:, 2] - np.clip(points[:, 2], -self.straight, self.straight)
@@ -75,32 +74,32 @@ class Mapping:
         return coordinates
 
 
-def mapping_of(model: Any, piece: Piece) -> Mapping:
-    """How MuJoCo (3.12 and later) lays the texture of a piece's material on it.
+def mapping_of(model: Any, visual: Visual) -> Mapping:
+    """How MuJoCo (3.12 and later) lays the texture of a visual's material on it.
 
-    Flat pictures go once round what is round, with their left edge in the xz plane where x > 0 and their upper edge
-    towards +z; a cylinder's discs, a capsule's ends and each face of a box carry a whole picture of their own. Meshes
-    without texture coordinates and height fields are laid under them as seen from above.
+    Flat textures go once round what is round, with their left edge in the xz plane where x > 0 and their upper edge
+    towards +z; a cylinder's discs, a capsule's ends and each face of a box carry a whole texture of their own. On
+    height fields, and on meshes without texture coordinates, they are projected from above.
     """
-    texture, material, half = _texture(model, piece.material), piece.material, piece.half_sizes
+    texture, material, half = _texture(model, visual.material), visual.material, visual.half_sizes
     if texture < 0:
         return Mapping()
     uniform = bool(model.mat_texuniform[material])
     if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE:
         factor = np.where(half > 0, half, 1.0) if uniform else np.ones(3)
-        if piece.kind in _WRAPPED:
-            return _on_primitive(piece, CUBE_IMAGE, texture, factor, (1.0, 1.0, 0.0, 0.0))
-        return Mapping(CUBE_IMAGE, texture, factor)
+        if visual.kind in _WRAPPED:
+            return _on_primitive(visual, MappingKind.CUBE_IMAGE, texture, factor, (1.0, 1.0, 0.0, 0.0))
+        return Mapping(MappingKind.CUBE_IMAGE, texture, factor)
     repeat = np.array(model.mat_texrepeat[material], dtype=np.float64)
     times = np.where(repeat > 0, repeat, 1.0) * np.where((half[:2] > 0) & uniform, half[:2], 1.0)
-    if piece.kind in _WRAPPED:
-        return _on_primitive(piece, _WRAPPED[piece.kind], texture, np.ones(3), (*times, 0.0, 0.0))
-    if piece.kind in _MESHES and piece.asset >= 0 and model.mesh_texcoordadr[piece.asset] >= 0:
-        return Mapping(FLAT_IMAGE, texture, own=True, tiling=(*times, 0.0, 0.0))
-    if piece.kind == _GEOM.mjGEOM_PLANE:
-        return Mapping(FLAT_IMAGE, texture, tiling=_on_plane(half[:2], times))
+    if visual.kind in _WRAPPED:
+        return _on_primitive(visual, _WRAPPED[visual.kind], texture, np.ones(3), (*times, 0.0, 0.0))
+    if visual.kind in _MESHES and visual.asset >= 0 and model.mesh_texcoordadr[visual.asset] >= 0:
+        return Mapping(MappingKind.FLAT_IMAGE, texture, own=True, tiling=(*times, 0.0, 0.0))
+    if visual.kind == _GEOM.mjGEOM_PLANE:
+        return Mapping(MappingKind.FLAT_IMAGE, texture, tiling=_on_plane(half[:2], times))
     scale = 0.5 * (repeat if uniform else repeat / np.where(half[:2] > 0, half[:2], 1.0))
-    return Mapping(FLAT_IMAGE, texture, tiling=(scale[0], -scale[1], -0.5, -0.5))
+    return Mapping(MappingKind.FLAT_IMAGE, texture, tiling=(scale[0], -scale[1], -0.5, -0.5))
 
 
 def _texture(model: Any, material: int) -> int:
@@ -110,9 +109,11 @@ def _texture(model: Any, material: int) -> int:
     return -1 if texture >= 0 and model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX else texture
 
 
-def _on_primitive(piece: Piece, kind: int, texture: int, factor: NDArray[np.float64], tiling: _Tiling) -> Mapping:
-    """Mapping by coordinates that reach from -factor to factor."""
-    half, round_ends = piece.half_sizes, piece.kind == _GEOM.mjGEOM_CAPSULE
+def _on_primitive(
+    visual: Visual, kind: MappingKind, texture: int, factor: NDArray[np.float64], tiling: _Tiling
+) -> Mapping:
+    """Mapping by coordinates from -factor to factor."""
+    half, round_ends = visual.half_sizes, visual.kind == _GEOM.mjGEOM_CAPSULE
     return Mapping(
         kind,
         texture,
@@ -124,7 +125,7 @@ def _on_primitive(piece: Piece, kind: int, texture: int, factor: NDArray[np.floa
 
 
 def _on_plane(half: NDArray[np.float64], times: NDArray[np.float64]) -> _Tiling:
-    """Tiling that begins at the corner of a plane, or half a picture before the origin where it has no end."""
+    """Tiling that begins at the corner of a plane, or half a texture before the origin if the plane is infinite."""
     endless = half <= 0
     scale = 0.5 * times / np.where(endless, 1.0, half)
     offset = np.where(endless, 0.0, 0.5 * times) - 0.5 * endless.any()

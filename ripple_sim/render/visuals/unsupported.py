@@ -1,17 +1,17 @@
-"""Kinds of things in a MuJoCo model that are not drawn."""
+"""Elements of a MuJoCo model that are not drawn."""
 
 from __future__ import annotations
 
 import warnings
 from typing import Any
 
-from ripple_sim.coupling.model.target import shells
+from ripple_sim.coupling.model.flex_colliders import find_flex_colliders
 from ripple_sim.errors import RippleWarning
 
 
-def warn_of_undrawn(model: Any) -> None:
-    """Say once what of a model will be missing from the picture; flexes that stand for a geom are not."""
-    kinds = {"tendons": model.ntendon, "flexes": model.nflex - len(shells(model)), "skins": model.nskin}
+def warn_of_unsupported(model: Any) -> None:
+    """Warn once of what will be missing from the frames; flex colliders of targets are drawn as their geoms."""
+    kinds = {"tendons": model.ntendon, "flexes": model.nflex - len(find_flex_colliders(model)), "skins": model.nskin}
     missing = [f"{count} {kind}" for kind, count in kinds.items() if count]
     if missing:
         warnings.warn(

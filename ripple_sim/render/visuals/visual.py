@@ -1,4 +1,4 @@
-"""What a MuJoCo model shows: its geoms and its sites, read alike."""
+"""Visuals: the geoms and sites that a MuJoCo model shows, read alike."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.color import linear
+from ripple_sim.render.bounds import Balls
+from ripple_sim.render.color import srgb_to_linear
 
 _GEOM = mujoco.mjtGeom
 _VISIBLE_GROUPS = 3  # MuJoCo shows groups 0 to 2 by default
@@ -17,8 +18,8 @@ _UNSET = [0.5, 0.5, 0.5, 1.0]  # a geom's or site's colour where the MJCF gives 
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
-    """A geom or a site.
+class Visual:
+    """A geom or a site as it is drawn.
 
     Attributes
     ----------
@@ -32,7 +33,7 @@ class Piece:
     asset : int
         Id of its mesh or height field, -1 without.
     rgba : float64 [4]
-        sRGB and opacity: its own, or its material's where it has none of its own.
+        sRGB and opacity: its own, or else its material's.
     material : int
         -1 without.
     group : int
@@ -49,13 +50,13 @@ class Piece:
 
     @property
     def visible(self) -> bool:
-        """Whether MuJoCo shows it by default: of groups 0 to 2, and not wholly transparent."""
+        """Whether MuJoCo shows it by default: in groups 0 to 2, and not fully transparent."""
         return self.group < _VISIBLE_GROUPS and self.opacity > 0.0
 
     @property
     def color(self) -> NDArray[np.float64]:
         """Linear colour, shape [3]."""
-        return linear(self.rgba[:3])
+        return srgb_to_linear(self.rgba[:3])
 
     @property
     def opacity(self) -> float:
@@ -64,7 +65,7 @@ class Piece:
 
     @property
     def half_sizes(self) -> NDArray[np.float64]:
-        """Half sizes of a primitive along its axes [m], a capsule's without its ends; 0 where a plane has no end."""
+        """Half sizes of a primitive along its axes [m], a capsule's without its ends; 0 where a plane is infinite."""
         match self.kind:
             case _GEOM.mjGEOM_SPHERE:
                 return np.full(3, self.size[0])
@@ -74,48 +75,50 @@ class Piece:
                 return self.size
 
 
-def geom_piece(model: Any, geom: int) -> Piece:
+def geom_visual(model: Any, geom: int) -> Visual:
     """Geom of a model."""
-    return _piece(model, "geom", geom, int(model.geom_dataid[geom]))
+    return _visual(model, "geom", geom, int(model.geom_dataid[geom]))
 
 
-def site_piece(model: Any, site: int) -> Piece:
+def site_visual(model: Any, site: int) -> Visual:
     """Site of a model."""
-    return _piece(model, "site", site, -1)
+    return _visual(model, "site", site, -1)
 
 
 def visible_geoms(model: Any) -> list[int]:
     """Ids of the geoms that MuJoCo shows by default."""
-    return [geom for geom in range(model.ngeom) if geom_piece(model, geom).visible]
+    return [geom for geom in range(model.ngeom) if geom_visual(model, geom).visible]
 
 
 def visible_sites(model: Any) -> list[int]:
     """Ids of the sites that MuJoCo shows by default."""
-    return [site for site in range(model.nsite) if site_piece(model, site).visible]
+    return [site for site in range(model.nsite) if site_visual(model, site).visible]
 
 
-def host_of(model: Any, piece: Piece) -> int:
-    """Geom that a piece belongs to: itself, or the geom of the site's body whose middle is nearest; -1 without."""
-    if not piece.site:
-        return piece.index
-    near = np.flatnonzero(model.geom_bodyid == model.site_bodyid[piece.index])
+def host_of(model: Any, visual: Visual) -> int:
+    """Geom that a visual belongs to: itself, or the nearest geom of a site's body; -1 if that has none."""
+    if not visual.site:
+        return visual.index
+    near = np.flatnonzero(model.geom_bodyid == model.site_bodyid[visual.index])
     if not len(near):
         return -1
-    return int(near[np.argmin(np.linalg.norm(model.geom_pos[near] - model.site_pos[piece.index], axis=1))])
+    return int(near[np.argmin(np.linalg.norm(model.geom_pos[near] - model.site_pos[visual.index], axis=1))])
 
 
-def ball_of(model: Any, data: Any, piece: Piece) -> tuple[NDArray[np.float64], float]:
-    """Bounding ball of a piece in the world: centre [3] and radius, in metres; that of a plane has no end."""
-    if piece.site:
-        half = piece.half_sizes
-        return data.site_xpos[piece.index], float(np.linalg.norm(half) + half[0])  # a capsule has ends, too
-    box, position = model.geom_aabb[piece.index], data.geom_xpos[piece.index]
-    if piece.kind == _GEOM.mjGEOM_PLANE:
-        return position, np.inf
-    return position + data.geom_xmat[piece.index].reshape(3, 3) @ box[:3], float(np.linalg.norm(box[3:]))
+def ball_of(model: Any, data: Any, visual: Visual) -> Balls:
+    """Bounding ball of a visual in the world; that of a plane is infinite."""
+    if visual.site:
+        half = visual.half_sizes
+        radius = float(np.linalg.norm(half) + half[0])  # a capsule has ends, too
+        return Balls(data.site_xpos[visual.index][None], np.array([radius]))
+    box, position = model.geom_aabb[visual.index], data.geom_xpos[visual.index]
+    if visual.kind == _GEOM.mjGEOM_PLANE:
+        return Balls(position[None], np.array([np.inf]))
+    centre = position + data.geom_xmat[visual.index].reshape(3, 3) @ box[:3]
+    return Balls(centre[None], np.array([float(np.linalg.norm(box[3:]))]))
 
 
-def _piece(model: Any, which: str, index: int, asset: int) -> Piece:
+def _visual(model: Any, which: str, index: int, asset: int) -> Visual:
     def value(name: str) -> Any:
         return getattr(model, f"{which}_{name}")[index]
 
@@ -123,4 +126,4 @@ def _piece(model: Any, which: str, index: int, asset: int) -> Piece:
     if material >= 0 and np.array_equal(rgba, _UNSET):
         rgba = np.array(model.mat_rgba[material], dtype=np.float64)
     size = np.array(value("size"), dtype=np.float64)
-    return Piece(which == "site", index, int(value("type")), size, asset, rgba, material, int(value("group")))
+    return Visual(which == "site", index, int(value("type")), size, asset, rgba, material, int(value("group")))

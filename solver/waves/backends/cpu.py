@@ -64,6 +64,11 @@ class CPUBackend:
         self._shift = self._prepared_dt = 0.0
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
+    @property
+    def thread_count(self) -> int:
+        """How many threads share out the faces."""
+        return self._threads
+
     def height(self) -> NDArray[np.float32]:
         """Copy of the height [m], [6, N, N]."""
         elastic = self._texels(self._h)

@@ -175,7 +175,7 @@ class GLBackend:
         return kick_drift
 
     def _shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
-        return self._gl.shared_compute_shader("ripple_sim.solver.waves.backends", name, **defines)
+        return self._gl.shared_compute_shader("ripple_sim.solver.waves.backends.shaders", name, **defines)
 
     def _block_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         fields, (columns, rows) = self._fields, self._group

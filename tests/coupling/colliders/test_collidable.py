@@ -1,6 +1,4 @@
-"""The way to the true surface, and the warning where a hull is in the way."""
-
-import warnings
+"""The way to the true surface."""
 
 import mujoco
 import numpy as np
@@ -8,10 +6,8 @@ import pytest
 
 from ripple_sim import Material, Ripples, make_collidable
 from ripple_sim.coupling.colliders import collidable
-from ripple_sim.coupling.colliders.collidable import hull_gap
-from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.scenes.shapes import limbed, peanut
-from ripple_sim.solver import Mesh, build_atlas
+from ripple_sim.errors import SceneError
+from ripple_sim.scenes.shapes import peanut
 
 
 def spec_of(V: np.ndarray, F: np.ndarray) -> mujoco.MjSpec:
@@ -110,31 +106,3 @@ def test_fast_bodies_are_stopped_by_speculative_contacts_where_there_are_any(mon
 def test_unknown_names_are_refused(geom: str, route: str, message: str) -> None:
     with pytest.raises(SceneError, match=message):
         make_collidable(spec_of(*peanut(0.05)), geom, route)
-
-
-def test_hull_over_a_waist_is_as_far_off_as_the_waist_is_deep() -> None:
-    V, F = peanut(0.03)
-    widest = np.hypot(V[:, 1], V[:, 2]).max()
-    waist = np.hypot(V[:, 1], V[:, 2])[np.abs(V[:, 0]) < 0.01].min()
-    atlas = build_atlas(Mesh.from_arrays(V, F), 16, cache=False)
-    assert hull_gap(atlas) == pytest.approx(widest - waist, rel=0.1)
-
-
-def test_hull_that_matters_is_warned_of_by_name_and_distance() -> None:
-    model = spec_of(*limbed(0.05)).compile()
-    with pytest.warns(RippleWarning, match=r"geom 'target'.*hull, up to 0\.\d+ m.*make_collidable"):
-        Ripples(model, {"target": Material()}, resolution=8, backend="cpu")
-
-
-def test_no_warning_without_a_gap_or_without_collisions() -> None:
-    convex = spec_of(*peanut(0.05))
-    V = peanut(0.05)[0]
-    convex = spec_of(0.3 * V / np.linalg.norm(V, axis=1, keepdims=True), peanut(0.05)[1])
-    ghost = spec_of(*limbed(0.05))
-    ghost.geom("target").contype = ghost.geom("target").conaffinity = 0
-    true = spec_of(*limbed(0.05))
-    make_collidable(true, "target")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        for spec in (convex, ghost, true):
-            Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")

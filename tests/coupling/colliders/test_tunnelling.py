@@ -1,4 +1,4 @@
-"""Bodies that are too fast for the time step are reported before they get through, and others are not."""
+"""Geoms too fast for the time step are reported before they get through, and others are not."""
 
 import warnings
 
@@ -6,10 +6,12 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
+from mujoco_models import mesh_asset
 
 from ripple_sim import make_collidable
-from ripple_sim.coupling.colliders import tunnelling as speeds
-from ripple_sim.coupling.colliders.tunnelling import SpeedCheck
+from ripple_sim.coupling.colliders import tunnelling
+from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
+from ripple_sim.coupling.model.coupled_model import CoupledModel
 from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import peanut
 
@@ -26,7 +28,7 @@ def shoot(speed: float, solref: str, timestep: float, worldbody: str = PLATE) ->
         </mujoco>"""
     )
     data = mujoco.MjData(model)
-    check = SpeedCheck(model, [0])
+    check = TunnellingCheck(CoupledModel(model), [0])
     data.qvel[2] = -speed
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -69,26 +71,25 @@ def test_moving_target_counts_with_its_own_speed() -> None:
     mujoco.mj_forward(model, data)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        SpeedCheck(model, [0])(data)  # both fly along together
+        TunnellingCheck(CoupledModel(model), [0])(data)  # both fly along together
     data.qvel[2], data.qvel[8] = 15, -15
     mujoco.mj_forward(model, data)
     with pytest.warns(RippleWarning, match="at 30 m/s"):
-        SpeedCheck(model, [0])(data)
+        TunnellingCheck(CoupledModel(model), [0])(data)
 
 
 @pytest.mark.parametrize("solref", ["0.02 1", "0.01 0.2", "0.149 0.0335"])
 def test_what_an_sdf_pushes_from_all_sides_was_warned_of(solref: str) -> None:
-    V, F = peanut(0.05)
-    mesh = f'vertex="{" ".join(f"{x:.5g}" for x in V.ravel())}" face="{" ".join(map(str, F.ravel()))}"'
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option timestep="0.002" gravity="0 0 0" sdf_initpoints="10"/>
-        <default><geom solref="{solref}" condim="1"/></default><asset><mesh name="m" {mesh}/></asset><worldbody>
+        <default><geom solref="{solref}" condim="1"/></default>
+        <asset>{mesh_asset("m", *peanut(0.05))}</asset><worldbody>
         <geom name="target" type="sdf" mesh="m"/><body name="ball" pos="-0.17 0.01 0.3"><freejoint/>
         <geom size="0.03" mass="0.3"/></body></worldbody></mujoco>"""
     )
     outcomes = []
     for speed in np.geomspace(1, 30, 8):
-        data, check, wrench = mujoco.MjData(model), SpeedCheck(model, [0]), np.zeros(6)
+        data, check, wrench = mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0]), np.zeros(6)
         data.qvel[2], forces, push = -speed, 0.0, 0.0
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
@@ -110,10 +111,9 @@ def test_what_an_sdf_pushes_from_all_sides_was_warned_of(solref: str) -> None:
 def slab_of_flex(kind: str, solref: str) -> mujoco.MjModel:
     slab = trimesh.creation.box(extents=(0.6, 0.6, 0.4))
     V, F = trimesh.remesh.subdivide_to_size(slab.vertices, slab.faces, 0.06)
-    mesh = f'vertex="{" ".join(f"{x:.5g}" for x in V.ravel())}" face="{" ".join(map(str, F.ravel()))}"'
     spec = mujoco.MjSpec.from_string(
         f"""<mujoco><option timestep="0.002" gravity="0 0 0"/><default><geom solref="{solref}" condim="3"/></default>
-        <asset><mesh name="m" {mesh}/></asset><worldbody><geom name="slab" type="mesh" mesh="m"/>
+        <asset>{mesh_asset("m", V, F)}</asset><worldbody><geom name="slab" type="mesh" mesh="m"/>
         <body name="body" pos="-0.03 0.01 0.26"><freejoint/><geom type="{kind}" size="0.05 0.04" mass="0.3"/></body>
         </worldbody></mujoco>"""
     )
@@ -126,7 +126,7 @@ def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(kind: s
     model = slab_of_flex(kind, solref)
     right, warned, back = [], [], None
     for speed in np.geomspace(0.5, 60, 9):
-        data, check = mujoco.MjData(model), SpeedCheck(model, [0])
+        data, check = mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0])
         data.qvel[2] = -speed
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
@@ -144,8 +144,8 @@ def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(kind: s
 
 def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: pytest.MonkeyPatch) -> None:
     flags = [flag for name, flag in mujoco.mjtEnableBit.__members__.items() if "SPECULATIVE" in name]
-    assert sum(int(flag) for flag in flags) == speeds.SPECULATIVE
-    monkeypatch.setattr(speeds, "SPECULATIVE", 1 << 20)
+    assert sum(int(flag) for flag in flags) == tunnelling.SPECULATIVE
+    monkeypatch.setattr(tunnelling, "SPECULATIVE", 1 << 20)
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option gravity="0 0 0"/><worldbody>{PLATE}<body name="ball" pos="0 0 0.2"><freejoint/>
         <geom size="0.03"/></body></worldbody></mujoco>"""
@@ -154,8 +154,8 @@ def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: p
     data.qvel[2] = -60
     mujoco.mj_forward(model, data)
     with pytest.warns(RippleWarning, match="at 60 m/s"):
-        SpeedCheck(model, [0])(data)
+        TunnellingCheck(CoupledModel(model), [0])(data)
     model.opt.enableflags |= 1 << 20
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        SpeedCheck(model, [0])(data)
+        TunnellingCheck(CoupledModel(model), [0])(data)

@@ -1,78 +1,22 @@
-"""Contacts mark the corners of a patch: the force is spread over it, and stays the same force at the same place."""
+"""Contacts near each other are joined; their forces and their force-weighted middle stay."""
 
 import numpy as np
-import pytest
 
-from ripple_sim.coupling.patches.clusters import MAX_CONTACTS, cluster, probe, spread
-from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver import Atlas, Mesh, build_atlas
-
-SQUARE = 0.1 * np.array([[-1, -1, 5], [1, -1, 5], [-1, 1, 5], [1, 1, 5]])
+from ripple_sim.coupling.patches.clusters import MAX_CLUSTERS, cluster
 
 
-def pressed_patch(
-    atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: float, convex: bool
-) -> tuple[np.ndarray, np.ndarray, float]:
-    loads, probes = probe(points, forces, radius, convex)
-    spots, pressing, greater, rows = spread(loads, probes, atlas.project(probes)[0], radius)
-    if rows[0] >= 0:
-        np.testing.assert_array_equal(probes[rows], spots)
-    return spots, pressing, greater
+def test_far_contacts_of_one_pair_stay_apart_and_add_up() -> None:
+    points = np.array([[0, 0, 0], [0.01, 0, 0], [1.0, 0, 0]])
+    forces = np.array([1.0, 3.0, 2.0])
+    middles, totals = cluster(points, forces, 0.05)
+    np.testing.assert_allclose(totals, [4.0, 2.0])
+    np.testing.assert_allclose(middles, [[0.0075, 0, 0], [1, 0, 0]])
 
 
-@pytest.fixture(scope="module")
-def block() -> Atlas:
-    """A cube of 1 m, cut into triangles."""
-    import trimesh
-
-    solid = trimesh.creation.box(extents=(1, 1, 1)).subdivide_to_size(0.2)
-    return build_atlas(Mesh.from_arrays(solid.vertices, solid.faces), 24, cache=False)
-
-
-def test_four_equal_corners_press_evenly_on_the_square(block: Atlas) -> None:
-    points, forces, radius = pressed_patch(block, SQUARE, np.full(4, 2.5), 0.01, convex=True)
-    # nodes of a 3 x 3 lattice, each with the area that it stands for: 1 at a corner, 2 at a rim, 4 in the middle
-    assert sorted(np.round(forces / 10 * 16)) == [1, 1, 1, 1, 2, 2, 2, 2, 4]
-    assert np.abs(points[:, :2]).max() < 0.1
-    assert radius > 0.05
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_force_and_torque_stay_what_they_are(block: Atlas, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    corners = np.column_stack([rng.uniform(-0.3, 0.3, (6, 2)), np.full(6, 0.5)])
-    loads = rng.uniform(0.1, 3.0, 6)
-    points, forces, _ = pressed_patch(block, corners, loads, 0.01, convex=True)
-    assert len(forces) > 6
-    assert forces.sum() == pytest.approx(loads.sum(), rel=1e-12)
-    np.testing.assert_allclose(forces @ points, loads @ corners, atol=1e-12)
-
-
-def test_number_of_sources_is_bounded_however_many_contacts_there_are(block: Atlas) -> None:
+def test_number_of_clusters_is_bounded_however_many_contacts_there_are() -> None:
     rng = np.random.default_rng(5)
-    corners = np.column_stack([rng.uniform(-0.4, 0.4, (200, 2)), np.full(200, 0.5)])
-    loads = rng.uniform(0.1, 1.0, 200)
-    middles, totals = cluster(corners, loads, 0.001)
-    assert len(totals) == MAX_CONTACTS
-    np.testing.assert_allclose(totals @ middles, loads @ corners)
-    points, forces, _ = pressed_patch(block, corners, loads, 0.001, convex=True)
-    assert len(forces) <= MAX_CONTACTS * (MAX_CONTACTS + 1) // 2
-    np.testing.assert_allclose(forces @ points, loads @ corners)
-
-
-def test_nothing_presses_where_the_surface_is_not(block: Atlas) -> None:
-    """Two contacts on the head and on the rump of an animal press there, and not on the saddle between them."""
-    V, F = limbed(0.05)
-    animal = build_atlas(Mesh.from_arrays(V, F), 16, cache=False)
-    head, rump = V[V[:, 2].argmax()], V[V[:, 0].argmin()]
-    loads = np.array([2.0, 1.0])
-    points, forces, radius = pressed_patch(animal, np.array([head, rump]), loads, 0.02, convex=True)
-    np.testing.assert_array_equal(points, [head, rump])
-    np.testing.assert_allclose(forces, loads)
-    assert radius == 0.02
-
-
-def test_bodies_that_are_not_convex_press_at_their_contacts(block: Atlas) -> None:
-    points, _, radius = pressed_patch(block, SQUARE, np.ones(4), 0.01, convex=False)
-    assert len(points) == 4
-    assert radius == 0.01
+    points = np.column_stack([rng.uniform(-0.4, 0.4, (200, 2)), np.full(200, 0.5)])
+    forces = rng.uniform(0.1, 1.0, 200)
+    middles, totals = cluster(points, forces, 0.001)
+    assert len(totals) == MAX_CLUSTERS
+    np.testing.assert_allclose(totals @ middles, forces @ points)

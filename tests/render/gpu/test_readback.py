@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from ripple_sim.render import Camera, Renderer
+from ripple_sim.render.frame_format import FrameFormat
 from ripple_sim.render.gpu.readback import Readback
-from ripple_sim.render.gpu.resources import OwnedObjects
+from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import GLContext, shared_context
@@ -49,7 +50,7 @@ def test_frames_come_back_in_order_however_many_are_on_their_way(
     model = mujoco.MjModel.from_xml_string(BALL)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    renderer = Renderer(shared_context(), model, {}, width=70, height=50, alpha=alpha)
+    renderer = Renderer(shared_context(), model, {}, size=(70, 50), alpha=alpha)
     expected = [renderer.render(data, {}, camera) for camera in views(5)]
     assert all((a != b).any() for a, b in itertools.pairwise(expected))
     if driver == "gpu":
@@ -72,7 +73,7 @@ def test_colours_are_divided_by_opacity() -> None:
     gl = shared_context()
     with gl as ctx:
         picture = ctx.framebuffer([ctx.texture((257, 128), 4, pixels)])
-    readback = Readback(gl, OwnedObjects(gl, picture), picture.size, alpha=True)
+    readback = Readback(Resources(gl, picture), FrameFormat(picture.size, alpha=True))
     readback.submit(picture)
     frame = readback.fetch()
     expected = 255 * pixels.astype(float) / np.maximum(opacity, 1)[:, None]

@@ -1,4 +1,4 @@
-"""Where the pictures of MuJoCo's materials lie on its geoms, as in mujoco.Renderer since 3.12."""
+"""How the textures of MuJoCo's materials lie on its geoms, as in mujoco.Renderer since 3.12."""
 
 import os
 import subprocess
@@ -8,50 +8,25 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
+from textured import textured_model
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.visuals import primitives as meshes
-from ripple_sim.render.visuals.materials import look_of
-from ripple_sim.render.visuals.texture_mapping import FLAT_IMAGE, mapping_of
-from ripple_sim.render.visuals.visual import geom_piece
-from ripple_sim.solver.errors import GLError
-from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.render.visuals import primitives
 
 SIZE = 96
+
+
 FROM_X = Camera((0.0, 0.0, 0.0), 4.0, 180.0, 0.0, 20.0)  # the picture's right is +y, its up +z
+
+
 ABOVE = Camera((0.0, 0.0, 0.0), 4.0, 90.0, -89.99, 20.0)  # right is +x, up +y
-# a texture of four squares: red and green above blue and yellow
-COLORS = {"r": (255, 0, 0), "g": (0, 255, 0), "b": (0, 0, 255), "y": (255, 255, 0)}
-TEXTURE = '<texture name="t" type="{kind}" builtin="flat" width="64" height="{height}"/>'
-MATERIAL = '<material name="m" texture="t" specular="0" {}/>'
-
-
-@pytest.fixture(scope="module")
-def gl() -> GLContext:
-    try:
-        return shared_context()
-    except GLError as error:
-        pytest.skip(f"no OpenGL context: {error}")
-
-
-def painted(body: str, attributes: str = "", *, kind: str = "2d", asset: str = "", material: str = MATERIAL):
-    texture = TEXTURE.format(kind=kind, height=64 if kind == "2d" else 384)
-    xml = f"<mujoco><asset>{texture}{material.format(attributes)}{asset}</asset><worldbody>{body}</worldbody></mujoco>"
-    model = mujoco.MjModel.from_xml_string(xml)
-    squares = np.array([["r", "g"], ["b", "y"]]).repeat(32, axis=0).repeat(32, axis=1)
-    image = np.array([[COLORS[name] for name in row] for row in squares], dtype=np.uint8)
-    model.tex_data[: 3 * 64 * 64] = image.ravel()
-    if kind == "cube":
-        for face, name in enumerate("rgbyrg"):  # right, left, up, down, front, back
-            model.tex_data[3 * 4096 * face : 3 * 4096 * (face + 1)] = np.tile(COLORS[name], 4096)
-    return model
 
 
 def names(gl, model, places, camera=FROM_X, targets=None) -> str:
     """Names of the colours at places of the picture, x to the right and y upwards from its middle, in pixels."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    with Renderer(gl, model, targets or {}, width=SIZE, height=SIZE, lighting="studio") as renderer:
+    with Renderer(gl, model, targets or {}, size=(SIZE, SIZE), lighting="studio") as renderer:
         frame = renderer.render(data, {}, camera).astype(float)
     found = ""
     for x, y in places:
@@ -82,12 +57,12 @@ def corners(distance: int) -> list[tuple[int, int]]:
     ],
 )
 def test_a_flat_picture_lies_on_each_primitive_as_in_mujoco(gl, geom, camera, expected):
-    model = painted(f'<geom {geom} material="m"/>')
+    model = textured_model(f'<geom {geom} material="m"/>')
     assert names(gl, model, corners(9), camera) == expected
 
 
 def test_the_ends_of_a_capsule_carry_whole_pictures_of_their_own(gl):
-    model = painted('<geom type="capsule" size=".4 .1" material="m"/>')
+    model = textured_model('<geom type="capsule" size=".4 .1" material="m"/>')
     # upwards over the lower end, the straight part, the upper end; the picture's upper edge is always above
     heights = [-0.46, -0.25, -0.05, 0.05, 0.25, 0.46]
     pixels = SIZE / (2 * 4 * np.tan(np.radians(10)))
@@ -96,28 +71,28 @@ def test_the_ends_of_a_capsule_carry_whole_pictures_of_their_own(gl):
 
 def test_repetitions_are_counted_along_the_object_or_with_texuniform_in_units_of_its_size(gl):
     geom = '<geom type="box" size=".5 .5 .5" material="m"/>'
-    assert names(gl, painted(geom, 'texrepeat="2 1"'), [(-29, 9), (-10, 9), (10, 9), (29, 9)]) == "rgrg"
-    assert names(gl, painted(geom, 'texuniform="true"'), corners(9)) == "rrrr"
+    assert names(gl, textured_model(geom, 'texrepeat="2 1"'), [(-29, 9), (-10, 9), (10, 9), (29, 9)]) == "rgrg"
+    assert names(gl, textured_model(geom, 'texuniform="true"'), corners(9)) == "rrrr"
     assert (
-        names(gl, painted(geom, 'texuniform="true" texrepeat="2 4"'), [(-29, 29), (-29, 10), (10, 29), (10, 10)])
+        names(gl, textured_model(geom, 'texuniform="true" texrepeat="2 4"'), [(-29, 29), (-29, 10), (10, 29), (10, 10)])
         == "rbgy"
     )
     plane = '<geom type="plane" size=".5 .5 .1" material="m"/>'
-    assert names(gl, painted(plane, 'texuniform="true"'), corners(9), ABOVE) == "rrrr"
+    assert names(gl, textured_model(plane, 'texuniform="true"'), corners(9), ABOVE) == "rrrr"
 
 
 def test_a_cube_picture_is_stretched_over_a_primitive_or_with_texuniform_is_not(gl):
     """The side of a flat box seen under 45 degrees shows up as such, or as what lies beyond its far edge."""
     geom = '<geom type="box" size=".2 .6 .6" material="m"/>'
-    assert names(gl, painted(geom, kind="cube"), [(-20, 0), (0, 0), (20, 0)]) == "rrr"
-    assert names(gl, painted(geom, 'texuniform="true"', kind="cube"), [(-20, 0), (0, 0), (20, 0)])[1] == "r"
-    assert names(gl, painted(geom, 'texuniform="true"', kind="cube"), [(-20, 0), (20, 0)]) != "rr"
+    assert names(gl, textured_model(geom, kind="cube"), [(-20, 0), (0, 0), (20, 0)]) == "rrr"
+    assert names(gl, textured_model(geom, 'texuniform="true"', kind="cube"), [(-20, 0), (0, 0), (20, 0)])[1] == "r"
+    assert names(gl, textured_model(geom, 'texuniform="true"', kind="cube"), [(-20, 0), (20, 0)]) != "rr"
 
 
 @pytest.mark.parametrize(("shape", "look"), [("sphere", "model"), ("capsule", "model"), ("sphere", "rubber")])
 def test_a_target_wears_the_picture_as_a_body_does(gl, shape, look):
-    model = painted(f'<geom type="{shape}" size=".4 .2" material="m"/>')
-    ball = meshes.ball(12)
+    model = textured_model(f'<geom type="{shape}" size=".4 .2" material="m"/>')
+    ball = primitives.ball(12)
     V = 0.4 * ball.shell + (np.sign(ball.shell) * [0, 0, 0.2] if shape == "capsule" else 0.0)
     places = [*corners(5), *corners(12)]
     surface = Surface(V, ball.faces, ball.shell, 8, look)
@@ -132,27 +107,17 @@ def test_the_first_role_for_colours_is_found_among_layers(gl):
         '<material name="m" specular="0"><layer role="normal" texture="n"/><layer role="rgb" texture="t"/></material>'
     )
     flat = '<texture name="n" type="2d" builtin="flat" rgb1=".5 .5 1" width="8" height="8"/>'
-    model = painted('<geom type="sphere" size=".4" material="m"/>', asset=flat, material=layers)
+    model = textured_model('<geom type="sphere" size=".4" material="m"/>', asset=flat, material=layers)
     assert names(gl, model, corners(9)) == "gryb"
 
 
 def test_the_colour_of_the_geom_or_else_of_the_material_multiplies_the_picture(gl):
     """Yellow times red is red, and so on; a geom without a colour takes the material's."""
     yellow = [(10, -10)]
-    assert names(gl, painted('<geom type="box" size=".4 .4 .4" material="m" rgba="1 0 0 1"/>'), yellow) == "r"
-    assert names(gl, painted('<geom type="box" size=".4 .4 .4" material="m"/>', 'rgba="0 1 0 1"'), yellow) == "g"
+    assert names(gl, textured_model('<geom type="box" size=".4 .4 .4" material="m" rgba="1 0 0 1"/>'), yellow) == "r"
+    assert names(gl, textured_model('<geom type="box" size=".4 .4 .4" material="m"/>', 'rgba="0 1 0 1"'), yellow) == "g"
 
 
-def test_a_mesh_keeps_its_texture_coordinates():
-    mesh = '<mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1" texcoord="0 0 1 0 0 1 1 1" face="0 2 1 0 1 3 0 3 2 1 2 3"/>'
-    model = painted('<geom type="mesh" mesh="m" material="m"/>', 'texrepeat="3 2"', asset=mesh)
-    mapping = mapping_of(model, geom_piece(model, 0))
-    assert (mapping.kind, mapping.own, mapping.tiling) == (FLAT_IMAGE, True, (3.0, 2.0, 0.0, 0.0))
-    shape = meshes.mesh_asset(model, 0)
-    assert {tuple(uv) for uv in shape.uv} == {(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)}
-
-
-# All primitives, turned in all directions, in sight of a camera above them
 SHELF = "".join(
     f'<geom type="{kind}" size="{size}" pos="{place} 0" euler="{turn}" material="m"/>'
     for kind, size, place, turn in [
@@ -164,6 +129,8 @@ SHELF = "".join(
         ("plane", ".4 .5 .1", "1.1 -.55", "10 -30 40"),
     ]
 )
+
+
 THEIRS = """
 import sys, mujoco, numpy as np
 frames = []
@@ -199,7 +166,8 @@ def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
         ("cube", 'texuniform="true"'),
     ]
     models = [
-        painted(SHELF + '<geom type="plane" size="0 0 .1" pos="0 0 -9"/>', text, kind=kind) for kind, text in variants
+        textured_model(SHELF + '<geom type="plane" size="0 0 .1" pos="0 0 -9"/>', text, kind=kind)
+        for kind, text in variants
     ]
     paths = [str(tmp_path / f"{i}.mjb") for i in range(len(models))]
     for model, path in zip(models, paths, strict=True):
@@ -211,7 +179,7 @@ def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
     for model, theirs, variant in zip(models, np.load(tmp_path / "theirs.npy"), variants, strict=True):
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
-        with Renderer(gl, model, {}, width=320, height=240, lighting="studio") as renderer:
+        with Renderer(gl, model, {}, size=(320, 240), lighting="studio") as renderer:
             ours = renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 4.2, 70.0, -50.0, 45.0))
         theirs_shows, ours_shows = colours(theirs), colours(ours)
         # away from edges, where they show a clear colour
@@ -221,17 +189,3 @@ def test_each_pixel_shows_what_mujocos_renderer_shows(gl, tmp_path):
         agree = (theirs_shows == ours_shows).all(axis=2)[inside]
         assert inside.sum() > 3000, variant
         assert agree.mean() > 0.99, variant
-
-
-def test_a_material_answers_light_as_it_says():
-    """Roughness is taken where it is given; otherwise more shininess is less of it. Reflectance is a coat."""
-
-    def look(attributes: str):
-        return look_of(model := painted('<geom size=".1" material="m"/>', attributes), geom_piece(model, 0))
-
-    assert look('roughness="0.3" metallic="1" shininess="0.9"').roughness == pytest.approx(0.3)
-    assert look('roughness="0.3" metallic="1"').metallic == 1.0
-    assert look('shininess="0"').roughness > look('shininess="0.5"').roughness > look('shininess="1"').roughness
-    assert look('reflectance="0.4"').coat == pytest.approx(0.4)
-    assert look('emission="0.7"').emission == pytest.approx(0.7)
-    assert look("").metallic == 0.0

@@ -41,9 +41,10 @@ def test_two_hundred_solvers_leave_nothing_on_the_gpu(gl_backend: str) -> None:
 
 def test_a_shared_shader_is_compiled_once(gl_backend: str) -> None:
     gl = shared_context()
-    shaders = [gl.shared_compute_shader("ripple_sim.solver.waves.backends", name) for name in ("ring", "ring", "kick")]
+    package = "ripple_sim.solver.waves.backends.shaders"
+    shaders = [gl.shared_compute_shader(package, name) for name in ("ring", "ring", "kick")]
     assert shaders[0] is shaders[1] and shaders[0] is not shaders[2]
-    assert gl.compute_shader("ripple_sim.solver.waves.backends", "ring") is not shaders[0]
+    assert gl.compute_shader(package, "ring") is not shaders[0]
 
 
 def test_solvers_that_share_shaders_keep_their_own_coefficients(gl_backend: str) -> None:
@@ -102,19 +103,19 @@ def test_lost_context_is_reported() -> None:
     script = """
         import ctypes, sys
         from ripple_sim.solver import GLError, WaveSolver, sphere_atlas
-        from ripple_sim.solver import gl
+        from ripple_sim.solver.gl import egl, shared_context
         try:
             waves = WaveSolver(sphere_atlas(1.0, 8), backend="gl")
         except GLError:
             sys.exit(77)
-        egl = gl._egl()
-        for function in (egl.eglGetCurrentDisplay, egl.eglGetPlatformDisplay):
+        library = egl.load_egl()
+        for function in (library.eglGetCurrentDisplay, library.eglGetPlatformDisplay):
             function.restype = ctypes.c_void_p
-        with gl.shared_context():
-            display = egl.eglGetCurrentDisplay()
+        with shared_context():
+            display = library.eglGetCurrentDisplay()
         none = ctypes.c_void_p(None)
-        egl.eglMakeCurrent(ctypes.c_void_p(display), none, none, none)
-        egl.eglTerminate(ctypes.c_void_p(display))
+        library.eglMakeCurrent(ctypes.c_void_p(display), none, none, none)
+        library.eglTerminate(ctypes.c_void_p(display))
         try:
             waves.height
         except GLError as error:

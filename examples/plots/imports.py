@@ -1,0 +1,120 @@
+"""Which module of the project imports which, read from the source tree (nothing is imported for it).
+
+Folders stand where they are installed: solver/ is ripple_sim.solver, scenes/ is ripple_sim.scenes. An import of a
+public name, such as `from ripple_sim.solver import Material`, counts as one of the module that the name comes from.
+The `__init__` files, which only hand such names on, are not counted as modules.
+"""
+
+import ast
+import dataclasses
+import functools
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = {"ripple_sim": "ripple_sim", "solver": "ripple_sim.solver", "scenes": "ripple_sim.scenes"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Module:
+    """A Python file: its dotted name, where it lies, its text, and the names of the project's modules it imports."""
+
+    name: str
+    path: Path
+    text: str
+    imports: frozenset[str]
+
+    @functools.cached_property
+    def tree(self) -> ast.Module:
+        return ast.parse(self.text)
+
+    @property
+    def package(self) -> str:
+        return self.name.rpartition(".")[0]
+
+
+def read(root: Path = ROOT) -> dict[str, Module]:
+    """All modules of the project, by name."""
+    paths = {}
+    for folder, package in FOLDERS.items():
+        for path in sorted((root / folder).rglob("*.py")):
+            inside = path.relative_to(root / folder).with_suffix("")
+            paths[".".join((package, *inside.parts))] = path
+    trees = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in paths.items()}
+    public = {
+        f"{name.removesuffix('.__init__')}.{given}": f"{module}.{original}"
+        for name, tree in trees.items()
+        if name.endswith(".__init__")
+        for module, original, given in _imported(name, tree)
+    }
+    modules = {}
+    for name, tree in trees.items():
+        if name.endswith("__init__"):
+            continue
+        targets = (_home(f"{module}.{imported}", trees, public) for module, imported, _ in _imported(name, tree))
+        imports = frozenset(target for target in targets if target not in (None, name))
+        modules[name] = Module(name, paths[name], paths[name].read_text(encoding="utf-8"), imports)
+    return modules
+
+
+def _imported(importer: str, tree: ast.Module) -> list[tuple[str, str, str]]:
+    """Module, name in it, and name given to it, of every import of the project's own, wherever it stands in a file."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found += [(each.name, "", each.asname or each.name) for each in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            above = ".".join(importer.split(".")[: -node.level]) if node.level else ""
+            module = ".".join(filter(None, (above, node.module)))
+            found += [(module, each.name, each.asname or each.name) for each in node.names]
+    return [each for each in found if each[0].split(".")[0] == "ripple_sim"]
+
+
+def _home(name: str, trees: dict[str, ast.Module], public: dict[str, str]) -> str | None:
+    """The module that an imported name is, or comes from; None for a package itself."""
+    while name in public:
+        name = public[name]
+    name = name.rstrip(".")
+    while name:
+        if name in trees:
+            return name
+        name = name.rpartition(".")[0]
+        if f"{name}.__init__" in trees:
+            return None
+    return None
+
+
+def grouped(modules: dict[str, Module], group: dict[str, str]) -> dict[str, set[str]]:
+    """Imports between groups of modules, given the group of each module; a group does not import itself."""
+    arrows: dict[str, set[str]] = {each: set() for each in group.values()}
+    for name, module in modules.items():
+        for imported in module.imports:
+            if name in group and imported in group and group[name] != group[imported]:
+                arrows[group[name]].add(group[imported])
+    return arrows
+
+
+def cycles(arrows: dict[str, set[str]]) -> list[list[str]]:
+    """Sets of nodes that all reach one another (Tarjan's strongly connected components of more than one node)."""
+    order: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found: list[list[str]] = []
+
+    def visit(node: str) -> None:
+        order[node] = low[node] = len(order)
+        stack.append(node)
+        for other in sorted(arrows.get(node, ())):
+            if other not in order:
+                visit(other)
+            if other in stack:
+                low[node] = min(low[node], low[other])
+        if low[node] == order[node]:
+            component = stack[stack.index(node) :]
+            del stack[stack.index(node) :]
+            if len(component) > 1:
+                found.append(sorted(component))
+
+    for node in sorted(arrows):
+        if node not in order:
+            visit(node)
+    return found

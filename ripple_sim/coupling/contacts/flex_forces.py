@@ -1,0 +1,131 @@
+"""Forces of contacts with flex colliders: the sum of whole forces, in place of that of normal ones."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ripple_sim.solver.kernel import Floats, Ints, Ints32, kernel
+
+from .target_contacts import PairContacts, group_by_pair
+
+# Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push sideways: geoms that
+# hit an edge or a corner push at down to 0.5.
+_SIDEWAYS = 0.1
+
+
+class FlexNormals(NamedTuple):
+    """Outward unit normals of all flex colliders' triangles.
+
+    Attributes
+    ----------
+    first : int64 [ngeom]
+        Row of the first triangle of a target among the normals; -1 for other geoms.
+    normals : float64 [nflexelem, 3]
+        In the frames of the geoms.
+    """
+
+    first: Ints
+    normals: Floats
+
+
+class MujocoFlexContacts(NamedTuple):
+    """MuJoCo's arrays of contacts, of the same names, forces of its constraint solver, and rotations of its geoms."""
+
+    efc_address: Ints32
+    dim: Ints32
+    friction: Floats
+    elem: Ints32
+    frame: Floats
+    pos: Floats
+    dist: Floats
+    includemargin: Floats
+    efc_force: Floats
+    geom_xmat: Floats
+
+
+@kernel
+def summed_contacts(
+    geoms: Ints, contacts: MujocoFlexContacts, flex: FlexNormals, extents: Floats, pyramidal: bool
+) -> PairContacts:
+    """Contacts that share the sum of the whole forces of their pair; pairs whose sum does not push are left out.
+
+    Parameters
+    ----------
+    geoms : int64 [ncon, 2]
+        Geom ids of each contact, also for flex colliders; -1 for other flexes.
+    contacts : MujocoFlexContacts
+    flex : FlexNormals
+    extents : float64 [ngeom]
+        Smallest half-extents [m].
+    pyramidal : bool
+        Whether MuJoCo's friction cones are.
+    """
+    pairs, forces = group_by_pair(geoms, contacts.efc_address, flex.first >= 0), _whole_forces(contacts, pyramidal)
+    count = len(pairs.contacts)
+    targets, others = np.empty(len(pairs.targets), np.int64), np.empty(len(pairs.targets), np.int64)
+    begins = np.empty(len(pairs.targets) + 1, np.int64)
+    points, loads, normals = np.empty((count, 3)), np.empty(count), np.empty((count, 3))
+    found, row = 0, 0
+    for pair in range(len(pairs.targets)):
+        target, other = pairs.targets[pair], pairs.others[pair]
+        first, sum_of_weights = row, 0.0
+        whole, mean = np.zeros(3), np.zeros(3)
+        for k in range(pairs.begins[pair], pairs.begins[pair + 1]):
+            i, side = pairs.contacts[k], pairs.sides[k]
+            sign = 1.0 if side else -1.0
+            outward = -sign * contacts.frame[i, :3]
+            normal = outward
+            # a plane touches vertices, which are no element, and its own normal is right
+            if contacts.elem[i, side] >= 0:
+                rotation = contacts.geom_xmat[target].copy().reshape(3, 3)
+                normal = rotation @ flex.normals[flex.first[target] + contacts.elem[i, side]]
+            whole += sign * forces[i]
+            force, along = (forces[i] * contacts.frame[i, :3]).sum(), (outward * normal).sum()
+            if force <= 0 or along <= _SIDEWAYS:
+                continue
+            mean += force * outward
+            weight = force * along**2
+            sum_of_weights += weight
+            # from the other geom's surface, which is in by a depth, to as far outside the target's own
+            depth = contacts.includemargin[i] - contacts.dist[i]
+            outside = depth + min(depth, extents[other])
+            points[row] = contacts.pos[i] - sign * contacts.dist[i] / 2 * contacts.frame[i, :3] + outside * normal
+            loads[row], normals[row] = weight, normal
+            row += 1
+        length = np.sqrt((mean**2).sum())
+        if row == first or -(whole * mean).sum() <= 0:
+            row = first
+            continue
+        loads[first:row] *= -(whole * mean).sum() / length / sum_of_weights
+        targets[found], others[found], begins[found] = target, other, first
+        found += 1
+    begins[found] = row
+    return PairContacts(targets[:found], others[:found], begins[: found + 1], points[:row], loads[:row], normals[:row])
+
+
+@kernel
+def _whole_forces(contacts: MujocoFlexContacts, pyramidal: bool) -> Floats:
+    """Force of every contact on its second geom, in the world [N], [ncon, 3]; see `mj_contactForce`."""
+    address, dim, frame, efc_force = contacts.efc_address, contacts.dim, contacts.frame, contacts.efc_force
+    forces = np.zeros((len(address), 3))
+    for i in range(len(address)):
+        if address[i] < 0:
+            continue
+        along = np.zeros(3)
+        if pyramidal and dim[i] > 1:
+            # each direction has two opposite edges of the friction pyramid: normal force is their sum, friction their
+            # difference
+            for k in range(dim[i] - 1):
+                one, two = efc_force[address[i] + 2 * k], efc_force[address[i] + 2 * k + 1]
+                along[0] += one + two
+                if k < 2:
+                    along[k + 1] = contacts.friction[i, k] * (one - two)
+        else:
+            for k in range(min(dim[i], 3)):
+                along[k] = efc_force[address[i] + k]
+        for k in range(3):
+            for j in range(3):
+                forces[i, j] += along[k] * frame[i, 3 * k + j]
+    return forces

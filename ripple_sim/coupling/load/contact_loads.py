@@ -1,0 +1,82 @@
+"""From the contacts of a physics step to loads on the texels of all targets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+
+from ripple_sim.coupling.contacts.contact_reader import ContactReader
+from ripple_sim.coupling.model.coupled_model import CoupledModel
+from ripple_sim.coupling.patches.pose import Pose
+from ripple_sim.solver import Load, WaveSolver
+
+from .contact_record import ContactRecord, Impulse, Touch
+from .target_load import TargetLoad
+
+
+class ContactLoads:
+    """The loads of all contacts, target by target and step by step.
+
+    Parameters
+    ----------
+    coupled : CoupledModel
+    waves : mapping
+        Geom id of every target to its waves. Looked at again by `waves_changed` and `clear`.
+    """
+
+    def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
+        self._coupled, self._waves = coupled, waves
+        self._contacts = ContactReader(coupled, {geom: each.atlas.mesh for geom, each in waves.items()})
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all contacts."""
+        self._targets = {
+            geom: TargetLoad(waves, self._coupled.footprint_radii, self._coupled.convex)
+            for geom, waves in self._waves.items()
+        }
+        self.skip()
+
+    def skip(self) -> None:
+        """Forget the latest step: nothing was given since."""
+        self._records: list[ContactRecord] = []
+        self._impulses: list[Impulse] | None = None
+
+    def waves_changed(self, geom: int) -> None:
+        """Go on with the new waves of a target."""
+        self._targets[geom].set_waves(self._waves[geom])
+
+    def loads(self, data: mujoco.MjData, elapsed: float) -> dict[int, Load]:
+        """Load on each target over a time [s], from the contact forces that MuJoCo held over its latest time step."""
+        loads = {}
+        self.skip()
+        self._timestep = self._coupled.model.opt.timestep
+        contacts = self._contacts.read(data)
+        for geom, target in self._targets.items():
+            if geom in contacts:
+                # copies, since MuJoCo's own arrays will move on
+                pose = Pose(data.geom_xpos[geom].copy(), data.geom_xmat[geom].reshape(3, 3).copy())
+                loads[geom], record = target.touched(contacts[geom], pose, self._timestep, elapsed)
+                self._records.append(record)
+            else:
+                loads[geom] = target.untouched(elapsed)
+        return loads
+
+    @property
+    def impulses(self) -> list[Impulse]:
+        """The impulses given in the latest step, one record for each pair."""
+        if self._impulses is None:
+            self._impulses = [
+                impulse
+                for record in self._records
+                for impulse in record.impulses(
+                    self._coupled.names, self._waves[record.contacts.target].atlas.areas.shape, self._timestep
+                )
+            ]
+        return self._impulses
+
+    @property
+    def touches(self) -> list[Touch]:
+        """The pairs that touched in the latest step."""
+        return [touch for record in self._records for touch in record.touches()]

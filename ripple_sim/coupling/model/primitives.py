@@ -1,0 +1,44 @@
+"""Triangles on the surfaces of MuJoCo's primitive geoms."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+# Longest edge of a triangle over the size of the primitive.
+_LONGEST_EDGE = 1 / 24
+_CYLINDER_SIDES = 96
+
+
+def primitive_triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices [m], [n, 3], on an ellipsoid, capsule, cylinder or box of a MuJoCo size, [3], and triangles, [m, 3]."""
+    if kind == "ellipsoid":
+        solid = trimesh.creation.icosphere(subdivisions=4)
+        solid.apply_scale(size)
+    elif kind == "capsule":
+        solid = trimesh.creation.capsule(height=2 * size[1], radius=size[0], count=(48, 48))
+        solid.apply_translation([0, 0, -solid.bounds.mean(axis=0)[2]])
+    elif kind == "cylinder":
+        solid = trimesh.creation.cylinder(radius=size[0], height=2 * size[1], sections=_CYLINDER_SIDES)
+    else:
+        solid = trimesh.creation.box(extents=2 * size)
+    longest = float(np.max(solid.extents)) * _LONGEST_EDGE
+    V, F = trimesh.remesh.subdivide_to_size(solid.vertices, solid.faces, max_edge=longest)
+    return _on_round_surface(kind, size, V), F
+
+
+def _on_round_surface(kind: str, size: NDArray[np.float64], V: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vertices moved along the radius from the chords of a round solid onto its surface [m]."""
+    if kind == "ellipsoid":
+        return V / np.linalg.norm(V / size, axis=1, keepdims=True)
+    if kind == "capsule":
+        axis = np.clip(V[:, 2:], -size[1], size[1]) * [0.0, 0.0, 1.0]
+        return axis + size[0] * (V - axis) / np.linalg.norm(V - axis, axis=1, keepdims=True)
+    if kind == "cylinder":
+        radius = np.linalg.norm(V[:, :2], axis=1)
+        # the other vertices lie inside the flat ends
+        on_side = radius > size[0] * (np.cos(np.pi / _CYLINDER_SIDES) - 1e-9)
+        V = V.copy()
+        V[on_side, :2] *= (size[0] / radius[on_side])[:, None]
+    return V

@@ -1,0 +1,64 @@
+"""The surface of a target as a mesh, and its atlas, in the geom's own frame."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
+
+from .geoms import TARGET_TYPES, geom_name
+from .primitives import primitive_triangles
+
+
+def target_atlas(model: mujoco.MjModel, geom: int, resolution: int) -> Atlas:
+    """Atlas of a geom's surface in the geom's frame [m].
+
+    Raises
+    ------
+    MeshError
+        If the geom's mesh is not a closed genus-0 surface.
+    """
+    if TARGET_TYPES[int(model.geom_type[geom])] == "sphere":
+        return sphere_atlas(float(model.geom_size[geom, 0]), resolution)
+    return build_atlas(target_mesh(model, geom), resolution)
+
+
+def target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
+    """Surface of a geom in the geom's frame [m]; see `target_atlas`."""
+    kind = TARGET_TYPES[int(model.geom_type[geom])]
+    name = f"mesh of geom {geom_name(model, geom)!r}"
+    if kind not in ("mesh", "sdf"):
+        V, F = primitive_triangles(kind, model.geom_size[geom])
+        return Mesh.from_arrays(V, F, name=name)
+    mesh = model.geom_dataid[geom]
+    first_vertex, first_triangle = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+    V = model.mesh_vert[first_vertex : first_vertex + model.mesh_vertnum[mesh]]
+    F = model.mesh_face[first_triangle : first_triangle + model.mesh_facenum[mesh]]
+    return _textured(Mesh.from_arrays(V, F, name=name), F, _texture_coordinates(model, mesh))
+
+
+def _texture_coordinates(model: mujoco.MjModel, mesh: int) -> NDArray[np.float64] | None:
+    """A mesh's own texture coordinates at the corners of its triangles, [triangle_count, 3, 2], or None.
+
+    MuJoCo counts v from the upper edge of the image.
+    """
+    first, first_triangle = model.mesh_texcoordadr[mesh], model.mesh_faceadr[mesh]
+    if first < 0:
+        return None
+    pairs = model.mesh_texcoord[first : first + model.mesh_texcoordnum[mesh]]
+    corners = model.mesh_facetexcoord[first_triangle : first_triangle + model.mesh_facenum[mesh]]
+    uv = pairs[corners].astype(np.float64)
+    return np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1)
+
+
+def _textured(mesh: Mesh, F: NDArray[np.int32], corner_uv: NDArray[np.float64] | None) -> Mesh:
+    """The mesh with texture coordinates, unless its triangles had to be repaired."""
+    if corner_uv is None or not np.array_equal(mesh.F, F):
+        return mesh
+    uv = np.zeros((len(mesh.V), 2))
+    uv[F] = corner_uv
+    return dataclasses.replace(mesh, uv=uv, corner_uv=corner_uv)

@@ -1,0 +1,93 @@
+"""One target: the waves on a geom's surface, and the material that may change while they run."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ripple_sim.coupling.model.target_mesh import target_atlas
+from ripple_sim.solver import Material, SolverError, WaveSolver
+from ripple_sim.solver.waves.footprint import footprint
+from ripple_sim.solver.waves.holding import hold
+
+
+class Target:
+    """A geom that ripples.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    geom : int
+        Geom id.
+    material : Material
+    resolution : int
+        Of the atlas.
+    options : mapping
+        Keyword arguments of `WaveSolver`.
+
+    Attributes
+    ----------
+    geom : int
+    waves : WaveSolver
+        A new one after each change, in the state of the old one.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, geom: int, material: Material, resolution: int, options: Mapping[str, Any]
+    ) -> None:
+        self.geom = geom
+        self._model, self._material, self._options = model, material, dict(options)
+        self._held: NDArray[np.float64] | None = None
+        self.waves = WaveSolver(target_atlas(model, geom, resolution), material, **options)
+
+    def change_material(self, **coefficients: Any) -> None:
+        """Change coefficients of the material, by their names in `Material`.
+
+        Raises
+        ------
+        SolverError
+            For an unknown or invalid coefficient; the old ones stay.
+        """
+        names = [field.name for field in dataclasses.fields(Material)]
+        for name in coefficients:
+            if name not in names:
+                raise SolverError(f"a material has no coefficient {name!r}; valid are {', '.join(names)}")
+        self._rebuild(dataclasses.replace(self._material, **coefficients), self._held, self._options)
+
+    def change_operator(self, operator: str) -> None:
+        """Change the wave operator, by its name in `WaveSolver`."""
+        self._rebuild(self._material, self._held, {**self._options, "operator": operator})
+
+    def make_rigid(self, point: ArrayLike, radius: float) -> None:
+        """Hold a disc still, of a radius [m] round a point [m] in the frame of the geom; waves bounce off its rim."""
+        disc = np.zeros(self.waves.atlas.areas.shape)
+        disc.reshape(-1)[footprint(self.waves.atlas, point, radius).texels] = 1.0
+        self.hold(disc)
+
+    def hold(self, region: ArrayLike) -> None:
+        """Hold a region still, bool or shares from 0 to 1, [C, n, n], beside those held already; see `hold`."""
+        held = np.asarray(region, dtype=np.float64)
+        if self._held is not None and held.shape == self._held.shape:
+            held = np.maximum(held, self._held)
+        self._rebuild(self._material, held, self._options)
+
+    def to_geom(self, point: ArrayLike) -> NDArray[np.float64]:
+        """Carry a point [m] from the frame of the geom's body to that of the geom."""
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, self._model.geom_quat[self.geom])
+        return (np.asarray(point, dtype=np.float64) - self._model.geom_pos[self.geom]) @ rotation.reshape(3, 3)
+
+    def _rebuild(self, material: Material, held: NDArray[np.float64] | None, options: dict[str, Any]) -> None:
+        """Make a new solver in the old one's state; if that fails, nothing has changed."""
+        old, held_material = self.waves, material
+        if held is not None:
+            held_material = hold(old.atlas, material, held)
+        new = WaveSolver(old.atlas, held_material, **options)
+        new.height, new.velocity, new.pressure = old.height, old.velocity, old.pressure
+        new.time, new.substeps_taken = old.time, old.substeps_taken
+        self.waves, self._material, self._held, self._options = new, material, held, options

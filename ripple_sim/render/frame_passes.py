@@ -1,0 +1,118 @@
+"""The passes of one frame in their order: shadow maps, floor map, reflection, G-buffer, shading, transparent layers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from .bounds import enclosing, within
+from .camera import Pose
+from .drawn_scene import DrawnScene
+from .frame_format import FrameFormat
+from .gpu.frame_uniforms import FrameUniforms
+from .gpu.resources import Resources
+from .passes.deferred import DeferredShading
+from .passes.floor import Floor
+from .passes.floor_occlusion import FloorOcclusion
+from .passes.mirror import Mirror
+from .passes.screen_bounds import boxes_of
+from .passes.shadow import ShadowMaps
+from .scene_light import SceneLight
+
+_SHADOW_REACH = 2.5  # casters further than that from the focus, in camera distances, cast no shadow
+
+
+class FramePasses:
+    """Draws frames of a scene on the GPU.
+
+    Parameters
+    ----------
+    resources : Resources
+    frame_format : FrameFormat
+    scene : DrawnScene
+    floor : Floor, optional
+    light : SceneLight
+    """
+
+    def __init__(
+        self,
+        resources: Resources,
+        frame_format: FrameFormat,
+        scene: DrawnScene,
+        floor: Floor | None,
+        light: SceneLight,
+    ) -> None:
+        self._gl, self._format = resources.gl, frame_format
+        self._scene, self._floor, self._light = scene, floor, light
+        self._frame = FrameUniforms(resources)
+        self._shadows = ShadowMaps(resources, light.shadows)
+        self._occlusion = FloorOcclusion(resources, light.shadows, floor)
+        self._shading = DeferredShading(resources, frame_format, floor, light.options)
+        self._mirror = None
+        if floor is not None and floor.reflects and not frame_format.alpha:
+            self._mirror = Mirror(resources, frame_format, floor, light.options)
+
+    def draw(
+        self, data: Any, height_maps: Mapping[int, NDArray[np.float32]], pose: Pose, exposure: int
+    ) -> moderngl.Framebuffer:
+        """Draw a frame and leave it on the GPU; see `Renderer.draw`."""
+        scene, shading = self._scene, self._shading
+        with self._gl as ctx:
+            self._update(ctx, data, height_maps, pose, exposure)
+            self._draw_maps(ctx)
+            balls = scene.balls(data)
+            if self._mirror is not None:
+                self._mirror.draw(ctx, self._frame, pose, balls, scene.draw, self._bind)
+            shading.begin(ctx)
+            scene.draw()
+            self._bind()
+            if self._gl.software:  # which would draw all this in the next call, holding the interpreter's lock
+                self._gl.wait()
+            shading.shade(ctx, boxes_of(balls, pose, self._format.size))
+            for layer in scene.layers(data, pose):
+                shading.layers.add(ctx, layer.number, layer.draw, boxes_of(layer.balls, pose, self._format.size))
+        return shading.frame
+
+    def _update(
+        self,
+        ctx: moderngl.Context,
+        data: Any,
+        height_maps: Mapping[int, NDArray[np.float32]],
+        pose: Pose,
+        exposure: int,
+    ) -> None:
+        """Bring everything on the GPU up to date."""
+        frame, floor = self._frame, self._floor
+        occluders = self._scene.update(ctx, data, height_maps, pose)
+        frame.set_camera(pose, self._format.aspect)
+        casters = within(self._scene.casters(data), pose.focus, _SHADOW_REACH * pose.distance)
+        centre, radius = enclosing(casters) if len(casters.radii) else (pose.focus, pose.distance)
+        if floor is not None:
+            floor.place(frame, data, centre, radius)
+        lights = self._light.set(frame, data, pose, floor)
+        casting = self._shadows.fit(frame, lights, centre, radius)
+        if floor is not None and len(casters.radii):
+            floor.shade(frame, casting, casters)
+        frame.set_vector("counts", [occluders, len(lights), exposure], len(casting))
+        frame.bind()
+
+    def _draw_maps(self, ctx: moderngl.Context) -> None:
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        ctx.depth_func = "<="
+        self._shadows.draw(self._scene.draw_shadow)
+        self._occlusion.draw(ctx, self._scene.draw_occluders, self._shadows)
+
+    def _bind(self) -> None:
+        """Bind what shading needs."""
+        self._scene.bind()
+        self._shadows.bind()
+        self._occlusion.bind()
+        if self._floor is not None:
+            self._floor.bind()
+        self._light.bind()
+        if self._mirror is not None:
+            self._mirror.bind()

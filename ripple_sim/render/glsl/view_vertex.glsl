@@ -1,0 +1,20 @@
+#version 430
+// One triangle over the whole framebuffer, at a given depth, with its rays and what is the same all over the floor.
+#include "glsl/ray_cast.glsl"
+#include "visuals/environment.glsl"
+
+uniform float level;
+uniform vec2 span = vec2(1.0);  // of the framebuffer, in frames
+uniform float reach = 1.0;      // of the viewport, in framebuffers
+
+flat out vec3 focus_local;
+flat out vec3 around;  // ambient light on the open floor
+
+void main()
+{
+    vec2 corner = 4.0 * vec2(gl_VertexID == 1, gl_VertexID == 2);
+    cast_ray(corner * span - 1.0);
+    focus_local = along_floor(focus.xyz - floor_origin.xyz);
+    around = ambient(floor_normal.xyz, vec3(0.0));
+    gl_Position = vec4(corner / reach - 1.0, 2.0 * level - 1.0, 1.0);
+}

@@ -1,0 +1,137 @@
+#version 430
+// The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW the marked
+// pixels, and those that show solids too. With COARSE every pixel stands for a block of them.
+#include "gpu/frame_uniforms.glsl"
+#include "glsl/ray.glsl"
+#include "gpu/g_buffer_read.glsl"
+#include "passes/floor_map.glsl"
+#include "visuals/environment.glsl"
+#include "glsl/tone_mapping.glsl"
+#include "visuals/lights.glsl"
+#include "passes/shadow.glsl"
+
+layout(binding = FLAT_IMAGE_UNIT) uniform sampler2D floor_image;
+
+uniform vec4 tiling;   // texture coordinates a metre, and at the origin
+uniform vec3 tint;     // of the image
+
+flat in vec3 focus_local;
+flat in vec3 around;
+out vec4 fragment;
+
+#if MIRROR
+layout(binding = MIRROR_UNIT) uniform sampler2D mirror;  // the scene as the floor reflects it, tone mapped
+
+uniform float reflectance;
+#endif
+
+const float STEEPEST = 0.03;  // change from one block to the next up to which the background is smooth
+
+// A skybox continues below the horizon, which the floor hides.
+#if SKYBOX
+const float HORIZON = 0.0;
+#else
+const float HORIZON = -1.0;
+#endif
+
+#if !SHADOW
+// Whether a shadow may fall on a point of the floor; `near` is its texel of the floor map.
+bool may_be_shaded(vec2 place, vec2 near)
+{
+    vec2 off = abs(place - 0.5);
+    bool boxed = false;
+    for (int i = 0; i < SHADOWS; ++i) {
+        vec4 box = shadows[i].floor;
+        boxed = boxed || counts.w > float(i) && all(greaterThan(place, box.xy)) && all(lessThan(place, box.zw));
+    }
+    return boxed && (max(off.x, off.y) > 0.5 || near.g > 0.0);
+}
+#endif
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    bool met = meets_floor();
+    float at = floor_distance();
+    vec2 plane = eye_local.xy + at * way_local.xy;
+    // the lights are near: a pool of light about the focus, and the background's colour beyond
+    float away = length(vec3(plane - focus_local.xy, focus_local.z));
+    // antialiasing of the floor's own edges
+    vec2 inside = vec2(floor_u.w, floor_v.w) - abs(plane), filled = clamp(inside / fwidth(inside), 0.0, 1.0);
+    float edge = 1.0 - min(filled.x, filled.y);
+    float fade = met ? max(smoothstep(floor_fade.x, floor_fade.y, away / eye.w), edge) : 1.0;
+#if TILED
+    vec3 albedo = texture(floor_image, plane * tiling.xy + tiling.zw).rgb * tint;
+#else
+    vec3 albedo = floor_albedo.rgb;
+#endif
+    vec3 world = eye.xyz + at * way;
+    vec2 place = floor_map_position(plane);
+#if COARSE
+    vec2 near = texture(floor_visibility, place).rg;
+#else
+    vec2 near = textureLod(floor_visibility, place, 0.0).rg;
+#endif
+#if SHADOW
+    // The filters of neighbouring pixels are turned differently: their mean has half the noise. It is taken where all
+    // four pixels of a block belong to this pass; derivatives across others are undefined.
+    int solid = bitCount(covered(pixel, floor_depth()));
+    bool whole = block_inside(pixel) && block_mean(solid > 0 || !met ? 1.0 : 0.0) == 0.0;
+    float shadow[SHADOWS], share = 1.0 - float(solid) / float(SAMPLES);
+    for (int i = 0; i < SHADOWS; ++i) {
+        shadow[i] = light_visibility(i, world, floor_normal.xyz, 0.0);
+        float mean = block_mean(shadow[i]);
+        shadow[i] = whole ? mean : shadow[i];
+    }
+#else
+    const float share = 1.0;
+    bool shaded = met && may_be_shaded(place, near);
+#if !COARSE
+    // all four pixels of a block, so that their shadows can be averaged
+    gl_FragDepth = block_mean(shaded ? 1.0 : 0.0) > 0.0 ? SHADED_LEVEL : OPEN_LEVEL;
+#endif
+#endif
+#if NEAR_LIGHTS
+    vec3 light = vec3(0.0), unshaded = vec3(0.0);
+    for (int i = 0; i < int(counts.y); ++i) {
+        vec3 towards;
+        vec3 arrives = incident(lights[i], world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
+#if SHADOW
+        light += arrives * (i < SHADOWS ? shadow[i] : 1.0);
+#else
+        light += arrives;
+#endif
+        unshaded += arrives;
+    }
+#else
+    vec3 unshaded = floor_light.rgb, light = unshaded;
+#if SHADOW
+    for (int i = 0; i < SHADOWS; ++i) {
+        vec3 arrives = lights[i].radiance.rgb * max(dot(floor_normal.xyz, lights[i].direction.xyz), 0.0);
+        light -= (1.0 - shadow[i]) * arrives;
+    }
+#endif
+#endif
+    light += around * (0.15 + 0.85 * near.r);
+#if CUT_OUT
+    // only the shadows are left of the floor
+    fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g + around.g, 1e-6)));
+#else
+    vec3 direction = normalize(way);
+    vec3 far = sky_at(met && edge == 0.0 ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);
+    vec3 shown = tone_mapped(mix(albedo * light, far, fade));
+#if MIRROR
+    // as in MuJoCo, the reflectance does not depend on the angle
+    shown = mix(shown, textureLod(mirror, 0.5 + 0.5 * screen, 0.0).rgb, reflectance * (1.0 - fade));
+#endif
+#if COARSE
+    float rim = beside_floor();
+    bool steep = any(greaterThan(fwidth(shown), vec3(STEEPEST)));
+    // shadows are marked with a margin, so that leaving out the nearest blocks is enough
+    bool rough = steep || abs(rim) < 2.0 * fwidth(rim);
+    fragment = vec4(shown, rough ? 0.5 : shaded ? 1.0 - 2.0 * UNSURE : met ? 1.0 : 0.0);
+#else
+    fragment = share * vec4(dithered(shown), 1.0);
+#endif
+#endif
+}

@@ -1,0 +1,10 @@
+// The floor map; see floor_occlusion_fragment.glsl.
+#include "gpu/frame_uniforms.glsl"
+
+layout(binding = FLOOR_MAP_UNIT) uniform sampler2D floor_visibility;  // r: ambient visibility; g: 1 where shadows may fall
+
+// Texture coordinates in the floor map of a point given along the floor's axes.
+vec2 floor_map_position(vec2 local)
+{
+    return (local - floor_map.xy) / (2.0 * floor_map.z) + 0.5;
+}

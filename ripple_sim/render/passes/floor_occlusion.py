@@ -1,0 +1,78 @@
+"""Ambient occlusion of the floor by what is above it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import moderngl
+import numpy as np
+
+from ripple_sim.render.gpu.contract import Unit
+from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.projection import orthographic
+
+from .floor import Floor
+from .shadow import ShadowMaps
+
+_CEILING_SIZE, _MAP_SIZE = 224, 112
+_INFLUENCE = 0.35  # radius, in half widths of the map
+
+
+class FloorOcclusion:
+    """The floor map: its ambient visibility (1 - occlusion), and where shadows may fall.
+
+    Without a floor the map is a single texel that nothing shades.
+
+    Parameters
+    ----------
+    resources : Resources
+    shadows : int
+        How many lights may cast shadows.
+    floor : Floor, optional
+    """
+
+    def __init__(self, resources: Resources, shadows: int, floor: Floor | None) -> None:
+        self._floor = floor
+        if floor is None:
+            self._map = resources.texture((1, 1), 2, np.ones(2, dtype=np.float16).tobytes(), dtype="f2")
+            return
+        program = resources.program(
+            "glsl/screen_vertex", "passes/floor_occlusion_fragment", NEAR_LIGHTS=1, SHADOWS=shadows
+        )
+        self._pass = resources.vertex_array(program, [])
+        self._ceiling = resources.depth_texture((_CEILING_SIZE, _CEILING_SIZE))
+        self._ceiling.compare_func = ""
+        self._ceiling_framebuffer = resources.framebuffer(depth_attachment=self._ceiling)
+        self._map = resources.texture((_MAP_SIZE, _MAP_SIZE), 2, dtype="f2")
+        self._map.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        for texture in (self._ceiling, self._map):
+            texture.repeat_x = texture.repeat_y = False
+        self._map_framebuffer = resources.framebuffer([self._map])
+
+    def draw(self, ctx: moderngl.Context, draw_depth: Callable[[tuple[float, ...]], None], shadows: ShadowMaps) -> None:
+        """Draw what is above the floor from below, and fill the map from its height."""
+        floor = self._floor
+        if floor is None:
+            return
+        top = floor.half_width
+        # height above the floor becomes depth; this mirrors the scene, so nothing is culled
+        view = np.eye(4)
+        view[:3, :3] = np.diag([1.0, 1.0, -1.0]) @ floor.rotation.T
+        view[:3, 3] = -view[:3, :3] @ (floor.origin + floor.rotation[:, :2] @ floor.centre[:2])
+        matrix = orthographic(floor.half_width, top) @ view
+        self._ceiling_framebuffer.use()
+        ctx.disable(moderngl.CULL_FACE)
+        ctx.enable(moderngl.DEPTH_TEST)
+        self._ceiling_framebuffer.clear(depth=1.0)
+        draw_depth(tuple(matrix.T.ravel()))
+        self._map_framebuffer.use()
+        ctx.disable(moderngl.DEPTH_TEST)
+        shadows.bind()
+        self._ceiling.use(Unit.CEILING)
+        self._pass.program["extent"] = (2 * floor.half_width, top, _INFLUENCE * floor.half_width)
+        self._pass.render(moderngl.TRIANGLES, vertices=3)
+        self._map.build_mipmaps()
+
+    def bind(self) -> None:
+        """Bind the map for the shaders."""
+        self._map.use(Unit.FLOOR_MAP)

@@ -1,0 +1,97 @@
+// How a solid surface reflects light: GGX highlights with Schlick's Fresnel term over a diffuse, translucent base, under
+// a clear coat.
+#include "glsl/pixel_block.glsl"
+#include "passes/floor_map.glsl"
+#include "passes/shadow.glsl"
+#include "visuals/environment.glsl"
+#include "visuals/lights.glsl"
+#include "visuals/occluders.glsl"
+
+struct Material {
+    vec3 albedo;
+    float roughness, metallic, sheen, coat, translucency, transparency, emission;
+    float thickness;    // of the object under the surface, 0 to about 1
+    vec3 behind;        // radiance of what is seen through the object
+    float shadow_bias;  // height of bumps that the shading normal accounts for [m]
+    float visibility;   // ambient visibility that the object itself leaves, and its neighbours where `occluders` is 0
+    int occluders;
+    bvec2 block;        // neighbours in the block of 2 x 2 pixels that share their shadows with this one
+};
+
+// Light that the floor reflects up to a point; what is close above the floor shades it.
+vec3 floor_bounce(vec3 position)
+{
+    vec3 local = position - floor_origin.xyz;
+    vec2 place = floor_map_position(vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)));
+    float open = textureLod(floor_visibility, place, 3.0).r;
+    vec3 lit = floor_albedo.rgb * (floor_light.rgb * 0.7 * open * open + sky.rgb * 0.5 * open);
+    // less saturated: a coloured floor would stain everything
+    lit = mix(lit, vec3(dot(lit, vec3(0.2126, 0.7152, 0.0722))), 0.5);
+    return floor_origin.w > 0.0 ? lit : sky.rgb * 0.8;
+}
+
+float ggx(float n_h, float roughness)
+{
+    float a2 = roughness * roughness * roughness * roughness;
+    float d = n_h * n_h * (a2 - 1.0) + 1.0;
+    return a2 / (d * d);
+}
+
+vec3 fresnel(vec3 f0, float cosine)
+{
+    return f0 + (1.0 - f0) * pow(max(1.0 - cosine, 0.0), 5.0);
+}
+
+vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_geom, float spread)
+{
+    vec3 view = normalize(eye.xyz - position);
+    // interpolated normals of bumpy silhouettes may look away from the camera
+    normal = normalize(normal + max(0.1 - dot(normal, view), 0.0) * view);
+    vec3 reflected = reflect(-view, normal);
+    float n_v = clamp(dot(normal, view), 0.1, 1.0);
+
+    float open = m.visibility * occluder_visibility(position, flat_normal, own_geom, m.occluders);
+    vec3 bounce = floor_bounce(position);
+    float height = max(dot(position - floor_origin.xyz, floor_normal.xyz), 0.0);
+    vec3 mirrored = 1.7 * floor_bounce(position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2));
+    // narrow highlights of distant ripples would flicker
+    float rough = sqrt(clamp(m.roughness * m.roughness + spread, 0.004, 1.0));
+    vec3 f0 = mix(vec3(0.04), m.albedo, m.metallic);
+
+    // in translucent objects light of their own colour wraps round the edges
+    vec3 wrap = 0.6 * m.translucency * m.albedo;
+    // light that enters elsewhere and leaves here: more of it where the object is thin
+    float thin = exp(-4.0 * m.thickness);
+    float shadow[SHADOWS];
+    for (int i = 0; i < SHADOWS; ++i)
+        shadow[i] = block_mean(light_visibility(i, position, flat_normal, m.shadow_bias), m.block);
+    vec3 direct = vec3(0.0), highlight = vec3(0.0), glow = vec3(0.0);
+    for (int i = 0; i < int(counts.y); ++i) {
+        vec3 light;
+        vec3 radiance = incident(lights[i], position, light);
+        float n_l = dot(normal, light), visible = i < SHADOWS ? shadow[i] : 1.0;
+        vec3 halfway = normalize(view + light);
+        vec3 diffuse = max(n_l + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
+        direct += radiance * diffuse * mix(visible, 1.0, 0.35 * m.translucency);
+        highlight += radiance * visible * clamp(n_l * 4.0, 0.0, 1.0) * fresnel(f0, max(dot(view, halfway), 0.0))
+                   * ggx(max(dot(normal, halfway), 0.0), rough) * 0.25;
+        float behind = clamp(0.5 - 0.5 * n_l, 0.0, 1.0);
+        glow += radiance * thin * (0.35 + 0.65 * behind * behind);
+    }
+    vec3 around = ambient(normal, bounce) * open;
+    around *= mix(vec3(1.0), m.albedo / max(max(m.albedo.r, m.albedo.g), max(m.albedo.b, 1e-3)), 0.8 * m.translucency);
+    // light bounces between coloured walls: occlusion is less deep and more saturated
+    around *= mix(m.albedo * (1.0 - open) + open, vec3(1.0), open);
+    vec3 base = m.albedo * (direct + around) * (1.0 - m.metallic) + m.translucency * m.albedo * glow;
+    base += m.emission * m.albedo;
+    // transparent objects show what is behind them, refracted, and tinted by their thickness
+    base = mix(base, m.behind * pow(m.albedo, vec3(0.15 + 0.8 * m.thickness)), m.transparency);
+    base += m.sheen * m.albedo * around * pow(1.0 - n_v, 3.0);
+
+    float hidden = clamp(open * open + 0.15, 0.0, 1.0);
+    vec3 at_edge = f0 + (max(vec3(1.0 - rough), f0) - f0) * pow(1.0 - n_v, 5.0);
+    vec3 gloss = environment(reflected, rough, mirrored) * at_edge * hidden + highlight;
+    float coat = m.coat * fresnel(vec3(0.04), n_v).x;
+    vec3 film = environment(reflected, 0.06, mirrored) * hidden;
+    return (base + gloss) * (1.0 - coat) + coat * film;
+}

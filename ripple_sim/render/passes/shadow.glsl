@@ -1,0 +1,87 @@
+// Soft shadows: percentage-closer soft shadows (PCSS). SHADOWS lights may cast them; their maps lie side by side.
+#include "gpu/frame_uniforms.glsl"
+#include "glsl/disc.glsl"
+#include "glsl/noise.glsl"
+
+layout(binding = SHADOW_TEST_UNIT) uniform sampler2DShadow shadow_test;
+layout(binding = SHADOW_MAPS_UNIT) uniform sampler2D shadow_maps;
+
+const int SEARCH_TAPS = 10;
+const int FILTER_TAPS = 16;
+
+// Texture coordinates of a point of one light's map.
+vec2 in_maps(int light, vec2 point)
+{
+#if SHADOWS > 1
+    float edge = 0.5 / shadows[light].width.z;  // keeps a neighbour's texels out
+    point.x = (clamp(point.x, edge, 1.0 - edge) + float(light)) / float(SHADOWS);
+#endif
+    return point;
+}
+
+// Distance from a light [m] of a depth in its map.
+float light_distance(int light, float depth)
+{
+    vec4 d = shadows[light].depth;
+    return (d.x * depth + d.y) / (d.z * depth + d.w);
+}
+
+// Radius of the penumbra, in the map, of a blocker on what lies behind it; both by their distance from the light [m].
+float penumbra_of(int light, float blocker, float behind)
+{
+    vec4 penumbra = shadows[light].penumbra, width = shadows[light].width;
+    float blur = penumbra.x + penumbra.y / max(blocker, 1e-6);
+    return min((behind - blocker) * blur / (width.x + width.y * behind), penumbra.z);
+}
+
+// Share of a light that arrives. The normal is that of the surface without ripples; `bias` [m] raises the position above
+// bumps, which shall not shade each other.
+float light_visibility(int light, vec3 position, vec3 normal, float bias)
+{
+    vec4 place = lights[light].position, of_depth = shadows[light].depth, of_width = shadows[light].width;
+    bool far_away = NEAR_LIGHTS == 0 || place.w == 0.0;
+    vec3 towards = far_away ? lights[light].direction.xyz : normalize(place.xyz - position);
+    float facing = dot(normal, towards);
+    float away = far_away ? 0.0 : distance(place.xyz, position);
+    float texel = (of_width.x + of_width.y * away) / of_width.z;
+    vec3 raised = position + (bias + (1.5 + 2.5 * (1.0 - facing)) * texel) * normal;
+    vec4 clip = shadows[light].matrix * vec4(raised, 1.0);
+    vec3 p = clip.xyz / clip.w;
+    float to_light = light_distance(light, p.z), width = of_width.x + of_width.y * to_light;
+    float stretch = of_depth.z * p.z + of_depth.w;
+    float metre = stretch * stretch / (of_depth.x * of_depth.w - of_depth.y * of_depth.z);
+    // receiver plane depth bias: with a wide filter the surface would shade itself
+    vec4 plane = shadows[light].planes * vec4(normal, -dot(normal, raised));
+    float steepest = 10.0 * width * metre;
+    vec2 slope = -plane.xy * (abs(plane.z) > 1e-9 ? 1.0 / plane.z : 1e9);
+    slope = clamp(slope, -steepest, steepest);
+    // another noise in each exposure: a step along the diagonal turns the filter by about the golden angle
+    float turn = TWO_PI * gradient_noise(gl_FragCoord.xy + 5.588238 * counts.z);
+    vec2 direction = vec2(cos(turn), sin(turn));
+    float depth_bias = 0.5 * texel * metre;
+    float widest = shadows[light].penumbra.z;
+
+    // loops that run zero times instead of branches: software drivers execute both sides of a branch
+    bool inside = counts.w > float(light) && facing > -0.5 && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
+    float depth = 0.0, blockers = 0.0;
+    int taps = inside ? SEARCH_TAPS : 0;
+    for (int i = 0; i < taps; ++i) {
+        // denser in the middle, where a near blocker must not be missed
+        vec2 offset = widest * (float(i) + 0.1) / float(SEARCH_TAPS) * direction;
+        direction = GOLDEN_TURN * direction;
+        float d = textureLod(shadow_maps, in_maps(light, p.xy + offset), 0.0).r;
+        float blocks = step(d, p.z + dot(slope, offset) - 2.0 * depth_bias);
+        depth += blocks * d;
+        blockers += blocks;
+    }
+    float blocker = light_distance(light, depth / max(blockers, 1.0));
+    float penumbra = max(penumbra_of(light, blocker, to_light), 1.5 / of_width.z);
+    float lit = 0.0;
+    taps = blockers > 0.0 ? FILTER_TAPS : 0;
+    for (int i = 0; i < taps; ++i) {
+        vec2 offset = penumbra * sqrt((float(i) + 0.5) / float(FILTER_TAPS)) * direction;
+        direction = GOLDEN_TURN * direction;
+        lit += textureLod(shadow_test, vec3(in_maps(light, p.xy + offset), p.z + dot(slope, offset) - depth_bias), 0.0);
+    }
+    return taps > 0 ? lit / float(FILTER_TAPS) : 1.0;
+}

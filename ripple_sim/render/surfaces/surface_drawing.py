@@ -1,0 +1,105 @@
+"""The draw calls of a target: into the G-buffer, with its texture, heatmap and grid, and its depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render.gpu.contract import MappingKind
+from ripple_sim.render.visuals.assets import Assets
+from ripple_sim.render.visuals.texture_mapping import Mapping
+
+from .heatmap import HeatmapTexture
+from .surface import Surface, load_image
+from .vertices import BAKED, NORMAL, SPHERE, mapped_coordinates
+
+
+@dataclass(frozen=True)
+class Paint:
+    """What colours a target.
+
+    Attributes
+    ----------
+    surface : Surface
+    mapping : Mapping
+        Of its texture.
+    color : tuple of 4 floats
+        Linear colour under the texture; number in the table of objects.
+    """
+
+    surface: Surface
+    mapping: Mapping
+    color: tuple[float, ...]
+
+
+class SurfaceDrawing:
+    """Programs and textures of a target.
+
+    Parameters
+    ----------
+    assets : Assets
+    paint : Paint
+    vertices : array, shape [n, ...]
+        Attributes; for the columns see vertices.py.
+    moved : moderngl.Buffer
+        The displaced vertices.
+    indices : moderngl.Buffer
+        Of the triangles, int32.
+    """
+
+    def __init__(
+        self, assets: Assets, paint: Paint, vertices: NDArray, moved: moderngl.Buffer, indices: moderngl.Buffer
+    ) -> None:
+        resources, surface, mapping = assets.resources, paint.surface, paint.mapping
+        heatmap, self._paint = surface.heatmap_colors is not None, paint
+        options = {"MAPPING": mapping.kind, "HEATMAP": int(heatmap), "GRID": int(surface.grid > 0)}
+        self._program = resources.program("surfaces/surface_vertex", "surfaces/surface_fragment", **options)
+        depth = resources.program("surfaces/surface_depth_vertex", "glsl/depth_fragment")
+        columns = [vertices[:, NORMAL], vertices[:, SPHERE], vertices[:, BAKED], mapped_coordinates(vertices, mapping)]
+        still = resources.buffer(np.concatenate(columns, axis=1).astype("f4").tobytes())
+        names = ("in_normal", "in_sphere", "in_baked", "in_mapped")
+        content = [(moved, "4f", "in_moved"), (still, "3f 3f 2f 3f", *names)]
+        # what a program does not use is optimised away
+        self._solid = resources.vertex_array(self._program, content, indices, skip_errors=True)
+        self._depth = resources.vertex_array(depth, content[:1], indices)
+        self._image: moderngl.Texture | moderngl.TextureCube | None = None
+        if mapping.kind != MappingKind.NO_IMAGE:
+            modelled = mapping.texture >= 0
+            self._image = assets.textures.get(mapping.texture) if modelled else load_image(resources, surface)
+        self._heatmap: HeatmapTexture | None = None
+        if surface.heatmap_colors is not None:
+            self._heatmap = HeatmapTexture(resources, surface.resolution, surface.heatmap_colors)
+        if heatmap or surface.grid:
+            self._program["resolution"] = float(surface.resolution)
+        if surface.grid:
+            self._program["grid_spacing"] = float(surface.grid)
+        if mapping.kind not in (MappingKind.NO_IMAGE, MappingKind.CUBE_IMAGE):
+            self._program["tiling"] = mapping.tiling
+
+    @property
+    def has_heatmap(self) -> bool:
+        """Whether a heatmap is shown."""
+        return self._heatmap is not None
+
+    def set_heatmap(self, values: NDArray[np.float32], limit: float) -> None:
+        """Replace the heatmap's values, if there is one; see `HeatmapTexture.set`."""
+        if self._heatmap is not None:
+            self._heatmap.set(values, limit)
+
+    def draw(self, rotation: NDArray[np.float64], count: int) -> None:
+        """Draw the first `count` indices into the G-buffer; normals are turned by the rotation, [3, 3]."""
+        if self._image is not None:
+            self._image.use(self._paint.mapping.unit)
+        if self._heatmap is not None:
+            self._heatmap.use(self._program)
+        self._program["rotation"] = tuple(rotation.T.ravel())
+        self._program["color"] = self._paint.color
+        self._solid.render(vertices=count)
+
+    def draw_depth(self, view_projection: tuple[float, ...], count: int) -> None:
+        """Draw the depth of the first `count` indices, under a matrix of 16 numbers, column by column."""
+        self._depth.program["view_projection"] = view_projection
+        self._depth.render(vertices=count)

@@ -1,0 +1,50 @@
+// The surroundings: a skybox or a backdrop, and soft boxes that only reflections and ambient light see.
+#include "gpu/frame_uniforms.glsl"
+
+#if SKYBOX
+layout(binding = SKYBOX_UNIT) uniform samplerCube skybox;
+#endif
+
+// Radiance of the background, blurred over a lobe of the given roughness.
+vec3 sky_at(vec3 direction, float roughness)
+{
+#if SKYBOX
+    // in MuJoCo's skyboxes +y is up
+    return textureLod(skybox, vec3(direction.x, direction.z, -direction.y), 8.0 * sqrt(roughness)).rgb;
+#else
+    return mix(horizon.rgb, zenith.rgb, smoothstep(-0.1 - 0.2 * roughness, 0.8 + 0.2 * roughness, direction.z));
+#endif
+}
+
+// Share of a soft box that a lobe about the direction, of the given blur, meets.
+float soft_box(vec3 direction, vec4 normal, vec4 tangent, float blur)
+{
+    float along = dot(direction, normal.xyz);
+    vec2 hit = vec2(dot(direction, tangent.xyz), dot(direction, cross(normal.xyz, tangent.xyz))) / max(along, 1e-3);
+    vec2 size = vec2(normal.w, tangent.w);
+    vec2 inside = smoothstep(-blur, blur, size - abs(hit)) * (size / (size + 0.5 * blur));
+    return along > 0.0 ? inside.x * inside.y : 0.0;
+}
+
+// Radiance that a lobe about the direction, of the given roughness, collects; `bounce` comes from below.
+vec3 environment(vec3 direction, float roughness, vec3 bounce)
+{
+    // wide lobes get most of the soft boxes' light from the key light itself
+    float width = 0.04 + 0.9 * roughness, boxes = mix(1.0, 0.3, smoothstep(0.08, 0.4, roughness));
+    vec3 radiance = mix(bounce, 0.75 * sky_at(direction, roughness), smoothstep(-width, width, direction.z));
+    for (int i = 0; i < SOFT_BOXES; ++i)
+        radiance += boxes * soft_box_radiance[i].rgb * soft_box(direction, soft_box_normal[i], soft_box_tangent[i], width);
+    return radiance;
+}
+
+// Ambient light on a diffuse surface, over pi.
+vec3 ambient(vec3 normal, vec3 bounce)
+{
+    vec3 radiance = mix(0.75 * bounce, sky.rgb, 0.5 + 0.5 * normal.z);
+    for (int i = 0; i < SOFT_BOXES; ++i) {
+        float wrapped = max(0.35 + 0.65 * dot(normal, soft_box_normal[i].xyz), 0.0);
+        float size = soft_box_normal[i].w * soft_box_tangent[i].w * 0.13;
+        radiance += sky.w * soft_box_radiance[i].rgb * size * wrapped * wrapped;
+    }
+    return radiance;
+}

@@ -1,0 +1,129 @@
+"""The geoms of a MuJoCo model other than its floor and its targets, and its sites, on the GPU."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import moderngl
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render.bounds import Balls, join
+
+from .assets import Assets
+from .instances import INSTANCE, Instances, ShapeLevels
+from .materials import look_of
+from .occluders import Occluders
+from .shapes import NamedShape, shape_of, sizes
+from .texture_mapping import mapping_of
+from .visual import Visual, ball_of, geom_visual, host_of, site_visual, visible_sites
+
+_PLANE = mujoco.mjtGeom.mjGEOM_PLANE
+
+
+@dataclass(frozen=True)
+class TransparentVisual:
+    """A visual through which the scene behind it shows."""
+
+    visual: Visual
+    number: int  # in the table of objects
+    instances: Instances
+
+
+class GeomVisuals:
+    """All geoms of a model but the floor and the targets, and its sites, which cast shadows but occlude no sky.
+
+    Parameters
+    ----------
+    assets : Assets
+    geoms : iterable of int
+
+    Attributes
+    ----------
+    occluders : Occluders
+    transparent : list of TransparentVisual
+    """
+
+    def __init__(self, assets: Assets, geoms: Iterable[int]) -> None:
+        self._assets, self._model = assets, assets.model
+        self._shapes: dict[str, ShapeLevels] = {}
+        self._programs: dict[tuple[int, bool], moderngl.Program] = {}
+        self._depth = assets.resources.program("visuals/geom_depth_vertex", "glsl/depth_fragment")
+        model = assets.model
+        visuals = [geom_visual(model, geom) for geom in geoms] + [site_visual(model, i) for i in visible_sites(model)]
+        shaped = [(visual, shape) for visual in visuals if (shape := shape_of(model, visual)) is not None]
+        solid = [visual.index for visual, _ in shaped if not visual.site and visual.kind != _PLANE]
+        self.occluders = Occluders(assets.resources, model, np.array(solid, dtype=np.int64))
+        groups: dict[tuple[Any, ...], tuple[NamedShape, list[tuple[Visual, int]]]] = {}
+        self.transparent: list[TransparentVisual] = []
+        for visual, shape in shaped:
+            mapping = mapping_of(model, visual)
+            number = assets.objects.add(look_of(model, visual), host_of(model, visual), opacity=visual.opacity)
+            if visual.opacity < 1.0:
+                self.transparent.append(TransparentVisual(visual, number, self._instances(shape, [(visual, number)])))
+            else:
+                key = visual.site, shape[0], mapping.kind, mapping.texture
+                groups.setdefault(key, (shape, []))[1].append((visual, number))
+        self._opaque = [self._instances(shape, members) for shape, members in groups.values()]
+        self._planes = [visual.index for visual, _ in shaped if not visual.site and visual.kind == _PLANE]
+        self._sites = [visual for visual, _ in shaped if visual.site and visual.opacity == 1.0]
+
+    def balls(self, data: Any) -> Balls:
+        """Bounding balls of everything that may cast a shadow."""
+        return join(self.occluders.balls(data), *(ball_of(self._model, data, site) for site in self._sites))
+
+    def planes(self, data: Any) -> Balls:
+        """Infinite balls at the planes."""
+        return Balls(data.geom_xpos[self._planes].reshape(-1, 3), np.full(len(self._planes), np.inf))
+
+    def update(self, data: Any, eye: NDArray[np.float64], pixels: float) -> None:
+        """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""
+        for instances in (*self._opaque, *(each.instances for each in self.transparent)):
+            instances.update(data, eye, pixels)
+            for number, bias in zip(instances.numbers, instances.shadow_biases, strict=True):
+                self._assets.objects.set_shadow_bias(number, float(bias))
+
+    def draw(self) -> None:
+        """Draw the opaque visuals into the G-buffer."""
+        for instances in self._opaque:
+            instances.draw()
+
+    def draw_depth(self, view_projection: tuple[float, ...], *, sites: bool) -> None:
+        """Draw the opaque visuals' depth only, under a matrix of 16 numbers, column by column; sites on request."""
+        for instances in self._opaque:
+            if sites or not instances.sites:
+                instances.draw_depth(view_projection)
+
+    def _instances(self, shape: NamedShape, members: list[tuple[Visual, int]]) -> Instances:
+        """Visuals of one shape and texture, each with its number in the table of objects."""
+        name, make = shape
+        assets = self._assets
+        if name not in self._shapes:
+            self._shapes[name] = ShapeLevels(assets.resources, make)
+        mappings = [mapping_of(self._model, visual) for visual, _ in members]
+        mapping = mappings[0]
+        records = np.zeros(len(members), dtype=INSTANCE)
+        for record, (visual, number), own in zip(records, members, mappings, strict=True):
+            record["core_size"], record["shell_size"] = sizes(self._model, visual)
+            record["color"] = [*visual.color, number]
+            record["mapping"] = [*own.scale, own.stretch * own.scale[2]]
+            record["tiling"] = own.tiling
+        return Instances(
+            assets.resources,
+            self._shapes[name],
+            (self._program(mapping.kind, mapping.own), self._depth),
+            [visual for visual, _ in members],
+            records,
+            None if mapping.texture < 0 else (mapping.unit, assets.textures.get(mapping.texture)),
+        )
+
+    def _program(self, kind: int, own: bool) -> moderngl.Program:
+        """Program of a kind of mapping, with the mesh's own texture coordinates or without."""
+        if (kind, own) not in self._programs:
+            self._programs[kind, own] = self._assets.resources.program(
+                "visuals/geom_vertex", "visuals/geom_fragment", MAPPING=kind, OWN=int(own)
+            )
+        return self._programs[kind, own]

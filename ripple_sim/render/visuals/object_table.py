@@ -1,0 +1,64 @@
+"""The table of objects: one row for each visual and target, to which the samples of the G-buffer refer."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render.gpu.contract import OBJECT, Binding
+from ripple_sim.render.gpu.resources import Resources
+
+from .looks import Look
+
+_ROW = OBJECT.dtype
+
+
+class ObjectTable:
+    """Rows of the shaders' `Object`; draw calls write the number of their row."""
+
+    def __init__(self, resources: Resources) -> None:
+        self._resources = resources
+        self._rows: list[np.ndarray] = []
+        self._buffer: moderngl.Buffer | None = None
+
+    def add(
+        self,
+        look: Look,
+        geom: int,
+        *,
+        opacity: float = 1.0,
+        size: float = 1.0,
+        heatmap: bool = False,
+        height_map: tuple[int, int] = (0, 0),
+    ) -> int:
+        """Append a row and return its number.
+
+        `size` [m] is how thick a transparent object is where its relative thickness is 1; `heatmap` says that colours
+        are shown as they are, but for shadows; `height_map` is the first layer of the object's height map and the
+        number of texels along an edge of a face, 0 without one.
+        """
+        row = np.zeros((), dtype=_ROW)
+        row["base"] = look.roughness, look.metallic, look.sheen, look.coat
+        row["volume"] = look.translucency, look.transparency, look.emission, opacity
+        row["place"] = geom, size, 0.0, heatmap
+        row["height_map"][:2] = height_map
+        self._rows.append(row)
+        return len(self._rows) - 1
+
+    def set_shadow_bias(self, number: int, bias: float) -> None:
+        """Set how far above its surface an object's shadows are looked up [m]: its bumps shall not shade each other."""
+        self._rows[number]["place"][2] = bias
+
+    def set_height_map(self, number: int, bias: float, rotation: NDArray[np.float64]) -> None:
+        """Set an object's shadow bias [m], and the rotation of its height map into the world, shape [3, 3]."""
+        self.set_shadow_bias(number, bias)
+        self._rows[number]["rotation"][:, :3] = rotation.T  # column by column
+
+    def bind(self) -> None:
+        """Upload the rows and bind them for the shaders."""
+        data = np.array(self._rows, dtype=_ROW).tobytes() or bytes(_ROW.itemsize)
+        if self._buffer is None or self._buffer.size != len(data):
+            self._buffer = self._resources.buffer(reserve=len(data), dynamic=True)
+        self._buffer.write(data)
+        self._buffer.bind_to_storage_buffer(Binding.OBJECTS)

@@ -1,0 +1,48 @@
+"""GLSL sources: read from packages, their includes resolved, their constants defined by Python."""
+
+from __future__ import annotations
+
+import importlib.resources
+
+from ripple_sim.solver.errors import GLError
+
+
+def load_shader(package: str, name: str, **defines: object) -> str:
+    """Read a shader, resolve its includes, and put the defines behind `#version`.
+
+    Parameters
+    ----------
+    package : str
+        The package below which the shader and whatever it includes lie.
+    name : str
+        Path of the file below the package, without `.glsl`: "passes/classify_fragment". A line
+        `#include "gpu/frame_uniforms.glsl"` is replaced by that file, its path likewise relative to the package; a
+        file that was included before is not included again.
+    **defines
+        Constants, written as `#define NAME value`.
+
+    Raises
+    ------
+    GLError
+        If a file is missing, or the shader does not start with `#version`.
+    """
+    text = _read(package, f"{name}.glsl", set())
+    head, _, body = text.partition("\n")
+    if not head.startswith("#version"):
+        raise GLError(f"shader {name}.glsl of {package} must start with #version, found {head!r}")
+    lines = "".join(f"#define {key} {value}\n" for key, value in defines.items())
+    return f"{head}\n{lines}{body}"
+
+
+def _read(package: str, path: str, seen: set[str]) -> str:
+    """Text of a file with what it includes, unless it has been seen."""
+    if path in seen:
+        return ""
+    seen.add(path)
+    file = importlib.resources.files(package).joinpath(*path.split("/"))
+    if not file.is_file():
+        raise GLError(f"package {package} has no shader {path}")
+    lines = []
+    for line in file.read_text().splitlines():
+        lines.append(_read(package, line.split('"')[1], seen) if line.startswith("#include") else line)
+    return "\n".join(lines) + "\n"

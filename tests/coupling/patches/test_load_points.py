@@ -1,0 +1,67 @@
+"""Contacts mark the corners of a patch: the force is spread over it, and force and torque stay the same."""
+
+import numpy as np
+import pytest
+
+from ripple_sim.coupling.patches.clusters import MAX_CLUSTERS
+from ripple_sim.coupling.patches.load_points import find_probes, spread
+from ripple_sim.scenes.shapes import limbed
+from ripple_sim.solver import Atlas, Mesh, build_atlas
+
+SQUARE = 0.1 * np.array([[-1, -1, 5], [1, -1, 5], [-1, 1, 5], [1, 1, 5]])
+
+
+def spread_patch(
+    atlas: Atlas, points: np.ndarray, forces: np.ndarray, radius: float, convex: bool
+) -> tuple[np.ndarray, np.ndarray, float]:
+    loads, probes = find_probes(points, forces, radius, convex)
+    at, spread_forces, greater, rows = spread(loads, probes, atlas.project(probes)[0], radius)
+    if rows[0] >= 0:
+        np.testing.assert_array_equal(probes[rows], at)
+    return at, spread_forces, greater
+
+
+def test_four_equal_corners_spread_evenly_over_the_square(block: Atlas) -> None:
+    points, forces, radius = spread_patch(block, SQUARE, np.full(4, 2.5), 0.01, convex=True)
+    # nodes of a 3 x 3 lattice, each with the area that it stands for: 1 at a corner, 2 at a rim, 4 in the middle
+    assert sorted(np.round(forces / 10 * 16)) == [1, 1, 1, 1, 2, 2, 2, 2, 4]
+    assert np.abs(points[:, :2]).max() < 0.1
+    assert radius > 0.05
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_force_and_torque_stay_what_they_are(block: Atlas, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    corners = np.column_stack([rng.uniform(-0.3, 0.3, (6, 2)), np.full(6, 0.5)])
+    loads = rng.uniform(0.1, 3.0, 6)
+    points, forces, _ = spread_patch(block, corners, loads, 0.01, convex=True)
+    assert len(forces) > 6
+    assert forces.sum() == pytest.approx(loads.sum(), rel=1e-12)
+    np.testing.assert_allclose(forces @ points, loads @ corners, atol=1e-12)
+
+
+def test_number_of_points_is_bounded_however_many_contacts_there_are(block: Atlas) -> None:
+    rng = np.random.default_rng(5)
+    corners = np.column_stack([rng.uniform(-0.4, 0.4, (200, 2)), np.full(200, 0.5)])
+    loads = rng.uniform(0.1, 1.0, 200)
+    points, forces, _ = spread_patch(block, corners, loads, 0.001, convex=True)
+    assert len(forces) <= MAX_CLUSTERS * (MAX_CLUSTERS + 1) // 2
+    np.testing.assert_allclose(forces @ points, loads @ corners)
+
+
+def test_no_force_where_the_surface_is_not(block: Atlas) -> None:
+    """Two contacts on the head and on the rump of an animal load it there, and not on the saddle between them."""
+    V, F = limbed(0.05)
+    animal = build_atlas(Mesh.from_arrays(V, F), 16, cache=False)
+    head, rump = V[V[:, 2].argmax()], V[V[:, 0].argmin()]
+    loads = np.array([2.0, 1.0])
+    points, forces, radius = spread_patch(animal, np.array([head, rump]), loads, 0.02, convex=True)
+    np.testing.assert_array_equal(points, [head, rump])
+    np.testing.assert_allclose(forces, loads)
+    assert radius == 0.02
+
+
+def test_geoms_that_are_not_convex_load_the_surface_at_their_contacts(block: Atlas) -> None:
+    points, _, radius = spread_patch(block, SQUARE, np.ones(4), 0.01, convex=False)
+    assert len(points) == 4
+    assert radius == 0.01

@@ -1,0 +1,160 @@
+"""The code keeps to the words of docs/glossary.md: words that it has given up appear in no name.
+
+Names are all identifiers of Python and GLSL files and the names of the files themselves, taken apart into words at
+underscores and capitals. To retire a word, add a line to RETIRED; where it means something else, say so in ALLOWED.
+"""
+
+import io
+import re
+import tokenize
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+GLOSSARY = ROOT / "docs" / "glossary.md"
+
+# the retired word, or words one after the other, and what is said instead
+RETIRED = {
+    "relief": "height map",
+    "reliefs": "height maps",
+    "footing": "footprint cache",
+    "used_before": "reusable",
+    "hovering": "reach",
+    "nowhere": "scratch",
+    "everywhere_infinite": "scratch",
+    "felt": "filtered force",
+    "owed": "deficit",
+    "owing": "deficit",
+    "debt": "deficit",
+    "undrawn": "unsupported",
+    "piece": "visual",
+    "pieces": "visuals",
+    "clear_body": "transparent visual",
+    "ring": "halo",
+    "padded": "halo",
+    "carries": "movable",
+    "carried": "movable",
+    "press": "contact load",
+    "presses": "contact loads",
+    "pressed": "contact load",
+    "speed_check": "tunnelling",
+    "check_speeds": "tunnelling",
+    "shell": "flex collider",
+    "shells": "flex colliders",
+    "ripple_surface": "target",
+    "pictures": "ripple renderer",
+    "moments": "shutter times",
+    "job": "render settings",
+    "pipeline": "double buffering",
+    "ahead": "prefetch",
+    "owned": "resources",
+    "folded": "octahedral encoding",
+    "unfolded": "octahedral encoding",
+    "parted": "unpack",
+    "development": "tone mapping",
+    "developed": "tone mapping",
+    "lift": "shadow bias",
+}
+
+# Retired words that stay: the beginning of the path, the word, and why.
+ALLOWED = [
+    ("solver/sphere_map/", "ring", "the one-ring of a vertex"),
+    ("solver/sphere_map/", "carried", "area of collapsed vertices, which the kept ones stand for"),
+    ("solver/sphere_map/", "ahead", "a trial step of the descent"),
+    ("solver/sphere_map/", "folded", "a triangle that the map turns over"),
+    ("solver/mesh/", "folded", "a polygon that turns over"),
+    ("solver/", "piece", "part of a triangle, cut at the edges of the cube"),
+    ("solver/", "pieces", "parts of a triangle"),
+    ("ripple_sim/cli/", "shell", "bash, zsh, fish"),
+    (
+        "ripple_sim/render/",
+        "shell",
+        "the round outside of a primitive, sized apart from its core",
+    ),
+    ("ripple_sim/video/", "ahead", "how many frames one stage may be in front of the next"),
+    ("ripple_sim/viewer/", "press", "a key or a button"),
+    ("ripple_sim/viewer/", "pressed", "a key or a button"),
+]
+
+
+def names(path: Path) -> Iterator[str]:
+    """Every identifier of a file, and the file's own name."""
+    yield path.stem
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".py":
+        for token in tokenize.generate_tokens(io.StringIO(text).readline):
+            if token.type == tokenize.NAME:
+                yield token.string
+    else:
+        yield from re.findall(r"[A-Za-z_]\w*", re.sub(r"//[^\n]*|/\*.*?\*/", "", text, flags=re.DOTALL))
+
+
+def words(name: str) -> str:
+    """The words of a name, in lower case, each between underscores: ClearBody is _clear_body_."""
+    return "_" + "_".join(each.lower() for each in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)) + "_"
+
+
+def retired_names(root: Path) -> list[str]:
+    """Every name with a retired word in it, where it stands, and what to say instead."""
+    found = set()
+    for folder in ("ripple_sim", "solver", "scenes"):
+        for path in sorted((root / folder).rglob("*")):
+            if path.suffix not in (".py", ".glsl"):
+                continue
+            place = path.relative_to(root).as_posix()
+            for name in names(path):
+                for word, instead in RETIRED.items():
+                    kept = any(place.startswith(start) and word == each for start, each, _ in ALLOWED)
+                    if f"_{word}_" in words(name) and not kept:
+                        found.add(f"{place}: {name} (say {instead})")
+    return sorted(found)
+
+
+def test_no_name_has_a_retired_word() -> None:
+    found = retired_names(ROOT)
+    assert not found, "\n".join(["names with words that docs/glossary.md has given up:", *found])
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "found"),
+    [
+        ("ripple_sim/a.py", "def add_relief(x): ...", "add_relief (say height map)"),
+        ("ripple_sim/a.py", "class ClearBody: ...", "ClearBody (say transparent visual)"),
+        ("ripple_sim/a.py", "x = everywhere_infinite_mask", "everywhere_infinite_mask (say scratch)"),
+        ("solver/nowhere.py", "", "nowhere (say scratch)"),
+        ("solver/shaders/a.glsl", "int RING_COUNT; // a relief", "RING_COUNT (say halo)"),
+        ("ripple_sim/a.py", "# the relief\nstring = 'relief'\nbelief = 1", None),
+        ("ripple_sim/a.py", "substring = bring(everywhere)", None),
+        ("solver/sphere_map/orientation.py", "orientation = 1", None),
+    ],
+)
+def test_retired_words_are_found_in_names_only(tmp_path: Path, file: str, text: str, found: str | None) -> None:
+    (tmp_path / file).parent.mkdir(parents=True)
+    (tmp_path / file).write_text(text)
+    assert retired_names(tmp_path) == ([] if found is None else [f"{file}: {found}"])
+
+
+def test_the_glossary_has_the_words_that_are_said_instead() -> None:
+    page = GLOSSARY.read_text(encoding="utf-8").lower()
+    names_in_code = {"unpack", "reusable"}  # of functions, which need no entry
+    phrases = {instead.removesuffix("s") for instead in RETIRED.values()} - names_in_code
+    assert not [each for each in phrases if each not in page]
+
+
+def test_every_entry_of_the_glossary_is_explained_and_in_order() -> None:
+    entries, section = [], ""
+    for line in GLOSSARY.read_text(encoding="utf-8").splitlines():
+        if line.startswith("## "):
+            section = line
+        if line.startswith("| **"):
+            cells = [cell.strip() for cell in line.strip("|").split("|")]
+            assert len(cells) == 3, line
+            assert len(cells[1].split()) >= 4, line
+            entries.append((section, re.sub(r"[^a-z -]", "", cells[0].lower())))
+    assert len(entries) > 80
+    assert len({name for _, name in entries}) == len(entries)
+    for section in {section for section, _ in entries}:
+        inside = [name for each, name in entries if each == section]
+        assert inside == sorted(inside), section

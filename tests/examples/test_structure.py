@@ -1,0 +1,102 @@
+"""What the drawing of the packages and the table of measures are made of: on a small tree whose imports are known."""
+
+import importlib
+import itertools
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+PLOTS = Path(__file__).parents[2] / "examples" / "plots"
+
+TREE = {
+    "ripple_sim/__init__.py": "from .coupling.ripples import Ripples\n",
+    "ripple_sim/simulation.py": "from ripple_sim import Ripples\n\ndef run(self, a, *, b):\n    a += b\n    return a\n",
+    "ripple_sim/coupling/__init__.py": "",
+    "ripple_sim/coupling/ripples.py": "from ripple_sim.solver import Material\nfrom . import load\n",
+    "ripple_sim/coupling/load.py": "def late():\n    from .ripples import Ripples\n",
+    "solver/__init__.py": "from .waves.material import Material\n",
+    "solver/waves/__init__.py": "",
+    "solver/waves/material.py": "import numpy\nimport ripple_sim.solver.errors\n",
+    "solver/errors.py": "",
+    "scenes/__init__.py": "",
+    "tests/test_it.py": "\n" * 4,
+}
+MATERIAL, ERRORS = "ripple_sim.solver.waves.material", "ripple_sim.solver.errors"
+RIPPLES, LOAD, SIMULATION = "ripple_sim.coupling.ripples", "ripple_sim.coupling.load", "ripple_sim.simulation"
+
+
+@pytest.fixture
+def plots(monkeypatch: pytest.MonkeyPatch):
+    names = ("imports", "layered", "structure")
+    monkeypatch.syspath_prepend(str(PLOTS))
+    yield SimpleNamespace(**{name: importlib.import_module(name) for name in names})
+    for name in names:
+        del sys.modules[name]
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    for name, text in TREE.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def test_imports_are_those_of_the_modules_that_names_come_from(plots, root: Path) -> None:
+    modules = plots.imports.read(root)
+    assert {name: set(module.imports) for name, module in modules.items()} == {
+        SIMULATION: {RIPPLES},  # by way of ripple_sim/__init__.py
+        RIPPLES: {MATERIAL, LOAD},
+        LOAD: {RIPPLES},  # inside a function
+        MATERIAL: {ERRORS},
+        ERRORS: set(),
+    }
+
+
+def test_cycles_are_found_and_counted_as_the_folders_stand(plots, root: Path) -> None:
+    modules = plots.imports.read(root)
+    assert plots.imports.cycles({name: set(each.imports) for name, each in modules.items()}) == [[LOAD, RIPPLES]]
+    rooms = plots.imports.grouped(modules, {name: plots.structure.room(name) for name in modules})
+    assert rooms["ripple_sim.coupling"] == {"ripple_sim.solver.waves"}
+    assert plots.imports.cycles(rooms) == []
+
+
+def test_measures_of_the_small_tree(plots, root: Path) -> None:
+    measures = plots.structure.measure(root)
+    assert measures["modules"] == "5"
+    assert measures["lines of code"] == "11"
+    assert measures["longest function"] == "3 lines (simulation.run)"
+    assert measures["most parameters"] == "2 (simulation.run)"
+    assert measures["rooms, arrows between them"] == "4, 3"
+    assert measures["arrows between modules"] == "5"
+    assert measures["cycles of modules"] == "1: coupling.load - coupling.ripples"
+    assert measures["tests / code"] == "0.36"
+    assert measures["code that stands twice, 40 tokens or more"] == "0.0 %"
+
+
+def test_copies_are_counted_in_both_places(plots, root: Path) -> None:
+    for name in ("one", "two"):
+        (root / "solver" / f"{name}.py").write_text(
+            f"{name} = 1\n" + "x = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]\n" * 2
+        )
+    share = plots.structure.measure(root)["code that stands twice, 40 tokens or more"]
+    assert 70 < float(share.split()[0]) < 100
+
+
+def test_arrows_that_others_imply_are_left_out(plots) -> None:
+    arrows = {"a": {"b", "c", "d"}, "b": {"c"}, "c": {"d"}, "d": set()}
+    assert plots.layered.without_detours(arrows) == {"a": {"b"}, "b": {"c"}, "c": {"d"}, "d": set()}
+
+
+def test_layers_go_downwards_and_boxes_keep_apart(plots) -> None:
+    arrows = {"top": {"left", "right", "low"}, "left": {"low", "other"}, "right": {"low"}, "low": set(), "other": set()}
+    level = plots.layered.layers(arrows)
+    assert all(level[node] > level[end] for node, ends in arrows.items() for end in ends)
+    layout = plots.layered.Layout(arrows, level)
+    assert layout.crossings() == 0
+    for row in layout.rows:
+        for a, b in itertools.pairwise(row):
+            least = sum(0.3 if isinstance(each, tuple) else 1.0 for each in (a, b)) / 2
+            assert layout.x[b] - layout.x[a] > least - 1e-9

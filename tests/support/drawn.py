@@ -1,0 +1,31 @@
+"""Frames of small MuJoCo scenes."""
+
+import mujoco
+
+from ripple_sim.render import Camera, Renderer, Surface
+from ripple_sim.render.visuals import primitives
+
+SIZE = (160, 120)
+ABOVE = Camera((0.0, 0.0, 0.0), 4.0, 90.0, -89.9, 40.0)  # the frame's up is +y, its right +x
+FRONT = Camera((0.0, 0.0, 0.5), 4.0, 90.0, -10.0, 40.0)
+
+FLOOR = '<geom type="plane" size="0 0 .1" rgba=".8 .8 .8 1"/>'
+BALL = '<geom type="sphere" size=".3" pos="0 0 .8" rgba=".8 .2 .2 1"/>'
+SUN = '<light directional="true" pos="0 0 3" dir="{} 0 -1" diffuse=".8 .8 .8" castshadow="{}"/>'
+SPOT = '<light pos="{} 0 2" dir="{} 0 -1" diffuse=".9 .9 .9" cutoff="60" exponent="1"/>'
+
+
+def frame_of(gl, body, *, asset="", visual="", camera=ABOVE, targets=None, size=SIZE, **options):
+    """Frame, as integers, of a scene given by the contents of its MJCF's elements."""
+    xml = f"<mujoco><visual>{visual}</visual><asset>{asset}</asset><worldbody>{body}</worldbody></mujoco>"
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    surfaces = {model.geom(name).id: surface for name, surface in (targets or {}).items()}
+    with Renderer(gl, model, surfaces, size=size, **options) as renderer:
+        return renderer.render(data, {}, camera).astype(int)
+
+
+def ball_surface(look: str, radius: float = 0.5) -> Surface:
+    ball = primitives.ball(16)
+    return Surface(radius * ball.shell, ball.faces, ball.shell, 8, look)
