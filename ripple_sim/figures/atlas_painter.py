@@ -116,9 +116,9 @@ class AtlasPainter:
     @functools.cached_property
     def _widths(self) -> NDArray[np.float64]:
         """Width of rows and of columns on the surface, in units of an even spread's, [2, 6, N, N]."""
-        padded, areas = self._atlas.padded_positions, self._atlas.areas
-        along_columns = np.linalg.norm(padded[:, 1:-1, 2:] - padded[:, 1:-1, :-2], axis=-1) / 2
-        along_rows = np.linalg.norm(padded[:, 2:, 1:-1] - padded[:, :-2, 1:-1], axis=-1) / 2
+        with_halo, areas = self._atlas.padded_positions, self._atlas.areas
+        along_columns = np.linalg.norm(with_halo[:, 1:-1, 2:] - with_halo[:, 1:-1, :-2], axis=-1) / 2
+        along_rows = np.linalg.norm(with_halo[:, 2:, 1:-1] - with_halo[:, :-2, 1:-1], axis=-1) / 2
         even = np.sqrt(areas.mean())
         return np.stack([areas / np.maximum(side, 1e-6 * even) for side in (along_columns, along_rows)]) / even
 

@@ -127,13 +127,13 @@ _SHADING: dict[str, Any] = {"ambient": 0.32, "diffuse": 0.75, "specular": 0.3, "
 
 def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
     """Surface of a geom in its frame [m], with normals; None for types that cannot be drawn."""
-    piece = geom_visual(model, geom)
-    found = shape_of(model, piece)
+    visual = geom_visual(model, geom)
+    found = shape_of(model, visual)
     if found is None:
         return None
     _, make = found
     shape = make(_SEGMENTS)
-    mesh = pv.PolyData.from_regular_faces(shape.positions(*sizes(model, piece)), shape.faces)
+    mesh = pv.PolyData.from_regular_faces(shape.positions(*sizes(model, visual)), shape.faces)
     mesh.point_data.active_normals = shape.normals
     return mesh
 

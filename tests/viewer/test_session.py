@@ -11,6 +11,7 @@ from played import RADIUS, run
 
 from ripple_sim.errors import SimulationError
 from ripple_sim.scene.scene import Scene
+from ripple_sim.scenes import shapes
 from ripple_sim.solver import SolverError
 from ripple_sim.viewer.opening import open_scene
 from ripple_sim.viewer.session import OPERATORS, Session
@@ -58,7 +59,7 @@ def test_two_sessions_that_are_played_alike_are_alike(scene: Scene) -> None:
 
 
 def test_a_script_and_its_changed_materials_start_again_too(tmp_path: Path) -> None:
-    folder = Path(sys.modules["ripple_sim.scenes.shapes"].__file__).parent
+    folder = Path(shapes.__file__).parent
     (tmp_path / "sphere.xml").write_text((folder / "sphere.xml").read_text())
     (tmp_path / "sphere.toml").write_text(
         (folder / "sphere.toml").read_text()
