@@ -1,6 +1,6 @@
 # make demo   sets everything up, then renders out/demo.mp4
 # make test   sets everything up, then runs the tests
-# make lint   ruff and mypy
+# make lint   ruff, mypy and the layers of packages
 # make docs   the documentation, into build/docs
 # make package  builds the distributions and tries them on every Python that is here
 # make clean  removes what was built and rendered, but not .venv
@@ -39,6 +39,7 @@ lint: setup types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	MYPYPATH=$(TYPES) $(BIN)/mypy -p ripple_sim
+	cd $(TYPES) && $(CURDIR)/$(BIN)/lint-imports --config $(CURDIR)/pyproject.toml --no-cache
 
 docs: setup types
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir build/docs

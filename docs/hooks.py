@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import typing
 from typing import Any
@@ -10,6 +11,8 @@ import latex2mathml.converter
 import msgspec
 
 from ripple_sim.scene import scene_file
+from ripple_sim.scene.material_entry import PRESETS
+from ripple_sim.solver import Material
 
 _TYPES = {
     "tuple[float, float, float]": "three numbers",
@@ -54,7 +57,11 @@ def _table(name: str, entry: type[msgspec.Struct]) -> str:
     title = f"`[{name}]`" if name and " " not in name else name.capitalize() or "The file"
     lead, _, rest = (entry.__doc__ or "").partition("\n\n")
     lead = re.sub(r"^`\[+[\w.]+\]+`: ", "", " ".join(lead.split()))
-    rows = [f"| `{f.name}` | {_kind(f.type)} | {_default(f)} |" for f in msgspec.structs.fields(entry)]
+    units = _units(entry)
+    rows = [
+        f"| `{f.name}` | {_kind(f.type)}{units.get(f.name, '')} | {_default(f)} |"
+        for f in msgspec.structs.fields(entry)
+    ]
     text = [
         f"### {title}",
         lead[:1].upper() + lead[1:],
@@ -62,6 +69,21 @@ def _table(name: str, entry: type[msgspec.Struct]) -> str:
         "| key | value | default |\n| --- | --- | --- |\n" + "\n".join(rows),
     ]
     return "\n\n".join(part for part in text if part)
+
+
+def _units(entry: type[msgspec.Struct]) -> dict[str, str]:
+    """Units of a material's coefficients and of the presets' parameters, as the docstrings of `Material` give them."""
+    sources = {
+        scene_file.MaterialEntry: [Material],
+        scene_file.MaterialChange: [Material],
+        scene_file.PresetEntry: [getattr(Material, preset) for preset in PRESETS],
+    }
+    units: dict[str, list[str]] = {}
+    for source in sources.get(entry, []):
+        for name, unit in re.findall(r"^(\w+) : .*?\[(.+?)\]$", inspect.getdoc(source) or "", re.MULTILINE):
+            if unit not in units.setdefault(name, []):
+                units[name].append(unit)
+    return {name: f" [{' or '.join(each)}]" for name, each in units.items()}
 
 
 def _kind(hint: Any) -> str:

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from PIL import Image
 
-from ripple_sim import Camera, Material, Pictures, Ripples
+from ripple_sim import Camera, Material, RippleRenderer, Ripples
 
 MODEL = """<mujoco>
   <worldbody>
@@ -28,7 +28,7 @@ def main() -> None:
     data = mujoco.MjData(model)
     material = Material(speed=0.6, damping=1.5, stiffness=1500.0, viscosity=3e-4, density=150.0)
     ripples = Ripples(model, {"egg": material}, resolution=96)
-    pictures = Pictures(model, ripples, width=480, height=400, looks={"egg": "jelly"})
+    renderer = RippleRenderer(model, ripples, width=480, height=400, looks={"egg": "jelly"})
     camera = Camera(lookat=(0.0, 0.0, 0.33), distance=1.9, azimuth=120.0, elevation=-32.0)
 
     frames, hit = [], np.inf
@@ -38,7 +38,7 @@ def main() -> None:
         if ripples.last_impulses:
             hit = min(hit, data.time)
         if data.time > hit + (0.06, 0.15, 0.3)[len(frames)]:
-            frames.append(pictures.draw(data, camera))
+            frames.append(renderer.render(data, camera))
 
     path = Path("out/own_loop.png")
     path.parent.mkdir(exist_ok=True)

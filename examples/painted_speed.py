@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from PIL import Image
 
-from ripple_sim import Camera, Material, Pictures, Ripples
+from ripple_sim import Camera, Material, RippleRenderer, Ripples
 from ripple_sim.solver import vertex_map
 
 MODEL = """<mujoco>
@@ -37,12 +37,12 @@ def main() -> None:
 
     egg = ripples["egg"]
     egg.add_impulse((0.02, -0.05, 0.3), 0.6, radius=0.05)
-    pictures = Pictures(model, ripples, width=480, height=400, looks={"egg": "clay"})
+    renderer = RippleRenderer(model, ripples, width=480, height=400, looks={"egg": "clay"})
     camera = Camera(lookat=(0.0, 0.0, 0.3), distance=1.7, azimuth=90.0, elevation=-50.0)
     frames = []
     for _ in range(3):
         egg.step(0.2)
-        frames.append(pictures.draw(data, camera))
+        frames.append(renderer.render(data, camera))
 
     path = Path("out/painted_speed.png")
     path.parent.mkdir(exist_ok=True)

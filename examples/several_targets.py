@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from PIL import Image
 
-from ripple_sim import Camera, Material, Pictures, Ripples
+from ripple_sim import Camera, Material, RippleRenderer, Ripples
 
 MODEL = """<mujoco>
   <option timestep="0.002"/>
@@ -32,7 +32,7 @@ def main() -> None:
     soft = Material(speed=0.5, damping=3.0, stiffness=3000.0, viscosity=5e-4, density=600.0)
     ripples = Ripples(model, dict.fromkeys(("red", "blue", "yellow"), soft), resolution=64)
     looks = {"red": "rubber", "blue": "jelly", "yellow": "clay"}
-    pictures = Pictures(model, ripples, width=480, height=400, looks=looks)
+    renderer = RippleRenderer(model, ripples, width=480, height=400, looks=looks)
     camera = Camera(lookat=(0.0, 0.0, 0.3), distance=2.1, azimuth=80.0, elevation=-38.0)
 
     frames = []
@@ -40,7 +40,7 @@ def main() -> None:
         mujoco.mj_step(model, data)
         ripples.step(data)
         if data.time > TIMES[len(frames)]:
-            frames.append(pictures.draw(data, camera))
+            frames.append(renderer.render(data, camera))
 
     path = Path("out/several_targets.png")
     path.parent.mkdir(exist_ok=True)

@@ -6,8 +6,9 @@ mocap bodies, and the ripples, to press on surfaces.
 
 import numpy as np
 
-from ripple_sim.scene.scene import load_scene
+from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.simulation import Simulation
+from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import render_video
 
 FORCE = 12.0  # N
@@ -23,5 +24,5 @@ def stir(simulation: Simulation) -> None:
 
 
 if __name__ == "__main__":
-    summary = render_video(load_scene("sphere"), "out/step_hook.mp4", duration=3.0, on_step=stir)
+    summary = render_video(load_scene("sphere"), "out/step_hook.mp4", VideoOptions(duration=3.0), on_step=stir)
     print(f"{summary.frames} frames in {summary.output}")

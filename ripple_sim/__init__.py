@@ -6,14 +6,15 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .capture.ripple_renderer import Pictures
+    from .capture.ripple_renderer import RippleRenderer
     from .coupling.colliders.collidable import make_collidable
     from .coupling.ripples import Impulse, Ripples
     from .errors import RippleWarning
     from .render import Camera
-    from .scene.scene import load_scene
+    from .scene.load_scene import load_scene
     from .simulation import Simulation
     from .solver import Material, RippleError
+    from .video.options import VideoOptions
     from .video.render_video import render_video
 
 __version__ = "0.1.0"
@@ -21,11 +22,12 @@ __all__ = [
     "Camera",
     "Impulse",
     "Material",
-    "Pictures",
     "RippleError",
+    "RippleRenderer",
     "RippleWarning",
     "Ripples",
     "Simulation",
+    "VideoOptions",
     "load_scene",
     "make_collidable",
     "render_video",
@@ -35,12 +37,13 @@ _HOMES = {
     "Camera": ".render",
     "Impulse": ".coupling.ripples",
     "Material": ".solver",
-    "Pictures": ".capture.ripple_renderer",
     "RippleError": ".solver",
+    "RippleRenderer": ".capture.ripple_renderer",
     "RippleWarning": ".errors",
     "Ripples": ".coupling.ripples",
     "Simulation": ".simulation",
-    "load_scene": ".scene.scene",
+    "VideoOptions": ".video.options",
+    "load_scene": ".scene.load_scene",
     "make_collidable": ".coupling.colliders.collidable",
     "render_video": ".video.render_video",
 }

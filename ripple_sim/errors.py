@@ -1,14 +1,14 @@
-"""Errors of the application. Like the solver's, every one of them is a `RippleError`."""
+"""Errors of the application. Like the solver's, each is a `RippleError`."""
 
 from ripple_sim.solver.errors import RippleError
 
 
 class VideoError(RippleError):
-    """A video cannot be written like this: its ending, place, size or frame rate is invalid."""
+    """The ending, place, size or frame rate of a video is invalid."""
 
 
 class EncodingError(RippleError):
-    """Encoding or writing a video failed half-way, for instance on a full disk."""
+    """Encoding or writing a video failed, for instance on a full disk."""
 
 
 class SceneError(RippleError):
@@ -20,8 +20,8 @@ class SimulationError(RippleError):
 
 
 class DisplayError(RippleError):
-    """There is no display to open a window on, or what serves the web page in its stead is not installed."""
+    """There is no display for a window, or the web page cannot be served."""
 
 
 class RippleWarning(UserWarning):
-    """Something that runs, but not as one would expect: a hull off its surface, a body too fast for the time step."""
+    """Something runs, but not as expected: a hull off its surface, a body too fast for the time step."""

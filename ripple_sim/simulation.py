@@ -1,4 +1,4 @@
-"""The simulation: physics and waves, frame by frame."""
+"""`Simulation`: physics and waves of a scene, frame by frame."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from ripple_sim.scene.scene import Scene
 from .errors import SceneError, SimulationError
 from .solver import texture_map
 
-# More than this is a mistake in a unit, and would seem to hang.
+# More is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000
 
 
 class Simulation:
-    """A scene that runs: MuJoCo's state and the ripples on its surfaces, advanced frame by frame.
+    """A running scene: MuJoCo's state and the ripples on its targets, advanced frame by frame.
 
-    The model's time step is shortened a little where needed, so that a whole number of steps makes one frame.
+    The model's time step is shortened a little if needed, so that a frame is a whole number of steps.
 
     Parameters
     ----------
     scene : Scene
     fps : float
-        Frames a second of the simulation's time.
+        Frames per second of simulated time.
     resolution : int, optional
         Overrides the scene's atlas resolutions.
     backend, operator : str
@@ -40,9 +40,9 @@ class Simulation:
     Attributes
     ----------
     steps_per_frame : int
-        Physics steps that make a frame.
+        Physics steps in a frame.
     impulses : list of Impulse
-        All of the present frame, so far.
+        Of the present frame, so far.
     """
 
     def __init__(
@@ -64,42 +64,31 @@ class Simulation:
         self._reset_bodies()
         self.ripples = Ripples(
             self.model,
-            {entry.geom: entry.material.material() for entry in scene.surfaces},
-            resolution={entry.geom: resolution or entry.resolution for entry in scene.surfaces},
+            {entry.geom: entry.material.material() for entry in scene.targets},
+            resolution={entry.geom: resolution or entry.resolution for entry in scene.targets},
             backend=backend,
             operator=operator,
             two_way=scene.two_way,
         )
-        for entry in scene.surfaces:
-            atlas = self.ripples[entry.geom].atlas
-            maps = {
-                name: texture_map(atlas, each.map, each.low, each.high, each.channel)
-                for name, each in entry.material.maps().items()
-            }
-            if maps:
-                self.ripples.change_material(entry.geom, **maps)
-            if entry.still_map is not None:
-                self.ripples.hold(entry.geom, 1.0 - texture_map(atlas, entry.still_map, 0.0, 1.0))
-            for disc in entry.still:
-                self.ripples.make_rigid(entry.geom, self.ripples.to_geom(entry.geom, disc.point), disc.radius)
+        self._apply_maps()
         self._materials = {name: self.ripples[name].material for name in self.ripples}
         self._script = Script(self.model, scene.events, list(self.ripples))
         self.physics_seconds = self.wave_seconds = 0.0
         self.impulses: list[Impulse] = []
-        self._steps = 0  # of the next frame, already made
+        self._steps = 0  # of the next frame, already taken
 
     @property
     def backend(self) -> str:
         """Backend of the wave solvers."""
-        return self.ripples[self.scene.surfaces[0].geom].backend
+        return self.ripples[self.scene.targets[0].geom].backend
 
     @property
     def substeps_taken(self) -> int:
-        """Wave steps so far, on all surfaces."""
+        """Wave steps so far, on all targets."""
         return sum(self.ripples[name].substeps_taken for name in self.ripples)
 
     def advance_frame(self) -> None:
-        """Advance physics and waves to the next frame; `impulses` then holds all impulses since the last one.
+        """Advance physics and waves to the next frame; `impulses` then holds all since the last one.
 
         Raises
         ------
@@ -111,7 +100,7 @@ class Simulation:
         self._steps = 0
 
     def step(self) -> None:
-        """Advance physics and waves by one physics step; `advance_frame` then makes the rest of the frame.
+        """Advance physics and waves by one physics step; `advance_frame` then does the rest of the frame.
 
         Raises
         ------
@@ -134,7 +123,7 @@ class Simulation:
         self.wave_seconds += time.perf_counter() - stepped
 
     def reset(self) -> None:
-        """Go back to the beginning: bodies, waves, materials and script."""
+        """Return to the beginning: bodies, waves, materials and script."""
         self._reset_bodies()
         self.ripples.reset()
         for name, material in self._materials.items():
@@ -144,6 +133,21 @@ class Simulation:
         self._script = Script(self.model, self.scene.events, list(self.ripples))
         self.impulses = []
         self._steps = 0
+
+    def _apply_maps(self) -> None:
+        """Give the targets their materials' maps and their parts without waves."""
+        for entry in self.scene.targets:
+            atlas = self.ripples[entry.geom].atlas
+            maps = {
+                name: texture_map(atlas, each.map, each.low, each.high, each.channel)
+                for name, each in entry.material.maps().items()
+            }
+            if maps:
+                self.ripples.change_material(entry.geom, **maps)
+            if entry.still_map is not None:
+                self.ripples.hold(entry.geom, 1.0 - texture_map(atlas, entry.still_map, 0.0, 1.0))
+            for disc in entry.still:
+                self.ripples.make_rigid(entry.geom, self.ripples.to_geom(entry.geom, disc.point), disc.radius)
 
     def _reset_bodies(self) -> None:
         if self.model.nkey:
@@ -166,11 +170,11 @@ class Simulation:
 
 
 def _steps_per_frame(fps: float, timestep: float) -> int:
-    """Fewest equal physics steps a frame that are no longer than the model's [s]."""
+    """Smallest number of equal physics steps per frame that are no longer than the model's [s]."""
     steps = 1 / (fps * timestep)
     if not steps < _MOST_STEPS_PER_FRAME:
         raise SceneError(
-            f"the model's timestep is {timestep:g} s, {steps:.3g} steps a frame; valid are {_MOST_STEPS_PER_FRAME} at "
-            "most: use a longer timestep in the MJCF's <option>"
+            f"the model's timestep is {timestep:g} s, {steps:.3g} steps per frame; valid are at most "
+            f"{_MOST_STEPS_PER_FRAME}: use a longer timestep in the MJCF's <option>"
         )
     return max(1, math.ceil(steps - 1e-9))

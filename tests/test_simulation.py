@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ripple_sim.capture.snapshot import FrameSource, run
+from ripple_sim.capture.frame_source import FrameSource
+from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.errors import SceneError, SimulationError, VideoError
-from ripple_sim.scene.scene import Scene, load_scene
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import shared_context
+from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import render_video
 
 MJCF = """<mujoco><option timestep="0.002"/><default><geom solref="0.01 0.3"/></default><worldbody>
@@ -48,8 +51,8 @@ def test_same_scene_twice_gives_the_same_fields_and_frames(scene: Scene, backend
     def result() -> tuple[bytes, bytes]:
         simulation = Simulation(scene, fps=30, backend=backend)
         frames = FrameSource(simulation, width=160, height=90)
-        *_, last = run(simulation, 11)
-        return last.heights["egg"].tobytes(), frames.draw(last).tobytes()
+        *_, last = snapshots(simulation, 11)
+        return last.heights["egg"].tobytes(), frames.render(last).tobytes()
 
     first, second = result(), result()
     assert first == second
@@ -59,9 +62,9 @@ def test_same_scene_twice_gives_the_same_fields_and_frames(scene: Scene, backend
 def test_ripples_change_the_picture(scene: Scene) -> None:
     simulation = Simulation(scene, fps=30, backend="cpu")
     frames = FrameSource(simulation, width=160, height=90)
-    *_, last = run(simulation, 11)
-    rippled = frames.draw(last).astype(int)
-    flat = frames.draw(dataclasses.replace(last, height_maps={})).astype(int)
+    *_, last = snapshots(simulation, 11)
+    rippled = frames.render(last).astype(int)
+    flat = frames.render(dataclasses.replace(last, height_maps={})).astype(int)
     changed = (np.abs(rippled - flat).max(axis=-1) > 8).mean()
     assert 0.01 < changed < 0.5
 
@@ -71,8 +74,7 @@ def test_video_has_the_frames_that_were_asked_for(scene: Scene, tmp_path: Path) 
     summary = render_video(
         scene,
         tmp_path / "out" / "a.mp4",
-        size=(160, 90),
-        fps=20,
+        VideoOptions(size=(160, 90), fps=20),
         progress=lambda done, total: calls.append((done, total)),
     )
     assert summary.frames == 10
@@ -89,7 +91,7 @@ def test_video_has_the_frames_that_were_asked_for(scene: Scene, tmp_path: Path) 
 
 def test_folder_of_frames_is_identical_twice(scene: Scene, tmp_path: Path) -> None:
     for name in ("a", "b"):
-        render_video(scene, tmp_path / name, size=(96, 54), fps=10)
+        render_video(scene, tmp_path / name, VideoOptions(size=(96, 54), fps=10))
     files = sorted(path.name for path in (tmp_path / "a").iterdir())
     assert len(files) == 5
     for file in files:
@@ -100,7 +102,7 @@ def test_folder_of_frames_is_identical_twice(scene: Scene, tmp_path: Path) -> No
 
 def test_a_snapshot_stays_as_it_is_while_the_simulation_goes_on(scene: Scene) -> None:
     kept, digests = [], []
-    for state in run(Simulation(scene, fps=30, backend="cpu"), 6, alive=6):
+    for state in snapshots(Simulation(scene, fps=30, backend="cpu"), 6, alive=6):
         kept.append(state)
         digests.append(state.digest())
     assert [state.digest() for state in kept] == digests
@@ -109,22 +111,23 @@ def test_a_snapshot_stays_as_it_is_while_the_simulation_goes_on(scene: Scene) ->
 
 
 def test_slow_motion_shows_the_same_simulation_more_often(scene: Scene, tmp_path: Path) -> None:
-    summary = render_video(scene, tmp_path / "slow.mp4", size=(64, 48), fps=10, slow_motion=2.5)
+    summary = render_video(scene, tmp_path / "slow.mp4", VideoOptions(size=(64, 48), fps=10, slow_motion=2.5))
     assert summary.frames == 12  # half a second of the scene, 25 frames a second of it
     with av.open(summary.output) as container:
         assert float(container.streams.video[0].average_rate) == 10
-    heights = [state.data.qpos[2] for state in run(Simulation(scene, fps=10 * 2.5, backend="cpu"), 3)]
+    heights = [state.data.qpos[2] for state in snapshots(Simulation(scene, fps=10 * 2.5, backend="cpu"), 3)]
     # it falls freely: at frame k, k / 25 s have gone by
     np.testing.assert_allclose(heights[0] - heights, 9.81 / 2 * (np.arange(3) / 25) ** 2, rtol=0.06)
     with pytest.raises(SceneError, match=r"slow motion is 0.*up to 1000"):
-        render_video(scene, tmp_path / "none.mp4", slow_motion=0)
+        render_video(scene, tmp_path / "none.mp4", VideoOptions(slow_motion=0))
 
 
 def test_supersampled_frames_have_softer_edges_of_the_same_brightness(scene: Scene) -> None:
     simulation = Simulation(scene, fps=30, backend="cpu")
-    (state,) = run(simulation, 1)
+    (state,) = snapshots(simulation, 1)
     plain, fine = (
-        FrameSource(simulation, width=96, height=54, supersample=factor).draw(state).astype(float) for factor in (1, 3)
+        FrameSource(simulation, width=96, height=54, supersample=factor).render(state).astype(float)
+        for factor in (1, 3)
     )
     assert fine.shape == plain.shape
     assert 0 < np.abs(fine - plain).mean() < 3
@@ -132,7 +135,7 @@ def test_supersampled_frames_have_softer_edges_of_the_same_brightness(scene: Sce
 
 
 def test_transparent_frames_show_the_bodies_and_no_background(scene: Scene, tmp_path: Path) -> None:
-    render_video(scene, tmp_path / "frames", size=(96, 54), fps=10, duration=0.1, transparent=True)
+    render_video(scene, tmp_path / "frames", VideoOptions(size=(96, 54), fps=10, duration=0.1, transparent=True))
     frame = np.asarray(Image.open(tmp_path / "frames" / "frame_00000.png"))
     assert frame.shape == (54, 96, 4)
     assert frame[27, 48, 3] == 255  # the egg is in the middle
@@ -142,11 +145,11 @@ def test_transparent_frames_show_the_bodies_and_no_background(scene: Scene, tmp_
 def test_bad_requests_leave_nothing_behind(scene: Scene, tmp_path: Path) -> None:
     before = sorted(tmp_path.iterdir())
     with pytest.raises(VideoError):
-        render_video(scene, tmp_path / "odd.mp4", size=(161, 90))
+        render_video(scene, tmp_path / "odd.mp4", VideoOptions(size=(161, 90)))
     with pytest.raises(SceneError, match="duration"):
-        render_video(scene, tmp_path / "none.mp4", duration=-1)
+        render_video(scene, tmp_path / "none.mp4", VideoOptions(duration=-1))
     with pytest.raises(RippleError, match="resolution"):
-        render_video(scene, tmp_path / "res.mp4", resolution=2)
+        render_video(scene, tmp_path / "res.mp4", VideoOptions(resolution=2))
     assert sorted(tmp_path.iterdir()) == before
 
 
@@ -156,6 +159,6 @@ def test_unstable_physics_is_reported_and_no_file_is_left(tmp_path: Path) -> Non
     )
     (tmp_path / "scene.toml").write_text(TOML)
     with pytest.raises(SimulationError, match="became unstable at"):
-        render_video(load_scene(tmp_path / "scene.toml"), tmp_path / "x.mp4", size=(64, 48), fps=20)
+        render_video(load_scene(tmp_path / "scene.toml"), tmp_path / "x.mp4", VideoOptions(size=(64, 48), fps=20))
     assert not (tmp_path / "x.mp4").exists()
     assert len(list(tmp_path.iterdir())) == 2

@@ -17,10 +17,12 @@ from typing import TypeVar
 
 os.environ.setdefault("MUJOCO_GL", "disable")
 
-from ripple_sim.capture.snapshot import FrameSource, run
+from ripple_sim.capture.frame_source import FrameSource
+from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.encode import open_writer
-from ripple_sim.scene.scene import load_scene
+from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.simulation import Simulation
+from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import render_video
 
 Result = TypeVar("Result")
@@ -54,23 +56,22 @@ def main() -> None:
             for frame in frames:
                 writer.write(frame)
 
+    video = VideoOptions(size=(width, height), fps=FPS, duration=options.frames / FPS, overlay=())
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clip.mp4"
         simulation, frames = set_up()
-        *_, state = run(simulation, options.frames)
-        frames.draw(state)  # what is compiled once, and kept on the disk, is not counted
+        *_, state = snapshots(simulation, options.frames)
+        frames.render(state)  # what is compiled once, and kept on the disk, is not counted
         for _ in range(options.rounds):
             simulation, frames = timed("set-up", set_up)
-            states = run(simulation, options.frames, alive=options.frames)
+            states = snapshots(simulation, options.frames, alive=options.frames)
             states = timed("simulation", lambda states=states: list(states))
-            images = timed("drawing", lambda states=states, frames=frames: [frames.draw(state) for state in states])
+            images = timed("drawing", lambda states=states, frames=frames: [frames.render(state) for state in states])
             timed("encoding", lambda images=images: encode(path, images))
             del simulation, frames, states, images
             timed(
                 "whole",
-                lambda: render_video(
-                    scene, path, size=(width, height), fps=FPS, duration=options.frames / FPS, overlay=()
-                ),
+                lambda: render_video(scene, path, video),
             )
 
     least = {name: [min(times) for times in zip(*each, strict=True)] for name, each in rounds.items()}

@@ -16,11 +16,12 @@ os.environ.setdefault("MUJOCO_GL", "disable")
 import numpy as np
 
 from ripple_sim.overlay.notes import Notebook
+from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.overlays import parse_request
-from ripple_sim.scene.scene import load_scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.video.film import Film
+from ripple_sim.video.options import VideoOptions
 
 KINDS = ([], ["height"], ["grid"], ["contacts"], ["time"], ["energy"], ["height", "contacts", "grid", "time", "energy"])
 RATE, START = 30, 1.0
@@ -42,19 +43,16 @@ def main() -> None:
     scene, first = load_scene(options.scene), round(START * RATE)
 
     # one film shows everything there is to know; each kind draws of it what it needs
-    everything = parse_request(KINDS[-1])
     total = first + options.frames
-    source = Film([Simulation(scene, fps=RATE)], everything, width=width, height=height, frames=total, rate=RATE)
-    films = [
-        Film(source.simulations, parse_request(words), width=width, height=height, frames=total, rate=RATE)
-        for words in KINDS
-    ]
+    each = [VideoOptions(size=(width, height), fps=RATE, overlay=words) for words in KINDS]
+    source = Film([Simulation(scene, fps=RATE)], each[-1], total)
+    films = [Film(source.simulations, video, total) for video in each]
     books = [Notebook(parse_request(words), source.simulations, total, RATE) for words in KINDS]
     drawing, noting = np.zeros((2, len(KINDS), options.frames))
-    for shot in islice(source.states(), first, None):
+    for shot in islice(source.shots(), first, None):
         for kind, (film, book) in enumerate(zip(films, books, strict=True)):
             frame = shot.number - first
-            drawing[kind, frame] = seconds(lambda film=film, shot=shot: film.draw(shot))
+            drawing[kind, frame] = seconds(lambda film=film, shot=shot: film.render(shot))
             noting[kind, frame] = seconds(book.follow)
     print(shared_context().renderer)
     print(f"{options.scene}, {width}x{height}; processor time, least of {options.frames} frames")

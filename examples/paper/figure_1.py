@@ -8,7 +8,7 @@ from pathlib import Path
 from page import Part
 from stills import strip
 
-from ripple_sim.scene.scene import load_scene
+from ripple_sim.scene.load_scene import load_scene
 
 
 def make(folder: Path) -> Part:
@@ -16,7 +16,7 @@ def make(folder: Path) -> Part:
     return Part(
         "Figure 1: a ball hits a face",
         "The ball is a rigid body of MuJoCo; its contact force presses on the forehead. "
-        "The waves run round the eyes, where a picture says that no waves run.",
+        "The waves go around the eyes, which an image excludes.",
         [(file, "The scene `face` at 0.2, 0.35, 0.5 and 0.8 s.")],
     )
 

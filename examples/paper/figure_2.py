@@ -34,8 +34,8 @@ def make(folder: Path) -> Part:
         )
     return Part(
         "Figure 2: an object and its sphere map",
-        "A conformal map keeps angles and leaves the legs next to nothing of the sphere: few texels fall on them, "
-        "and waves end there. The progressive map spreads the texels evenly and does not fold.",
+        "A conformal map preserves angles but leaves the legs almost no area on the sphere: they get few texels, "
+        "and waves die there. The progressive map spreads the texels evenly, without folds.",
         pictures,
         rows,
     )

@@ -12,7 +12,8 @@ from page import Part
 from PIL import Image
 from stills import strip
 
-from ripple_sim.scene.scene import Scene, load_scene
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import MapEntry, MaterialEntry
 
 TIMES, SIZE = [0.25, 0.4, 0.6, 0.8], (400, 400)
@@ -28,7 +29,7 @@ def half(path: Path) -> None:
 
 def scene_with(material: MaterialEntry) -> Scene:
     scene = load_scene("face")
-    return dataclasses.replace(scene, surfaces=(msgspec.structs.replace(scene.surfaces[0], material=material),))
+    return dataclasses.replace(scene, targets=(msgspec.structs.replace(scene.targets[0], material=material),))
 
 
 def make(folder: Path) -> Part:
@@ -42,8 +43,8 @@ def make(folder: Path) -> Part:
         pictures.append((file, f"As {name}, from {low:g} to {high:g}, at {', '.join(map(str, TIMES))} s."))
     return Part(
         "Figure 8: speed and damping from a texture",
-        "A picture in the object's own texture coordinates is sampled once a texel. "
-        "Waves run slower, or die sooner, on one half.",
+        "An image in the object's own texture coordinates is sampled once per texel. "
+        "Waves travel slower, or decay faster, on one half.",
         pictures,
     )
 

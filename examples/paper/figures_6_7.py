@@ -24,10 +24,10 @@ BASELINES = {"uncorrected": "figure_6", "paper": "figure_7"}
 
 def make(folder: Path) -> Part:
     scene = drop_scene(LIMBED_FILE, bodies=0, up="z")
-    material = msgspec.structs.replace(scene.surfaces[0].material, stiffness=300.0, damping=0.5, density=150.0)
+    material = msgspec.structs.replace(scene.targets[0].material, stiffness=300.0, damping=0.5, density=150.0)
     scene = dataclasses.replace(
         scene,
-        surfaces=(msgspec.structs.replace(scene.surfaces[0], material=material),),
+        targets=(msgspec.structs.replace(scene.targets[0], material=material),),
         camera=msgspec.structs.replace(scene.camera, azimuth=60.0, elevation=-35.0, orbit=0.0, distance=3.0),
         events=Events(poke=(PokeEntry("target", 0.02, (-0.2, 0.05, 0.7), 0.8, 0.05),)),
     )
@@ -49,7 +49,7 @@ def make(folder: Path) -> Part:
         "Figures 6 and 7: corrected and uncorrected",
         "A ring that starts on the back should stay a circle along the surface. Without real-space distances it "
         "follows the texels; with the paper's formula its speed still depends on the shape of the texels; with finite "
-        "elements on the texels it does not. The correction is made before the first step; all steps cost the same.",
+        "elements on the texels it does not. The correction is part of the set-up; all steps cost the same.",
         pictures,
         rows,
     )

@@ -17,8 +17,8 @@ FOLDER = Path("out/paper")
 PARTS = ("figure_1", "figure_2", "figure_5", "figures_6_7", "figure_8", "table_1")
 TITLE = "The paper, part by part"
 LEAD = (
-    'The figures of Kira, Nakayama and Fujishiro, "Jacobian-free Deformation of Genus-0 Surfaces", with objects of our '
-    "own, drawn and measured by one command: `python examples/paper/run.py`."
+    'The figures of Kira, Nakayama and Fujishiro, "Jacobian-free Deformation of Genus-0 Surfaces", with other '
+    "objects, drawn and measured by one command: `python examples/paper/run.py`."
 )
 
 

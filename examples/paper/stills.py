@@ -8,6 +8,7 @@ from typing import Any
 from PIL import Image
 
 from ripple_sim.scene.scene import Scene
+from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import render_video
 
 RATE = 20  # frames a second, the grid of times to choose from
@@ -21,7 +22,7 @@ def strip(
     columns = min(columns, len(times))
     with tempfile.TemporaryDirectory() as folder:
         frames = Path(folder) / "frames"
-        render_video(scene, frames, size=size, fps=RATE, duration=max(times) + 1 / RATE, **options)
+        render_video(scene, frames, VideoOptions(size=size, fps=RATE, duration=max(times) + 1 / RATE, **options))
         drawn = sorted(frames.glob("*.png"))
         picture = Image.new("RGB", (width * columns, height * -(-len(times) // columns)))
         for i, time in enumerate(times):

@@ -25,10 +25,10 @@ def make(folder: Path) -> Part:
             ]
         )
     return Part(
-        "Table 1: steps a second, and the precomputation",
-        "Wave steps a second on the CPU, without drawing. The polygons count in the precomputation only: the waves run "
-        f"on texels. The paper gives {PAPER['seconds']} s for casting the rays of {PAPER['texels']} texels against "
-        f"each of {PAPER['polygons']} polygons; an atlas of N = 56 has 18,816 texels.",
+        "Table 1: steps per second, and the precomputation",
+        "Wave steps per second on the CPU, without rendering. The polygons matter in the precomputation only: the "
+        f"waves run on texels. The paper gives {PAPER['seconds']} s for casting the rays of {PAPER['texels']} texels "
+        f"against each of {PAPER['polygons']} polygons; an atlas of N = 56 has 18,816 texels.",
         table=rows,
     )
 

@@ -1,4 +1,4 @@
-"""Pictures of anybody's MuJoCo model with its ripples, one at a time."""
+"""`RippleRenderer`: frames of a MuJoCo model with its ripples, in your own loop."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
 from ripple_sim.render.gpu.contract import MappingKind
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual
-from ripple_sim.scene.scene_file import CameraEntry
+from ripple_sim.scene.camera import CameraEntry
 from ripple_sim.solver import HeightMap, WaveSolver
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .viewpoint import viewpoint
 
 
-class Pictures:
-    """Draws a model and its rippling surfaces, headless, as `mujoco.Renderer` draws a model.
+class RippleRenderer:
+    """Renders a model and its rippling surfaces offscreen, as `mujoco.Renderer` renders a model.
 
     Parameters
     ----------
     model : mujoco.MjModel
     ripples : Ripples
-        The surfaces that are drawn as they ripple.
+        Whose targets are drawn with their ripples.
     width, height : int
         [pixels].
     looks : mapping
-        Geom name to the look of its surface: rubber, jelly, clay and so on; rubber where nothing is said. Its colour is
-        that of the geom, where the model gives it a texture or a colour.
+        Geom name to the look of its surface: rubber (the default), jelly, clay and so on. Its colour is the geom's,
+        where the model gives it a texture or a colour.
     gl : GLContext, optional
         By default the process's shared one.
 
     Raises
     ------
     RippleError
-        For an unknown look, or if the driver cannot make pictures of this size.
+        For an unknown look, or if the driver cannot render frames of this size.
     """
 
     def __init__(
@@ -61,15 +61,15 @@ class Pictures:
         }
         self._renderer = Renderer(gl or shared_context(), model, surfaces, size=(width, height))
 
-    def draw(self, data: mujoco.MjData, camera: Camera | FixedCamera | str | None = None) -> NDArray[np.uint8]:
-        """Draw the present state, uint8 [height, width, 3].
+    def render(self, data: mujoco.MjData, camera: Camera | FixedCamera | str | None = None) -> NDArray[np.uint8]:
+        """Render the present state to pixels, uint8 [height, width, 3].
 
         Parameters
         ----------
         data : mujoco.MjData
             After `mj_step` or `mj_forward`.
         camera : Camera, FixedCamera or str, optional
-            A camera, or the name of one of the MJCF; by default MuJoCo's free camera, aimed at the model's middle.
+            A camera, or the name of one in the MJCF; by default MuJoCo's free camera, aimed at the model's middle.
         """
         if camera is None or isinstance(camera, str):
             free = self._model.vis.global_
@@ -83,7 +83,7 @@ class Pictures:
 
 
 def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] | None = None) -> Surface:
-    """What the renderer needs to know of a rippling surface."""
+    """Surface to be drawn of a target."""
     atlas = waves.atlas
     mesh = atlas.mesh
     return Surface(

@@ -1,4 +1,4 @@
-"""The state of a simulation at moments between its physics steps, as a shutter that is open for a while sees it."""
+"""A simulation's state at times between its physics steps, while the shutter is open."""
 
 from __future__ import annotations
 
@@ -15,19 +15,18 @@ Heights = dict[str, NDArray[np.float32]]
 _ROUNDING = 9  # decimals of a physics step: what is a whole step but for round-off is one
 
 
-class Moments:
-    """Moments of each frame of a simulation.
+class ShutterTimes:
+    """States of a simulation at given times of each frame.
 
-    To iterate over it is to advance the simulation through those of the present frame. Only the physics steps are made
-    that would be made anyway, so that what happens does not hang on how it is filmed. A moment within a step lies on
-    the way between the step's ends: bodies go along it with a steady velocity, which is how MuJoCo's Euler and implicit
-    integrators move them, and heights linearly.
+    Iterating over it advances the simulation through the times of the present frame. It takes the same physics steps
+    as without a shutter, so motion blur does not change the motion. Within a step, states are interpolated between its
+    ends: bodies move at constant velocity, as in MuJoCo's Euler and implicit integrators, and heights linearly.
 
     Parameters
     ----------
     simulation : Simulation
     times : float64 [n]
-        The moments, in frames from a frame's beginning: not falling, from 0 to 1.
+        In frames from a frame's beginning, ascending, from 0 to 1.
     """
 
     def __init__(self, simulation: Simulation, times: NDArray[np.float64]) -> None:
@@ -37,12 +36,12 @@ class Moments:
         self._start, self._between = mujoco.MjData(simulation.model), mujoco.MjData(simulation.model)
 
     def __iter__(self) -> Iterator[tuple[mujoco.MjData, Heights]]:
-        """Advance to one moment after the other.
+        """Advance to one time after the other.
 
         Yields
         ------
         data : mujoco.MjData
-            State of the bodies, until the next moment is asked for.
+            State of the bodies, until the next iteration.
         heights : dict
             By the geom's name [m], float32 [6, N, N]. The same object as before where no time has passed.
         """
@@ -66,10 +65,10 @@ class Moments:
         return {name: self._simulation.ripples[name].height for name in self._simulation.ripples}
 
     def _go_back(self, duration: float) -> None:
-        """Set the bodies to where they were so long [s] ago, within the last step.
+        """Set the bodies to where they were a duration [s] ago, within the last step.
 
-        After a step MuJoCo's poses are those from which it began: so are the ones here, and the way that led to them is
-        that of the step before.
+        After `mj_step` MuJoCo's poses are those at the step's beginning. So are these, and the motion that led to them
+        is the one of the step before.
         """
         model, data = self._simulation.model, self._between
         mujoco.mj_copyData(data, model, self._start)

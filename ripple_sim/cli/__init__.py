@@ -1,1 +1,1 @@
-"""The command line: one typed function a command, errors as one line, pictures and reports of an atlas."""
+"""The command line: one typed class per command, errors as one line, reports of an atlas."""

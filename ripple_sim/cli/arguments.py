@@ -1,4 +1,4 @@
-"""Types of command line arguments: how a word becomes a value, and what is said if it cannot."""
+"""Types of command line arguments: how a word is parsed, and the message if it is invalid."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ def parse_size(word: str) -> tuple[int, int]:
     """Read width and height [pixels] from a word such as "1280x720"."""
     match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", word)
     if match is None:
-        raise ValueError(f"{word!r} is no frame size; valid is WIDTHxHEIGHT in pixels, such as 1280x720")
+        raise ValueError(f"{word!r} is not a frame size; valid is WIDTHxHEIGHT in pixels, such as 1280x720")
     return int(match[1]), int(match[2])
 
 
 def parse_count(word: str) -> int:
-    """Read a whole number from 1 on."""
+    """Read a whole number of 1 or more."""
     return _whole(word, 1)
 
 
 def parse_seed(word: str) -> int:
-    """Read a whole number from 0 on."""
+    """Read a whole number of 0 or more."""
     return _whole(word, 0)
 
 
 def _whole(word: str, least: int) -> int:
     if not re.fullmatch(r"[0-9]{1,9}", word) or int(word) < least:
-        raise ValueError(f"{word!r} is not valid; it must be a whole number from {least} on")
+        raise ValueError(f"{word!r} is not valid; it must be a whole number, {least} or more")
     return int(word)
 
 
@@ -60,7 +60,7 @@ def parse_diameter(word: str) -> float:
     """Read the diameter of a lens [m]."""
     number = _number(word)
     if not 0 <= number < math.inf:
-        raise ValueError(f"{word!r} is not valid; it must be a number of metres from 0 on, such as 0.02")
+        raise ValueError(f"{word!r} is not valid; it must be a number of metres, 0 or more, such as 0.02")
     return number
 
 
@@ -85,7 +85,7 @@ def _number(word: str) -> float:
 
 
 def parse_supersample(word: str) -> int:
-    """Read how many times as wide and high a frame is drawn."""
+    """Read a supersampling factor."""
     if not re.fullmatch(r"[1-4]", word):
         raise ValueError(f"{word!r} is not valid; it must be 1, 2, 3 or 4")
     return int(word)
@@ -99,7 +99,7 @@ def parse_axis(word: str) -> str:
 
 
 def parse_overlay(word: str) -> tuple[str, ...]:
-    """Read a list of overlays, at commas; it is checked where it is used."""
+    """Read a list of overlays, separated by commas; the names are checked later."""
     return tuple(part.strip() for part in word.split(",")) if word.strip() else ()
 
 
@@ -136,7 +136,9 @@ Supersample = Annotated[int, _one_word(parse_supersample, "N")]
 Shutter = Annotated[float | None, _one_word(parse_angle, "DEGREES"), arg(help_behavior_hint="(default: the scene's)")]
 Aperture = Annotated[float | None, _one_word(parse_diameter, "M"), arg(help_behavior_hint="(default: the scene's)")]
 Focus = Annotated[
-    float | str | None, _one_word(parse_focus, "M|NAME"), arg(help_behavior_hint="(default: what the camera looks at)")
+    float | str | None,
+    _one_word(parse_focus, "M|NAME"),
+    arg(help_behavior_hint="(default: the camera's aim)"),
 ]
 Exposures = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's, or 32)")]
 Device = Annotated[int | None, _one_word(parse_seed, "N"), arg(help_behavior_hint="(default: the first that works)")]

@@ -1,4 +1,4 @@
-"""What `ripple-sim atlas` says: the mesh, what was mended, how good the atlas is, how long each stage took."""
+"""The report of `ripple-sim atlas`: the mesh, its repairs, the quality of the atlas, the time of each stage."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def atlas_report(path: Path, atlas: Atlas, method: str, seconds: dict[str, float
     Returns
     -------
     dict
-        `mesh`, `vertices`, `triangles`, `size` of the bounding box [m], `area` [m^2], `volume` [m^3], `fixes` (what was
-        mended, one phrase each), `resolution`, `method`, `quality` (see `Atlas.quality`) and `seconds`.
+        `mesh`, `vertices`, `triangles`, `size` of the bounding box [m], `area` [m^2], `volume` [m^3], `fixes` (repairs,
+        one phrase each), `resolution`, `method`, `quality` (see `Atlas.quality`) and `seconds`.
     """
     mesh = atlas.mesh
     return {
@@ -46,14 +46,14 @@ def atlas_report(path: Path, atlas: Atlas, method: str, seconds: dict[str, float
 
 
 def report_text(report: dict[str, Any]) -> str:
-    """Lay a report out for reading."""
+    """Format a report as text."""
     n = report["resolution"]
     rows = [
         ("mesh", f"{report['vertices']} vertices, {report['triangles']} triangles"),
         ("size", f"{' x '.join(f'{x:.4g}' for x in report['size'])} m"),
         ("area", f"{report['area']:.6g} m^2"),
         ("volume", f"{report['volume']:.6g} m^3"),
-        *(("mended", fix) for fix in report["fixes"]),
+        *(("repaired", fix) for fix in report["fixes"]),
         ("atlas", f"6 x {n} x {n} texels, {report['method']} sphere map"),
         *((name, f"{value:.6g}") for name, value in report["quality"].items()),
         *((f"{stage.replace('_', ' ')} time", f"{seconds:.3f} s") for stage, seconds in report["seconds"].items()),

@@ -5,10 +5,7 @@ Exit status: 0 done, 1 something failed, 2 bad input, 130 interrupted, 143 termi
 
 from __future__ import annotations
 
-import contextlib
-import io
 import os
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,8 +14,6 @@ from typing import Any
 from .signals import INTERRUPTED, TERMINATED, end_at_once, end_in_good_order
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-
-_DESCRIPTION = "Surface ripples on any genus-0 mesh, driven by the contact forces of a MuJoCo simulation."
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -37,10 +32,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         command.run()
         sys.stdout.flush()
     except OSError as error:
-        # standard output has failed (a full disk, a reader that has stopped): nothing more goes there, not even at exit
+        # standard output has failed (full disk, closed pipe): nothing more goes there, not even at exit
         sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115
         return FAILED if isinstance(error, BrokenPipeError) else _fail(error.strerror or error, FAILED)
-    except (GLError, DisplayError, EncodingError) as error:  # nothing that other input would cure
+    except (GLError, DisplayError, EncodingError) as error:  # other input would not help
         return _fail(error, FAILED)
     except RippleError as error:
         return _fail(error, BAD_INPUT)
@@ -62,36 +57,11 @@ def _fail(message: object, status: int, ending: BaseException | None = None) -> 
 
 def _parse(argv: list[str]) -> Any:
     """Return the command to run, or the exit status if there is nothing to run."""
-    # here, where the signals are taken care of: it takes a third of a second
-    import tyro.conf
-    import tyro.extras
+    # here, where the signals are handled: importing it takes a third of a second
+    from .parser import UsageError, parse
 
-    from .commands import COMMANDS
-
-    complaint = io.StringIO()
     try:
-        with contextlib.redirect_stderr(complaint):
-            return tyro.extras.subcommand_cli_from_dict(
-                COMMANDS,
-                prog="ripple-sim",
-                description=_DESCRIPTION,
-                args=argv,
-                config=(tyro.conf.FlagCreatePairsOff,),
-            )
-    except SystemExit as ending:
-        if not ending.code:
-            return DONE
-        return _fail(_first_part(complaint.getvalue()), BAD_INPUT)
-
-
-def _first_part(box: str) -> str:
-    """Reduce tyro's complaint to what stands between its first two rules, without the help texts (indented by 8).
-
-    It is a title, a rule, what is wrong, a rule, and hints; framed where stdout is UTF-8.
-    """
-    text = re.sub(r"\x1b\[[0-9;]*m", "", box)
-    parts = re.split(r"^[│╭╰ ]*(?:─ .* ─+|─{3,}|-{3,})[│╮╯ ]*$", text, flags=re.MULTILINE)
-    part = parts[1] if len(parts) > 1 else text
-    said = [line.strip("│ ") for line in part.splitlines() if not re.match(r"│? {9}", line)]
-    program = re.search(r"ripple-sim(?: [a-z]+)? --help", text)
-    return f"{' '.join(said).strip().rstrip('.')}; see {program[0] if program else 'ripple-sim --help'}"
+        command = parse(argv)
+    except UsageError as error:
+        return _fail(error, BAD_INPUT)
+    return DONE if command is None else command

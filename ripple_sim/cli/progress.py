@@ -20,9 +20,9 @@ class _Rate(ProgressColumn):
 
 @contextlib.contextmanager
 def frame_progress(title: str) -> Iterator[Report | None]:
-    """Show a title, and below it frames done, rate and time left, on stderr while the block runs.
+    """Show a title, and below it frames done, rate and remaining time, on stderr while the block runs.
 
-    Yields what to call with the number of frames done and of all frames, or None if stderr is no terminal.
+    Yields a function of the number of frames done and of all frames, or None if stderr is not a terminal.
     """
     if not sys.stderr.isatty():
         yield None

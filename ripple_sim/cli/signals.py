@@ -1,7 +1,7 @@
-"""Ctrl-C and SIGTERM: exceptions, so that what is unfinished is cleared away on the way out.
+"""Ctrl-C and SIGTERM as exceptions, so that unfinished work is cleaned up.
 
-Before anything has begun, and while a module is being imported, which an exception would leave as any other error,
-nothing needs clearing away, and the process ends at once.
+Before a command begins, and during imports, where an exception could be taken for an import error, there is nothing to
+clean up, and the process ends at once.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ _STATUS = {signal.SIGINT: (INTERRUPTED, "interrupted"), signal.SIGTERM: (TERMINA
 
 
 def end_at_once() -> None:
-    """Let both signals end the process, with one line; one that the caller had ignored stays ignored."""
+    """Let both signals end the process, with one line; a signal ignored by the parent stays ignored."""
     _handle(_end)
 
 
 def end_in_good_order() -> None:
-    """Let both signals raise `KeyboardInterrupt` or `SystemExit`; one that the caller had ignored stays ignored."""
+    """Let both signals raise `KeyboardInterrupt` or `SystemExit`; a signal ignored by the parent stays ignored."""
     _handle(_raise)
 
 

@@ -16,41 +16,41 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class View:
-    """Open a window on a scene, or on any closed mesh, and play with it.
+    """Open a scene or a closed mesh in an interactive window.
 
-    Click: poke the surface. Drag: orbit; with shift: pan; wheel: zoom. Space: pause, go on. N: next frame. R: reset.
-    T: throw a ball at the pointer. O: operator (fem, uncorrected, paper). C: height as colours. S: screenshot.
-    V: record a video, stop. H: list of keys. Q: quit. Sliders set the poke's impulse and the material.
+    Click: poke the surface. Drag: orbit; with shift: pan; wheel: zoom. Space: pause or resume. N: next frame. R: reset.
+    T: throw a ball at the pointer. O: next operator (fem, uncorrected, paper). C: heatmap on or off. S: screenshot.
+    V: start or stop a recording. H: list of keys. Q: quit. Sliders set the poke's impulse and the material.
     """
 
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
     """Name of a shipped scene, path of a scene file (TOML), or a closed mesh (OBJ, OFF, PLY, STL, GLB ...)."""
     size: Size = (800, 600)
-    """Size of the window in pixels."""
+    """Window size in pixels."""
     resolution: Count = 64
-    """Texels along an edge of a cube face; more carry finer waves and take longer."""
+    """Texels along the edge of a chart; more resolve finer waves and take longer."""
     bodies: Seed = 3
-    """How many bodies fall on a mesh; 0 for none."""
+    """Number of bodies that fall on a mesh; 0 for none."""
     seed: Seed = 0
-    """Chooses where and what falls."""
+    """Seed for the bodies' places and sizes."""
     up: UpAxis = None
     """Axis of the mesh that points up."""
     repair: bool = False
-    """Mend a mesh that is open or not manifold (needs the package pymeshfix)."""
+    """Repair an open or non-manifold mesh (needs the package pymeshfix)."""
     folder: Annotated[Path, arg(metavar="FOLDER")] = Path()
-    """Where screenshots and videos go."""
+    """Folder for screenshots and videos."""
     web: bool = False
-    """Serve it to a browser on this machine in place of a window (needs the extra ripple-sim[web])."""
+    """Serve a web page to a browser on this machine instead of a window (needs the extra ripple-sim[web])."""
     port: Count = 8080
     """Port of the web page on 127.0.0.1."""
     benchmark: bool = False
-    """Measure how many times a second the window can be updated, print that, and leave."""
+    """Measure the window's update rate, print it, and exit."""
 
     def run(self) -> None:
-        """Show the scene until the user leaves."""
+        """Show the scene until the user quits."""
         from ripple_sim.viewer.display import check_display, display_problem
 
-        # what cannot work is told before anything that takes time
+        # refuse what cannot work before anything that takes time
         if self.benchmark:
             from ripple_sim.viewer.desktop import benchmark
 

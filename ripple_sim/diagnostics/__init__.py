@@ -1,1 +1,1 @@
-"""What this machine offers, and what keeps it from rendering."""
+"""Versions and drivers of this machine, and reasons why it cannot render."""

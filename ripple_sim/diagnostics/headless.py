@@ -1,8 +1,8 @@
-"""Why OpenGL does not run headless, or not on the GPU: the commonest reasons on Linux, each with its fix.
+"""Why OpenGL does not run headless, or not on the GPU: common reasons on Linux, each with its fix.
 
-An OpenGL program without a window goes through libEGL.so.1 (of libglvnd), which reads the vendor files: small JSON
-files that name each driver's own EGL library. Mesa's driver then opens a render node, /dev/dri/renderD*; NVIDIA's
-opens /dev/nvidia*.
+An OpenGL program without a window uses libEGL.so.1 (of libglvnd), which reads the vendor files: small JSON files that
+name each driver's own EGL library. Mesa's driver then opens a render node, /dev/dri/renderD*; NVIDIA's opens
+/dev/nvidia*.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _CONTAINER = "in a container, start that with NVIDIA_DRIVER_CAPABILITIES=all"
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """What is wrong, and what to do about it."""
+    """A problem and its fix."""
 
     problem: str
     fix: str
@@ -34,24 +34,24 @@ class Finding:
 
 
 def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[Finding]:
-    """Look for what keeps OpenGL from the GPU, or from running at all.
+    """Find what keeps OpenGL off the GPU, or from running at all.
 
     Parameters
     ----------
     software : bool or None
-        Whether OpenGL runs, but on the processor; None if it does not run.
+        Whether OpenGL runs on the processor; None if it does not run.
     devices : Path
         Folder of the device files.
 
     Returns
     -------
     list of Finding
-        The likeliest cause first; empty if OpenGL runs on a GPU, or none of the known causes is found.
+        The likeliest cause first; empty if OpenGL runs on a GPU, or for an unknown cause.
     """
     if software is False:
         return []
     if software is None:
-        # where a library is missing, the rest follows from that
+        # a missing library explains the rest
         return list(_library_problems()) or list(_vendor_problems()) or list(_device_problems(devices))
     found = [*_device_problems(devices), *_nvidia_problems(devices)]
     if found or any(_gpus(devices)):
@@ -59,7 +59,7 @@ def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[F
     return [
         Finding(
             f"OpenGL runs in software, on the processor: there is no GPU ({devices}/dri/renderD* or {devices}/nvidia*)",
-            "nothing to mend; on a machine with a GPU rendering is faster (in a container, pass it on with "
+            "nothing to fix; rendering is faster on a machine with a GPU (in a container, pass it through with "
             "--device /dev/dri or --gpus all)",
         )
     ]
@@ -88,7 +88,9 @@ def _vendor_problems() -> Iterator[Finding]:
     for file in files:
         library = _library_of(file)
         if library is None:
-            yield Finding(f"the EGL vendor file {file} is damaged", f"install anew what it belongs to: dpkg -S {file}")
+            yield Finding(
+                f"the EGL vendor file {file} is damaged", f"reinstall the package it belongs to: dpkg -S {file}"
+            )
             continue
         try:
             ctypes.CDLL(library)
@@ -105,8 +107,8 @@ def _device_problems(devices: Path) -> Iterator[Finding]:
         if not os.access(node, os.R_OK | os.W_OK, effective_ids=True):
             group = _group_of(node)
             yield Finding(
-                f"this user may not use the GPU's render node {node}",
-                f"sudo usermod -aG {group} $USER, then log in anew (in a container: --group-add {group})",
+                f"this user has no access to the GPU's render node {node}",
+                f"sudo usermod -aG {group} $USER, then log in again (in a container: --group-add {group})",
             )
 
 
@@ -114,19 +116,19 @@ def _nvidia_problems(devices: Path) -> Iterator[Finding]:
     """An NVIDIA driver in the kernel without its EGL library beside it."""
     if (devices / "nvidia0").exists() and not any("nvidia" in (_library_of(f) or "") for f in _vendor_files()[0]):
         yield Finding(
-            "there is an NVIDIA GPU, but no EGL vendor file of its driver, so that OpenGL runs in software",
+            "there is an NVIDIA GPU, but no EGL vendor file of its driver, so OpenGL runs in software",
             _install_nvidia(),
         )
 
 
 def _install_nvidia() -> str:
     version = re.search(r"\b(\d{3})\.\d+", _NVIDIA_VERSION.read_text()) if _NVIDIA_VERSION.exists() else None
-    package = f"libnvidia-gl-{version[1]}" if version else "libnvidia-gl-NNN, with NNN the driver's version"
+    package = f"libnvidia-gl-{version[1]}" if version else "libnvidia-gl-NNN, where NNN is the driver's version"
     return f"apt-get install {package}; {_CONTAINER}"
 
 
 def _vendor_files() -> tuple[list[Path], str]:
-    """The vendor files that libglvnd reads, and where it looks for them."""
+    """The vendor files that libglvnd reads, and its search path."""
     names = os.environ.get("__EGL_VENDOR_LIBRARY_FILENAMES")
     if names:
         return [Path(name) for name in names.split(":")], f"__EGL_VENDOR_LIBRARY_FILENAMES={names}"
@@ -136,7 +138,7 @@ def _vendor_files() -> tuple[list[Path], str]:
 
 
 def _library_of(file: Path) -> str | None:
-    """Library that a vendor file names; None if it cannot be read."""
+    """Library named in a vendor file; None if it cannot be read."""
     try:
         return str(json.loads(file.read_text())["ICD"]["library_path"])
     except (OSError, ValueError, KeyError, TypeError):

@@ -1,4 +1,4 @@
-"""What this machine offers: versions, OpenGL driver, wave solver; and what to install if rendering cannot work."""
+"""The report of `ripple-sim info`: versions, OpenGL driver, wave solver; and what to install to render."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PACKAGES = (
 
 @dataclasses.dataclass(frozen=True)
 class OpenGL:
-    """The driver that renders, as it names itself."""
+    """The driver that renders, in its own words."""
 
     renderer: str
     vendor: str
@@ -45,16 +45,16 @@ class Info:
     Attributes
     ----------
     versions : dict
-        Version of ripple-sim, Python and each package that counts; None for one that is not installed.
+        Version of ripple-sim, Python and each main dependency; None if it is not installed.
     system : str
         Operating system and architecture.
     processors : int
     opengl : OpenGL or None
         None if there is no usable context; `advice` then says what to install.
     backend : str
-        The wave solver that "auto" takes: "gl" or "cpu".
+        The wave solver of "auto": "gl" or "cpu".
     advice : str
-        What keeps rendering from working, or from working faster, and what to do, a line each; "" if there is nothing.
+        Problems that prevent or slow down rendering, with their fixes, one per line; "" if there is none.
     """
 
     versions: dict[str, str | None]
@@ -66,7 +66,7 @@ class Info:
 
 
 def collect() -> Info:
-    """Look at this machine. It never fails for want of OpenGL."""
+    """Examine this machine; a lack of OpenGL is reported, not raised."""
     opengl, failure = None, ""
     try:
         context = shared_context()
@@ -86,14 +86,16 @@ def collect() -> Info:
 
 
 def as_text(info: Info) -> str:
-    """Lay the report out for reading."""
+    """Format the report as text."""
     gl = info.opengl
     where = "on the CPU" if info.backend == "cpu" else "on the GPU, in OpenGL compute shaders"
     rows = {
         **{name: version or "not installed" for name, version in info.versions.items()},
         "system": f"{info.system}, {info.processors} processors",
         "OpenGL": f"{gl.version}, {gl.vendor}" if gl else "none",
-        "renderer": f"{gl.renderer} ({'software' if gl.software else 'hardware'})" if gl else "none: no video here",
+        "renderer": f"{gl.renderer} ({'software' if gl.software else 'hardware'})"
+        if gl
+        else "none: rendering is impossible",
         "waves": f"{info.backend} (auto: {where})",
     }
     width = max(map(len, rows))

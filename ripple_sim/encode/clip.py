@@ -1,4 +1,4 @@
-"""Clips: short runs of frames, each coded on its own into a file of its own, that join without being coded anew."""
+"""Clips: short runs of frames, each encoded to a file of its own, that join without re-encoding."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from av.video.reformatter import ColorPrimaries, ColorRange, Colorspace, ColorTrc
 from numpy.typing import NDArray
 
-# A fixed number, since x264's output depends on it; small, since the renderer needs the processor too.
+# Fixed, since x264's output depends on it; small, since the renderer needs the processor too.
 THREADS = 2
 
 
@@ -28,7 +28,7 @@ class Stream:
 
 @dataclasses.dataclass(frozen=True)
 class Codec:
-    """How frames are coded.
+    """How frames are encoded.
 
     Attributes
     ----------
@@ -49,8 +49,8 @@ class Codec:
         return self.pixel_format.startswith("yuv")
 
 
-# What browsers play. mbtree reads beyond its arrays where a row is no multiple of 8 macroblocks: the same frames then
-# give another file every time.
+# What browsers play. mbtree reads beyond its arrays where a row is not a multiple of 8 macroblocks: the same frames
+# would then give another file every time.
 H264 = Codec("mp4", "libx264", "yuv420p", {"crf": "18", "preset": "fast", "x264-params": "mbtree=0"})
 VP9 = Codec(
     "webm", "libvpx-vp9", "yuv420p", {"crf": "24", "b": "0", "deadline": "good", "cpu-used": "5", "row-mt": "1"}
@@ -60,7 +60,7 @@ GIF = Codec("gif", "gif", "pal8")
 
 
 class Clip:
-    """A file with one video stream that is being written, by PyAV."""
+    """A file with one video stream, being written by PyAV."""
 
     def __init__(self, path: Path, codec: Codec, stream: Stream) -> None:
         self._codec = codec
@@ -80,7 +80,7 @@ class Clip:
         self.encode(av.VideoFrame.from_ndarray(frame, format="rgb24"))
 
     def encode(self, image: av.VideoFrame) -> None:
-        """Encode one frame that FFmpeg holds already."""
+        """Encode one frame of FFmpeg's."""
         if self._codec.yuv:
             image = image.reformat(
                 format=self._codec.pixel_format, dst_colorspace=Colorspace.ITU709, dst_color_range=ColorRange.MPEG
@@ -97,27 +97,27 @@ class Clip:
             self.close()
 
     def close(self) -> None:
-        """Close the file, which is then of no use unless it is finished."""
+        """Close the file, which is useless unless it is finished."""
         self._container.close()
 
 
 def open_container(path: Path, container: str) -> Any:
-    """Open a file for writing, such that the same content gives the same bytes."""
-    # bitexact: Matroska and WebM would otherwise get random identifiers. faststart: an MP4's index goes in front, so
-    # that it starts before it is loaded.
+    """Open a file for writing; the same content gives the same bytes."""
+    # bitexact: no random identifiers in Matroska and WebM. faststart: an MP4's index goes in front, so that playback
+    # starts before the file is loaded.
     options = {"fflags": "+bitexact", **({"movflags": "+faststart"} if container == "mp4" else {})}
     return av.open(str(path), "w", format=container, options=options)
 
 
 def join_clips(clips: Sequence[tuple[Path, int]], path: Path, container: str, fps: int) -> None:
-    """Put clips one behind the other into one file.
+    """Concatenate clips into one file.
 
     Parameters
     ----------
     clips : sequence of (path, number)
         Clips of one codec, and the number of each one's first frame in the whole.
     path : path
-        What is written.
+        To write.
     container : str
         FFmpeg's name.
     fps : int
@@ -133,9 +133,9 @@ def join_clips(clips: Sequence[tuple[Path, int]], path: Path, container: str, fp
                     stream = output.add_stream_from_template(video)
                     stream.time_base = Fraction(1, fps)
                 for packet in source.demux(video):
-                    if packet.pts is None:  # the end's mark
+                    if packet.pts is None:  # end of stream
                         continue
-                    # as numbers of frames, exactly, whatever clock the container counts by
+                    # exact frame numbers, whatever the container's time base
                     tick = packet.time_base
                     decoded = packet.pts if packet.dts is None else packet.dts
                     packet.pts, packet.dts = (first + round(time * tick * fps) for time in (packet.pts, decoded))

@@ -39,7 +39,7 @@ class Exr:
         self._path, self._rate = path, stream.fps
 
     def write(self, frame: NDArray[np.float16]) -> None:
-        """Write the picture, float16 [height, width, 3 or 4], with colours multiplied by opacity."""
+        """Write the image, float16 [height, width, 3 or 4], with colours multiplied by opacity."""
         import OpenEXR
 
         header = {
@@ -48,13 +48,13 @@ class Exr:
             "chromaticities": _CHROMATICITIES,
             "framesPerSecond": Fraction(self._rate),
         }
-        # by way of memory: the library does not notice when a disk fills up with the last bytes of a file
+        # through memory: the library does not notice a disk that fills up with the last bytes of a file
         file = io.BytesIO()
         OpenEXR.File(header, {"RGBA"[: frame.shape[2]]: np.ascontiguousarray(frame)}).write(file)
         self._path.write_bytes(file.getbuffer())
 
     def finish(self) -> None:
-        """Nothing is left to do."""
+        """Do nothing: the image is complete."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no file is open."""

@@ -1,4 +1,4 @@
-"""The formats: what each stores its frames in until the video is whole, and how it is joined of that."""
+"""The formats: how each stores its frames in segments, and joins these to the video."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .exr import Exr
 from .gif import join_gif
 from .webp import join_webp
 
-# What is lost when a job is killed, and how often a video starts anew with a frame that needs no other.
+# As many frames may be lost when a render is killed; each clip begins with a key frame.
 FRAMES_IN_CLIP = 48
 
 Segments = Sequence[tuple[Path, int]]
@@ -36,20 +36,20 @@ class Segment(Protocol):
 
 
 class Still:
-    """One frame in a picture of its own."""
+    """One frame in an image file of its own."""
 
     def __init__(self, path: Path, **settings: Any) -> None:
         self._path, self._settings = path, settings
 
     def write(self, frame: NDArray[np.uint8]) -> None:
-        """Write the picture."""
+        """Write the image."""
         Image.fromarray(frame).save(self._path, **self._settings)
 
     def finish(self) -> None:
-        """Nothing is left to do."""
+        """Do nothing: the image is complete."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no file is open."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,11 +61,11 @@ class Format:
     suffix : str
         Ending of a segment's file.
     length : int
-        Frames in a segment; the last one may have less.
+        Frames in a segment; the last one may have fewer.
     start : callable
         Begins a segment at a path.
     join : callable or None
-        Makes the file of all segments, given with the number of each one's first frame. None: their folder is the
+        Makes the video of all segments, given with the number of each one's first frame. None: their folder is the
         video.
     linear : bool
         Whether frames are linear light, float16, colours multiplied by opacity; otherwise sRGB, uint8, not multiplied.

@@ -1,7 +1,7 @@
 """GIF with one palette made for the whole animation.
 
-A palette can be chosen only when every frame has been seen, so the frames are stored losslessly first, and then read
-twice: to choose the colours, and to draw with them. Memory does not grow with the length of the video.
+The palette depends on every frame, so the frames are first stored losslessly, and then read twice: to choose the
+colours, and to draw with them. Memory does not grow with the length of the video.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from av.filter import Graph
 
 from .clip import GIF, Clip, Stream
 
-# Ordered dithering stays where it is from frame to frame: it does not shimmer, and it packs well.
+# Ordered dithering is the same from frame to frame: it does not shimmer, and it compresses well.
 _PALETTE_USE = "dither=bayer:bayer_scale=4:diff_mode=rectangle"
 
 
 def join_gif(clips: Sequence[tuple[Path, int]], path: Path, stream: Stream) -> None:
-    """Make an animated GIF that repeats for ever of clips, given with the number of each one's first frame."""
+    """Make an endlessly looping GIF of clips, given with the number of each one's first frame."""
     palette = _choose_palette(clips, stream)
     gif = Clip(path, GIF, stream)
     try:

@@ -1,4 +1,4 @@
-"""What can be written where: all that can be known of a video before its first frame is rendered."""
+"""Checks of a video's output before its first frame is rendered."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .exr import check_exr
 
 MIN_SIZE, MAX_SIZE = 16, 8192
 MAX_FPS = 240
-# Browsers slow a GIF down to 10 frames a second where a frame lasts less than two hundredths of a second.
+# Browsers slow a GIF down to 10 frames per second if a frame lasts less than 0.02 s.
 MAX_GIF_FPS = 50
 
 ENDINGS = (".mp4", ".webm", ".gif", ".webp")
@@ -24,18 +24,18 @@ _VALID = f"valid is {', '.join(ENDINGS)}, or a name without ending for a folder 
 
 
 def video_format(path: Path, frame_format: str = "png") -> str:
-    """Tell the format a path asks for: one of `ENDINGS`, or for a folder the format of its frames.
+    """Format of an output path: one of `ENDINGS`, or for a folder the format of its frames.
 
     Raises
     ------
     VideoError
-        If the path names no file, or has any other ending and is no folder, or frames have no such format.
+        If the path is not a file name, has any other ending and is not a folder, or the frame format is unknown.
     """
     if frame_format not in FRAME_FORMATS:
         raise VideoError(f"frame format is {frame_format!r}; valid is {' or '.join(map(repr, FRAME_FORMATS))}")
     name = path.name
     if name in ("", "..") or name.lower() in ENDINGS:
-        raise VideoError(f"output is {str(path)!r}, which names no file; {_VALID}")
+        raise VideoError(f"output is {str(path)!r}, which is not a file name; {_VALID}")
     if path.is_dir() and path.suffix.lower() not in ENDINGS:
         return frame_format
     _, dot, ending = name[1:].rpartition(".")  # a name may begin with a dot
@@ -45,7 +45,7 @@ def video_format(path: Path, frame_format: str = "png") -> str:
 
 
 def default_fps(path: Path) -> int:
-    """Frames per second where the user names none: 60, and for a GIF 25."""
+    """Default frames per second: 60, and 25 for a GIF."""
     return 25 if video_format(path) == ".gif" else 60
 
 
@@ -59,16 +59,16 @@ def check_output(
     frame_format: str = "png",
     overlaid: bool = False,
 ) -> None:
-    """Make sure that a video of this size and rate [1/s] can be written to `path`; leave nothing behind.
+    """Make sure that a video of this size and frame rate [1/s] can be written to `path`; leave nothing behind.
 
     Raises
     ------
     VideoError
-        If the ending is unknown, the size or rate is out of range, the size is odd where the format halves its colour
-        resolution, the format keeps no transparency or takes no overlays that are asked for, frames of another format
-        than PNG are asked for and the video is no folder, or something else stands in the place.
+        If the ending is unknown, the size or rate is out of range, the size is odd in a format of halved colour
+        resolution, the format supports no transparency or no overlays, EXR frames are not for a folder, or something
+        else stands in the output's place.
     EncodingError
-        If the place cannot be written to.
+        If the output cannot be written.
     """
     path = Path(path)
     try:
@@ -109,8 +109,8 @@ def _check_exr(overlaid: bool) -> None:
     check_exr()
     if overlaid:
         raise VideoError(
-            "EXR frames are linear light, over which overlays and comparisons are not drawn; leave them out "
-            "(--overlay '', and no --compare), or take PNG frames"
+            "EXR frames are linear light, without overlays and comparisons; leave these out (--overlay '', and no "
+            "--compare), or write PNG frames"
         )
 
 
@@ -125,7 +125,7 @@ def _check_place(path: Path, form: str) -> None:
                 f"cannot write frames to {path}: it holds other files ({sorted(strangers)[0]}); name a new folder"
             )
     elif path.exists() and not (is_file and path.is_file()):
-        raise VideoError(f"cannot write {path}: it exists and is no {'file' if is_file else 'folder'}")
+        raise VideoError(f"cannot write {path}: it exists and is not a {'file' if is_file else 'folder'}")
     folder = path.absolute().parent
     while not folder.exists():
         folder = folder.parent

@@ -1,7 +1,7 @@
-"""Animated WebP, put together from still pictures so that memory does not grow with the length of the video.
+"""Animated WebP, assembled from still images so that memory does not grow with the length of the video.
 
 The container is RIFF; see "WebP Container Specification" by Google: VP8X (size and flags), ANIM (background, loops),
-and an ANMF chunk a frame that holds the chunks of a still picture.
+and an ANMF chunk per frame with the chunks of a still image.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ _DO_NOT_BLEND = 0x02
 
 
 def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
-    """Make an animated WebP that repeats for ever of still ones, all of the stream's size."""
+    """Make an endlessly looping WebP of still ones, all of the stream's size."""
     flags = _ANIMATION
     with path.open("wb") as file:
-        file.write(bytes(12 + 8 + 10))  # RIFF and VP8X, which come last: they tell the size and the flags
+        file.write(bytes(12 + 8 + 10))  # RIFF and VP8X, which come last: they hold the size and the flags
         file.write(_chunk(b"ANIM", struct.pack("<IH", 0, 0)))
         for number, still in enumerate(stills):
-            # whole milliseconds, such that the error does not add up
+            # whole milliseconds, without accumulating the rounding error
             begin, end = (round(1000 * n / stream.fps) for n in (number, number + 1))
-            picture = _picture(still.read_bytes())
-            if picture.startswith(b"ALPH") or (picture.startswith(b"VP8L") and picture[12] & 0x10):
+            image = _image_chunks(still.read_bytes())
+            if image.startswith(b"ALPH") or (image.startswith(b"VP8L") and image[12] & 0x10):
                 flags |= _OPACITY
             header = bytes(6) + _canvas(stream) + struct.pack("<I", end - begin)[:3] + bytes([_DO_NOT_BLEND])
-            file.write(_chunk(b"ANMF", header + picture))
+            file.write(_chunk(b"ANMF", header + image))
         size = file.tell()
         file.seek(0)
         file.write(struct.pack("<4sI4s", b"RIFF", size - 8, b"WEBP"))
         file.write(_chunk(b"VP8X", struct.pack("<I", flags) + _canvas(stream)))
 
 
-def _picture(still: bytes) -> bytes:
-    """The chunks of a still WebP that make up its picture."""
+def _image_chunks(still: bytes) -> bytes:
+    """The chunks of a still WebP that make up its image."""
     at, kept = 12, b""
     while at < len(still):
         name, size = struct.unpack_from("<4sI", still, at)
@@ -49,7 +49,7 @@ def _picture(still: bytes) -> bytes:
 
 
 def _canvas(stream: Stream) -> bytes:
-    """Width and height less one, three bytes each."""
+    """Width and height minus one, three bytes each."""
     return struct.pack("<I", stream.width - 1)[:3] + struct.pack("<I", stream.height - 1)[:3]
 
 

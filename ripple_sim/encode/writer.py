@@ -1,13 +1,7 @@
-"""`FrameWriter`: encoding in a thread of its own, so that the renderer does not wait for it."""
+"""`FrameWriter`: frames go in one by one, a video comes out at the end or not at all."""
 
 from __future__ import annotations
 
-import contextlib
-import queue
-import threading
-import time
-from collections.abc import Callable, Mapping
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -18,84 +12,24 @@ from ripple_sim.errors import EncodingError, SimulationError, VideoError
 from ripple_sim.solver.errors import SolverError
 
 from .clip import Stream
-from .formats import FORMATS, Format, Segment
-from .output import check_output, video_format
+from .encoder import Encoder
+from .formats import Format
 from .part import Part
 
-# Rendering runs ahead of encoding by at most this many frames; 8 frames of 1280x720 are 22 MB, or 44 MB of EXR.
-QUEUE_FRAMES = 8
-
-# They would come again.
+# Errors that would occur again when the render is resumed.
 _HOPELESS = (SimulationError, SolverError)
-
-
-def open_writer(
-    path: str | Path,
-    *,
-    width: int,
-    height: int,
-    fps: int,
-    transparent: bool = False,
-    frame_format: str = "png",
-    job: Mapping[str, str | int | float] | None = None,
-    resume: bool = False,
-) -> FrameWriter:
-    """Start a video, or go on with one; the ending of `path` chooses its format.
-
-    `.mp4` is H.264, `.webm` VP9, `.gif` and `.webp` are animated pictures; a name without ending becomes a folder of
-    PNG or EXR frames. Missing parent folders are created. Nothing appears at `path` before the video is complete; what
-    was there stays until then. Meanwhile the frames are in a folder beside it, `path` with `.part` behind: clips of
-    some frames that play, or pictures. They join to the same video, bit for bit, however often the work was
-    interrupted.
-
-    Parameters
-    ----------
-    path : str or Path
-        Where the video goes.
-    width, height : int
-        Size of the frames [pixels].
-    fps : int
-        Frames per second.
-    transparent : bool
-        Frames have a fourth channel, their opacity, by which the colours are multiplied for EXR, and for others not.
-    frame_format : str
-        Of a folder's frames, "png" or "exr".
-    job : mapping, optional
-        What the video is made of and how. With it, what is finished stays after an interruption, to be gone on with.
-    resume : bool
-        Go on where an interrupted writer of the same job has stopped: the next frame to write is number `frames`.
-
-    Raises
-    ------
-    VideoError
-        If `check_output` refuses the arguments, another process is writing this video, or, with `resume`, what is
-        there is of another job.
-    EncodingError
-        If the folder cannot be written.
-    """
-    path = Path(path)
-    check_output(path, width, height, fps, transparent=transparent, frame_format=frame_format)
-    video = FORMATS[video_format(path, frame_format)]
-    try:
-        part = Part(path, suffix=video.suffix, length=video.length, job=job or {}, resume=resume)
-    except OSError as error:
-        raise EncodingError(f"cannot write the video {path}: {error.strerror}") from error
-    shape = (height, width, 4 if transparent else 3)
-    return FrameWriter(part, video, Stream(width, height, fps), shape, resumable=job is not None)
 
 
 class FrameWriter:
     """Takes frames, hands them to a thread that encodes them, and moves the finished video to its place.
 
-    Use it as a context manager: leaving it normally closes it, leaving it by an exception ends it. If a job was named,
-    what is finished then stays for later, unless the exception would come again.
+    Use it as a context manager: leaving it normally closes it, leaving it by an exception ends it. A resumable writer
+    then keeps what is finished, unless the same exception would occur again.
 
     Attributes
     ----------
     frames : int
-        Frames written so far, by interrupted writers before this one too.
-    encode_seconds : float
-        Time the thread has spent encoding [s]; complete after `close`.
+        Frames written so far, including those of interrupted writers before this one.
     """
 
     def __init__(
@@ -103,20 +37,17 @@ class FrameWriter:
     ) -> None:
         self.path = part.video
         self.frames = part.frames
-        self.encode_seconds = 0.0
-        self._part, self._format, self._stream, self._shape = part, video, stream, shape
+        self._part, self._shape, self._resumable = part, shape, resumable
         self._type = np.dtype(np.float16 if video.linear else np.uint8)
-        self._resumable = resumable
-        self._segment: Segment | None = None
-        self._pending = 0
-        self._queue: queue.Queue[NDArray | None] = queue.Queue(QUEUE_FRAMES)
-        self._error: Exception | None = None
-        self._abandoned = self._finished = False
-        self._thread = threading.Thread(target=self._encode, name="video encoder", daemon=True)
-        self._thread.start()
+        self._encoder = Encoder(part, video, stream)
+
+    @property
+    def encode_seconds(self) -> float:
+        """Time spent encoding [s]; complete after `close`."""
+        return self._encoder.seconds
 
     def write(self, frame: NDArray) -> None:
-        """Add one frame, first row on top. It is copied; this waits where the queue is full.
+        """Add one frame, first row on top. It is copied; this waits while the queue is full.
 
         Parameters
         ----------
@@ -129,23 +60,23 @@ class FrameWriter:
         EncodingError
             If an earlier frame could not be encoded.
         """
-        if not self._thread.is_alive():
+        if not self._encoder.running:
             raise VideoError(f"the video {self.path} is closed; open another writer")
         if frame.shape != self._shape or frame.dtype != self._type:
             raise VideoError(f"frame is {frame.dtype} {list(frame.shape)}; valid is {self._type} {list(self._shape)}")
         self._raise_error()
-        self._queue.put(frame.copy())
+        self._encoder.put(frame.copy())
         self.frames += 1
 
     def check_state(self, frame: int, digest: str) -> None:
-        """Note a fingerprint, in hexadecimal digits, of what a frame was made of, or compare it with the one noted.
+        """Record the fingerprint, in hexadecimal digits, of a frame's state, or compare it with the recorded one.
 
         Raises
         ------
         VideoError
-            If it is another than it was before the interruption.
+            If it differs from the one before the interruption.
         EncodingError
-            If it cannot be noted.
+            If it cannot be recorded.
         """
         try:
             self._part.check_state(frame, digest)
@@ -153,7 +84,7 @@ class FrameWriter:
             raise EncodingError(f"cannot write the video {self.path}: {error.strerror}") from error
 
     def close(self) -> None:
-        """Finish the video and move it to its place. Doing it again does nothing.
+        """Finish the video and move it to its place. Repeated calls do nothing.
 
         Raises
         ------
@@ -162,22 +93,22 @@ class FrameWriter:
         EncodingError
             If a frame could not be encoded, or the file not be written.
         """
-        if not self._thread.is_alive():
+        if not self._encoder.running:
             return
         if self.frames == 0:
             self.discard()
             raise VideoError(f"the video {self.path} has no frame; write at least one")
         try:
-            self._stop()
+            self._encoder.stop()
             self._raise_error()
-        except BaseException as error:  # the user may lose patience while the last frames are encoded
+        except BaseException as error:  # such as Ctrl-C while the last frames are encoded
             self._give_up(error)
             raise
 
     def discard(self) -> None:
-        """Stop, and remove what was written. What was at the video's place before stays."""
-        self._abandon()
-        if not self._finished:
+        """Stop, and remove what was written. A previous video in the same place stays."""
+        self._encoder.abandon()
+        if not self._encoder.finished:
             self._part.remove()
 
     def __enter__(self) -> Self:
@@ -192,70 +123,18 @@ class FrameWriter:
             self._give_up(error)
 
     def _give_up(self, error: BaseException) -> None:
-        """End the work on an exception, to which is added what is left of it."""
+        """End the work on an exception, and add a note of what is kept."""
         if not self._resumable or isinstance(error, _HOPELESS):
             self.discard()
             return
-        self._abandon()
-        if not self._finished and self._part.keep():
+        self._encoder.abandon()
+        if not self._encoder.finished and self._part.keep():
             error.add_note(
                 f"{self._part.frames} frames are kept in {self._part.folder}; --resume carries on from there"
             )
 
-    def _abandon(self) -> None:
-        self._abandoned = True
-        self._stop()
-
-    def _stop(self) -> None:
-        if self._thread.is_alive():
-            self._queue.put(None)
-            self._thread.join()
-
     def _raise_error(self) -> None:
-        if self._error is not None:
-            reason = getattr(self._error, "strerror", None) or self._error
-            raise EncodingError(f"cannot write the video {self.path}: {reason}") from self._error
-
-    def _encode(self) -> None:
-        while (frame := self._queue.get()) is not None:
-            self._timed(self._add, frame)
-        self._timed(self._finish)
-        if self._segment is not None:
-            with contextlib.suppress(Exception):  # what it could say has been said
-                self._segment.close()
-
-    def _add(self, frame: NDArray) -> None:
-        if self._segment is None:
-            self._segment = self._format.start(self._part.unfinished, self._stream)
-        self._segment.write(frame)
-        self._pending += 1
-        if self._pending == self._format.length:
-            self._store()
-
-    def _store(self) -> None:
-        if self._segment is not None:
-            self._segment.finish()
-            self._part.store(self._pending)
-            self._segment, self._pending = None, 0
-
-    def _finish(self) -> None:
-        self._store()
-        if self._format.join is not None:
-            self._format.join(self._part.segments(), self._part.whole, self._stream)
-        if not self._abandoned:
-            self._part.finish()
-            self._finished = True
-
-    def _timed(self, work: Callable[..., None], *arguments: object) -> None:
-        """Do the work unless it has become useless, and remember the error instead of ending the thread.
-
-        The thread must go on taking frames from the queue, or `write` would wait for ever.
-        """
-        if self._abandoned or self._error is not None:
-            return
-        start = time.perf_counter()
-        try:
-            work(*arguments)
-        except Exception as error:  # whatever it is, it belongs to the caller's thread
-            self._error = error
-        self.encode_seconds += time.perf_counter() - start
+        error = self._encoder.error
+        if error is not None:
+            reason = getattr(error, "strerror", None) or error
+            raise EncodingError(f"cannot write the video {self.path}: {reason}") from error

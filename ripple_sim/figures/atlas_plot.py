@@ -1,4 +1,4 @@
-"""One picture of an atlas: the mesh and the sphere with the texel grid, the six faces unfolded, and how good it is."""
+"""A figure of an atlas: the mesh and the sphere with the texel grid, the six charts unfolded, and its quality."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas, AtlasError
 
-from .atlas_views import AtlasPainter, View, texel_stretch
+from .atlas_painter import AtlasPainter, texel_stretch
+from .view import View
 
-# Finer than an even spread is blue, coarser is red; the ends are twice as fine and twice as coarse.
+# Finer than an even spread is blue, coarser is red; the ends stand for a factor of 2.
 _COLORS = LinearSegmentedColormap.from_list(
     "stretch", ["#1f4e8c", "#3f8fc0", "#8fd0d4", "#f6f1df", "#f4b46f", "#dd6247", "#8c1d40"], N=512
 )
@@ -25,7 +26,7 @@ _DPI = 120
 
 
 def check_plot_path(path: str | Path) -> None:
-    """Raise `AtlasError` if pictures of this ending are not written, or there is no such folder."""
+    """Raise `AtlasError` if the ending is unknown, or the folder does not exist."""
     path = Path(path)
     if path.suffix.lower() not in _ENDINGS:
         raise AtlasError(f"plot file {str(path)!r} has an unknown ending; valid are {', '.join(_ENDINGS)}")
@@ -34,7 +35,7 @@ def check_plot_path(path: str | Path) -> None:
 
 
 def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = "", up: str = "y") -> None:
-    """Write a picture of an atlas and its quality.
+    """Write a figure of an atlas and its quality.
 
     Parameters
     ----------
@@ -43,7 +44,7 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
         Ends in .png, .jpg, .pdf or .svg.
     title, subtitle : str
     up : str
-        Axis of the mesh that points up in the picture, "y" or "z".
+        Axis of the mesh that points up in the figure, "y" or "z".
 
     Raises
     ------
@@ -60,7 +61,7 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
     _show(figure, (0.025, 0.05, 0.37, 0.82), painter.mesh(front, 800))
     _show(figure, (0.42, 0.50, 0.20, 0.38), painter.mesh(back, 400), "the other side")
     _show(figure, (0.42, 0.07, 0.20, 0.355), painter.sphere(front, 380), "on the sphere")
-    _show(figure, (0.635, 0.455, 0.35, 0.47), painter.cross(160), "the six faces, unfolded")
+    _show(figure, (0.635, 0.455, 0.35, 0.47), painter.cross(160), "the six charts, unfolded")
     _histogram(figure.add_axes((0.655, 0.300, 0.31, 0.105)), stretch, atlas.areas)
     _figures(figure, atlas)
     try:
@@ -74,22 +75,22 @@ def _shade(stretch: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.clip(0.5 + 0.5 * np.log(stretch) / np.log(_RANGE), 0, 1)
 
 
-def _show(figure: Figure, place: tuple[float, float, float, float], picture: NDArray, caption: str = "") -> None:
+def _show(figure: Figure, place: tuple[float, float, float, float], image: NDArray, caption: str = "") -> None:
     axes = figure.add_axes(place)
-    axes.imshow(picture, interpolation="antialiased")
+    axes.imshow(image, interpolation="antialiased")
     axes.set_axis_off()
     if caption:
         axes.text(0.5, -0.03, caption, transform=axes.transAxes, ha="center", va="top", fontsize=11.5, color=_FAINT)
 
 
 def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
-    """Share of the surface over stretch, in the colours of the pictures: their legend too."""
+    """Share of the surface over stretch, in the colours of the images, as their legend."""
     bins = np.geomspace(1 / _RANGE, _RANGE, 121)
     share, _ = np.histogram(stretch.clip(bins[0], bins[-1]), bins, weights=areas)
     middles = np.sqrt(bins[1:] * bins[:-1])
     colors = _COLORS(_shade(middles))
     axes.bar(bins[:-1], share / share.max(), np.diff(bins), align="edge", color=colors, edgecolor="none")
-    axes.stairs(share / share.max(), bins, color=_FAINT, linewidth=0.7)  # pale bars are seen by their outline
+    axes.stairs(share / share.max(), bins, color=_FAINT, linewidth=0.7)  # pale bars need an outline
     axes.bar(bins[:-1], -0.14, np.diff(bins), bottom=-0.03, align="edge", color=colors, edgecolor="none")
     axes.set_xscale("log")
     axes.set_xlim(bins[0], bins[-1])

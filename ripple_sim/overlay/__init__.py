@@ -1,1 +1,1 @@
-"""What figures show over a picture: a field in colours, contacts, the texel grid, time, energy; two runs at once."""
+"""Overlays on frames: heatmap, contacts, texel grid, time, energy; titles for two runs side by side."""

@@ -1,8 +1,7 @@
 """A diverging colour map: blue for negative, almost white for zero, red for positive values.
 
-It is laid out in CIELAB and run through at constant speed, so that equal steps of the value look equally large. Both
-arms have the same lightness at the same distance from zero, and blue against orange-red is told apart with every common
-colour vision.
+It is a curve in CIELAB of constant speed, so that equal steps of the value look equally large. Both arms have the same
+lightness at the same distance from zero, and blue differs from orange-red in every common colour vision.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ def color_table() -> NDArray[np.uint8]:
 
 
 def colors(values: ArrayLike, limit: float) -> NDArray[np.uint8]:
-    """Colours of values, sRGB uint8 [..., 3]; the map reaches from -limit to limit, what is beyond takes its ends."""
+    """Colours of values, sRGB uint8 [..., 3]; the map extends from -limit to limit, and values beyond are clipped."""
     place = np.clip(np.asarray(values, dtype=np.float64) / limit, -1, 1)
     return color_table()[np.rint((0.5 + 0.5 * place) * (SIZE - 1)).astype(np.int64)]
 

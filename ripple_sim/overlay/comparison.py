@@ -1,4 +1,4 @@
-"""Two runs of one scene side by side: which they are, and what they are called."""
+"""Two runs of one scene side by side: their wave operators and titles."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from ripple_sim.errors import SceneError
 
 OWN = "fem"
 
-# By the name of the wave operator: a title, and a word about it.
+# By wave operator: a title, and a remark.
 TITLES = {
     OWN: ("ripple-sim", "finite elements"),
     "paper": ("paper", "real distances, 4 neighbours"),
@@ -17,7 +17,7 @@ BASELINES = tuple(name for name in TITLES if name != OWN)
 
 
 def compared_operators(baseline: str | None) -> tuple[str, ...]:
-    """Wave operators of the runs of a video: our own, and a baseline where one is asked for.
+    """Wave operators of the runs of a video: our own, and a baseline if given.
 
     Raises
     ------

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_POINTS = 1024  # more than a chart has columns of pixels, save on very large frames
+MOST_POINTS = 1024  # more than the energy plot has columns of pixels, save on very large frames
 
 
 class History:
-    """One value a frame, thinned out to at most `MOST_POINTS` as they come: of several frames the largest is kept.
+    """One value per frame, thinned to at most `MOST_POINTS`: of several frames the largest is kept.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where things stand on a frame of any size."""
+"""Sizes and places of the overlays on a frame of any size."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Layout:
         return max(2.6 * self.scale, 1.3)
 
     def panel_width(self, ems: float) -> int:
-        """Width of a panel [pixels] of which two shall fit side by side."""
+        """Width of a panel [pixels], of which two must fit side by side."""
         return min(round(ems * self.em), (self.width - 3 * self.margin) // 2)
 
     def place(self, corner: str, width: int, height: int) -> tuple[int, int]:

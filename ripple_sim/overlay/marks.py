@@ -1,4 +1,4 @@
-"""Contacts on a frame: an arrow along each push, as long as its impulse is large."""
+"""Contact marks on a frame: arrows as long as the impulse is large."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrows import HEAD_WIDTH, RIM, draw_arrow
-from .contacts import Mark
+from .contact_marks import Mark
 from .layout import Layout
-from .patch import Patch
 from .projection import Projection
+from .sprite import Sprite
 
-_LONGEST = 1.5  # times the scale's arrow; a scale that glides to its new end is behind for a moment
-_HIDDEN = 0.3  # opacity of what stands behind something
-_SAMPLES = 9  # along an arrow, to see what hides it
+_LONGEST = 1.5  # times the scale's arrow; a growing scale lags for a moment
+_HIDDEN = 0.3  # opacity behind other geoms
+_SAMPLES = 9  # along an arrow, to find its hidden parts
 
 
 class PlacedMark(NamedTuple):
@@ -30,21 +30,20 @@ class PlacedMark(NamedTuple):
 def place_marks(
     marks: Sequence[Mark], scale: float, layout: Layout, projection: Projection, model: Any, data: Any
 ) -> list[PlacedMark]:
-    """Place contacts on a frame, as the camera sees them.
+    """Place contact marks on a frame.
 
-    Arrows stand on the surface, in perspective but for their size, which is the same at every distance. What stands
-    before them shows through.
+    Arrows stand on the surface, in perspective except for their size, the same at any distance. Hidden parts are faint.
 
     Parameters
     ----------
     marks : sequence of Mark
     scale : float
-        Impulse [N s] that is `Layout.arrow_length` long, seen from the side.
+        Impulse [N s] of an arrow of length `Layout.arrow_length`, seen from the side.
     layout : Layout
     projection : Projection
         Of this frame.
     model, data : mujoco.MjModel, mujoco.MjData
-        What may hide the arrows.
+        Whose geoms may hide the arrows.
     """
     placed = []
     for mark in marks:
@@ -65,6 +64,6 @@ def draw_marks(frame: NDArray[np.uint8], marks: Sequence[PlacedMark], layout: La
         low = np.floor(np.maximum(np.minimum(tip, tail) - reach, 0)).astype(int)
         high = np.ceil(np.minimum(np.maximum(tip, tail) + reach, frame.shape[1::-1])).astype(int)
         if (low < high).all():
-            patch = Patch(int(high[0] - low[0]), int(high[1] - low[1]))
-            draw_arrow(patch, tip - low, tail - low, thickness, opacity)
-            patch.over(frame, int(low[0]), int(low[1]))
+            sprite = Sprite(int(high[0] - low[0]), int(high[1] - low[1]))
+            draw_arrow(sprite, tip - low, tail - low, thickness, opacity)
+            sprite.over(frame, int(low[0]), int(low[1]))

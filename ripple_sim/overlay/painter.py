@@ -1,4 +1,4 @@
-"""Lays panels over finished frames: each has its corner, and those of a corner stand under one another."""
+"""Draws panels over finished frames, stacked in the corners."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.scene.overlays import FIELDS, Request
+from ripple_sim.scene.overlays import HEATMAPS, Request
 
-from .chart import COLORS, Chart
+from .energy_plot import COLORS, EnergyPlot
 from .layout import Layout
 from .notes import Notes
 from .panels import arrow_key, color_bar, label
-from .patch import Patch
+from .sprite import Sprite
 
 
 class Painter:
-    """Draws the panels that a request asks for.
+    """Draws the requested panels.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Painter:
     spacing : int
         Texels between the lines of the grid, where all targets have the same; 0 where they differ.
     titles : sequence of (str, str)
-        Names of the runs and a word about each, where there are two side by side.
+        Names of two runs side by side, and a remark about each.
     """
 
     def __init__(
@@ -43,12 +43,12 @@ class Painter:
         titles: Sequence[tuple[str, str]] = (),
     ) -> None:
         self._request, self._layout, self._titles = request, layout, titles
-        self._chart = Chart(self._layout, "wave energy", "J", duration, [title for title, _ in titles])
+        self._energy_plot = EnergyPlot(self._layout, "wave energy", "J", duration, [title for title, _ in titles])
         self._spacing = spacing
         self._decimals = 2 if duration < 100 else 1
         # a title leaves room for the clock on the seam
         self._title_width = layout.width / 2 - 2 * layout.margin - 4.5 * layout.em
-        # what stands still is drawn once
+        # static panels are drawn once
         self._label = functools.lru_cache(maxsize=8)(label)
         self._bar = functools.lru_cache(maxsize=1)(color_bar)
         self._key = functools.lru_cache(maxsize=1)(arrow_key)
@@ -60,10 +60,10 @@ class Painter:
         for corner, panels in self._panels(notes).items():
             self._stack(frame, corner, panels)
 
-    def _panels(self, notes: Notes) -> dict[str, list[Patch]]:
+    def _panels(self, notes: Notes) -> dict[str, list[Sprite]]:
         """Panels by corner, those nearest to the frame's border first."""
         request, layout, em = self._request, self._layout, self._layout.em
-        corners: dict[str, list[Patch]] = {
+        corners: dict[str, list[Sprite]] = {
             name: [] for name in ("top left", "top", "top right", "bottom left", "bottom right")
         }
         for corner, title, color in zip(("top left", "top right"), self._titles, COLORS, strict=False):
@@ -80,18 +80,18 @@ class Painter:
         if request.contacts and notes.mark_scale.value > 0:
             scale = notes.mark_scale
             corners["top right"].append(self._key(layout, scale.value, scale.goal))
-        if request.field:
-            scale = notes.field_scale
-            bar = self._bar(layout, request.field, FIELDS[request.field], scale.value, scale.goal)
+        if request.heatmap:
+            scale = notes.heatmap_scale
+            bar = self._bar(layout, request.heatmap, HEATMAPS[request.heatmap], scale.value, scale.goal)
             corners["bottom left"].append(bar)
         if request.energy:
             scale = notes.energy_scale
-            corners["bottom right"].append(self._chart.draw(notes.energies, scale.value, scale.goal))
+            corners["bottom right"].append(self._energy_plot.draw(notes.energies, scale.value, scale.goal))
         return corners
 
-    def _stack(self, frame: NDArray[np.uint8], corner: str, panels: Sequence[Patch]) -> None:
+    def _stack(self, frame: NDArray[np.uint8], corner: str, panels: Sequence[Sprite]) -> None:
         offset = 0
-        for patch in panels:
-            left, top = self._layout.place(corner, patch.width, patch.height)
-            patch.over(frame, left, top + (offset if "top" in corner else -offset))
-            offset += patch.height + self._layout.margin // 2
+        for sprite in panels:
+            left, top = self._layout.place(corner, sprite.width, sprite.height)
+            sprite.over(frame, left, top + (offset if "top" in corner else -offset))
+            offset += sprite.height + self._layout.margin // 2

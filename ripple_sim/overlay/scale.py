@@ -1,4 +1,4 @@
-"""Round numbers for axes: limits that hold still, and a unit in which they are easily read."""
+"""Round numbers for axes: steady limits, and a unit in which they are easy to read."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ _FAR = 4.0  # a limit that is more than this factor away catches up at once
 
 
 def round_up(value: float, steps: tuple[float, ...] = _STEPS) -> float:
-    """Return the least of `steps` times a power of ten that is not below a positive value."""
+    """Return the smallest of `steps` times a power of ten that is at least a positive value."""
     power = 10.0 ** math.floor(math.log10(value) + 1e-9)
     return next((step * power for step in steps if value <= step * power * (1 + 1e-9)), 10.0 * power)
 
 
 class Limit:
-    """End of a scale that follows what has been seen so far and never shrinks.
+    """End of a scale that follows the magnitudes so far and never shrinks.
 
-    It aims at round numbers, so that it seldom moves, and glides from one to the next, so that nothing jumps. It knows
-    what it was told alone: the same run has the same limits.
+    Its goals are round numbers, so it seldom moves, and it glides from one to the next. It depends on the magnitudes
+    alone: the same run has the same limits.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Limit:
     fixed : float, optional
         The limit, for good.
     memory : float
-        Magnitudes are averaged over about this time [s], so that what is short does not count. 0: each counts.
+        Magnitudes are averaged over about this time [s], so that brief peaks do not count. 0: each counts.
     """
 
     def __init__(self, floor: float = 0.0, fixed: float | None = None, memory: float = 0.0) -> None:
@@ -39,7 +39,7 @@ class Limit:
         self.value = self.goal
 
     def follow(self, magnitude: float, dt: float) -> float:
-        """Take in a magnitude, dt seconds after the last one; return the limit, 0 as long as there is none."""
+        """Take in a magnitude, dt seconds after the last one; return the limit, 0 while there is none."""
         if self._fixed:
             return self.value
         self._mean += (magnitude - self._mean) * (-math.expm1(-dt / self._memory) if self._memory else 1.0)
@@ -60,6 +60,6 @@ def readable(limit: float, unit: str) -> tuple[float, str]:
 
 
 def number(value: float) -> str:
-    """Write a number shortly, with a true minus sign."""
+    """Format a number briefly, with a true minus sign."""
     text = f"{value:.4g}"
     return "0" if text == "-0" else text.replace("-", "\N{MINUS SIGN}")

@@ -1,10 +1,9 @@
-"""A scene's script: what happens to bodies and surfaces at given times."""
+"""A scene's script: timed events of bodies and surfaces."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import msgspec
 import mujoco
@@ -13,11 +12,12 @@ import numpy as np
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
 
+from .material_entry import MaterialChange, given_fields
 from .motion import DropEntry, Motions, PlaceEntry, ThrowEntry, Vector, check_time
 
 
 class PokeEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[poke]]`: press on a rippling geom for an instant.
+    """`[[poke]]`: an instantaneous push on a rippling geom.
 
     At a point [m] in the frame of the geom's body (the world, for a fixed target), with an impulse [N s], positive
     inwards, spread over a radius [m], at a time [s].
@@ -30,22 +30,8 @@ class PokeEntry(msgspec.Struct, forbid_unknown_fields=True):
     radius: float = 0.0
 
 
-class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
-    """`[change.material]`: the coefficients that change; the others stay as they are."""
-
-    speed: float | None = None
-    damping: float | None = None
-    stiffness: float | None = None
-    viscosity: float | None = None
-    density: float | None = None
-
-    def changes(self) -> dict[str, Any]:
-        """The coefficients that were given."""
-        return {name: value for name, value in msgspec.structs.asdict(self).items() if value is not None}
-
-
 class ChangeEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[change]]`: another material for a rippling geom, from a time [s] on."""
+    """`[[change]]`: change the material of a rippling geom at a time [s]."""
 
     geom: str
     time: float
@@ -53,7 +39,7 @@ class ChangeEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class ControlEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[control]]`: set an actuator's control from a time [s] on, in the actuator's own unit."""
+    """`[[control]]`: set an actuator's control at a time [s], in the actuator's own unit."""
 
     actuator: str
     time: float
@@ -62,7 +48,7 @@ class ControlEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclasses.dataclass(frozen=True)
 class Events:
-    """All that is to happen."""
+    """All events of a scene."""
 
     drop: Sequence[DropEntry] = ()
     throw: Sequence[ThrowEntry] = ()
@@ -78,7 +64,7 @@ class Script:
     Raises
     ------
     SceneError
-        If an event names a body or a geom that is not there, or has an invalid time, impulse or radius.
+        If an event names a missing body or geom, or has an invalid time, impulse or radius.
     """
 
     def __init__(self, model: mujoco.MjModel, events: Events, targets: Sequence[str]) -> None:
@@ -97,7 +83,7 @@ class Script:
         self._surface_events = sorted(surface_events, key=lambda event: event.time)
 
     def apply(self, data: mujoco.MjData, ripples: Ripples) -> None:
-        """Do what is due."""
+        """Carry out the events that are due."""
         self._motions.apply(data)
         while self._controls and self._controls[0][0].time <= data.time + 1e-9:
             entry, actuator = self._controls.pop(0)
@@ -108,7 +94,7 @@ class Script:
                 point = ripples.to_geom(event.geom, event.point)
                 ripples[event.geom].add_impulse(point, event.impulse, event.radius)
             else:
-                ripples.change_material(event.geom, **event.material.changes())
+                ripples.change_material(event.geom, **given_fields(event.material))
 
 
 def _check_target(verb: str, geom: str, time: float, targets: Sequence[str]) -> None:

@@ -1,10 +1,15 @@
-"""`[ripple.material]` of a scene file: coefficients as numbers or pictures, alone or on top of a preset."""
+"""`[ripple.material]` of a scene file: coefficients as numbers or images, alone or on top of a preset.
+
+The coefficients are the fields of `Material`, and the parameters of a preset those of its constructor.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -13,11 +18,14 @@ from ripple_sim.solver import Material
 
 PRESETS = ("membrane", "jelly", "plate", "dent")
 
+# The numbers among `Material`'s fields; the others are flags.
+COEFFICIENTS = tuple(field.name for field in dataclasses.fields(Material) if isinstance(field.default, float))
+
 
 class MapEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """A coefficient from a picture in the mesh's own texture coordinates, see `texture_map`.
+    """A coefficient from an image in the mesh's own texture coordinates, see `texture_map`.
 
-    `map` is the picture's path, relative to the scene file; black stands for `low`, white for `high`.
+    `map` is the image's path, relative to the scene file; black stands for `low`, white for `high`.
     """
 
     map: str
@@ -26,24 +34,26 @@ class MapEntry(msgspec.Struct, forbid_unknown_fields=True):
     channel: str = "luminance"
 
 
-class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """A preset by name, with parameters of its own: those of `Material.membrane`, `jelly`, `plate` or `dent`.
+Coefficient = float | str | MapEntry
 
-    Units: tension [N/m]; modulus [Pa]; thickness [m]; viscosity [Pa s]; density [kg/m^2] of a membrane or a dent,
-    [kg/m^3] of jelly or a plate; damping [1/s]; stiffness [1/s^2]; speed [m/s]; yield_height [m].
-    """
 
-    name: str
-    tension: float | None = None
-    modulus: float | None = None
-    thickness: float | None = None
-    viscosity: float | None = None
-    density: float | None = None
-    poisson: float | None = None
-    damping: float | None = None
-    stiffness: float | None = None
-    speed: float | None = None
-    yield_height: float | None = None
+def _struct(fields: Iterable[str], kind: Any, *required: tuple[str, type]) -> Any:
+    """A struct with fields of one kind that may be left out (None)."""
+    optional = [(field, kind | None, None) for field in fields]
+    return msgspec.defstruct("_Fields", [*required, *optional], forbid_unknown_fields=True)
+
+
+def _parameters(preset: str) -> dict[str, inspect.Parameter]:
+    return dict(inspect.signature(getattr(Material, preset)).parameters)
+
+
+_OfPresets: Any = _struct({name: None for preset in PRESETS for name in _parameters(preset)}, float, ("name", str))
+_OfMaterial: Any = _struct(COEFFICIENTS, Coefficient)
+_Numbers: Any = _struct(COEFFICIENTS, float)
+
+
+class PresetEntry(_OfPresets):
+    """A preset by name, with the parameters of `Material.membrane`, `jelly`, `plate` or `dent`, in their units."""
 
     def material(self) -> Material:
         """The preset's material.
@@ -51,15 +61,11 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
         Raises
         ------
         SceneError
-            For an unknown preset, a parameter that it does not take, or one that it needs.
+            For an unknown preset, a parameter that it does not take, or a missing one.
         """
         if self.name not in PRESETS:
             raise SceneError(f"ripple.material.preset {self.name!r} does not exist; valid are {', '.join(PRESETS)}")
-        preset = getattr(Material, self.name)
-        parameters = inspect.signature(preset).parameters
-        given = {
-            key: value for key, value in msgspec.structs.asdict(self).items() if value is not None and key != "name"
-        }
+        parameters, given = _parameters(self.name), given_fields(self, without="name")
         for key in given:
             if key not in parameters:
                 raise SceneError(
@@ -70,28 +76,16 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
                 raise SceneError(
                     f"the preset {self.name!r} needs {key}: write preset = {{name = {self.name!r}, {key} = ...}}"
                 )
-        return preset(**given)
+        return getattr(Material, self.name)(**given)
 
 
-Coefficient = float | str | MapEntry
+class MaterialEntry(_OfMaterial):
+    """`[ripple.material]`: the wave equation's coefficients, by their names and in their units in `Material`.
 
-
-class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[ripple.material]`: the wave equation's coefficients, see `Material`.
-
-    Units: speed [m/s], damping [1/s], stiffness [1/s^2], viscosity [m^2/s], density [kg/m^2], bending [m^4/s^2],
-    yield_height [m]. Each is a number, the path of a picture, or a table {map = ..., low = ..., high = ...}. A preset,
-    by its name or as a table {name = ..., its parameters}, gives those that are left out; without one they are those of
-    `Material()`.
+    Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}. A preset, by its name or as a
+    table {name = ..., its parameters}, gives those that are left out; without one they are those of `Material()`.
     """
 
-    speed: Coefficient | None = None
-    damping: Coefficient | None = None
-    stiffness: Coefficient | None = None
-    viscosity: Coefficient | None = None
-    density: Coefficient | None = None
-    bending: Coefficient | None = None
-    yield_height: Coefficient | None = None
     preset: str | PresetEntry | None = None
 
     def material(self) -> Material:
@@ -104,8 +98,9 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True):
         SolverError
             For an invalid coefficient.
         """
-        preset = PresetEntry(self.preset) if isinstance(self.preset, str) else self.preset
-        numbers = {name: value for name, value in self._coefficients().items() if isinstance(value, int | float)}
+        preset = PresetEntry(name=self.preset) if isinstance(self.preset, str) else self.preset
+        coefficients = given_fields(self, without="preset")
+        numbers = {name: value for name, value in coefficients.items() if isinstance(value, int | float)}
         white = {name: entry.high for name, entry in self.maps().items()}
         return dataclasses.replace(preset.material() if preset is not None else Material(), **numbers, **white)
 
@@ -113,12 +108,12 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True):
         """The coefficients that are maps."""
         return {
             name: value if isinstance(value, MapEntry) else MapEntry(value)
-            for name, value in self._coefficients().items()
+            for name, value in given_fields(self, without="preset").items()
             if isinstance(value, str | MapEntry)
         }
 
     def located(self, folder: Path) -> MaterialEntry:
-        """The same with the pictures' paths made relative to a folder."""
+        """The same with the images' paths made relative to a folder."""
         return msgspec.structs.replace(
             self,
             **{
@@ -126,8 +121,13 @@ class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True):
             },
         )
 
-    def _coefficients(self) -> dict[str, Coefficient]:
-        """The coefficients that were given."""
-        # not `asdict`, which would not tell the maps from other values
-        given = {name: getattr(self, name) for name in self.__struct_fields__ if name != "preset"}
-        return {name: value for name, value in given.items() if value is not None}
+
+class MaterialChange(_Numbers):
+    """`[change.material]`: the coefficients that change; the others stay as they are."""
+
+
+def given_fields(entry: msgspec.Struct, without: str = "") -> dict[str, Any]:
+    """The fields of a struct that are not None."""
+    # not `asdict`, which would turn maps into dictionaries
+    given = {name: getattr(entry, name) for name in entry.__struct_fields__ if name != without}
+    return {name: value for name, value in given.items() if value is not None}

@@ -16,10 +16,10 @@ Quaternion = tuple[float, float, float, float]
 
 
 class DropEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[drop]]`: hold a free body where it is until a time [s], then let it go.
+    """`[[drop]]`: hold a free body in place until a time [s], then release it.
 
-    From a position [m] and an orientation (quaternion w x y z; default: as it is), at a velocity [m/s] and an angular
-    velocity [rad/s], all in the world.
+    From a position [m] and an orientation (quaternion w x y z; default: unchanged), with a velocity [m/s] and an
+    angular velocity [rad/s], all in the world.
     """
 
     body: str
@@ -31,7 +31,7 @@ class DropEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class ThrowEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[throw]]`: give a free body a velocity at a time; from where it is, unless a place is given. Units as above."""
+    """`[[throw]]`: give a free body a velocity at a time, from its place or a given one. Units as above."""
 
     body: str
     time: float
@@ -42,7 +42,7 @@ class ThrowEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class PlaceEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[place]]`: put a free body somewhere at a time, at rest. Units as above."""
+    """`[[place]]`: move a free body to a place at a time, at rest. Units as above."""
 
     body: str
     time: float
@@ -51,7 +51,7 @@ class PlaceEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Motions:
-    """Sets bodies in motion when their time has come. Call `apply` before each physics step.
+    """Sets bodies in motion at their times. Call `apply` before each physics step.
 
     Raises
     ------
@@ -64,7 +64,7 @@ class Motions:
         self._home: dict[str, NDArray[np.float64]] = {}
 
     def apply(self, data: mujoco.MjData) -> None:
-        """Put bodies that wait for their drop back to their places, and set those in motion whose time has come."""
+        """Hold bodies that wait for their drop, and set the bodies in motion whose time has come."""
         begun = 0
         for entry, position, velocity in self._waiting:
             if isinstance(entry, DropEntry):
@@ -118,6 +118,6 @@ def free_joint(model: mujoco.MjModel, entry: DropEntry | ThrowEntry | PlaceEntry
 
 
 def check_time(verb: str, name: str, time: float) -> None:
-    """Refuse times before the beginning, infinity and NaN."""
+    """Refuse negative times, infinity and NaN."""
     if not 0 <= time < float("inf"):
         raise SceneError(f"[[{verb}]] of {name!r} has time {time!r} s; valid is 0 or greater")

@@ -1,4 +1,4 @@
-"""Which overlays are wanted, as words: "height", "velocity=0.5", "contacts" and so on."""
+"""Overlays by name: "height", "velocity=0.5", "contacts" and so on."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from collections.abc import Iterable
 
 from ripple_sim.errors import SceneError
 
-FIELDS = {"height": "m", "velocity": "m/s"}
-NAMES = (*FIELDS, "contacts", "grid", "time", "energy")
+HEATMAPS = {"height": "m", "velocity": "m/s"}
+NAMES = (*HEATMAPS, "contacts", "grid", "time", "energy")
 
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """Overlays that are drawn.
+    """Overlays to draw.
 
     Attributes
     ----------
-    field : str or None
-        "height" or "velocity": shown in colours on the targets, with a bar.
+    heatmap : str or None
+        "height" or "velocity": shown as colours on the targets, with a colour bar.
     limit : float or None
-        Largest magnitude that the colours tell apart, in m or m/s; None: found and kept up while the video runs.
+        End of the colours, in m or m/s; None: adapts to the waves during the video.
     contacts, grid, time, energy : bool
-        Arrows of the impulses at the contact points; the texel grid; a clock; the waves' energy over time.
+        Arrows of the impulses at the contact points; the texel grid; a clock; a plot of the waves' energy.
     """
 
-    field: str | None = None
+    heatmap: str | None = None
     limit: float | None = None
     contacts: bool = False
     grid: bool = False
@@ -43,23 +43,23 @@ def parse_request(words: Iterable[str]) -> Request:
     Raises
     ------
     SceneError
-        For an unknown name, a range that is no positive number or stands where there is none, or both fields at once.
+        For an unknown name, a range that is not a positive number or of an overlay without range, or two heatmaps.
     """
     chosen: dict[str, float | None] = {}
     for word in words:
         name, given, value = word.strip().partition("=")
         if name not in NAMES:
             raise SceneError(f"there is no overlay {name!r}; valid are {', '.join(NAMES)}")
-        if given and name not in FIELDS:
-            raise SceneError(f"overlay {word.strip()!r}: {name} has no range; {' and '.join(FIELDS)} have")
-        chosen[name] = _positive(word, value, FIELDS[name]) if given else None
-    fields = [name for name in FIELDS if name in chosen]
-    if len(fields) > 1:
-        raise SceneError(f"overlays {' and '.join(fields)} would both colour the surface; choose one")
+        if given and name not in HEATMAPS:
+            raise SceneError(f"overlay {word.strip()!r}: {name} has no range; only {' and '.join(HEATMAPS)} have one")
+        chosen[name] = _positive(word, value, HEATMAPS[name]) if given else None
+    heatmaps = [name for name in HEATMAPS if name in chosen]
+    if len(heatmaps) > 1:
+        raise SceneError(f"overlays {' and '.join(heatmaps)} cannot both colour the surface; choose one")
     return Request(
-        field=fields[0] if fields else None,
-        limit=chosen[fields[0]] if fields else None,
-        **{name: name in chosen for name in NAMES if name not in FIELDS},
+        heatmap=heatmaps[0] if heatmaps else None,
+        limit=chosen[heatmaps[0]] if heatmaps else None,
+        **{name: name in chosen for name in NAMES if name not in HEATMAPS},
     )
 
 

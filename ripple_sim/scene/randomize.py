@@ -8,23 +8,15 @@ import numpy as np
 
 from ripple_sim.errors import SceneError
 
-_GEOM = mujoco.mjtGeom
-# half-sizes over the radius of the geom that a shape replaces
-_SHAPES = {
-    "sphere": (_GEOM.mjGEOM_SPHERE, (1.0, 0.0, 0.0)),
-    "box": (_GEOM.mjGEOM_BOX, (0.8, 0.8, 0.8)),
-    "capsule": (_GEOM.mjGEOM_CAPSULE, (0.65, 0.85, 0.0)),
-    "ellipsoid": (_GEOM.mjGEOM_ELLIPSOID, (1.2, 0.9, 0.7)),
-    "cylinder": (_GEOM.mjGEOM_CYLINDER, (0.9, 0.5, 0.0)),
-}
+from .body_shapes import BODY_SHAPES
 
 
 class RandomEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[random]`: what is drawn anew for every free body, by a seed.
+    """`[random]`: random variation of every free body, by a seed.
 
-    position [m] is the greatest shift along each axis, of where the body stands and of where it is dropped or thrown
-    from; size and mass are the ranges of factors; shapes are those to choose from (none: as they are); orientation is
-    whether it is turned at random.
+    `position` [m] is the largest shift along each axis, of the body's place and of the place it is dropped or thrown
+    from; `size` and `mass` are ranges of factors; `shapes` are those to choose from (none: unchanged); `orientation`
+    turns the body at random.
     """
 
     seed: int = 0
@@ -78,7 +70,7 @@ def _vary(geom: mujoco.MjsGeom, size: float, mass: float, kind: str | None) -> N
         return
     if kind is not None:
         radius = float(np.max(geom.size))
-        geom.type, proportions = _SHAPES[kind][0], _SHAPES[kind][1]
+        geom.type, proportions = BODY_SHAPES[kind]
         geom.size = radius * np.array(proportions)
     geom.size = geom.size * size
     if np.isfinite(geom.mass):
@@ -98,5 +90,5 @@ def _check(entry: RandomEntry) -> None:
     if entry.seed < 0:
         raise SceneError(f"[random] seed is {entry.seed}; valid is 0 or greater")
     for shape in entry.shapes:
-        if shape not in _SHAPES:
-            raise SceneError(f"[random] names the shape {shape!r}; valid are {', '.join(_SHAPES)}")
+        if shape not in BODY_SHAPES:
+            raise SceneError(f"[random] names the shape {shape!r}; valid are {', '.join(BODY_SHAPES)}")

@@ -1,4 +1,4 @@
-"""The TOML file of a scene: its tables, and strict reading of them."""
+"""The TOML file of a scene: its tables, read strictly."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import msgspec
 
 from ripple_sim.errors import SceneError
 
-from .events import ChangeEntry, ControlEntry, MaterialChange, PokeEntry
-from .material_entry import MapEntry, MaterialEntry, PresetEntry
+from .camera import CameraEntry
+from .events import ChangeEntry, ControlEntry, PokeEntry
+from .material_entry import MapEntry, MaterialChange, MaterialEntry, PresetEntry
 from .motion import DropEntry, PlaceEntry, ThrowEntry, Vector
 from .randomize import RandomEntry
 
@@ -18,17 +19,17 @@ Color = tuple[float, float, float]
 
 
 class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[ripple.still]]`: a disc of the surface that carries no waves, round a point [m] of the geom's body's frame."""
+    """`[[ripple.still]]`: a disc of the surface without waves, around a point [m] in the frame of the geom's body."""
 
     point: Vector
     radius: float
 
 
 class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[ripple]]`: one surface that carries waves, and how it looks.
+    """`[[ripple]]`: one target, its material and its look.
 
-    `color` (sRGB, 0 to 1) takes the place of the look's own colour, or of the texture of the geom's material, if it has
-    one. `still_map` is the path of a picture in the mesh's own texture coordinates: no waves run where it is black.
+    `color` (sRGB, 0 to 1) replaces the look's own colour, or the texture of the geom's material. `still_map` is the
+    path of an image in the mesh's own texture coordinates: there are no waves where it is black.
     """
 
     geom: str
@@ -40,45 +41,17 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     still_map: str | None = None
 
     def located(self, folder: Path) -> RippleEntry:
-        """The same with the pictures' paths made relative to a folder."""
+        """The same with the images' paths made relative to a folder."""
         still_map = None if self.still_map is None else str(folder / self.still_map)
         return msgspec.structs.replace(self, material=self.material.located(folder), still_map=still_map)
-
-
-class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[camera]`: a camera of the MJCF by name, or MuJoCo's free camera (metres, degrees).
-
-    With `orbit` it goes round by so many degrees a second. With `track` it follows a body: the free camera moves along
-    with the body's centre of mass, from which `lookat` then counts; a named one turns to it.
-
-    A frame is the mean of so many `exposures`, where `shutter` or `aperture` is not 0. `shutter` is the shutter angle
-    [degrees]: 360 leaves the shutter open from one frame to the next, 180, usual in film, half of that time. `aperture`
-    is the diameter of the lens [m]; an f-number would need a focal length, which MuJoCo's cameras do not have. `focus`
-    is what is sharp: a distance along the camera's axis [m], a body or a geom by its name, which the camera then keeps
-    sharp, or a point in the world [m]; by default it is what the camera looks at.
-    """
-
-    name: str | None = None
-    track: str | None = None
-    lookat: Vector | None = None
-    distance: float | None = None
-    azimuth: float = 90.0
-    elevation: float = -20.0
-    fovy: float = 45.0
-    orbit: float = 0.0
-    shutter: float = 0.0
-    aperture: float = 0.0
-    focus: float | str | Vector | None = None
-    exposures: int = 32
 
 
 class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
     """The whole TOML file.
 
-    `overlay` names what is drawn over the pictures: "height" or "velocity" in colours (with the end of the colours in m
-    or m/s where it shall be fixed, such as "height=0.02"), "contacts", "grid", "time", "energy". `lighting` is "model"
-    for the MJCF's lamps and skybox, "studio" for a photo studio in their place, or "auto": the studio where the MJCF
-    sets no lamp.
+    `overlay` names the overlays: "height" or "velocity" as a heatmap (with a fixed end of the colours in m or m/s as in
+    "height=0.02"), "contacts", "grid", "time", "energy". `lighting` is "model" for the MJCF's lamps and skybox,
+    "studio" for a photo studio instead, or "auto": the studio if the MJCF has no lamp.
     """
 
     model: str
@@ -113,12 +86,12 @@ def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
         raise SceneError(f"scene file {origin!r}: {str(error).replace('`$.', '`')}") from error
 
 
-# Metres, seconds, newtons, degrees: nothing that a scene means is larger, and squares of it do not overflow.
+# Metres, seconds, newtons, degrees: no sensible scene has larger numbers, and their squares do not overflow.
 _LARGEST = 1e12
 
 
 def _check_numbers(value: Any, place: str, origin: str) -> None:
-    """Refuse NaN, infinity and absurdly large numbers wherever they stand."""
+    """Refuse NaN, infinity and absurdly large numbers anywhere."""
     if isinstance(value, dict):
         for key, inner in value.items():
             _check_numbers(inner, f"{place}.{key}" if place else key, origin)

@@ -6,5 +6,5 @@ UP_AXES = ("y", "z")
 
 
 def usual_up(path: str | Path) -> str:
-    """Axis that points up in files of this format as they are usually made: "z" for STL, else "y"."""
+    """Axis that usually points up in files of this format: "z" for STL, else "y"."""
     return "z" if Path(path).suffix.lower() == ".stl" else "y"

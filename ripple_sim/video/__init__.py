@@ -1,1 +1,1 @@
-"""The film of a scene: simulation, drawing and encoding at the same time."""
+"""Videos of scenes: simulation, rendering and encoding at the same time."""

@@ -1,4 +1,4 @@
-"""One simulation, or two side by side, with overlays: the states of a video and their pictures."""
+"""`Film`: one simulation, or two side by side, rendered to frames with overlays."""
 
 from __future__ import annotations
 
@@ -6,46 +6,26 @@ import dataclasses
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.capture.snapshot import FrameSource, Snapshot, run
+from ripple_sim.capture.frame_source import FrameSource
+from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.overlay.colormap import color_table
-from ripple_sim.overlay.comparison import TITLES
-from ripple_sim.overlay.field import grid_spacing
+from ripple_sim.overlay.comparison import TITLES, compared_operators
+from ripple_sim.overlay.heatmap import grid_spacing
 from ripple_sim.overlay.layout import Layout
 from ripple_sim.overlay.marks import PlacedMark, draw_marks, place_marks
-from ripple_sim.overlay.notes import Notebook, Notes
+from ripple_sim.overlay.notes import Notebook
 from ripple_sim.overlay.painter import Painter
 from ripple_sim.overlay.projection import Projection
 from ripple_sim.render import Surface
-from ripple_sim.scene.overlays import Request
+from ripple_sim.scene.overlays import parse_request
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.gl import GLContext
 
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Shot:
-    """An exposure of a film's frame: a snapshot of each run, and what the overlays show, the same all frame long."""
-
-    snapshots: tuple[Snapshot, ...]
-    notes: Notes
-
-    @property
-    def number(self) -> int:
-        """Of the frame, from 0."""
-        return self.snapshots[0].number
-
-    @property
-    def exposure(self) -> int:
-        """Of the frame's exposures, from 0."""
-        return self.snapshots[0].exposure
-
-    def digest(self) -> str:
-        """Fingerprint of all runs, see `Snapshot.digest`."""
-        return "".join(snapshot.digest() for snapshot in self.snapshots)
+from .options import VideoOptions
+from .shot import Shot
 
 
 class Film:
@@ -54,21 +34,11 @@ class Film:
     Parameters
     ----------
     simulations : sequence of Simulation
-        One, or two that are shown side by side.
-    request : Request
-        The overlays.
-    width, height : int
-        Of the frames [pixels]; two runs share the width.
+        One, or two that are shown side by side and share the width.
+    options : VideoOptions
+        Settled. Linear frames are without overlays, and of one run.
     frames : int
         How many.
-    rate : float
-        Frames in a second of the scene's time.
-    operators : sequence of str
-        Those of the runs, for their titles where there are two.
-    supersample, transparent, linear
-        As for `FrameSource`; linear frames are without overlays, and of one run.
-    gl : GLContext, optional
-        By default the process's shared one.
 
     Attributes
     ----------
@@ -76,63 +46,53 @@ class Film:
         Time spent on frames so far [s].
     """
 
-    def __init__(
-        self,
-        simulations: Sequence[Simulation],
-        request: Request,
-        *,
-        width: int,
-        height: int,
-        frames: int,
-        rate: float,
-        operators: Sequence[str] = (),
-        supersample: int = 1,
-        transparent: bool = False,
-        linear: bool = False,
-        gl: GLContext | None = None,
-    ) -> None:
-        self.simulations, self._request, self._frames = simulations, request, frames
-        self._layout = Layout(width, height)
-        self._notebook = Notebook(request, simulations, frames, rate)
-        self._drawing: dict[str, Any] = {
-            "supersample": supersample,
-            "transparent": transparent,
-            "linear": linear,
-            "gl": gl,
-        }
+    def __init__(self, simulations: Sequence[Simulation], options: VideoOptions, frames: int) -> None:
+        self.simulations, self._options, self._frames = simulations, options, frames
+        self._request = parse_request(options.overlay or ())
+        self._layout = Layout(*options.size)
+        self._notebook = Notebook(self._request, simulations, frames, options.rate)
         self._sources: list[FrameSource] = []
         self._submitted: deque[Shot] = deque()
         self._marks: list[list[PlacedMark]] = []
         self.seconds = 0.0
+        operators = compared_operators(options.compare)
         self._painter = Painter(
-            request,
+            self._request,
             self._layout,
-            duration=frames / rate,
+            duration=frames / options.rate,
             spacing=_common_spacing(simulations[0]),
             titles=[TITLES[operator] for operator in operators] if len(operators) > 1 else [],
         )
 
     def prepare(self) -> None:
-        """Make the renderers, which takes a while, before the first `draw` does; the simulations may run meanwhile."""
+        """Make the renderers, which takes a while, before the first frame; the simulations may run meanwhile."""
         if self._sources:
             return
-        count, width, height = len(self.simulations), self._layout.width, self._layout.height
-        ends = [round(width * k / count) for k in range(count + 1)]
+        count, options = len(self.simulations), self._options
+        ends = [round(self._layout.width * k / count) for k in range(count + 1)]
         self._sources = [
-            FrameSource(simulation, width=right - left, height=height, annotate=self._annotated, **self._drawing)
+            FrameSource(
+                simulation,
+                width=right - left,
+                height=self._layout.height,
+                supersample=options.supersample,
+                transparent=options.transparent,
+                linear=options.linear,
+                annotate=self._annotated,
+            )
             for simulation, left, right in zip(self.simulations, ends[:-1], ends[1:], strict=True)
         ]
 
-    def states(self, alive: int = 1) -> Iterator[Shot]:
-        """Run the simulations; see `ripple_sim.frames.run`."""
-        runs = [run(simulation, self._frames, alive=alive) for simulation in self.simulations]
-        for snapshots in zip(*runs, strict=True):
-            if snapshots[0].exposure == 0:
+    def shots(self, alive: int = 1) -> Iterator[Shot]:
+        """Run the simulations; `alive` of the latest shots stay valid, see `snapshots`."""
+        runs = [snapshots(simulation, self._frames, alive=alive) for simulation in self.simulations]
+        for exposures in zip(*runs, strict=True):
+            if exposures[0].exposure == 0:
                 notes = self._notebook.follow()
-            yield Shot(snapshots, notes)
+            yield Shot(exposures, notes)
 
-    def draw_all(self, shots: Iterable[Shot], ahead: int = 0) -> Iterator[NDArray]:
-        """Draw frames in their order, as `draw` does, and wait for each shot when `ahead` later ones are submitted."""
+    def render_all(self, shots: Iterable[Shot], ahead: int = 0) -> Iterator[NDArray]:
+        """Render frames in their order, and wait for each shot when `ahead` later ones are submitted."""
         for shot in shots:
             self.submit(shot)
             if len(self._submitted) > ahead and (frame := self.fetch()) is not None:
@@ -141,52 +101,52 @@ class Film:
             if (frame := self.fetch()) is not None:
                 yield frame
 
-    def draw(self, shot: Shot) -> NDArray | None:
-        """Draw an exposure; return the frame after its last, [height, width, 3], or 4 if it is transparent."""
+    def render(self, shot: Shot) -> NDArray | None:
+        """Render an exposure; return the frame after its last, [height, width, 3], or 4 if it is transparent."""
         self.submit(shot)
         return self.fetch()
 
     def submit(self, shot: Shot) -> None:
-        """Draw an exposure without waiting for it: `fetch` returns what `draw` does, after those submitted before.
+        """Draw an exposure without waiting for it: `fetch` returns it, after those submitted before.
 
         The shot must stay as it is until then.
         """
         self.prepare()
         start = time.perf_counter()
         for number, (source, snapshot) in enumerate(zip(self._sources, shot.snapshots, strict=True)):
-            if self._request.field and shot.exposure == 0:
+            if self._request.heatmap and shot.exposure == 0:
                 geoms = self.simulations[number].ripples.geom_ids
-                for name, field in shot.notes.fields[number].items():
-                    source.renderer.set_heatmap(geoms[name], field, shot.notes.field_scale.value)
+                for name, heatmap in shot.notes.heatmaps[number].items():
+                    source.renderer.set_heatmap(geoms[name], heatmap, shot.notes.heatmap_scale.value)
             source.submit(snapshot)
         self._submitted.append(shot)
         self.seconds += time.perf_counter() - start
 
     def fetch(self) -> NDArray | None:
-        """Wait for the earliest submitted exposure, and return what `draw` does."""
+        """Wait for the earliest exposure submitted, and return what `render` does."""
         start = time.perf_counter()
         shot = self._submitted.popleft()
         if shot.exposure == 0:
             self._marks = [self._placed_marks(run, shot) for run in range(len(self._sources))]
-        pictures = [picture for source in self._sources if (picture := source.fetch()) is not None]
-        frame = self._composed(pictures, shot) if pictures else None
+        halves = [half for source in self._sources if (half := source.fetch()) is not None]
+        frame = self._composed(halves, shot) if halves else None
         self.seconds += time.perf_counter() - start
         return frame
 
-    def _composed(self, pictures: list[NDArray], shot: Shot) -> NDArray:
-        """The pictures of the runs side by side, under the overlays."""
-        for picture, marks in zip(pictures, self._marks, strict=True):
-            draw_marks(picture, marks, self._layout)
-        frame = pictures[0]
-        if len(pictures) > 1:
-            frame = np.concatenate(pictures, axis=1)
-            seam, half = pictures[0].shape[1], max(1, round(self._layout.em / 16))
-            frame[:, seam - half : seam + half] = 255
+    def _composed(self, halves: list[NDArray], shot: Shot) -> NDArray:
+        """The runs' images side by side, under the overlays."""
+        for half, marks in zip(halves, self._marks, strict=True):
+            draw_marks(half, marks, self._layout)
+        frame = halves[0]
+        if len(halves) > 1:
+            frame = np.concatenate(halves, axis=1)
+            middle, seam = halves[0].shape[1], max(1, round(self._layout.em / 16))
+            frame[:, middle - seam : middle + seam] = 255
         self._painter.paint(frame, shot.notes)
         return frame
 
     def _placed_marks(self, run: int, shot: Shot) -> list[PlacedMark]:
-        """Where the contacts of a run lie in its picture."""
+        """Contact marks of a run, in pixels of its image."""
         source, snapshot, notes = self._sources[run], shot.snapshots[run], shot.notes
         if not self._request.contacts:
             return []
@@ -195,10 +155,10 @@ class Film:
         return place_marks(notes.marks[run], notes.mark_scale.value, self._layout, projection, *hiding)
 
     def _annotated(self, surface: Surface) -> Surface:
-        """A target with what the request asks for."""
+        """A target's surface with the heatmap and the grid that the request asks for."""
         return dataclasses.replace(
             surface,
-            heatmap_colors=color_table() if self._request.field else None,
+            heatmap_colors=color_table() if self._request.heatmap else None,
             grid=grid_spacing(surface.resolution) if self._request.grid else 0,
         )
 

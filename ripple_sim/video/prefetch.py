@@ -1,4 +1,4 @@
-"""Stages that run at the same time: an iterator in a thread of its own, a few items ahead of whoever takes them."""
+"""Double buffering: an iterator in a thread of its own, a few items ahead of its consumer."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ Item = TypeVar("Item")
 _END = object()
 
 
-class Ahead(Generic[Item]):
+class Prefetch(Generic[Item]):
     """Runs an iterable in a thread, at most `depth` items ahead; iterate over this instead, inside a `with`.
 
-    Items come in their order. What the iterable raises is raised where its next item would have come. Leaving the block
-    stops the thread at the item it is at.
+    Items come in their order. An exception of the iterable is raised in place of its next item. Leaving the block stops
+    the thread at its current item.
 
     Parameters
     ----------
     items : iterable
-        Belongs to the thread from now on.
+        Consumed by the thread alone.
     depth : int
         How many finished items may wait.
     """
@@ -40,7 +40,7 @@ class Ahead(Generic[Item]):
     def __exit__(self, *error: object) -> None:
         self._stopped = True
         while self._thread.is_alive():
-            with contextlib.suppress(queue.Empty):  # makes room for the item that the thread is at
+            with contextlib.suppress(queue.Empty):  # makes room for the thread's current item
                 self._queue.get(timeout=0.05)
 
     def _run(self) -> None:
@@ -50,7 +50,7 @@ class Ahead(Generic[Item]):
                 if self._stopped:
                     return
                 self._queue.put((item, None))
-        except BaseException as failure:  # whatever it is, it belongs to the taker's thread
+        except BaseException as failure:  # of any kind: it is raised in the consumer's thread
             error = failure
         self._queue.put((_END, error))
 

@@ -1,4 +1,4 @@
-"""What decides the pixels of a video: the scene with all its files, and the software that simulates and draws it."""
+"""Fingerprints of a scene with all its files, and of the software that simulates and renders it."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def scene_digest(scene: Scene) -> str:
     model = np.zeros(mujoco.mj_sizeModel(scene.model), np.uint8)
     mujoco.mj_saveModel(scene.model, None, model)
     hasher.update(model.tobytes())
-    for entry in scene.surfaces:
+    for entry in scene.targets:
         for each in entry.material.maps().values():
             hasher.update(Path(each.map).read_bytes())
         if entry.still_map is not None:
             hasher.update(Path(entry.still_map).read_bytes())
-    hasher.update(msgspec.json.encode((scene.surfaces, scene.camera, scene.events, scene.two_way)))
+    hasher.update(msgspec.json.encode((scene.targets, scene.camera, scene.events, scene.two_way)))
     return hasher.hexdigest()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ripple_sim.render.visuals.shapes import shape_of, sizes
 from ripple_sim.render.visuals.visual import geom_visual, visible_geoms
 
+from .floor import add_floor, is_endless
 from .session import Session
 from .skin import Skin
 
@@ -20,10 +21,7 @@ _PER_METRE = 1000.0
 
 _GEOM = mujoco.mjtGeom
 _COLORMAP = "coolwarm"
-_SEGMENTS = 8  # of a body, to a right angle
-# What is shown of a plane that is larger than the view: a disc that fades into the background.
-BACKGROUND = (0.74, 0.77, 0.81)
-_FADE_RINGS, _FADE_SIDES = 24, 72
+_SEGMENTS = 8  # of a geom, per right angle
 
 
 class BodyActors:
@@ -34,9 +32,9 @@ class BodyActors:
     plotter : pyvista.Plotter
     session : Session
     middle : float64 [3]
-        What the camera is about [m].
+        Of the view [m].
     reach : float
-        Bodies farther than this from the middle are not shown [m]: they wait for their turn.
+        Bodies farther than this from the middle wait for their turn, and are hidden [m].
     """
 
     def __init__(self, plotter: pv.Plotter, session: Session, middle: NDArray[np.float64], reach: float) -> None:
@@ -47,16 +45,16 @@ class BodyActors:
             if geom in session.simulation.ripples.geom_ids.values():
                 continue
             rgba = geom_visual(model, geom).rgba
-            if _is_floor(model, geom, reach):
+            if is_endless(model, geom, reach):
                 position, rotation = self._pose(geom)
-                self._actors[geom] = _add_floor(plotter, (middle - position) @ rotation, reach, rgba)
+                self._actors[geom] = add_floor(plotter, (middle - position) @ rotation, reach, rgba)
             elif (mesh := geom_mesh(model, geom)) is not None:
                 self._actors[geom] = _add(plotter, mesh, rgba)
         self.update()
 
     @property
     def solid(self) -> list[int]:
-        """Geoms that can be seen and are no planes."""
+        """Visible geoms except planes."""
         kinds = self._session.simulation.model.geom_type
         return [geom for geom in self._actors if kinds[geom] != _GEOM.mjGEOM_PLANE]
 
@@ -106,7 +104,7 @@ class SkinActor:
         self.actor.prop.specular_color = "white"
 
     def update(self, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
-        """Take what the skin holds now; place it in the world."""
+        """Take the skin's present points, normals and heights, and its pose in the world."""
         mesh, skin = self._mesh, self._skin
         mesh.points[:] = skin.points
         data = mesh.GetPointData()
@@ -129,13 +127,13 @@ _SHADING: dict[str, Any] = {"ambient": 0.32, "diffuse": 0.75, "specular": 0.3, "
 
 def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
     """Surface of a geom in its frame [m], with normals; None for types that cannot be drawn."""
-    piece = geom_visual(model, geom)
-    found = shape_of(model, piece)
+    visual = geom_visual(model, geom)
+    found = shape_of(model, visual)
     if found is None:
         return None
     _, make = found
     shape = make(_SEGMENTS)
-    mesh = pv.PolyData.from_regular_faces(shape.positions(*sizes(model, piece)), shape.faces)
+    mesh = pv.PolyData.from_regular_faces(shape.positions(*sizes(model, visual)), shape.faces)
     mesh.point_data.active_normals = shape.normals
     return mesh
 
@@ -144,24 +142,6 @@ def _add(plotter: pv.Plotter, mesh: pv.PolyData, rgba: NDArray[np.float64]) -> p
     return plotter.add_mesh(
         mesh, color=rgba[:3].tolist(), opacity=float(rgba[3]), interpolation="Phong", reset_camera=False, **_SHADING
     )
-
-
-def _is_floor(model: mujoco.MjModel, geom: int, reach: float) -> bool:
-    """Whether a geom is a plane without end, or one that reaches beyond the view."""
-    size = model.geom_size[geom, :2]
-    return model.geom_type[geom] == _GEOM.mjGEOM_PLANE and bool(((size <= 0) | (size > reach / 2)).all())
-
-
-def _add_floor(plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, rgba: NDArray[np.float64]) -> pv.Actor:
-    """Unlit, for a lit pixel takes software OpenGL much longer and this one has most of them."""
-    disc = pv.Disc(inner=0.0, outer=radius, normal=(0, 0, 1), r_res=_FADE_RINGS, c_res=_FADE_SIDES)
-    away = np.linalg.norm(disc.points, axis=1) / radius
-    share = np.clip((away - 0.1) / 0.7, 0, 1)[:, None]
-    share = share * share * (3 - 2 * share)
-    colors = (1 - share) * rgba[:3] + share * np.array(BACKGROUND)
-    disc.points[:, :2] += middle[:2]
-    disc.point_data["color"] = np.rint(255 * colors).astype(np.uint8)
-    return plotter.add_mesh(disc, scalars="color", rgb=True, lighting=False, reset_camera=False)
 
 
 def _place(actor: pv.Actor, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:

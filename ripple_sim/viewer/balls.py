@@ -1,4 +1,4 @@
-"""Balls to throw: a pool of free bodies in the model, parked far away until they are wanted."""
+"""Balls to throw: a pool of free bodies in the model, parked far away until thrown."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _NAME = "thrown ball {}"
-# Parked this many radii above the origin, as many apart from each other as is needed not to touch.
+# Parked this many radii above the origin, and this many apart, so that they do not touch.
 _AWAY, _APART = 2000.0, 4.0
 
 
@@ -37,7 +37,7 @@ def add_balls(spec: mujoco.MjSpec, count: int, radius: float, mass: float) -> No
             size=[radius, 0, 0],
             mass=mass,
             rgba=[*colorsys.hsv_to_rgb((0.58 + 0.13 * i) % 1.0, 0.65, 0.9), 1.0],
-            # whatever groups of collision the scene knows, a ball belongs to all of them
+            # a ball belongs to all collision groups of the scene
             contype=2**31 - 1,
             conaffinity=2**31 - 1,
         )
@@ -50,12 +50,12 @@ def add_balls(spec: mujoco.MjSpec, count: int, radius: float, mass: float) -> No
 
 
 class Balls:
-    """The balls of a model: parked, or thrown. The oldest is used again once all are thrown.
+    """The balls of a model, parked or thrown. When all are thrown, the oldest is thrown again.
 
     Parameters
     ----------
     model : mujoco.MjModel
-        One whose specification `add_balls` has seen; without balls there is nothing to throw.
+        With balls from `add_balls`, or none.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:

@@ -1,4 +1,4 @@
-"""What can be done in the viewer, and by which key: for the window, the web page and the help texts alike."""
+"""The viewer's controls and their keys, for the window, the web page and the help texts alike."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import dataclasses
 
 @dataclasses.dataclass(frozen=True)
 class Control:
-    """A key, the method of `Window` that it calls, and what that does, in few words."""
+    """A key, the method of `Actions` that it calls, and a short label."""
 
     key: str
     action: str
@@ -15,12 +15,12 @@ class Control:
 
 
 CONTROLS = (
-    Control("space", "pause", "pause, go on"),
+    Control("space", "pause", "pause, resume"),
     Control("n", "step", "next frame"),
     Control("r", "reset", "reset"),
     Control("t", "throw", "throw a ball"),
     Control("o", "operator", "operator"),
-    Control("c", "colors", "height as colours"),
+    Control("c", "colors", "heatmap on, off"),
     Control("s", "screenshot", "screenshot"),
     Control("v", "record", "record, stop"),
     Control("h", "help", "keys on, off"),
@@ -31,6 +31,6 @@ MOUSE = (("click", "poke"), ("drag", "orbit"), ("shift + drag", "pan"), ("wheel"
 
 
 def help_text() -> str:
-    """All of them, one a line."""
+    """All controls, one per line."""
     rows = [*MOUSE, *((control.key, control.label) for control in CONTROLS)]
     return "\n".join(f"{what}: {does}" for what, does in rows)

@@ -1,4 +1,4 @@
-"""The viewer on the desktop: the window's loop, and how fast it can go."""
+"""The viewer on the desktop: the window's loop, and its speed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .window import Window
 
 
 def run(window: Window) -> None:
-    """Show a window until the user closes it; simulated time goes no faster than the clock."""
+    """Show a window until the user closes it, at most in real time."""
     window.open()
     frame = 1 / window.session.fps
     due = time.perf_counter()
@@ -25,15 +25,15 @@ def run(window: Window) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class Benchmark:
-    """Updates a second of a window at its fastest, and where the time goes.
+    """Highest update rate of a window, and where the time goes.
 
     Attributes
     ----------
     updates_per_second : float
     simulate, draw : float
-        [ms] an update for physics, waves and the displaced mesh; for VTK's picture.
+        [ms] per update, for physics, waves and the displaced mesh; for VTK.
     processor : float
-        Processor time of all threads [ms] an update: what it takes where other programs run as well.
+        Processor time of all threads [ms] per update, which other programs hardly change.
     renderer : str
         OpenGL driver.
     """
@@ -52,14 +52,14 @@ class Benchmark:
 
 
 def benchmark(window: Window, updates: int = 60, tries: int = 3) -> Benchmark:
-    """Best of several tries to go through some updates without waiting, each begun with a poke and a ball."""
+    """Best of several runs of some updates without waiting, each with a poke and a ball at the start."""
     window.open()
     width, height = window.plotter.render_window.GetSize()
     trials = []
     for _ in range(tries):
-        window.reset()
-        window.poke_at(width // 2, height // 2)
-        window.throw()
+        window.actions.reset()
+        window.actions.poke_at(width // 2, height // 2)
+        window.actions.throw()
         start, processor, drawing = time.perf_counter(), time.process_time(), window.seconds_drawing
         for _ in range(updates):
             window.tick()
@@ -73,11 +73,11 @@ def benchmark(window: Window, updates: int = 60, tries: int = 3) -> Benchmark:
     renderer = window.gl_renderer
     window.close()
     seconds, drawing, processor = min(trials)
-    an_update = 1e3 / updates
+    per_update = 1e3 / updates
     return Benchmark(
         updates_per_second=updates / seconds,
-        simulate=(seconds - drawing) * an_update,
-        draw=drawing * an_update,
-        processor=processor * an_update,
+        simulate=(seconds - drawing) * per_update,
+        draw=drawing * per_update,
+        processor=processor * per_update,
         renderer=renderer,
     )

@@ -1,4 +1,4 @@
-"""Is there a display? VTK would go on without one, and show nothing to nobody."""
+"""Whether there is a display. Without one VTK would run and show nothing."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ def check_display() -> None:
     Raises
     ------
     DisplayError
-        With what is missing, and what can be done instead.
+        With what is missing, and the alternatives.
     """
     problem = display_problem()
     if problem is not None:
         raise DisplayError(
-            f"no window can be opened: {problem}; add --web to see it in a browser, or make a video with `ripple-sim "
-            "render` or `ripple-sim drop`"
+            f"no window can be opened: {problem}; add --web to use a browser instead, or render a video with "
+            "`ripple-sim render` or `ripple-sim drop`"
         )
 
 
 def display_problem() -> str | None:
-    """What keeps VTK from opening a window, or None. Wayland desktops serve X11 too, and set DISPLAY."""
+    """Why VTK cannot open a window, or None. Wayland desktops serve X11 too, and set DISPLAY."""
     if not sys.platform.startswith("linux"):
         return None
     name = os.environ.get("DISPLAY")

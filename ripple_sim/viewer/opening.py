@@ -1,4 +1,4 @@
-"""What is to be viewed: a scene or a mesh, with balls to throw at it."""
+"""Opening a scene or a mesh in the viewer, with balls to throw at it."""
 
 from __future__ import annotations
 
@@ -12,30 +12,31 @@ import numpy as np
 from ripple_sim.coupling.model.geoms import find_target
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
-from ripple_sim.scene.scene import Scene, load_scene, shipped_scenes
+from ripple_sim.scene.load_scene import load_scene, shipped_scenes
+from ripple_sim.scene.scene import Scene
 from ripple_sim.solver import Material
 
 from .balls import add_balls
 
 BALLS = 6
 
-# Shares of a surface's size: a ball's radius, a poke's radius, and how far a poke presses the surface in.
+# Relative to a surface's size: a ball's radius, a poke's radius, and a poke's depth.
 _BALL, _POKE, _DEPTH = 0.06, 0.06, 0.025
-# Time of flight of a thrown ball [s], and how far it comes meanwhile, in sizes of the surface.
+# Time of flight of a thrown ball [s], and the distance it covers, in sizes of the surface.
 FLIGHT = 0.5
 _THROW = 3.0
 
 
 @dataclasses.dataclass(frozen=True)
 class Strength:
-    """Impulses that suit a surface.
+    """A poke.
 
     Attributes
     ----------
     radius : float
         Footprint radius of a poke [m].
     impulse : float
-        That presses the surface in by some per cent of its size [N s].
+        Presses the surface in by a few per cent of its size [N s].
     """
 
     radius: float
@@ -43,7 +44,7 @@ class Strength:
 
 
 def poke_strength(material: Material, size: float) -> Strength:
-    """Poke that suits a surface of a size [m].
+    """A suitable poke for a surface of a size [m].
 
     The footprint (1 - (d / r)^2)^3 has its peak at 4 / (pi r^2), so an impulse J sets its middle moving at
     4 J / (pi r^2 sigma); it swings back at about omega^2 = (2 c / r)^2 + k.
@@ -53,7 +54,7 @@ def poke_strength(material: Material, size: float) -> Strength:
         float(np.max(value)) for value in (material.speed, material.stiffness, material.density)
     )
     omega = np.hypot(2 * speed / radius, np.sqrt(stiffness))
-    # nothing pulls a rigid surface back; then a second is as good a time as any
+    # nothing pulls a surface without stiffness back: it then gets a second
     return Strength(radius, _DEPTH * size * density * np.pi * radius**2 / 4 * max(float(omega), 1.0))
 
 
@@ -65,7 +66,7 @@ def open_scene(
     up: str | None = None,
     repair: bool = False,
 ) -> Scene:
-    """Scene of a name, a TOML file or a mesh file, with balls to throw.
+    """Scene by name, TOML file or mesh file, with balls to throw.
 
     Parameters
     ----------
@@ -93,12 +94,12 @@ def open_scene(
         )
     scene = load()
     size = surface_size(scene)
-    impulse = poke_strength(scene.surfaces[0].material.material(), size).impulse
+    impulse = poke_strength(scene.targets[0].material.material(), size).impulse
     # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of a poke
     mass = impulse / (1.5 * _THROW * size / FLIGHT)
 
     def edit(spec: mujoco.MjSpec) -> None:
-        # parked balls are no part of what a camera should see
+        # parked balls must not widen the camera's view
         spec.stat.extent, spec.stat.center = scene.model.stat.extent, scene.model.stat.center
         add_balls(spec, BALLS, _BALL * size, mass)
 
@@ -107,5 +108,5 @@ def open_scene(
 
 def surface_size(scene: Scene) -> float:
     """Longest extent of the smallest rippling surface [m]."""
-    geoms = [find_target(scene.model, entry.geom) for entry in scene.surfaces]
+    geoms = [find_target(scene.model, entry.geom) for entry in scene.targets]
     return float(2 * scene.model.geom_aabb[geoms, 3:].max(axis=1).min())

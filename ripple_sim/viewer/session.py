@@ -1,15 +1,12 @@
-"""A scene that runs and can be played with: the viewer's model, without a window."""
+"""`Session`: a running scene that the user can poke and change, without a window."""
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import mujoco
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
@@ -17,39 +14,23 @@ from ripple_sim.solver import RippleError
 
 from .balls import Balls
 from .opening import FLIGHT, poke_strength, surface_size
+from .picking import Hit, Picker
 from .skin import Skin
 
 OPERATORS = ("fem", "uncorrected", "paper")
-SLIDERS = ("speed", "damping", "stiffness")
+# Coefficients of the material that the user can change, with their units.
+SLIDERS = {"speed": "m/s", "damping": "1/s", "stiffness": "1/s²"}
 
-# The range of the colours follows the waves: at once where they grow, by this factor a frame where they die.
+# The range of the colours follows the waves: at once as they grow, by this factor per frame as they fade.
 _FADE = 0.96
-# Colours are full at this share of the greatest height: where something hits, the surface is higher than its waves.
+# Colours end at this share of the greatest height: at a contact the surface is higher than its waves.
 _FULL = 0.25
 # Least range of the colours over the surface's size, so that rounding noise is not shown.
 _FAINT = 1e-4
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Hit:
-    """Where a ray meets a rippling surface.
-
-    Attributes
-    ----------
-    geom : str
-    point : float64 [3]
-        In the frame of the geom [m].
-    distance : float
-        From the ray's origin, in lengths of its direction.
-    """
-
-    geom: str
-    point: NDArray[np.float64]
-    distance: float
-
-
 class Session:
-    """A running scene: it goes on frame by frame, pauses, starts again, is poked and thrown at.
+    """A running scene: advances frame by frame, pauses, restarts, takes pokes and thrown balls.
 
     Parameters
     ----------
@@ -65,12 +46,12 @@ class Session:
     skins : dict
         `Skin` of each rippling geom, by name, as of the latest frame.
     poke_impulse : float
-        What a poke gives [N s].
+        Of a poke [N s].
     paused : bool
     operator : str
         The wave operator, one of `OPERATORS`.
     color_range : float
-        Height from which on the colours should be full [m].
+        Height at the end of the colours [m].
     """
 
     def __init__(self, scene: Scene, *, fps: int = 30, resolution: int | None = None) -> None:
@@ -81,9 +62,9 @@ class Session:
         self._balls = Balls(self.simulation.model)
         self._material: dict[str, float] = {}
         self.skins = {name: Skin(self.simulation.ripples[name].atlas) for name in self.simulation.ripples}
-        self._rays = {name: self._ray_scene(name) for name in self.simulation.ripples}
+        self._picker = Picker(self.simulation)
         self._size = surface_size(scene)
-        self._strength = poke_strength(scene.surfaces[0].material.material(), self._size)
+        self._strength = poke_strength(scene.targets[0].material.material(), self._size)
         self.poke_impulse = self._strength.impulse
         self.operator = OPERATORS[0]
         self.paused = False
@@ -101,16 +82,16 @@ class Session:
 
     @property
     def parked(self) -> set[int]:
-        """Geoms of the balls that wait to be thrown."""
+        """Geoms of the balls not thrown yet."""
         return {self._balls.geoms[i] for i in self._balls.parked}
 
     def material(self, name: str) -> float:
         """Coefficient of the first surface's material, one of `SLIDERS`; where it is a map, its largest value."""
-        waves = self.simulation.ripples[self.simulation.scene.surfaces[0].geom]
+        waves = self.simulation.ripples[self.simulation.scene.targets[0].geom]
         return self._material.get(name, float(np.max(getattr(waves.material, name))))
 
     def advance(self) -> bool:
-        """Go on by one frame, unless paused; return whether anything moved.
+        """Advance by one frame, unless paused; return whether anything moved.
 
         Raises
         ------
@@ -122,7 +103,7 @@ class Session:
         return not self.paused
 
     def step(self) -> None:
-        """Go on by one frame, paused or not. Raises as `advance` does."""
+        """Advance by one frame, paused or not. Raises as `advance` does."""
         try:
             self.simulation.advance_frame()
             self.refresh()
@@ -139,7 +120,7 @@ class Session:
         self.color_range = max(wanted, _FADE * self.color_range)
 
     def reset(self) -> None:
-        """Start again from the beginning; material and operator as they were chosen stay."""
+        """Restart from the beginning; the chosen material and operator stay."""
         self._balls.park()
         self.simulation.reset()
         if self._material:
@@ -148,7 +129,7 @@ class Session:
         self.refresh()
 
     def set_operator(self, operator: str) -> None:
-        """Take another wave operator on all surfaces; the waves go on as they are.
+        """Switch the wave operator on all surfaces; the waves stay as they are.
 
         Raises
         ------
@@ -159,7 +140,7 @@ class Session:
         self.operator = operator
 
     def set_material(self, **coefficients: float) -> None:
-        """Change coefficients of the material of all surfaces; the waves go on as they are.
+        """Change coefficients of all surfaces' material; the waves stay as they are.
 
         Raises
         ------
@@ -171,19 +152,10 @@ class Session:
 
     def pick(self, origin: ArrayLike, direction: ArrayLike) -> Hit | None:
         """Nearest point of an undisplaced rippling surface on a ray from a point [m] of the world, or None."""
-        start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
-        hits = []
-        for name, rays in self._rays.items():
-            position, rotation = self._pose(name)
-            local, heading = (start - position) @ rotation, along @ rotation
-            found = rays.run(local[None].astype(np.float32), heading[None].astype(np.float32), output=1)
-            if found["primID"][0] >= 0:
-                distance = float(found["tfar"][0])
-                hits.append(Hit(name, local + distance * heading, distance))
-        return min(hits, key=lambda hit: hit.distance, default=None)
+        return self._picker.pick(origin, direction)
 
     def poke(self, origin: ArrayLike, direction: ArrayLike) -> Hit | None:
-        """Press on the surface where a ray meets it first, with `poke_impulse`; return the place, if there is one."""
+        """Press on the first surface on a ray, with `poke_impulse`; return the place, if there is one."""
         hit = self.pick(origin, direction)
         if hit is not None:
             self.simulation.ripples[hit.geom].add_impulse(hit.point, self.poke_impulse, self._strength.radius)
@@ -192,17 +164,12 @@ class Session:
     def throw(self, origin: ArrayLike, direction: ArrayLike) -> bool:
         """Throw a ball from a point [m] of the world along a direction; it comes down where that meets a surface.
 
-        Past the surface it flies through the point of the ray that is nearest to the first surface's middle. Returns
+        Beside the surface it flies through the point of the ray that is nearest to the first surface's middle. Returns
         whether there was a ball.
         """
         start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
-        hit = self.pick(start, along)
-        if hit is not None:
-            reach = hit.distance
-        else:
-            middle, _ = self._pose(self.simulation.scene.surfaces[0].geom)
-            reach = max(float((middle - start) @ along / (along @ along)), 0.0)
-        return self._balls.throw(self.simulation.data, start, start + reach * along, FLIGHT)
+        through = start + self._picker.reach(start, along) * along
+        return self._balls.throw(self.simulation.data, start, through, FLIGHT)
 
     def _before_step(self, simulation: Simulation) -> None:
         self._balls.hold(simulation.data)
@@ -210,14 +177,3 @@ class Session:
     def _change_material(self, **coefficients: Any) -> None:
         for name in self.simulation.ripples:
             self.simulation.ripples.change_material(name, **coefficients)
-
-    def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Position [m] and rotation matrix of a geom in the world."""
-        geom, data = self.simulation.ripples.geom_ids[name], self.simulation.data
-        return data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
-
-    def _ray_scene(self, name: str) -> Any:
-        mesh = self.simulation.ripples[name].atlas.mesh
-        rays = EmbreeScene()
-        TriangleMesh(rays, mesh.V.astype(np.float32), mesh.F.astype(np.int32))
-        return rays

@@ -1,4 +1,4 @@
-"""Soft blots on the floor under bodies and surfaces: enough of a shadow to see how high something is."""
+"""Soft round shadows on the floor, which show how high bodies and targets are."""
 
 from __future__ import annotations
 
@@ -8,36 +8,36 @@ import pyvista as pv
 
 from .session import Session
 
-# Darkness under something that touches the floor, and how many of its radii it has to be above the floor to cast none.
+# Darkness under a geom that touches the floor, and the height above the floor, in radii, from which it casts none.
 _DARKEST, _HIGHEST = 0.42, 6.0
-# Radius of a blot over that of the body's bounding ball, and how far above the floor it lies, in radii.
+# Radius of a shadow over that of the geom's bounding ball, and its height above the floor, in radii.
 _WIDER, _ABOVE = 1.15, 0.01
 _RINGS, _SIDES = 8, 32
 
 
 class Shadows:
-    """A blot for each of some geoms on a horizontal plane.
+    """A shadow for each of some geoms on a horizontal plane.
 
     Parameters
     ----------
     plotter : pyvista.Plotter
     session : Session
     geoms : list of int
-        What casts shadows.
+        That cast shadows.
     floor : int
         Geom id of the plane.
     """
 
     def __init__(self, plotter: pv.Plotter, session: Session, geoms: list[int], floor: int) -> None:
         self._session, self._floor = session, floor
-        blot = pv.Disc(inner=0.0, outer=1.0, normal=(0, 0, 1), r_res=_RINGS, c_res=_SIDES)
-        dark = np.clip(1 - np.linalg.norm(blot.points, axis=1), 0, 1)
-        shade = np.zeros((blot.n_points, 4), np.uint8)
+        disc = pv.Disc(inner=0.0, outer=1.0, normal=(0, 0, 1), r_res=_RINGS, c_res=_SIDES)
+        dark = np.clip(1 - np.linalg.norm(disc.points, axis=1), 0, 1)
+        shade = np.zeros((disc.n_points, 4), np.uint8)
         shade[:, 3] = np.rint(255 * dark * dark * (3 - 2 * dark))
-        blot.point_data["shade"] = shade
+        disc.point_data["shade"] = shade
         self._actors = {
             geom: plotter.add_mesh(
-                blot, scalars="shade", rgb=True, lighting=False, reset_camera=False, show_scalar_bar=False
+                disc, scalars="shade", rgb=True, lighting=False, reset_camera=False, show_scalar_bar=False
             )
             for geom in geoms
         }
@@ -60,16 +60,6 @@ class Shadows:
             pose = np.diag([wide, wide, 1.0, 1.0])
             pose[:3, 3] = x, y, ground + _ABOVE * radius
             actor.user_matrix = pose
-
-
-def find_floor(model: mujoco.MjModel, data: mujoco.MjData) -> int | None:
-    """Geom id of the highest plane that faces up, or None."""
-    planes = [
-        geom
-        for geom in range(model.ngeom)
-        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE and data.geom_xmat[geom, 8] > 0.999
-    ]
-    return max(planes, key=lambda geom: float(data.geom_xpos[geom, 2]), default=None)
 
 
 def _half_height(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:

@@ -1,8 +1,9 @@
-"""The skin of a rippling surface: a fine triangle mesh whose points and normals follow the waves, changed in place."""
+"""The skin of a target: a fine triangle mesh whose points and normals follow the waves, changed in place."""
 
 from __future__ import annotations
 
-import numba
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,13 +11,14 @@ from ripple_sim.render.surfaces.vertices import DIRECTION, NORMAL, POSITION, SPH
 from ripple_sim.render.visuals.corners import smooth_normals
 from ripple_sim.solver import Atlas, HeightMap
 from ripple_sim.solver.cube_map.convention import cube_chart_points
+from ripple_sim.solver.kernel import Floats32, Ints32, kernel
 
-# Triangles that software OpenGL draws 30 times a second beside the simulation, on two cores.
+# Software OpenGL draws this many triangles 30 times a second beside the simulation, on two cores.
 MAX_TRIANGLES = 24_000
 
 
 class Skin:
-    """A surface, refined about to its texels and displaced by their heights.
+    """A surface, tessellated to about its texels and displaced by their heights.
 
     Parameters
     ----------
@@ -46,27 +48,24 @@ class Skin:
         )
         for columns in (DIRECTION, NORMAL):  # those of midpoints are means
             vertices[:, columns] /= np.linalg.norm(vertices[:, columns], axis=1, keepdims=True)
-        self._rest, self._direction, self._rest_normals = (
+        rest, direction, normals = (
             np.ascontiguousarray(vertices[:, columns], dtype=np.float32) for columns in (POSITION, DIRECTION, NORMAL)
         )
-        self._texels, self._weights = _bilinear(vertices[:, SPHERE], atlas.resolution)
+        self._rest = _Rest(rest, direction, normals, *_bilinear(vertices[:, SPHERE], atlas.resolution))
         self._height_map = HeightMap(atlas.texels)
-        self.points, self.normals = self._rest.copy(), self._rest_normals.copy()
+        self.points, self.normals = rest.copy(), normals.copy()
         self.height = np.zeros(len(vertices), np.float32)
 
     def update(self, height: NDArray[np.float32]) -> None:
         """Follow a height field, float32 [6, N, N], in metres."""
         height_map = self._height_map(height).reshape(-1, 4)
-        _displace(
-            height_map, self._texels, self._weights, self._rest, self._direction, self._rest_normals,
-            self.points, self.normals, self.height,
-        )  # fmt: skip
+        _displace(height_map, self._rest, self.points, self.normals, self.height)
 
 
 def _bilinear(directions: NDArray[np.float64], n: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Addresses in a height map [6 (N + 2)^2] and weights of the four texels round each direction, [k, 4] both."""
     face, row, column = cube_chart_points(directions, n)
-    # the height map has a ring of neighbours round each face
+    # the height map has a halo around each chart
     row, column = np.clip(row + 1, 0, n + 1), np.clip(column + 1, 0, n + 1)
     r, c = np.minimum(row.astype(np.int64), n), np.minimum(column.astype(np.int64), n)
     s, t = row - r, column - c
@@ -76,9 +75,23 @@ def _bilinear(directions: NDArray[np.float64], n: int) -> tuple[NDArray[np.int32
     return texels.astype(np.int32), weights.astype(np.float32)
 
 
-@numba.njit(cache=True, nogil=True)
-def _displace(height_map, texels, weights, rest, direction, rest_normals, points, normals, height):
+class _Rest(NamedTuple):
+    """The undisplaced skin: points and outward directions and normals [n, 3], and where each point lies on the texels.
+
+    `texels` and `weights` [n, 4] are addresses in a height map [6 (N + 2)^2] and bilinear weights.
+    """
+
+    points: Floats32
+    directions: Floats32
+    normals: Floats32
+    texels: Ints32
+    weights: Floats32
+
+
+@kernel
+def _displace(height_map: Floats32, rest: _Rest, points: Floats32, normals: Floats32, height: Floats32) -> None:
     """Raise points by the height; a normal tips against the gradient, to first order in the height."""
+    texels, weights, direction, rest_normals = rest.texels, rest.weights, rest.directions, rest.normals
     for i in range(len(texels)):
         gx = gy = gz = h = np.float32(0)
         for k in range(4):
@@ -89,7 +102,7 @@ def _displace(height_map, texels, weights, rest, direction, rest_normals, points
             h += weight * height_map[texel, 3]
         height[i] = h
         for k in range(3):
-            points[i, k] = rest[i, k] + h * direction[i, k]
+            points[i, k] = rest.points[i, k] + h * direction[i, k]
         x, y, z = rest_normals[i, 0] - gx, rest_normals[i, 1] - gy, rest_normals[i, 2] - gz
         scale = 1 / np.sqrt(x * x + y * y + z * z)
         normals[i, 0], normals[i, 1], normals[i, 2] = x * scale, y * scale, z * scale

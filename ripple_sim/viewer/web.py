@@ -1,4 +1,4 @@
-"""The viewer in a browser on the same machine: trame sends pictures of an off-screen window, and events come back."""
+"""The viewer in a browser on the same machine: trame sends frames of an off-screen window, and events come back."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from .window import Window
 
 HOST = "127.0.0.1"
 
-# Without an answer for so long [s] the browser may have been closed, or opened anew.
+# Without an answer for this long [s] the browser may have been closed, or reopened.
 _PATIENCE = 1.0
-_QUALITY = 85  # of the JPEG pictures, per cent
+_QUALITY = 85  # of the JPEG frames, per cent
 
 _STYLE = """
 body { margin: 0; font: 14px sans-serif; background: #bdc4cf; color: #111; }
@@ -55,7 +55,7 @@ def check_web(port: int) -> None:
 
 
 def serve(window: Window, port: int) -> None:
-    """Serve a window that was made off screen, until it is closed or the program is interrupted."""
+    """Serve an off-screen window until it is closed or the program is interrupted."""
     from trame.app import get_server
 
     server = get_server("ripple-sim")
@@ -69,7 +69,7 @@ def serve(window: Window, port: int) -> None:
                 port=port, host=HOST, exec_mode="coroutine", open_browser=False, show_connection_info=False, timeout=0
             )
         )
-        print(f"http://{HOST}:{port}/ shows {window.plotter.title}; end it with Ctrl+C", flush=True)
+        print(f"http://{HOST}:{port}/ shows {window.plotter.title}; press Ctrl+C to stop", flush=True)
         await page.animate()
         await server.stop()
         with contextlib.suppress(asyncio.CancelledError):
@@ -77,14 +77,14 @@ def serve(window: Window, port: int) -> None:
 
     try:
         asyncio.run(main())
-    except KeyboardInterrupt:  # the usual way to end it
+    except KeyboardInterrupt:  # the usual way to stop
         pass
     finally:
         window.close()
 
 
 def _report(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """Say nothing of a browser that has left while something was being sent to it."""
+    """Ignore a browser that has left while something was being sent to it."""
     if not isinstance(context.get("exception"), ConnectionError):
         loop.default_exception_handler(context)
 
@@ -98,7 +98,7 @@ class _Page:
 
         self._server, self._window = server, window
         window.hide_texts()
-        # numbers of the latest pictures that were sent, and that the browser says it has got
+        # numbers of the latest frames sent, and acknowledged by the browser
         self._sent = self._received = 0
         self._heard = 0.0
         server.state.update({"status": "", "sent": 0})
@@ -114,21 +114,21 @@ class _Page:
                             html.Button(
                                 f"{control.label} ({control.key})",
                                 id=control.action,
-                                click=getattr(window, control.action),
+                                click=getattr(window.actions, control.action),
                             )
                 with html.Div(id="picture", style=f"height: {height}px"):
                     self._view = vtk.VtkRemoteView(
                         window.plotter.render_window, interactive_ratio=1, interactive_quality=_QUALITY
                     )
                 html.Output("{{ status }}", id="status")
-        # while an animation runs, this only says that the picture has changed
+        # while an animation runs, this only marks the frame as changed
         window.render = self._view.update
 
     async def animate(self) -> None:
-        """Go on with the session frame by frame until the window is closed.
+        """Run the session frame by frame until the window is closed.
 
-        The pictures are drawn and sent by trame's own animation: without one it would draw at every movement of the
-        pointer. None is drawn before the browser has got the one before, or they would queue up, and clicks with them.
+        Trame's own animation draws and sends the frames: without one it would draw at every movement of the pointer.
+        The next frame is drawn once the browser has the last one, or they would queue up, and clicks with them.
         """
         await self._server.ready
         window = self._window

@@ -121,7 +121,7 @@ class Atlas:
         return self.nearest(points)[1]
 
     def sampling_matrix(self, points: ArrayLike) -> Any:
-        """SciPy CSR matrix [k, T] that takes a flattened field to its values at the surface points nearest to others."""
+        """SciPy CSR matrix [k, T] that takes a flattened field to its values at the closest surface points."""
         return sampling_matrix(self.texels.topology, *self.locate(points))
 
     def stiffness(self, speed: float | NDArray[np.float64] = 1.0) -> Any:

@@ -1,10 +1,10 @@
-"""Pictures of a model with ripples in somebody's own loop."""
+"""Frames of a model with ripples in somebody's own loop."""
 
 import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim import Camera, Material, Pictures, RippleError, Ripples
+from ripple_sim import Camera, Material, RippleError, RippleRenderer, Ripples
 
 MODEL = """<mujoco><worldbody>
   <geom name="egg" type="ellipsoid" size="0.4 0.3 0.3" rgba="0.9 0.1 0.1 1"/>
@@ -21,11 +21,11 @@ def egg():
 
 def test_a_ripple_changes_the_picture_where_it_is(egg):
     model, data, ripples = egg
-    pictures = Pictures(model, ripples, width=96, height=72)
-    flat = pictures.draw(data, "side").astype(int)
+    renderer = RippleRenderer(model, ripples, width=96, height=72)
+    flat = renderer.render(data, "side").astype(int)
     ripples["egg"].add_impulse((0.0, -0.3, 0.1), 0.02, radius=0.1)
     ripples["egg"].step(0.1)
-    changed = np.abs(pictures.draw(data, "side").astype(int) - flat).max(axis=2) > 4
+    changed = np.abs(renderer.render(data, "side").astype(int) - flat).max(axis=2) > 4
     ripples.reset()
     assert changed.any()
     assert not changed[:, :8].any()
@@ -35,8 +35,8 @@ def test_a_ripple_changes_the_picture_where_it_is(egg):
 def test_the_same_state_gives_the_same_picture_in_the_colour_of_the_geom(egg):
     model, data, ripples = egg
     camera = Camera(lookat=(0, 0, 0), distance=2.0, azimuth=90.0, elevation=-20.0)
-    first = Pictures(model, ripples, width=96, height=72).draw(data, camera)
-    assert np.array_equal(first, Pictures(model, ripples, width=96, height=72).draw(data, camera))
+    first = RippleRenderer(model, ripples, width=96, height=72).render(data, camera)
+    assert np.array_equal(first, RippleRenderer(model, ripples, width=96, height=72).render(data, camera))
     red, green, blue = first[30:42, 42:54].reshape(-1, 3).mean(axis=0)
     assert red > 1.5 * green
     assert red > 1.5 * blue
@@ -44,14 +44,14 @@ def test_the_same_state_gives_the_same_picture_in_the_colour_of_the_geom(egg):
 
 def test_without_a_camera_it_is_the_free_one_of_the_model(egg):
     model, data, ripples = egg
-    pictures = Pictures(model, ripples, width=96, height=72)
+    renderer = RippleRenderer(model, ripples, width=96, height=72)
     free = Camera(lookat=tuple(model.stat.center), distance=1.5 * model.stat.extent, azimuth=90.0, elevation=-45.0)
-    assert np.array_equal(pictures.draw(data), pictures.draw(data, free))
+    assert np.array_equal(renderer.render(data), renderer.render(data, free))
 
 
 def test_an_unknown_look_or_camera_is_refused_by_name(egg):
     model, data, ripples = egg
     with pytest.raises(RippleError, match="glass"):
-        Pictures(model, ripples, looks={"egg": "glass"})
+        RippleRenderer(model, ripples, looks={"egg": "glass"})
     with pytest.raises(RippleError, match="above"):
-        Pictures(model, ripples, width=96, height=72).draw(data, "above")
+        RippleRenderer(model, ripples, width=96, height=72).render(data, "above")

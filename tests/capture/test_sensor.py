@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from exposed_scene import linear
 
 from ripple_sim.capture.sensor import Sensor
 
@@ -50,3 +51,27 @@ def test_linear_light_is_averaged_as_it_is() -> None:
     assert frame.dtype == np.float16
     expected = pictures.astype(float).reshape(3, 4, 2, 3, 2, 4).mean(axis=(0, 2, 4))
     np.testing.assert_allclose(frame, expected, rtol=1e-3)
+
+
+def test_the_sensor_averages_light_over_exposures():
+    black, white = np.zeros((2, 3, 3), np.uint8), np.full((2, 3, 3), 255, np.uint8)
+    sensor = Sensor(exposures=2)
+    for _ in range(2):  # the second frame keeps nothing of the first
+        assert sensor.expose(black) is None
+        np.testing.assert_array_equal(sensor.expose(white), 188)  # sRGB of half the light
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+def test_the_sensor_averages_codes_and_linear_light_alike(channels):
+    codes = np.random.default_rng(6).integers(0, 256, (3, 4, 6, channels), dtype=np.uint8)
+    light = linear(codes)
+    light[..., 3:] = codes[..., 3:] / 255
+    light[..., :3] *= light[..., 3:] if channels == 4 else 1
+    sensor, meter = Sensor(2, 3), Sensor(2, 3)
+    for number in range(3):
+        frame, mean = sensor.expose(codes[number]), meter.expose(light[number].astype(np.float32))
+    np.testing.assert_allclose(mean, light.reshape(3, 2, 2, 3, 2, channels).mean(axis=(0, 2, 4)), rtol=1e-5)
+    assert frame.dtype == np.uint8
+    expected = mean[..., :3] / (mean[..., 3:] if channels == 4 else 1)
+    np.testing.assert_allclose(linear(frame)[..., :3], expected, atol=5e-3)
+    np.testing.assert_allclose(frame[..., 3:] / 255, mean[..., 3:], atol=2e-3)

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from ripple_sim.cli import commands
+from ripple_sim.cli import info_command
 from ripple_sim.cli import main as cli
 from ripple_sim.errors import EncodingError, SceneError
 from ripple_sim.solver.errors import GLError
@@ -103,7 +103,7 @@ def test_a_usage_error_reads_the_same_in_every_locale(encoding):
     ("options", "said"),
     [
         (["-o", "clip.avi"], r"clip\.avi.*valid is \.mp4"),
-        (["-o", ".mp4"], r"\.mp4', which names no file"),
+        (["-o", ".mp4"], r"\.mp4', which is not a file name"),
         (["-o", "x."], r"x\. ends in \.; valid is"),
         (["-o", "clip.mp4", "--size", "641x360"], "641x360.*even"),
         (["-o", "clip.gif", "--fps", "60"], "60.*1 to 50"),
@@ -185,7 +185,7 @@ def test_the_exit_status_tells_what_kind_of_error_it_was(monkeypatch, capsys, er
     def run(self):
         raise error
 
-    monkeypatch.setattr(commands.Info, "run", run)
+    monkeypatch.setattr(info_command.Info, "run", run)
     assert cli.main(["info"]) == status
     line = capsys.readouterr().err
     assert line.startswith("ripple-sim: ")
@@ -196,7 +196,7 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
     def run(self):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(commands.Info, "run", run)
+    monkeypatch.setattr(info_command.Info, "run", run)
     with pytest.raises(ZeroDivisionError):
         cli.main(["info"])
 
@@ -204,13 +204,13 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
 @pytest.mark.parametrize(
     ("number", "status", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
 )
-@pytest.mark.parametrize("where", ["cli._parse = meet_signal", "commands.Info.run = meet_signal"])
+@pytest.mark.parametrize("where", ["cli._parse = meet_signal", "info_command.Info.run = meet_signal"])
 def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_path, number, status, word, where):
     (tmp_path / "slow.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\nfor _ in range(10**9): pass\n")
     code = (
         "import signal, sys\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # which a job in the background has ignored
-        "from ripple_sim.cli import commands\n"
+        "from ripple_sim.cli import info_command\n"
         "from ripple_sim.cli import main as cli\n"
         "def meet_signal(argument):\n"
         "    import slow\n"
@@ -229,7 +229,7 @@ def test_an_interrupted_command_says_what_is_left(monkeypatch, capsys):
         ending.add_note("48 frames are kept")
         raise ending
 
-    monkeypatch.setattr(commands.Info, "run", run)
+    monkeypatch.setattr(info_command.Info, "run", run)
     assert cli.main(["info"]) == 130
     assert capsys.readouterr().err == "ripple-sim: interrupted; 48 frames are kept\n"
 

@@ -9,7 +9,7 @@ from mujoco_models import mesh_asset
 
 from ripple_sim import Material, Ripples, make_collidable
 from ripple_sim.errors import RippleWarning
-from ripple_sim.scene.scene import load_scene
+from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scenes.shapes import limbed, peanut
 from ripple_sim.simulation import Simulation
 

@@ -114,7 +114,7 @@ def test_no_permission_on_the_render_node(devices: Path, plain_user: None) -> No
         node.chmod(0)
     for software in (True, None):
         [finding] = find_problems(software, devices)
-        assert finding.problem == f"this user may not use the GPU's render node {node}"
+        assert finding.problem == f"this user has no access to the GPU's render node {node}"
         assert finding.fix.startswith("sudo usermod -aG ")
         assert f" {grp.getgrgid(group_of_node).gr_name} $USER" in finding.fix
 

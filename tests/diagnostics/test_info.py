@@ -51,7 +51,7 @@ def test_without_egl_info_says_what_to_install(capsys, no_egl):
 def test_without_egl_the_text_says_so_too(capsys, no_egl):
     assert cli.main(["info"]) == 0
     out = capsys.readouterr().out
-    assert "none: no video here" in out
+    assert "none: rendering is impossible" in out
     assert "apt-get install" in out
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from ripple_sim.scene.scene import parse_scene
+from ripple_sim.scene.scene_file import parse_scene
 from ripple_sim.scenes.shapes import peanut, write_obj
 
 README = Path(__file__).parents[2] / "README.md"

@@ -17,9 +17,11 @@ from ripple_sim.errors import VideoError
 from ripple_sim.overlay.colormap import color_table
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.visuals import primitives as meshes
-from ripple_sim.scene.scene import Scene, load_scene
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene import Scene
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import shared_context
+from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import render_video
 
 WIDTH, HEIGHT = 64, 48
@@ -129,7 +131,7 @@ def test_a_disk_that_fills_up_with_the_last_bytes_is_noticed(tmp_path: Path) -> 
         "import resource, signal, sys\n"
         "import numpy as np\n"
         "from ripple_sim.errors import EncodingError\n"
-        "from ripple_sim.video import open_writer\n"
+        "from ripple_sim.encode import open_writer\n"
         "noise = np.random.default_rng(0).integers(0, 31743, (60, 60, 3), np.uint16).view(np.float16)\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (noise.nbytes - 1000,) * 2)\n"
@@ -175,16 +177,16 @@ def test_overlays_and_comparisons_are_refused_whoever_asks_for_them(scene: Scene
     frames = ["-o", str(tmp_path / "frames"), "--frame-format", "exr"]
     for option in (["--overlay", "time"], ["--compare", "paper"]):
         assert cli.main(["render", "missing", *frames, *option]) == 2
-        assert "linear light, over which overlays" in capsys.readouterr().err
+        assert "linear light, without overlays" in capsys.readouterr().err
     (tmp_path / "scene.toml").write_text('overlay = ["time"]\n' + TOML)
-    with pytest.raises(VideoError, match="linear light, over which overlays"):
-        render_video(load_scene(tmp_path / "scene.toml"), tmp_path / "frames", **OPTIONS)
+    with pytest.raises(VideoError, match="linear light, without overlays"):
+        render_video(load_scene(tmp_path / "scene.toml"), tmp_path / "frames", VideoOptions(**OPTIONS))
     assert not (tmp_path / "frames").exists()
 
 
 @pytest.mark.usefixtures("exr")
 def test_the_command_writes_a_folder_over_older_frames(scene: Scene, tmp_path: Path) -> None:
-    render_video(scene, tmp_path / "frames", size=(WIDTH, HEIGHT), fps=30)
+    render_video(scene, tmp_path / "frames", VideoOptions(size=(WIDTH, HEIGHT), fps=30))
     command = ["render", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "frames"), "--frame-format", "exr"]
     assert cli.main([*command, "--size", f"{WIDTH}x{HEIGHT}", "--fps", "30", "--duration", "0.1"]) == 0
     assert sorted(contents(tmp_path / "frames")) == [f"frame_{number:05d}.exr" for number in range(3)]
@@ -197,12 +199,12 @@ def test_an_interrupted_render_goes_on_to_the_same_frames(scene: Scene, tmp_path
             raise KeyboardInterrupt
 
     options = {**OPTIONS, "transparent": True}
-    render_video(scene, tmp_path / "whole", **options)
+    render_video(scene, tmp_path / "whole", VideoOptions(**options))
     with pytest.raises(KeyboardInterrupt):
-        render_video(scene, tmp_path / "broken", progress=interrupt, **options)
+        render_video(scene, tmp_path / "broken", VideoOptions(**options), progress=interrupt)
     with pytest.raises(VideoError, match="the frame format was exr and now is png"):
-        render_video(scene, tmp_path / "broken", resume=True, **{**options, "frame_format": "png"})
-    assert render_video(scene, tmp_path / "broken", resume=True, **options).frames == 12
+        render_video(scene, tmp_path / "broken", VideoOptions(resume=True, **{**options, "frame_format": "png"}))
+    assert render_video(scene, tmp_path / "broken", VideoOptions(resume=True, **options)).frames == 12
     assert contents(tmp_path / "broken") == contents(tmp_path / "whole")
 
 

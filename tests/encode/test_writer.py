@@ -304,7 +304,7 @@ def test_a_video_without_frames_is_refused(tmp_path):
     ("name", "size", "fps", "message"),
     [
         ("clip.avi", (1280, 720), 60, r"\.avi.*valid is \.mp4, \.webm, \.gif, \.webp"),
-        (".mp4", (1280, 720), 60, r"\.mp4', which names no file"),
+        (".mp4", (1280, 720), 60, r"\.mp4', which is not a file name"),
         ("clip.", (1280, 720), 60, r"ends in \.; valid"),
         ("..", (1280, 720), 60, "valid is .mp4"),
         ("clip.mp4", (1281, 720), 60, "1281x720.*even.*1282x720"),
@@ -314,7 +314,7 @@ def test_a_video_without_frames_is_refused(tmp_path):
         ("clip.mp4", (1280, 720), 0, "rate is 0.*1 to 240"),
         ("clip.mp4", (1280, 720), 1000, "rate is 1000.*1 to 240"),
         ("clip.gif", (1280, 720), 60, "GIF.*60.*1 to 50"),
-        ("a_file", (1280, 720), 60, "no folder"),
+        ("a_file", (1280, 720), 60, "is not a folder"),
         ("a_folder.mp4", (1280, 720), 60, "is a folder"),
         ("photos", (1280, 720), 60, r"other files \(me\.jpg\)"),
     ],

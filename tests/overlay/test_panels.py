@@ -1,52 +1,48 @@
-"""The panels: what they show stands where it should, on frames of every size."""
+"""Panels fit, and their type stays inside and apart."""
 
 import itertools
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ripple_sim.overlay import patch as patch_module
-from ripple_sim.overlay.arrows import draw_arrow
-from ripple_sim.overlay.chart import Chart
 from ripple_sim.overlay.colormap import colors
 from ripple_sim.overlay.comparison import TITLES
+from ripple_sim.overlay.energy_plot import EnergyPlot
 from ripple_sim.overlay.layout import Layout
 from ripple_sim.overlay.notes import Notes, Scale
 from ripple_sim.overlay.painter import Painter
 from ripple_sim.overlay.panels import arrow_key, color_bar, label
-from ripple_sim.overlay.patch import Patch, text_width
-from ripple_sim.overlay.scale import number
+from ripple_sim.overlay.sprite import Sprite, text_width
 from ripple_sim.scene.overlays import NAMES, parse_request
 
 SIZES = [(320, 180), (640, 360), (720, 1280), (1280, 720), (3840, 2160)]
 
 
 @pytest.fixture
-def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float, float, Patch]]:
-    """Boxes (left, top, right, bottom) of everything that is written, and the patch that it is written on."""
+def written(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float, float, Sprite]]:
+    """Boxes (left, top, right, bottom) of everything that is written, and the sprite that it is written on."""
     boxes = []
-    plain = Patch.text
+    plain = Sprite.text
 
-    def text(self: Patch, x: float, y: float, text: str, size: int, *style: object) -> None:
+    def text(self: Sprite, x: float, y: float, text: str, size: int, *style: object) -> None:
         align = style[1] if len(style) > 1 else "left"
         width = text_width(text, size)
         left = x - {"left": 0.0, "middle": 0.5, "right": 1.0}[str(align)] * width
         boxes.append((left, y - 0.75 * size, left + width, y + 0.24 * size, self))
         plain(self, x, y, text, size, *style)
 
-    monkeypatch.setattr(Patch, "text", text)
+    monkeypatch.setattr(Sprite, "text", text)
     return boxes
 
 
-def all_panels(layout: Layout) -> dict[str, Patch]:
+def all_panels(layout: Layout) -> dict[str, Sprite]:
     times = np.linspace(0, 3, 200)
-    chart = Chart(layout, "wave energy", "J", 4.0, ["ripple-sim", "Dynamic Paint"])
+    plot = EnergyPlot(layout, "wave energy", "J", 4.0, ["ripple-sim", "Dynamic Paint"])
     return {
         "top left": label("t = 12.34 s", layout.em, "slow"),
         "top right": arrow_key(layout, 0.05, 0.05),
         "bottom left": color_bar(layout, "velocity", "m/s", 0.5, 0.5),
-        "bottom right": chart.draw([(times, np.sin(times) ** 2)] * 2, 1.0, 1.0),
+        "bottom right": plot.draw([(times, np.sin(times) ** 2)] * 2, 1.0, 1.0),
     }
 
 
@@ -81,8 +77,8 @@ def test_a_comparison_fits(size: tuple[int, int], written: list) -> None:
     left, middle, right = (panels[corner][0].width for corner in ("top left", "top", "top right"))
     assert max(left, right) + middle / 2 < size[0] / 2 - Layout(*size).margin
     assert panels["bottom left"][0].width + panels["bottom right"][0].width < size[0]
-    chart = panels["bottom right"][0]
-    heading = [box for box in written if box[4].height == chart.height and box[3] < 2 * Layout(*size).em]
+    plot = panels["bottom right"][0]
+    heading = [box for box in written if box[4].height == plot.height and box[3] < 2 * Layout(*size).em]
     lines = sorted(box[:3:2] for box in heading)
     assert len(lines) == (2 if size[0] < 400 else 4)  # title, unit, and the names where there is room
     for (_, end), (begin, _) in itertools.pairwise(lines):
@@ -124,87 +120,3 @@ def test_bar_has_the_colors_of_its_values() -> None:
         assert nearest.min() <= 2
     middle = np.abs(row - colors(0.0, 0.02).astype(int)).sum(axis=1)
     assert abs(int(np.argmin(middle)) - bar.width / 2) < 3
-
-
-def test_patch_covers_in_proportion() -> None:
-    patch = Patch(10, 6)
-    patch.box(2.25, 1.0, 5.5, 2.5, (255, 255, 255))
-    frame = np.zeros((6, 10, 3), np.uint8)
-    patch.over(frame, 0, 0)
-    np.testing.assert_array_equal(frame[1, :, 0], [0, 0, 191, 255, 255, 128, 0, 0, 0, 0])
-    np.testing.assert_array_equal(frame[2, 3:5, 0], [128, 128])
-    assert frame[3:].max() == 0
-
-
-def test_patch_over_a_transparent_frame() -> None:
-    patch = Patch(3, 1)
-    patch.box(0, 0, 3, 1, (200, 100, 0), 0.5)
-    frame = np.zeros((1, 3, 4), np.uint8)
-    frame[0, 1:] = (0, 0, 80, 255), (0, 0, 80, 51)
-    patch.over(frame, 0, 0)
-    np.testing.assert_array_equal(frame[0, 0], (200, 100, 0, 128))  # the patch's own
-    np.testing.assert_array_equal(frame[0, 1], (100, 50, 40, 255))  # half and half
-    # shares of 0.5 and 0.2 * 0.5 of what is seen, over an opacity of 0.6
-    np.testing.assert_allclose(frame[0, 2], (200 * 5 / 6, 100 * 5 / 6, 80 / 6, 0.6 * 255), atol=1)
-
-
-@pytest.mark.parametrize("place", [(-6, -3), (95, 45), (200, 10), (40, -60)])
-def test_patch_over_the_border_is_cut(place: tuple[int, int]) -> None:
-    patch = Patch(12, 8)
-    patch.box(0, 0, 12, 8, (200, 100, 50))
-    frame = np.zeros((50, 100, 3), np.uint8)
-    patch.over(frame, *place)
-    x, y = place
-    expected = np.zeros_like(frame)
-    expected[max(y, 0) : max(y + 8, 0), max(x, 0) : max(x + 12, 0)] = (200, 100, 50)
-    np.testing.assert_array_equal(frame, expected)
-
-
-def test_chart_draws_values_at_their_height() -> None:
-    layout = Layout(1280, 720)
-    chart = Chart(layout, "energy", "J", 10.0)
-    times = np.linspace(0, 10, 300)
-
-    def row_of(value: float) -> float:
-        frame = np.full((400, 400, 3), 255, np.uint8)
-        chart.draw([(times, np.full(300, value))], 2.0, 2.0).over(frame, 0, 0)
-        blue = (frame[..., 2].astype(int) - frame[..., 0]) > 80
-        return float(np.flatnonzero(blue[:, 200]).mean())
-
-    low, middle, high = row_of(0.5), row_of(1.0), row_of(1.5)
-    assert low > middle > high
-    assert low - middle == pytest.approx(middle - high, abs=1.0)
-
-
-def test_chart_grows_with_time() -> None:
-    layout = Layout(1280, 720)
-    chart = Chart(layout, "energy", "J", 10.0)
-
-    def reach(until: float) -> int:
-        times = np.linspace(0, until, 50)
-        frame = np.full((400, 400, 3), 255, np.uint8)
-        chart.draw([(times, np.ones(50))], 2.0, 2.0).over(frame, 0, 0)
-        blue = (frame[..., 2].astype(int) - frame[..., 0]) > 80
-        return int(np.flatnonzero(blue.any(axis=0)).max())
-
-    quarter, half, whole = reach(2.5), reach(5.0), reach(10.0)
-    assert half - quarter == pytest.approx((whole - quarter) / 3, abs=1.5)
-
-
-def test_arrow_has_its_length_and_fades() -> None:
-    patch = Patch(120, 60)
-    draw_arrow(patch, (100.0, 30.0), (20.0, 30.0), 4.0, [1.0, 1.0, 0.0, 0.0])
-    frame = np.full((60, 120, 3), 255, np.uint8)
-    patch.over(frame, 0, 0)
-    dark = 255 - frame[30, :, 0].astype(int)
-    assert dark[100] > 200  # the tip's dot
-    assert dark[70:95].min() > 200
-    assert dark[20:40].max() == 0  # towards the tail nothing is seen
-    assert dark[110:].max() == 0
-
-
-def test_number_is_written_in_a_font_that_has_its_signs() -> None:
-    assert Path(patch_module._font(20).path).name == "DejaVuSans.ttf"
-    missing = patch_module._font(40).getmask("\U0010ffff").getbbox()
-    for sign in number(-1.0)[0], "µ", "\N{MULTIPLICATION SIGN}":
-        assert patch_module._font(40).getmask(sign).getbbox() != missing

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.scene import load_scene
+from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.simulation import Simulation
 
 MJCF = """<mujoco><compiler angle="degree"/><option timestep="0.002" gravity="0 0 0"/><worldbody>

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.scene import load_scene
+from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.scene_file import MapEntry, MaterialEntry, parse_scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import SolverError, texture_map
@@ -19,7 +19,7 @@ def test_eyes_of_the_face_stay_still() -> None:
     waves = simulation.ripples["face"]
     for _ in range(18):
         simulation.advance_frame()
-    still = texture_map(waves.atlas, simulation.scene.surfaces[0].still_map) < 0.5
+    still = texture_map(waves.atlas, simulation.scene.targets[0].still_map) < 0.5
     assert 0.01 < still.mean() < 0.1
     # all of it is on the two eyeballs
     eyes = [simulation.ripples.to_geom("face", [0.205, y, 0.445]) for y in (0.108, -0.108)]
@@ -60,6 +60,6 @@ def test_unknown_keys_of_a_map_are_refused() -> None:
 
 def test_missing_picture_is_named() -> None:
     scene = load_scene("face")
-    entry = msgspec.structs.replace(scene.surfaces[0], material=MaterialEntry(speed=MapEntry("slot_scratch.png")))
+    entry = msgspec.structs.replace(scene.targets[0], material=MaterialEntry(speed=MapEntry("slot_scratch.png")))
     with pytest.raises(SolverError, match=r"slot_scratch\.png.* cannot be read"):
-        Simulation(dataclasses.replace(scene, surfaces=(entry,)), resolution=16, backend="cpu")
+        Simulation(dataclasses.replace(scene, targets=(entry,)), resolution=16, backend="cpu")

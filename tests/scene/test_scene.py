@@ -8,7 +8,7 @@ import pytest
 
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
-from ripple_sim.scene.scene import load_scene, shipped_scenes
+from ripple_sim.scene.load_scene import load_scene, shipped_scenes
 from ripple_sim.scenes.shapes import peanut, write_obj
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import MeshError, RippleError
@@ -42,13 +42,13 @@ def test_every_shipped_scene_loads() -> None:
     assert "duck" in shipped_scenes()
     for name in shipped_scenes():
         scene = load_scene(name)
-        assert scene.surfaces
+        assert scene.targets
         assert scene.duration > 0
 
 
 def test_values_arrive_where_they_belong(tmp_path: Path) -> None:
     scene = load_scene(write(tmp_path))
-    [entry] = scene.surfaces
+    [entry] = scene.targets
     assert (entry.geom, entry.resolution, entry.material.speed) == ("egg", 16, 0.5)
     assert scene.camera.name == "eye"
     assert scene.name == "scene"

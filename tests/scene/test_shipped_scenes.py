@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from ripple_sim.scene.scene import load_scene, shipped_scenes
+from ripple_sim.scene.load_scene import load_scene, shipped_scenes
 from ripple_sim.scenes import shapes
 from ripple_sim.simulation import Simulation
 
@@ -41,7 +41,7 @@ def test_eyes_of_the_animal_stay_still_while_its_head_ripples() -> None:
     place = waves.atlas.positions
     away = np.min(
         [np.linalg.norm(place - simulation.ripples.to_geom("animal", eye.point), axis=-1)
-         for eye in simulation.scene.surfaces[0].still],
+         for eye in simulation.scene.targets[0].still],
         axis=0,
     )  # fmt: skip
     eyes, round_them = away < 0.016, (away > 0.045) & (away < 0.08)  # discs of 25 mm, texels of 4 mm

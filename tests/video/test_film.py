@@ -9,11 +9,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.capture.snapshot import FrameSource, run
+from ripple_sim.capture.frame_source import FrameSource
+from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.errors import SceneError
 from ripple_sim.overlay.colormap import color_table, colors
 from ripple_sim.overlay.comparison import compared_operators
-from ripple_sim.overlay.contacts import MEMORY, ContactMarks, Mark
+from ripple_sim.overlay.contact_marks import MEMORY, ContactMarks, Mark
 from ripple_sim.overlay.layout import Layout
 from ripple_sim.overlay.marks import draw_marks, place_marks
 from ripple_sim.overlay.notes import Notebook
@@ -21,14 +22,16 @@ from ripple_sim.overlay.projection import Projection
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.projection import perspective, view_matrix
 from ripple_sim.render.visuals import primitives as meshes
+from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.overlays import NAMES, parse_request
-from ripple_sim.scene.scene import Scene, load_scene
+from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.cube_map.convention import cube_topology, texel_directions
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.texels.halo import with_filled_halo
 from ripple_sim.video.film import Film
-from ripple_sim.video.render_video import render_video
+from ripple_sim.video.options import VideoOptions
+from ripple_sim.video.render_video import Progress, render_video
 
 MJCF = """<mujoco><option timestep="0.002"/><default><geom solref="0.01 0.3"/></default><worldbody>
 <geom name="floor" type="plane" size="2 2 1" pos="0 0 -0.3"/>
@@ -65,14 +68,11 @@ def make_scene(tmp_path: Path) -> Callable[..., Scene]:
 def film_of(scene: Scene, words: list[str], size: tuple[int, int], baseline: str | None = None) -> Film:
     operators = compared_operators(baseline)
     simulations = [Simulation(scene, fps=RATE, backend="cpu", operator=operator) for operator in operators]
-    width, height = size
-    return Film(
-        simulations, parse_request(words), width=width, height=height, frames=FRAMES, rate=RATE, operators=operators
-    )
+    return Film(simulations, VideoOptions(size=size, fps=RATE, overlay=words, compare=baseline), FRAMES)
 
 
 def last_frame(film: Film) -> np.ndarray:
-    return film.draw(list(film.states(alive=FRAMES))[-1])
+    return film.render(list(film.shots(alive=FRAMES))[-1])
 
 
 def ball_with_field(field: np.ndarray, limit: float) -> np.ndarray:
@@ -206,7 +206,7 @@ def test_halves_of_a_comparison_are_the_separate_runs(make_scene: Callable[..., 
     for operator in ("fem", baseline):
         simulation = Simulation(scene, fps=RATE, backend="cpu", operator=operator)
         source = FrameSource(simulation, width=160, height=120)
-        halves.append(source.draw(list(run(simulation, FRAMES))[-1]))
+        halves.append(source.render(list(snapshots(simulation, FRAMES))[-1]))
     # below the titles, and without the seam
     np.testing.assert_array_equal(frame[30:, :158], halves[0][30:, :158])
     np.testing.assert_array_equal(frame[30:, 162:], halves[1][30:, 2:])
@@ -216,10 +216,10 @@ def test_halves_of_a_comparison_are_the_separate_runs(make_scene: Callable[..., 
 
 def test_runs_share_their_scales(make_scene: Callable[..., Scene]) -> None:
     film = film_of(make_scene(), ["height", "contacts", "energy"], (64, 48), "uncorrected")
-    notes = [shot.notes for shot in film.states()][-1]
+    notes = [shot.notes for shot in film.shots()][-1]
     largest = max(float(values.max()) for _, values in notes.energies)
     assert notes.energy_scale.goal >= largest > 0
-    assert len(notes.fields) == len(notes.marks) == len(notes.energies) == 2
+    assert len(notes.heatmaps) == len(notes.marks) == len(notes.energies) == 2
     times, values = notes.energies[0]
     assert times[-1] == pytest.approx(notes.time)
     assert values[-1] == pytest.approx(film.simulations[0].ripples["egg"].energy())
@@ -229,7 +229,7 @@ def test_without_a_request_nothing_is_drawn_over(make_scene: Callable[..., Scene
     scene = make_scene()
     simulation = Simulation(scene, fps=RATE, backend="cpu")
     source = FrameSource(simulation, width=96, height=54)
-    plain = source.draw(list(run(simulation, FRAMES))[-1])
+    plain = source.render(list(snapshots(simulation, FRAMES))[-1])
     np.testing.assert_array_equal(last_frame(film_of(scene, [], (96, 54))), plain)
 
 
@@ -246,8 +246,7 @@ def test_overlays_on_a_transparent_background(make_scene: Callable[..., Scene]) 
     frames = []
     for words in ([], EVERYTHING):
         simulation = Simulation(make_scene(), fps=RATE, backend="cpu")
-        request = parse_request(words)
-        film = Film([simulation], request, width=192, height=108, frames=FRAMES, rate=RATE, transparent=True)
+        film = Film([simulation], VideoOptions(size=(192, 108), fps=RATE, overlay=words, transparent=True), FRAMES)
         frames.append(last_frame(film))
     plain, drawn = frames
     assert drawn.shape == (108, 192, 4)
@@ -265,7 +264,7 @@ def test_each_alone_changes_the_picture(make_scene: Callable[..., Scene]) -> Non
 
 def test_a_given_range_holds(make_scene: Callable[..., Scene]) -> None:
     film = film_of(make_scene(), ["velocity=0.25"], (64, 48))
-    assert {shot.notes.field_scale.value for shot in film.states()} == {0.25}
+    assert {shot.notes.heatmap_scale.value for shot in film.shots()} == {0.25}
 
 
 def test_notes_do_not_grow(make_scene: Callable[..., Scene]) -> None:
@@ -277,9 +276,12 @@ def test_notes_do_not_grow(make_scene: Callable[..., Scene]) -> None:
 
 
 def test_resumed_video_is_the_unbroken_one(make_scene: Callable[..., Scene], tmp_path: Path) -> None:
-    def render(name: str, **options: Any) -> list[bytes]:
+    def render(name: str, progress: Progress | None = None, **options: Any) -> list[bytes]:
         render_video(
-            make_scene(), tmp_path / name, size=(192, 108), fps=20, duration=0.3, overlay=EVERYTHING, **options
+            make_scene(),
+            tmp_path / name,
+            VideoOptions(size=(192, 108), fps=20, duration=0.3, overlay=EVERYTHING, **options),
+            progress=progress,
         )
         return [path.read_bytes() for path in sorted((tmp_path / name).iterdir())]
 
@@ -297,10 +299,10 @@ def test_scene_file_names_overlays_and_a_video_shows_them(make_scene: Callable[.
     assert scene.overlay == ("height=0.01", "time")
     pictures = {}
     for name, overlay in (("own", None), ("same", ["height=0.01", "time"]), ("none", [])):
-        render_video(scene, tmp_path / name, size=(96, 54), fps=10, duration=0.3, overlay=overlay)
+        render_video(scene, tmp_path / name, VideoOptions(size=(96, 54), fps=10, duration=0.3, overlay=overlay))
         pictures[name] = sorted(path.read_bytes() for path in (tmp_path / name).iterdir())
     assert pictures["own"] == pictures["same"] != pictures["none"]
     with pytest.raises(SceneError, match="no overlay 'hight'"):
         make_scene('overlay = ["hight"]\n' + TOML)
     with pytest.raises(SceneError, match="valid are paper"):
-        render_video(scene, tmp_path / "x", size=(96, 54), fps=10, compare="jacobian")
+        render_video(scene, tmp_path / "x", VideoOptions(size=(96, 54), fps=10, compare="jacobian"))

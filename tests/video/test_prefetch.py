@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from ripple_sim.video.prefetch import Ahead
+from ripple_sim.video.prefetch import Prefetch
 
 
 def test_items_come_in_order_from_another_thread():
@@ -17,8 +17,8 @@ def test_items_come_in_order_from_another_thread():
             threads.add(threading.get_ident())
             yield number
 
-    with Ahead(items(), 3) as ahead:
-        assert list(ahead) == list(range(50))
+    with Prefetch(items(), 3) as prefetched:
+        assert list(prefetched) == list(range(50))
     assert len(threads) == 1
     assert threading.get_ident() not in threads
 
@@ -31,8 +31,8 @@ def test_it_runs_ahead_as_far_as_it_may_and_no_further():
             begun.append(number)
             yield number
 
-    with Ahead(items(), 3) as ahead:
-        for number in ahead:
+    with Prefetch(items(), 3) as prefetched:
+        for number in prefetched:
             waited = time.monotonic() + 5
             # one is in the taker's hands, three wait, one is held until there is room
             while len(begun) < min(number + 5, 50) and time.monotonic() < waited:
@@ -47,8 +47,8 @@ def test_an_error_comes_where_the_next_item_would_have_come():
         raise ZeroDivisionError
 
     taken = []
-    with pytest.raises(ZeroDivisionError), Ahead(items(), 3) as ahead:
-        for number in ahead:
+    with pytest.raises(ZeroDivisionError), Prefetch(items(), 3) as prefetched:
+        for number in prefetched:
             taken.append(number)
     assert taken == [1, 2]
 
@@ -61,6 +61,6 @@ def test_leaving_early_stops_the_thread():
             number += 1
 
     before = threading.active_count()
-    with Ahead(items(), 3) as ahead:
-        assert next(ahead) == 0
+    with Prefetch(items(), 3) as prefetched:
+        assert next(prefetched) == 0
     assert threading.active_count() == before

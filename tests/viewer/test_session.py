@@ -1,44 +1,25 @@
-"""The viewer without a window: running, pausing, resetting, poking, throwing, and the surface that is shown."""
+"""The viewer without a window: running, pausing, resetting, poking."""
 
 import re
 import subprocess
 import sys
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
+from played import RADIUS, run
 
-from ripple_sim.errors import SceneError, SimulationError
-from ripple_sim.scene.scene import Scene, load_scene
-from ripple_sim.scenes.shapes import peanut, write_obj
-from ripple_sim.solver import SolverError, sphere_atlas
-from ripple_sim.viewer.balls import Balls, add_balls
-from ripple_sim.viewer.opening import BALLS, FLIGHT, open_scene, poke_strength
+from ripple_sim.errors import SimulationError
+from ripple_sim.scene.scene import Scene
+from ripple_sim.scenes import shapes
+from ripple_sim.solver import SolverError
+from ripple_sim.viewer.opening import open_scene
 from ripple_sim.viewer.session import OPERATORS, Session
-from ripple_sim.viewer.skin import Skin
-
-RADIUS, MIDDLE = 0.5, np.array([0.0, 0.0, 0.5])  # of the scene "sphere" [m]
-
-
-@pytest.fixture(scope="module")
-def scene() -> Scene:
-    return open_scene("sphere")
-
-
-@pytest.fixture
-def session(scene: Scene) -> Session:
-    return Session(scene, resolution=24)
 
 
 def state(session: Session) -> bytes:
     fields = [session.simulation.ripples[name].height.tobytes() for name in session.simulation.ripples]
     return b"".join([session.simulation.data.qpos.tobytes(), *fields])
-
-
-def run(session: Session, frames: int) -> None:
-    for _ in range(frames):
-        session.advance()
 
 
 def test_time_goes_on_frame_by_frame_and_stops_where_it_is_paused(session: Session) -> None:
@@ -78,7 +59,7 @@ def test_two_sessions_that_are_played_alike_are_alike(scene: Scene) -> None:
 
 
 def test_a_script_and_its_changed_materials_start_again_too(tmp_path: Path) -> None:
-    folder = Path(sys.modules["ripple_sim.scenes.shapes"].__file__).parent
+    folder = Path(shapes.__file__).parent
     (tmp_path / "sphere.xml").write_text((folder / "sphere.xml").read_text())
     (tmp_path / "sphere.toml").write_text(
         (folder / "sphere.toml").read_text()
@@ -93,41 +74,6 @@ def test_a_script_and_its_changed_materials_start_again_too(tmp_path: Path) -> N
     assert np.max(session.simulation.ripples["sphere"].material.speed) == 0.5
     run(session, 8)
     assert state(session) == first
-
-
-def test_a_ray_finds_the_surface_where_geometry_says(session: Session) -> None:
-    rng = np.random.default_rng(1)
-    for _ in range(20):
-        origin = MIDDLE + 3 * rng.standard_normal(3) / np.sqrt(3)
-        if np.linalg.norm(origin - MIDDLE) < 1:
-            continue
-        toward = MIDDLE + 0.3 * rng.uniform(-1, 1, 3) - origin
-        hit = session.pick(origin, toward)
-        assert hit is not None
-        # |o + t d| = R
-        local = origin - MIDDLE
-        a, b, c = toward @ toward, local @ toward, local @ local - RADIUS**2
-        assert hit.distance == pytest.approx((-b - np.sqrt(b * b - a * c)) / a, rel=3e-3)
-    assert session.pick([3, 0, 0.5], [1, 0, 0]) is None
-    assert session.pick([3, 0, 2.5], [-1, 0, 0]) is None
-
-
-def test_a_ray_finds_the_nearest_of_two_turned_and_moved_surfaces() -> None:
-    session = Session(open_scene("pair"), resolution=16)
-    run(session, 4)
-    data, ids = session.simulation.data, session.simulation.ripples.geom_ids
-    left, right = (data.geom_xpos[ids[name]] for name in ("left", "right"))
-    along = (right - left) / np.linalg.norm(right - left)
-    for start, way, name in ((left - 2 * along, along, "left"), (right + 2 * along, -along, "right")):
-        hit = session.pick(start, way)
-        assert hit is not None
-        assert hit.geom == name
-        atlas = session.simulation.ripples[name].atlas
-        closest, _ = atlas.project(hit.point)
-        assert np.linalg.norm(closest[0] - hit.point) < 1e-3  # triangles in a ball
-        # carried back to the world the point lies on the ray
-        world = data.geom_xpos[ids[name]] + data.geom_xmat[ids[name]].reshape(3, 3) @ hit.point
-        np.testing.assert_allclose(world, start + hit.distance * way, atol=1e-6)
 
 
 def test_a_poke_presses_the_surface_in_where_it_points(session: Session) -> None:
@@ -146,20 +92,6 @@ def test_a_poke_presses_the_surface_in_where_it_points(session: Session) -> None
     assert -0.1 * RADIUS < skin.height.min() < -0.003 * RADIUS
 
 
-@pytest.mark.parametrize("name", ["sphere", "rolling", "heavy", "animal"])
-def test_the_suggested_poke_is_seen_but_not_absurd(name: str) -> None:
-    session = Session(open_scene(name), resolution=32)
-    [waves] = (session.simulation.ripples[geom] for geom in session.simulation.ripples)
-    [geom] = session.simulation.ripples.geom_ids.values()
-    middle = session.simulation.data.geom_xpos[geom]
-    assert session.poke(middle + np.array([0, 0, 9]), [0, 0, -1]) is not None
-    deepest = 0.0
-    for _ in range(8):
-        waves.step(1 / 30)  # without the bodies of the scene
-        deepest = max(deepest, float(np.abs(waves.height).max()))
-    assert 0.003 < deepest / session.size < 0.05
-
-
 def test_a_stronger_poke_goes_deeper_in_proportion(scene: Scene) -> None:
     depth = []
     for factor in (1.0, 2.0):
@@ -169,63 +101,6 @@ def test_a_stronger_poke_goes_deeper_in_proportion(scene: Scene) -> None:
         session.step()
         depth.append(session.skins["sphere"].height.min())
     assert depth[1] == pytest.approx(2 * depth[0], rel=1e-4)
-
-
-def test_a_thrown_ball_hits_where_the_ray_meets_the_surface(session: Session) -> None:
-    assert len(session.parked) == BALLS
-    assert session.throw([2.5, 0.0, 0.9], [-2.5, 0.0, -0.4])
-    assert len(session.parked) == BALLS - 1
-    impulses = []
-    for _ in range(round(1.5 * FLIGHT * session.fps)):
-        session.advance()
-        impulses += [hit for hit in session.simulation.impulses if hit.other.startswith("thrown")]
-    expected = session.pick([2.5, 0.0, 0.9], [-2.5, 0.0, -0.4])
-    assert expected is not None
-    assert impulses
-    # it arrives a radius early, and rolls a little while it presses
-    assert np.linalg.norm(impulses[0].point - (MIDDLE + expected.point)) < 0.15 * RADIUS
-
-
-def test_a_ball_flies_a_parabola_through_its_point() -> None:
-    spec = mujoco.MjSpec()
-    add_balls(spec, 2, 0.05, 0.1)
-    model = spec.compile()
-    model.opt.timestep = 1e-3
-    data, balls = mujoco.MjData(model), Balls(model)
-    assert balls.throw(data, [1.0, 2.0, 3.0], [-1.0, 0.5, 2.0], 0.4)
-    for _ in range(400):
-        balls.hold(data)
-        mujoco.mj_step(model, data)
-    np.testing.assert_allclose(data.body(1).xpos, [-1.0, 0.5, 2.0], atol=0.02)
-    np.testing.assert_allclose(data.qpos[7:10], model.qpos0[7:10], atol=1e-4)  # the other one waits
-
-
-def test_the_oldest_ball_is_used_again_and_a_reset_calls_all_back(session: Session) -> None:
-    for number in range(BALLS + 1):
-        assert session.throw([3.0, 0.0, 2.0 + 0.3 * number], [-1.0, 0.0, 0.0])
-    assert session.parked == set()
-    session.reset()
-    session.advance()
-    assert len(session.parked) == BALLS
-    assert session.simulation.data.qpos[-5] > 10
-
-
-def test_a_scene_without_balls_says_so() -> None:
-    session = Session(load_scene("sphere"), resolution=8)
-    assert not session.throw([3.0, 0.0, 0.5], [-1.0, 0.0, 0.0])
-
-
-def test_balls_change_neither_the_view_nor_a_keyframe(tmp_path: Path) -> None:
-    (tmp_path / "scene.xml").write_text("""<mujoco><worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
-      <body pos="0 0 1"><freejoint/><geom size="0.05"/></body></worldbody>
-      <keyframe><key qpos="0.1 0.2 0.9 1 0 0 0"/></keyframe></mujoco>""")
-    (tmp_path / "scene.toml").write_text('model = "scene.xml"\n[[ripple]]\ngeom = "egg"\n')
-    scene, plain = open_scene(tmp_path / "scene.toml"), load_scene(tmp_path / "scene.toml")
-    assert scene.model.stat.extent == plain.model.stat.extent
-    np.testing.assert_array_equal(scene.model.stat.center, plain.model.stat.center)
-    session = Session(scene, resolution=8)
-    np.testing.assert_array_equal(session.simulation.data.qpos[:3], [0.1, 0.2, 0.9])
-    np.testing.assert_array_equal(session.simulation.data.qpos[7:], scene.model.qpos0[7:])
 
 
 def test_sliders_change_the_material_and_outlive_a_reset(session: Session) -> None:
@@ -288,52 +163,6 @@ def test_what_becomes_unstable_is_paused_and_can_start_again(tmp_path: Path, mon
     session.reset()
     assert session.time == 0
     assert {path.name for path in tmp_path.iterdir()} == {"scene.xml", "scene.toml"}  # no log of MuJoCo's
-
-
-def test_a_skin_is_the_surface_while_nothing_moves(session: Session) -> None:
-    skin = session.skins["sphere"]
-    np.testing.assert_allclose(np.linalg.norm(skin.points, axis=1), RADIUS, rtol=2e-3)
-    np.testing.assert_allclose(np.linalg.norm(skin.normals, axis=1), 1, rtol=1e-5)
-    corners = skin.points[skin.F]
-    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert (np.einsum("ij,ij->i", outward, corners.mean(axis=1)) > 0).all()
-
-
-def test_a_skin_follows_a_smooth_height_with_its_points_and_normals() -> None:
-    atlas = sphere_atlas(1.0, 48)
-    skin = Skin(atlas)
-    rest, flat, height = skin.points.copy(), skin.normals.copy(), 0.02
-    x, _, z = np.moveaxis(atlas.positions, -1, 0)
-    skin.update((height * (x * z)).astype(np.float32))
-    direction = rest / np.linalg.norm(rest, axis=1, keepdims=True)
-    wave = height * direction[:, 0] * direction[:, 2]
-    np.testing.assert_allclose(skin.height, wave, atol=2e-3 * height)
-    np.testing.assert_allclose(np.linalg.norm(skin.points - rest, axis=1), np.abs(wave), atol=3e-3 * height)
-    # gradient on the unit sphere of a x z: the plane gradient (z, 0, x) a without its radial part
-    gradient = height * np.stack([direction[:, 2], np.zeros(len(rest)), direction[:, 0]], axis=1)
-    gradient -= np.einsum("ij,ij->i", gradient, direction)[:, None] * direction
-    tipped = flat - gradient
-    tipped /= np.linalg.norm(tipped, axis=1, keepdims=True)
-    assert np.linalg.norm(skin.normals - tipped, axis=1).max() < 0.02 * np.linalg.norm(tipped - flat, axis=1).max()
-
-
-def test_meshes_and_scene_files_can_be_opened_and_mistakes_are_named(tmp_path: Path) -> None:
-    write_obj(tmp_path / "peanut.obj", *peanut())
-    scene = open_scene(tmp_path / "peanut.obj", bodies=0)
-    assert scene.name == "peanut"
-    assert scene.model.nbody == 1 + BALLS
-    for wrong in ("no such thing", tmp_path / "missing.obj"):
-        with pytest.raises(SceneError, match=r"there is no scene or mesh.*shipped scenes are"):
-            open_scene(wrong)
-    with pytest.raises(SceneError, match="there is no scene"):
-        open_scene(tmp_path / "missing.toml")
-
-
-def test_a_suggested_poke_scales_with_size_and_density() -> None:
-    material = load_scene("sphere").surfaces[0].material.material()
-    one, two = poke_strength(material, 1.0), poke_strength(material, 2.0)
-    assert two.radius == pytest.approx(2 * one.radius)
-    assert two.impulse > 4 * one.impulse
 
 
 def test_a_session_needs_no_vtk() -> None:

@@ -61,7 +61,7 @@ def difference(one: np.ndarray, other: np.ndarray, region: tuple[slice, slice] =
 
 
 def test_the_first_picture_shows_the_scene(window: Window) -> None:
-    picture = window.picture()
+    picture = window.pixels()
     assert picture.shape == (300, 400, 3)
     # the sphere is grey (no height) before a bright floor, upright
     ball = picture[300 - MIDDLE[1], MIDDLE[0]].astype(int)
@@ -71,16 +71,16 @@ def test_the_first_picture_shows_the_scene(window: Window) -> None:
 
 
 def test_a_click_pokes_what_is_under_it(window: Window) -> None:
-    before = window.picture().copy()
+    before = window.pixels().copy()
     drag(window, MIDDLE)
     for _ in range(3):
         assert window.tick()
     skin = window.session.skins["sphere"]
     assert skin.height.min() < -1e-3
     # blue, in the middle of the picture
-    red, _, blue = window.picture()[300 - MIDDLE[1], MIDDLE[0]].astype(int)
+    red, _, blue = window.pixels()[300 - MIDDLE[1], MIDDLE[0]].astype(int)
     assert blue > red + 40
-    assert difference(before, window.picture()) > 0.005
+    assert difference(before, window.pixels()) > 0.005
 
 
 def test_a_click_beside_the_surface_and_a_drag_poke_nothing(window: Window) -> None:
@@ -123,14 +123,14 @@ def test_pause_step_and_reset_by_keys(window: Window) -> None:
 def test_a_ball_is_thrown_at_the_pointer_and_seen(window: Window) -> None:
     press(window, "space")
     window.tick()
-    before = window.picture().copy()
+    before = window.pixels().copy()
     window.plotter.iren._mouse_move(*MIDDLE)
     press(window, "t")
     assert len(window.session.parked) == BALLS - 1
     press(window, "space")
     for _ in range(6):
         window.tick()
-    assert difference(before, window.picture()) > 0.002
+    assert difference(before, window.pixels()) > 0.002
     hit = []
     for _ in range(12):
         window.tick()
@@ -145,21 +145,21 @@ def test_keys_change_operator_and_colours_and_hide_the_help(window: Window) -> N
         assert window.session.operator == operator
         assert f"operator {operator}" in window.status()
     window.tick()
-    grey = window.picture().copy()
+    grey = window.pixels().copy()
     press(window, "c")
     window.tick()
-    own = window.picture().copy()
+    own = window.pixels().copy()
     red, _, blue = own[300 - MIDDLE[1], MIDDLE[0]].astype(int)
     assert blue > red + 60  # the scene's colour is blue
     assert difference(grey, own) > 0.1
     press(window, "h")
     window.tick()
-    assert difference(own, window.picture(), np.s_[:150, 250:]) > 0.01
+    assert difference(own, window.pixels(), np.s_[:150, 250:]) > 0.01
 
 
 def test_every_control_does_something_and_other_keys_do_nothing(window: Window) -> None:
     for control in CONTROLS:
-        assert callable(getattr(window, control.action))
+        assert callable(getattr(window.actions, control.action))
     for key in ("w", "e", "p", "3", "f", "j", "Escape"):
         press(window, key)
     assert not window.closed
@@ -197,7 +197,7 @@ def test_screenshots_are_numbered(window: Window, tmp_path: Path) -> None:
     press(window, "s")
     pictures = [np.asarray(Image.open(tmp_path / f"sphere-{number}.png")) for number in (1, 2)]
     assert pictures[0].shape == (300, 400, 3)
-    assert difference(pictures[0], window.picture()) < 0.05
+    assert difference(pictures[0], window.pixels()) < 0.05
     assert "sphere-2.png" in window.message
 
 
@@ -212,13 +212,13 @@ def test_a_recording_is_a_video_of_the_frames(window: Window, tmp_path: Path) ->
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
     assert (stream.width, stream.height, float(stream.average_rate)) == (400, 300, 30)
     assert len(frames) == 8
-    assert difference(frames[-1], window.picture()) < 0.05
+    assert difference(frames[-1], window.pixels()) < 0.05
 
 
 def test_a_recording_ends_with_the_window(closed: Window, tmp_path: Path) -> None:
     closed.open()
     closed.tick()
-    closed.record()
+    closed.actions.record()
     closed.tick()
     closed.close()
     assert (tmp_path / "sphere-1.mp4").stat().st_size > 0
@@ -226,9 +226,9 @@ def test_a_recording_ends_with_the_window(closed: Window, tmp_path: Path) -> Non
 
 
 def test_an_unwritable_folder_is_told_and_the_window_goes_on(window: Window) -> None:
-    window._takes._folder = Path("/proc/slot_scratch")
+    window.recorder._folder = Path("/proc/nowhere")
     press(window, "s")
-    assert "cannot write /proc/slot_scratch/sphere-1.png" in window.message
+    assert "cannot write /proc/nowhere/sphere-1.png" in window.message
     press(window, "v")
     assert "cannot write" in window.message
     assert window.tick()
@@ -246,7 +246,7 @@ def test_what_becomes_unstable_is_told_and_can_be_reset(window: Window) -> None:
 
 
 def test_arrays_are_changed_in_place(window: Window) -> None:
-    actor = window._skins["sphere"]
+    actor = window.stage.skins["sphere"]
     places = [actor._mesh.GetPoints().GetData().GetVoidPointer(0), actor._mesh.GetPolys().GetMTime()]
     drag(window, MIDDLE)
     window.tick()
@@ -281,11 +281,11 @@ def test_shadows_darken_as_bodies_come_down(window: Window) -> None:
     session = window.session
     model, data = session.simulation.model, session.simulation.data
     ball = model.geom("ball").id
-    shadow = window._shadows._actors[ball]
+    shadow = window.stage.shadows._actors[ball]
     darkness = []
     for height in (1.5, 0.3, 0.07):
         data.geom_xpos[ball] = 1.0, 0.5, height
-        window._shadows.update()
+        window.stage.shadows.update()
         darkness.append(shadow.prop.opacity if shadow.GetVisibility() else 0.0)
     assert 0 == darkness[0] < darkness[1] < darkness[2]
     np.testing.assert_allclose(shadow.GetCenter(), [1.0, 0.5, 0.0], atol=2e-3)

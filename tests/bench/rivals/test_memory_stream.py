@@ -26,7 +26,7 @@ def test_stream_has_the_bytes_of_a_substep() -> None:
     """Read are 4 link weights, gain, height and velocity (28 bytes); written are velocity and next height (8 bytes)."""
     operator = build_operator(sphere_atlas(1.0, 16), Material(), "fem")
     texels = operator.mass.size
-    stencil = operator.stencil[..., 1:, 1:]  # one weight of each direction a texel
+    stencil = operator.stencil.weights[..., 1:, 1:]  # one weight of each direction a texel
     fields = [stencil, operator.mass, operator.mass, operator.mass]
     assert sum(each.size for each in fields) == READS * texels
     streams = MemoryStream(texels).streams

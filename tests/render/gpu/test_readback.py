@@ -11,9 +11,10 @@ from ripple_sim.render import Camera, Renderer
 from ripple_sim.render.frame_format import FrameFormat
 from ripple_sim.render.gpu.readback import Readback
 from ripple_sim.render.gpu.resources import Resources
-from ripple_sim.scene.scene import load_scene
+from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import render_video
 
 pytestmark = pytest.mark.usefixtures("opengl")
@@ -96,11 +97,8 @@ def test_a_video_is_the_same_whether_or_not_its_frames_are_drawn_ahead(
         render_video(
             scene,
             tmp_path / driver,
-            size=(96, 64),
-            fps=30,
-            backend=backend,
+            VideoOptions(size=(96, 64), fps=30, backend=backend, **options),
             progress=lambda frames, total: done.append(frames),
-            **options,
         )
     assert done == 2 * list(range(1, 13))
     for software, gpu in zip(*(sorted((tmp_path / driver).iterdir()) for driver in ("software", "gpu")), strict=True):

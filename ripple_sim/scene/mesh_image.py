@@ -1,4 +1,4 @@
-"""The picture that belongs to a mesh file's texture coordinates."""
+"""The image that belongs to a mesh file's texture coordinates."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _SUFFIXES = (".png", ".jpg", ".jpeg")
 _SCENES = (".glb", ".gltf")
 
 
-def mesh_picture(mesh_path: str | Path) -> NDArray[np.uint8] | None:
-    """Picture of a mesh file, or None: what an OBJ's material library or a GLB names, or NAME_texture.png beside it.
+def mesh_image(mesh_path: str | Path) -> NDArray[np.uint8] | None:
+    """Image of a mesh file, or None: named in an OBJ's material library or in a GLB, or NAME_texture.png beside it.
 
-    Where several pictures colour one mesh, none is taken, with a warning.
+    If several images colour one mesh, none is used, with a warning.
 
     Returns
     -------
@@ -35,38 +35,38 @@ def mesh_picture(mesh_path: str | Path) -> NDArray[np.uint8] | None:
         found = named or [path for path in beside if path.is_file()][:1]
     if len(found) > 1:
         warnings.warn(
-            f"{mesh_path.name} is coloured by {len(found)} pictures, and one mesh shows one: none is drawn; join them "
-            "to one picture, or choose one with --texture",
+            f"{mesh_path.name} is coloured by {len(found)} images, but a mesh can show only one: none is used; join "
+            "them into one image, or choose one with --texture",
             RippleWarning,
             stacklevel=3,
         )
-    return load_picture(found[0]) if len(found) == 1 else None
+    return load_image(found[0]) if len(found) == 1 else None
 
 
-def load_picture(source: Any) -> NDArray[np.uint8]:
-    """Pixels of a picture file or of a PIL image, uint8 [height, width, 3], top row first.
+def load_image(source: Any) -> NDArray[np.uint8]:
+    """Pixels of an image file or of a PIL image, uint8 [height, width, 3], top row first.
 
     Raises
     ------
     SceneError
-        If the file cannot be read as a picture.
+        If the file cannot be read as an image.
     """
     try:
-        picture = source if isinstance(source, Image.Image) else Image.open(source)
-        return np.asarray(picture.convert("RGB"))
+        image = source if isinstance(source, Image.Image) else Image.open(source)
+        return np.asarray(image.convert("RGB"))
     except (OSError, ValueError, Image.DecompressionBombError) as error:
         raise SceneError(f"texture {str(source)!r} cannot be read: {error}") from error
 
 
 def _of_materials(mesh_path: Path) -> list[Path]:
-    """Pictures (map_Kd) of the materials that an OBJ file uses, as far as they are there."""
+    """Existing images (map_Kd) of the materials that an OBJ file uses."""
     libraries, used = [], set()
     for words in _statements(mesh_path):
         if words[0] == "mtllib":
             libraries.append(mesh_path.parent / words[1])
         elif words[0] == "usemtl":
             used.add(words[1])
-    pictures: dict[Path, None] = {}
+    images: dict[Path, None] = {}
     for library in filter(Path.is_file, libraries):
         material = ""
         for words in _statements(library):
@@ -77,23 +77,23 @@ def _of_materials(mesh_path: Path) -> list[Path]:
                 name = words[1].replace("\\", "/")
                 path = library.parent / (name if not name.startswith("-") else name.split()[-1])
                 if path.is_file():
-                    pictures[path] = None
-    return list(pictures)
+                    images[path] = None
+    return list(images)
 
 
 def _statements(path: Path) -> list[tuple[str, str]]:
-    """Keyword and the rest of every line that has both."""
+    """Keyword and rest of every line that has both."""
     text = path.read_text(encoding="utf-8", errors="replace")
     pairs = (line.strip().split(maxsplit=1) for line in text.splitlines() if line[:1] not in "vf#")
     return [(pair[0], pair[1].strip()) for pair in pairs if len(pair) == 2]
 
 
 def _embedded(mesh_path: Path) -> list[Image.Image]:
-    """Pictures of the base colours in a GLB or glTF file."""
+    """Base colour images in a GLB or glTF file."""
     materials = {
         id(material): material
         for part in trimesh.load_scene(mesh_path).geometry.values()
         if (material := getattr(part.visual, "material", None)) is not None
     }
-    pictures = (getattr(material, "baseColorTexture", None) for material in materials.values())
-    return list({id(picture): picture for picture in pictures if picture is not None}.values())
+    images = (getattr(material, "baseColorTexture", None) for material in materials.values())
+    return list({id(image): image for image in images if image is not None}.values())

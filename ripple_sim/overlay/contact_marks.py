@@ -1,4 +1,4 @@
-"""Where bodies touch the targets and how hard: marks that stay long enough to be seen."""
+"""Marks of contacts with the targets and their impulses, which stay long enough to be seen."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.simulation import Simulation
 
 MEMORY = 0.25  # time in which a mark fades to 1/e [s]; it holds the impulse of about this time
-_FADING, _FADED = 0.35, 0.08  # shares of its largest impulse at which a mark begins to vanish, and is gone
-_SAME_PLACE = 0.05  # contacts closer than this share of the target's size are one that moves
+_FADING, _FADED = 0.35, 0.08  # shares of its largest impulse at which a mark begins to fade, and disappears
+_SAME_PLACE = 0.05  # contacts closer than this share of the target's size are one moving contact
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -25,11 +25,11 @@ class Mark:
     point : float64 [3]
         On the rippled surface, in the world [m].
     axis : float64 [3]
-        The surface's outward normal there; what touches presses against it.
+        The surface's outward normal there, against which the contact presses.
     impulse : float
         [N s], with the weight exp(-age / MEMORY).
     opacity : float
-        From 1 to 0 as the mark vanishes.
+        From 1 to 0 as the mark fades.
     """
 
     point: NDArray[np.float64]
@@ -66,7 +66,7 @@ class ContactMarks:
         self._near = {name: _SAME_PLACE * float(np.ptp(ripples[name].atlas.mesh.V, axis=0).max()) for name in ripples}
 
     def follow(self) -> list[Mark]:
-        """Take in the frame that the simulation has just made; return the marks to be drawn, the weakest first."""
+        """Take in the simulation's present frame; return the marks to draw, the weakest first."""
         for contact in self._contacts:
             contact.impulse *= self._fade
         for impulse in self._simulation.impulses:

@@ -1,4 +1,4 @@
-"""Pictures and videos of a window, numbered so that none is overwritten."""
+"""Screenshots and videos of a window, numbered so that none is overwritten."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.errors import VideoError
 
 
-class Takes:
+class Recorder:
     """Writes screenshots and one video at a time.
 
     Parameters
@@ -33,8 +33,8 @@ class Takes:
         """Whether a video is being written."""
         return self._writer is not None
 
-    def save(self, picture: NDArray[np.uint8]) -> Path:
-        """Write a picture, uint8 [height, width, 3], and return its path.
+    def save(self, frame: NDArray[np.uint8]) -> Path:
+        """Write a frame to an image, uint8 [height, width, 3], and return its path.
 
         Raises
         ------
@@ -43,34 +43,34 @@ class Takes:
         """
         path = self._free(".png")
         try:
-            Image.fromarray(picture).save(path)
+            Image.fromarray(frame).save(path)
         except OSError as error:
             raise VideoError(f"cannot write {path}: {error.strerror or error}") from error
         return path
 
-    def start(self, picture: NDArray[np.uint8]) -> Path:
-        """Begin a video of pictures of this size; an odd row or column is left out. Return its path.
+    def start(self, frame: NDArray[np.uint8]) -> Path:
+        """Begin a video of frames of this size; an odd row or column is left out. Return its path.
 
         Raises
         ------
         VideoError
             If it cannot be written.
         """
-        height, width, _ = _even(picture).shape
+        height, width, _ = _even(frame).shape
         path = self._free(".mp4")
         self._writer = open_writer(path, width=width, height=height, fps=self._fps)
         self._shape = height, width, 3
         return path
 
-    def add(self, picture: NDArray[np.uint8]) -> bool:
-        """Add a frame; a window that has changed its size ends the video. Return whether it goes on.
+    def add(self, frame: NDArray[np.uint8]) -> bool:
+        """Add a frame, or end the video if the window has changed its size. Return whether it goes on.
 
         Raises
         ------
         EncodingError
-            If it cannot be written on; the video is over then.
+            If it cannot be written; the video has then ended.
         """
-        frame = _even(picture)
+        frame = _even(frame)
         if self._writer is None or frame.shape != self._shape:
             self.stop()
             return False
@@ -100,6 +100,6 @@ class Takes:
         return path
 
 
-def _even(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    height, width, _ = picture.shape
-    return np.ascontiguousarray(picture[: height - height % 2, : width - width % 2])
+def _even(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    height, width, _ = frame.shape
+    return np.ascontiguousarray(frame[: height - height % 2, : width - width % 2])

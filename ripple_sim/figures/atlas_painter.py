@@ -1,11 +1,10 @@
-"""Pictures of an atlas, ray by ray: the mesh and the sphere with the texel grid on them, and the six faces as a cross.
+"""Images of an atlas, ray by ray: the mesh and the sphere with the texel grid on them, and the six charts as a cross.
 
 Every pixel is traced to its direction on the sphere and from there to its texel, so the grid is exactly the atlas's.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 
 import numpy as np
@@ -18,38 +17,12 @@ from ripple_sim.render.visuals.corners import corner_normals
 from ripple_sim.solver import Atlas, sphere_atlas
 from ripple_sim.solver.cube_map.convention import cube_chart_points
 
-# The belt of four faces from left to right with the one in the middle of the cross second, and those over and under it.
+from .view import OVERSAMPLING, View, antialiased, lit, screen
+
+# The belt of four charts from left to right, the second in the middle of the cross, and those above and below it.
 BELT, ABOVE, BELOW = (1, 3, 0, 2), 4, 5
-GRID_CELLS = 16  # along a face
-_OVERSAMPLING = 2
-_LIGHT = np.array([-0.45, 0.55, 0.7]) / np.linalg.norm([-0.45, 0.55, 0.7])  # to the right, up, to the eye
+GRID_CELLS = 16  # along a chart
 _INK = np.array([0.10, 0.13, 0.20])
-
-
-@dataclasses.dataclass(frozen=True)
-class View:
-    """An orthographic look at a surface.
-
-    Attributes
-    ----------
-    azimuth, elevation : float
-        Where the eye is [degrees]; azimuth 0 looks along the negative forward axis, which points out of the screen.
-    up : str
-        Axis of the mesh's file that points up: "y" or "z".
-    """
-
-    azimuth: float = 35.0
-    elevation: float = 18.0
-    up: str = "y"
-
-    @property
-    def axes(self) -> NDArray[np.float64]:
-        """Unit vectors to the right, up and towards the eye, as rows, shape [3, 3]."""
-        azimuth, elevation = np.radians([self.azimuth, self.elevation])
-        eye = np.array([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)])
-        right = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
-        axes = np.stack([right, np.cross(eye, right), eye])
-        return axes if self.up == "y" else axes[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
 
 
 def texel_stretch(atlas: Atlas) -> NDArray[np.float64]:
@@ -59,7 +32,7 @@ def texel_stretch(atlas: Atlas) -> NDArray[np.float64]:
 
 
 class AtlasPainter:
-    """Paints pictures of one atlas.
+    """Paints images of one atlas.
 
     Parameters
     ----------
@@ -72,11 +45,11 @@ class AtlasPainter:
         self._atlas, self._colors = atlas, colors
 
     def mesh(self, view: View, size: int) -> NDArray[np.float64]:
-        """RGBA picture of the mesh, [size, size, 4], row 0 at the top."""
+        """RGBA image of the mesh, [size, size, 4], row 0 at the top."""
         right, up, eye = view.axes
         plane = self._vertices @ np.stack([right, up], axis=1)
         middle = (plane.min(axis=0) + plane.max(axis=0)) / 2
-        x, y = _screen(size * _OVERSAMPLING, float(np.ptp(plane, axis=0).max()) / 2 * 1.02)
+        x, y = screen(size * OVERSAMPLING, float(np.ptp(plane, axis=0).max()) / 2 * 1.02)
         origins = (middle[0] + x)[..., None] * right + (middle[1] + y)[..., None] * up + 4 * eye
         hit = self._scene.run(
             origins.reshape(-1, 3).astype(np.float32), np.tile(-eye, (x.size, 1)).astype(np.float32), output=1
@@ -89,31 +62,31 @@ class AtlasPainter:
         directions = np.einsum("ki,kij->kj", weights, self._atlas.sphere[corners])
         normals = np.einsum("ki,kij->kj", weights, self._corner_normals[triangle])
         openness = np.einsum("ki,ki->k", weights, self._openness[corners])
-        return _picture(x.shape, seen, self._lit(self.paint(directions), normals, openness, view))
+        return antialiased(x.shape, seen, lit(self.paint(directions), normals, openness, view))
 
     def sphere(self, view: View, size: int) -> NDArray[np.float64]:
-        """RGBA picture of the unit sphere that the mesh is mapped onto, [size, size, 4]."""
-        x, y = _screen(size * _OVERSAMPLING, 1.01)
+        """RGBA image of the unit sphere that the mesh is mapped onto, [size, size, 4]."""
+        x, y = screen(size * OVERSAMPLING, 1.01)
         seen = np.flatnonzero((x**2 + y**2).ravel() < 1)
         local = np.stack([x.ravel()[seen], y.ravel()[seen]], axis=1)
         local = np.column_stack([local, np.sqrt(1 - (local**2).sum(axis=1))])
         directions = local @ view.axes
         colors = self._grid(*cube_chart_points(directions, self._atlas.resolution))
-        return _picture(x.shape, seen, self._lit(colors, directions, np.ones(len(seen)), view))
+        return antialiased(x.shape, seen, lit(colors, directions, np.ones(len(seen)), view))
 
     def cross(self, size: int) -> NDArray[np.float64]:
-        """RGBA picture of the six faces unfolded, [3 size, 4 size, 4]: the belt, and a face over and under it."""
-        n, fine = self._atlas.resolution, size * _OVERSAMPLING
+        """RGBA image of the six charts unfolded, [3 size, 4 size, 4]: the belt, and a chart above and below it."""
+        n, fine = self._atlas.resolution, size * OVERSAMPLING
         place = (np.arange(fine) + 0.5) / fine * n - 0.5
         row, column = np.meshgrid(place[::-1], place, indexing="ij")
-        picture = np.zeros((3 * size, 4 * size, 4))
-        layout = [(face, 1, k) for k, face in enumerate(BELT)] + [(ABOVE, 0, 1), (BELOW, 2, 1)]
-        for face, i, k in layout:
-            colors = self._grid(np.full(row.size, face), row.ravel(), column.ravel())
-            picture[i * size : (i + 1) * size, k * size : (k + 1) * size] = _picture(
+        image = np.zeros((3 * size, 4 * size, 4))
+        layout = [(chart, 1, k) for k, chart in enumerate(BELT)] + [(ABOVE, 0, 1), (BELOW, 2, 1)]
+        for chart, i, k in layout:
+            colors = self._grid(np.full(row.size, chart), row.ravel(), column.ravel())
+            image[i * size : (i + 1) * size, k * size : (k + 1) * size] = antialiased(
                 row.shape, np.arange(row.size), colors
             )
-        return picture
+        return image
 
     def paint(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Colours [k, 3] of the surface in directions [k, 3] from the cube's centre; override it to paint others."""
@@ -142,60 +115,30 @@ class AtlasPainter:
     @functools.cached_property
     def _widths(self) -> NDArray[np.float64]:
         """Width of rows and of columns on the surface, in units of an even spread's, [2, 6, N, N]."""
-        padded, areas = self._atlas.texels.halo_positions, self._atlas.areas
-        along_columns = np.linalg.norm(padded[:, 1:-1, 2:] - padded[:, 1:-1, :-2], axis=-1) / 2
-        along_rows = np.linalg.norm(padded[:, 2:, 1:-1] - padded[:, :-2, 1:-1], axis=-1) / 2
+        with_halo, areas = self._atlas.texels.halo_positions, self._atlas.areas
+        along_columns = np.linalg.norm(with_halo[:, 1:-1, 2:] - with_halo[:, 1:-1, :-2], axis=-1) / 2
+        along_rows = np.linalg.norm(with_halo[:, 2:, 1:-1] - with_halo[:, :-2, 1:-1], axis=-1) / 2
         even = np.sqrt(areas.mean())
         return np.stack([areas / np.maximum(side, 1e-6 * even) for side in (along_columns, along_rows)]) / even
 
     def _grid(
         self,
-        face: NDArray[np.int64],
+        chart: NDArray[np.int64],
         row: NDArray[np.float64],
         column: NDArray[np.float64],
         widths: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
-        """Colours of places in the faces [k, 3]: the texel's, under a grid of fine lines and the cube's edges.
+        """Colours of places in the charts [k, 3]: the texel's, under a grid of fine lines and the cube's edges.
 
-        With `widths` the lines are equally wide on the surface, without it in the faces.
+        With `widths` the lines are equally wide on the surface, without it in the charts.
         """
         n = self._atlas.resolution
         i, j = (np.clip(np.rint(x).astype(np.int64), 0, n - 1) for x in (row, column))
-        colors = self._colors[face, i, j]
+        colors = self._colors[chart, i, j]
         cells = min(GRID_CELLS, n)
         along = np.stack([row, column]) + 0.5
-        scale = cells / n * (1.0 if widths is None else widths[:, face, i, j])
+        scale = cells / n * (1.0 if widths is None else widths[:, chart, i, j])
         to_line = (np.abs((along * (cells / n) + 0.5) % 1 - 0.5) * (n / cells) * scale).min(axis=0)
         to_edge = (np.minimum(along, n - along) * scale).min(axis=0)
         ink = np.where(to_edge < 0.09, 0.85, np.where(to_line < 0.04, 0.42, 0.0))[:, None]
         return colors * (1 - ink) + _INK * ink
-
-    @staticmethod
-    def _lit(
-        colors: NDArray[np.float64], normals: NDArray[np.float64], openness: NDArray[np.float64], view: View
-    ) -> NDArray[np.float64]:
-        """Colours under a soft light from the upper left, with a little sheen; flat enough for colours to be read."""
-        local = normals @ view.axes.T
-        local /= np.maximum(np.linalg.norm(local, axis=1, keepdims=True), 1e-9)
-        diffuse = 0.5 + 0.5 * local @ _LIGHT
-        half = _LIGHT + np.array([0.0, 0.0, 1.0])
-        sheen = np.maximum(local @ (half / np.linalg.norm(half)), 0) ** 40
-        shade = (0.42 + 0.68 * diffuse) * (0.45 + 0.55 * openness)
-        return np.clip(colors * shade[:, None] + 0.10 * (sheen * openness)[:, None], 0, 1)
-
-
-def _screen(size: int, half_width: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    place = ((np.arange(size) + 0.5) / size * 2 - 1) * half_width
-    y, x = np.meshgrid(place[::-1], place, indexing="ij")
-    return x, y
-
-
-def _picture(shape: tuple[int, ...], seen: NDArray[np.int64], colors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """RGBA picture, averaged over the oversampling, of colours [k, 3] at the pixels `seen`."""
-    fine = np.zeros((shape[0] * shape[1], 4))
-    fine[seen, :3], fine[seen, 3] = colors, 1.0
-    k = _OVERSAMPLING
-    coarse = fine.reshape(shape[0] // k, k, shape[1] // k, k, 4).mean(axis=(1, 3))
-    # colours are summed where something is seen only: undo the dilution, which alpha already expresses
-    coarse[..., :3] /= np.maximum(coarse[..., 3:], 1e-9)
-    return np.clip(coarse, 0, 1)

@@ -1,4 +1,4 @@
-"""The window's camera: kept level, and asked for the ray through a pixel."""
+"""The orbiting camera of the window: kept level, and the ray through a pixel."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _STEEPEST = 88.0
 
 
 def level(camera: pv.Camera) -> None:
-    """Keep the horizon level, and the camera off the vertical, where it would have none."""
+    """Keep the horizon level, and the camera off the vertical, where there is no horizon."""
     focus = np.array(camera.focal_point)
     x, y, z = np.array(camera.position) - focus
     across, most = math.hypot(x, y), math.tan(math.radians(_STEEPEST))

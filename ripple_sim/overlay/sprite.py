@@ -1,4 +1,4 @@
-"""`Patch`: a small picture with transparency that is drawn once and laid over many frames."""
+"""`Sprite`: a small transparent image that is drawn once and laid over many frames."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _SUPERSAMPLING = 8
 _CORNERS = {"left": 0.0, "middle": 0.5, "right": 1.0}
 
 
-class Patch:
-    """Shapes and type with smooth edges on a transparent ground.
+class Sprite:
+    """Shapes and text with smooth edges on a transparent background.
 
     Coordinates are in pixels from the upper left corner, x to the right and y down; whole numbers lie between pixels.
     Colours are sRGB, 0 to 255.
@@ -36,14 +36,14 @@ class Patch:
         self._color = np.zeros((height, width, 3), np.float32)  # times alpha
         self._alpha = np.zeros((height, width, 1), np.float32)
 
-    def copy(self) -> Patch:
-        """A patch of its own with the same content."""
-        other = Patch(self.width, self.height)
+    def copy(self) -> Sprite:
+        """A copy with the same content."""
+        other = Sprite(self.width, self.height)
         other._color, other._alpha = self._color.copy(), self._alpha.copy()
         return other
 
     def fill(self, coverage: NDArray[np.floating], color: NDArray | Color, opacity: float = 1.0) -> None:
-        """Lay a colour, or a picture [height, width, 3], over the share `coverage`, 0 to 1, of each pixel."""
+        """Lay a colour, or an image [height, width, 3], over the share `coverage`, 0 to 1, of each pixel."""
         alpha = (opacity * coverage[..., None]).astype(np.float32)
         self._color += alpha * (np.asarray(color, dtype=np.float32) - self._color)
         self._alpha += alpha * (1 - self._alpha)
@@ -71,19 +71,19 @@ class Patch:
         self.fill(np.clip(radius + 0.5 - np.hypot(across, down[:, None]), 0, 1), color)
 
     def panel(self, radius: float, opacity: float) -> None:
-        """Fill the whole patch with paper, its corners rounded."""
+        """Fill the whole sprite with paper, its corners rounded."""
         size = (0, 0, _SUPERSAMPLING * self.width - 1, _SUPERSAMPLING * self.height - 1)
         self.fill(self._drawn(lambda draw, k: draw.rounded_rectangle(size, k * radius, 255)), PAPER, opacity)
 
     def text(self, x: float, y: float, text: str, size: int, color: Color = INK, align: str = "left") -> None:
-        """Write a line on the baseline y that begins, has its middle or ends at x ("left", "middle", "right")."""
+        """Write a line on the baseline y that begins, is centred or ends at x ("left", "middle", "right")."""
         mask = Image.new("L", (self.width, self.height))
         x -= _CORNERS[align] * text_width(text, size)
         ImageDraw.Draw(mask).text((round(x), round(y)), text, font=_font(size), fill=255, anchor="ls")
         self.fill(np.asarray(mask, dtype=np.float32) / 255, color)
 
     def over(self, frame: NDArray[np.uint8], left: int, top: int) -> None:
-        """Lay the patch over a frame in place; what does not fit is cut off.
+        """Lay the sprite over a frame in place, clipped to it.
 
         The frame is uint8 [height, width, 3], or [height, width, 4] with straight alpha.
         """
@@ -116,7 +116,7 @@ def text_width(text: str, size: int) -> float:
 
 @functools.lru_cache(maxsize=32)
 def _font(size: int) -> ImageFont.FreeTypeFont:
-    # Matplotlib brings DejaVu Sans, which has the minus sign, the micro sign, and digits of one width
+    # Matplotlib ships DejaVu Sans, which has a minus sign, a micro sign, and digits of equal width
     package = importlib.util.find_spec("matplotlib")
     folder = Path((package.submodule_search_locations or [""])[0] if package else "")
     return ImageFont.truetype(folder / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf", size)

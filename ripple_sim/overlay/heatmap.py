@@ -1,4 +1,4 @@
-"""A scalar field on the texels, made ready to be shown."""
+"""Heatmaps: a scalar field on the texels, prepared for the renderer."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 
 def magnitude(field: NDArray[np.float32]) -> float:
-    """Mean magnitude of a padded field, each value with its own magnitude as weight: how high waves are where they are.
+    """Mean magnitude of a field with halo, weighted by the magnitude itself: how high the waves are.
 
-    A calm surface round the first small ring does not count, nor do a few texels in the dent under a contact for much.
+    The calm surface around a small wave does not count, and the few texels in the dent under a contact count little.
     """
     inside = np.abs(field[:, 1:-1, 1:-1]).ravel()
     total = float(inside.sum(dtype=np.float64))
@@ -17,5 +17,5 @@ def magnitude(field: NDArray[np.float32]) -> float:
 
 
 def grid_spacing(resolution: int) -> int:
-    """Texels between the lines of a grid: a power of two that leaves 16 to 31 cells along a face, or all there are."""
+    """Texels between grid lines: a power of two that leaves 16 to 31 cells along a chart, or one texel per cell."""
     return 1 << max(0, (resolution // 16).bit_length() - 1)

@@ -1,4 +1,4 @@
-"""The chart of energy over time, which grows while the video runs."""
+"""The plot of energy over time, which grows during the video."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .layout import Layout
 from .panels import panel
-from .patch import FAINT, INK, Color, Patch, text_width
 from .scale import number, readable, round_up
+from .sprite import FAINT, INK, Color, Sprite, text_width
 
 Curve = tuple[NDArray[np.float64], NDArray[np.float64]]  # times [s], values
 
@@ -18,7 +18,7 @@ COLORS = ((38, 92, 160), (196, 88, 52))  # of the curves
 _GRID = (150, 158, 170)
 
 
-class Chart:
+class EnergyPlot:
     """Draws curves over the time of the whole video.
 
     Parameters
@@ -28,7 +28,7 @@ class Chart:
     duration : float
         [s].
     names : sequence of str
-        Of the curves where there are several.
+        Of several curves.
     """
 
     def __init__(self, layout: Layout, title: str, unit: str, duration: float, names: Sequence[str] = ()) -> None:
@@ -38,50 +38,50 @@ class Chart:
         self._width, self._height = layout.panel_width(23), round(min(8.6 * em, 0.38 * layout.height))
         self._left, self._right = round(3.6 * em), self._width - round(1.1 * em)
         self._top, self._bottom = round(2.4 * em), self._height - round(1.95 * em)
-        self._axes: tuple[tuple[float, float], Patch] | None = None
+        self._axes: tuple[tuple[float, float], Sprite] | None = None
 
-    def draw(self, curves: Sequence[Curve], limit: float, goal: float) -> Patch:
-        """Draw curves up to the present; values from 0 to `limit`, with numbers at half and whole of `goal`."""
+    def draw(self, curves: Sequence[Curve], limit: float, goal: float) -> Sprite:
+        """Draw curves up to the present, from 0 to `limit`, with labels at half and whole of `goal`."""
         if self._axes is None or self._axes[0] != (limit, goal):
             self._axes = (limit, goal), self._draw_axes(limit, goal)
-        patch = self._axes[1].copy()
+        sprite = self._axes[1].copy()
         for color, (times, values) in zip(COLORS, curves, strict=False):
-            self._draw_curve(patch, times, values, limit, color)
-        return patch
+            self._draw_curve(sprite, times, values, limit, color)
+        return sprite
 
-    def _draw_axes(self, limit: float, goal: float) -> Patch:
+    def _draw_axes(self, limit: float, goal: float) -> Sprite:
         em, small = self._em, round(0.85 * self._em)
         factor, prefixed = readable(goal, self._unit) if goal else (1.0, self._unit)
-        patch = panel(self._width, self._height, em)
-        patch.text(round(0.7 * em), 1.4 * em, self._title, em)
-        patch.text(round(0.7 * em) + text_width(self._title, em) + 0.5 * em, 1.4 * em, prefixed, small, FAINT)
-        self._draw_names(patch, small)
+        sprite = panel(self._width, self._height, em)
+        sprite.text(round(0.7 * em), 1.4 * em, self._title, em)
+        sprite.text(round(0.7 * em) + text_width(self._title, em) + 0.5 * em, 1.4 * em, prefixed, small, FAINT)
+        self._draw_names(sprite, small)
         hair = max(1, round(em / 16))
         half = [goal / 2] if self._bottom - self._top > 2.6 * small else []
         for value in [0.0, *half, goal] if goal else [0.0]:
             if value <= 1.001 * limit or not value:
                 y = round(float(self._row(value, limit)))
-                patch.box(self._left, y - hair, self._right, y, INK if not value else _GRID, 0.9 if not value else 0.5)
-                patch.text(self._left - 0.4 * em, y + 0.3 * em, number(value * factor), small, INK, "right")
+                sprite.box(self._left, y - hair, self._right, y, INK if not value else _GRID, 0.9 if not value else 0.5)
+                sprite.text(self._left - 0.4 * em, y + 0.3 * em, number(value * factor), small, INK, "right")
         step = round_up(self._duration / 4, (1.0, 2.0, 5.0))
         last = int(self._duration / step + 1e-9)
         for k in range(last + 1):
             x = round(float(self._column(k * step)))
-            patch.box(x, self._bottom, x + hair, self._bottom + 0.25 * em, INK)
+            sprite.box(x, self._bottom, x + hair, self._bottom + 0.25 * em, INK)
             unit = " s" if k == last else ""
-            patch.text(x, self._bottom + 1.25 * em, number(k * step) + unit, small, INK, "middle")
-        return patch
+            sprite.text(x, self._bottom + 1.25 * em, number(k * step) + unit, small, INK, "middle")
+        return sprite
 
-    def _draw_names(self, patch: Patch, size: int) -> None:
+    def _draw_names(self, sprite: Sprite, size: int) -> None:
         x = float(self._width - round(0.7 * self._em))
         titles = text_width(f"{self._title} {self._unit}", self._em) + self._em
         if sum(text_width(name, size) + 0.9 * self._em for name in self._names) > x - titles:
-            return  # too narrow; the runs' titles have the curves' colours, too
+            return  # too narrow; the runs' titles have the curves' colours anyway
         for color, name in reversed(list(zip(COLORS, self._names, strict=False))):
-            patch.text(x, 1.4 * self._em, name, size, color, "right")
+            sprite.text(x, 1.4 * self._em, name, size, color, "right")
             x -= text_width(name, size) + 0.9 * self._em
 
-    def _draw_curve(self, patch: Patch, times: NDArray, values: NDArray, limit: float, color: Color) -> None:
+    def _draw_curve(self, sprite: Sprite, times: NDArray, values: NDArray, limit: float, color: Color) -> None:
         if len(times) == 0 or limit <= 0:
             return
         end = float(self._column(times[-1]))
@@ -95,9 +95,9 @@ class Chart:
         coverage = np.zeros((2, self._height, self._width), np.float32)
         coverage[:, :, edges[:-1]] = under, line
         if len(self._names) < 2:
-            patch.fill(coverage[0], color, 0.14)
-        patch.fill(coverage[1], color)
-        patch.disc(end, float(self._row(values[-1], limit)), 0.26 * self._em, color)
+            sprite.fill(coverage[0], color, 0.14)
+        sprite.fill(coverage[1], color)
+        sprite.disc(end, float(self._row(values[-1], limit)), 0.26 * self._em, color)
 
     def _column(self, time: ArrayLike) -> NDArray[np.float64]:
         return self._left + (self._right - self._left) * np.asarray(time, dtype=np.float64) / self._duration

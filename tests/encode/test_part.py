@@ -1,10 +1,8 @@
 """Interrupted videos: whatever kills them, what is left is whole, and they go on to the very same bytes."""
 
 import fcntl
-import json
 import os
 import random
-import re
 import signal
 import subprocess
 import sys
@@ -15,32 +13,28 @@ import av
 import numpy as np
 import pytest
 from PIL import Image
+from unfinished_videos import contents
 
 from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.encode.formats import FRAMES_IN_CLIP
 from ripple_sim.errors import EncodingError, SimulationError, VideoError
-from ripple_sim.scene.scene import Scene, load_scene
-from ripple_sim.solver import RippleError
-from ripple_sim.solver.gl import shared_context
-from ripple_sim.video.render_video import render_video
 
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
 FRAMES, SIZE, FPS = 2 * FRAMES_IN_CLIP + 10, (64, 48), 25
-JOB = {"the scene": "a moving square"}
+SETTINGS = {"the scene": "a moving square"}
 DIGEST = "0123456789abcdef" * 2
-
 # Writes all the videos one behind the other, and goes on with those that are not whole.
 PROGRAM = f"""
 import sys, time
 from pathlib import Path
 import numpy as np
-from ripple_sim.video import open_writer
+from ripple_sim.encode import open_writer
 print("ready", flush=True)
 for ending in {ENDINGS!r}:
     path = Path(sys.argv[1]) / f"clip{{ending}}"
     if path.exists() and not path.with_name(path.name + ".part").exists():
         continue
-    with open_writer(path, width={SIZE[0]}, height={SIZE[1]}, fps={FPS}, job={JOB!r}, resume=True) as writer:
+    with open_writer(path, width={SIZE[0]}, height={SIZE[1]}, fps={FPS}, settings={SETTINGS!r}, resume=True) as writer:
         for number in range(writer.frames, {FRAMES}):
             frame = np.full(({SIZE[1]}, {SIZE[0]}, 3), 60, np.uint8)
             frame[10:30, number % 40 : number % 40 + 20] = (230, 180, number)
@@ -49,15 +43,28 @@ for ending in {ENDINGS!r}:
 """
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
 def start(folder: Path) -> subprocess.Popen:
     process = subprocess.Popen([sys.executable, "-c", PROGRAM, folder], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
     return process
+
+
+def write(path: Path, first: int, last: int, settings: dict = SETTINGS, resume: bool = True) -> FrameWriter:
+    with open_writer(path, width=SIZE[0], height=SIZE[1], fps=FPS, settings=settings, resume=resume) as writer:
+        for number in range(first, last):
+            writer.write(np.full((SIZE[1], SIZE[0], 3), number, np.uint8))
+        if last < FRAMES:
+            raise KeyboardInterrupt
+    return writer
+
+
+@pytest.fixture
+def interrupted(tmp_path) -> Path:
+    path = tmp_path / "clip.mp4"
+    with pytest.raises(KeyboardInterrupt):
+        write(path, 0, 60)
+    return path
 
 
 def test_killed_again_and_again_videos_become_the_same_bytes(tmp_path):
@@ -85,23 +92,6 @@ def test_killed_again_and_again_videos_become_the_same_bytes(tmp_path):
     assert sorted(path.name for path in broken.iterdir()) == sorted(f"clip{ending}" for ending in ENDINGS)
 
 
-def write(path: Path, first: int, last: int, job: dict = JOB, resume: bool = True) -> FrameWriter:
-    with open_writer(path, width=SIZE[0], height=SIZE[1], fps=FPS, job=job, resume=resume) as writer:
-        for number in range(first, last):
-            writer.write(np.full((SIZE[1], SIZE[0], 3), number, np.uint8))
-        if last < FRAMES:
-            raise KeyboardInterrupt
-    return writer
-
-
-@pytest.fixture
-def interrupted(tmp_path) -> Path:
-    path = tmp_path / "clip.mp4"
-    with pytest.raises(KeyboardInterrupt):
-        write(path, 0, 60)
-    return path
-
-
 def test_an_interrupted_video_says_what_is_left(tmp_path):
     with pytest.raises(KeyboardInterrupt) as ending:
         write(tmp_path / "clip.mp4", 0, 60)
@@ -121,7 +111,7 @@ def test_a_video_without_a_whole_clip_leaves_nothing(tmp_path):
 def test_what_would_fail_again_leaves_nothing(tmp_path):
     with (
         pytest.raises(SimulationError),
-        open_writer(tmp_path / "frames", width=SIZE[0], height=SIZE[1], fps=FPS, job=JOB) as writer,
+        open_writer(tmp_path / "frames", width=SIZE[0], height=SIZE[1], fps=FPS, settings=SETTINGS) as writer,
     ):
         writer.write(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
         raise SimulationError
@@ -133,12 +123,12 @@ def test_without_resume_a_video_starts_anew(interrupted):
     assert list(interrupted.parent.iterdir()) == [interrupted]
 
 
-def test_resuming_another_job_is_refused_and_harms_nothing(interrupted):
+def test_resuming_with_other_settings_is_refused_and_harms_nothing(interrupted):
     before = contents(interrupted.parent)
     with pytest.raises(VideoError, match=r"the scene was a moving square and now is a ball; .* leave --resume out"):
-        write(interrupted, 48, FRAMES, job={"the scene": "a ball"})
+        write(interrupted, 48, FRAMES, settings={"the scene": "a ball"})
     with pytest.raises(VideoError, match="the length was None and now is 3"):
-        write(interrupted, 48, FRAMES, job={**JOB, "the length": 3})
+        write(interrupted, 48, FRAMES, settings={**SETTINGS, "the length": 3})
     assert contents(interrupted.parent) == before
 
 
@@ -146,7 +136,7 @@ def test_a_simulation_that_comes_out_otherwise_is_refused_and_harms_nothing(tmp_
     path = tmp_path / "clip.mp4"
 
     def go(digest: str) -> None:
-        with open_writer(path, width=SIZE[0], height=SIZE[1], fps=FPS, job=JOB, resume=True) as writer:
+        with open_writer(path, width=SIZE[0], height=SIZE[1], fps=FPS, settings=SETTINGS, resume=True) as writer:
             writer.check_state(0, DIGEST)
             writer.check_state(16, digest)
             for _ in range(writer.frames, 60):
@@ -189,12 +179,12 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_broken(tmp_path, ending):
         "from pathlib import Path\n"
         "import numpy as np\n"
         "from ripple_sim.errors import EncodingError\n"
-        "from ripple_sim.video import open_writer\n"
+        "from ripple_sim.encode import open_writer\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))\n"
         "rng = np.random.default_rng(0)\n"
         "try:\n"
-        f"    with open_writer(sys.argv[1], width=160, height=90, fps=25, job={JOB!r}) as writer:\n"
+        f"    with open_writer(sys.argv[1], width=160, height=90, fps=25, settings={SETTINGS!r}) as writer:\n"
         "        for number in range(120):\n"
         "            writer.write(rng.integers(0, 256, (90, 160, 3), np.uint8))\n"
         "except EncodingError as error:\n"
@@ -208,114 +198,10 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_broken(tmp_path, ending):
     assert result.stdout.count("\n") == 1
     assert "Traceback" not in result.stderr
     left = [path for path in tmp_path.rglob("*") if path.is_file()]
-    assert all(path.name in ("job.json", "states.txt") or path.name.startswith("frame") for path in left)
+    assert all(path.name in ("settings.json", "states.txt") or path.name.startswith("frame") for path in left)
 
 
 def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
     (tmp_path / "clip.mp4.part").write_text("in the way")
     with pytest.raises(EncodingError, match=r"cannot write the video .*clip\.mp4: "):
         write(tmp_path / "clip.mp4", 0, FRAMES)
-
-
-MJCF = """<mujoco><option timestep="0.005"/><worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
-<body name="stone" pos="0.05 0 0.3"><freejoint/><geom name="stone" size="0.05"/></body></worldbody></mujoco>"""
-TOML = """model = "scene.xml"
-duration = 2.0
-[[ripple]]
-geom = "egg"
-resolution = 12
-material = {speed = 0.3, density = 20.0}
-"""
-OPTIONS = {"size": (64, 48), "fps": 30}
-
-
-@pytest.fixture
-def scene(tmp_path) -> Scene:
-    try:
-        shared_context()
-    except RippleError as error:
-        pytest.skip(str(error))
-    (tmp_path / "scene.xml").write_text(MJCF)
-    (tmp_path / "scene.toml").write_text(TOML)
-    return load_scene(tmp_path / "scene.toml")
-
-
-class Impatience:
-    """Interrupts at a frame."""
-
-    def __init__(self, frame: int) -> None:
-        self._frame = frame
-
-    def __call__(self, done: int, total: int) -> None:
-        if done == self._frame:
-            raise KeyboardInterrupt
-
-
-@pytest.mark.parametrize("name", ["clip.mp4", "frames"])
-def test_a_render_goes_on_to_the_same_video(scene, tmp_path, name):
-    whole, broken = tmp_path / "whole" / name, tmp_path / "broken" / name
-    assert render_video(scene, whole, **OPTIONS).resumed_at == 0
-    for frame in (20, 58):
-        with pytest.raises(KeyboardInterrupt):
-            render_video(scene, broken, resume=True, progress=Impatience(frame), **OPTIONS)
-    summary = render_video(scene, broken, resume=True, **OPTIONS)
-    # frames that wait to be encoded are lost
-    assert summary.resumed_at == FRAMES_IN_CLIP if name == "clip.mp4" else 48 <= summary.resumed_at <= 58
-    assert contents(broken.parent) == contents(whole.parent)
-
-
-def test_a_render_of_a_changed_scene_or_with_other_options_is_not_resumed(scene, tmp_path):
-    def resume(scene: Scene, **options: object) -> None:
-        render_video(scene, tmp_path / "frames", resume=True, progress=Impatience(20), **{**OPTIONS, **options})
-
-    with pytest.raises(KeyboardInterrupt):
-        resume(scene)
-    with pytest.raises(VideoError, match="the size was 64x48 and now is 96x48"):
-        resume(scene, size=(96, 48))
-    with pytest.raises(VideoError, match="the number of frames was 60 and now is 30"):
-        resume(scene, duration=1.0)
-    (tmp_path / "scene.xml").write_text(MJCF.replace('size="0.05"', 'size="0.06"'))
-    with pytest.raises(VideoError, match="the scene's fingerprint was"):
-        resume(load_scene(tmp_path / "scene.toml"))
-    (tmp_path / "scene.xml").write_text(MJCF)
-    with pytest.raises(VideoError, match="at frame 16 the simulation is not in the state"):
-        render_video(scene, tmp_path / "frames", resume=True, on_step=_push, **OPTIONS)
-    assert json.loads((tmp_path / "frames.part" / "job.json").read_text())["the size"] == "64x48"
-
-
-def _push(simulation) -> None:
-    simulation.data.qvel[0] += 1e-9
-
-
-@pytest.mark.parametrize("ahead", [False, True])
-def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
-    program = (
-        "import ctypes, sys\n"
-        "from ripple_sim.cli import main as cli\n"
-        "from ripple_sim.solver.gl import GLContext, shared_context\n"
-        + "GLContext.software = False\n"
-        * ahead  # a frame is on its way back when it happens
-        + "def lose(done, total):\n"
-        "    if done == 20:\n"
-        "        egl = ctypes.CDLL('libEGL.so.1')\n"
-        "        egl.eglGetCurrentDisplay.restype = ctypes.c_void_p\n"
-        "        with shared_context():\n"
-        "            egl.eglTerminate(ctypes.c_void_p(egl.eglGetCurrentDisplay()))\n"
-        "from ripple_sim import job\n"
-        "render = job.render_video\n"
-        "job.render_video = lambda *args, **options: render(*args, **{**options, 'progress': lose})\n"
-        "sys.exit(cli.main(['render', *sys.argv[1:], '--size', '64x48', '--fps', '30', '--backend', 'cpu']))\n"
-    )
-    result = subprocess.run(
-        [sys.executable, "-c", program, tmp_path / "scene.toml", "-o", tmp_path / "frames"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert result.returncode == 1
-    lines = [line for line in result.stderr.splitlines() if "nanobind" not in line and not line.startswith(" - ")]
-    assert len(lines) == 1, result.stderr
-    assert re.match(
-        r"ripple-sim: the OpenGL context .* is lost; .* frames are kept in .*; --resume carries on", lines[0]
-    )
-    assert render_video(scene, tmp_path / "frames", resume=True, **OPTIONS, backend="cpu").resumed_at > 8

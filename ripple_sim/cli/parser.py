@@ -1,0 +1,82 @@
+"""From the words of a command line to a command.
+
+A command is a class: its fields are the arguments, the docstrings the help, and `run` does the work. Heavy imports are
+inside `run`, so that `--help` and usage errors are answered at once.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import tyro.conf
+import tyro.extras
+
+from .atlas_command import Atlas
+from .bench_command import Bench
+from .completion_command import Completion
+from .info_command import Info
+from .render_commands import Drop, Render
+from .view_command import View
+
+COMMANDS: dict[str, Callable[..., Any]] = {
+    "render": Render,
+    "drop": Drop,
+    "atlas": Atlas,
+    "info": Info,
+    "bench": Bench,
+    "view": View,
+    "completion": Completion,
+}
+
+_DESCRIPTION = "Surface ripples on any genus-0 mesh, driven by the contact forces of a MuJoCo simulation."
+
+
+class UsageError(Exception):
+    """The command line is invalid; the message says where, and names the help."""
+
+
+def parse(argv: Sequence[str]) -> Any:
+    """Return the command to run, or None if the help or a completion script was printed instead.
+
+    Raises
+    ------
+    UsageError
+    """
+    command = _parse(argv)
+    if isinstance(command, Completion):  # which tyro makes from all the commands
+        command = _parse(["--tyro-print-completion", command.shell])
+    return command
+
+
+def _parse(argv: Sequence[str]) -> Any:
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return tyro.extras.subcommand_cli_from_dict(
+                COMMANDS,
+                prog="ripple-sim",
+                description=_DESCRIPTION,
+                args=list(argv),
+                config=(tyro.conf.FlagCreatePairsOff,),
+            )
+    except SystemExit as ending:
+        if ending.code:
+            raise UsageError(_first_part(complaint.getvalue())) from None
+        return None
+
+
+def _first_part(box: str) -> str:
+    """Reduce tyro's complaint to the text between its first two rules, without the help texts (indented by 8).
+
+    A complaint is a title, a rule, what is wrong, a rule, and hints; it is framed where stdout is UTF-8.
+    """
+    text = re.sub(r"\x1b\[[0-9;]*m", "", box)
+    parts = re.split(r"^[│╭╰ ]*(?:─ .* ─+|─{3,}|-{3,})[│╮╯ ]*$", text, flags=re.MULTILINE)
+    part = parts[1] if len(parts) > 1 else text
+    said = [line.strip("│ ") for line in part.splitlines() if not re.match(r"│? {9}", line)]
+    program = re.search(r"ripple-sim(?: [a-z]+)? --help", text)
+    return f"{' '.join(said).strip().rstrip('.')}; see {program[0] if program else 'ripple-sim --help'}"

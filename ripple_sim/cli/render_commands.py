@@ -1,0 +1,103 @@
+"""`ripple-sim render` and `ripple-sim drop`."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from .arguments import Count, Device, Seed, UpAxis
+from .video_arguments import VideoArguments
+
+if TYPE_CHECKING:
+    from ripple_sim.scene.scene import Scene
+    from ripple_sim.video.summary import Summary
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class _VideoCommand(VideoArguments):
+    camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
+    """Camera of the MJCF to render from."""
+    device: Device = None
+    """EGL device to render on, by number, where there are several."""
+
+    def load(self) -> Scene:
+        """Make the scene that is rendered."""
+        raise NotImplementedError
+
+    def run(self) -> None:
+        """Render the scene and print a summary."""
+        from ripple_sim.video.settings import check_options
+
+        check_options(self.options(), self.output)  # before anything that takes time
+
+        from ripple_sim.scene.camera_override import through_camera
+        from ripple_sim.solver.gl import select_device, shared_context
+        from ripple_sim.video.render_video import render_video
+        from ripple_sim.video.settings import settled
+
+        from .progress import frame_progress
+
+        if self.device is not None:
+            select_device(self.device)
+        scene = self.load()
+        if self.camera is not None:
+            scene = through_camera(scene, self.camera)
+        options = settled(self.options(), scene, self.output)
+        with frame_progress(f"renderer {shared_context().renderer}, waves {options.backend}") as progress:
+            summary = render_video(scene, self.output, options, progress=progress)
+        print(_summary_text(summary))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Render(_VideoCommand):
+    """Render a scene to a video."""
+
+    scene: Annotated[Positional[str], arg(metavar="SCENE")]
+    """Name of a shipped scene, such as duck, or path of a scene file (TOML)."""
+
+    def load(self) -> Scene:
+        """Load the scene."""
+        from ripple_sim.scene.load_scene import load_scene
+
+        return load_scene(self.scene)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Drop(_VideoCommand):
+    """Put a closed mesh on a floor, drop bodies on it, and render a video."""
+
+    mesh: Annotated[Positional[Path], arg(metavar="MESH")]
+    """Mesh file (OBJ, OFF, PLY, STL, GLB ...): closed, in one part, without handles."""
+    bodies: Count = 12
+    """Number of falling bodies."""
+    seed: Seed = 0
+    """Seed for the bodies' places and sizes; the same seed gives the same video."""
+    up: UpAxis = None
+    """Axis of the mesh that points up."""
+    texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Image in the mesh's own texture coordinates; by default the one that the file names, or NAME_texture.png."""
+    repair: bool = False
+    """Repair an open or non-manifold mesh (needs the package pymeshfix)."""
+
+    def load(self) -> Scene:
+        """Build a scene around the mesh."""
+        from ripple_sim.scene.drop import drop_scene
+
+        return drop_scene(
+            self.mesh, bodies=self.bodies, seed=self.seed, up=self.up, texture=self.texture, repair=self.repair
+        )
+
+
+def _summary_text(summary: Summary) -> str:
+    resumed = f", the first {summary.resumed_at} of them rendered before" if summary.resumed_at else ""
+    return (
+        f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s{resumed}\n"
+        f"renderer  {summary.renderer}\n"
+        f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps per frame\n"
+        f"stages    set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
+        f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
+        f"encoding {summary.encode_seconds:.1f} s"
+    )

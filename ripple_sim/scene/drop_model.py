@@ -1,0 +1,84 @@
+"""The MuJoCo model of a default scene: a target on a floor, and bodies parked above it until they drop."""
+
+from __future__ import annotations
+
+import colorsys
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.mesh.vertical_rays import downward_hits
+
+from .body_shapes import BODY_SHAPES
+from .motion import DropEntry
+
+_GEOM = mujoco.mjtGeom
+_HUES = (0.01, 0.48, 0.60, 0.08, 0.82, 0.36)
+
+
+def drop_model(
+    V: NDArray[np.float64], F: NDArray[np.int64], bodies: int, rng: np.random.Generator
+) -> tuple[mujoco.MjSpec, list[DropEntry]]:
+    """Model of a mesh on a floor, with bodies, and when and where these drop.
+
+    Parameters
+    ----------
+    V : float64 [n, 3]
+        Vertices of the target [m], standing on z = 0.
+    F : int64 [m, 3]
+    bodies : int
+    rng : numpy.random.Generator
+        Of the bodies' sizes, places and colours.
+    """
+    spec = mujoco.MjSpec()
+    spec.option.timestep = 0.002
+    # enough starting points to find the contacts of a body with a target, a fifth of the default's cost
+    spec.option.sdf_initpoints = 8
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    # springy contacts (restitution about 0.5): a spring of 0.01 s at a damping ratio of 0.2
+    spec.default.geom.solref = [0.01, 0.2]
+    spec.default.geom.friction = [0.4, 0.005, 0.0001]
+    spec.add_mesh(name="target", uservert=V.ravel(), userface=F.ravel())
+    spec.worldbody.add_geom(name="target", type=_GEOM.mjGEOM_SDF, meshname="target")
+    spec.worldbody.add_geom(
+        name="floor",
+        type=_GEOM.mjGEOM_PLANE,
+        size=[12, 12, 0.1],
+        rgba=[0.86, 0.87, 0.88, 1],
+        condim=6,
+        friction=[0.8, 0.01, 0.02],
+    )
+    landing = _landing_points(V, F, bodies, rng)
+    times = 0.1 + 3.4 * np.arange(bodies) / max(bodies, 1)
+    return spec, [_add_body(spec, i, float(times[i]), landing[i], rng) for i in range(bodies)]
+
+
+def _add_body(
+    spec: mujoco.MjSpec, number: int, time: float, landing: NDArray[np.float64], rng: np.random.Generator
+) -> DropEntry:
+    """Add a body that drops at a time [s] on a landing point [m]."""
+    kind, proportions = list(BODY_SHAPES.values())[number % len(BODY_SHAPES)]
+    radius = rng.uniform(0.05, 0.085)
+    name = f"body_{number}"
+    # parked high above until it drops, out of sight and out of reach of the others
+    body = spec.worldbody.add_body(name=name, pos=[0.0, 0.0, 20.0 + number], quat=rng.standard_normal(4))
+    body.add_freejoint()
+    color = colorsys.hsv_to_rgb(_HUES[number % len(_HUES)], rng.uniform(0.6, 0.8), rng.uniform(0.7, 0.95))
+    body.add_geom(name=name, type=kind, size=[radius * p for p in proportions], density=400, rgba=[*color, 1.0])
+    height = rng.uniform(0.8, 1.2)
+    x, y, z = landing
+    return DropEntry(body=name, time=time, position=(float(x), float(y), float(z + height)))
+
+
+def _landing_points(
+    V: NDArray[np.float64], F: NDArray[np.int64], count: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Random points of the surface with nothing above them, shape [count, 3] [m]."""
+    found: list[NDArray] = []
+    low, high = V.min(axis=0), V.max(axis=0)
+    while len(found) < count:
+        xy = rng.uniform(low[:2], high[:2], size=(64, 2))
+        z = downward_hits(V, F, xy)
+        found.extend(np.column_stack([xy, z])[np.isfinite(z)])
+    return np.array(found[:count])

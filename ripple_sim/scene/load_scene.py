@@ -1,0 +1,136 @@
+"""Reading a scene: one MJCF, and one TOML file that names its targets, the camera, the duration and the script."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.resources
+import tomllib
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+import mujoco
+import numpy as np
+
+from ripple_sim.errors import SceneError
+
+from .check_scene import check_scene
+from .events import Events
+from .motion import DropEntry, ThrowEntry
+from .randomize import RandomEntry, randomize
+from .scene import Scene
+from .scene_file import SceneFile, parse_scene
+
+Moved = TypeVar("Moved", DropEntry, ThrowEntry)
+Edit = Callable[[mujoco.MjSpec], None]
+
+
+def shipped_scenes() -> list[str]:
+    """Names of the scenes that come with ripple-sim."""
+    folder = importlib.resources.files("ripple_sim.scenes")
+    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+
+
+def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
+    """Load a shipped scene by its name, or any scene by the path of its TOML file.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+    edit : callable, optional
+        Called with the model's specification (`mujoco.MjSpec`) before it is compiled, to change it in place.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene or file, the TOML has an unknown key or a wrong value, MuJoCo refuses the MJCF, or a
+        geom or camera is not in it.
+    """
+    path = _scene_path(str(name_or_path))
+    content = _read(path)
+    model, shifts = load_model(path.parent / content.model, content.random, edit)
+    scene = Scene(
+        name=path.stem,
+        model=model,
+        targets=tuple(entry.located(path.parent) for entry in content.ripple),
+        camera=content.camera,
+        duration=content.duration,
+        events=Events(
+            drop=_shifted(content.drop, shifts),
+            throw=_shifted(content.throw, shifts),
+            place=tuple(content.place),
+            poke=tuple(content.poke),
+            change=tuple(content.change),
+            control=tuple(content.control),
+        ),
+        two_way=content.two_way,
+        overlay=tuple(content.overlay),
+        lighting=content.lighting,
+    )
+    check_scene(scene)
+    return scene
+
+
+def _read(path: Path) -> SceneFile:
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(f"scene file {str(path)!r} cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from error
+    return parse_scene(table, str(path))
+
+
+def _scene_path(name_or_path: str) -> Path:
+    shipped = shipped_scenes()
+    if name_or_path in shipped:
+        return Path(str(importlib.resources.files("ripple_sim.scenes") / f"{name_or_path}.toml"))
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    raise SceneError(
+        f"there is no scene {name_or_path!r}; shipped scenes are {', '.join(shipped)}, or give the path of a TOML file"
+    )
+
+
+def _shifted(entries: Sequence[Moved], shifts: dict[str, np.ndarray]) -> tuple[Moved, ...]:
+    """The entries, with their positions shifted like their bodies."""
+    return tuple(
+        msgspec.structs.replace(entry, position=tuple(float(x) for x in np.add(entry.position, shifts[entry.body])))
+        if entry.position is not None and entry.body in shifts
+        else entry
+        for entry in entries
+    )
+
+
+def load_model(
+    path: Path, random: RandomEntry | None = None, edit: Edit | None = None
+) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
+    """Compile an MJCF file; also return how far each of its bodies was shifted at random [m].
+
+    Raises
+    ------
+    SceneError
+        If the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the randomisation is invalid.
+    """
+    if not path.is_file():
+        problem = "is not a file" if path.exists() else "does not exist"
+        raise SceneError(f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file")
+    with refusal_of(repr(str(path))):
+        if random is None and edit is None:
+            return mujoco.MjModel.from_xml_path(str(path)), {}
+        spec = mujoco.MjSpec.from_file(str(path))
+        shifts = {} if random is None else randomize(spec, random)
+        if edit is not None:
+            edit(spec)
+        return spec.compile(), shifts
+
+
+@contextlib.contextmanager
+def refusal_of(name: str) -> Iterator[None]:
+    """Turn MuJoCo's refusal of a model, by its name in messages, into a `SceneError` with MuJoCo's reason."""
+    try:
+        yield
+    except ValueError as error:
+        raise SceneError(f"MuJoCo refuses {name}: {' '.join(str(error).split())}") from error

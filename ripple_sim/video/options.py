@@ -1,0 +1,64 @@
+"""`VideoOptions`: every option of a video, listed once for Python and for the command line."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Literal
+
+Backend = Literal["auto", "gl", "cpu"]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class VideoOptions:
+    """How a scene is rendered to a video.
+
+    The docstring of a field is its help on the command line. None leaves an option to the scene or to the output.
+    """
+
+    size: tuple[int, int] = (1280, 720)
+    """Frame size in pixels."""
+    fps: int | None = None
+    """Frames per second."""
+    duration: float | None = None
+    """Seconds of the scene to render."""
+    slow_motion: float = 1.0
+    """Seconds of video per second of the scene: 4 is four times slower."""
+    supersample: int = 1
+    """Render at this many times the width and height and average: finer edges and highlights."""
+    shutter: float | None = None
+    """Shutter angle in degrees, for motion blur: 180 keeps the shutter open for half the time between frames."""
+    aperture: float | None = None
+    """Lens diameter in metres, for depth of field."""
+    focus: float | str | tuple[float, float, float] | None = None
+    """Focus: a distance in metres along the camera's axis, or the name of a body or geom."""
+    exposures: int | None = None
+    """Exposures averaged per frame where shutter or aperture blur it; more are smoother and take longer."""
+    transparent: bool = False
+    """Leave out the background (.webp and folders of frames)."""
+    frame_format: Literal["png", "exr"] = "png"
+    """Format of the frames in a folder: PNG, or EXR for linear light, without tone mapping or overlays (needs
+    OpenEXR)."""
+    overlay: Sequence[str] | None = None
+    """Overlays on the video: height or velocity as a heatmap, contacts, grid, time, energy. Examples:
+    height,contacts,time or velocity=0.5,energy, where the colours end at 0.5 m/s."""
+    compare: str | None = None
+    """Also run the scene with this wave operator and show both side by side."""
+    resolution: int | None = None
+    """Texels along the edge of a chart; more resolve finer waves and take longer."""
+    backend: Backend = "auto"
+    """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
+    resume: bool = False
+    """Continue an interrupted render of the same scene with the same options."""
+
+    @property
+    def rate(self) -> float:
+        """Frames in a second of the scene's time."""
+        if self.fps is None:
+            raise ValueError("the frame rate depends on the output: settle the options first")
+        return self.fps * self.slow_motion
+
+    @property
+    def linear(self) -> bool:
+        """Whether frames are linear light, float16; otherwise sRGB, uint8."""
+        return self.frame_format == "exr"

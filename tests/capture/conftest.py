@@ -1,0 +1,22 @@
+"""Scenes with a shutter and a lens."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from exposed_scene import MJCF, SHOT, THROW, TOML
+
+from ripple_sim.scene.camera_override import with_exposure
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene import Scene
+
+
+@pytest.fixture
+def make_scene(tmp_path: Path) -> Callable[..., Scene]:
+    def make(bodies: str = SHOT, script: str = THROW, **exposure: Any) -> Scene:
+        (tmp_path / "scene.xml").write_text(MJCF.format(bodies=bodies))
+        (tmp_path / "scene.toml").write_text(TOML + script)
+        return with_exposure(load_scene(tmp_path / "scene.toml"), **exposure)
+
+    return make

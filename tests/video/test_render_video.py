@@ -1,0 +1,101 @@
+"""Interrupted renders go on to the same video, or say why not."""
+
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+from unfinished_videos import MJCF, contents
+
+from ripple_sim.encode.formats import FRAMES_IN_CLIP
+from ripple_sim.errors import VideoError
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene import Scene
+from ripple_sim.video.options import VideoOptions
+from ripple_sim.video.render_video import render_video
+
+OPTIONS = {"size": (64, 48), "fps": 30}
+
+
+class Impatience:
+    """Interrupts at a frame."""
+
+    def __init__(self, frame: int) -> None:
+        self._frame = frame
+
+    def __call__(self, done: int, total: int) -> None:
+        if done == self._frame:
+            raise KeyboardInterrupt
+
+
+def _push(simulation) -> None:
+    simulation.data.qvel[0] += 1e-9
+
+
+@pytest.mark.parametrize("name", ["clip.mp4", "frames"])
+def test_a_render_goes_on_to_the_same_video(scene, tmp_path, name):
+    whole, broken = tmp_path / "whole" / name, tmp_path / "broken" / name
+    assert render_video(scene, whole, VideoOptions(**OPTIONS)).resumed_at == 0
+    for frame in (20, 58):
+        with pytest.raises(KeyboardInterrupt):
+            render_video(scene, broken, VideoOptions(resume=True, **OPTIONS), progress=Impatience(frame))
+    summary = render_video(scene, broken, VideoOptions(resume=True, **OPTIONS))
+    # frames that wait to be encoded are lost
+    assert summary.resumed_at == FRAMES_IN_CLIP if name == "clip.mp4" else 48 <= summary.resumed_at <= 58
+    assert contents(broken.parent) == contents(whole.parent)
+
+
+def test_a_render_of_a_changed_scene_or_with_other_options_is_not_resumed(scene, tmp_path):
+    def resume(scene: Scene, **options: object) -> None:
+        render_video(
+            scene, tmp_path / "frames", VideoOptions(resume=True, **{**OPTIONS, **options}), progress=Impatience(20)
+        )
+
+    with pytest.raises(KeyboardInterrupt):
+        resume(scene)
+    with pytest.raises(VideoError, match="the size was 64x48 and now is 96x48"):
+        resume(scene, size=(96, 48))
+    with pytest.raises(VideoError, match="the number of frames was 60 and now is 30"):
+        resume(scene, duration=1.0)
+    (tmp_path / "scene.xml").write_text(MJCF.replace('size="0.05"', 'size="0.06"'))
+    with pytest.raises(VideoError, match="the scene's fingerprint was"):
+        resume(load_scene(tmp_path / "scene.toml"))
+    (tmp_path / "scene.xml").write_text(MJCF)
+    with pytest.raises(VideoError, match="at frame 16 the simulation is not in the state"):
+        render_video(scene, tmp_path / "frames", VideoOptions(resume=True, **OPTIONS), on_step=_push)
+    assert json.loads((tmp_path / "frames.part" / "settings.json").read_text())["the size"] == "64x48"
+
+
+@pytest.mark.parametrize("ahead", [False, True])
+def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
+    program = (
+        "import ctypes, sys\n"
+        "from ripple_sim.cli import main as cli\n"
+        "from ripple_sim.solver.gl import GLContext, shared_context\n"
+        + "GLContext.software = False\n"
+        * ahead  # a frame is on its way back when it happens
+        + "def lose(done, total):\n"
+        "    if done == 20:\n"
+        "        egl = ctypes.CDLL('libEGL.so.1')\n"
+        "        egl.eglGetCurrentDisplay.restype = ctypes.c_void_p\n"
+        "        with shared_context():\n"
+        "            egl.eglTerminate(ctypes.c_void_p(egl.eglGetCurrentDisplay()))\n"
+        "from ripple_sim.video import render_video as module\n"
+        "render = module.render_video\n"
+        "module.render_video = lambda *args, **others: render(*args, **{**others, 'progress': lose})\n"
+        "sys.exit(cli.main(['render', *sys.argv[1:], '--size', '64x48', '--fps', '30', '--backend', 'cpu']))\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", program, tmp_path / "scene.toml", "-o", tmp_path / "frames"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 1
+    lines = [line for line in result.stderr.splitlines() if "nanobind" not in line and not line.startswith(" - ")]
+    assert len(lines) == 1, result.stderr
+    assert re.match(
+        r"ripple-sim: the OpenGL context .* is lost; .* frames are kept in .*; --resume carries on", lines[0]
+    )
+    assert render_video(scene, tmp_path / "frames", VideoOptions(resume=True, **OPTIONS, backend="cpu")).resumed_at > 8
