@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ripple_sim.solver.cube_map.convention import texel_directions
+from ripple_sim.solver.cube_map.convention import cube_topology, texel_directions
 
 N = 24
 
