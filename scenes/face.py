@@ -1,4 +1,4 @@
-"""A cartoon head: its mesh with texture coordinates, its colours, and the picture that tells where waves run.
+"""A cartoon head: its mesh with texture coordinates, its colours, and the image that tells where waves run.
 
 `python -m ripple_sim.scenes.face` writes `meshes/face.obj`, `meshes/face.png` and `meshes/face_waves.png` again.
 """
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ripple_sim.solver.atomic_file import whole_file
+from ripple_sim.solver.atomic_file import atomic_write
 
 from .implicit import (
     Array,
@@ -30,7 +30,7 @@ from .implicit import (
 FOLDER = Path(__file__).parent / "meshes"
 
 _MIDDLE = np.array([0.0, 0.0, 0.52])  # texture coordinates are longitude and latitude about this point [m]
-_HEIGHT = 512  # of the pictures [pixels]; they are twice as wide
+_HEIGHT = 512  # of the images [pixels]; they are twice as wide
 _FINER = 2  # they are painted so many times as fine, for smooth edges
 
 _EYE, _EYE_RADIUS = np.array([0.205, 0.108, 0.575]), 0.088
@@ -79,7 +79,7 @@ def write_mesh(path: Path) -> None:
     """Write the head as OBJ, with texture coordinates that end at the back."""
     V, F = head()
     uv = _coordinates(V + np.array([0.0, 0.0, _FOOT]))[F]
-    # triangles across the end of the picture go on into its next repetition
+    # triangles across the end of the image go on into its next repetition
     uv[..., 0] += uv[..., 0] < uv[..., 0].max(axis=1, keepdims=True) - 0.5
     unique, index = np.unique(np.round(uv.reshape(-1, 2), 5), axis=0, return_inverse=True)
     lines = ["# made by python -m ripple_sim.scenes.face"]
@@ -87,11 +87,11 @@ def write_mesh(path: Path) -> None:
     lines += [f"vt {u:.5g} {v:.5g}" for u, v in unique]
     corners = np.stack([F, index.reshape(F.shape)], axis=2) + 1
     lines += ["f " + " ".join(f"{vertex}/{texture}" for vertex, texture in face) for face in corners]
-    with whole_file(path) as unfinished:
+    with atomic_write(path) as unfinished:
         unfinished.write_text("\n".join(lines) + "\n")
 
 
-def write_pictures(colors: Path, waves: Path) -> None:
+def write_images(colors: Path, waves: Path) -> None:
     """Write the colours, and where waves run: white; the eyes, black, stay still."""
     points = _painted_points()
     size = (2 * _HEIGHT, _HEIGHT)
@@ -107,7 +107,7 @@ def _coordinates(points: Array) -> Array:
 
 
 def _painted_points() -> Array:
-    """Outermost points of the head that a picture's pixels stand for, [height, width, 3], top row first."""
+    """Outermost points of the head that an image's pixels stand for, [height, width, 3], top row first."""
     height, width = _FINER * _HEIGHT, 2 * _FINER * _HEIGHT
     latitude = np.pi * (0.5 - (np.arange(height) + 0.5) / height)[:, None]
     longitude = 2 * np.pi * ((np.arange(width) + 0.5) / width - 0.5)
@@ -121,22 +121,22 @@ def _painted_points() -> Array:
 
 
 def _colors(points: Array) -> NDArray[np.uint8]:
-    picture = np.empty(points.shape)
-    picture[:] = _SKIN
+    image = np.empty(points.shape)
+    image[:] = _SKIN
     both = points * [1.0, 0.0, 1.0] + np.abs(points) * [0.0, 1.0, 0.0]
     flush = np.exp(-((np.linalg.norm(both - [0.225, 0.15, 0.44], axis=-1) / 0.06) ** 2))
-    picture += 0.7 * flush[..., None] * np.subtract(_CHEEK, _SKIN)
-    picture[_LIPS(points.reshape(-1, 3)).reshape(points.shape[:2]) < 0.002] = _LIP
+    image += 0.7 * flush[..., None] * np.subtract(_CHEEK, _SKIN)
+    image[_LIPS(points.reshape(-1, 3)).reshape(points.shape[:2]) < 0.002] = _LIP
     eye = _is_eye(points)
-    picture[eye] = _WHITE
+    image[eye] = _WHITE
     gaze = _GAZE / np.linalg.norm(_GAZE)
     middle = _EYE + _EYE_RADIUS * gaze
     off = np.linalg.norm(both - middle, axis=-1)
-    picture[eye & (off < _IRIS)] = _BLUE
-    picture[eye & (off < _PUPIL)] = _BLACK
+    image[eye & (off < _IRIS)] = _BLUE
+    image[eye & (off < _PUPIL)] = _BLACK
     glint = np.linalg.norm(both - middle - [0.0, -0.013, 0.020], axis=-1)
-    picture[eye & (glint < _GLINT)] = _WHITE
-    return picture.round().astype(np.uint8)
+    image[eye & (glint < _GLINT)] = _WHITE
+    return image.round().astype(np.uint8)
 
 
 def _is_eye(points: Array) -> NDArray[np.bool_]:
@@ -147,4 +147,4 @@ def _is_eye(points: Array) -> NDArray[np.bool_]:
 
 if __name__ == "__main__":
     write_mesh(FOLDER / "face.obj")
-    write_pictures(FOLDER / "face.png", FOLDER / "face_waves.png")
+    write_images(FOLDER / "face.png", FOLDER / "face_waves.png")

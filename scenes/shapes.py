@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.atomic_file import whole_file
+from ripple_sim.solver.atomic_file import atomic_write
 
 from .implicit import (
     Array,
@@ -70,7 +70,7 @@ def peanut(cell: float = 0.02) -> tuple[Array, Triangles]:
 
 
 def _duck_solid() -> Sdf:
-    body = smooth_union(
+    torso = smooth_union(
         0.12,
         ellipsoid((-0.06, 0.0, 0.24), (0.39, 0.31, 0.25)),
         sphere((0.14, 0.0, 0.26), 0.26),  # the breast
@@ -81,7 +81,7 @@ def _duck_solid() -> Sdf:
         ellipsoid((-0.05, 0.285, 0.30), (0.17, 0.065, 0.115), _turned(pitch=0.15, yaw=0.12)),
         rounded_cone((-0.14, 0.30, 0.32), (-0.27, 0.29, 0.41), 0.065, 0.035),
     )
-    body = smooth_union(0.04, body, mirrored(wing))
+    torso = smooth_union(0.04, torso, mirrored(wing))
     neck = rounded_cone((0.14, 0.0, 0.40), (0.19, 0.0, 0.58), 0.18, 0.16)
     head = sphere((0.19, 0.0, 0.68), 0.222)
     bill = smooth_union(
@@ -90,7 +90,7 @@ def _duck_solid() -> Sdf:
         pebble((0.40, 0.0, 0.605), 0.060, 0.030, _turned(pitch=0.12)),
     )
     eye = sphere((0.325, 0.118, 0.755), 0.052)
-    solid = smooth_union(0.08, body, smooth_union(0.05, neck, head))
+    solid = smooth_union(0.08, torso, smooth_union(0.05, neck, head))
     solid = smooth_union(0.035, solid, bill)
     solid = smooth_union(0.02, solid, mirrored(eye))
     return smooth_intersection(0.04, solid, half_space((0.0, 0.0, -1.0), -0.035))
@@ -107,7 +107,7 @@ def write_obj(path: Path, V: Array, F: Triangles) -> None:
     lines = ["# made by python -m ripple_sim.scenes.shapes"]
     lines += [f"v {x:.5g} {y:.5g} {z:.5g}" for x, y, z in V]
     lines += [f"f {a} {b} {c}" for a, b, c in F + 1]
-    with whole_file(path) as unfinished:
+    with atomic_write(path) as unfinished:
         unfinished.write_text("\n".join(lines) + "\n")
 
 

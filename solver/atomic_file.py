@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Files that appear complete or not at all."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 @contextlib.contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """Give a temporary path beside `path` to write to, renamed to `path` at the end, removed after an exception.
 
     Symbolic links are followed, missing folders made.
@@ -17,12 +17,11 @@ def whole_file(path: Path) -> Iterator[Path]:
     Raises
     ------
     OSError
-        If the path is taken by something that is no regular file (a device, say, which renaming would destroy), or
-        cannot be written.
+        If the path exists and is not a regular file (renaming would destroy a device, say), or cannot be written.
     """
     path = path.resolve()
     if path.exists() and not path.is_file():
-        raise FileExistsError(0, "it exists and is no regular file")
+        raise FileExistsError(0, "it exists and is not a regular file")
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:

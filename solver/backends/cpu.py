@@ -69,7 +69,7 @@ class CPUBackend:
 
     @property
     def thread_count(self) -> int:
-        """How many threads share out the faces."""
+        """How many threads share out the charts."""
         return self._threads
 
     def height(self) -> NDArray[np.float32]:
@@ -100,7 +100,7 @@ class CPUBackend:
         self._shift = 0.0
 
     def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: float) -> None:
-        """Add velocities [m/s] to some texels (each named once), and one to all that carry waves.
+        """Add velocities [m/s] to some texels (each named once), and one to all movable texels.
 
         The latter is only noted: the next drift, which touches every texel anyway, hands it out.
         """
@@ -108,7 +108,7 @@ class CPUBackend:
         self._shift += everywhere
 
     def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: float) -> None:
-        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all that carry waves, until the next call."""
+        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all movable texels, until the next call."""
         self._loaded, self._forces, self._acceleration = texels, forces, everywhere
         self._load_is_new = True
 

@@ -81,7 +81,7 @@ class GLBackend:
         self._waiting, self._shift = [], 0.0
 
     def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: float) -> None:
-        """Add velocities [m/s] to some texels, and one to all that carry waves.
+        """Add velocities [m/s] to some texels, and one to all movable texels.
 
         They are gathered here, and travel together when the next step or look at the velocity needs them.
         """
@@ -89,7 +89,7 @@ class GLBackend:
         self._shift += everywhere
 
     def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: float) -> None:
-        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all that carry waves, until the next call."""
+        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all movable texels, until the next call."""
         self._loaded, self._load_forces, self._acceleration = texels, forces, everywhere
         self._load_is_new = True
 

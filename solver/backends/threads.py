@@ -50,7 +50,7 @@ _yield_core = numba.types.ExternalFunction("sched_yield", numba.types.int32())
 
 @intrinsic
 def _add(context, counters, which, amount):
-    """Add to a counter in one piece, and return what it was."""
+    """Add to a counter atomically, and return its old value."""
 
     def generate(context, builder, signature, arguments):
         array = context.make_array(signature.args[0])(context, builder, arguments[0])
@@ -62,7 +62,7 @@ def _add(context, counters, which, amount):
 
 @kernel
 def _advance(substeps: int, dt: np.float32, state: State, halo: Halo, kick: Kick, loads: Loads, counters: Ints) -> None:
-    """What every thread does: draw a ticket, which stands for a chart of a substep, wait until that is open, and do it.
+    """Loop of every thread: draw a ticket for a chart of a substep, wait until that substep is open, and compute it.
 
     Whoever finishes the last chart of a substep opens the next one.
     """

@@ -61,5 +61,5 @@ def _sampled_areas(
     """
     corners = sphere[mesh.F]
     meeting = np.einsum("...k,...kj->...j", barycentrics, corners[triangles])
-    real = 2 * mesh.face_areas / np.linalg.det(corners)
+    real = 2 * mesh.triangle_areas / np.linalg.det(corners)
     return solid_angles(triangles.shape[1]) * real[triangles] * np.linalg.norm(meeting, axis=-1) ** 3

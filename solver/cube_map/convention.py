@@ -1,4 +1,4 @@
-"""The equiangular cube map: where the texels of six N x N charts lie on the sphere, and how these hang together.
+"""The equiangular cube map: where the texels of six N x N charts lie on the sphere, and how the charts are connected.
 
 Chart order is +x, -x, +y, -y, +z, -z. A chart has a normal n and two axes u (columns) and v (rows) with u x v = n.
 Texel (chart, row, column) looks along n + tan(pi/4 a) u + tan(pi/4 b) v with a = (2 column + 1)/N - 1 and
@@ -78,7 +78,7 @@ def cube_topology(resolution: int) -> TexelTopology:
 
 @functools.lru_cache(maxsize=1)
 def cube_rotations() -> NDArray[np.float64]:
-    """The 24 rotations that carry the cube onto itself, shape [24, 3, 3]."""
+    """The 24 rotations that map the cube onto itself, shape [24, 3, 3]."""
     rotations = []
     for first in range(6):
         for second in range(6):
@@ -89,7 +89,7 @@ def cube_rotations() -> NDArray[np.float64]:
 
 
 def permute_texels(field: NDArray, transform: NDArray[np.float64]) -> NDArray:
-    """Carry a field [6, N, N, ...] along one of the cube's 48 symmetries (a 3 x 3 signed permutation matrix).
+    """Move a field [6, N, N, ...] by one of the cube's 48 symmetries (a 3 x 3 signed permutation matrix).
 
     The result r satisfies r(transform @ d) = field(d) for the texel directions d.
     """

@@ -21,5 +21,5 @@ def sphere_map_quality(mesh: Mesh, sphere: NDArray[np.float64]) -> dict[str, flo
         "flipped": certificate.flipped,
         "solid_angle": certificate.solid_angle,
         **{name: float(value) for name, value in zip(QUANTILES, quantiles, strict=True)},
-        "starved": float(mesh.face_areas[starved].sum() / mesh.area),
+        "starved": float(mesh.triangle_areas[starved].sum() / mesh.area),
     }

@@ -24,7 +24,7 @@ def cast_rays(
     ----------
     sphere : [vertex_count, 3]
         A fold-free sphere map (unit vectors).
-    F : [face_count, 3]
+    F : [triangle_count, 3]
     directions : [k, 3]
         Ray directions.
     stride : int

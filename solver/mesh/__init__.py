@@ -1,1 +1,1 @@
-"""Triangle meshes: reading files, mending what is safe to mend, refusing what is no genus-0 surface."""
+"""Triangle meshes: reading files, mending what is safe to mend, refusing surfaces that are not of genus 0."""

@@ -28,7 +28,7 @@ def merge_vertices(
     -------
     V, F
         A mesh that is clean comes through unchanged.
-    keep : bool [face_count]
+    keep : bool [triangle_count]
         Which of the given triangles are left.
     """
     used = np.zeros(len(V), dtype=bool)

@@ -27,11 +27,11 @@ class Mesh:
     ----------
     V : float64 [vertex_count, 3]
         Vertices [m].
-    F : int64 [face_count, 3]
+    F : int64 [triangle_count, 3]
         Triangles, counter-clockwise seen from outside.
     uv : float64 [vertex_count, 2] or None
         The object's own texture coordinates, one pair a vertex (at a UV seam, one of the pairs that meet there).
-    corner_uv : float64 [face_count, 3, 2] or None
+    corner_uv : float64 [triangle_count, 3, 2] or None
         The object's own texture coordinates at every corner of every triangle: exact at seams.
     fixes : tuple of str
         What was mended on the way in, one phrase each.
@@ -51,9 +51,9 @@ class Mesh:
         ----------
         V : [vertex_count, 3]
             Vertices [m]. Equal positions are merged.
-        F : [face_count, 3]
+        F : [triangle_count, 3]
             Triangles in any winding.
-        uv : [vertex_count, 2] or [face_count, 3, 2], optional
+        uv : [vertex_count, 2] or [triangle_count, 3, 2], optional
             Texture coordinates of the vertices as given (before merging), or of every corner.
         name : str
             What to call the mesh in error messages.
@@ -78,14 +78,14 @@ class Mesh:
         return cls(points, triangles, vertex_uv, corner_uv, tuple(fixes))
 
     @functools.cached_property
-    def face_areas(self) -> NDArray[np.float64]:
-        """Triangle areas [m^2], shape [face_count]."""
+    def triangle_areas(self) -> NDArray[np.float64]:
+        """Triangle areas [m^2], shape [triangle_count]."""
         return _area_vectors(self.V, self.F)[1] / 2
 
     @property
     def area(self) -> float:
         """Surface area [m^2]."""
-        return float(self.face_areas.sum())
+        return float(self.triangle_areas.sum())
 
     @property
     def volume(self) -> float:
@@ -96,16 +96,16 @@ class Mesh:
     def vertex_normals(self) -> NDArray[np.float64]:
         """Unit normals weighted by corner angle, shape [vertex_count, 3] (Thuermer and Wuethrich 1998)."""
         corners = self.V[self.F]
-        face_normals = _area_vectors(self.V, self.F)[0]
-        length = np.linalg.norm(face_normals, axis=1, keepdims=True)
-        face_normals = face_normals / np.where(length > 0, length, 1)
+        triangle_normals = _area_vectors(self.V, self.F)[0]
+        length = np.linalg.norm(triangle_normals, axis=1, keepdims=True)
+        triangle_normals = triangle_normals / np.where(length > 0, length, 1)
         normals = np.zeros_like(self.V)
         for k in range(3):
             a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
             angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
             for axis in range(3):
                 normals[:, axis] += np.bincount(
-                    self.F[:, k], weights=angle * face_normals[:, axis], minlength=len(self.V)
+                    self.F[:, k], weights=angle * triangle_normals[:, axis], minlength=len(self.V)
                 )
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         return np.where(length > 0, normals / np.where(length > 0, length, 1), [0.0, 0.0, 1.0])

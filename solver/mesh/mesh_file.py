@@ -17,7 +17,7 @@ from .polygons import Soup
 from .repair import repaired
 from .text_formats import read_obj, read_off
 
-# trimesh logs whole tracebacks, which Python prints to stderr where nobody has set up logging
+# trimesh logs whole tracebacks; without a handler Python prints them to stderr
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 _READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
@@ -75,33 +75,33 @@ def _read(path: Path) -> Soup:
         raise MeshError(f"mesh file {str(path)!r} cannot be read: {error}") from error
     except OSError as error:
         raise MeshError(f"mesh file {str(path)!r} cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # trimesh raises whatever its parsers stumble over
+    except Exception as error:  # trimesh lets its parsers' exceptions through
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise MeshError(
-            f"mesh file {str(path)!r} cannot be read: it is damaged or no {kind} file ({reason})"
+            f"mesh file {str(path)!r} cannot be read: it is damaged or not a {kind} file ({reason})"
         ) from error
 
 
 def _parts(scene: trimesh.Scene) -> Soup:
-    """All triangle meshes of a scene, each where its node puts it. Pictures and materials are left alone."""
+    """All triangle meshes of a scene, each where its node puts it. Images and materials are ignored."""
     V, F, corner_uv = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [np.empty((0, 3, 2))]
     textured = False
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
         part = scene.geometry[name]
-        faces = np.asarray(getattr(part, "faces", ()), dtype=np.int64)
-        if len(faces) == 0:
+        triangles = np.asarray(getattr(part, "faces", ()), dtype=np.int64)
+        if len(triangles) == 0:
             continue
         vertices = np.asarray(part.vertices, dtype=np.float64)
-        if faces.min() < 0 or faces.max() >= len(vertices):
-            raise MeshError(f"a triangle refers to vertex {faces.max()}; valid is 0 to {len(vertices) - 1}")
+        if triangles.min() < 0 or triangles.max() >= len(vertices):
+            raise MeshError(f"a triangle refers to vertex {triangles.max()}; valid is 0 to {len(vertices) - 1}")
         uv = np.asarray(getattr(part.visual, "uv", None), dtype=np.float64)
         if uv.shape == (len(vertices), 2):
             textured = True
         else:
             uv = np.zeros((len(vertices), 2))
-        F.append(faces + sum(map(len, V)))
-        corner_uv.append(uv[faces])
+        F.append(triangles + sum(map(len, V)))
+        corner_uv.append(uv[triangles])
         # an identity would still round
         moved = vertices if np.array_equal(transform, np.eye(4)) else trimesh.transform_points(vertices, transform)
         V.append(moved)

@@ -46,13 +46,13 @@ def read_ply(content: bytes) -> Soup:
     Raises
     ------
     MeshError
-        For a file that is no PLY file, ends early, or has an index that no vertex has.
+        If the file is not a PLY file, ends early, or refers to a vertex that does not exist.
     """
-    order, elements, body = _header(content)
+    order, elements, data = _header(content)
     columns: dict[str, dict[str, Any]] = {}
     for element in elements:
         read = _read_text if order == "" else _read_binary
-        columns[element.name], body = read(element, body, order)
+        columns[element.name], data = read(element, data, order)
         if "face" in columns and "vertex" in columns:
             break
     vertex, faces = columns.get("vertex", {}), columns.get("face", {})
@@ -85,7 +85,7 @@ def _corner_uv(
 
 
 def _header(content: bytes) -> tuple[str, list[_Element], bytes]:
-    head, found, body = content.partition(b"end_header")
+    head, found, data = content.partition(b"end_header")
     lines = [line.split() for line in head.decode("ascii", errors="replace").splitlines()]
     if not found or not lines or lines[0] != ["ply"]:
         raise MeshError("it has no header from ply to end_header, as a PLY file does")
@@ -109,11 +109,11 @@ def _header(content: bytes) -> tuple[str, list[_Element], bytes]:
         raise MeshError(f"the line {' '.join(words)[:60]!r} of its header is not understood") from error
     if order is None or any(element.rows < 0 for element in elements):
         raise MeshError("its header gives no format or a negative number of rows")
-    return order, elements, body[2:] if body.startswith(b"\r\n") else body[1:]
+    return order, elements, data[2:] if data.startswith(b"\r\n") else data[1:]
 
 
-def _read_text(element: _Element, body: bytes, order: str) -> tuple[dict[str, Any], bytes]:
-    parts = body.split(b"\n", element.rows) if element.rows <= len(body) else []
+def _read_text(element: _Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
+    parts = data.split(b"\n", element.rows) if element.rows <= len(data) else []
     if len(parts) < element.rows or (len(parts) == element.rows and element.rows and not parts[-1].strip()):
         raise _ends_early(element)
     rest = parts[element.rows] if len(parts) > element.rows else b""
@@ -137,17 +137,17 @@ def _read_text(element: _Element, body: bytes, order: str) -> tuple[dict[str, An
     return columns, rest
 
 
-def _read_binary(element: _Element, body: bytes, order: str) -> tuple[dict[str, Any], bytes]:
-    columns = _read_table(element, body, order)
+def _read_binary(element: _Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
+    columns = _read_table(element, data, order)
     if columns is not None:
         return columns
-    return _read_rows(element, body, order)
+    return _read_rows(element, data, order)
 
 
-def _read_table(element: _Element, body: bytes, order: str) -> tuple[dict[str, Any], bytes] | None:
+def _read_table(element: _Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes] | None:
     """Read rows that are all of one length, in one go; None where their lists are not."""
     if not element.names:
-        return {}, body
+        return {}, data
     fields: list[Any] = []
     sizes: dict[str, int] = {}
     for name, kind, length in zip(element.names, element.types, element.lengths, strict=True):
@@ -156,24 +156,24 @@ def _read_table(element: _Element, body: bytes, order: str) -> tuple[dict[str, A
             continue
         first = np.dtype(fields).itemsize if fields else 0
         kind_of_length = np.dtype(order + length)
-        if len(body) < first + kind_of_length.itemsize:
+        if len(data) < first + kind_of_length.itemsize:
             return None
-        sizes[name] = int(np.frombuffer(body, kind_of_length, 1, first)[0])
-        if not 0 <= sizes[name] * np.dtype(kind).itemsize <= len(body):
+        sizes[name] = int(np.frombuffer(data, kind_of_length, 1, first)[0])
+        if not 0 <= sizes[name] * np.dtype(kind).itemsize <= len(data):
             return None
         fields += [(f"{name} length", kind_of_length), (name, order + kind, (sizes[name],))]
     row = np.dtype(fields)
-    if element.rows * row.itemsize > len(body):
+    if element.rows * row.itemsize > len(data):
         if sizes:
             return None
         raise _ends_early(element)
-    table = np.frombuffer(body, row, element.rows)
+    table = np.frombuffer(data, row, element.rows)
     if any((table[f"{name} length"] != size).any() for name, size in sizes.items()):
         return None
-    return {name: table[name] for name in element.names}, body[element.rows * row.itemsize :]
+    return {name: table[name] for name in element.names}, data[element.rows * row.itemsize :]
 
 
-def _read_rows(element: _Element, body: bytes, order: str) -> tuple[dict[str, Any], bytes]:
+def _read_rows(element: _Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
     columns: dict[str, list[NDArray]] = {name: [] for name in element.names}
     kinds = [np.dtype(order + kind) for kind in element.types]
     lengths = [None if length is None else np.dtype(order + length) for length in element.lengths]
@@ -183,16 +183,16 @@ def _read_rows(element: _Element, body: bytes, order: str) -> tuple[dict[str, An
             for name, kind, length in zip(element.names, kinds, lengths, strict=True):
                 size = 1
                 if length is not None:
-                    size = int(np.frombuffer(body, length, 1, at)[0])
+                    size = int(np.frombuffer(data, length, 1, at)[0])
                     at += length.itemsize
-                if not 0 <= size <= len(body):
+                if not 0 <= size <= len(data):
                     raise _ends_early(element)
-                columns[name].append(np.frombuffer(body, kind, size, at))
+                columns[name].append(np.frombuffer(data, kind, size, at))
                 at += size * kind.itemsize
     except ValueError as error:  # what numpy says where the bytes are too few
         raise _ends_early(element) from error
-    return dict(columns), body[at:]
+    return dict(columns), data[at:]
 
 
 def _ends_early(element: _Element) -> MeshError:
-    return MeshError(f"it ends before the {element.rows} rows of its element {element.name} that it promises")
+    return MeshError(f"it ends before the {element.rows} rows of its element {element.name}")

@@ -15,8 +15,8 @@ class Soup:
     Attributes
     ----------
     V : float64 [vertex_count, 3]
-    F : int64 [face_count, 3]
-    corner_uv : float64 [face_count, 3, 2] or None
+    F : int64 [triangle_count, 3]
+    corner_uv : float64 [triangle_count, 3, 2] or None
         Texture coordinates of the corners; 0 where the file has none for some of them.
     """
 

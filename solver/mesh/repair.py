@@ -26,7 +26,7 @@ def repaired(V: NDArray[np.float64], F: NDArray[np.int64], name: str, defect: Me
 
     Parameters
     ----------
-    V, F : [vertex_count, 3], [face_count, 3]
+    V, F : [vertex_count, 3], [triangle_count, 3]
         The surface as it was found.
     name : str
         What to call it in messages.
@@ -62,9 +62,9 @@ def _mended(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.fl
         try:
             subprocess.run(program, check=True, capture_output=True, stdin=subprocess.DEVNULL, timeout=_TIME_LIMIT)
         except subprocess.TimeoutExpired as error:
-            raise MeshError(f"it was not done after {_TIME_LIMIT} s") from error
+            raise MeshError(f"it did not finish within {_TIME_LIMIT} s") from error
         except (OSError, subprocess.CalledProcessError) as error:
-            raise MeshError("it broke off") from error
+            raise MeshError("it failed") from error
         with np.load(target) as arrays:
             V, F = arrays["V"], arrays["F"].astype(np.int64)
     if len(F) == 0:

@@ -27,7 +27,7 @@ def read_obj(content: bytes) -> Soup:
     Raises
     ------
     MeshError
-        For a line that cannot be read, or an index that no vertex has.
+        For a line that cannot be read, or a vertex that does not exist.
     """
     places: list[str] = []
     pairs: list[str] = []
@@ -76,27 +76,29 @@ def read_off(content: bytes) -> Soup:
     Raises
     ------
     MeshError
-        For a file that is no OFF file in text form, ends early, or has an index that no vertex has.
+        If the file is not an OFF file in text form, ends early, or refers to a vertex that does not exist.
     """
     rows = [words for line in _decoded(content).splitlines() if (words := line.partition("#")[0].split())]
     if not rows or not re.fullmatch(r"(ST)?C?N?OFF", rows[0][0].upper()) or "BINARY" in rows[0]:
         raise MeshError("it does not start with OFF, as an OFF file in text form does")
     counts = rows[0][1:] or (rows[1] if len(rows) > 1 else [])
-    body = rows[1:] if rows[0][1:] else rows[2:]
+    lines_left = rows[1:] if rows[0][1:] else rows[2:]
     if len(counts) < 2 or not all(word.isdecimal() for word in counts[:2]):
         raise MeshError("the numbers of vertices and faces are missing after OFF")
     vertices, faces = int(counts[0]), int(counts[1])
-    if len(body) < vertices + faces:
-        raise MeshError(f"it ends early: {vertices} vertices and {faces} faces are promised, {len(body)} lines follow")
-    # the numbers of the lines are lost with the comments; counting from the first vertex is the next best
-    places = [_three(words, number, "vertex") for number, words in enumerate(body[:vertices], 1)]
+    if len(lines_left) < vertices + faces:
+        raise MeshError(
+            f"it ends early: {vertices} vertices and {faces} faces are announced, {len(lines_left)} lines follow"
+        )
+    # the numbers of the lines are lost with the comments, so vertices are counted instead
+    places = [_three(words, number, "vertex") for number, words in enumerate(lines_left[:vertices], 1)]
     V = _numbers([word for row in places for word in row]).reshape(-1, 3)
     polygons = []
-    for words in body[vertices : vertices + faces]:
+    for words in lines_left[vertices : vertices + faces]:
         size = _whole(words[0])
         corners = [_whole(word) for word in words[1 : 1 + max(size, 0)]]
         if len(corners) != size:
-            raise MeshError(f"the face {' '.join(words)[:40]!r} does not have the {size} corners that it promises")
+            raise MeshError(f"the face {' '.join(words)[:40]!r} has {len(corners)} corners instead of {size}")
         if any(not 0 <= corner < vertices for corner in corners):
             raise MeshError(f"the face {' '.join(words)[:40]!r} refers to a vertex outside 0 to {vertices - 1}")
         polygons.append(corners)
@@ -106,15 +108,17 @@ def read_off(content: bytes) -> Soup:
 
 
 def _decoded(content: bytes) -> str:
-    # what is not UTF-8 can only be a name or a comment; Windows may have put a mark at the beginning
+    # only names and comments can be other than UTF-8; Windows may put a byte order mark in front
     return content.decode("utf-8-sig", errors="replace")
 
 
 def _corner(word: str, places: int, pairs: int, line: int) -> tuple[int, int]:
-    """Vertex and texture coordinate, counted from 0, of a corner such as 3, 3/1, 3//2 or 3/1/2."""
+    """Vertex and texture coordinate, counted from 0, of a corner: 3, 3/1, 3//2 or 3/1/2."""
     match = _CORNER.fullmatch(word)
     if match is None:
-        raise MeshError(f"line {line}: {word[:40]!r} is no corner of a face; valid is such as 3, 3/1, 3//2 or 3/1/2")
+        raise MeshError(
+            f"line {line}: {word[:40]!r} is not a corner of a face; valid are 3, 3/1, 3//2 and 3/1/2, for example"
+        )
     vertex, pair = int(match[1]), int(match[2] or 0)
     return (vertex - 1 if vertex >= 0 else places + vertex), (pair - 1 if pair >= 0 else pairs + pair)
 
@@ -129,10 +133,10 @@ def _numbers(words: list[str]) -> NDArray[np.float64]:
     try:
         return np.array(words, dtype=np.float64)
     except ValueError as error:
-        raise MeshError(f"a coordinate is no number: {error}") from error
+        raise MeshError(f"a coordinate is not a number: {error}") from error
 
 
 def _whole(word: str) -> int:
     if not _WHOLE.fullmatch(word):
-        raise MeshError(f"{word[:40]!r} stands where a whole number should")
+        raise MeshError(f"expected a whole number, found {word[:40]!r}")
     return int(word)

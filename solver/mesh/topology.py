@@ -18,7 +18,7 @@ def check_topology(V: NDArray[np.float64], F: NDArray[np.int64], name: str) -> N
     ----------
     V : [vertex_count, 3]
         Vertices, all of them in use.
-    F : [face_count, 3]
+    F : [triangle_count, 3]
     name : str
         What to call the mesh.
     """

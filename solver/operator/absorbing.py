@@ -39,7 +39,7 @@ def absorbing_damping(
     Raises
     ------
     SolverError
-        If the region is no mask of the atlas, covers nothing or everything, or a number is out of range.
+        If the region is not a mask of the atlas, covers nothing or everything, or a number is out of range.
     """
     mask = np.asarray(region)
     shape = atlas.areas.shape

@@ -47,7 +47,7 @@ def hold(atlas: Atlas, material: Material, region: ArrayLike) -> Material:
     Raises
     ------
     SolverError
-        If the region is no mask of the atlas, or holds shares that are not from 0 to 1.
+        If the region is not a mask of the atlas, or holds shares that are not from 0 to 1.
     """
     share = np.asarray(region, dtype=np.float64)
     if share.shape != atlas.areas.shape:

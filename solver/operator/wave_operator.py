@@ -56,7 +56,7 @@ class WaveOperator:
 
     @property
     def topology(self) -> TexelTopology:
-        """How the charts hang together."""
+        """How the charts are connected."""
         return self.stencil.topology
 
     @functools.cached_property

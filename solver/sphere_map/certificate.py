@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .vectors import Ints, cross, dot, kernel, row, subtract
+from ripple_sim.solver.kernel import Ints32, kernel
+
+from .vectors import cross, dot, row, subtract
 
 EPSILON = float(np.finfo(np.float64).eps)
 QUANTILES = (0.001, 0.01, 0.5, 0.99, 0.999)
@@ -35,7 +37,7 @@ def certify(F: NDArray[np.integer], S: NDArray[np.float64]) -> Certificate:
 
 
 @kernel
-def _folds_and_angle(F: Ints, S: NDArray[np.float64]) -> tuple[int, float]:
+def _folds_and_angle(F: Ints32, S: NDArray[np.float64]) -> tuple[int, float]:
     """Number of triangles whose triple product is not above round-off, and the sum of solid angles."""
     flipped, angle = 0, 0.0
     for f in range(len(F)):

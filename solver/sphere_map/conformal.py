@@ -1,7 +1,7 @@
 """The conformal sphere map of Choi, Lam and Lui (FLASH, 2015).
 
 One triangle is cut out and the rest laid flat inside it by a harmonic map, which an inverse stereographic projection
-carries to the sphere. Angles suffer near the cut, at the north pole. So the map is projected from the south pole, where
+puts on the sphere. Angles suffer near the cut, at the north pole. So the map is projected from the south pole, where
 the cut lies in the middle of the plane, and composed with the quasi-conformal map that undoes the distortion.
 
 It keeps angles, not areas: limbs shrink beyond use, and badly shaped meshes fold. The progressive map does neither.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .vectors import Floats, Ints, kernel
+from ripple_sim.solver.kernel import Floats, Ints32, kernel
 
 
 @kernel
-def solve(ends: Ints, diagonal: Floats, blocks: Floats, gradient: Floats, steps: int, tolerance: float) -> Floats:
+def solve(ends: Ints32, diagonal: Floats, blocks: Floats, gradient: Floats, steps: int, tolerance: float) -> Floats:
     """Solve H x = -gradient roughly, preconditioned by the inverse diagonal blocks; x has shape [n, 2].
 
     `diagonal` [n, 3] holds xx, xy, yy of a vertex; `blocks` [e, 4] holds xx, xy, yx, yy of the edge between the

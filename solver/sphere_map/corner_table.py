@@ -13,15 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .vectors import Ints, kernel
+from ripple_sim.solver.kernel import Ints32, kernel
 
 
 class CornerTable(NamedTuple):
     """Half-edges of a closed triangle mesh."""
 
-    tail: Ints  # [3 m]
-    twin: Ints  # [3 m]
-    leaving: Ints  # [n]
+    tail: Ints32  # [3 m]
+    twin: Ints32  # [3 m]
+    leaving: Ints32  # [n]
 
 
 def corner_table(F: NDArray[np.integer], vertex_count: int) -> CornerTable:
@@ -50,7 +50,7 @@ def preceding(h: int) -> int:
 
 
 @kernel
-def gather_star(table: CornerTable, v: int, star: Ints) -> int:
+def gather_star(table: CornerTable, v: int, star: Ints32) -> int:
     """Fill `star` with the half-edges that leave v, counterclockwise, and return how many there are."""
     first = table.leaving[v]
     h = first

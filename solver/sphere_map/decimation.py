@@ -10,15 +10,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from ripple_sim.solver.kernel import Floats, Ints32, kernel
+
 from .corner_table import CornerTable, collapse, following, gather_star, preceding
-from .vectors import Floats, Ints, cross, dot, kernel, row, set_row, subtract
+from .vectors import cross, dot, row, set_row, subtract
 
 ROUND_SHARE = 0.15  # of the vertices left, removed in one round
 COMFORTABLE_DEGREE = 8
 DEGREE_LIMIT = 12  # of a merged vertex, raised where nothing else is left to collapse
 
 
-def decimate(table: CornerTable, V: Floats) -> Ints:
+def decimate(table: CornerTable, V: Floats) -> Ints32:
     """Collapse `table` to a tetrahedron in place and return the half-edges collapsed, in order, shape [n - 4]."""
     edges = V[table.tail] - V[table.tail[table.twin]]
     blur = 1e-4 * float(np.mean(np.sum(edges * edges, axis=1)))
@@ -45,7 +47,7 @@ def decimate(table: CornerTable, V: Floats) -> Ints:
 
 
 @kernel
-def _vertex_quadrics(tail: Ints, V: Floats) -> Floats:
+def _vertex_quadrics(tail: Ints32, V: Floats) -> Floats:
     """Area-weighted sums of squared plane distances: xx xy xz yy yz zz, x y z, 1 of each vertex, shape [n, 10]."""
     quadrics = np.zeros((len(V), 10))
     for f in range(len(tail) // 3):
@@ -69,7 +71,7 @@ def _quadric_error(q: Floats, x: float, y: float, z: float) -> float:
 
 
 @kernel
-def _mark_neighbours(table: CornerTable, u: int, mark: Ints) -> None:
+def _mark_neighbours(table: CornerTable, u: int, mark: Ints32) -> None:
     """Write u beside each of its neighbours."""
     first = h = table.leaving[u]
     while True:
@@ -80,7 +82,7 @@ def _mark_neighbours(table: CornerTable, u: int, mark: Ints) -> None:
 
 
 @kernel
-def _is_legal(table: CornerTable, u: int, v: int, mark: Ints) -> bool:
+def _is_legal(table: CornerTable, u: int, v: int, mark: Ints32) -> bool:
     """Tell whether v and u, whose neighbours are marked, meet the link condition."""
     first = h = table.leaving[v]
     common = 0
@@ -93,17 +95,17 @@ def _is_legal(table: CornerTable, u: int, v: int, mark: Ints) -> bool:
 
 @kernel
 def _price(
-    alive: Ints,
+    alive: Ints32,
     table: CornerTable,
     V: Floats,
     quadrics: Floats,
     merged: Floats,
-    degree: Ints,
+    degree: Ints32,
     blur: float,
     limit: int,
     stale: np.ndarray,
     cost: Floats,
-    target: Ints,
+    target: Ints32,
 ) -> None:
     """Find the cheapest legal collapse of every stale vertex (`blur`: a squared length below which all are alike)."""
     neighbours, mark = np.empty(len(V), np.int32), np.full(len(V), -1, np.int32)
@@ -142,17 +144,17 @@ def _price(
 
 @kernel
 def _collapse_round(
-    order: Ints,
+    order: Ints32,
     quota: int,
     table: CornerTable,
     quadrics: Floats,
     merged: Floats,
-    degree: Ints,
+    degree: Ints32,
     limit: int,
     cost: Floats,
-    target: Ints,
+    target: Ints32,
     stale: np.ndarray,
-    log: Ints,
+    log: Ints32,
 ) -> int:
     """Collapse up to `quota` vertices in `order`, none beside another; mark removed ones by a negative cost."""
     star, mark = np.empty(len(cost), np.int32), np.full(len(cost), -1, np.int32)

@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .vectors import Floats, Ints, cross, dot, kernel, row, subtract
+from ripple_sim.solver.kernel import Floats, Ints32, kernel
+
+from .vectors import cross, dot, row, subtract
 
 FOLDED = 1e-16  # a triple product must exceed this
 LONG = 0.53**8  # weights of long texel edges ...
@@ -61,7 +63,7 @@ def density_derivatives(dirichlet: float, jacobian: float) -> tuple[float, float
 
 
 @kernel
-def total_energy(tail: Ints, S: Floats, reference: Reference) -> float:
+def total_energy(tail: Ints32, S: Floats, reference: Reference) -> float:
     """Energy of the whole map S; infinite if a triangle is folded."""
     cotangent = reference.cotangent
     total = 0.0

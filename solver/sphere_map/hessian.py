@@ -11,9 +11,11 @@ from typing import TypeAlias
 
 import numpy as np
 
+from ripple_sim.solver.kernel import Floats, kernel
+
 from .energy import Reference, density_derivatives
 from .level import Level
-from .vectors import Floats, Vector, combine, cross, dot, kernel, row, subtract
+from .vectors import Vector, combine, cross, dot, row, subtract
 
 # of D and J along the two tangents of a vertex: D_x, D_y, J_x, J_y
 Slopes: TypeAlias = tuple[float, float, float, float]

@@ -8,19 +8,23 @@ from __future__ import annotations
 
 import numpy as np
 
+from ripple_sim.solver.kernel import Floats, Ints32, kernel
+
 from .corner_table import CornerTable, following, gather_star, preceding, undo_collapse
 from .energy import Reference
 from .level import set_shape
 from .reference import Source, update_load, update_triangle
 from .relaxation import relax_vertex
 from .star import TERMS, energy_after, expand
-from .vectors import Floats, Ints, combine, cross, dot, kernel, row, set_row, subtract, tangent_frame, unit
+from .vectors import combine, cross, dot, row, set_row, subtract, tangent_frame, unit
 
 CROWDED = 64  # neighbours of a new vertex with more triangles than this wait for the sweeps
 
 
 @kernel
-def _gather(star: Ints, degree: int, tail: Ints, S: Floats, reference: Reference, ring: Floats, shapes: Floats) -> None:
+def _gather(
+    star: Ints32, degree: int, tail: Ints32, S: Floats, reference: Reference, ring: Floats, shapes: Floats
+) -> None:
     """Fill in what `star.expand` asks for."""
     for i in range(degree):
         set_row(ring, i, row(S, tail[following(star[i])]))
@@ -59,7 +63,7 @@ def _place(
 
 
 @kernel
-def insert_vertices(log: Ints, table: CornerTable, source: Source, S: Floats, reference: Reference) -> None:
+def insert_vertices(log: Ints32, table: CornerTable, source: Source, S: Floats, reference: Reference) -> None:
     """Undo the collapses in `log`, latest first, and relax round every new vertex.
 
     A vertex that finds no place leaves a fold behind, which the certificate will find.

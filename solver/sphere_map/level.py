@@ -7,25 +7,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver.kernel import Floats, Ints32, kernel
+
 from .corner_table import CornerTable, following, gather_star, preceding
 from .energy import Reference
-from .vectors import Floats, Ints, kernel
 
 
 class Level(NamedTuple):
     """Triangles of a level, its edges, and the star of each vertex; h is one of the level's 3 m half-edges."""
 
-    tail: Ints  # [3 m] vertex where a half-edge starts
-    edge: Ints  # [3 m] edge that a half-edge lies on
-    ends: Ints  # [e, 2] vertices of an edge; the half-edge that starts at the first one is the lower-numbered
-    star_start: Ints  # [n + 1] where the neighbours of a vertex begin in `ring`
-    ring: Ints  # [3 m] neighbours of each vertex, counterclockwise
-    star: Ints  # [3 m] the half-edges to them
+    tail: Ints32  # [3 m] vertex where a half-edge starts
+    edge: Ints32  # [3 m] edge that a half-edge lies on
+    ends: Ints32  # [e, 2] vertices of an edge; the half-edge that starts at the first one is the lower-numbered
+    star_start: Ints32  # [n + 1] where the neighbours of a vertex begin in `ring`
+    ring: Ints32  # [3 m] neighbours of each vertex, counterclockwise
+    star: Ints32  # [3 m] the half-edges to them
 
 
-def build_level(table: CornerTable, vertices: NDArray[np.integer], faces: NDArray[np.integer]) -> Level:
+def build_level(table: CornerTable, vertices: NDArray[np.integer], triangles: NDArray[np.integer]) -> Level:
     """Level made of the given vertices and triangles of a (partly collapsed) corner table."""
-    corners = (3 * faces[:, None] + np.arange(3)).ravel()
+    corners = (3 * triangles[:, None] + np.arange(3)).ravel()
     vertex_number, corner_number = _renumber(vertices, len(table.leaving)), _renumber(corners, len(table.tail))
     tail, twin = vertex_number[table.tail[corners]], corner_number[table.twin[corners]]
     lower = np.flatnonzero(np.arange(len(twin)) < twin)
@@ -40,7 +41,7 @@ def build_level(table: CornerTable, vertices: NDArray[np.integer], faces: NDArra
 
 
 @kernel
-def _gather_stars(vertices: Ints, table: CornerTable, star_start: Ints, star: Ints) -> None:
+def _gather_stars(vertices: Ints32, table: CornerTable, star_start: Ints32, star: Ints32) -> None:
     for i in range(len(vertices)):
         gather_star(table, vertices[i], star[star_start[i] : star_start[i + 1]])
 
@@ -55,7 +56,7 @@ def set_shape(shapes: Floats, i: int, h: int, reference: Reference) -> None:
 
 
 @kernel
-def star_shapes(star: Ints, reference: Reference) -> Floats:
+def star_shapes(star: Ints32, reference: Reference) -> Floats:
     """References of the triangles left of the half-edges `star`, one after the other in memory, shape [3 m, 4]."""
     shapes = np.empty((len(star), 4))
     for i in range(len(star)):
@@ -63,7 +64,7 @@ def star_shapes(star: Ints, reference: Reference) -> Floats:
     return shapes
 
 
-def _renumber(kept: NDArray[np.integer], count: int) -> Ints:
+def _renumber(kept: NDArray[np.integer], count: int) -> Ints32:
     number = np.full(count, -1, dtype=np.int32)
     number[kept] = np.arange(len(kept))
     return number

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ripple_sim.solver.kernel import Floats, Ints32, kernel
+
 from .conjugate_gradients import solve
 from .energy import Reference, total_energy
 from .hessian import assemble
 from .level import Level
-from .vectors import Floats, Ints, combine, cross, dot, kernel, row, set_row, subtract, tangent_frame, unit
+from .vectors import combine, cross, dot, row, set_row, subtract, tangent_frame, unit
 
 LONGEST_STEP = 0.7  # [rad]
 FURTHER, SHORTER = 1.6, 0.6  # factors from one trial step to the next
@@ -44,7 +46,7 @@ def newton_step(level: Level, S: Floats, reference: Reference, cg_steps: int) ->
 
 
 def _search(
-    energy: float, expected: float, bound: float, tail: Ints, S: Floats, velocity: Floats, reference: Reference
+    energy: float, expected: float, bound: float, tail: Ints32, S: Floats, velocity: Floats, reference: Reference
 ) -> tuple[float, float]:
     """Move S along `velocity`, by less than `bound`, to about the least energy; return the step and that energy.
 
@@ -79,7 +81,7 @@ def tangents(S: Floats) -> tuple[Floats, Floats]:
 
 
 @kernel
-def _energy_at(t: float, tail: Ints, S: Floats, velocity: Floats, reference: Reference, moved: Floats) -> float:
+def _energy_at(t: float, tail: Ints32, S: Floats, velocity: Floats, reference: Reference, moved: Floats) -> float:
     """Energy a step t along `velocity`; fills the positions there."""
     for v in range(len(S)):
         set_row(moved, v, unit(combine(1.0, row(S, v), t, row(velocity, v))))
@@ -87,7 +89,7 @@ def _energy_at(t: float, tail: Ints, S: Floats, velocity: Floats, reference: Ref
 
 
 @kernel
-def _time_of_first_fold(tail: Ints, S: Floats, velocity: Floats) -> float:
+def _time_of_first_fold(tail: Ints32, S: Floats, velocity: Floats) -> float:
     """Lower bound on the first time t in (0, 1.2] at which det(a + t a', b + t b', c + t c') of a triangle is zero.
 
     Infinite where no triangle folds by then.

@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.errors import SphereMapError
+from ripple_sim.solver.kernel import Floats
 
+from .alignment import align
 from .certificate import certify
 from .corner_table import CornerTable, corner_table, following, preceding
 from .decimation import decimate
 from .energy import Reference
 from .insertion import insert_vertices
 from .level import build_level
-from .orientation import orient
 from .reference import Source, carry, update_level
 from .relax_level import relax_level
-from .vectors import Floats
 
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 GRID = 2.0**32  # the normalised mesh is rounded to multiples of 1 / GRID
@@ -61,7 +61,7 @@ def progressive_sphere_map(V: NDArray[np.float64], F: NDArray[np.integer]) -> ND
         S = _map_by_levels(normal_V[order], triangles, trust)[number]
         certificate = certify(F, S)
         if certificate.valid:
-            turned = orient(normal_V, F, S)
+            turned = align(normal_V, F, S)
             return turned if certify(F, turned).valid else S  # round-off can fold the tiniest triangles
     raise SphereMapError(
         f"no fold-free sphere map was found: {certificate.flipped} of {len(F)} triangles are folded, the solid angle "
@@ -91,9 +91,9 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     removed, kept = table.tail[log], table.tail[table.twin[log]]
     carry(removed, kept, carried)
     # how many vertices the first level has that shows a vertex or a triangle
-    vertex_since, face_since = np.full(n, 4), np.full(len(F), 4)
+    vertex_since, triangle_since = np.full(n, 4), np.full(len(F), 4)
     arrival = n - np.arange(len(log))
-    vertex_since[removed] = face_since[log // 3] = face_since[table.twin[log] // 3] = arrival
+    vertex_since[removed] = triangle_since[log // 3] = triangle_since[table.twin[log] // 3] = arrival
 
     S = np.zeros((n, 3))
     S[_tetrahedron(table, np.flatnonzero(vertex_since == 4))] = TETRAHEDRON
@@ -105,17 +105,17 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
         sliver = COARSE_SLIVER if size < n / 4 else FINE_SLIVER
         source = Source(V, carried, load, shape_trust, sliver, 4 * np.pi / (2 * size - 4))
 
-        vertices, faces = np.flatnonzero(vertex_since <= count), np.flatnonzero(face_since <= count)
-        update_level(vertices, faces, table, source, reference)
+        vertices, triangles = np.flatnonzero(vertex_since <= count), np.flatnonzero(triangle_since <= count)
+        update_level(vertices, triangles, table, source, reference)
         insert_vertices(log[n - size : n - count], table, source, S, reference)
         count = size
 
-        vertices, faces = np.flatnonzero(vertex_since <= count), np.flatnonzero(face_since <= count)
-        update_level(vertices, faces, table, source, reference)
-        corners = (3 * faces[:, None] + np.arange(3)).ravel()
+        vertices, triangles = np.flatnonzero(vertex_since <= count), np.flatnonzero(triangle_since <= count)
+        update_level(vertices, triangles, table, source, reference)
+        corners = (3 * triangles[:, None] + np.arange(3)).ravel()
         level_S = S[vertices]
-        shown = Reference(reference.area[faces], reference.cotangent[corners])
-        relax_level(build_level(table, vertices, faces), level_S, shown)
+        shown = Reference(reference.area[triangles], reference.cotangent[corners])
+        relax_level(build_level(table, vertices, triangles), level_S, shown)
         S[vertices] = level_S
     return S
 

@@ -13,9 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ripple_sim.solver.kernel import Floats, Ints32, kernel
+
 from .corner_table import CornerTable, gather_star
 from .energy import Reference
-from .vectors import Floats, Ints, cross, dot, kernel, row, subtract
+from .vectors import cross, dot, row, subtract
 
 SMALLEST_SHARE = 1e-3  # of the mean reference area: no triangle gets less
 
@@ -32,21 +34,21 @@ class Source(NamedTuple):
 
 
 @kernel
-def _real_area(tail: Ints, f: int, V: Floats) -> float:
+def _real_area(tail: Ints32, f: int, V: Floats) -> float:
     p = row(V, tail[3 * f])
     normal = cross(subtract(row(V, tail[3 * f + 1]), p), subtract(row(V, tail[3 * f + 2]), p))
     return 0.5 * np.sqrt(dot(normal, normal))
 
 
 @kernel
-def carry(removed: Ints, kept: Ints, carried: Floats) -> None:
+def carry(removed: Ints32, kept: Ints32, carried: Floats) -> None:
     """Hand the area of each removed vertex on to the one it merges with, in the order of the collapses."""
     for i in range(len(removed)):
         carried[kept[i]] += carried[removed[i]]
 
 
 @kernel
-def update_load(v: int, star: Ints, degree: int, tail: Ints, source: Source) -> None:
+def update_load(v: int, star: Ints32, degree: int, tail: Ints32, source: Source) -> None:
     """Find the load of v: the area it carries over its share of the real area that the level still shows."""
     shown = 0.0
     for i in range(degree):
@@ -56,7 +58,7 @@ def update_load(v: int, star: Ints, degree: int, tail: Ints, source: Source) -> 
 
 
 @kernel
-def update_triangle(f: int, tail: Ints, source: Source, reference: Reference) -> None:
+def update_triangle(f: int, tail: Ints32, source: Source, reference: Reference) -> None:
     """Set the reference of triangle f from its real shape and the loads of its corners."""
     V = source.V
     a, b, c = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
@@ -82,17 +84,17 @@ def update_triangle(f: int, tail: Ints, source: Source, reference: Reference) ->
 
 
 @kernel
-def update_level(vertices: Ints, faces: Ints, table: CornerTable, source: Source, reference: Reference) -> None:
+def update_level(vertices: Ints32, triangles: Ints32, table: CornerTable, source: Source, reference: Reference) -> None:
     """Set the references of a whole level, their areas summing to the sphere's 4 pi."""
     star = np.empty(len(source.V), np.int32)
     for v in vertices:
         update_load(v, star, gather_star(table, v, star), table.tail, source)
     total = 0.0
-    for f in faces:
+    for f in triangles:
         update_triangle(f, table.tail, source, reference)
         total += reference.area[f]
     scale = 4.0 * np.pi / total
-    for f in faces:
+    for f in triangles:
         reference.area[f] *= scale
         for h in range(3 * f, 3 * f + 3):
             reference.cotangent[h] /= scale

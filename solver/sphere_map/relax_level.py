@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ripple_sim.solver.kernel import Floats
+
 from .energy import Reference, total_energy
 from .level import Level, star_shapes
 from .newton import newton_step
 from .relaxation import sweep
-from .vectors import Floats
 
 MOST_SWEEPS, TIRED_SWEEP = 5, 0.1  # stop when a sweep lowers the energy by less than this share
 MOST_NEWTON_STEPS, TIRED_NEWTON = 20, 5e-3  # stop when two steps in a row do

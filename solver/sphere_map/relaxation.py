@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ripple_sim.solver.kernel import Floats, kernel
+
 from .level import Level
 from .star import TERMS, energy_after, expand, slopes, tangent_move
-from .vectors import Floats, combine, kernel, row, set_row, tangent_frame, unit
+from .vectors import combine, row, set_row, tangent_frame, unit
 
 REACH = 0.3  # longest step [rad]
 ARMIJO = 1e-4

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ripple_sim.solver.kernel import Floats, kernel
+
 from .energy import FOLDED, density, density_derivatives
-from .vectors import Floats, Vector, dot, kernel, row, subtract
+from .vectors import Vector, dot, row, subtract
 
 # what is known of a triangle: J and D at rest, their slopes (that of J along p is J itself), half of D's second
 # derivative, and the reference area

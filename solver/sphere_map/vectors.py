@@ -1,20 +1,14 @@
-"""Vectors in space as tuples of three floats, for numba kernels: they live in registers and read like mathematics."""
+"""Vectors in space as tuples of three floats, for kernels: they live in registers and read like mathematics."""
 
 from __future__ import annotations
 
 from typing import TypeAlias
 
-import numba
 import numpy as np
-from numpy.typing import NDArray
+
+from ripple_sim.solver.kernel import Floats, kernel
 
 Vector: TypeAlias = tuple[float, float, float]
-Floats: TypeAlias = NDArray[np.float64]
-Ints: TypeAlias = NDArray[np.int32]
-
-# One thread and no fast-math: the same mesh gives the same map, bit for bit. The compiled kernels are kept on disk;
-# numba notices a change of a kernel's own file only, so delete the *.nbi files after editing one that others call.
-kernel = numba.njit(cache=True, error_model="numpy")
 
 
 @kernel

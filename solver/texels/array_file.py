@@ -34,7 +34,7 @@ def read_arrays(path: Path) -> dict[str, NDArray]:
     Raises
     ------
     ValueError
-        If it is damaged or no such archive.
+        If the file is damaged, or is not such an archive.
     OSError
         If it cannot be read.
     """

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.atomic_file import whole_file
+from ripple_sim.solver.atomic_file import atomic_write
 from ripple_sim.solver.errors import AtlasError
 
 from .array_file import read_arrays, write_arrays
@@ -30,7 +30,7 @@ def write_atlas_file(path: Path, arrays: dict[str, NDArray]) -> None:
     """
     small = {name: arrays[name].astype(np.int32) for name in _INDICES & arrays.keys()}
     try:
-        with whole_file(path) as unfinished, unfinished.open("wb") as file:
+        with atomic_write(path) as unfinished, unfinished.open("wb") as file:
             write_arrays(file, {**arrays, **small, "format": np.array([FORMAT])})
     except OSError as error:
         raise AtlasError(f"atlas file {str(path)!r} cannot be written: {error.strerror or error}") from error

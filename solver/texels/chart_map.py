@@ -78,7 +78,7 @@ class TextureCoordinates:
 
         Parameters
         ----------
-        corner_values : [face_count, 3, ...]
+        corner_values : [triangle_count, 3, ...]
             Values at the corners of the mesh's triangles, such as `mesh.V[mesh.F]` or `mesh.corner_uv`.
 
         Returns

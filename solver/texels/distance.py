@@ -92,8 +92,8 @@ def march(halo: Ints, positions: Floats, seeds: Ints, limit: float, distance: Fl
     """
     n = halo.shape[1] - 2
     # the eight neighbours in order round a texel
-    ring_row = (0, 1, 1, 1, 0, -1, -1, -1)
-    ring_column = (1, 1, 0, -1, -1, -1, 0, 1)
+    neighbour_row = (0, 1, 1, 1, 0, -1, -1, -1)
+    neighbour_column = (1, 1, 0, -1, -1, -1, 0, 1)
     around = np.empty(8, np.int64)
     done = np.zeros(len(distance), np.bool_)
     front = [(distance[seeds[0]], seeds[0])]
@@ -112,7 +112,7 @@ def march(halo: Ints, positions: Floats, seeds: Ints, limit: float, distance: Fl
         order.append(t)
         chart, row, column = t // (n * n), t // n % n, t % n
         for k in range(8):
-            around[k] = halo[chart, row + 1 + ring_row[k], column + 1 + ring_column[k]]
+            around[k] = halo[chart, row + 1 + neighbour_row[k], column + 1 + neighbour_column[k]]
         for k in range(8):
             a = around[k]
             if a < 0 or done[a]:
@@ -123,7 +123,7 @@ def march(halo: Ints, positions: Floats, seeds: Ints, limit: float, distance: Fl
                 positions[a, 2] - positions[t, 2],
             )
             best = d + np.sqrt(dx * dx + dy * dy + dz * dz)
-            # triangles (t, b, a): b one step round the ring, or two where a is straight ahead (the other diagonal)
+            # triangles (t, b, a): b one step round the texel, or two where a is straight ahead (the other diagonal)
             for turn in (-2, -1, 1, 2):
                 if (turn == 2 or turn == -2) and k % 2 == 1:
                     continue

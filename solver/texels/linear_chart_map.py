@@ -19,9 +19,9 @@ class LinearChartMap:
 
     Attributes
     ----------
-    charts : int64 [face_count]
+    charts : int64 [triangle_count]
         Chart of each triangle.
-    corners : float64 [face_count, 3, 2]
+    corners : float64 [triangle_count, 3, 2]
         Row and column of its corners, from -0.5 to n - 0.5.
     resolution : int
         Texels along a chart's side, n.

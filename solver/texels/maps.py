@@ -1,4 +1,4 @@
-"""Maps: a picture in the object's own texture coordinates, or an attribute of its vertices, carried onto the texels."""
+"""Maps: an image in the object's own texture coordinates, or an attribute of its vertices, sampled at the texels."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ def vertex_map(atlas: Atlas, values: ArrayLike) -> NDArray[np.float64]:
 
 def texture_map(
     atlas: Atlas,
-    picture: str | Path | ArrayLike,
+    image: str | Path | ArrayLike,
     low: float = 0.0,
     high: float = 1.0,
     channel: str = "luminance",
 ) -> NDArray[np.float64]:
-    """Sample a picture in the object's own texture coordinates, once a texel.
+    """Sample an image in the object's own texture coordinates, once a texel.
 
     Parameters
     ----------
     atlas : Atlas
         Of a mesh with texture coordinates.
-    picture : path, or array [height, width] or [height, width, channels]
-        Path of a PNG or any picture that Pillow reads, 8 or 16 bits; its numbers are taken as they are, without gamma.
+    image : path, or array [height, width] or [height, width, channels]
+        Path of a PNG or any image that Pillow reads, 8 or 16 bits; its values are taken as they are, without gamma.
         Or an array of values from 0 to 1. It repeats beyond its borders; v = 0 is its lower edge.
     low, high : float
         What black and white stand for; in between is linear.
@@ -67,37 +67,37 @@ def texture_map(
     Raises
     ------
     SolverError
-        If the mesh has no texture coordinates, the picture cannot be read, or it lacks the channel.
+        If the mesh has no texture coordinates, the image cannot be read, or it lacks the channel.
     """
     if atlas.mesh.corner_uv is None:
-        raise SolverError("the mesh has no texture coordinates for a picture; give it some, or use `vertex_map`")
-    values = _channel(_pixels(picture), channel)
+        raise SolverError("the mesh has no texture coordinates for an image; give it some, or use `vertex_map`")
+    values = _channel(_pixels(image), channel)
     return low + (high - low) * _bilinear(values, _interpolate(atlas, atlas.mesh.corner_uv))
 
 
 def _interpolate(atlas: Atlas, corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values at the corners of the triangles [face_count, 3, ...], at the texels [C, n, n, ...]."""
+    """Values at the corners of the triangles [triangle_count, 3, ...], at the texels [C, n, n, ...]."""
     return np.einsum("fijk,fijk...->fij...", atlas.barycentrics, corners[atlas.triangles])
 
 
-def _pixels(picture: str | Path | ArrayLike) -> NDArray[np.float64]:
+def _pixels(image: str | Path | ArrayLike) -> NDArray[np.float64]:
     """Values from 0 to 1, [height, width, channels]."""
-    if isinstance(picture, str | Path):
+    if isinstance(image, str | Path):
         try:
-            with Image.open(picture) as image:
-                # palettes and the like have numbers that are no brightness
-                plain = image if image.mode in ("L", "LA", "RGB", "RGBA") or image.mode[0] == "I" else None
-                pixels = np.asarray(plain if plain is not None else image.convert("RGBA"))
+            with Image.open(image) as file:
+                # the numbers of a palette are not brightness
+                plain = file if file.mode in ("L", "LA", "RGB", "RGBA") or file.mode[0] == "I" else None
+                pixels = np.asarray(plain if plain is not None else file.convert("RGBA"))
         except (OSError, ValueError) as error:
-            raise SolverError(f"picture {str(picture)!r} cannot be read: {error}") from error
+            raise SolverError(f"image {str(image)!r} cannot be read: {error}") from error
         largest = 255.0 if pixels.dtype == np.uint8 else 65535.0
         pixels = pixels / largest
     else:
-        pixels = np.asarray(picture, dtype=np.float64)
+        pixels = np.asarray(image, dtype=np.float64)
     if pixels.ndim == 2:
         pixels = pixels[..., None]
     if pixels.ndim != 3 or 0 in pixels.shape or pixels.shape[2] > 4:
-        raise SolverError(f"picture has shape {pixels.shape}; valid is [height, width] with up to 4 channels")
+        raise SolverError(f"image has shape {pixels.shape}; valid is [height, width] with up to 4 channels")
     return pixels
 
 
@@ -109,7 +109,7 @@ def _channel(pixels: NDArray[np.float64], channel: str) -> NDArray[np.float64]:
         raise SolverError(f"channel {channel!r} does not exist; valid are 'luminance', {str(list(_CHANNELS))[1:-1]}")
     place = channels - 1 if channel == "alpha" and channels in (2, 4) else _CHANNELS[channel]
     if place >= channels:
-        raise SolverError(f"the picture has no channel {channel!r}, only {channels}; use 'luminance'")
+        raise SolverError(f"the image has no channel {channel!r}, only {channels}; use 'luminance'")
     return pixels[..., place]
 
 

@@ -1,4 +1,4 @@
-"""How the charts of a texel mesh hang together: which texel lies beyond each border texel of a chart.
+"""How the charts of a texel mesh are connected: which texel lies beyond each border texel of a chart.
 
 A chart is a square of n x n texels. Its sides are numbered counter-clockwise, south (row 0), east, north, west; side s
 runs from corner s to corner s + 1, so that corner 0 lies south-west. Two charts that share a side run along it in

@@ -14,7 +14,7 @@ from ripple_sim.solver.texels.atlas import Atlas, check_points
 from ripple_sim.solver.texels.distance import distance_scratch, march_from_point
 from ripple_sim.solver.texels.texel_mesh import TexelGrid
 
-# Fewer texels across than this and the source would excite waves that the grid cannot carry.
+# Fewer texels across than this and the source would excite waves that the grid cannot resolve.
 MIN_TEXELS = 2.0
 
 # Distance along the surface over straight distance: up to the first value the surface is flat, from the second on
@@ -117,7 +117,7 @@ def _spacing(grid: TexelGrid, center: int) -> float:
 
 @kernel
 def _patch(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats, bool]:
-    """Texels that hang together within a straight distance of a point, their distances, and whether they lie flat.
+    """Connected texels within a straight distance of a point, their distances, and whether they lie flat.
 
     Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph over the plane there
     whose slope makes no way along it longer than 1.05 times the straight one.

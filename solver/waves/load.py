@@ -7,11 +7,11 @@ import functools
 import threading
 from collections.abc import Sequence
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.kernel import Floats, Ints, kernel
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class Load:
     Attributes
     ----------
     texels : int64 [k]
-        Flat texel indices (chart n + row) n + column; a texel may stand there more than once.
+        Flat texel indices (chart n + row) n + column; a texel may occur more than once.
     forces : float64 [k]
         [N], positive inwards.
     """
@@ -71,9 +71,9 @@ def _slot_scratch(size: int, thread: int) -> NDArray[np.int64]:
     return np.full(size, -1)
 
 
-@numba.njit(cache=True, nogil=True)
-def add_up_by(place, texels, values):
-    """Add the values [m, k] that stand at the same texel: each texel once, in order of first appearance, and sums."""
+@kernel
+def add_up_by(place: Ints, texels: Ints, values: Floats) -> tuple[Ints, Floats]:
+    """Sum the values [m, k] of equal texels [k]: each texel once, in order of first appearance, and its sums."""
     once = np.empty_like(texels)
     sums = np.zeros_like(values)
     count = 0

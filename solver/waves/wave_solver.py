@@ -17,7 +17,7 @@ from .finite import where_not_finite
 from .footprint import Footprint, footprint
 from .load import Load
 
-# A step that needs more is a mistake in a unit, and would seem to hang.
+# A step that needs more is a mistake in a unit, and would run for ever.
 _MOST_SUBSTEPS = 1_000_000
 
 
@@ -42,7 +42,7 @@ class WaveSolver:
     Raises
     ------
     SolverError
-        For invalid names, something that is no material, or a material of another resolution.
+        For invalid names, a material of another type, or a material of another resolution.
     GLError
         If "gl" is asked for and no context can be made.
     """
@@ -294,7 +294,7 @@ class WaveSolver:
         return where.weights * area[where.texels] * movable[where.texels]
 
     def _counterpart(self, momentum: float) -> float:
-        """What all carrying texels are given so that a source of this momentum has none in the end."""
+        """What all movable texels are given so that a source of this momentum has none in the end."""
         return -float(momentum) / self._movable_mass if self.conserve_volume and self._movable_mass else 0.0
 
     def _source(self, value: ArrayLike, name: str, weight: NDArray[np.float64]) -> NDArray[np.float32]:

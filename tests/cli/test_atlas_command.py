@@ -84,7 +84,7 @@ def test_a_picture_is_written_and_is_not_blank(tmp_path, capsys, ball_file):
     [
         ("atlas.bmp", r"'atlas\.bmp'.*valid are \.png"),
         ("atlas", "valid are"),
-        ("slot_scratch/atlas.png", "folder that exists"),
+        ("missing/atlas.png", "folder that exists"),
     ],
 )
 def test_a_picture_that_cannot_be_written_is_refused_before_the_mesh_is_read(capsys, monkeypatch, tmp_path, path, said):

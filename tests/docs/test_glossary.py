@@ -127,7 +127,7 @@ def test_no_name_has_a_retired_word() -> None:
         ("solver/shaders/a.glsl", "int RING_COUNT; // a relief", "RING_COUNT (say halo)"),
         ("ripple_sim/a.py", "# the relief\nstring = 'relief'\nbelief = 1", None),
         ("ripple_sim/a.py", "substring = bring(everywhere)", None),
-        ("solver/sphere_map/orientation.py", "orientation = 1", None),
+        ("solver/sphere_map/alignment.py", "ring = 1", None),
     ],
 )
 def test_retired_words_are_found_in_names_only(tmp_path: Path, file: str, text: str, found: str | None) -> None:

@@ -4,7 +4,7 @@
 //
 // Each link is read once for both of its ends: what a row needs of the row below stays in registers. Threads side by
 // side read what lies side by side. Fields are strips of [N + 2, STRIDE] floats, read by eights; the texels begin at
-// column 8, and the ring of neighbours lies round them. `x` is the field, `w` the links that start in each place, shifted
+// column 8, and the halo lies round them. `x` is the field, `w` the links that start in each place, shifted
 // by one column to the right: east, north, north-east, and from its east to its north.
 layout(local_size_x = GROUP_COLUMNS, local_size_y = GROUP_ROWS) in;
 const int PITCH = STRIDE / 8;

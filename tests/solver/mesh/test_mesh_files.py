@@ -246,10 +246,10 @@ def test_texture_of_a_glb_is_kept(tmp_path: Path) -> None:
         ("lid.obj", obj(CORNERS, QUADS[1:]), "open: 4 boundary edges round 1 hole"),
         ("holes.obj", obj(CORNERS, QUADS[2:]), "open: 8 boundary edges round 2 holes"),
         ("huge.obj", obj(CORNERS, [*QUADS, (0, 1, 999_999_999)]), "line 15 refers to vertex 1000000000.*1 to 8"),
-        ("huger.obj", obj(CORNERS, QUADS) + f"f 1 2 {10**30}\n", "line 15.*no corner"),
+        ("huger.obj", obj(CORNERS, QUADS) + f"f 1 2 {10**30}\n", "line 15.*not a corner"),
         ("zero.obj", obj(CORNERS, QUADS) + "f 0 1 2\n", "line 15 refers to vertex 0"),
         ("back.obj", obj(CORNERS, QUADS) + "f -9 1 2\n", "line 15 refers to vertex 0"),
-        ("word.obj", obj(CORNERS, QUADS).replace("v 0 0 1", "v 0 zero 1"), "no number.*zero"),
+        ("word.obj", obj(CORNERS, QUADS).replace("v 0 0 1", "v 0 zero 1"), "not a number.*zero"),
         ("short.obj", obj(CORNERS, QUADS).replace("v 0 0 1", "v 0 0"), "line 2 has 2 coordinates"),
         ("nan.obj", obj(CORNERS, QUADS).replace("v 0 0 1", "v 0 0 nan"), "1 vertices are NaN"),
         ("infinite.obj", obj(CORNERS, QUADS).replace("v 0 0 1", "v 0 0 1e999"), "NaN or infinite"),
@@ -258,14 +258,14 @@ def test_texture_of_a_glb_is_kept(tmp_path: Path) -> None:
         ("early.off", off(CORNERS, QUADS)[:60], "ends early"),
         ("counts.off", "OFF\nmany 3\n", "numbers of vertices and faces"),
         ("range.off", off(CORNERS, [*QUADS, (0, 1, 8)]), "outside 0 to 7"),
-        ("missing.off", off(CORNERS, QUADS).replace("4 0 1 3 2", "4 0 1 3"), "promises"),
+        ("missing.off", off(CORNERS, QUADS).replace("4 0 1 3 2", "4 0 1 3"), "has 3 corners instead of 4"),
         ("junk.ply", b"\x00\x01", "no header from ply to end_header"),
         ("early.ply", ply(CORNERS, QUADS, "binary_little_endian")[:-30], "ends before the 6 rows of its element face"),
         ("lines.ply", ply(CORNERS, QUADS, "ascii")[:-30], "not understood|ends before"),
         ("range.ply", ply(CORNERS, [*QUADS, (0, 1, 8)], "ascii"), "vertices 0 to 8; valid is 0 to 7"),
         ("type.ply", ply(CORNERS, QUADS, "ascii").replace(b"uchar red", b"colour red"), "'property colour red'"),
         ("flat.ply", ply(CORNERS, QUADS, "ascii").replace(b"float z", b"float w"), "no vertices with x, y and z"),
-        ("junk.glb", b"glTF junk", "damaged or no GLB file"),
+        ("junk.glb", b"glTF junk", "damaged or not a GLB file"),
         ("junk.stl", b"solid nothing", "no triangles|damaged"),
         ("cloud.xyz", "1 2 3\n4 5 6\n", "no triangles"),
         ("notes.txt", "hello", "unknown ending; valid are .obj"),
@@ -283,7 +283,7 @@ def test_folders_and_missing_files_are_named(tmp_path: Path) -> None:
     assert "is a folder" in refusal(tmp_path / "folder.obj")
     assert "does not exist" in refusal(tmp_path / "missing.obj")
     assert "does not exist" in refusal(tmp_path / "missing" / "deep.obj")
-    (tmp_path / "dangling.obj").symlink_to(tmp_path / "slot_scratch.obj")
+    (tmp_path / "dangling.obj").symlink_to(tmp_path / "nothing.obj")
     assert "does not exist" in refusal(tmp_path / "dangling.obj")
     assert "cannot be read" in refusal(tmp_path / ("long" * 100 + ".obj"))
 

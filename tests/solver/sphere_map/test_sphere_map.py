@@ -171,7 +171,7 @@ def test_next_rung_is_tried_where_one_folds(monkeypatch):
         return S if len(tried) == 3 else -S
 
     monkeypatch.setattr(progressive, "_map_by_levels", fold_at_first)
-    monkeypatch.setattr(progressive, "orient", lambda V, F, S: S)
+    monkeypatch.setattr(progressive, "align", lambda V, F, S: S)
     np.testing.assert_allclose(progressive_sphere_map(V, F), V, atol=1e-8)
     assert tried == list(progressive.TRUST_LADDER[:3])
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ripple_sim.solver import Mesh, WaveSolver, build_atlas
 from ripple_sim.solver.atlas.build import atlas_from_sphere_map
-from ripple_sim.solver.sphere_map import certify, orientation, progressive_sphere_map, stretch_quantiles
+from ripple_sim.solver.sphere_map import alignment, certify, progressive_sphere_map, stretch_quantiles
 
 SEEDS = st.integers(0, 2**32 - 1)
 EXAMPLES = settings(max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
@@ -153,7 +153,7 @@ def test_a_renumbered_mesh_has_an_atlas_as_good(seed, limbed_figures):
 
 
 def test_candidate_rotations_are_rotations_and_leave_no_gap():
-    rotations = orientation.spread_rotations(2000)
+    rotations = alignment.spread_rotations(2000)
     np.testing.assert_allclose(
         rotations @ rotations.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (2000, 3, 3)), atol=1e-12
     )
@@ -174,21 +174,21 @@ def test_turning_the_cube_lengthens_the_time_step():
     others = [step(S @ rotation.T) for rotation in Rotation.random(12, random_state=1).as_matrix()]
     assert step(S) > np.median(others)
     # wherever the map starts from
-    again = orientation.orient(V, F, S @ Rotation.random(random_state=7).as_matrix().T)
+    again = alignment.align(V, F, S @ Rotation.random(random_state=7).as_matrix().T)
     assert step(again) > np.median(others)
 
 
 def test_narrow_texels_are_found_where_they_are():
-    """On the round sphere the narrowest texel is pi/4 cos(45 deg) of two, in every orientation."""
+    """On the round sphere the narrowest texel is pi/4 cos(45 deg) of two, in every alignment."""
     V, F = sphere(5)
-    metric, area = orientation._vertex_metrics(F.astype(np.int32), V, V)
+    metric, area = alignment._vertex_metrics(F.astype(np.int32), V, V)
     np.testing.assert_allclose(area.sum(), 4 * np.pi, rtol=0.01)
     one = np.array([1.0])
     for direction, width in (([0, 0, 1], 1), ([0, 1, 1], np.sqrt(0.5)), ([1, 0, 1], np.sqrt(0.5))):
         p = np.array([direction]) / np.linalg.norm(direction)
         tangent = np.eye(3) - p.T @ p
         pure = np.array([[*np.diag(tangent), tangent[0, 1], tangent[0, 2], tangent[1, 2]]])
-        found = orientation._narrowness(np.eye(3), p, pure, one, np.inf) ** (-1 / (2 * orientation.SHARPNESS))
+        found = alignment._narrowness(np.eye(3), p, pure, one, np.inf) ** (-1 / (2 * alignment.SHARPNESS))
         assert found == pytest.approx(width)
     nearest = np.argmax(V @ [0.6, 0, 0.8])
     tangent = np.eye(3) - np.outer(V[nearest], V[nearest])

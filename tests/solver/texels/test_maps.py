@@ -51,11 +51,11 @@ def test_channels_are_told_apart(globe: Atlas, tmp_path: Path) -> None:
         np.testing.assert_allclose(texture_map(globe, path, channel=channel), value, atol=1e-12)
 
 
-def test_eye_that_carries_no_waves_stays_still(globe: Atlas) -> None:
-    # black disc in the middle of the picture
+def test_an_eye_of_speed_0_stays_still(globe: Atlas) -> None:
+    # black disc in the middle of the image
     y, x = np.mgrid[:64, :128]
-    picture = (np.hypot(x - 64, y - 32) > 8).astype(float)
-    speed = texture_map(globe, picture, high=1.5)
+    image = (np.hypot(x - 64, y - 32) > 8).astype(float)
+    speed = texture_map(globe, image, high=1.5)
     speed[speed < 1.5] = 0
     waves = WaveSolver(globe, Material(speed=speed), backend="cpu")
     for point in ([1, 0, 0.2], [-1, 0, 0], [0, 0, 1.0]):

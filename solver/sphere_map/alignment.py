@@ -1,6 +1,6 @@
 """Turning a sphere map so that the cube lies well on it: the atlas's narrowest texels come out as wide as they can.
 
-On the sphere a texel is 1.09 of the mean width at the middle of a face and 0.77, in one direction, at the middle of an
+On the sphere a texel is 1.09 of the mean width at the middle of a chart and 0.77, in one direction, at the middle of an
 edge of the cube. Where the map itself is narrow, at the roots of limbs, this decides how long the time step may be.
 """
 
@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .vectors import Floats, Ints, Vector, cross, dot, kernel, row, subtract
+from ripple_sim.solver.kernel import Floats, Ints32, kernel
+
+from .vectors import Vector, cross, dot, row, subtract
 
 CANDIDATES = 400  # rotations; the cube's own symmetries make that 8 degrees from one to the next
 SHARPNESS = 8  # the power of the squared narrowness that stands for its maximum
@@ -17,7 +19,7 @@ LEAST_SQUARE = 1e-6  # of a width: triangles without area are not narrow texels
 NEGLIGIBLE = 1e-2  # share of the narrowness that no rotation need look at
 
 
-def orient(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
+def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
     """Rotate a sphere map S [n, 3] of the mesh V [n, 3], F [m, 3], of area 4 pi, so that texels are not narrow."""
     metric, area = _vertex_metrics(F.astype(np.int32), V, S)
     trace = metric[:, 0] + metric[:, 1] + metric[:, 2]
@@ -51,7 +53,7 @@ def _inverse_square(trace: Floats, determinant: Floats) -> Floats:
 
 
 @kernel
-def _vertex_metrics(F: Ints, V: Floats, S: Floats) -> tuple[Floats, Floats]:
+def _vertex_metrics(F: Ints32, V: Floats, S: Floats) -> tuple[Floats, Floats]:
     """Squared real length of a sphere's tangent, xx yy zz xy xz yz [n, 6], averaged round each vertex, and area [n].
 
     The average lets a sliver count no more than it covers.
