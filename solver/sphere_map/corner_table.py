@@ -93,3 +93,26 @@ def undo_collapse(table: CornerTable, h: int) -> None:
         tail[g] = u
         g = twin[preceding(g)]
     leaving[u], leaving[tail[t]] = h, t
+
+
+@kernel
+def mark_neighbours(table: CornerTable, u: int, mark: Ints32) -> None:
+    """Write u beside each of its neighbours."""
+    first = h = table.leaving[u]
+    while True:
+        mark[table.tail[following(h)]] = u
+        h = table.twin[preceding(h)]
+        if h == first:
+            return
+
+
+@kernel
+def is_collapsible(table: CornerTable, u: int, v: int, mark: Ints32) -> bool:
+    """Tell whether v and u, whose neighbours are marked, meet the link condition."""
+    first = h = table.leaving[v]
+    common = 0
+    while True:
+        common += mark[table.tail[following(h)]] == u
+        h = table.twin[preceding(h)]
+        if h == first:
+            return common == 2

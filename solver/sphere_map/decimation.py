@@ -8,106 +8,77 @@ condition: its two vertices have exactly two neighbours in common. Then the mesh
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Ints32, kernel
+from ripple_sim.solver.kernel import Bools, Floats, Ints32, kernel
 
-from .corner_table import CornerTable, collapse, following, gather_star, preceding
-from .vectors import cross, dot, row, set_row, subtract
+from .corner_table import (
+    CornerTable,
+    collapse,
+    following,
+    gather_star,
+    is_collapsible,
+    mark_neighbours,
+    preceding,
+)
+from .quadrics import quadric_error, vertex_quadrics
+from .vectors import dot, row, set_row, subtract
 
 ROUND_SHARE = 0.15  # of the vertices left, removed in one round
 COMFORTABLE_DEGREE = 8
 DEGREE_LIMIT = 12  # of a merged vertex, raised where nothing else is left to collapse
 
 
+class _Front(NamedTuple):
+    """The mesh while it collapses, and what is known of the next collapse of each vertex."""
+
+    table: CornerTable
+    V: Floats  # [n, 3]
+    quadrics: Floats  # [n, 10]
+    merged: Floats  # [n] how many vertices each has taken in, itself included
+    degree: Ints32  # [n]
+    stale: Bools  # [n] whose price is to be found again
+    cost: Floats  # [n] price of the cheapest collapse; negative once the vertex is gone
+    target: Ints32  # [n] half-edge of the cheapest collapse
+
+
 def decimate(table: CornerTable, V: Floats) -> Ints32:
     """Collapse `table` to a tetrahedron in place and return the half-edges collapsed, in order, shape [n - 4]."""
     edges = V[table.tail] - V[table.tail[table.twin]]
     blur = 1e-4 * float(np.mean(np.sum(edges * edges, axis=1)))
-    log = np.empty(len(V) - 4, dtype=np.int32)
-    quadrics = _vertex_quadrics(table.tail, V)
-    target = np.full(len(V), -1, dtype=np.int32)  # half-edge of the cheapest collapse
-    cost = np.full(len(V), np.inf)
-    stale = np.ones(len(V), dtype=np.bool_)
-    merged = np.ones(len(V))
-    degree = np.bincount(table.tail, minlength=len(V)).astype(np.int32)
-    alive = np.arange(len(V), dtype=np.int32)
+    n = len(V)
+    log = np.empty(n - 4, dtype=np.int32)
+    front = _Front(
+        table,
+        V,
+        vertex_quadrics(table.tail, V),
+        merged=np.ones(n),
+        degree=np.bincount(table.tail, minlength=n).astype(np.int32),
+        stale=np.ones(n, dtype=np.bool_),
+        cost=np.full(n, np.inf),
+        target=np.full(n, -1, dtype=np.int32),
+    )
+    alive = np.arange(n, dtype=np.int32)
     done, limit = 0, DEGREE_LIMIT
     while done < len(log):
-        _price(alive, table, V, quadrics, merged, degree, blur, limit, stale, cost, target)
-        order = alive[np.argsort(cost[alive], kind="stable")]
+        _price(alive, front, blur, limit)
+        order = alive[np.argsort(front.cost[alive], kind="stable")]
         quota = min(len(log) - done, max(1, int(ROUND_SHARE * len(alive))))
-        removed = _collapse_round(order, quota, table, quadrics, merged, degree, limit, cost, target, stale, log[done:])
+        removed = _collapse_round(order, quota, front, limit, log[done:])
         if removed == 0:
             limit *= 2
-            stale[alive] = True
+            front.stale[alive] = True
         done += removed
-        alive = alive[cost[alive] >= 0.0]
+        alive = alive[front.cost[alive] >= 0.0]
     return log
 
 
 @kernel
-def _vertex_quadrics(tail: Ints32, V: Floats) -> Floats:
-    """Area-weighted sums of squared plane distances: xx xy xz yy yz zz, x y z, 1 of each vertex, shape [n, 10]."""
-    quadrics = np.zeros((len(V), 10))
-    for f in range(len(tail) // 3):
-        p = row(V, tail[3 * f])
-        normal = cross(subtract(row(V, tail[3 * f + 1]), p), subtract(row(V, tail[3 * f + 2]), p))
-        twice_area = np.sqrt(dot(normal, normal))
-        if twice_area > 0.0:
-            x, y, z = normal[0] / twice_area, normal[1] / twice_area, normal[2] / twice_area
-            d = -(x * p[0] + y * p[1] + z * p[2])
-            terms = (x * x, x * y, x * z, y * y, y * z, z * z, x * d, y * d, z * d, d * d)
-            for j in range(3):
-                for i in range(10):
-                    quadrics[tail[3 * f + j], i] += 0.5 * twice_area * terms[i]
-    return quadrics
-
-
-@kernel
-def _quadric_error(q: Floats, x: float, y: float, z: float) -> float:
-    squares = q[0] * x * x + q[3] * y * y + q[5] * z * z + 2.0 * (q[1] * x * y + q[2] * x * z + q[4] * y * z)
-    return squares + 2.0 * (q[6] * x + q[7] * y + q[8] * z) + q[9]
-
-
-@kernel
-def _mark_neighbours(table: CornerTable, u: int, mark: Ints32) -> None:
-    """Write u beside each of its neighbours."""
-    first = h = table.leaving[u]
-    while True:
-        mark[table.tail[following(h)]] = u
-        h = table.twin[preceding(h)]
-        if h == first:
-            return
-
-
-@kernel
-def _is_legal(table: CornerTable, u: int, v: int, mark: Ints32) -> bool:
-    """Tell whether v and u, whose neighbours are marked, meet the link condition."""
-    first = h = table.leaving[v]
-    common = 0
-    while True:
-        common += mark[table.tail[following(h)]] == u
-        h = table.twin[preceding(h)]
-        if h == first:
-            return common == 2
-
-
-@kernel
-def _price(
-    alive: Ints32,
-    table: CornerTable,
-    V: Floats,
-    quadrics: Floats,
-    merged: Floats,
-    degree: Ints32,
-    blur: float,
-    limit: int,
-    stale: np.ndarray,
-    cost: Floats,
-    target: Ints32,
-) -> None:
+def _price(alive: Ints32, front: _Front, blur: float, limit: int) -> None:
     """Find the cheapest legal collapse of every stale vertex (`blur`: a squared length below which all are alike)."""
+    table, V, quadrics, merged, degree, stale, cost, target = front
     neighbours, mark = np.empty(len(V), np.int32), np.full(len(V), -1, np.int32)
     ring = np.empty((len(V), 3))
     for u in alive:
@@ -118,7 +89,7 @@ def _price(
         if degree[u] > limit + 1:
             continue
         gather_star(table, u, neighbours)
-        _mark_neighbours(table, u, mark)
+        mark_neighbours(table, u, mark)
         position, size = row(V, u), degree[u]
         for i in range(size):
             set_row(ring, i, row(V, table.tail[following(neighbours[i])]))
@@ -136,27 +107,16 @@ def _price(
                 span = max(span, dot(e, e))
             e = subtract(position, p)
             shape = (span + blur) * (dot(e, e) + blur) * (1.0 + 0.5 * max(merged_degree - COMFORTABLE_DEGREE, 0))
-            price = shape + max(_quadric_error(quadrics[u], p[0], p[1], p[2]), 0.0) + blur * blur * merged[u]
-            if price < least and _is_legal(table, u, v, mark):
+            price = shape + max(quadric_error(quadrics[u], p[0], p[1], p[2]), 0.0) + blur * blur * merged[u]
+            if price < least and is_collapsible(table, u, v, mark):
                 least, cheapest = price, h
         cost[u], target[u] = least, cheapest
 
 
 @kernel
-def _collapse_round(
-    order: Ints32,
-    quota: int,
-    table: CornerTable,
-    quadrics: Floats,
-    merged: Floats,
-    degree: Ints32,
-    limit: int,
-    cost: Floats,
-    target: Ints32,
-    stale: np.ndarray,
-    log: Ints32,
-) -> int:
+def _collapse_round(order: Ints32, quota: int, front: _Front, limit: int, log: Ints32) -> int:
     """Collapse up to `quota` vertices in `order`, none beside another; mark removed ones by a negative cost."""
+    table, _, quadrics, merged, degree, stale, cost, target = front
     star, mark = np.empty(len(cost), np.int32), np.full(len(cost), -1, np.int32)
     done = 0
     for u in order:
@@ -167,8 +127,8 @@ def _collapse_round(
         if stale[u] or degree[u] + degree[v] - 4 > limit:
             stale[u] = True
             continue
-        _mark_neighbours(table, u, mark)
-        if not _is_legal(table, u, v, mark):
+        mark_neighbours(table, u, mark)
+        if not is_collapsible(table, u, v, mark):
             stale[u] = True
             continue
         for i in range(gather_star(table, u, star)):

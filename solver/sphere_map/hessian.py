@@ -1,9 +1,4 @@
-"""The energy's Hessian on the vertices and edges of a level, made positive semidefinite triangle by triangle.
-
-With a = (s1 + s2)/2 and b = (s1 - s2)/2, the energy density is a function of a^2 = D/4 + J/2 and b^2 = D/4 - J/2, and
-its Hessian splits into a twist (slope along a over a), a flip (slope along b over b), and a 2 x 2 block in (a, b)
-(Smith, de Goes, Kim 2019). Each of them loses its negative part in closed form.
-"""
+"""The energy's Hessian on the vertices and edges of a level, made positive semidefinite triangle by triangle."""
 
 from __future__ import annotations
 
@@ -13,15 +8,15 @@ import numpy as np
 
 from ripple_sim.solver.kernel import Floats, kernel
 
-from .energy import Reference, density_derivatives
+from .density_hessian import Shares, projected_hessian
+from .energy import Reference
 from .level import Level
 from .vectors import Vector, combine, cross, dot, row, subtract
 
 # of D and J along the two tangents of a vertex: D_x, D_y, J_x, J_y
 Slopes: TypeAlias = tuple[float, float, float, float]
-# W_D and W_J; then the Hessian is the second of D, the second of J, and gD gD^T, gD gJ^T + gJ gD^T and gJ gJ^T with the
-# gradients gD and gJ, in these shares
-Shares: TypeAlias = tuple[float, float, float, float, float, float, float]
+# an end of an edge: its tangents, and its slopes
+End: TypeAlias = tuple[Vector, Vector, Slopes]
 
 
 @kernel
@@ -57,7 +52,7 @@ def assemble(
         ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
         dirichlet = cot_a * dot(bc, bc) + cot_b * dot(ac, ac) + cot_c * dot(ab, ab)
         jacobian = half * dot(a, cross(ab, ac))
-        energy, shares = _projected_hessian(area, dirichlet, jacobian)
+        energy, shares = projected_hessian(area, dirichlet, jacobian)
         total += energy
         grad_a = combine(-2.0 * cot_c, ab, -2.0 * cot_b, ac)
         grad_b = combine(-2.0 * cot_a, bc, 2.0 * cot_c, ab)
@@ -73,45 +68,17 @@ def assemble(
         _add_vertex(v, at_b, cot_c + cot_a, shares, gradient, diagonal)
         _add_vertex(w, at_c, cot_a + cot_b, shares, gradient, diagonal)
         i, j, k = edge[h], edge[h + 1], edge[h + 2]
-        _add_edge(i, ends[i, 0] == u, (xa, ya), (xb, yb), c, cot_c, half, at_a, at_b, shares, blocks)
-        _add_edge(j, ends[j, 0] == v, (xb, yb), (xc, yc), a, cot_a, half, at_b, at_c, shares, blocks)
-        _add_edge(k, ends[k, 0] == w, (xc, yc), (xa, ya), b, cot_b, half, at_c, at_a, shares, blocks)
+        end_a, end_b, end_c = (xa, ya, at_a), (xb, yb, at_b), (xc, yc, at_c)
+        flat, twist = -2.0 * shares[2], shares[3] * half
+        _add_edge(blocks, i, ends[i, 0] == u, end_a, end_b, c, (flat * cot_c, twist), shares)
+        _add_edge(blocks, j, ends[j, 0] == v, end_b, end_c, a, (flat * cot_a, twist), shares)
+        _add_edge(blocks, k, ends[k, 0] == w, end_c, end_a, b, (flat * cot_b, twist), shares)
     for v in range(len(S)):
         # on the sphere a tangent step also falls towards the centre: the Hessian gains minus the radial slope
         shift = max(-radial[v], 0.0) + 1e-8 * (diagonal[v, 0] + diagonal[v, 2])
         diagonal[v, 0] += shift
         diagonal[v, 2] += shift
     return total
-
-
-@kernel
-def _projected_hessian(area: float, dirichlet: float, jacobian: float) -> tuple[float, Shares]:
-    """Energy of a triangle of the given area, and the shares that make up its Hessian's positive part."""
-    w, wd, wj, wdd, wdj, wjj = density_derivatives(dirichlet, jacobian)
-    aa, bb = 0.25 * dirichlet + 0.5 * jacobian, max(0.25 * dirichlet - 0.5 * jacobian, 0.0)
-    twist, flip = 4.0 * wd + 2.0 * wj, 4.0 * wd - 2.0 * wj
-    haa = aa * (16.0 * (wdd + wdj) + 4.0 * wjj) + twist
-    hbb = bb * (16.0 * (wdd - wdj) + 4.0 * wjj) + flip
-    root = np.sqrt(aa * bb)
-    hab = root * (16.0 * wdd - 4.0 * wjj)
-    if haa < 0.0 or hbb < 0.0 or haa * hbb < hab * hab:
-        # keep the upper eigenvalue alone: its projector is (1 + (H - mean) / radius) / 2
-        mean, half = 0.5 * (haa + hbb), 0.5 * (haa - hbb)
-        radius = np.sqrt(half * half + hab * hab)
-        upper = max(mean + radius, 0.0)
-        turn = half / radius if radius > 0.0 else 0.0
-        haa, hbb = 0.5 * upper * (1.0 + turn), 0.5 * upper * (1.0 - turn)
-        hab = 0.5 * upper * hab / radius if radius > 0.0 else 0.0
-    twist, flip = max(twist, 0.0), max(flip, 0.0)
-    along_aa = 0.25 * (haa - twist) / aa
-    along_bb = along_ab = 0.0
-    if bb > 1e-10 * aa:  # else b has no direction
-        along_bb, along_ab = 0.25 * (hbb - flip) / bb, 0.25 * hab / root
-    dd = (along_aa + 2.0 * along_ab + along_bb) / 16.0
-    dj = (along_aa - along_bb) / 8.0
-    jj = (along_aa - 2.0 * along_ab + along_bb) / 4.0
-    bend_d, bend_j = 0.125 * (twist + flip), 0.25 * (twist - flip)
-    return area * w, (area * wd, area * wj, area * bend_d, area * bend_j, area * dd, area * dj, area * jj)
 
 
 @kernel
@@ -141,21 +108,20 @@ def _add_vertex(v: int, at_v: Slopes, bend: float, shares: Shares, gradient: Flo
 
 @kernel
 def _add_edge(
+    blocks: Floats,
     e: int,
     forwards: bool,
-    tangents_u: tuple[Vector, Vector],
-    tangents_v: tuple[Vector, Vector],
+    u: End,
+    v: End,
     apex: Vector,
-    cotangent: float,
-    half: float,
-    at_u: Slopes,
-    at_v: Slopes,
+    bends: tuple[float, float],
     shares: Shares,
-    blocks: Floats,
 ) -> None:
-    """Add what the triangle u, v, apex says about its edge e, which `blocks` takes from u to v if `forwards`."""
-    (ux, uy), (vx, vy) = tangents_u, tangents_v
-    flat, twist = -2.0 * shares[2] * cotangent, shares[3] * half
+    """Add what the triangle u, v, apex says about its edge e, which `blocks` takes from u to v if `forwards`.
+
+    `bends` are the shares of the second derivatives of D and J along the edge.
+    """
+    (ux, uy, at_u), (vx, vy, at_v), (flat, twist) = u, v, bends
     bent_x, bent_y = combine(flat, ux, twist, cross(apex, ux)), combine(flat, uy, twist, cross(apex, uy))
     px, py, qx, qy = _combined(at_u, shares)
     dx, dy, jx, jy = at_v

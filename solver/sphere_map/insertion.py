@@ -6,6 +6,8 @@ neighbours they share, left and right. The bisector of that wedge always leads i
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ripple_sim.solver.kernel import Floats, Ints32, kernel
@@ -21,21 +23,26 @@ from .vectors import combine, cross, dot, row, set_row, subtract, tangent_frame,
 CROWDED = 64  # neighbours of a new vertex with more triangles than this wait for the sweeps
 
 
+class _Star(NamedTuple):
+    """Scratch for the star of one vertex, of room for so many neighbours; see `star.expand`."""
+
+    ring: Floats  # [room, 3]
+    shapes: Floats  # [room, 4]
+    terms: Floats  # [room, 9]
+
+
 @kernel
-def _gather(
-    star: Ints32, degree: int, tail: Ints32, S: Floats, reference: Reference, ring: Floats, shapes: Floats
-) -> None:
-    """Fill in what `star.expand` asks for."""
+def _gather(neighbours: Ints32, degree: int, tail: Ints32, S: Floats, reference: Reference, star: _Star) -> None:
+    """Fill in what `star.expand` asks for, from the half-edges to the neighbours."""
     for i in range(degree):
-        set_row(ring, i, row(S, tail[following(star[i])]))
-        set_shape(shapes, i, star[i], reference)
+        set_row(star.ring, i, row(S, tail[following(neighbours[i])]))
+        set_shape(star.shapes, i, neighbours[i], reference)
 
 
 @kernel
-def _place(
-    u: int, v: int, left: int, right: int, S: Floats, ring: Floats, shapes: Floats, degree: int, terms: Floats
-) -> None:
+def _place(u: int, v: int, left: int, right: int, S: Floats, star: _Star, degree: int) -> None:
     """Put u where its star's energy is least among trial points on the ways from v."""
+    ring, shapes, terms = star
     start = row(S, v)
     x, y = tangent_frame(start)
     expand(start, x, y, ring, shapes, degree, terms)
@@ -69,26 +76,26 @@ def insert_vertices(log: Ints32, table: CornerTable, source: Source, S: Floats, 
     A vertex that finds no place leaves a fold behind, which the certificate will find.
     """
     tail = table.tail
-    star, other = np.empty(len(S), np.int32), np.empty(len(S), np.int32)
-    ring, shapes, terms = np.empty((len(S), 3)), np.empty((len(S), 4)), np.empty((len(S), TERMS))
-    other_ring, other_shapes = np.empty((CROWDED, 3)), np.empty((CROWDED, 4))
+    neighbours, others = np.empty(len(S), np.int32), np.empty(len(S), np.int32)
+    star = _Star(np.empty((len(S), 3)), np.empty((len(S), 4)), np.empty((len(S), TERMS)))
+    other_star = _Star(np.empty((CROWDED, 3)), np.empty((CROWDED, 4)), star.terms)
     for h in log[::-1]:
         u, v = tail[h], tail[table.twin[h]]
         undo_collapse(table, h)
         source.carried[v] -= source.carried[u]
         for w in (v, u):
-            update_load(w, star, gather_star(table, w, star), tail, source)
+            update_load(w, neighbours, gather_star(table, w, neighbours), tail, source)
         for w in (v, u):
-            degree = gather_star(table, w, star)
+            degree = gather_star(table, w, neighbours)
             for i in range(degree):
-                update_triangle(star[i] // 3, tail, source, reference)
-        _gather(star, degree, tail, S, reference, ring, shapes)
-        _place(u, v, tail[preceding(h)], tail[preceding(table.twin[h])], S, ring, shapes, degree, terms)
-        relax_vertex(u, S, ring, shapes, degree, terms)
+                update_triangle(neighbours[i] // 3, tail, source, reference)
+        _gather(neighbours, degree, tail, S, reference, star)
+        _place(u, v, tail[preceding(h)], tail[preceding(table.twin[h])], S, star, degree)
+        relax_vertex(u, S, star.ring, star.shapes, degree, star.terms)
         for i in range(degree):
-            w = tail[following(star[i])]
-            other_degree = gather_star(table, w, other)
+            w = tail[following(neighbours[i])]
+            other_degree = gather_star(table, w, others)
             if other_degree <= CROWDED:
-                _gather(other, other_degree, tail, S, reference, other_ring, other_shapes)
-                relax_vertex(w, S, other_ring, other_shapes, other_degree, terms)
-            set_row(ring, i, row(S, w))
+                _gather(others, other_degree, tail, S, reference, other_star)
+                relax_vertex(w, S, other_star.ring, other_star.shapes, other_degree, other_star.terms)
+            set_row(star.ring, i, row(S, w))
