@@ -18,10 +18,11 @@ if TYPE_CHECKING:
     from .operator.absorbing import absorbing_damping
     from .operator.material import Material
     from .texels.atlas import Atlas
+    from .texels.glue import glue
     from .texels.maps import texture_map, vertex_map
     from .texels.texel_atlas import texel_atlas
     from .texels.texel_mesh import TexelMesh
-    from .texels.topology import TexelTopology, glue
+    from .texels.topology import TexelTopology
     from .waves.footprint import Footprint
     from .waves.height_map import HeightMap
     from .waves.load import Load
@@ -46,7 +47,7 @@ _HOME = {
     "WaveSolver": "waves.wave_solver",
     "absorbing_damping": "operator.absorbing",
     "build_atlas": "atlas.build",
-    "glue": "texels.topology",
+    "glue": "texels.glue",
     "load_atlas": "atlas.load",
     "load_mesh": "mesh.mesh_file",
     "sphere_atlas": "cube_map.sphere_atlas",

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.errors import AtlasError
-from ripple_sim.solver.texels.topology import TexelTopology, glue
+from ripple_sim.solver.texels.glue import glue
+from ripple_sim.solver.texels.topology import TexelTopology
 
 CHART_NORMALS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
 CHART_U = np.array([[0, 1, 0], [0, -1, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0]])

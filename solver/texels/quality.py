@@ -7,7 +7,7 @@ import numpy as np
 from ripple_sim.solver.mesh.mesh import Mesh
 
 from .links import EAST, NORTH, link_lengths
-from .stencil import lumped_areas
+from .stiffness import lumped_areas
 from .texel_mesh import TexelMesh
 
 

@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.kernel import Floats, Ints
 
-from .links import LINK_ENDS, link_exists
-from .stencil import Stencil, lumped_areas, stiffness_stencil
+from .stencil import Stencil
+from .stiffness import lumped_areas, stiffness_stencil
+from .stiffness_matrix import stiffness_matrix
 from .topology import TexelTopology
 
 
@@ -121,30 +122,6 @@ class TexelGrid(NamedTuple):
     positions: Floats
     normals: Floats
     areas: Floats
-
-
-def stiffness_matrix(stencil: Stencil) -> csr_array:
-    """A stencil as a matrix [T, T] whose product with a field is minus the stencil's value."""
-    topology = stencil.topology
-    rows, columns, weights = [], [], []
-    for link, (a, b) in enumerate(LINK_ENDS):
-        for end, other in ((a, b), (b, a)):
-            own = link_exists(topology, link) & topology.own[end]
-            rows.append(topology.halo[end][own])
-            columns.append(topology.halo[other][own])
-            weights.append(stencil.weights[:, link][own])
-    irregular = stencil.irregular
-    if irregular is not None:
-        rows.append(np.repeat(irregular.texels, np.diff(irregular.begins)))
-        columns.append(irregular.others)
-        weights.append(irregular.weights)
-    row, column, weight = np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
-    size = topology.texel_count
-    diagonal = np.bincount(row, weight, size)
-    texels = np.arange(size)
-    entries = np.concatenate([-weight, diagonal])
-    places = np.concatenate([row, texels]), np.concatenate([column, texels])
-    return csr_array(coo_array((entries, places), shape=(size, size)))
 
 
 def _checked(positions: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -1,10 +1,13 @@
-"""Where a field is no longer finite."""
+"""What has to be finite: numbers that users give, fields, and the height."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+import numbers
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ripple_sim.solver.errors import SolverError
 from ripple_sim.solver.texels.atlas import Atlas
 
 
@@ -20,3 +23,27 @@ def where_not_finite(atlas: Atlas, field: NDArray) -> str | None:
     x, y, z = places[middle]
     where = f"at chart {chart}, row {row}, column {column}, ({x:.4g}, {y:.4g}, {z:.4g}) m"
     return f"{where} ({bad.sum()} of {bad.size} texels)"
+
+
+def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """A number, or an array of the given shape, as a float32 field [C, n, n].
+
+    Raises
+    ------
+    SolverError
+        If the shape is another one, or a value is not finite.
+    """
+    array = np.asarray(value, dtype=np.float32)
+    if array.shape not in ((), shape):
+        raise SolverError(f"{name} has shape {array.shape}; valid is {shape}, or one number")
+    array = np.broadcast_to(array, shape)
+    if not np.isfinite(array).all():
+        raise SolverError(f"{name} holds {(~np.isfinite(array)).sum()} values that are NaN or infinite")
+    return array
+
+
+def require_finite(name: str, value: float, unit: str, least: float = -np.inf) -> None:
+    """Raise `SolverError` unless a value is a finite number, of at least `least`."""
+    if not (isinstance(value, numbers.Real) and np.isfinite(value) and value >= least):
+        bound = "" if least == -np.inf else f", {least:g} or greater"
+        raise SolverError(f"{name} is {value!r} {unit}; valid is a finite number{bound}")

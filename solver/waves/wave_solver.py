@@ -1,8 +1,6 @@
-"""The wave solver: height and velocity on an atlas, impulses in, time steps forward."""
+"""The wave solver: impulses and loads in, time steps forward."""
 
 from __future__ import annotations
-
-import numbers
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,15 +11,15 @@ from ripple_sim.solver.operator.assembly import build_operator
 from ripple_sim.solver.operator.material import Material
 from ripple_sim.solver.texels.atlas import Atlas
 
-from .finite import where_not_finite
+from .finite import as_field, require_finite
 from .footprint import Footprint, footprint
+from .held_load import HeldLoad
 from .load import Load
+from .substeps import count_substeps
+from .wave_field import WaveField
 
-# A step that needs more is a mistake in a unit, and would run for ever.
-_MOST_SUBSTEPS = 1_000_000
 
-
-class WaveSolver:
+class WaveSolver(WaveField):
     """Waves on the surface of an atlas.
 
     Time stepping is leapfrog in its drift-kick-drift form with implicit damping: second order, stable up to
@@ -58,54 +56,12 @@ class WaveSolver:
     ) -> None:
         if not (material is None or isinstance(material, Material)):
             raise SolverError(f"material is {material!r}; valid is a Material, for instance Material(speed=1.0)")
-        self.atlas = atlas
         self.material = material if material is not None else Material()
+        wave_operator = build_operator(atlas, self.material, operator)
+        super().__init__(atlas, wave_operator, make_backend(backend, wave_operator))
         self.conserve_volume = conserve_volume
-        self.operator = build_operator(atlas, self.material, operator)
-        self.time = 0.0
-        self.substeps_taken = 0
-        self._backend = make_backend(backend, self.operator)
-        self._movable_mass = float(self.operator.mass[self.operator.movable].sum())
-        self._substep = 0.0
-        self._held = Load.none()
-        self._uploaded = self._held
-        self._reported = False
-
-    @property
-    def backend(self) -> str:
-        """Which backend runs: "gl" or "cpu"."""
-        return self._backend.name
-
-    @property
-    def height(self) -> NDArray[np.float32]:
-        """Displacement along the outward normal [m], float32 [C, n, n]: a copy; assign to change it.
-
-        `waves.height = field` and `waves.height += field` work, also with one number; `waves.height[0] = x` changes the
-        copy only.
-
-        Reading raises `SolverError` if the GPU has met a value that is not finite.
-        """
-        height = self._backend.height()
-        self._check_finite(height)
-        return height
-
-    @height.setter
-    def height(self, value: ArrayLike) -> None:
-        self._backend.set_height(self._field(value, "height") * self.operator.free)
-
-    @property
-    def dent(self) -> NDArray[np.float32]:
-        """The part of the height that stays [m], float32 [C, n, n]; 0 unless the material yields."""
-        return self._backend.dent()
-
-    @property
-    def velocity(self) -> NDArray[np.float32]:
-        """Rate of the height [m/s], float32 [C, n, n]: a copy; assign to change it, as with `height`."""
-        return self._backend.velocity()
-
-    @velocity.setter
-    def velocity(self, value: ArrayLike) -> None:
-        self._backend.set_velocity(self._field(value, "velocity") * self.operator.free)
+        self._movable_mass = float(wave_operator.mass[wave_operator.movable].sum())
+        self._held = HeldLoad(self._backend, wave_operator.mass.shape)
 
     @property
     def pressure(self) -> NDArray[np.float64]:
@@ -113,12 +69,11 @@ class WaveSolver:
 
         A copy; it holds the forces of `add_force` as well.
         """
-        force = np.bincount(self._held.texels, self._held.forces, self.operator.mass.size)
-        return force.reshape(self.operator.mass.shape) / self.atlas.areas
+        return self._held.forces() / self.atlas.areas
 
     @pressure.setter
     def pressure(self, value: ArrayLike) -> None:
-        self._held = Load.none()
+        self._held.clear()
         self.add_pressure(value)
 
     @property
@@ -149,9 +104,8 @@ class WaveSolver:
         SolverError
             If the impulse or the radius is not finite, the radius is negative, or there are several points.
         """
-        _require_finite("impulse", impulse, "N s")
-        where = footprint(self.atlas, point, radius)
-        momentum = -impulse * self._shares(where)
+        where, impulses = self._spread("impulse", impulse, "N s", point, radius)
+        momentum = -impulses
         velocities = momentum / self.operator.mass.reshape(-1)[where.texels]
         # what float32 cannot hold becomes infinite here, and is reported by the next step
         with np.errstate(over="ignore"):
@@ -175,17 +129,17 @@ class WaveSolver:
         SolverError
             If the force or the radius is not finite, the radius is negative, or there are several points.
         """
-        _require_finite("force", force, "N")
-        where = footprint(self.atlas, point, radius)
-        self._hold(Load(where.texels, force * self._shares(where)))
+        where, forces = self._spread("force", force, "N", point, radius)
+        self._held.add(Load(where.texels, forces))
         return where
 
     def add_pressure(self, pressure: ArrayLike) -> None:
         """Add a pressure field [Pa], a number or [C, n, n], positive inwards, that is held from now on."""
-        field = self._field(np.broadcast_to(pressure, self.operator.mass.shape), "pressure")
+        shape = self.operator.mass.shape
+        field = as_field(np.broadcast_to(pressure, shape), "pressure", shape)
         force = (field * self.atlas.areas * self.operator.movable).reshape(-1)
         texels = np.flatnonzero(force)
-        self._hold(Load(texels, force[texels]))
+        self._held.add(Load(texels, force[texels]))
 
     def add_height(self, height: ArrayLike) -> None:
         """Raise the surface by a field [m], [C, n, n]; where volume is conserved its mean over the area is removed."""
@@ -216,27 +170,14 @@ class WaveSolver:
             If dt is negative or not finite, a given number of substeps is too small to be stable, a load is not finite
             or names no texel, or the height is no longer finite (on the GPU this is seen when the height is read).
         """
-        _require_finite("time step", dt, "s", least=0.0)
+        require_finite("time step", dt, "s", least=0.0)
         if dt == 0:
             return
-        ratio = dt / self.stable_timestep * (1 - 1e-12)
-        if not ratio < _MOST_SUBSTEPS:
-            raise SolverError(
-                f"a step of {dt:.4g} s would take {ratio:.3g} substeps of the stable {self.stable_timestep:.4g} s; "
-                f"valid are {_MOST_SUBSTEPS} at most: take shorter steps, or a material with slower waves"
-            )
-        needed = max(1, int(np.ceil(ratio)))
-        if substeps is None:
-            substeps = needed
-        elif substeps < needed:
-            raise SolverError(
-                f"{substeps} substeps of {dt / max(substeps, 1):.4g} s are longer than the stable "
-                f"{self.stable_timestep:.4g} s; use {needed} or more substeps, or leave the number out"
-            )
+        substeps = count_substeps(dt, self.stable_timestep, substeps)
         self._substep = dt / substeps
         # what float32 cannot hold becomes infinite here, and is reported below
         with np.errstate(over="ignore", invalid="ignore"):
-            self._upload(self._held if load is None else Load.together([self._held, load]))
+            self._held.upload(load, self._counterpart)
             self._backend.advance(substeps, self._substep)
         self.time += dt
         self.substeps_taken += substeps
@@ -251,84 +192,23 @@ class WaveSolver:
         self.pressure = 0.0
         self.time, self.substeps_taken, self._reported = 0.0, 0, False
 
-    def energy(self) -> float:
-        """Kinetic plus potential energy [J] of the discrete system.
-
-        Without damping this is what the leapfrog scheme conserves to round-off while the substep stays the same:
-        1/2 v' (M - dt^2/4 K) v + 1/2 h' K h, with dt the latest substep and K all elastic forces. It differs from the
-        continuous energy by O(dt^2). What a dent has swallowed is not in it.
-        """
-        height, velocity = self.height.astype(np.float64) - self.dent, self.velocity.astype(np.float64)
-        with np.errstate(invalid="ignore"):  # NaN says enough
-            kinetic = float((self.operator.mass * velocity**2).sum()) / 2
-            return kinetic + self._elastic_energy(height) - self._substep**2 / 4 * self._elastic_energy(velocity)
-
-    def volume(self) -> float:
-        """Volume that the waves add to the target, to first order: sum of area times height [m^3]."""
-        return float((self.atlas.areas * self.height.astype(np.float64)).sum())
-
-    def momentum(self) -> float:
-        """Sum of sigma A v [kg m/s], positive outwards."""
-        return float((self.operator.mass * self.velocity.astype(np.float64)).sum())
-
-    def _elastic_energy(self, field: NDArray[np.float64]) -> float:
-        return -float((field * self.operator.elastic_force(field)).sum()) / 2
-
-    def _hold(self, load: Load) -> None:
-        self._held = Load.together([self._held, load]).merged(self.operator.mass.size)
-
-    def _upload(self, load: Load) -> None:
-        """Hand the backend what presses in the coming step, unless it has that already."""
-        if load is self._uploaded or not (len(load.texels) or len(self._uploaded.texels)):
-            return
-        once = load.merged(self.operator.mass.size)
-        total = float(once.forces.sum())
-        if not np.isfinite(total):
-            raise SolverError(f"the forces of a load add up to {total!r} N; valid are finite numbers")
-        self._backend.load(once.texels, -once.forces, self._counterpart(-total))
-        self._uploaded = load
-
-    def _shares(self, where: Footprint) -> NDArray[np.float64]:
-        """Share of a unit source that each texel of a footprint takes up, [k]."""
+    def _spread(
+        self, name: str, value: float, unit: str, point: ArrayLike, radius: float
+    ) -> tuple[Footprint, NDArray[np.float64]]:
+        """Footprint of a point source, and the part of its value on each texel, [k]; 0 on texels that do not move."""
+        require_finite(name, value, unit)
+        where = footprint(self.atlas, point, radius)
         area, movable = self.atlas.areas.reshape(-1), self.operator.movable.reshape(-1)
-        return where.weights * area[where.texels] * movable[where.texels]
+        return where, value * (where.weights * area[where.texels] * movable[where.texels])
 
     def _counterpart(self, momentum: float) -> float:
-        """What all movable texels are given so that a source of this momentum has none in the end."""
+        """Velocity of all movable texels that balances the momentum of a source; acceleration, for a force."""
         return -float(momentum) / self._movable_mass if self.conserve_volume and self._movable_mass else 0.0
 
     def _source(self, value: ArrayLike, name: str, weight: NDArray[np.float64]) -> NDArray[np.float32]:
         """A field that is added, without its weighted mean where volume is conserved."""
-        field = self._field(value, name).astype(np.float64) * self.operator.free
+        field = as_field(value, name, self.operator.mass.shape).astype(np.float64) * self.operator.free
         movable = self.operator.movable
         if self.conserve_volume and movable.any():
             field -= movable * ((weight * field).sum() / weight[movable].sum())
         return field.astype(np.float32)
-
-    def _field(self, value: ArrayLike, name: str) -> NDArray[np.float32]:
-        array = np.asarray(value, dtype=np.float32)
-        shape = self.operator.mass.shape
-        if array.shape not in ((), shape):
-            raise SolverError(f"{name} has shape {array.shape}; valid is {shape}, or one number")
-        array = np.broadcast_to(array, shape)
-        if not np.isfinite(array).all():
-            raise SolverError(f"{name} holds {(~np.isfinite(array)).sum()} values that are NaN or infinite")
-        return array
-
-    def _check_finite(self, height: NDArray[np.float32]) -> None:
-        """Report once, with place and time, that the height is no longer finite."""
-        if self._reported:
-            return
-        where = where_not_finite(self.atlas, height)
-        if where is not None:
-            self._reported = True
-            raise SolverError(
-                f"height is no longer finite {where}, at time {self.time:.6g} s; a source was too large for float32: "
-                "make it smaller and `reset()` the waves"
-            )
-
-
-def _require_finite(name: str, value: float, unit: str, least: float = -np.inf) -> None:
-    if not (isinstance(value, numbers.Real) and np.isfinite(value) and value >= least):
-        bound = "" if least == -np.inf else f", {least:g} or greater"
-        raise SolverError(f"{name} is {value!r} {unit}; valid is a finite number{bound}")

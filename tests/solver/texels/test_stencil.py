@@ -8,7 +8,8 @@ from ripple_sim.solver import sphere_atlas
 from ripple_sim.solver.cube_map.convention import cube_topology, texel_directions
 from ripple_sim.solver.texels.cells import quad
 from ripple_sim.solver.texels.links import link_lengths
-from ripple_sim.solver.texels.texel_mesh import TexelMesh, stiffness_matrix
+from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
+from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
 
 def element(corners: np.ndarray) -> tuple[np.ndarray, float]:

@@ -1,0 +1,104 @@
+"""The weights of a footprint, compiled: contacts ask for them at every step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.texels.distance import march_from_point
+from ripple_sim.solver.texels.texel_mesh import TexelGrid
+
+# Fewer texels across than this and the source would excite waves that the grid cannot resolve.
+MIN_TEXELS = 2.0
+
+# Distance along the surface over straight distance: up to the first value the surface is flat, from the second on
+# only the way along the surface counts. In between the two are blended, so that no texel jumps in or out.
+_FLAT, _BENT = 1.05, 1.5
+
+
+@kernel
+def weigh(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats, float]:
+    """Texels, weights and radius of a footprint; `scratch` is `distance_scratch`."""
+    radius = max(radius, MIN_TEXELS * _spacing(grid, center))
+    texels, distance, flat = _patch(grid, center, point, radius, scratch)
+    if not flat:
+        texels, distance = _blended(grid, center, point, radius, scratch)
+    weights = np.empty(len(texels))
+    kept, total = 0, 0.0
+    for i in range(len(texels)):
+        weight = max(1 - (distance[i] / radius) ** 2, 0.0) ** 3
+        if weight > 0:
+            texels[kept], weights[kept] = texels[i], weight
+            total += weight * grid.areas[texels[i]]
+            kept += 1
+    return texels[:kept], weights[:kept] / total, radius
+
+
+@kernel
+def _spacing(grid: TexelGrid, center: int) -> float:
+    """Greatest distance from a texel to the four beside it."""
+    halo, positions = grid.halo, grid.positions
+    n = halo.shape[1] - 2
+    chart, row, column = center // (n * n), center // n % n, center % n
+    greatest = 0.0
+    for down, right in ((0, 1), (1, 0), (1, 2), (2, 1)):
+        t = halo[chart, row + down, column + right]
+        if t >= 0:
+            greatest = max(greatest, np.sqrt(((positions[t] - positions[center]) ** 2).sum()))
+    return greatest
+
+
+@kernel
+def _patch(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats, bool]:
+    """Connected texels within a straight distance of a point, their distances, and whether they lie flat.
+
+    Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph over the plane there
+    whose slope makes no way along it longer than 1.05 times the straight one.
+    """
+    halo, positions, normals = grid.halo, grid.positions, grid.normals
+    n = halo.shape[1] - 2
+    room = 256
+    texels = np.empty(room, np.int64)
+    count, done, flat = 1, 0, True
+    texels[0] = center
+    scratch[center] = np.sqrt(((positions[center] - point) ** 2).sum())
+    while done < count and flat:
+        t = texels[done]
+        done += 1
+        if scratch[t] > radius:
+            continue
+        along = 0.0
+        for k in range(3):
+            along += normals[t, k] * normals[center, k]
+        flat = along * _FLAT >= 1
+        if count + 8 > room:
+            room *= 2
+            longer = np.empty(room, np.int64)
+            longer[:count] = texels[:count]
+            texels = longer
+        chart, row, column = t // (n * n), t // n % n, t % n
+        for i in range(3):
+            for j in range(3):
+                a = halo[chart, row + i, column + j]
+                if a >= 0 and scratch[a] == np.inf:
+                    x, y, z = positions[a, 0] - point[0], positions[a, 1] - point[1], positions[a, 2] - point[2]
+                    scratch[a] = np.sqrt(x * x + y * y + z * z)
+                    texels[count] = a
+                    count += 1
+    texels = texels[:count]
+    distance = scratch[texels]
+    scratch[texels] = np.inf
+    return texels, distance, flat
+
+
+@kernel
+def _blended(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats]:
+    """Texels within a little more than the radius along the surface, and the distances that count."""
+    texels, distance = march_from_point(grid.halo, grid.positions, center, point, 1.1 * radius, scratch)
+    for i in range(len(texels)):
+        straight = np.sqrt(((grid.positions[texels[i]] - point) ** 2).sum())
+        if straight > 0:
+            bend = min(max((distance[i] / straight - _FLAT) / (_BENT - _FLAT), 0.0), 1.0)
+            bend = bend * bend * (3 - 2 * bend)
+            distance[i] = (1 - bend) * straight + bend * distance[i]
+    return texels, distance
