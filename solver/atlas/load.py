@@ -14,9 +14,9 @@ from ripple_sim.solver.mesh.mesh import Mesh
 from ripple_sim.solver.texels.atlas import Atlas
 from ripple_sim.solver.texels.atlas_file import ADVICE, read_atlas_file
 from ripple_sim.solver.texels.chart_map import ChartMap
+from ripple_sim.solver.texels.glue import glue
 from ripple_sim.solver.texels.linear_chart_map import LinearChartMap
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
-from ripple_sim.solver.texels.glue import glue
 
 Arrays = dict[str, NDArray]
 

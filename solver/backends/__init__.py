@@ -1,1 +1,1 @@
-"""Backends: who computes the waves, on the CPU or in compute shaders."""
+"""Backends: the waves computed on the CPU or in compute shaders."""

@@ -1,4 +1,4 @@
-"""Backends: who computes the waves."""
+"""The backends' protocol, and backends by name."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BACKENDS = ("auto", "gl", "cpu")
 
 
 class Backend(Protocol):
-    """What a backend does: hold height and velocity as float32, kick texels, and take leapfrog substeps."""
+    """A backend holds height and velocity as float32, kicks texels, and takes leapfrog substeps."""
 
     name: str
 
@@ -54,7 +54,7 @@ def make_backend(name: str, operator: WaveOperator) -> Backend:
 
 
 def auto_backend() -> str:
-    """What "auto" means on this machine: "gl" or "cpu"."""
+    """Backend that "auto" stands for on this machine: "gl" or "cpu"."""
     from ripple_sim.solver.gl import shared_context
 
     try:

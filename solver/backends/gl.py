@@ -10,14 +10,8 @@ from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.operator.step_coefficients import step_coefficients
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 
-from .gl_fields import EIGHT, FieldLayout, LinkBuffers, TexelList
-
-# Rows that one thread walks up, and threads of a group, in eights of columns and in blocks of rows (block.glsl). A
-# software driver has few threads and reads on where the last row ended; a GPU wants many.
-_SOFTWARE_BLOCK, _HARDWARE_BLOCK = (64, (8, 1)), (4, (8, 8))
-
-# Threads of a group that works through a list.
-_LIST_GROUP = 64
+from .gl_dispatch import Dispatch
+from .gl_fields import FieldLayout, LinkBuffers, TexelList
 
 
 class GLBackend:
@@ -29,7 +23,7 @@ class GLBackend:
         self._gl = gl if gl is not None else shared_context()
         self._operator = operator
         self._fields = fields = FieldLayout(self._gl, operator.topology)
-        self._rows, self._group = _SOFTWARE_BLOCK if self._gl.software else _HARDWARE_BLOCK
+        self._dispatch = Dispatch(self._gl, fields)
         self._viscous = self._laplace = self._dent = self._extra = None
         self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
         self._stencil = fields.upload_stencil(operator.stencil)
@@ -70,7 +64,7 @@ class GLBackend:
         return self._fields.read(self._v)
 
     def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
-        """Replace the elastic height, and what stays of it: nothing, unless given."""
+        """Replace the elastic height, and the permanent one: 0 unless given."""
         self._fields.write(self._h, height)
         if self._dent is not None:
             self._fields.write(self._dent, np.zeros_like(height) if dent is None else dent)
@@ -83,7 +77,7 @@ class GLBackend:
     def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: float) -> None:
         """Add velocities [m/s] to some texels, and one to all movable texels.
 
-        They are gathered here, and travel together when the next step or look at the velocity needs them.
+        They are collected, and uploaded together before the next step or read of the velocity.
         """
         self._waiting.append((texels, velocities))
         self._shift += everywhere
@@ -104,8 +98,8 @@ class GLBackend:
                 self._fill_halo(self._h)
                 self._gather_extra_forces()
                 kick_drift["dt"] = drift
-                self._bind(self._h, self._v, self._h_next, self._stencil, self._coefficients, self._extra)
-                self._run_blocks(kick_drift)
+                self._dispatch.bind(self._h, self._v, self._h_next, self._stencil, self._coefficients, self._extra)
+                self._dispatch.run_blocks(kick_drift)
                 self._kick_irregular(drift)
                 self._h, self._h_next = self._h_next, self._h
                 self._kick_texels(self._forces, drift)
@@ -116,22 +110,24 @@ class GLBackend:
         self._gl.wait()
 
     def finite(self) -> bool:
-        """Whether all heights are finite, as far as it is known without waiting for the GPU: it is not."""
+        """True: nothing is known without waiting for the GPU."""
         return True
 
     def _compile(self) -> None:
-        self._drift, self._halo, self._kick = (self._shader(name) for name in ("drift", "halo", "kick"))
+        self._drift, self._halo, self._kick = (self._dispatch.shader(name) for name in ("drift", "halo", "kick"))
         if self._viscous:
-            self._apply_viscous = self._block_shader("apply")
+            self._apply_viscous = self._dispatch.block_shader("apply")
         if self._laplace:
-            self._apply_rigidity = self._block_shader("apply", FACTOR=1)
-            self._subtract_laplace = self._block_shader("apply", SUBTRACT=1, **({"ADD": 1} if self._viscous else {}))
-        self._irregular_kick, self._irregular_apply = (self._shader("irregular", KICK=kick) for kick in (1, 0))
+            self._apply_rigidity = self._dispatch.block_shader("apply", FACTOR=1)
+            self._subtract_laplace = self._dispatch.block_shader(
+                "apply", SUBTRACT=1, **({"ADD": 1} if self._viscous else {})
+            )
+        self._irregular_kick, self._irregular_apply = (self._dispatch.shader("irregular", KICK=kick) for kick in (1, 0))
         if self._dent:
-            self._yielding = self._shader("flow")
+            self._yielding = self._dispatch.shader("flow")
 
     def _start(self, dt: float) -> None:
-        """Hand out the kicks that wait, and drift."""
+        """Apply the kicks that wait, and drift."""
         if self._waiting:
             texels, where = np.unique(np.concatenate([each[0] for each in self._waiting]), return_inverse=True)
             kicks = np.bincount(where, np.concatenate([each[1] for each in self._waiting]))
@@ -140,43 +136,43 @@ class GLBackend:
             self._kick_texels(self._kicks, 0.0)
         if dt or self._shift:
             self._drift["dt"], self._drift["shift"] = dt, self._shift
-            self._bind(self._h, self._v, self._movable)
-            self._run_list(self._drift, self._fields.eights)
+            self._dispatch.bind(self._h, self._v, self._movable)
+            self._dispatch.run_list(self._drift, self._fields.eights)
         self._shift = 0.0
 
     def _flow(self) -> None:
         if self._dent is not None:
-            self._bind(self._h, self._dent, self._yield)
-            self._run_list(self._yielding, self._fields.eights)
+            self._dispatch.bind(self._h, self._dent, self._yield)
+            self._dispatch.run_list(self._yielding, self._fields.eights)
 
     def _gather_extra_forces(self) -> None:
         """Forces beside tension and stiffness: viscous, and of bending."""
         if self._viscous and self._extra:
             self._fill_halo(self._v)
-            self._bind(self._v, self._extra, None, self._viscous)
-            self._run_blocks(self._apply_viscous)
+            self._dispatch.bind(self._v, self._extra, None, self._viscous)
+            self._dispatch.run_blocks(self._apply_viscous)
             self._apply_irregular(self._viscous_links, self._v, self._extra)
         if self._laplace and self._extra:
-            self._bind(self._h, self._moment, None, self._laplace, self._rigidity)
-            self._run_blocks(self._apply_rigidity)
+            self._dispatch.bind(self._h, self._moment, None, self._laplace, self._rigidity)
+            self._dispatch.run_blocks(self._apply_rigidity)
             self._apply_irregular(self._moment_links, self._h, self._moment)
             self._fill_halo(self._moment)
-            self._bind(self._moment, self._extra, None, self._laplace)
-            self._run_blocks(self._subtract_laplace)
+            self._dispatch.bind(self._moment, self._extra, None, self._laplace)
+            self._dispatch.run_blocks(self._subtract_laplace)
             self._apply_irregular(self._bending_links, self._moment, self._extra)
 
     def _apply_irregular(self, links: LinkBuffers, field: moderngl.Buffer, result: moderngl.Buffer) -> None:
         if links.count:
             self._irregular_apply["count"] = links.count
-            self._bind(field, result, None, links.texels, links.links)
-            self._run_list(self._irregular_apply, links.count)
+            self._dispatch.bind(field, result, None, links.texels, links.links)
+            self._dispatch.run_list(self._irregular_apply, links.count)
 
     def _kick_irregular(self, dt: float) -> None:
         """What the irregular links add to a substep."""
         if self._links.count:
             self._irregular_kick["count"], self._irregular_kick["dt"] = self._links.count, dt
-            self._bind(self._h, self._v, self._h_next, self._links.texels, self._links.links)
-            self._run_list(self._irregular_kick, self._links.count)
+            self._dispatch.bind(self._h, self._v, self._h_next, self._links.texels, self._links.links)
+            self._dispatch.run_list(self._irregular_kick, self._links.count)
 
     def _prepare(self, dt: float) -> moderngl.ComputeShader:
         """Compile the kick for this material; upload its coefficients once a step length, and the load once."""
@@ -193,43 +189,19 @@ class GLBackend:
             self._forces.set(self._fields.texels[self._loaded], kicks)
             self._load_is_new = False
         defines = {"EXTRA": self._extra, "MAPS": self._maps}
-        kick_drift = self._block_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
+        kick_drift = self._dispatch.block_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
         kick_drift["acceleration"] = self._acceleration
         if not self._maps:
             kick_drift["decay"], kick_drift["spring"], kick_drift["span"] = k.decay, k.spring, k.span
         return kick_drift
 
-    def _shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
-        return self._gl.shared_compute_shader("ripple_sim.solver.backends.shaders", name, **defines)
-
-    def _block_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
-        fields, (columns, rows) = self._fields, self._group
-        strips = {"N": fields.n, "WIDTH": fields.width, "STRIDE": fields.stride, "FIELD": fields.eights}
-        block = {"ROWS": self._rows, "GROUP_COLUMNS": columns, "GROUP_ROWS": rows}
-        return self._shader(name, **strips, **block, **defines)
-
     def _kick_texels(self, kicks: TexelList, dt: float) -> None:
         if kicks.count:
             self._kick["count"], self._kick["dt"] = kicks.count, dt
-            self._bind(self._h, self._v, kicks.places, kicks.values)
-            self._run_list(self._kick, kicks.count)
+            self._dispatch.bind(self._h, self._v, kicks.places, kicks.values)
+            self._dispatch.run_list(self._kick, kicks.count)
 
     def _fill_halo(self, field: moderngl.Buffer) -> None:
-        self._bind(field, self._fields.halo_pairs)
+        self._dispatch.bind(field, self._fields.halo_pairs)
         self._halo["count"] = self._fields.halo_count
-        self._run_list(self._halo, self._fields.halo_count)
-
-    def _bind(self, *buffers: moderngl.Buffer | None) -> None:
-        for binding, buffer in enumerate(buffers):
-            if buffer is not None:
-                buffer.bind_to_storage_buffer(binding)
-
-    def _run_blocks(self, shader: moderngl.ComputeShader) -> None:
-        columns, rows = self._group
-        fields = self._fields
-        shader.run(-(-fields.width // (EIGHT * columns)), -(-fields.n // (self._rows * rows)), fields.strips)
-        self._gl.barrier()
-
-    def _run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
-        shader.run(-(-count // _LIST_GROUP))
-        self._gl.barrier()
+        self._dispatch.run_list(self._halo, self._fields.halo_count)

@@ -2,121 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
-
-import numba
 import numpy as np
-from numba.extending import overload
 
-from ripple_sim.solver.kernel import Floats32, Ints, kernel
+from ripple_sim.solver.kernel import Floats32, kernel
 
-Coefficient: TypeAlias = Floats32 | np.float32
-
-
-class State(NamedTuple):
-    """Height [m], velocity [m/s], and where the next height goes, each with halo."""
-
-    h: Floats32
-    v: Floats32
-    h_next: Floats32
-
-
-class Halo(NamedTuple):
-    """Addresses of the halo's places, [k], and of the texels that they show."""
-
-    ghosts: Ints
-    sources: Ints
-
-
-class Links(NamedTuple):
-    """The irregular links of a stencil; see `IrregularLinks`. Often none.
-
-    Flat indices of the texels, their addresses in a field with halo, where the links of each begin, the addresses of
-    their other ends, their weights.
-    """
-
-    texels: Ints
-    addresses: Ints
-    begins: Ints
-    others: Ints
-    weights: Floats32
-
-
-class Weights(NamedTuple):
-    """A stencil: its rows, [C, 4, n + 1, as wide as a field], and its irregular links."""
-
-    rows: Floats32
-    irregular: Links
-
-
-class Kick(NamedTuple):
-    """v = decay v + gain (force + extra) - spring h + span acceleration; see `StepCoefficients`."""
-
-    stencil: Weights
-    gain: Floats32
-    decay: Coefficient
-    spring: Coefficient
-    span: Coefficient
-    extra: Coefficient
-    acceleration: np.float32
-
-
-class Loads(NamedTuple):
-    """Addresses of the texels that are kicked in each substep, [k], and by how much [m/s]."""
-
-    addresses: Ints
-    kicks: Floats32
-
-
-class Bending(NamedTuple):
-    """Stencil of the Laplacian, rigidity, and a field with halo for the moments."""
-
-    laplace: Weights
-    rigidity: Floats32
-    moment: Floats32
-
-
-class Plasticity(NamedTuple):
-    """Yield height, and the field with halo of what stays."""
-
-    limit: Coefficient
-    dent: Floats32
-
-
-def _row(x, f, r):
-    """x[f, r] of an array, or the number x itself."""
-    raise NotImplementedError("for compiled code only")
-
-
-@overload(_row, inline="always")
-def _row_overload(x, f, r):
-    if isinstance(x, numba.types.Array):
-        return lambda x, f, r: x[f, r]
-    return lambda x, f, r: x
-
-
-def _in(x, c):
-    """x[c] of an array, or the number x itself."""
-    raise NotImplementedError("for compiled code only")
-
-
-@overload(_in, inline="always")
-def _in_overload(x, c):
-    if isinstance(x, numba.types.Array):
-        return lambda x, c: x[c]
-    return lambda x, c: x
-
-
-def _texel(x, i):
-    """Value at the texel of flat index i of an array, or the number x itself."""
-    raise NotImplementedError("for compiled code only")
-
-
-@overload(_texel, inline="always")
-def _texel_overload(x, i):
-    if isinstance(x, numba.types.Array):
-        return lambda x, i: x.reshape(-1)[i]
-    return lambda x, i: x
+from .arguments import Bending, Coefficient, Halo, Kick, Links, Loads, Plasticity, State, Weights
+from .coefficients import row_of, value_at, value_in
 
 
 @kernel
@@ -141,10 +32,10 @@ def drift(h: Floats32, v: Floats32, movable: Coefficient, shift: np.float32, dt:
     """Add the shift to v where texels are movable, then dt v to h."""
     n = h.shape[1] - 2
     for i in range(len(h) * n):
-        f, r = i // n, i % n + 1
+        chart, r = i // n, i % n + 1
         for c in range(1, n + 1):
-            v[f, r, c] += shift * _in(_row(movable, f, r - 1), c - 1)
-            h[f, r, c] += dt * v[f, r, c]
+            v[chart, r, c] += shift * value_in(row_of(movable, chart, r - 1), c - 1)
+            h[chart, r, c] += dt * v[chart, r, c]
 
 
 @kernel
@@ -153,12 +44,12 @@ def flow(h: Floats32, plasticity: Plasticity) -> None:
     n = h.shape[1] - 2
     dent = plasticity.dent
     for i in range(len(h) * n):
-        f, r = i // n, i % n + 1
+        chart, r = i // n, i % n + 1
         for c in range(1, n + 1):
-            most = _in(_row(plasticity.limit, f, r - 1), c - 1)
-            kept = min(max(h[f, r, c], -most), most)
-            dent[f, r, c] += h[f, r, c] - kept
-            h[f, r, c] = kept
+            most = value_in(row_of(plasticity.limit, chart, r - 1), c - 1)
+            kept = min(max(h[chart, r, c], -most), most)
+            dent[chart, r, c] += h[chart, r, c] - kept
+            h[chart, r, c] = kept
 
 
 # Rows are cut out of the fields before the loop over columns: the compiler then makes better vector code of that loop.
@@ -184,9 +75,17 @@ def _force(rows, links, c):
 
 
 @kernel(inline="always")
-def _links(w, f, r):
+def _links(w, chart, r):
     """Rows of a stencil's links that meet in row r."""
-    return w[f, 0, r], w[f, 1, r], w[f, 1, r - 1], w[f, 2, r], w[f, 2, r - 1], w[f, 3, r], w[f, 3, r - 1]
+    return (
+        w[chart, 0, r],
+        w[chart, 1, r],
+        w[chart, 1, r - 1],
+        w[chart, 2, r],
+        w[chart, 2, r - 1],
+        w[chart, 3, r],
+        w[chart, 3, r - 1],
+    )
 
 
 @kernel
@@ -203,15 +102,15 @@ def apply(stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Fl
     """The stencil on a field times a factor, written into `out` or added to it."""
     n = h.shape[1] - 2
     for i in range(len(h) * n):
-        f, r = i // n, i % n + 1
-        rows, links = (h[f, r - 1], h[f, r], h[f, r + 1]), _links(stencil.rows, f, r)
-        result = out[f, r]
+        chart, r = i // n, i % n + 1
+        rows, links = (h[chart, r - 1], h[chart, r], h[chart, r + 1]), _links(stencil.rows, chart, r)
+        result = out[chart, r]
         for c in range(1, n + 1):
-            force = _in(_row(factor, f, r - 1), c - 1) * _force(rows, links, c)
+            force = value_in(row_of(factor, chart, r - 1), c - 1) * _force(rows, links, c)
             result[c] = result[c] + force if add else force
     irregular, flat, sums = stencil.irregular, h.reshape(-1), out.reshape(-1)
     for i in range(len(irregular.texels)):
-        sums[irregular.addresses[i]] += _texel(factor, irregular.texels[i]) * _irregular_force(irregular, i, flat)
+        sums[irregular.addresses[i]] += value_at(factor, irregular.texels[i]) * _irregular_force(irregular, i, flat)
 
 
 @kernel(fastmath=_FAST)
@@ -219,24 +118,24 @@ def kick_drift(state: State, kick: Kick, dt: np.float32, first: int, last: int) 
     """One substep of some charts: v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v."""
     h, v, h_next = state
     n = h.shape[1] - 2
-    for f in range(first, last):
+    for chart in range(first, last):
         for r in range(1, n + 1):
-            row = h[f, r]
-            rows, links = (h[f, r - 1], row, h[f, r + 1]), _links(kick.stencil.rows, f, r)
-            velocity, gains, result = v[f, r], kick.gain[f, r - 1], h_next[f, r]
+            row = h[chart, r]
+            rows, links = (h[chart, r - 1], row, h[chart, r + 1]), _links(kick.stencil.rows, chart, r)
+            velocity, gains, result = v[chart, r], kick.gain[chart, r - 1], h_next[chart, r]
             more, decays, springs, spans = (
-                _row(kick.extra, f, r),
-                _row(kick.decay, f, r - 1),
-                _row(kick.spring, f, r - 1),
-                _row(kick.span, f, r - 1),
+                row_of(kick.extra, chart, r),
+                row_of(kick.decay, chart, r - 1),
+                row_of(kick.spring, chart, r - 1),
+                row_of(kick.span, chart, r - 1),
             )
             for c in range(1, n + 1):
                 force = _force(rows, links, c)
                 kicked = (
-                    _in(decays, c - 1) * velocity[c]
-                    + gains[c - 1] * (force + _in(more, c))
-                    - _in(springs, c - 1) * row[c]
-                    + _in(spans, c - 1) * kick.acceleration
+                    value_in(decays, c - 1) * velocity[c]
+                    + gains[c - 1] * (force + value_in(more, c))
+                    - value_in(springs, c - 1) * row[c]
+                    + value_in(spans, c - 1) * kick.acceleration
                 )
                 velocity[c] = kicked
                 result[c] = row[c] + dt * kicked
@@ -244,7 +143,7 @@ def kick_drift(state: State, kick: Kick, dt: np.float32, first: int, last: int) 
 
 @kernel
 def kick_irregular(state: State, kick: Kick, dt: np.float32) -> None:
-    """What the irregular links add to a substep: the same kick, and the drift by it."""
+    """The irregular links' part of a substep: the same kick, and the drift by it."""
     links, gain = kick.stencil.irregular, kick.gain.reshape(-1)
     heights, velocities, drifted = state.h.reshape(-1), state.v.reshape(-1), state.h_next.reshape(-1)
     for i in range(len(links.texels)):
@@ -266,7 +165,7 @@ def advance(
 ) -> None:
     """Substeps of dt, from the first half drift to the last; the height ends in `h_next` where their number is odd.
 
-    What a material lacks is None, and compiled away. The interpreter's lock is free all the while.
+    Features that a material lacks are None, and compiled away.
     """
     bending, plasticity = bends_yields
     half = dt / np.float32(2)

@@ -13,7 +13,8 @@ from numba.extending import intrinsic
 
 from ripple_sim.solver.kernel import Ints, kernel
 
-from .kernels import Halo, Kick, Loads, State, fill, kick_drift, kick_irregular, kick_texels
+from .arguments import Halo, Kick, Loads, State
+from .kernels import fill, kick_drift, kick_irregular, kick_texels
 
 # Counters, each in a cache line of its own: tickets drawn, charts done, substeps open.
 _DRAWN, _DONE, _OPEN, _COUNTERS = 0, 16, 32, 48
@@ -30,7 +31,7 @@ def available() -> int:
 def advance(threads: int, substeps: int, *fields: Any) -> None:
     """`kernels.advance` of a plain material, in several threads; the height's halo is filled already.
 
-    No thread is waited for before it has taken on a chart: one that comes late, or never, leaves its share to others.
+    Nobody waits for a thread that has not yet taken a chart: a late one leaves its share to the others.
     Every texel is computed by the same code whatever the thread, so the numbers do not depend on how many there are.
     """
     share = functools.partial(_advance, substeps, *fields, np.zeros(_COUNTERS, np.int64))

@@ -1,4 +1,4 @@
-"""What is mended without asking: duplicates, leftovers, hairline cracks, winding. `fixes` says what was done."""
+"""Repairs made without asking: duplicate and unused vertices, hairline cracks, winding. `fixes` lists them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def merge_vertices(
     Returns
     -------
     V, F
-        A mesh that is clean comes through unchanged.
+        A clean mesh stays unchanged.
     keep : bool [triangle_count]
         Which of the given triangles are left.
     """
@@ -72,7 +72,7 @@ def _first_equal(rows: NDArray) -> NDArray[np.int64]:
 def _joined_cracks(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.int64]:
     """Triangles with boundary vertices joined that lie within round-off of each other.
 
-    Only the boundary is looked at, so that a closed surface never changes.
+    Closed surfaces never change: only boundaries are examined.
     """
     edges, counts = edges_of(F)
     rim = np.unique(edges[(counts == 1) & (edges[:, 0] != edges[:, 1])])

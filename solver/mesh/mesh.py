@@ -1,4 +1,4 @@
-"""Triangle meshes: cleaned where that is safe, and refused by name where they are not closed genus-0 surfaces."""
+"""Triangle meshes: cleaned where that is safe, otherwise refused with the name of the defect."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Mesh:
     corner_uv : float64 [triangle_count, 3, 2] or None
         The object's own texture coordinates at every corner of every triangle: exact at seams.
     fixes : tuple of str
-        What was mended on the way in, one phrase each.
+        Repairs made on reading, one phrase each.
     """
 
     V: NDArray[np.float64]
@@ -56,7 +56,7 @@ class Mesh:
         uv : [vertex_count, 2] or [triangle_count, 3, 2], optional
             Texture coordinates of the vertices as given (before merging), or of every corner.
         name : str
-            What to call the mesh in error messages.
+            Its name in messages.
 
         Raises
         ------

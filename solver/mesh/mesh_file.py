@@ -1,4 +1,4 @@
-"""Mesh files: found, read in whatever format they have, and put together as one mesh."""
+"""Mesh files of any format, read and joined to one mesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Triangles as a file gives them, and its polygons cut into such: by a fan, or by clipping ears where a fan folds."""
+"""Polygons of a mesh file cut into triangles: by a fan, or by clipping ears where a fan folds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @dataclasses.dataclass(frozen=True)
 class Soup:
-    """Triangles as a file gives them, not validated.
+    """Triangles read from a file, not validated.
 
     Attributes
     ----------
@@ -54,10 +54,10 @@ def triangulate(points: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArra
 def _folded(
     points: NDArray[np.float64], triangles: NDArray[np.int64], owner: NDArray[np.int64], sizes: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Polygons of which a triangle of the fan faces against the sum of all of them: they are not convex."""
+    """Polygons that are not convex: a triangle of their fan faces against the sum of all."""
     many = np.flatnonzero(sizes[owner] > 3)
     a, b, c = (points[triangles[many, k]] for k in range(3))
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later, by name
+    with np.errstate(over="ignore", invalid="ignore"):  # values that are not finite are refused later, by name
         normals = np.cross(b - a, c - a)
     polygon = owner[many]
     total = np.stack([np.bincount(polygon, normals[:, k], minlength=len(sizes)) for k in range(3)], axis=1)
@@ -66,7 +66,7 @@ def _folded(
 
 
 def _clip_ears(corners: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Triangles [n - 2, 3] of one simple polygon [n, 3], which is seen along its normal (Meisters 1975)."""
+    """Triangles [n - 2, 3] of one simple polygon [n, 3], seen along its normal (Meisters 1975)."""
     # Newell's normal is that of the best plane; an axis pair that suits it spares a rotation
     normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     axis = int(np.argmax(np.abs(normal)))

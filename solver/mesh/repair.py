@@ -20,16 +20,16 @@ _TIME_LIMIT = 120  # [s]; a hundred thousand triangles take a few, hopeless case
 
 
 def repaired(V: NDArray[np.float64], F: NDArray[np.int64], name: str, defect: MeshError) -> Mesh:
-    """Fill holes, cut away what is not manifold, keep the largest part, and validate the result.
+    """Fill holes, cut away non-manifold parts, keep the largest part, and validate the result.
 
     Texture coordinates do not survive. Handles and tunnels stay as they are.
 
     Parameters
     ----------
     V, F : [vertex_count, 3], [triangle_count, 3]
-        The surface as it was found.
+        The surface as given.
     name : str
-        What to call it in messages.
+        Its name in messages.
     defect : MeshError
         Why it was refused.
 

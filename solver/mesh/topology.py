@@ -1,4 +1,4 @@
-"""What surface triangles make: closed, manifold, in one part, of genus 0; or why not, with numbers and places."""
+"""Checks of a surface's topology: closed, manifold, one part, genus 0. Defects come with numbers and places."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def check_topology(V: NDArray[np.float64], F: NDArray[np.int64], name: str) -> N
         Vertices, all of them in use.
     F : [triangle_count, 3]
     name : str
-        What to call the mesh.
+        Its name in messages.
     """
     if len(F) == 0:
         raise MeshError(f"{name} is not a closed genus-0 surface: no triangle of it has three different corners")

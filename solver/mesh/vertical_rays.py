@@ -1,4 +1,4 @@
-"""Where a mesh lies open to the sky."""
+"""Heights of a mesh seen from above."""
 
 from __future__ import annotations
 

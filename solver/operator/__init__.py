@@ -1,1 +1,1 @@
-"""What waves are governed by: materials, and the discrete wave operator of an atlas."""
+"""Materials, and the discrete wave operator of an atlas."""

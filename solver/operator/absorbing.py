@@ -1,4 +1,4 @@
-"""Absorbing regions: waves run in and do not come back."""
+"""Absorbing regions: waves enter and do not return."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ripple_sim.solver.texels.distance import depth_in_region
 def absorbing_damping(
     atlas: Atlas, region: ArrayLike, speed: float, reflection: float = 1e-3, width: float | None = None
 ) -> NDArray[np.float64]:
-    """Damping that grows with the square of the depth in a region, so gently that it throws little back.
+    """Damping that grows with the square of the depth in a region, so gently that little is reflected.
 
     A wave that goes through a layer of width w and back loses the factor exp(-integral of zeta / c), which for
-    zeta = z (depth / w)^2 is exp(-z w / 3 c). Waves longer than the layer is wide are thrown back in part whatever the
+    zeta = z (depth / w)^2 is exp(-z w / 3 c). Waves longer than the layer is wide are partly reflected whatever the
     damping (Israeli and Orszag 1981).
 
     Parameters

@@ -51,7 +51,7 @@ def build_operator(atlas: Atlas, material: Material, kind: str) -> WaveOperator:
         # these formulas give accelerations without masses: one area for all keeps the units, one density as well
         area, density = np.full_like(area, area.mean()), np.full_like(density, density.mean())
         assemble = functools.partial(_difference_stencil, atlas.texels, kind, area[0, 0, 0])
-    # what is rigid is not dragged along by its neighbours either
+    # rigid texels are not dragged along by their neighbours either
     moves = (field["speed"] > 0) | (field["stiffness"] > 0) | (field["bending"] > 0)
     if moves.any():
         field["viscosity"] *= moves

@@ -1,4 +1,4 @@
-"""Regions that are held still, with a rim as smooth as the surface rather than the texels' staircase."""
+"""Regions held still, whose rim follows their outline rather than the texels' staircase."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _CLAMPED = 0.98
 
 
 def hold(atlas: Atlas, material: Material, region: ArrayLike) -> Material:
-    """Material that holds a region still: waves bounce off it, inverted as from a clamp, and pushes do not move it.
+    """Material that holds a region still: waves reflect from it inverted, as from a clamp, and pushes do not move it.
 
     A clamp, like a region of speed 0, ends at texels: its rim is a staircase, and the surface is torn or kinked along
     it. Here springs lead up to the clamp, over a few texels about the rim. They stiffen with the share of the
@@ -37,7 +37,7 @@ def hold(atlas: Atlas, material: Material, region: ArrayLike) -> Material:
     material : Material
         Of the free surface.
     region : bool or float [C, n, n]
-        What is held; from 0 to 1, where only a share of a texel is.
+        Held share of each texel, from 0 to 1.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What the surface is made of: the coefficients of the wave equation, as numbers, as maps, and as presets."""
+"""Materials: the coefficients of the wave equation, as numbers, as maps, and as presets."""
 
 from __future__ import annotations
 
@@ -9,19 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver.errors import SolverError
 
-# name: unit, least value, whether the least value itself is excluded, whether infinity is allowed
-_LIMITS = {
-    "speed": ("m/s", 0.0, False, False),
-    "damping": ("1/s", 0.0, False, False),
-    "stiffness": ("1/s^2", 0.0, False, False),
-    "viscosity": ("m^2/s", 0.0, False, False),
-    "density": ("kg/m^2", 0.0, True, False),
-    "bending": ("m^4/s^2", 0.0, False, False),
-    "yield_height": ("m", 0.0, True, True),
-}
-
-# Beyond any physical value, and small enough that nothing overflows on the way to the time step.
-_HIGHEST = 1e12
+from .coefficients import LIMITS, check_mask, check_numbers, require_positive
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -35,7 +23,7 @@ class Material:
     Attributes
     ----------
     speed : c [m/s]
-        Wave speed of tension. Where it is 0 nothing propagates: waves bounce off as from a free rim, and a region
+        Wave speed of tension. Where it is 0 nothing propagates: waves reflect as from a free rim, and a region
         without tension, bending and stiffness is rigid, so that sources do not move it.
     damping : zeta [1/s]
         The amplitude of every wave falls as exp(-zeta t / 2).
@@ -46,9 +34,9 @@ class Material:
     density : sigma [kg/m^2]
         Mass that takes part in the motion, for each area. An impulse J raises the momentum of the surface by J.
     bending : b [m^4/s^2]
-        Resistance of a plate to being bent, rigidity over density: omega = sqrt(b) q^2, short ripples run ahead.
+        Resistance of a plate to being bent, rigidity over density: omega = sqrt(b) q^2, short ripples are the faster ones.
     yield_height : [m]
-        What is deformed beyond it stays (see `dent`). Infinite: fully elastic.
+        Deformation beyond it is permanent (see `dent`). Infinite: fully elastic.
     fixed : bool
         Where True, the surface is clamped: its height stays 0 and waves come back inverted.
     """
@@ -72,7 +60,7 @@ class Material:
         density : [kg/m^2]
         damping : [1/s]
         """
-        _require_positive(tension=(tension, "N/m"), density=(density, "kg/m^2"))
+        require_positive(tension=(tension, "N/m"), density=(density, "kg/m^2"))
         return cls(speed=(tension / density) ** 0.5, density=density, damping=damping)
 
     @classmethod
@@ -94,7 +82,7 @@ class Material:
         thickness : d [m]
         density : rho [kg/m^3]
         """
-        _require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))
+        require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))
         across = (np.pi / 2 / thickness) ** 2
         return cls(
             speed=(modulus / density) ** 0.5,
@@ -126,7 +114,7 @@ class Material:
             From 0 up to 0.5.
         damping : [1/s]
         """
-        _require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))
+        require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))
         if not 0 <= poisson <= 0.5:
             raise SolverError(f"plate poisson is {poisson!r}; valid is a number from 0 to 0.5")
         rigidity = modulus * thickness**3 / (12 * (1 - poisson**2))
@@ -142,7 +130,7 @@ class Material:
         damping: float = 1.0,
         density: float = 1.0,
     ) -> Material:
-        """Ideally plastic ground: what goes beyond the yield height stays.
+        """Ideally plastic ground: deformation beyond the yield height is permanent.
 
         Height is elastic plus permanent. Waves act on the elastic part, which never exceeds the yield height: while it
         stands at the limit the ground flows under the constant resistance sigma k yield_height, and the flow is
@@ -159,22 +147,9 @@ class Material:
         return cls(speed=speed, damping=damping, stiffness=stiffness, density=density, yield_height=yield_height)
 
     def __post_init__(self) -> None:
-        for name, (unit, low, strict, endless) in _LIMITS.items():
-            value = _numbers(name, getattr(self, name))
-            small = (value <= low) | (value < 1 / _HIGHEST) if strict else value < low
-            wrong = small | np.isnan(value) | ((value > _HIGHEST) & ~(np.isinf(value) & endless))
-            if wrong.any():
-                worst = value.flat[np.argmax(wrong)]
-                bound = f"greater than {low:g}" if strict else f"{low:g} or greater"
-                raise SolverError(
-                    f"material {name} is {worst:g} {unit}; valid is a finite number, {bound}, up to {_HIGHEST:g}"
-                    f"{', or infinity' if endless else ''}"
-                )
-            _check_shape(name, value)
-        fixed = np.asarray(self.fixed)
-        if fixed.dtype != bool:
-            raise SolverError(f"material fixed has type {fixed.dtype}; valid is bool: a mask [C, n, n], or False")
-        _check_shape("fixed", fixed)
+        for name in LIMITS:
+            check_numbers(name, getattr(self, name))
+        check_mask("fixed", self.fixed)
 
     def texels(self, name: str, shape: tuple[int, int, int]) -> NDArray:
         """One coefficient at every texel, [C, n, n], float64 (bool for `fixed`).
@@ -188,22 +163,3 @@ class Material:
         if value.ndim and value.shape != shape:
             raise SolverError(f"material {name} has shape {value.shape}, the atlas needs a number or {shape}")
         return np.array(np.broadcast_to(value, shape))
-
-
-def _numbers(name: str, value: object) -> NDArray[np.float64]:
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise SolverError(f"material {name} is {value!r}; valid is a number or an array of numbers") from error
-
-
-def _check_shape(name: str, value: NDArray) -> None:
-    charts = value.ndim == 3 and value.shape[1] == value.shape[2]
-    if value.ndim != 0 and not charts:
-        raise SolverError(f"material {name} has shape {value.shape}; valid is a number or [C, n, n], one value a texel")
-
-
-def _require_positive(**values: tuple[float, str]) -> None:
-    for name, (value, unit) in values.items():
-        if not 0 < value < np.inf:
-            raise SolverError(f"{name} is {value!r} {unit}; valid is a finite number greater than 0")

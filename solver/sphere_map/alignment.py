@@ -1,4 +1,4 @@
-"""Turning a sphere map so that the cube lies well on it: the atlas's narrowest texels come out as wide as they can.
+"""Rotation of a sphere map under the cube: the atlas's narrowest texels become as wide as possible.
 
 On the sphere a texel is 1.09 of the mean width at the middle of a chart and 0.77, in one direction, at the middle of an
 edge of the cube. Where the map itself is narrow, at the roots of limbs, this decides how long the time step may be.

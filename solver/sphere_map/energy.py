@@ -1,4 +1,4 @@
-"""What a good sphere map minimises: one number for each triangle, from its Dirichlet energy and its area ratio.
+"""The energy of a sphere map: one number a triangle, from its Dirichlet energy and its area ratio.
 
 For the map from a reference triangle (real shape, real area A) to the unit sphere, with singular values s1 >= s2,
 

@@ -1,4 +1,4 @@
-"""The star of one vertex as a function of where that vertex is.
+"""The star of one vertex as a function of that vertex's position.
 
 Let the vertex move from p to p + dx x + dy y + dz p with tangents x, y. Of each triangle of its star, J is linear in
 the move and D quadratic: a few numbers a triangle say all, and a trial position costs next to nothing.

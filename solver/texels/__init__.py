@@ -1,1 +1,1 @@
-"""The cube-map atlas: a mesh and its sphere map, sampled on six grids of texels that close into one surface."""
+"""The texel mesh: charts of texels, how they are connected, and what is computed on them; the atlas on a surface."""

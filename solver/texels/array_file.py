@@ -1,7 +1,7 @@
 """Named arrays in one file: an uncompressed NumPy archive, read at the speed of memory and verified.
 
-NumPy's own reader goes through the zip module in small pieces. Here every array is read straight to where it stays, on
-several threads, and held against the checksum that the archive keeps of it before anything is made of it.
+NumPy's own reader goes through the zip module in small pieces. Here every array is read straight into place, on several
+threads, and verified against the archive's checksum before use.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The atlas: a texel mesh on the surface of a mesh, each texel knowing the surface point it stands for."""
+"""The atlas: a texel mesh on the surface of a mesh, each texel with its surface point."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from ripple_sim.solver.errors import AtlasError
 
 from .array_file import read_arrays, write_arrays
 
-# Raise it when the sphere map or the file's contents change: older files are then rebuilt.
+# Raise it when the sphere map or the file's contents change: older files are rebuilt.
 FORMAT = 9
 ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
 

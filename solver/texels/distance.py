@@ -48,7 +48,7 @@ def depth_in_region(texels: TexelMesh, region: NDArray[np.bool_]) -> NDArray[np.
 
 
 def distance_scratch(size: int) -> NDArray[np.float64]:
-    """Scratch that its users clean up: a footprint must not cost more on a larger grid. One for each thread."""
+    """Scratch that its users clean up, so that a footprint costs no more on a larger grid. One for each thread."""
     return _distance_scratch(size, threading.get_ident())
 
 

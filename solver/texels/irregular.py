@@ -11,7 +11,7 @@ from ripple_sim.solver.kernel import Floats, Ints, kernel
 
 
 class IrregularLinks(NamedTuple):
-    """Links by the texels in which they end; every link stands there for both of its ends.
+    """Links by the texels in which they end; every link is stored for both of its ends.
 
     Attributes
     ----------

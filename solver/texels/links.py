@@ -40,7 +40,7 @@ def link_exists(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CrossingLinks:
-    """The links across glued sides, each of which stands on two charts.
+    """The links across glued sides; each is stored on two charts.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class CrossingLinks:
 
 
 def mean_of_copies(topology: TexelTopology, weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give both copies of every link that crosses a glued side their mean; clear entries that are no links."""
+    """Give both copies of every link that crosses a glued side their mean; clear entries that are not links."""
     for link in range(4):
         exists = link_exists(topology, link)
         weights[:, link][~exists & np.isfinite(weights[:, link])] = 0

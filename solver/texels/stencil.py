@@ -2,7 +2,7 @@
 
 Layout. A stencil's weights are [C, 4, n + 1, n + 1]: those of the links of place (r, c) of a chart with halo to the
 east (r, c)-(r, c + 1), north (r, c)-(r + 1, c), north-east (r, c)-(r + 1, c + 1), and its other diagonal
-(r, c + 1)-(r + 1, c). A link that crosses a glued side stands on both charts, with the same value to the last bit.
+(r, c + 1)-(r + 1, c). A link that crosses a glued side is stored on both charts, with the same value to the last bit.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Stencil:
     weights : float64 [C, 4, n + 1, n + 1]
         Of the nine-point stencil, see the module.
     irregular : IrregularLinks or None
-        What the nine-point stencil does not hold.
+        The links beyond the nine points.
     """
 
     topology: TexelTopology
@@ -63,24 +63,24 @@ _DIAGONALS = ((2, 0, 0, 1, 1), (2, -1, -1, -1, -1), (3, -1, 0, -1, 1), (3, 0, -1
 def _gather(w: Floats, h: Floats, out: Floats) -> None:
     """Sum of weight (h_j - h_i) over the stencil; h has a halo."""
     n = out.shape[1]
-    for f in range(len(out)):
+    for chart in range(len(out)):
         for r in range(1, n + 1):
             for c in range(1, n + 1):
                 total = 0.0
                 for links in (_SIDES, _DIAGONALS):
                     for link, i, j, dr, dc in links:
-                        total += w[f, link, r + i, c + j] * (h[f, r + dr, c + dc] - h[f, r, c])
-                out[f, r - 1, c - 1] = total
+                        total += w[chart, link, r + i, c + j] * (h[chart, r + dr, c + dc] - h[chart, r, c])
+                out[chart, r - 1, c - 1] = total
 
 
 @kernel
 def _sum_absolute(w: Floats, out: Floats) -> None:
     n = out.shape[1]
-    for f in range(len(out)):
+    for chart in range(len(out)):
         for r in range(1, n + 1):
             for c in range(1, n + 1):
                 total = 0.0
                 for links in (_SIDES, _DIAGONALS):
                     for link, i, j, _, _ in links:
-                        total += abs(w[f, link, r + i, c + j])
-                out[f, r - 1, c - 1] = total
+                        total += abs(w[chart, link, r + i, c + j])
+                out[chart, r - 1, c - 1] = total

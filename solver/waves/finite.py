@@ -1,4 +1,4 @@
-"""What has to be finite: numbers that users give, fields, and the height."""
+"""Checks that numbers, fields and heights are finite."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ _FLAT, _BENT = 1.05, 1.5
 def weigh(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats, float]:
     """Texels, weights and radius of a footprint; `scratch` is `distance_scratch`."""
     radius = max(radius, MIN_TEXELS * _spacing(grid, center))
-    texels, distance, flat = _patch(grid, center, point, radius, scratch)
+    texels, distance, flat = _nearby(grid, center, point, radius, scratch)
     if not flat:
         texels, distance = _blended(grid, center, point, radius, scratch)
     weights = np.empty(len(texels))
@@ -49,7 +49,7 @@ def _spacing(grid: TexelGrid, center: int) -> float:
 
 
 @kernel
-def _patch(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats, bool]:
+def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats, bool]:
     """Connected texels within a straight distance of a point, their distances, and whether they lie flat.
 
     Where no normal is farther than acos(1/1.05) from that in the middle, the surface is a graph over the plane there

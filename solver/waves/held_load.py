@@ -1,4 +1,4 @@
-"""The load that acts in the coming steps: what is held until further notice, and what a single step adds."""
+"""The load of the coming steps: forces held until further notice, and those of a single step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The state of the waves: height and velocity on an atlas, and what they amount to."""
+"""The state of the waves: height and velocity on an atlas, their energy, volume and momentum."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class WaveField:
 
         Without damping this is what the leapfrog scheme conserves to round-off while the substep stays the same:
         1/2 v' (M - dt^2/4 K) v + 1/2 h' K h, with dt the latest substep and K all elastic forces. It differs from the
-        continuous energy by O(dt^2). What a dent has swallowed is not in it.
+        continuous energy by O(dt^2). Energy spent on dents is not included.
         """
         height, velocity = self.height.astype(np.float64) - self.dent, self.velocity.astype(np.float64)
         with np.errstate(invalid="ignore"):  # NaN says enough

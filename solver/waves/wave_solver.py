@@ -90,7 +90,7 @@ class WaveSolver(WaveField):
             Where [m], in the frame of the mesh; the nearest surface point is taken.
         impulse : float
             J [N s]. Positive presses inwards: the sum of sigma A dv over the texels is -J (before the mean is removed,
-            where volume is conserved). What falls on clamped or rigid texels is lost to whatever holds them.
+            where volume is conserved). The part on clamped or rigid texels is lost to their support.
         radius : float
             Footprint radius [m], along the surface; at least two texels are used.
 
@@ -107,7 +107,7 @@ class WaveSolver(WaveField):
         where, impulses = self._spread("impulse", impulse, "N s", point, radius)
         momentum = -impulses
         velocities = momentum / self.operator.mass.reshape(-1)[where.texels]
-        # what float32 cannot hold becomes infinite here, and is reported by the next step
+        # values too large for float32 become infinite here, and are reported by the next step
         with np.errstate(over="ignore"):
             self._backend.kick(where.texels, velocities.astype(np.float32), self._counterpart(momentum.sum()))
         return where
@@ -175,7 +175,7 @@ class WaveSolver(WaveField):
             return
         substeps = count_substeps(dt, self.stable_timestep, substeps)
         self._substep = dt / substeps
-        # what float32 cannot hold becomes infinite here, and is reported below
+        # values too large for float32 become infinite here, and are reported below
         with np.errstate(over="ignore", invalid="ignore"):
             self._held.upload(load, self._counterpart)
             self._backend.advance(substeps, self._substep)

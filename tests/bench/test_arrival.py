@@ -1,17 +1,14 @@
 """Times of arrival: against exact geodesics, and the same for the same object however it lies, is scaled or meshed."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
+from known_meshes import known_mesh
 
 from ripple_sim.bench.arrival import arrival_error, arrival_times, ideal_width, spread_sources
 from ripple_sim.bench.plane_wave import plane_arrival
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas, load_mesh, sphere_atlas
-
-MESHES = Path(__file__).parents[3] / "shared" / "meshes" / "good"
 
 
 def test_front_on_a_sphere_arrives_at_the_distance() -> None:
@@ -41,9 +38,7 @@ def test_waves_arrive_in_time_on_a_body_with_limbs() -> None:
 
 @pytest.mark.parametrize("name", ["spot.obj", "bunny.off", "elephant.obj"])
 def test_waves_arrive_in_time_on_known_meshes(name: str) -> None:
-    if not (MESHES / name).is_file():
-        pytest.skip("the mesh is not here")
-    atlas = build_atlas(load_mesh(MESHES / name), 96, cache=False)
+    atlas = build_atlas(load_mesh(known_mesh(f"good/{name}")), 96, cache=False)
     errors = [arrival_error(atlas, source) for source in spread_sources(atlas, 3)]
     assert np.mean([error.front_median for error in errors]) < 0.01
     # a crest lags by what texels disperse, and by what limbs and furrows bend, however narrow the texels

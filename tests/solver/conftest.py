@@ -19,7 +19,7 @@ def ball_mesh() -> Mesh:
 
 @pytest.fixture(scope="session")
 def animal() -> Atlas:
-    """Atlas of a concave body with four limbs and a head."""
+    """Atlas of a concave mesh with four limbs and a head."""
     return build_atlas(Mesh.from_arrays(*limbed()), 64, cache=False)
 
 

@@ -1,6 +1,8 @@
 """Small texel meshes made by hand, whose waves are known."""
 
 import numpy as np
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import eigsh
 
 from ripple_sim.solver import TexelMesh, TexelTopology, glue
 
@@ -75,3 +77,9 @@ def two_squares(n: int) -> TexelMesh:
     """Two unit squares, one above the other, that have nothing to do with each other."""
     lower = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     return flat_charts([lower, lower + np.array([0, 0, 1])], [[RIM] * 4] * 2, n)
+
+
+def eigenvalues(texels: TexelMesh, count: int) -> np.ndarray:
+    """Least squares of the angular frequencies, at wave speed 1."""
+    mass = diags_array(texels.areas.ravel())
+    return np.sort(eigsh(texels.stiffness(), count, mass.tocsc(), sigma=-0.1, return_eigenvectors=False))

@@ -47,19 +47,3 @@ def test_irregular_links_take_part(backend: str) -> None:
     lacking = np.abs(without(height.astype(np.float64)) - waves.operator.stencil(height.astype(np.float64)))
     assert lacking[:, 0, 0].max() > 0.01 * np.abs(expected / dt * texels.areas).max()
     assert (lacking[:, 1:, 1:] == 0).all()
-
-
-def test_threads_change_no_bit_on_any_topology() -> None:
-    from ripple_sim.solver.backends.cpu import CPUBackend
-    from ripple_sim.solver.operator.assembly import build_operator
-
-    texels = polygon(5, 9)
-    operator = build_operator(texel_atlas(texels), Material(speed=1.0), "fem")
-    start = np.random.default_rng(1).standard_normal(texels.shape).astype(np.float32)
-    heights = []
-    for threads in (1, 2):
-        backend = CPUBackend(operator, threads)
-        backend.set_height(start)
-        backend.advance(7, 0.9 * operator.stable_timestep)
-        heights.append(backend.height())
-    np.testing.assert_array_equal(*heights)

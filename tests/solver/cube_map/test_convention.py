@@ -16,29 +16,29 @@ from ripple_sim.solver.cube_map.convention import (
 
 @pytest.mark.parametrize("n", [4, 5, 16, 33])
 def test_cube_chart_points_invert_texel_directions(n: int) -> None:
-    face, row, column = (x.reshape(6, n, n) for x in cube_chart_points(texel_directions(n), n))
-    assert (face == np.arange(6)[:, None, None]).all()
+    chart, row, column = (x.reshape(6, n, n) for x in cube_chart_points(texel_directions(n), n))
+    assert (chart == np.arange(6)[:, None, None]).all()
     np.testing.assert_allclose(row, np.broadcast_to(np.arange(n)[:, None], (6, n, n)), atol=1e-9)
     np.testing.assert_allclose(column, np.broadcast_to(np.arange(n), (6, n, n)), atol=1e-9)
 
 
 @pytest.mark.parametrize("n", [4, 7, 16])
-def test_the_ring_holds_the_nearest_texels_across_the_edges(n: int) -> None:
+def test_the_halo_holds_the_nearest_texels_across_the_edges(n: int) -> None:
     directions = texel_directions(n).reshape(-1, 3)
     index = cube_topology(n).halo
-    for face in range(6):
-        for own, ring in (
-            (index[face, 1, 1:-1], index[face, 0, 1:-1]),
-            (index[face, -2, 1:-1], index[face, -1, 1:-1]),
-            (index[face, 1:-1, 1], index[face, 1:-1, 0]),
-            (index[face, 1:-1, -2], index[face, 1:-1, -1]),
+    for chart in range(6):
+        for own, beside in (
+            (index[chart, 1, 1:-1], index[chart, 0, 1:-1]),
+            (index[chart, -2, 1:-1], index[chart, -1, 1:-1]),
+            (index[chart, 1:-1, 1], index[chart, 1:-1, 0]),
+            (index[chart, 1:-1, -2], index[chart, 1:-1, -1]),
         ):
             other = (directions[own] @ directions.T).copy()
-            same_face = np.arange(6 * n * n) // (n * n) == face
-            other[:, same_face] = -1
-            # the outermost texels stand at a cube corner, equally near to two faces
-            np.testing.assert_array_equal(other.argmax(axis=1)[1:-1], ring[1:-1])
-            assert (other[np.arange(n), ring] > other.max(axis=1) - 1e-12).all()
+            same_chart = np.arange(6 * n * n) // (n * n) == chart
+            other[:, same_chart] = -1
+            # the outermost texels stand at a cube corner, equally near to two charts
+            np.testing.assert_array_equal(other.argmax(axis=1)[1:-1], beside[1:-1])
+            assert (other[np.arange(n), beside] > other.max(axis=1) - 1e-12).all()
     assert (index < 0).sum() == 24
 
 

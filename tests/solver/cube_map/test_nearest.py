@@ -12,13 +12,13 @@ from ripple_sim.solver.cube_map.nearest import sphere_directions, texels_at
 def test_texels_are_those_of_the_rounded_coordinates(n: int) -> None:
     rng = np.random.default_rng(n)
     directions = rng.standard_normal((4000, 3))
-    # edges and corners of the cube too, which belong to several faces
+    # edges and corners of the cube too, which belong to several charts
     directions[:72] = np.concatenate(
         [[1, 1, 0] @ cube_rotations(), [1, 1, 1] @ cube_rotations(), [1, 0, 0] @ cube_rotations()]
     )
-    face, row, column = cube_chart_points(directions, n)
+    chart, row, column = cube_chart_points(directions, n)
     row, column = (np.clip(np.rint(each).astype(int), 0, n - 1) for each in (row, column))
-    np.testing.assert_array_equal(texels_at(directions, n), (face * n + row) * n + column)
+    np.testing.assert_array_equal(texels_at(directions, n), (chart * n + row) * n + column)
     np.testing.assert_array_equal(texels_at(texel_directions(n).reshape(-1, 3), n), np.arange(6 * n * n))
 
 

@@ -1,4 +1,4 @@
-"""Texture coordinates into the atlas: every triangle in one face's [0, 1], sampling agrees with direct evaluation."""
+"""Texture coordinates into the atlas: every triangle in one chart's [0, 1], sampling agrees with direct evaluation."""
 
 import numpy as np
 import pytest
@@ -26,31 +26,31 @@ def unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def direction_at(face: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """The direction that a place in a face stands for, by the definition of the equiangular cube map."""
+def direction_at(chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """The direction that a place in a chart stands for, by the definition of the equiangular cube map."""
     a, b = np.tan(np.pi / 4 * (2 * uv - 1)).T
-    return unit(CHART_NORMALS[face] + a[:, None] * CHART_U[face] + b[:, None] * CHART_V[face])
+    return unit(CHART_NORMALS[chart] + a[:, None] * CHART_U[chart] + b[:, None] * CHART_V[chart])
 
 
-def sample(field: np.ndarray, face: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """Bilinear interpolation in six padded layers, as a GPU does it."""
+def sample(field: np.ndarray, chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Bilinear interpolation in six layers with halo, as a GPU does it."""
     n = field.shape[1]
     index = cube_topology(n).halo
-    padded = field.reshape(-1)[index]
+    with_halo = field.reshape(-1)[index]
     for r, r_in in ((0, 1), (n + 1, n)):
         for c, c_in in ((0, 1), (n + 1, n)):
-            padded[:, r, c] = (padded[:, r_in, c_in] + padded[:, r, c_in] + padded[:, r_in, c]) / 3
+            with_halo[:, r, c] = (with_halo[:, r_in, c_in] + with_halo[:, r, c_in] + with_halo[:, r_in, c]) / 3
     column, row = (uv * n + 0.5).T
     j, i = np.floor(column).astype(int).clip(0, n), np.floor(row).astype(int).clip(0, n)
     s, t = column - j, row - i
     return (
-        (1 - t) * ((1 - s) * padded[face, i, j] + s * padded[face, i, j + 1])
-        + t * ((1 - s) * padded[face, i + 1, j] + s * padded[face, i + 1, j + 1])
+        (1 - t) * ((1 - s) * with_halo[chart, i, j] + s * with_halo[chart, i, j + 1])
+        + t * ((1 - s) * with_halo[chart, i + 1, j] + s * with_halo[chart, i + 1, j + 1])
     )  # fmt: skip
 
 
 def interior_points(atlas: Atlas, seed: int):
-    """One random point inside each piece: its face, interpolated coordinates, and true direction."""
+    """One random point inside each piece: its chart, interpolated coordinates, and true direction."""
     coordinates = atlas.texture_coordinates()
     weights = np.random.default_rng(seed).dirichlet(np.ones(3), size=len(coordinates.chart))
     uv = np.einsum("pi,pij->pj", weights, coordinates.uv)
@@ -100,19 +100,19 @@ def test_triangles_are_cut_exactly_where_they_cross_a_cube_edge(animal: Atlas) -
 def test_interpolated_coordinates_converge_at_second_order() -> None:
     errors = []
     for subdivisions in (3, 4, 5):
-        face, uv, directions = interior_points(ball(subdivisions, 8), 0)
-        distance = np.linalg.norm(direction_at(face, uv) - directions, axis=1)
+        chart, uv, directions = interior_points(ball(subdivisions, 8), 0)
+        distance = np.linalg.norm(direction_at(chart, uv) - directions, axis=1)
         assert distance.max() < 0.01
         errors.append(np.sqrt((distance**2).mean()))
     assert errors[0] / errors[1] == pytest.approx(4, abs=0.4)
     assert errors[1] / errors[2] == pytest.approx(4, abs=0.4)
 
 
-def test_sampling_a_padded_texture_agrees_with_the_field_itself() -> None:
+def test_sampling_a_texture_with_halo_agrees_with_the_field_itself() -> None:
     atlas = ball(5, 64)
-    face, uv, directions = interior_points(atlas, 1)
+    chart, uv, directions = interior_points(atlas, 1)
     texture = smooth(texel_directions(64))
-    error = np.abs(sample(texture, face, uv) - smooth(directions))
+    error = np.abs(sample(texture, chart, uv) - smooth(directions))
     texel = np.pi / 2 / 64
     near_edge = np.abs(2 * uv - 1).max(axis=1) > 1 - 1 / 64
     # bilinear interpolation is of second order; along cube edges the grid lines kink, which leaves a share of a texel
@@ -131,8 +131,8 @@ def test_a_sampled_texture_has_no_seam() -> None:
     directions = unit(coordinates.carry(atlas.sphere[atlas.mesh.F])).reshape(-1, 3)
     _, first, same = np.unique(directions.round(9) + 0.0, axis=0, return_index=True, return_inverse=True)
     np.testing.assert_allclose(values, values[first][same.reshape(-1)], atol=1e-6)
-    faces = np.repeat(coordinates.chart, 3)
-    assert (faces != faces[first][same.reshape(-1)]).sum() > 100  # on edges, where the question arises
+    charts = np.repeat(coordinates.chart, 3)
+    assert (charts != charts[first][same.reshape(-1)]).sum() > 100  # on edges, where the question arises
 
 
 def test_triangles_as_large_as_a_quarter_of_the_sphere_are_cut() -> None:

@@ -190,3 +190,31 @@ def test_gl_equals_cpu_with_every_coefficient_a_map(animal: Atlas, gl_backend: s
 def test_bad_presets_are_named(make, message: str) -> None:
     with pytest.raises(SolverError, match=message):
         make()
+
+
+def test_coefficients_per_texel_equal_the_same_numbers(backend: str) -> None:
+    atlas = sphere_atlas(1.0, 16)
+    numbers = {"speed": 0.7, "damping": 0.5, "stiffness": 2.0, "viscosity": 0.01, "density": 3.0}
+    rng = np.random.default_rng(0)
+    start = rng.standard_normal((6, 16, 16))
+    results = []
+    for fields in (numbers, {key: np.full((6, 16, 16), value) for key, value in numbers.items()}):
+        waves = WaveSolver(atlas, Material(**fields), backend=backend)
+        waves.height = start
+        waves.step(0.5)
+        results.append(waves.height)
+    np.testing.assert_allclose(results[0], results[1], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"speed": -1.0}, "speed is -1 m/s"),
+        ({"density": 0.0}, "greater than 0"),
+        ({"damping": np.nan}, "damping is nan"),
+        ({"viscosity": np.zeros((6, 4, 5))}, "shape"),
+    ],
+)
+def test_bad_materials_are_named(fields: dict, message: str) -> None:
+    with pytest.raises(SolverError, match=message):
+        Material(**fields)

@@ -1,4 +1,4 @@
-"""Maps: pictures and vertex attributes on the texels."""
+"""Maps: images and vertex attributes on the texels."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def test_vertex_map_of_positions_gives_the_texel_positions(animal: Atlas) -> Non
     np.testing.assert_allclose(vertex_map(animal, animal.mesh.V[:, 1]), animal.positions[..., 1], atol=1e-12)
 
 
-def test_picture_lands_where_its_coordinates_say(globe: Atlas, tmp_path: Path) -> None:
+def test_an_image_lands_where_its_coordinates_say(globe: Atlas, tmp_path: Path) -> None:
     # a smooth function of latitude and longitude, 16 bits deep, upper row first
     width, height = 256, 128
     longitude = (np.arange(width) + 0.5) / width * 2 * np.pi

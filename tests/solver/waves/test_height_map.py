@@ -24,17 +24,17 @@ def test_gradient_converges_at_second_order_also_at_the_cubes_edges() -> None:
     assert np.log2(errors[1] / errors[2]) > 1.8
 
 
-def test_ring_makes_interpolation_continuous() -> None:
+def test_halo_makes_interpolation_continuous() -> None:
     n = 12
     atlas = sphere_atlas(1.0, n)
     h, _ = field_and_gradient(atlas.positions)
     height_map = HeightMap(atlas.texels)(h.astype(np.float32))
-    # where three faces meet, each face's bilinear value at the cube's corner is the mean of the same three texels
+    # where three charts meet, each chart's bilinear value at the cube's corner is the mean of the same three texels
     corners = {}
-    for face in range(6):
+    for chart in range(6):
         for r, c in ((0, 0), (0, n), (n, 0), (n, n)):
-            cell = height_map[face, r : r + 2, c : c + 2].reshape(4, 4)
+            cell = height_map[chart, r : r + 2, c : c + 2].reshape(4, 4)
             value = tuple(np.round(cell.mean(axis=0), 5))
-            corners.setdefault(value, []).append(face)
+            corners.setdefault(value, []).append(chart)
     assert len(corners) == 8
-    assert all(len(faces) == 3 for faces in corners.values())
+    assert all(len(charts) == 3 for charts in corners.values())

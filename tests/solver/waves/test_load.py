@@ -1,13 +1,10 @@
 """Loads over one step: what they add up to, when they end, and what is refused."""
 
-import warnings
-
 import numpy as np
 import pytest
 
-from ripple_sim.solver import Atlas, Load, Material, SolverError, WaveSolver, sphere_atlas
-from ripple_sim.solver.texels.distance import distance_from_point
-from ripple_sim.solver.waves.footprint import footprint, footprint_at
+from ripple_sim.solver import Load, Material, SolverError, WaveSolver, sphere_atlas
+from ripple_sim.solver.waves.footprint import footprint
 
 
 def test_load_acts_over_its_step_alone_beside_what_is_held(backend: str) -> None:
@@ -59,47 +56,3 @@ def test_loads_that_cannot_be_are_refused(load: Load, message: str) -> None:
     waves = WaveSolver(sphere_atlas(1.0, 8), backend="cpu")
     with pytest.raises(SolverError, match=message):
         waves.step(0.1, load=load)
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda w: w.add_impulse([[0, 0, 1], [0, 1, 0]], 1.0, 0.1), "a source has 2 points; valid is one"),
-        (lambda w: w.add_impulse([0, 0, 1], "hard", 0.1), "impulse is 'hard' N s"),
-        (lambda w: w.add_force([0, 0, 1], 1.0, None), "radius is None m"),
-        (lambda w: w.step("long"), "time step is 'long' s"),
-        (lambda w: WaveSolver(w.atlas, {"speed": 1.0}), "material is {'speed': 1.0}; valid is a Material"),
-    ],
-)
-def test_arguments_of_a_wrong_kind_are_named(call, message: str) -> None:
-    with pytest.raises(SolverError, match=message):
-        call(WaveSolver(sphere_atlas(1.0, 8), backend="cpu"))
-
-
-def test_what_float32_cannot_hold_is_one_error_and_no_warning() -> None:
-    waves = WaveSolver(sphere_atlas(1.0, 8), backend="cpu")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        waves.add_impulse([0, 0, 1], 1e38, 0.5)
-        with pytest.raises(SolverError, match="no longer finite"):
-            waves.step(0.1)
-        assert np.isnan(waves.energy())
-
-
-def test_footprint_measures_straight_where_it_is_flat_and_along_the_surface_where_it_is_not(animal: Atlas) -> None:
-    """Both ways through the code against distances by fast marching."""
-    rng = np.random.default_rng(1)
-    positions, flat = animal.positions.reshape(-1, 3), 0
-    for vertex in rng.integers(0, len(animal.mesh.V), 40):
-        (point,), (center,) = animal.nearest(animal.mesh.V[vertex])
-        where = footprint_at(animal, point, int(center), 0.08)
-        texels, along = distance_from_point(animal.texels, int(center), point, 3 * where.radius)
-        distance = dict(zip(texels.tolist(), along, strict=True))
-        height = (where.weights / where.weights.max()) ** (1 / 3)
-        used = where.radius * np.sqrt(1 - np.minimum(1, height * (1 - (min(distance.values()) / where.radius) ** 2)))
-        straight = np.linalg.norm(positions[where.texels] - point, axis=1)
-        true = np.array([distance[texel] for texel in where.texels.tolist()])
-        assert (used > 0.97 * straight - 0.05 * where.radius).all()
-        assert (used < 1.05 * true + 0.05 * where.radius).all()
-        flat += np.allclose(used, straight, atol=0.02 * where.radius)
-    assert 5 < flat < 40, "only one of the two ways was taken"

@@ -22,10 +22,10 @@ def keeps(point: np.ndarray) -> np.ndarray:
     return ALL_48[np.abs(ALL_48 @ point - point).max(axis=1) < 1e-12]
 
 
-@pytest.mark.parametrize("face", range(6))
-def test_impulse_on_a_face_centre_keeps_the_eight_symmetries_of_the_face(face: int, backend: str) -> None:
+@pytest.mark.parametrize("chart", range(6))
+def test_impulse_on_a_chart_centre_keeps_the_eight_symmetries_of_the_chart(chart: int, backend: str) -> None:
     point = np.zeros(3)
-    point[face // 2] = 1 - 2 * (face % 2)
+    point[chart // 2] = 1 - 2 * (chart % 2)
     h = ripple(sphere_atlas(1.0, 32), point, backend)
     symmetries = keeps(point)
     assert len(symmetries) == 8
@@ -73,18 +73,18 @@ def sample(atlas: Atlas, field: np.ndarray, points: np.ndarray) -> np.ndarray:
     from ripple_sim.solver.cube_map.convention import cube_topology
 
     n = atlas.resolution
-    face, row, column = atlas.locate(points)
+    chart, row, column = atlas.locate(points)
     index = cube_topology(n).halo
-    padded = field.reshape(-1)[index]
+    with_halo = field.reshape(-1)[index]
     for r, c, a, b in ((0, 0, 1, 1), (0, -1, 1, -2), (-1, 0, -2, 1), (-1, -1, -2, -2)):
-        padded[:, r, c] = (padded[:, a, b] + padded[:, r, b] + padded[:, a, c]) / 3
+        with_halo[:, r, c] = (with_halo[:, a, b] + with_halo[:, r, b] + with_halo[:, a, c]) / 3
     r, c = np.floor(row).astype(int), np.floor(column).astype(int)
     s, t = row - r, column - c
     return (
-        (1 - s) * (1 - t) * padded[face, r + 1, c + 1]
-        + (1 - s) * t * padded[face, r + 1, c + 2]
-        + s * (1 - t) * padded[face, r + 2, c + 1]
-        + s * t * padded[face, r + 2, c + 2]
+        (1 - s) * (1 - t) * with_halo[chart, r + 1, c + 1]
+        + (1 - s) * t * with_halo[chart, r + 1, c + 2]
+        + s * (1 - t) * with_halo[chart, r + 2, c + 1]
+        + s * t * with_halo[chart, r + 2, c + 2]
     )
 
 

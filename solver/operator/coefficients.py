@@ -1,0 +1,66 @@
+"""The coefficients of a material: their units, limits and shapes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ripple_sim.solver.errors import SolverError
+
+# name: unit, least value, whether the least value itself is excluded, whether infinity is allowed
+LIMITS = {
+    "speed": ("m/s", 0.0, False, False),
+    "damping": ("1/s", 0.0, False, False),
+    "stiffness": ("1/s^2", 0.0, False, False),
+    "viscosity": ("m^2/s", 0.0, False, False),
+    "density": ("kg/m^2", 0.0, True, False),
+    "bending": ("m^4/s^2", 0.0, False, False),
+    "yield_height": ("m", 0.0, True, True),
+}
+
+# Beyond any physical value, and small enough that nothing overflows on the way to the time step.
+_HIGHEST = 1e12
+
+
+def check_numbers(name: str, value: ArrayLike) -> None:
+    """Raise `SolverError` unless a coefficient is within its limits, and one number or one value a texel."""
+    unit, low, strict, endless = LIMITS[name]
+    numbers = _numbers(name, value)
+    small = (numbers <= low) | (numbers < 1 / _HIGHEST) if strict else numbers < low
+    wrong = small | np.isnan(numbers) | ((numbers > _HIGHEST) & ~(np.isinf(numbers) & endless))
+    if wrong.any():
+        worst = numbers.flat[np.argmax(wrong)]
+        bound = f"greater than {low:g}" if strict else f"{low:g} or greater"
+        raise SolverError(
+            f"material {name} is {worst:g} {unit}; valid is a finite number, {bound}, up to {_HIGHEST:g}"
+            f"{', or infinity' if endless else ''}"
+        )
+    _check_shape(name, numbers)
+
+
+def check_mask(name: str, value: ArrayLike) -> None:
+    """Raise `SolverError` unless a value is one bool, or one a texel."""
+    mask = np.asarray(value)
+    if mask.dtype != bool:
+        raise SolverError(f"material {name} has type {mask.dtype}; valid is bool: a mask [C, n, n], or False")
+    _check_shape(name, mask)
+
+
+def _numbers(name: str, value: object) -> NDArray[np.float64]:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise SolverError(f"material {name} is {value!r}; valid is a number or an array of numbers") from error
+
+
+def _check_shape(name: str, value: NDArray) -> None:
+    charts = value.ndim == 3 and value.shape[1] == value.shape[2]
+    if value.ndim != 0 and not charts:
+        raise SolverError(f"material {name} has shape {value.shape}; valid is a number or [C, n, n], one value a texel")
+
+
+def require_positive(**values: tuple[float, str]) -> None:
+    """Raise `SolverError` unless every value, given with its unit, is a finite number greater than 0."""
+    for name, (value, unit) in values.items():
+        if not 0 < value < np.inf:
+            raise SolverError(f"{name} is {value!r} {unit}; valid is a finite number greater than 0")

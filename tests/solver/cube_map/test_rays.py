@@ -1,0 +1,66 @@
+"""Rays through the texels meet the triangles that they should."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import trimesh
+
+from ripple_sim.solver import Atlas
+from ripple_sim.solver.cube_map.convention import texel_directions
+from ripple_sim.solver.cube_map.exhaustive_rays import cast_rays_exhaustively
+from ripple_sim.solver.cube_map.rays import cast_rays
+
+
+def surface_points(atlas: Atlas, triangles: np.ndarray, barycentrics: np.ndarray) -> np.ndarray:
+    return np.einsum("ij,ijk->ik", barycentrics, atlas.mesh.V[atlas.mesh.F[triangles]])
+
+
+def test_rays_agree_with_every_ray_against_every_triangle(animal: Atlas) -> None:
+    directions = texel_directions(8).reshape(-1, 3)
+    triangles, barycentrics = cast_rays(animal.sphere, animal.mesh.F, directions)
+    expected, weights = cast_rays_exhaustively(animal.sphere, animal.mesh.F, directions)
+    assert weights.min() > -1e-12
+    # a ray through an edge may count to either side; the point is the same
+    differ = triangles != expected
+    assert differ.mean() < 0.05
+    assert np.abs(weights[differ].min(axis=1)).max(initial=0) < 1e-9
+    np.testing.assert_allclose(barycentrics[~differ], weights[~differ], atol=1e-9)
+    points, others = surface_points(animal, triangles, barycentrics), surface_points(animal, expected, weights)
+    np.testing.assert_allclose(points, others, atol=1e-9)
+    assert (barycentrics >= 0).all()
+    np.testing.assert_allclose(barycentrics.sum(axis=1), 1)
+
+
+def test_rays_that_walk_on_from_their_neighbours_hit_the_same(animal: Atlas) -> None:
+    n = 48
+    directions = texel_directions(n).reshape(-1, 3)
+    triangles, barycentrics = cast_rays(animal.sphere, animal.mesh.F, directions)
+    for stride in (3, 16, len(directions)):
+        walked, weights = cast_rays(animal.sphere, animal.mesh.F, directions, stride)
+        inside = barycentrics.min(axis=1) > 0
+        np.testing.assert_array_equal(walked[inside], triangles[inside])
+        np.testing.assert_array_equal(weights[inside], barycentrics[inside])
+        assert inside.mean() > 0.9
+        points, others = surface_points(animal, walked, weights), surface_points(animal, triangles, barycentrics)
+        np.testing.assert_allclose(points, others, atol=1e-12)
+
+
+@pytest.mark.parametrize("what", ["cube edges and corners", "edges and vertices of the mesh", "anywhere"])
+def test_rays_in_degenerate_directions_agree_too(what: str) -> None:
+    coarse = trimesh.creation.icosphere(subdivisions=2)
+    V, F = np.array(coarse.vertices), np.array(coarse.faces)
+    if what == "cube edges and corners":
+        directions = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+    elif what == "edges and vertices of the mesh":
+        directions = np.concatenate([V, (V[F[:, 0]] + V[F[:, 1]]) / 2])
+    else:
+        directions = np.random.default_rng(0).standard_normal((200, 3))
+    found, weights = cast_rays(V, F, directions)
+    expected, expected_weights = cast_rays_exhaustively(V, F, directions)
+    hit, other = (np.einsum("ij,ijk->ik", w, V[F[t]]) for t, w in ((found, weights), (expected, expected_weights)))
+    np.testing.assert_allclose(hit, other, atol=1e-9)
+    np.testing.assert_allclose(np.cross(hit, directions), 0, atol=1e-9)
+    assert (np.einsum("ij,ij->i", hit, directions) > 0).all()

@@ -1,0 +1,92 @@
+"""Mesh files: every format, nodes and transforms; and what is refused, always with one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from known_meshes import known_mesh
+from scipy.spatial import cKDTree
+
+from ripple_sim.solver import MeshError, load_mesh
+
+
+def test_files_of_every_format_give_the_same_surface(tmp_path: Path) -> None:
+    solid = trimesh.creation.icosphere(subdivisions=2)
+    for ending in ("obj", "ply", "stl", "off", "glb"):
+        solid.export(tmp_path / f"ball.{ending}")
+        mesh = load_mesh(tmp_path / f"ball.{ending}")
+        assert (len(mesh.V), len(mesh.F)) == (162, 320), ending
+        assert mesh.volume == pytest.approx(solid.volume, rel=1e-5)
+
+
+def test_missing_and_broken_files_are_one_line_errors(tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match="does not exist"):
+        load_mesh(tmp_path / "nothing.obj")
+    broken = tmp_path / "broken.ply"
+    broken.write_bytes(b"\x00\x01 not a mesh")
+    with pytest.raises(MeshError) as error:
+        load_mesh(broken)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        ("genus1-rocker-arm.obj", "genus 1"),
+        ("genus3-3holes.off", "genus 3"),
+        ("nonmanifold-cow.obj", "non-manifold"),
+        ("open-camelhead.off", "open"),
+        ("several-parts-teapot.obj", "separate parts"),
+    ],
+)
+def test_public_meshes_with_defects(file: str, name: str) -> None:
+    with pytest.raises(MeshError, match=name):
+        load_mesh(known_mesh(f"bad/{file}"))
+
+
+def test_nodes_of_a_scene_are_put_where_their_transforms_say(tmp_path: Path) -> None:
+    box = trimesh.creation.box()
+    lower = trimesh.Trimesh(box.vertices, box.faces[:5], process=False)
+    turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3]) @ trimesh.transformations.translation_matrix(
+        [5, 1, 2]
+    )
+    back = np.linalg.inv(turn)
+    upper = trimesh.Trimesh(trimesh.transform_points(box.vertices, back), box.faces[5:], process=False)
+    scene = trimesh.Scene()
+    scene.add_geometry(lower, node_name="lower")
+    scene.add_geometry(upper, node_name="upper", transform=turn)
+    scene.export(tmp_path / "two.glb")
+    mesh = load_mesh(tmp_path / "two.glb")
+    # the transform leaves round-off between the parts, which are joined all the same
+    assert (len(mesh.V), len(mesh.F)) == (8, 12)
+    assert mesh.volume == pytest.approx(1, rel=1e-5)
+
+
+def test_scaled_mirrored_and_nested_nodes(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    scene.add_geometry(
+        trimesh.creation.icosphere(subdivisions=1),
+        node_name="ball",
+        parent_node_name="arm",
+        transform=np.diag([-2, 1, 1, 1]),
+    )
+    scene.graph.update(frame_to="arm", frame_from="world", matrix=np.diag([1.0, 3.0, 1.0, 1.0]))
+    scene.export(tmp_path / "nested.glb")
+    mesh = load_mesh(tmp_path / "nested.glb")
+    np.testing.assert_allclose(np.ptp(mesh.V, axis=0), [4, 6, 2], rtol=0.2)
+    assert mesh.volume == pytest.approx(6 * trimesh.creation.icosphere(subdivisions=1).volume, rel=1e-5)
+
+
+def test_texture_of_a_glb_is_kept(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    uv = np.random.default_rng(0).uniform(size=(len(ball.vertices), 2))
+    ball.visual = trimesh.visual.TextureVisuals(uv=uv)
+    ball.export(tmp_path / "ball.glb")
+    mesh = load_mesh(tmp_path / "ball.glb")
+    assert mesh.uv is not None
+    distance, same = cKDTree(ball.vertices).query(mesh.V)
+    assert distance.max() < 1e-6
+    np.testing.assert_allclose(mesh.uv, uv[same], atol=1e-6)

@@ -1,0 +1,77 @@
+"""The atlas locates points, also where charts meet."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from solids import BALL
+
+from ripple_sim.solver import Atlas, Mesh, sphere_atlas
+from ripple_sim.solver.atlas.build import atlas_from_sphere_map
+from ripple_sim.solver.cube_map.convention import CHART_NORMALS, CHART_U, CHART_V
+
+quick = settings(derandomize=True, max_examples=60, deadline=None, database=None)
+
+DIAGONALS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+
+
+def assert_touching(chart, row, column, n: int) -> None:
+    """Places of the directions to the cube's corners, edges and faces: in a chart that touches them, on its border."""
+    on = DIAGONALS[np.arange(26), chart // 2]
+    np.testing.assert_array_equal(on, 1 - 2 * (chart % 2))
+    offset = np.abs(np.stack([row, column]) - (n - 1) / 2)
+    at_border, in_middle = np.isclose(offset, n / 2, atol=1e-6), np.isclose(offset, 0, atol=1e-6)
+    np.testing.assert_array_equal(at_border.sum(axis=0), np.count_nonzero(DIAGONALS, axis=1) - 1)
+    assert (at_border | in_middle).all()
+
+
+def test_cube_edges_and_corners_are_located_on_the_sphere() -> None:
+    atlas = sphere_atlas(2.0, 16)
+    assert_touching(*atlas.locate(3 * DIAGONALS), 16)
+    nearest = atlas.positions.reshape(-1, 3)[atlas.nearest_texel(DIAGONALS)]
+    distance = np.linalg.norm(nearest - 2 * DIAGONALS / np.linalg.norm(DIAGONALS, axis=1, keepdims=True), axis=1)
+    assert distance.max() < 2 * np.pi / 2 / 16  # a texel's width
+
+
+def test_cube_edges_and_corners_are_located_on_a_mesh_with_vertices_there() -> None:
+    box = trimesh.creation.box(extents=[2, 2, 2]).subdivide().subdivide()
+    mesh = Mesh.from_arrays(box.vertices, box.faces)
+    atlas = atlas_from_sphere_map(mesh, mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), 16)
+    assert_touching(*atlas.locate(DIAGONALS), 16)
+
+
+@quick
+@given(st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda d: np.linalg.norm(d) > 1e-3))
+def test_located_points_lie_in_their_chart(direction) -> None:
+    mesh = Mesh.from_arrays(BALL.vertices, BALL.faces)
+    atlas = atlas_from_sphere_map(mesh, mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), 8)
+    _, [onto] = atlas.project(direction)
+    chart, row, column = (x[0] for x in atlas.locate(direction))
+    a, b = np.tan(np.pi / 4 * ((2 * np.array([column, row]) + 1) / 8 - 1))
+    back = CHART_NORMALS[chart] + a * CHART_U[chart] + b * CHART_V[chart]
+    np.testing.assert_allclose(back / np.linalg.norm(back), onto, atol=1e-12)
+    assert max(abs(a), abs(b)) <= 1 + 1e-12
+
+
+def test_locate_returns_the_texel_that_a_point_was_taken_from(animal: Atlas) -> None:
+    n = animal.resolution
+    chart, row, column = (x.reshape(6, n, n) for x in animal.locate(animal.positions.reshape(-1, 3)))
+    assert (chart == np.arange(6)[:, None, None]).all()
+    np.testing.assert_allclose(row, np.broadcast_to(np.arange(n)[:, None], (6, n, n)), atol=1e-6)
+    np.testing.assert_allclose(column, np.broadcast_to(np.arange(n), (6, n, n)), atol=1e-6)
+
+
+def test_quality_of_a_limbed_atlas(animal: Atlas) -> None:
+    quality = animal.quality()
+    assert quality["flipped"] == 0
+    assert quality["solid_angle"] == pytest.approx(4 * np.pi, abs=1e-9)
+    assert quality["starved"] == 0
+    assert quality["q999"] < 4
+    assert quality["coverage"] == pytest.approx(1, abs=0.02)
+    assert animal.areas.sum() == pytest.approx(quality["coverage"] * animal.mesh.area)
+    assert 0 < quality["edge_min"] < quality["edge_max"]

@@ -1,0 +1,43 @@
+"""The cells: waves over sheared quads."""
+
+import numpy as np
+import pytest
+
+from ripple_sim.solver.texels import cells
+from ripple_sim.solver.texels.cells import quad
+
+
+@pytest.mark.parametrize(("long", "angle"), [(1.0, 30.0), (2.0, 35.0), (3.0, 20.0), (1.3, 150.0)])
+def test_waves_over_sheared_quads_are_in_time_in_the_mean_over_their_directions(long: float, angle: float) -> None:
+    east = np.array([long, 0.0, 0.0])
+    north = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
+    sides_ew, sides_ns, rising, falling, area = quad(0 * east, east, north, east + north)
+    direction = np.linspace(0, np.pi, 180, endpoint=False)
+    errors = []
+    for k in (0.2, 0.1):
+        wave = k * np.stack([np.cos(direction), np.sin(direction), 0 * direction], axis=1)
+        theta, phi = wave @ east, wave @ north
+        # every side belongs to two quads
+        squared = (
+            2 * sides_ew * (2 - 2 * np.cos(theta))
+            + 2 * sides_ns * (2 - 2 * np.cos(phi))
+            + rising * (2 - 2 * np.cos(theta + phi))
+            + falling * (2 - 2 * np.cos(theta - phi))
+        ) / area
+        errors.append(abs(np.mean(squared / k**2) - 1))
+    # the error in k^2 is gone, that in k^4 is left
+    assert errors[1] < errors[0] / 14
+
+
+@pytest.mark.parametrize("corners", [3, 4, 5, 8])
+def test_a_cell_with_many_corners_is_exact_for_linear_functions(corners: int) -> None:
+    rng = np.random.default_rng(corners)
+    angle = np.sort(rng.uniform(0, 2 * np.pi, corners))
+    flat = np.stack([np.cos(angle), 0.6 * np.sin(angle), 0 * angle], axis=1)
+    links, areas = cells.polygon(flat)
+    slope = np.array([0.7, -1.3, 0.0])
+    energy = (links * np.subtract.outer(flat @ slope, flat @ slope) ** 2).sum() / 4
+    x, y, _ = flat.T
+    area = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
+    assert energy == pytest.approx(area * slope @ slope / 2)
+    assert areas.sum() == pytest.approx(area)

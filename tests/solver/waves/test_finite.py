@@ -1,0 +1,96 @@
+"""Values that are not finite, or of the wrong kind, are named."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+from ripple_sim.solver import SolverError, WaveSolver, sphere_atlas
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda w: w.step(-1), "time step is -1"),
+        (lambda w: w.step(np.nan), "time step is nan"),
+        (lambda w: w.add_impulse([0, 0, 1], np.inf, 0.1), "impulse is inf"),
+        (lambda w: w.add_impulse([0, 0, 1], 1.0, -0.1), "radius is -0.1"),
+        (lambda w: w.add_impulse([0, 0, np.nan], 1.0, 0.1), "NaN"),
+        (lambda w: w.add_impulse([0, 1], 1.0, 0.1), "shape"),
+        (lambda w: setattr(w, "height", np.zeros((6, 4, 4))), "valid is \\(6, 8, 8\\)"),
+        (lambda w: setattr(w, "height", np.full((6, 8, 8), np.nan)), "NaN"),
+    ],
+)
+def test_bad_values_are_named(call, message: str) -> None:
+    from ripple_sim.solver import RippleError
+
+    waves = WaveSolver(sphere_atlas(1.0, 8), backend="cpu")
+    with pytest.raises(RippleError, match=message):
+        call(waves)
+
+
+def test_what_is_not_finite_is_reported_with_place_and_time(backend: str) -> None:
+    atlas = sphere_atlas(1.0, 16)
+    waves = WaveSolver(atlas, backend=backend)
+    waves.step(0.5)
+    height = np.zeros((6, 16, 16), np.float32)
+    height[2, 5, 9] = np.nan
+    waves._backend.set_height(height)
+    place = atlas.positions[2, 5, 9]
+    expected = rf"chart 2, row 5, column 9, \({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}\) m .* time 0\.6 s"
+    with pytest.raises(SolverError, match=expected):
+        waves.step(0.1)
+        _ = waves.height
+    waves.reset()
+    waves.step(0.1)
+    assert not waves.height.any()
+
+
+def test_overflow_is_reported(backend: str) -> None:
+    waves = WaveSolver(sphere_atlas(1.0, 8), backend=backend)
+    with pytest.raises(SolverError, match="no longer finite"):
+        for _ in range(50):
+            waves.add_impulse([0, 0, 1], 1e38, 0.5)
+            waves.step(1.0)
+            _ = waves.height
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda w: w.add_force([0, 0, 1], np.nan, 0.1), "force is nan N"),
+        (lambda w: w.add_pressure(np.inf), "pressure holds 384 values that are NaN or infinite"),
+        (lambda w: w.add_height(np.zeros((6, 4, 4))), "height has shape (6, 4, 4); valid is (6, 8, 8)"),
+        (lambda w: w.add_velocity(np.full((6, 8, 8), np.nan)), "velocity holds 384 values"),
+    ],
+)
+def test_bad_sources_are_named(call, message: str) -> None:
+    waves = WaveSolver(sphere_atlas(1.0, 8), backend="cpu")
+    with pytest.raises(SolverError, match=re.escape(message)):
+        call(waves)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda w: w.add_impulse([[0, 0, 1], [0, 1, 0]], 1.0, 0.1), "a source has 2 points; valid is one"),
+        (lambda w: w.add_impulse([0, 0, 1], "hard", 0.1), "impulse is 'hard' N s"),
+        (lambda w: w.add_force([0, 0, 1], 1.0, None), "radius is None m"),
+        (lambda w: w.step("long"), "time step is 'long' s"),
+        (lambda w: WaveSolver(w.atlas, {"speed": 1.0}), "material is {'speed': 1.0}; valid is a Material"),
+    ],
+)
+def test_arguments_of_a_wrong_kind_are_named(call, message: str) -> None:
+    with pytest.raises(SolverError, match=message):
+        call(WaveSolver(sphere_atlas(1.0, 8), backend="cpu"))
+
+
+def test_what_float32_cannot_hold_is_one_error_and_no_warning() -> None:
+    waves = WaveSolver(sphere_atlas(1.0, 8), backend="cpu")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        waves.add_impulse([0, 0, 1], 1e38, 0.5)
+        with pytest.raises(SolverError, match="no longer finite"):
+            waves.step(0.1)
+        assert np.isnan(waves.energy())
