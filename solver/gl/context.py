@@ -19,9 +19,9 @@ from .shader import load_shader
 class GLContext:
     """One headless OpenGL 4.3 context on EGL, shared by the GPU wave solver and the renderer.
 
-    Use it as a context manager: entering makes the context current, frees what Python has let go of, and returns the
-    `moderngl.Context`; leaving the outermost block restores the previous context and raises `GLError` if the driver
-    recorded an error meanwhile.
+    Use it as a context manager: entering makes the context current, frees the objects that Python has collected, and
+    returns the `moderngl.Context`; leaving the outermost block restores the previous context and raises `GLError` if
+    the driver recorded an error meanwhile.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ class GLContext:
             self._ctx.__enter__()
             if current_context() != self._handle:
                 raise GLError(
-                    f"the OpenGL context on {self.renderer} is lost; something else in this process has ended EGL (a "
-                    "pyvista or VTK window does): run one of the two in a process of its own"
+                    f"the OpenGL context on {self.renderer} is lost; something else in this process has shut EGL "
+                    "down (a pyvista or VTK window does): run one of the two in a process of its own"
                 )
             self._free()
         self._depth += 1
@@ -80,12 +80,12 @@ class GLContext:
             raise GLError(f"OpenGL reported {recorded} on {self.renderer}; see `ripple-sim info`")
 
     def barrier(self) -> None:
-        """Let what follows see what compute shaders have written."""
+        """Make what compute shaders have written visible to later commands."""
         with self as ctx:
             ctx.memory_barrier()
 
     def wait(self) -> None:
-        """Return when the driver has done all that it was told, and let other Python threads run meanwhile.
+        """Wait until the driver has finished all commands, without blocking other Python threads.
 
         moderngl holds the interpreter's lock while it waits, in `finish` as well as in reading back.
         """
@@ -93,12 +93,12 @@ class GLContext:
             self.wait_for(self.put_fence())
 
     def put_fence(self) -> int:
-        """Mark the place behind all that the driver was told so far; wait for each mark once."""
+        """Put a fence behind all commands so far, and return its handle; wait for each fence once."""
         with self:
             return self._fences.put()
 
     def wait_for(self, fence: int) -> None:
-        """Return when the driver has got to a fence, whatever it was told since; as `wait` does otherwise."""
+        """Wait until the driver has reached a fence, as `wait` does for all commands."""
         with self:
             self._fences.wait(fence)
 
@@ -107,7 +107,7 @@ class GLContext:
         return self._compute_shader(name, load_shader(package, name, **defines))
 
     def shared_compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
-        """Compile a compute shader, or return the one that was compiled before: set all uniforms before each use."""
+        """Compile a compute shader once and share it: set all uniforms before each use."""
         source = load_shader(package, name, **defines)
         if source not in self._shared_shaders:
             self._shared_shaders[source] = self._compute_shader(name, source)
@@ -128,7 +128,7 @@ class GLContext:
             return _compiled(name, lambda: ctx.compute_shader(source))
 
     def _free(self) -> None:
-        """Free what Python has let go of; `moderngl.Context.gc` stumbles over what was released by hand."""
+        """Free the objects that Python has collected; `moderngl.Context.gc` fails on those released by hand."""
         while self._ctx.objects:
             collected = self._ctx.objects.popleft()
             if hasattr(collected, "release"):
@@ -148,7 +148,7 @@ _lock = threading.Lock()
 
 
 def select_device(device: int | None) -> None:
-    """Let `shared_context` mean this EGL device from now on; None: the first that yields a context."""
+    """Select the EGL device of `shared_context`; None: the first that yields a context."""
     global _selected
     with _lock:
         _selected = device

@@ -22,7 +22,7 @@ def create_context(device: int | None) -> moderngl.Context:
     for libraries in _LIBRARIES:
         for index in devices:
             try:
-                # moderngl's hints know nothing of the keywords that its backends take
+                # moderngl's hints lack the keywords of its backends
                 settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}
                 return moderngl.create_context(require=430, standalone=True, **settings)
             except Exception as error:  # moderngl raises bare Exception here
@@ -51,4 +51,4 @@ def load_egl() -> ctypes.CDLL:
             egl = ctypes.CDLL(libraries.get("libegl", "libEGL.so"))
             egl.eglGetCurrentContext.restype = egl.eglGetProcAddress.restype = ctypes.c_void_p
             return egl
-    raise GLError("the EGL library has vanished since the context was made; see `ripple-sim info`")
+    raise GLError("the EGL library is gone since the context was created; see `ripple-sim info`")

@@ -1,4 +1,4 @@
-"""Waiting for the GPU while other Python threads go on: by OpenGL's sync objects, which moderngl does not offer."""
+"""Fences: OpenGL's sync objects, which moderngl lacks, to wait for the GPU without blocking other Python threads."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from ripple_sim.solver.errors import GLError
 _COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
 _FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
 _TIMEOUT_EXPIRED, _FAILED = 0x911B, 0x911D
-_PATIENCE = 100_000_000  # [ns], after which Python looks whether the user has had enough
+_PATIENCE = 100_000_000  # [ns], after which Python checks for an interrupt
 
 
 class Fences:
-    """Makes and awaits fences in the context that is current, without holding the interpreter's lock.
+    """Creates fences in the current context, and waits for them without holding the interpreter's lock.
 
     Parameters
     ----------
     address : callable
-        Where the driver has an OpenGL function, by its name.
+        Address of an OpenGL function, by its name.
     """
 
     def __init__(self, address: Callable[[bytes], int]) -> None:
@@ -29,16 +29,16 @@ class Fences:
         self._delete = ctypes.CFUNCTYPE(None, pointer)(address(b"glDeleteSync"))
 
     def put(self) -> int:
-        """Put a fence behind all that the driver was told so far, and return its handle."""
+        """Put a fence behind all commands so far, and return its handle."""
         return self._create(_COMMANDS_COMPLETE, 0)
 
     def wait(self, fence: int) -> None:
-        """Return when the driver has done all that it was told before the fence, and delete it.
+        """Wait until the driver has finished all commands before the fence, and delete it.
 
         Raises
         ------
         GLError
-            If the driver cannot tell.
+            If the driver reports a failure.
         """
         try:
             state = _TIMEOUT_EXPIRED
@@ -47,4 +47,4 @@ class Fences:
         finally:
             self._delete(fence)
         if state == _FAILED:
-            raise GLError("OpenGL cannot wait for what it draws; see `ripple-sim info`")
+            raise GLError("OpenGL cannot wait for its own commands; see `ripple-sim info`")

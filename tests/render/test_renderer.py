@@ -113,7 +113,7 @@ def test_constant_height_shades_as_flat(gl):
     assert np.abs(flat[inner] - raised[inner]).max() <= 3
 
 
-def test_a_slope_that_faces_the_lamp_is_brighter(gl):
+def test_a_slope_that_faces_the_light_is_brighter(gl):
     """The key light stands on the left. A height that grows to the right turns the surface towards it."""
     renderer, data, target = make(gl)
     slope = np.array([0.5, 0.0, 0.0])

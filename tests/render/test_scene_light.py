@@ -7,7 +7,7 @@ from drawn import BALL, FLOOR, FRONT, SPOT, SUN, frame_of
 from ripple_sim.solver import RippleError
 
 
-def test_no_lamp_in_the_mjcf_means_the_studio_and_both_can_be_asked_for(gl):
+def test_no_light_in_the_mjcf_means_the_studio_and_both_can_be_asked_for(gl):
     dark = "<headlight active='0'/>"
     sun = SUN.format(1.0, "true")
     np.testing.assert_array_equal(frame_of(gl, FLOOR + BALL), frame_of(gl, FLOOR + BALL, lighting="studio"))

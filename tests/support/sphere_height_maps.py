@@ -8,16 +8,16 @@ N = 24
 
 
 def height_map_of(height, gradient) -> np.ndarray:
-    """HeightMap of functions of the unit vector, with the ring of neighbours filled in."""
+    """Height map of functions of the unit vector, with its halo."""
     directions = texel_directions(N)
     texels = np.concatenate([gradient(directions), height(directions)[..., None]], axis=3)
     index = padded_indices(N)
-    padded = texels.reshape(-1, 4)[np.maximum(index, 0)]
+    with_halo = texels.reshape(-1, 4)[np.maximum(index, 0)]
     for row in (0, -1):
         for column in (0, -1):
             r, c = (1 if row == 0 else -2), (1 if column == 0 else -2)
-            padded[:, row, column] = (padded[:, r, c] + padded[:, r, column] + padded[:, row, c]) / 3
-    return padded.astype(np.float32)
+            with_halo[:, row, column] = (with_halo[:, r, c] + with_halo[:, r, column] + with_halo[:, row, c]) / 3
+    return with_halo.astype(np.float32)
 
 
 def constant_height_map(height: float) -> np.ndarray:

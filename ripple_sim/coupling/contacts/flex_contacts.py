@@ -62,16 +62,15 @@ class FlexContacts:
         if not data.ncon:
             return {}
         each = data.contact
-        # copies, as in `geom_contacts`
         contacts = MujocoFlexContacts(
-            each.efc_address.copy(),
-            each.dim.copy(),
-            each.friction.copy(),
-            each.elem.copy(),
-            each.frame.copy(),
-            each.pos.copy(),
-            each.dist.copy(),
-            each.includemargin.copy(),
+            each.efc_address,
+            each.dim,
+            each.friction,
+            each.elem,
+            each.frame,
+            each.pos,
+            each.dist,
+            each.includemargin,
             data.efc_force,
             data.geom_xmat,
         )

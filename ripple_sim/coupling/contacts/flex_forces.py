@@ -8,7 +8,7 @@ import numpy as np
 
 from ripple_sim.solver.kernel import Floats, Ints, Ints32, kernel
 
-from .target_contacts import PairContacts, group_by_pair
+from .target_contacts import PairContacts, group_by_pair, room_for, trimmed
 
 # Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push sideways: geoms that
 # hit an edge or a corner push at down to 0.5.
@@ -63,11 +63,7 @@ def summed_contacts(
         Whether MuJoCo's friction cones are.
     """
     pairs, forces = group_by_pair(geoms, contacts.efc_address, flex.first >= 0), _whole_forces(contacts, pyramidal)
-    count = len(pairs.contacts)
-    targets, others = np.empty(len(pairs.targets), np.int64), np.empty(len(pairs.targets), np.int64)
-    begins = np.empty(len(pairs.targets) + 1, np.int64)
-    points, loads, normals = np.empty((count, 3)), np.empty(count), np.empty((count, 3))
-    found, row = 0, 0
+    found, found_pairs, row = room_for(pairs), 0, 0
     for pair in range(len(pairs.targets)):
         target, other = pairs.targets[pair], pairs.others[pair]
         first, sum_of_weights = row, 0.0
@@ -91,18 +87,17 @@ def summed_contacts(
             # from the other geom's surface, which is in by a depth, to as far outside the target's own
             depth = contacts.includemargin[i] - contacts.dist[i]
             outside = depth + min(depth, extents[other])
-            points[row] = contacts.pos[i] - sign * contacts.dist[i] / 2 * contacts.frame[i, :3] + outside * normal
-            loads[row], normals[row] = weight, normal
+            met = contacts.pos[i] - sign * contacts.dist[i] / 2 * contacts.frame[i, :3]
+            found.points[row], found.normals[row], found.forces[row] = met + outside * normal, normal, weight
             row += 1
         length = np.sqrt((mean**2).sum())
         if row == first or -(whole * mean).sum() <= 0:
             row = first
             continue
-        loads[first:row] *= -(whole * mean).sum() / length / sum_of_weights
-        targets[found], others[found], begins[found] = target, other, first
-        found += 1
-    begins[found] = row
-    return PairContacts(targets[:found], others[:found], begins[: found + 1], points[:row], loads[:row], normals[:row])
+        found.forces[first:row] *= -(whole * mean).sum() / length / sum_of_weights
+        found.targets[found_pairs], found.others[found_pairs], found.begins[found_pairs] = target, other, first
+        found_pairs += 1
+    return trimmed(found, found_pairs, row)
 
 
 @kernel

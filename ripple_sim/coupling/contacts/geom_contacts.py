@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Bools, Floats, Ints, Ints32, kernel
 
-from .target_contacts import PairContacts, TargetContacts, group_by_pair
+from .target_contacts import PairContacts, TargetContacts, group_by_pair, room_for, trimmed
 
 PYRAMIDAL = int(mujoco.mjtCone.mjCONE_PYRAMIDAL)
 
@@ -50,16 +50,8 @@ def geom_contacts(
     if not data.ncon:
         return {}
     each = data.contact
-    # copies: MuJoCo's arrays have strides unless there is a single contact, and would compile the kernels twice
     geoms = each.geom.astype(np.int64) if geoms is None else geoms
-    contacts = _MujocoContacts(
-        each.efc_address.copy(),
-        each.dim.copy(),
-        each.frame.copy(),
-        each.pos.copy(),
-        each.dist.copy(),
-        data.efc_force,
-    )
+    contacts = _MujocoContacts(each.efc_address, each.dim, each.frame, each.pos, each.dist, data.efc_force)
     return _normal_contacts(geoms, contacts, is_target, extents, model.opt.cone == PYRAMIDAL).by_target()
 
 
@@ -69,32 +61,29 @@ def _normal_contacts(
 ) -> PairContacts:
     """Contacts whose normal force pushes; pairs without one are left out."""
     pairs = group_by_pair(geoms, contacts.efc_address, is_target)
-    count = len(pairs.contacts)
-    targets, others = np.empty(len(pairs.targets), np.int64), np.empty(len(pairs.targets), np.int64)
-    begins = np.empty(len(pairs.targets) + 1, np.int64)
-    points, forces, normals = np.empty((count, 3)), np.empty(count), np.empty((count, 3))
-    found, row = 0, 0
+    found, found_pairs, row = room_for(pairs), 0, 0
     for pair in range(len(pairs.targets)):
-        begins[found] = row
+        first = row
         for j in range(pairs.begins[pair], pairs.begins[pair + 1]):
             i, frame = pairs.contacts[j], contacts.frame
             force = _normal_force(contacts, i, pyramidal)
             if not force > 0:
                 continue
-            forces[row] = force
+            found.forces[row] = force
             # an overlap deeper than a geom is not real: a speculative contact's `dist` only says how hard to stop
             depth = min(abs(contacts.dist[i]), extents[pairs.targets[pair]], extents[pairs.others[pair]])
             for k in range(3):
                 # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's surface is
                 # dist/2 away. A little outside it the nearest surface point is on this side, even of a thin part.
-                normals[row, k] = -frame[i, k] if pairs.sides[j] else frame[i, k]
-                points[row, k] = contacts.pos[i, k] + 1.5 * depth * normals[row, k]
+                normal = -frame[i, k] if pairs.sides[j] else frame[i, k]
+                found.normals[row, k] = normal
+                found.points[row, k] = contacts.pos[i, k] + 1.5 * depth * normal
             row += 1
-        if row > begins[found]:
-            targets[found], others[found] = pairs.targets[pair], pairs.others[pair]
-            found += 1
-    begins[found] = row
-    return PairContacts(targets[:found], others[:found], begins[: found + 1], points[:row], forces[:row], normals[:row])
+        if row > first:
+            found.targets[found_pairs], found.others[found_pairs] = pairs.targets[pair], pairs.others[pair]
+            found.begins[found_pairs] = first
+            found_pairs += 1
+    return trimmed(found, found_pairs, row)
 
 
 @kernel

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.kernel import Bools, Floats, Ints, Ints32, kernel
 
 
 class TargetContacts(NamedTuple):
@@ -38,9 +38,18 @@ class TargetContacts(NamedTuple):
 
 
 class PairContacts(NamedTuple):
-    """The contacts on all targets: as in `TargetContacts`, by (target, other) in ascending order."""
+    """The contacts on all targets, by (target, other) in ascending order; more as in `TargetContacts`.
+
+    Attributes
+    ----------
+    targets : int64 [t]
+        Geom ids.
+    starts : int64 [t + 1]
+        The pairs of targets[i] are those from starts[i] to starts[i + 1].
+    """
 
     targets: Ints
+    starts: Ints
     others: Ints
     begins: Ints
     points: Floats
@@ -49,12 +58,10 @@ class PairContacts(NamedTuple):
 
     def by_target(self) -> dict[int, TargetContacts]:
         """Split by target, in ascending order of their geom ids."""
-        _, others, begins, points, forces, normals = self
-        targets = self.targets.tolist()
-        starts = [i for i, target in enumerate(targets) if i == 0 or target != targets[i - 1]]
+        targets, starts, others, begins, points, forces, normals = self
         return {
-            targets[a]: TargetContacts(targets[a], others[a:b], begins[a : b + 1], points, forces, normals)
-            for a, b in pairwise([*starts, len(targets)])
+            target: TargetContacts(target, others[a:b], begins[a : b + 1], points, forces, normals)
+            for target, (a, b) in zip(targets.tolist(), pairwise(starts.tolist()), strict=True)
         }
 
 
@@ -81,14 +88,14 @@ class Pairs(NamedTuple):
 
 
 @kernel
-def group_by_pair(geoms: Ints, address: Ints, is_target: np.ndarray) -> Pairs:
+def group_by_pair(geoms: Ints, address: Ints32, is_target: Bools) -> Pairs:
     """Group the contacts that bear on targets.
 
     Parameters
     ----------
     geoms : int64 [ncon, 2]
         Geom ids, -1 for a flex that stands for no geom.
-    address : int64 [ncon]
+    address : int32 [ncon]
         Their rows in the constraint solver. A contact without one (excluded, or in the margin only) carries no force.
     is_target : bool [ngeom]
     """
@@ -115,3 +122,33 @@ def group_by_pair(geoms: Ints, address: Ints, is_target: np.ndarray) -> Pairs:
         contacts[j], sides[j] = divmod(sources[order[j]], 2)
     begins[pairs] = count
     return Pairs(targets[:pairs], others[:pairs], begins[: pairs + 1], contacts, sides)
+
+
+@kernel
+def room_for(pairs: Pairs) -> PairContacts:
+    """Arrays for the contacts of all pairs, with a target for each pair."""
+    p, k = len(pairs.targets), len(pairs.contacts)
+    targets, starts, others = np.empty(p, np.int64), np.empty(p + 1, np.int64), np.empty(p, np.int64)
+    return PairContacts(
+        targets, starts, others, np.empty(p + 1, np.int64), np.empty((k, 3)), np.empty(k), np.empty((k, 3))
+    )
+
+
+@kernel
+def trimmed(room: PairContacts, pairs: int, contacts: int) -> PairContacts:
+    """The first pairs and contacts that were written to the arrays, with one entry for each target."""
+    targets, starts, begins, count = room.targets, room.starts, room.begins, 0
+    for pair in range(pairs):
+        if count == 0 or targets[pair] != targets[count - 1]:
+            targets[count], starts[count] = targets[pair], pair
+            count += 1
+    starts[count], begins[pairs] = pairs, contacts
+    return PairContacts(
+        targets[:count],
+        starts[: count + 1],
+        room.others[:pairs],
+        begins[: pairs + 1],
+        room.points[:contacts],
+        room.forces[:contacts],
+        room.normals[:contacts],
+    )

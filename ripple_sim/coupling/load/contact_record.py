@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from ripple_sim.coupling.contacts.target_contacts import TargetContacts
 from ripple_sim.coupling.patches.contact_patches import LoadPoints, Patches
 from ripple_sim.coupling.patches.pose import Pose, in_world
 from ripple_sim.solver import Load
+from ripple_sim.solver.kernel import Floats, Ints
 
 from .footprint_cache import FootprintCache
 from .texel_forces import texel_forces
@@ -64,8 +66,7 @@ class Touch:
     load: Load
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ContactRecord:
+class ContactRecord(NamedTuple):
     """The contacts on one target in a step, with their forces before the low-pass filter.
 
     Attributes
@@ -84,8 +85,8 @@ class ContactRecord:
     contacts: TargetContacts
     pose: Pose
     patches: Patches
-    surface: NDArray[np.float64]
-    texels: NDArray[np.int64]
+    surface: Floats
+    texels: Ints
     points: LoadPoints
     cache: FootprintCache
 
@@ -106,7 +107,7 @@ class ContactRecord:
         at = zip(*(index.tolist() for index in np.unravel_index(self.texels[middles], shape)), strict=True)
         geom, forces = names[self.contacts.target], self.patches.forces.tolist()
         for other, point, force, texel in zip(self.patches.geoms.tolist(), points, forces, at, strict=True):
-            yield Impulse(geom=geom, other=names[other], point=point, impulse=force * timestep, texel=texel)
+            yield Impulse(geom, names[other], point, force * timestep, texel)
 
     def touches(self) -> Iterator[Touch]:
         """One record for each geom that touches."""

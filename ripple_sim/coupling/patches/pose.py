@@ -1,4 +1,4 @@
-"""Where a geom is: points carried into its frame, and back into the world."""
+"""Poses of geoms, and points taken into their frames and back into the world."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Pose(NamedTuple):
 
 @kernel
 def in_frame(points: Floats, pose: Pose) -> Floats:
-    """Points in the world [m], [k, 3], carried into the frame of a geom."""
+    """Points in the world [m], [k, 3], taken into the frame of a geom."""
     local = np.empty_like(points)
     for i in range(len(points)):
         for k in range(3):
@@ -30,7 +30,7 @@ def in_frame(points: Floats, pose: Pose) -> Floats:
 
 @kernel
 def in_world(points: Floats, pose: Pose) -> Floats:
-    """Points in the frame of a geom [m], [k, 3], carried into the world."""
+    """Points in the frame of a geom [m], [k, 3], taken into the world."""
     world = np.empty_like(points)
     for i in range(len(points)):
         for k in range(3):

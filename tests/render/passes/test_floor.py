@@ -32,7 +32,7 @@ def test_the_edges_of_a_finite_floor_are_smooth(gl):
     assert shares.min() > 8
 
 
-def test_alpha_leaves_the_bodies_and_their_shadows(gl):
+def test_alpha_leaves_the_geoms_and_their_shadows(gl):
     whole = frame_of(gl, FLOOR + BALL + SUN.format(0.5, "true"), camera=FRONT)
     frame = frame_of(gl, FLOOR + BALL + SUN.format(0.5, "true"), camera=FRONT, alpha=True)
     assert frame.shape == (SIZE[1], SIZE[0], 4)

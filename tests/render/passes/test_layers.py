@@ -6,7 +6,7 @@ from drawn import FLOOR, FRONT, ball_surface, frame_of
 from ripple_sim.render import Camera
 
 
-def test_a_clear_body_lets_what_is_behind_through(gl):
+def test_a_transparent_geom_shows_what_is_behind_it(gl):
     wall = '<geom type="box" size="3 .1 3" pos="0 2 0" rgba="0 0 1 1"/>'
     glass = '<geom type="box" size=".5 .02 .5" pos="0 0 .5" rgba="1 0 0 {}"/>'
     middle = np.s_[55:65, 75:85]
@@ -17,7 +17,7 @@ def test_a_clear_body_lets_what_is_behind_through(gl):
     np.testing.assert_allclose(mixed, (red + blue) / 2, atol=12)
 
 
-def test_a_clear_plane_is_drawn_too(gl):
+def test_a_transparent_plane_is_drawn_too(gl):
     pane = '<geom type="plane" size=".5 .5 .1" pos="0 0 .5" rgba="1 0 0 .5"/>'
     assert (frame_of(gl, FLOOR + pane) - frame_of(gl, FLOOR))[60, 80, 2] < -40
 

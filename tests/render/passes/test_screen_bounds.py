@@ -45,7 +45,7 @@ def test_box_of_a_small_ball_is_tight() -> None:
     np.testing.assert_allclose(box, [*(middle - radius), *(middle + radius)], atol=1.3)
 
 
-def test_whole_picture_for_a_ball_about_the_eye_or_without_end_and_none_for_one_behind() -> None:
+def test_the_whole_frame_for_a_ball_about_the_eye_or_an_infinite_one_and_nothing_for_one_behind() -> None:
     camera = pose(4)
     behind = camera.eye + 2.0 * camera.rotation[:, 2]
     centres = np.stack([camera.eye, camera.eye + camera.rotation[:, 0], behind])

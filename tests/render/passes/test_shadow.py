@@ -7,19 +7,19 @@ from scipy.ndimage import binary_erosion
 
 
 @pytest.mark.parametrize("direction", [-1.0, 1.0])
-def test_a_shadow_falls_where_the_lamp_of_the_mjcf_throws_it(gl, direction):
+def test_a_shadow_falls_where_the_light_of_the_mjcf_casts_it(gl, direction):
     frame = frame_of(gl, FLOOR + BALL + SUN.format(direction, "true"))
     left, right = frame[50:70, 40:50].mean(), frame[50:70, 110:120].mean()
     assert (right < left - 60) if direction > 0 else (left < right - 60)
 
 
-def test_a_lamp_without_castshadow_throws_none(gl):
+def test_a_light_without_castshadow_casts_none(gl):
     frame = frame_of(gl, FLOOR + BALL + SUN.format(1.0, "false"))
     assert abs(frame[50:70, 40:50].mean() - frame[50:70, 110:120].mean()) < 12
 
 
-def test_a_near_lamp_throws_a_shadow_away_from_itself(gl):
-    """A lamp at x = -1, 2 m up: the ball's middle at 0.8 m lies in the way to x = 0.67 on the floor."""
+def test_a_near_light_casts_a_shadow_away_from_itself(gl):
+    """A light at x = -1, 2 m up: the ball's middle at 0.8 m lies in the way to x = 0.67 on the floor."""
     frame = frame_of(gl, FLOOR + BALL + SPOT.format(-1.0, 0.5))
     pixels = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))
     spot = int(SIZE[0] / 2 + 0.75 * pixels)
@@ -27,14 +27,14 @@ def test_a_near_lamp_throws_a_shadow_away_from_itself(gl):
 
 
 @pytest.mark.parametrize("lamps", [2, 3, 4])
-def test_every_lamp_throws_its_shadow(gl, lamps):
+def test_every_light_casts_its_shadow(gl, lamps):
     """Each of up to four suns, from four sides, darkens the floor where the ball stands in its way."""
     sun = '<light directional="true" pos="0 0 3" dir="{} {} -1" diffuse=".2 .2 .2" castshadow="{}"/>'
     ways = [(1, 0), (-1, 0), (0, 1), (0, -1)][:lamps]
     plain = frame_of(gl, FLOOR + BALL + "".join(sun.format(*way, "false") for way in ways))
     shaded = frame_of(gl, FLOOR + BALL + "".join(sun.format(*way, "true") for way in ways))
     pixels = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))
-    for x, y in ways:  # the ball's middle, 0.8 m up, throws its shadow 0.8 m away
+    for x, y in ways:  # the ball's middle, 0.8 m up, casts its shadow 0.8 m away
         column, row = int(SIZE[0] / 2 + 0.8 * x * pixels), int(SIZE[1] / 2 - 0.8 * y * pixels)
         here = np.s_[row - 2 : row + 2, column - 2 : column + 2]
         assert shaded[here].mean() < plain[here].mean() - 6
@@ -42,12 +42,12 @@ def test_every_lamp_throws_its_shadow(gl, lamps):
     assert abs(shaded[beside].mean() - plain[beside].mean()) < 1
 
 
-def test_more_lamps_than_can_throw_shadows_shine_all_the_same(gl):
+def test_more_lights_than_can_cast_shadows_shine_all_the_same(gl):
     suns = "".join(SUN.format(x, "true").replace(".8 .8 .8", ".1 .1 .1") for x in np.linspace(-1, 1, 6))
     assert frame_of(gl, FLOOR + BALL + suns)[:8].mean() > frame_of(gl, FLOOR + BALL, lighting="model")[:8].mean() + 20
 
 
-def test_a_near_lamp_and_a_sun_throw_shadows_side_by_side(gl):
+def test_a_near_light_and_a_sun_cast_shadows_side_by_side(gl):
     pixels = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))
     sun = SUN.format(-1.0, "{}").replace(".8 .8 .8", ".4 .4 .4")
     spot = SPOT.format(-1.0, 0.5).replace("/>", ' castshadow="{}"/>')
@@ -61,7 +61,7 @@ def test_a_near_lamp_and_a_sun_throw_shadows_side_by_side(gl):
     assert shaded[1] < plain[1] - 6
 
 
-def test_a_shadow_falls_far_below_its_body(gl):
+def test_a_shadow_falls_far_below_its_caster(gl):
     """A small ball ten of its radii above the floor, lit from the left."""
     ball = '<geom type="sphere" size=".1" pos="-.5 0 1" rgba=".8 .2 .2 1"/>'
     frame = frame_of(gl, FLOOR + ball + SUN.format(1.0, "true"))

@@ -16,14 +16,14 @@ from ripple_sim.render.visuals import primitives
 SIZE = 96
 
 
-FROM_X = Camera((0.0, 0.0, 0.0), 4.0, 180.0, 0.0, 20.0)  # the picture's right is +y, its up +z
+FROM_X = Camera((0.0, 0.0, 0.0), 4.0, 180.0, 0.0, 20.0)  # the frame's right is +y, its up +z
 
 
 ABOVE = Camera((0.0, 0.0, 0.0), 4.0, 90.0, -89.99, 20.0)  # right is +x, up +y
 
 
 def names(gl, model, places, camera=FROM_X, targets=None) -> str:
-    """Names of the colours at places of the picture, x to the right and y upwards from its middle, in pixels."""
+    """Names of the colours at points of the frame, x to the right and y upwards from its middle, in pixels."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     with Renderer(gl, model, targets or {}, size=(SIZE, SIZE), lighting="studio") as renderer:
@@ -44,7 +44,7 @@ def corners(distance: int) -> list[tuple[int, int]]:
 @pytest.mark.parametrize(
     ("geom", "camera", "expected"),
     [
-        # once round: at +x the picture's right edge meets its left one
+        # once round: at +x the texture's right edge meets its left one
         ('type="sphere" size=".4"', FROM_X, "gryb"),
         ('type="ellipsoid" size=".4 .5 .6"', FROM_X, "gryb"),
         ('type="cylinder" size=".4 .5"', FROM_X, "gryb"),
@@ -56,14 +56,14 @@ def corners(distance: int) -> list[tuple[int, int]]:
         ('type="plane" size="0 0 .1"', ABOVE, "rgby"),  # repeats every 2 m, and begins at -1 m
     ],
 )
-def test_a_flat_picture_lies_on_each_primitive_as_in_mujoco(gl, geom, camera, expected):
+def test_a_flat_texture_lies_on_each_primitive_as_in_mujoco(gl, geom, camera, expected):
     model = textured_model(f'<geom {geom} material="m"/>')
     assert names(gl, model, corners(9), camera) == expected
 
 
-def test_the_ends_of_a_capsule_carry_whole_pictures_of_their_own(gl):
+def test_the_ends_of_a_capsule_have_whole_textures_of_their_own(gl):
     model = textured_model('<geom type="capsule" size=".4 .1" material="m"/>')
-    # upwards over the lower end, the straight part, the upper end; the picture's upper edge is always above
+    # upwards over the lower end, the straight part, the upper end; the texture's upper edge is always above
     heights = [-0.46, -0.25, -0.05, 0.05, 0.25, 0.46]
     pixels = SIZE / (2 * 4 * np.tan(np.radians(10)))
     assert names(gl, model, [(6, round(z * pixels)) for z in heights]) == "brbrbr"
@@ -81,7 +81,7 @@ def test_repetitions_are_counted_along_the_object_or_with_texuniform_in_units_of
     assert names(gl, textured_model(plane, 'texuniform="true"'), corners(9), ABOVE) == "rrrr"
 
 
-def test_a_cube_picture_is_stretched_over_a_primitive_or_with_texuniform_is_not(gl):
+def test_a_cube_texture_is_stretched_over_a_primitive_or_with_texuniform_is_not(gl):
     """The side of a flat box seen under 45 degrees shows up as such, or as what lies beyond its far edge."""
     geom = '<geom type="box" size=".2 .6 .6" material="m"/>'
     assert names(gl, textured_model(geom, kind="cube"), [(-20, 0), (0, 0), (20, 0)]) == "rrr"
@@ -90,7 +90,7 @@ def test_a_cube_picture_is_stretched_over_a_primitive_or_with_texuniform_is_not(
 
 
 @pytest.mark.parametrize(("shape", "look"), [("sphere", "model"), ("capsule", "model"), ("sphere", "rubber")])
-def test_a_target_wears_the_picture_as_a_body_does(gl, shape, look):
+def test_a_target_has_its_texture_as_other_geoms_do(gl, shape, look):
     model = textured_model(f'<geom type="{shape}" size=".4 .2" material="m"/>')
     ball = primitives.ball(12)
     V = 0.4 * ball.shell + (np.sign(ball.shell) * [0, 0, 0.2] if shape == "capsule" else 0.0)
@@ -111,7 +111,7 @@ def test_the_first_role_for_colours_is_found_among_layers(gl):
     assert names(gl, model, corners(9)) == "gryb"
 
 
-def test_the_colour_of_the_geom_or_else_of_the_material_multiplies_the_picture(gl):
+def test_the_colour_of_the_geom_or_else_of_the_material_multiplies_the_texture(gl):
     """Yellow times red is red, and so on; a geom without a colour takes the material's."""
     yellow = [(10, -10)]
     assert names(gl, textured_model('<geom type="box" size=".4 .4 .4" material="m" rgba="1 0 0 1"/>'), yellow) == "r"

@@ -10,7 +10,7 @@ def test_groups_above_two_are_hidden(gl):
     assert np.abs(frame_of(gl, FLOOR + BALL) - frame_of(gl, FLOOR)).max() > 60
 
 
-def test_sites_of_visible_groups_are_drawn_like_bodies(gl):
+def test_sites_of_visible_groups_are_drawn_like_geoms(gl):
     """As MuJoCo draws them: round, in their colour or their material's, clear where they are, with a shadow."""
     site = '<site type="sphere" size=".3" pos="0 0 .8" {}/>'
     plain = frame_of(gl, FLOOR, camera=FRONT)
