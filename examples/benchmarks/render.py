@@ -66,6 +66,7 @@ def rippled(width: int, height: int, resolution: int, look: str) -> tuple[Callab
     import mujoco
 
     from ripple_sim.render import Camera, Renderer, Surface
+    from ripple_sim.render.surfaces.charts import Charts
     from ripple_sim.solver import HeightMap, Mesh, build_atlas
     from ripple_sim.solver.gl import shared_context
 
@@ -74,7 +75,7 @@ def rippled(width: int, height: int, resolution: int, look: str) -> tuple[Callab
     mujoco.mj_forward(model, data)
     target = model.geom("target").id
     atlas = build_atlas(Mesh.from_arrays(model.mesh_vert, model.mesh_face, name="target"), resolution)
-    surface = Surface(atlas.mesh.V, atlas.mesh.F, atlas.sphere, resolution, look)
+    surface = Surface(atlas.mesh.V, atlas.mesh.F, Charts.of(atlas), look)
     gl = shared_context()
     print(gl.renderer)
     renderer = Renderer(gl, model, {target: surface}, size=(width, height), samples=4)

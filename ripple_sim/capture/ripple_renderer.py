@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
 from ripple_sim.render.gpu.contract import MappingKind
+from ripple_sim.render.surfaces.charts import Charts
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.scene.camera import CameraEntry
@@ -89,8 +90,7 @@ def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] |
     return Surface(
         V=mesh.V,
         F=mesh.F,
-        sphere=atlas.sphere,
-        resolution=atlas.resolution,
+        charts=Charts.of(atlas),
         look=look,
         color=color,
         uv=mesh.uv if mesh.corner_uv is None else mesh.corner_uv,

@@ -46,7 +46,9 @@ class DrawnScene:
 
     def __init__(self, assets: Assets, targets: Mapping[int, Surface], geoms: list[int], size: tuple[int, int]) -> None:
         self._assets, self._model, self._height = assets, assets.model, size[1]
-        self._height_maps = HeightMapTextures(assets.resources, [surface.resolution for surface in targets.values()])
+        self._height_maps = HeightMapTextures(
+            assets.resources, [surface.charts.page for _, surface in sorted(targets.items())]
+        )
         self._targets = [
             SurfaceMesh(assets, geom, surface, self._height_maps, index, size)
             for index, (geom, surface) in enumerate(sorted(targets.items()))

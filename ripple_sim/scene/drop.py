@@ -42,16 +42,14 @@ def drop_scene(
     Parameters
     ----------
     mesh_path : path
-    bodies : int
-        How many drop, 0 to 100, over the first 3.5 seconds.
-    seed : int
-        Of the sizes, places and colours.
+    bodies, seed : int
+        How many drop, 0 to 100, over the first 3.5 seconds; of their sizes, places and colours.
     up : str, optional
-        Axis of the file that points up, "y" or "z". By default "z" for STL, else "y".
+        Axis of the file that points up, "y" or "z"; see `usual_up`.
     look : str
         Of the target.
     texture : path, optional
-        Image in the mesh's own texture coordinates, in place of the look's colour; by default see `mesh_image`.
+        Image in place of the look's colour; by default see `mesh_image`.
     repair : bool
         Repair an open or non-manifold mesh (needs the package pymeshfix).
     edit : callable, optional
@@ -62,7 +60,7 @@ def drop_scene(
     MeshError
         If the mesh cannot be read, or is not closed and of genus 0.
     SceneError
-        For an invalid number of bodies, axis or texture, or if MuJoCo refuses the mesh.
+        For any other invalid argument, or if MuJoCo refuses the mesh.
     """
     if not 0 <= bodies <= 100:
         raise SceneError(f"the number of bodies is {bodies}; valid is 0 to 100")

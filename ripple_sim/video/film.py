@@ -159,7 +159,7 @@ class Film:
         return dataclasses.replace(
             surface,
             heatmap_colors=color_table() if self._request.heatmap else None,
-            grid=grid_spacing(surface.resolution) if self._request.grid else 0,
+            grid=grid_spacing(surface.charts.page.resolution) if self._request.grid else 0,
         )
 
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.surfaces.vertices import DIRECTION, NORMAL, POSITION, SPHERE, tessellated
+from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.render.surfaces.vertices import COORDINATES, DIRECTION, NORMAL, POSITION, tessellated
 from ripple_sim.render.visuals.corners import smooth_normals
 from ripple_sim.solver import Atlas, HeightMap
-from ripple_sim.solver.cube_map.convention import cube_chart_points
 from ripple_sim.solver.kernel import Floats32, Ints32, kernel
 
 # Software OpenGL draws this many triangles 30 times a second beside the simulation, on two cores.
@@ -37,11 +37,10 @@ class Skin:
     """
 
     def __init__(self, atlas: Atlas) -> None:
-        mesh = atlas.mesh
+        mesh, charts = atlas.mesh, Charts.of(atlas)
         self.F, vertices, _ = tessellated(
-            mesh.V,
-            mesh.F,
-            atlas.sphere,
+            mesh,
+            charts,
             smooth=smooth_normals(mesh.V, mesh.F),
             max_length=float(np.sqrt(atlas.areas.mean())),
             max_faces=MAX_TRIANGLES,
@@ -51,25 +50,27 @@ class Skin:
         rest, direction, normals = (
             np.ascontiguousarray(vertices[:, columns], dtype=np.float32) for columns in (POSITION, DIRECTION, NORMAL)
         )
-        self._rest = _Rest(rest, direction, normals, *_bilinear(vertices[:, SPHERE], atlas.resolution))
+        chart_points = charts.map.chart_points(vertices[:, COORDINATES], atlas.resolution)
+        self._rest = _Rest(rest, direction, normals, *_bilinear(*chart_points, atlas.resolution))
         self._height_map = HeightMap(atlas.texels)
         self.points, self.normals = rest.copy(), normals.copy()
         self.height = np.zeros(len(vertices), np.float32)
 
     def update(self, height: NDArray[np.float32]) -> None:
-        """Follow a height field, float32 [6, N, N], in metres."""
+        """Follow a height field, float32 [C, n, n], in metres."""
         height_map = self._height_map(height).reshape(-1, 4)
         _displace(height_map, self._rest, self.points, self.normals, self.height)
 
 
-def _bilinear(directions: NDArray[np.float64], n: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Addresses in a height map [6 (N + 2)^2] and weights of the four texels round each direction, [k, 4] both."""
-    face, row, column = cube_chart_points(directions, n)
+def _bilinear(
+    chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64], n: int
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Addresses in a height map [C (n + 2)^2] and weights of the four texels round each chart point, [k, 4] both."""
     # the height map has a halo around each chart
     row, column = np.clip(row + 1, 0, n + 1), np.clip(column + 1, 0, n + 1)
     r, c = np.minimum(row.astype(np.int64), n), np.minimum(column.astype(np.int64), n)
     s, t = row - r, column - c
-    corner = (face * (n + 2) + r) * (n + 2) + c
+    corner = (chart * (n + 2) + r) * (n + 2) + c
     texels = np.stack([corner, corner + 1, corner + n + 2, corner + n + 3], axis=1)
     weights = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=1)
     return texels.astype(np.int32), weights.astype(np.float32)
@@ -78,7 +79,7 @@ def _bilinear(directions: NDArray[np.float64], n: int) -> tuple[NDArray[np.int32
 class _Rest(NamedTuple):
     """The undisplaced skin: points and outward directions and normals [n, 3], and where each point lies on the texels.
 
-    `texels` and `weights` [n, 4] are addresses in a height map [6 (N + 2)^2] and bilinear weights.
+    `texels` and `weights` [n, 4] are addresses in a height map [C (n + 2)^2] and bilinear weights.
     """
 
     points: Floats32

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.texels.chart_map import TextureCoordinates
+from ripple_sim.solver.texels.chart_map import ChartPieces
 from ripple_sim.solver.texels.topology import TexelTopology
 
 from .convention import cube_chart_points
+from .edges import chart_uv, split_at_edges
 from .nearest import sphere_directions, texels_at
 from .quality import sphere_map_quality
-from .texture_coordinates import chart_uv, texture_coordinates
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -48,9 +48,13 @@ class CubeChartMap:
         """Flat index of the texel in which each direction lies, [k]."""
         return texels_at(coordinates, topology.shape[1])
 
-    def texture_coordinates(self, mesh: Mesh) -> TextureCoordinates:
-        """The triangles of the mesh, cut along the edges of the cube."""
-        return texture_coordinates(mesh, self.sphere)
+    def corner_coordinates(self, mesh: Mesh) -> NDArray[np.float64]:
+        """Directions [face_count, 3, 3] of the triangles' corners."""
+        return self.sphere[mesh.F]
+
+    def split(self, corners: NDArray[np.float64]) -> ChartPieces:
+        """Cut triangles with the directions [m, 3, 3] at their corners along the edges of the cube."""
+        return split_at_edges(corners)
 
     def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
         """Place [k, ..., 2] in charts [k], 0 to 1, of directions [k, ..., 3] that belong to them."""

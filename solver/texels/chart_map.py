@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +35,11 @@ class ChartMap(Protocol):
     def nearest_texels(self, coordinates: NDArray[np.float64], topology: TexelTopology) -> NDArray[np.int64]:
         """Flat index of the texel in which map coordinates lie, [k]."""
 
-    def texture_coordinates(self, mesh: Mesh) -> TextureCoordinates:
-        """The triangles of the mesh, cut so that each piece lies in one chart."""
+    def corner_coordinates(self, mesh: Mesh) -> NDArray[np.float64]:
+        """Map coordinates [face_count, 3, d] of the corners of a mesh's triangles."""
+
+    def split(self, corners: NDArray[np.float64]) -> ChartPieces:
+        """Cut triangles with the map coordinates [m, 3, d] at their corners where they leave a chart."""
 
     def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
         """Place [k, ..., 2] in charts [k], 0 to 1, of map coordinates [k, ..., d] that belong to them."""
@@ -46,6 +49,23 @@ class ChartMap(Protocol):
 
     def arrays(self) -> dict[str, NDArray]:
         """What has to be stored to make the chart map again."""
+
+
+class ChartPieces(NamedTuple):
+    """Triangles cut so that each piece lies in one chart; most are not cut: one piece, the whole.
+
+    Attributes
+    ----------
+    triangle : int64 [piece_count]
+        Of which each piece is a part, in ascending order.
+    barycentrics : float64 [piece_count, 3, 3]
+        Where in that triangle the piece's three corners lie, in its winding.
+    chart : int64 [piece_count]
+    """
+
+    triangle: NDArray[np.int64]
+    barycentrics: NDArray[np.float64]
+    chart: NDArray[np.int64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -86,3 +106,11 @@ class TextureCoordinates:
         [piece_count, 3, ...]
         """
         return np.einsum("pij,pj...->pi...", self.barycentrics, np.asarray(corner_values)[self.triangle])
+
+
+def texture_coordinates(chart_map: ChartMap, mesh: Mesh) -> TextureCoordinates:
+    """Coordinates into the atlas at every corner of every triangle of a mesh; see `Atlas.texture_coordinates`."""
+    corners = chart_map.corner_coordinates(mesh)
+    triangle, barycentrics, chart = chart_map.split(corners)
+    coordinates = np.einsum("pij,pjk->pik", barycentrics, corners[triangle])
+    return TextureCoordinates(triangle, barycentrics, chart, coordinates, chart_map.uv(coordinates, chart))

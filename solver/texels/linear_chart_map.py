@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.mesh.mesh import Mesh
 
-from .chart_map import TextureCoordinates
+from .chart_map import ChartPieces
 from .topology import TexelTopology
 
 
@@ -54,13 +54,16 @@ class LinearChartMap:
         chart, row, column = np.rint(coordinates).astype(np.int64).T
         return (chart * n + row.clip(0, n - 1)) * n + column.clip(0, n - 1)
 
-    def texture_coordinates(self, mesh: Mesh) -> TextureCoordinates:
+    def corner_coordinates(self, mesh: Mesh) -> NDArray[np.float64]:
+        """Chart, row and column [face_count, 3, 3] of the triangles' corners."""
+        chart = np.broadcast_to(self.charts[:, None, None], (len(self.charts), 3, 1))
+        return np.concatenate([chart, self.corners], axis=2)
+
+    def split(self, corners: NDArray[np.float64]) -> ChartPieces:
         """The triangles as they are: each lies in one chart."""
-        count = len(self.charts)
-        chart = np.broadcast_to(self.charts[:, None, None], (count, 3, 1))
-        coordinates = np.concatenate([chart, self.corners], axis=2)
+        count = len(corners)
         whole = np.tile(np.eye(3), (count, 1, 1))
-        return TextureCoordinates(np.arange(count), whole, self.charts, coordinates, self.uv(coordinates, self.charts))
+        return ChartPieces(np.arange(count), whole, corners[:, 0, 0].astype(np.int64))
 
     def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
         """Place [k, ..., 2] in the charts, 0 to 1, of map coordinates [k, ..., 3]."""

@@ -10,6 +10,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from sphere_height_maps import cube_charts
 
 from ripple_sim.cli import main as cli
 from ripple_sim.encode import check_output, open_writer
@@ -275,6 +276,6 @@ def test_fields_and_grids_are_refused_in_linear_light() -> None:
     model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom size="1"/></worldbody></mujoco>')
     ball = meshes.ball(8)
     for paint in ({"heatmap_colors": color_table()}, {"grid": 4}):
-        surface = Surface(ball.shell, ball.faces, ball.shell, 8, "clay", **paint)
+        surface = Surface(ball.shell, ball.faces, cube_charts(ball.shell, 8), "clay", **paint)
         with pytest.raises(RippleError, match="linear=False"):
             Renderer(shared_context(), model, {0: surface}, size=(32, 32), linear=True)

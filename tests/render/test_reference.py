@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from scipy.ndimage import gaussian_filter
+from sphere_height_maps import cube_charts
 
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.visuals import primitives as meshes
@@ -38,7 +39,7 @@ def height(points):
 
 def displaced_ball(divisions: int) -> Surface:
     ball = meshes.ball(divisions)
-    return Surface((1.0 + height(ball.shell))[:, None] * ball.shell, ball.faces, ball.shell, N, "rubber")
+    return Surface((1.0 + height(ball.shell))[:, None] * ball.shell, ball.faces, cube_charts(ball.shell, N), "rubber")
 
 
 def frame(surface, height_map, factor):
@@ -99,9 +100,9 @@ def test_a_frame_is_that_of_the_brute_force_reference(tmp_path):
     atlas = sphere_atlas(1.0, N)
     height_map = HeightMap(atlas.texels)(height(atlas.positions).astype(np.float32))
     ball = meshes.ball(24)
-    own = frame(Surface(ball.shell, ball.faces, ball.shell, N, "rubber"), height_map, 1)
+    own = frame(Surface(ball.shell, ball.faces, cube_charts(ball.shell, N), "rubber"), height_map, 1)
     reference = shrunk(frame(displaced_ball(90), None, FINER), FINER)
     check(own, reference, 0.98, tmp_path)
     # the ripples do matter: without them the picture is another
-    flat = frame(Surface(ball.shell, ball.faces, ball.shell, N, "rubber"), None, 1)
+    flat = frame(Surface(ball.shell, ball.faces, cube_charts(ball.shell, N), "rubber"), None, 1)
     assert similarity(flat.astype(np.float64), reference) < similarity(own.astype(np.float64), reference) - 0.01

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from sphere_height_maps import N, constant_height_map, height_map_of, linear_height_map
+from sphere_height_maps import constant_height_map, cube_charts, height_map_of, linear_height_map
 
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.visuals import primitives
@@ -43,7 +43,7 @@ SCENE = """
 
 def ball_surface(radius: float = 1.0, look: str = "clay") -> Surface:
     ball = primitives.ball(16)
-    return Surface(radius * ball.shell, ball.faces, ball.shell, N, look)
+    return Surface(radius * ball.shell, ball.faces, cube_charts(ball.shell), look)
 
 
 def make(gl, xml=LONE_BALL, surface=None, size=SIZE, **options):

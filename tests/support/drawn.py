@@ -1,6 +1,7 @@
 """Frames of small MuJoCo scenes."""
 
 import mujoco
+from sphere_height_maps import cube_charts
 
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.visuals import primitives
@@ -28,4 +29,4 @@ def frame_of(gl, body, *, asset="", visual="", camera=ABOVE, targets=None, size=
 
 def ball_surface(look: str, radius: float = 0.5) -> Surface:
     ball = primitives.ball(16)
-    return Surface(radius * ball.shell, ball.faces, ball.shell, 8, look)
+    return Surface(radius * ball.shell, ball.faces, cube_charts(ball.shell, 8), look)

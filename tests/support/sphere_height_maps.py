@@ -2,9 +2,16 @@
 
 import numpy as np
 
+from ripple_sim.render.surfaces.charts import Charts
 from ripple_sim.solver.cube_map.convention import cube_topology, texel_directions
+from ripple_sim.solver.cube_map.cube_chart_map import CubeChartMap
 
 N = 24
+
+
+def cube_charts(sphere: np.ndarray, resolution: int = N) -> Charts:
+    """Charts of a surface by its sphere map, one unit vector a vertex."""
+    return Charts(CubeChartMap(sphere), (6, resolution, resolution))
 
 
 def height_map_of(height, gradient) -> np.ndarray:

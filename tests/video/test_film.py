@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from sphere_height_maps import cube_charts
 
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
@@ -82,7 +83,7 @@ def ball_with_field(field: np.ndarray, limit: float) -> np.ndarray:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     ball = meshes.ball(16)
-    surface = Surface(ball.shell, ball.faces, ball.shell, N, "metal", heatmap_colors=color_table())
+    surface = Surface(ball.shell, ball.faces, cube_charts(ball.shell), "metal", heatmap_colors=color_table())
     renderer = Renderer(shared_context(), model, {0: surface}, size=(200, 200))
     renderer.set_heatmap(0, with_filled_halo(cube_topology(field.shape[1]), field), limit)
     return renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0, 40.0))

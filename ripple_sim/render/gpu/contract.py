@@ -111,7 +111,7 @@ OBJECT = Struct(
     base="vec4",  # roughness, metallic, sheen, coat
     volume="vec4",  # translucency, transparency, emission, opacity
     place="vec4",  # geom, size [m], shadow bias [m], 1 where its colours are those of a heatmap
-    height_map="vec4",  # first layer, texels along an edge of a face; 0 without a height map
+    height_map="vec4",  # layer; 1 with a height map, 0 without
     rotation="mat3",  # of the height map's gradients, into the world
 )
 

@@ -52,7 +52,8 @@ SurfaceSample surface_sample(ivec2 pixel, int s)
     surface.color = vec3(red_green, blue_ink.x);
     surface.ink = blue_ink.y;
     Object object = objects[surface.object];
-    vec4 ripple = spline_at(height_maps, object.height_map.y, object.height_map.x, octahedral_decode(color.xy));
+    vec2 place = color.xy * vec2(textureSize(height_maps, 0).xy);
+    vec4 ripple = spline_at(height_maps, vec3(place, object.height_map.x));
     ripple *= object.height_map.y > 0.0 ? 1.0 : 0.0;
     surface.rippled = normalize(surface.normal - object.rotation * ripple.xyz);
     // cavity occlusion: less light reaches the troughs

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.cube_map.convention import cube_chart_points
 from ripple_sim.solver.kernel import Bools, Floats, Floats32, Ints32, kernel
+from ripple_sim.solver.texels.chart_page import ChartPage
 
 from .tessellation import Edges
 
@@ -25,10 +25,9 @@ class AdaptiveTessellation:
         Of the triangles, k of them.
     positions : array, shape [n + k, 3]
         Of the vertices, followed by the edges' midpoints [m].
-    sphere : array, shape [n + k, 3]
-        Where the height map is looked up: directions from the cube's centre.
-    resolution : int
-        Texels N along an edge of the height map's faces.
+    places : array, shape [n + k, 2]
+        Where the height map is looked up, on the page of charts [texels].
+    page : ChartPage
     tolerance : float
         How far the height at a midpoint may differ from the mean of those at the ends [m].
     min_length : float
@@ -45,8 +44,8 @@ class AdaptiveTessellation:
         F: NDArray,
         edges: Edges,
         positions: NDArray,
-        sphere: NDArray,
-        resolution: int,
+        places: NDArray,
+        page: ChartPage,
         tolerance: float,
         min_length: float,
     ) -> None:
@@ -58,15 +57,15 @@ class AdaptiveTessellation:
         self._long = np.flatnonzero(self._length >= min_length).astype(np.int32)
         ends, index = np.unique(edges.ends[self._long], return_inverse=True)
         self._ends = index.reshape(-1, 2).astype(np.int32)
-        face, row, column = cube_chart_points(sphere[np.concatenate([ends, self.base_count + self._long])], resolution)
+        chart, row, column = page.locate(places[np.concatenate([ends, self.base_count + self._long])])
         place = np.stack([row, column], axis=1)
-        nearest = np.clip(np.floor(place + 0.5), 0, resolution - 1)
-        # the first of the 3 x 3 texels about each point, in a face with its halo, and how far off the centre it is
-        self._texel = np.column_stack([face, nearest]).astype(np.int32)
+        nearest = np.clip(np.floor(place + 0.5), 0, page.resolution - 1)
+        # the first of the 3 x 3 texels about each point, in a chart with its halo, and how far off the centre it is
+        self._texel = np.column_stack([chart, nearest]).astype(np.int32)
         self._offset = (place - nearest).astype(np.float32)
 
     def __call__(self, height_map: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Triangles [t, 3] for a height map [6, N + 2, N + 2, 4], and the midpoints [s], as vertices, that they use.
+        """Triangles [t, 3] for a height map [C, n + 2, n + 2, 4], and the midpoints [s], as vertices, that they use.
 
         Where no edge is split, the triangles are the same array each time.
         """
@@ -83,17 +82,17 @@ class AdaptiveTessellation:
 
 @kernel
 def _heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Floats32:
-    """Heights [k] by the quadratic B-spline of spline.glsl: at offsets [k, 2] in texels [k, 3] (face, row, column)."""
+    """Heights [k] by the quadratic B-spline of spline.glsl: at offsets [k, 2] in texels [k, 3] (chart, row, column)."""
     height = np.empty(len(texel), np.float32)
     half = np.float32(0.5)
     for i in range(len(texel)):
-        face, row, column = texel[i]
+        chart, row, column = texel[i]
         s, t = offset[i]
         left, right = half * (half - t) * (half - t), half * (half + t) * (half + t)
         middle = np.float32(0.75) - t * t
         line = np.empty(3, np.float32)
         for k in range(3):
-            across = height_map[face, row + k]
+            across = height_map[chart, row + k]
             line[k] = left * across[column, 3] + middle * across[column + 1, 3] + right * across[column + 2, 3]
         height[i] = half * (half - s) ** 2 * line[0] + (np.float32(0.75) - s * s) * line[1]
         height[i] += half * (half + s) ** 2 * line[2]

@@ -6,7 +6,7 @@ layout(local_size_x = VERTEX_GROUP) in;
 #include "surfaces/height_maps.glsl"
 #include "visuals/occluders.glsl"
 
-struct Vertex { float position[3], direction[3], sphere[3]; };
+struct Vertex { float position[3], direction[3], place[2]; };
 layout(std430, binding = REST_VERTICES_BINDING) readonly buffer RestVertices { Vertex rest[]; };
 layout(std430, binding = MOVED_VERTICES_BINDING) writeonly buffer MovedVertices { vec4 moved[]; };
 layout(std430, binding = MIDPOINTS_BINDING) readonly buffer Midpoints { int midpoints[]; };  // used by this frame
@@ -14,8 +14,7 @@ layout(std430, binding = MIDPOINTS_BINDING) readonly buffer Midpoints { int midp
 uniform mat3 rotation;
 uniform vec3 origin;
 uniform int count, base_count;
-uniform float resolution;
-uniform float first_layer;
+uniform float layer;
 uniform float geom;
 uniform int occluder_count;
 
@@ -27,8 +26,7 @@ void main()
     if (i >= base_count)
         i = midpoints[i - base_count];
     Vertex v = rest[i];
-    vec3 sphere = vec3(v.sphere[0], v.sphere[1], v.sphere[2]);
-    float height = spline_at(height_maps, resolution, first_layer, sphere).w;
+    float height = spline_at(height_maps, vec3(v.place[0], v.place[1], layer)).w;
     vec3 direction = vec3(v.direction[0], v.direction[1], v.direction[2]);
     vec3 world = rotation * (vec3(v.position[0], v.position[1], v.position[2]) + height * direction) + origin;
     moved[i] = vec4(world, occluder_visibility(world, rotation * direction, geom, occluder_count));

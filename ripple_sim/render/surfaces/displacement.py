@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ripple_sim.render.gpu.contract import VERTEX_GROUP, Binding
 from ripple_sim.render.gpu.resources import Resources
 
-from .vertices import DIRECTION, POSITION, SPHERE, packed
+from .vertices import DIRECTION, POSITION, SurfaceVertices
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,10 @@ class Displacement:
     Parameters
     ----------
     resources : Resources
-    vertices : array, shape [n + k, ...]
-        Attributes of n vertices and k midpoints; for the columns see vertices.py.
-    base_count : int
-        Number n.
+    vertices : SurfaceVertices
     geom : int
         The target's geom.
-    resolution, first_layer : int
+    layer : int
         Of its height map.
 
     Attributes
@@ -53,18 +50,17 @@ class Displacement:
         vec4 a vertex: displaced, in the world [m], and the ambient visibility that nearby geoms leave.
     """
 
-    def __init__(
-        self, resources: Resources, vertices: NDArray, base_count: int, *, geom: int, resolution: int, first_layer: int
-    ) -> None:
+    def __init__(self, resources: Resources, vertices: SurfaceVertices, *, geom: int, layer: int) -> None:
+        attributes, midpoint_count = vertices.attributes, len(vertices.edges.ends)
+        self._base_count = base_count = len(attributes) - midpoint_count
         self._program = resources.compute_shader("surfaces/displacement")
-        self._rest = resources.buffer(packed(vertices, POSITION, DIRECTION, SPHERE))
-        self.moved: moderngl.Buffer = resources.buffer(reserve=16 * len(vertices))
-        self._midpoints = resources.buffer(reserve=4 * (len(vertices) - base_count), dynamic=True)
-        self._base_count = base_count
+        rest = np.concatenate([attributes[:, POSITION], attributes[:, DIRECTION], vertices.lookups], axis=1)
+        self._rest = resources.buffer(rest.astype(np.float32).tobytes())
+        self.moved: moderngl.Buffer = resources.buffer(reserve=16 * len(attributes))
+        self._midpoints = resources.buffer(reserve=4 * midpoint_count, dynamic=True)
         self._program["base_count"] = base_count
         self._program["geom"] = float(geom)
-        self._program["resolution"] = float(resolution)
-        self._program["first_layer"] = float(first_layer)
+        self._program["layer"] = float(layer)
 
     def run(self, ctx: moderngl.Context, place: Place, midpoints: NDArray[np.int32]) -> None:
         """Displace all vertices and the given midpoints; height maps and occluders are bound already."""

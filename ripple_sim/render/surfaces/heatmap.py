@@ -10,6 +10,9 @@ from ripple_sim.render.gpu.contract import Unit
 from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.visuals.looks import Look
 from ripple_sim.solver.errors import RippleError
+from ripple_sim.solver.texels.chart_page import ChartPage
+
+from .height_maps import write_page
 
 # What is lit under the colours: only its shadows are kept.
 UNDER_HEATMAP = Look(color=(0.81, 0.81, 0.81), roughness=0.8)
@@ -21,16 +24,15 @@ class HeatmapTexture:
     Parameters
     ----------
     resources : Resources
-    resolution : int
-        Texels N along an edge of a face, without the halo.
+    page : ChartPage
+        Of the target's charts.
     colors : array of uint8, shape [k, 3]
         sRGB, from the least to the greatest value.
     """
 
-    def __init__(self, resources: Resources, resolution: int, colors: NDArray[np.uint8]) -> None:
-        width = resolution + 2
-        self._shape = (6, width, width)
-        self._values = resources.texture_array((width, width, 6), 1, dtype="f4")
+    def __init__(self, resources: Resources, page: ChartPage, colors: NDArray[np.uint8]) -> None:
+        self._page, self._shape = page, (page.charts, page.block, page.block)
+        self._values = resources.texture_array((*page.size, 1), 1, dtype="f4")
         self._colors = resources.texture((len(colors), 1), 3, np.ascontiguousarray(colors).tobytes(), alignment=1)
         for texture in (self._values, self._colors):
             texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
@@ -38,7 +40,7 @@ class HeatmapTexture:
         self.set(np.zeros(self._shape, np.float32), 1.0)
 
     def set(self, values: NDArray[np.float32], limit: float) -> None:
-        """Replace the values, [6, N + 2, N + 2]; the colours range from -limit to limit.
+        """Replace the values, [C, n + 2, n + 2]; the colours range from -limit to limit.
 
         Raises
         ------
@@ -47,12 +49,12 @@ class HeatmapTexture:
         """
         if values.shape != self._shape:
             raise RippleError(
-                f"the heatmap's values have shape {list(values.shape)}; valid is {list(self._shape)}: six faces with a "
+                f"the heatmap's values have shape {list(values.shape)}; valid is {list(self._shape)}: charts with a "
                 "halo of one texel"
             )
         if not (np.isfinite(limit) and limit > 0):
             raise RippleError(f"the heatmap's limit is {limit!r}; valid is a positive, finite number")
-        self._values.write(np.ascontiguousarray(values, dtype=np.float32))
+        write_page(self._values, self._page, 0, values)
         self._limit = float(limit)
 
     def use(self, program: moderngl.Program) -> None:

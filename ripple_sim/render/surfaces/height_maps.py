@@ -10,32 +10,38 @@ from numpy.typing import NDArray
 
 from ripple_sim.render.gpu.contract import Unit
 from ripple_sim.render.gpu.resources import Resources
-
-LAYERS = 6  # of one target: a face each
+from ripple_sim.solver.texels.chart_page import ChartPage
 
 
 class HeightMapTextures:
-    """A texture array with six layers a target. All are as wide as the widest height map; others fill a corner.
+    """A texture array with one layer a target: a page of its charts. Layers are as large as the largest page.
 
     Parameters
     ----------
     resources : Resources
-    resolutions : sequence of int
-        Texels N along an edge of each target's faces, without the halo.
+    pages : sequence of ChartPage
+        Of the targets.
     """
 
-    def __init__(self, resources: Resources, resolutions: Sequence[int]) -> None:
-        width = max(resolutions, default=0) + 2
-        self._texture = resources.texture_array((width, width, LAYERS * max(len(resolutions), 1)), 4, dtype="f4")
+    def __init__(self, resources: Resources, pages: Sequence[ChartPage]) -> None:
+        self._pages = pages
+        width, height = (max((page.size[axis] for page in pages), default=1) for axis in range(2))
+        self._texture = resources.texture_array((width, height, max(len(pages), 1)), 4, dtype="f4")
         self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self._texture.repeat_x = self._texture.repeat_y = False
 
-    def write(self, first_layer: int, height_map: NDArray[np.float32]) -> None:
-        """Replace a target's height map, [6, N + 2, N + 2, 4]."""
-        layers, height, width, _ = height_map.shape
-        data = np.ascontiguousarray(height_map, dtype=np.float32)
-        self._texture.write(data, viewport=(0, 0, first_layer, width, height, layers))
+    def write(self, layer: int, height_map: NDArray[np.float32]) -> None:
+        """Replace a target's height map, [C, n + 2, n + 2, 4]."""
+        write_page(self._texture, self._pages[layer], layer, height_map)
 
     def bind(self) -> None:
         """Bind the texture for the shaders."""
         self._texture.use(Unit.HEIGHT_MAPS)
+
+
+def write_page(texture: moderngl.TextureArray, page: ChartPage, layer: int, charts: NDArray[np.float32]) -> None:
+    """Write charts with halo, [C, n + 2, n + 2, ...], to the page in a layer of a texture array."""
+    for chart, texels in enumerate(charts):
+        x, y = page.corner(chart)
+        data = np.ascontiguousarray(texels, dtype=np.float32)
+        texture.write(data, viewport=(x, y, layer, page.block, page.block, 1))

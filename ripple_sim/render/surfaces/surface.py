@@ -21,6 +21,7 @@ from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of
 from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.solver.errors import RippleError
 
+from .charts import Charts
 from .heatmap import UNDER_HEATMAP
 
 
@@ -34,10 +35,8 @@ class Surface:
         Vertices [m].
     F : array, shape [m, 3]
         Triangles, counter-clockwise from outside.
-    sphere : array, shape [n, 3]
-        Unit vectors: where the height map is looked up.
-    resolution : int
-        Texels N per edge of the height map's faces.
+    charts : Charts
+        Of the target's atlas: where height map and heatmap are looked up.
     look : str
         Name of one of `LOOKS`; "model" takes colour, texture and gloss from the geom's MuJoCo material.
     color : tuple, optional
@@ -52,8 +51,7 @@ class Surface:
 
     V: NDArray[np.float64]
     F: NDArray[np.int64]
-    sphere: NDArray[np.float64]
-    resolution: int
+    charts: Charts
     look: str = "rubber"
     color: tuple[float, float, float] | None = None
     uv: NDArray[np.float64] | None = None

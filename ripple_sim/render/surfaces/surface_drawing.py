@@ -14,7 +14,7 @@ from ripple_sim.render.visuals.texture_mapping import Mapping
 
 from .heatmap import HeatmapTexture
 from .surface import Surface, load_image
-from .vertices import BAKED, NORMAL, SPHERE, mapped_coordinates
+from .vertices import BAKED, NORMAL, SurfaceVertices, mapped_coordinates
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,7 @@ class SurfaceDrawing:
     ----------
     assets : Assets
     paint : Paint
-    vertices : array, shape [n, ...]
-        Attributes; for the columns see vertices.py.
+    vertices : SurfaceVertices
     moved : moderngl.Buffer
         The displaced vertices.
     indices : moderngl.Buffer
@@ -51,17 +50,19 @@ class SurfaceDrawing:
     """
 
     def __init__(
-        self, assets: Assets, paint: Paint, vertices: NDArray, moved: moderngl.Buffer, indices: moderngl.Buffer
+        self, assets: Assets, paint: Paint, vertices: SurfaceVertices, moved: moderngl.Buffer, indices: moderngl.Buffer
     ) -> None:
         resources, surface, mapping = assets.resources, paint.surface, paint.mapping
         heatmap, self._paint = surface.heatmap_colors is not None, paint
         options = {"MAPPING": mapping.kind, "HEATMAP": int(heatmap), "GRID": int(surface.grid > 0)}
         self._program = resources.program("surfaces/surface_vertex", "surfaces/surface_fragment", **options)
         depth = resources.program("surfaces/surface_depth_vertex", "glsl/depth_fragment")
-        columns = [vertices[:, NORMAL], vertices[:, SPHERE], vertices[:, BAKED], mapped_coordinates(vertices, mapping)]
+        attributes = vertices.attributes
+        mapped = mapped_coordinates(attributes, mapping)
+        columns = [attributes[:, NORMAL], vertices.places, attributes[:, BAKED], mapped]
         still = resources.buffer(np.concatenate(columns, axis=1).astype("f4").tobytes())
-        names = ("in_normal", "in_sphere", "in_baked", "in_mapped")
-        content = [(moved, "4f", "in_moved"), (still, "3f 3f 2f 3f", *names)]
+        names = ("in_normal", "in_place", "in_baked", "in_mapped")
+        content = [(moved, "4f", "in_moved"), (still, "3f 2f 2f 3f", *names)]
         # what a program does not use is optimised away
         self._solid = resources.vertex_array(self._program, content, indices, skip_errors=True)
         self._depth = resources.vertex_array(depth, content[:1], indices)
@@ -71,9 +72,8 @@ class SurfaceDrawing:
             self._image = assets.textures.get(mapping.texture) if modelled else load_image(resources, surface)
         self._heatmap: HeatmapTexture | None = None
         if surface.heatmap_colors is not None:
-            self._heatmap = HeatmapTexture(resources, surface.resolution, surface.heatmap_colors)
-        if heatmap or surface.grid:
-            self._program["resolution"] = float(surface.resolution)
+            self._heatmap = HeatmapTexture(resources, surface.charts.page, surface.heatmap_colors)
+        self._program["resolution"] = float(surface.charts.page.resolution)
         if surface.grid:
             self._program["grid_spacing"] = float(surface.grid)
         if mapping.kind not in (MappingKind.NO_IMAGE, MappingKind.CUBE_IMAGE):

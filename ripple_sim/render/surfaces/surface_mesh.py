@@ -11,12 +11,12 @@ from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.solver.errors import RippleError
 
 from .adaptive_tessellation import AdaptiveTessellation
+from .charts import Charts
 from .displacement import Displacement, Place
-from .height_maps import LAYERS, HeightMapTextures
+from .height_maps import HeightMapTextures
 from .surface import Surface, appearance
 from .surface_drawing import Paint, SurfaceDrawing
-from .tessellation import Edges
-from .vertices import POSITION, SPHERE, surface_vertices
+from .vertices import POSITION, SurfaceVertices, surface_vertices
 
 _PIXELS = 4.0  # length of an edge where the target fills the frame's height
 _PIXELS_PER_FACE = 48  # of the frame
@@ -60,8 +60,8 @@ class SurfaceMesh:
         index: int,
         size: tuple[int, int],
     ) -> None:
-        self.geom, self.resolution = geom, surface.resolution
-        self._objects, self._height_maps, self._first_layer = assets.objects, height_maps, LAYERS * index
+        self.geom, self._charts = geom, surface.charts
+        self._objects, self._height_maps, self._layer = assets.objects, height_maps, index
         self._radius = float(np.linalg.norm(surface.V, axis=1).max())
         look, rgb, mapping = appearance(assets.model, geom, surface)
         self.transparent = look.transparency > 0.0
@@ -71,41 +71,35 @@ class SurfaceMesh:
             geom,
             size=self._radius,
             heatmap=surface.heatmap_colors is not None,
-            height_map=(self._first_layer, self.resolution),
+            height_map=index,
         )
         pixel = 2 * self._radius / size[1]
-        faces, vertices, edges = surface_vertices(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
-        middle = len(vertices) - len(edges.ends) + edges.of_side
-        self._balls = balls_about(vertices[:, POSITION][np.concatenate([faces, middle])], _BALLS)
-        self._tessellation = _adaptive(faces, edges, vertices, self.resolution, pixel)
+        vertices = surface_vertices(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
+        middle = len(vertices.attributes) - len(vertices.edges.ends) + vertices.edges.of_side
+        corners = np.concatenate([vertices.F, middle])
+        self._balls = balls_about(vertices.attributes[:, POSITION][corners], _BALLS)
+        self._tessellation = _adaptive(vertices, surface.charts, pixel)
         self._triangles: NDArray[np.int32] | None = None  # on the GPU
-        self._displacement = Displacement(
-            assets.resources,
-            vertices,
-            self._tessellation.base_count,
-            geom=geom,
-            resolution=self.resolution,
-            first_layer=self._first_layer,
-        )
-        self._indices = assets.resources.buffer(reserve=4 * 12 * len(faces), dynamic=True)
+        self._displacement = Displacement(assets.resources, vertices, geom=geom, layer=index)
+        self._indices = assets.resources.buffer(reserve=4 * 12 * len(vertices.F), dynamic=True)
         paint = Paint(surface, mapping, (*rgb, float(self.number)))
         self._drawing = SurfaceDrawing(assets, paint, vertices, self._displacement.moved, self._indices)
 
     def update(self, ctx: moderngl.Context, place: Place, height_map: NDArray[np.float32] | None) -> None:
-        """Displace the vertices by a height map [6, N + 2, N + 2, 4] (none: flat) where the geom is.
+        """Displace the vertices by a height map [C, n + 2, n + 2, 4] (none: flat) where the geom is.
 
         Raises
         ------
         RippleError
             If the height map has another shape.
         """
-        shape = (6, self.resolution + 2, self.resolution + 2, 4)
+        shape = (*self._charts.halo_shape, 4)
         if height_map is None:
             height_map = np.zeros(shape, dtype=np.float32)
         if height_map.shape != shape:
             raise RippleError(
-                f"the height map of geom {self.geom} has shape {list(height_map.shape)}; resolution {self.resolution} "
-                f"needs {list(shape)}: six faces with a halo of one texel, gradient and height"
+                f"the height map of geom {self.geom} has shape {list(height_map.shape)}; valid is {list(shape)}: "
+                "charts with a halo of one texel, gradient and height"
             )
         self._pose, self._highest = (place.rotation, place.origin), float(np.abs(height_map[..., 3]).max())
         bias = min(1.5 * self._highest, _HIGHEST_BIAS * self._radius)
@@ -115,12 +109,12 @@ class SurfaceMesh:
             self._indices.write(triangles)
             self._triangles = triangles
         self._index_count = triangles.size
-        self._height_maps.write(self._first_layer, height_map)
+        self._height_maps.write(self._layer, height_map)
         self._height_maps.bind()
         self._displacement.run(ctx, place, midpoints)
 
     def set_heatmap(self, values: NDArray[np.float32], limit: float) -> None:
-        """Replace the heatmap's values, [6, N + 2, N + 2] with a halo; the colours range from -limit to limit.
+        """Replace the heatmap's values, [C, n + 2, n + 2] with a halo; the colours range from -limit to limit.
 
         Raises
         ------
@@ -149,13 +143,13 @@ class SurfaceMesh:
         self._drawing.draw_depth(view_projection, self._index_count)
 
 
-def _adaptive(faces: NDArray, edges: Edges, vertices: NDArray, resolution: int, pixel: float) -> AdaptiveTessellation:
+def _adaptive(vertices: SurfaceVertices, charts: Charts, pixel: float) -> AdaptiveTessellation:
     return AdaptiveTessellation(
-        faces,
-        edges,
-        vertices[:, POSITION],
-        vertices[:, SPHERE],
-        resolution,
+        vertices.F,
+        vertices.edges,
+        vertices.attributes[:, POSITION],
+        vertices.lookups,
+        charts.page,
         tolerance=_TOLERANCE * pixel,
         min_length=1.5 * _PIXELS * pixel,
     )

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.visuals.corners import smooth_normals, split_corners
 from ripple_sim.render.visuals.texture_mapping import Mapping
+from ripple_sim.solver import Mesh
 
 from . import ambient_occlusion as occlusion
+from .charts import Charts, VertexColumns, shared_places, split_at_charts
 from .surface import Surface
 from .tessellation import Edges, edges_of, midpoints, tessellate
 
 _LEAST_FACES, _MOST_FACES = 20_000, 400_000
-# columns of the vertex attributes; along DIRECTION, the smooth normal, a vertex is displaced
-POSITION, DIRECTION, SPHERE, NORMAL, BAKED, UV = (
+# columns of the vertex attributes: along DIRECTION, the smooth normal, a vertex is displaced; COORDINATES are for the
+# chart map
+POSITION, DIRECTION, COORDINATES, NORMAL, BAKED, UV = (
     slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 14), slice(14, 16),
 )  # fmt: skip
 
 
 def tessellated(
-    V: NDArray,
-    F: NDArray,
-    sphere: NDArray,
+    mesh: Mesh,
+    charts: Charts,
     *,
     smooth: NDArray,
     max_length: float,
@@ -30,14 +34,12 @@ def tessellated(
     baked: NDArray | None = None,
     corner_uv: NDArray | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
-    """Split a mesh's vertices where normals or texture coordinates jump, and its edges where they are long.
+    """Split a mesh's vertices where normals, texture or map coordinates jump, and its edges where they are long.
 
     Parameters
     ----------
-    V, F : array, shape [n, 3] and [m, 3]
-        Vertices [m] and triangles.
-    sphere : array, shape [n, 3]
-        Where the height map is looked up.
+    mesh : Mesh
+    charts : Charts
     smooth : array, shape [n, 3]
         Smooth normals of the vertices.
     max_length, max_faces
@@ -52,11 +54,13 @@ def tessellated(
     F, attributes, same
         As for `tessellate`; the attributes' columns are named above.
     """
-    split = split_corners(V, F, corner_uv)
+    V, F = mesh.V, mesh.F
+    coordinates = charts.map.corner_coordinates(mesh)
+    split = split_corners(V, F, corner_uv, coordinates)
     baked = np.zeros((len(V), 2)) if baked is None else baked
     _, same = np.unique(np.column_stack([split.vertices, split.normals]), axis=0, return_inverse=True)
     each = split.vertices
-    attributes = [V[each], smooth[each], sphere[each], split.normals, baked[each], split.uv]
+    attributes = [V[each], smooth[each], split.coordinates, split.normals, baked[each], split.uv]
     return tessellate(
         split.F,
         np.concatenate(attributes, axis=1),
@@ -68,36 +72,54 @@ def tessellated(
     )
 
 
-def surface_vertices(
-    surface: Surface, max_length: float, max_faces: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64], Edges]:
-    """Triangles, vertex attributes (see the columns above) and edges of a surface, tessellated.
+class SurfaceVertices(NamedTuple):
+    """The vertices of a surface; the last ones are the edges' midpoints.
 
-    The last vertices are the edges' midpoints.
+    Attributes
+    ----------
+    F : int64 [m, 3]
+        Triangles.
+    attributes : float64 [n + k, ...]
+        See the columns above.
+    edges : Edges
+        k of them.
+    places : float64 [n + k, 2]
+        On the page of charts [texels].
+    lookups : float64 [n + k, 2]
+        Where heights are looked up: the same for all vertices at one point.
     """
+
+    F: NDArray[np.int64]
+    attributes: NDArray[np.float64]
+    edges: Edges
+    places: NDArray[np.float64]
+    lookups: NDArray[np.float64]
+
+
+def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> SurfaceVertices:
+    """Tessellate a surface."""
     V, F = np.asarray(surface.V, dtype=np.float64), np.asarray(surface.F, dtype=np.int64)
-    smooth = smooth_normals(V, F)
+    smooth, charts = smooth_normals(V, F), surface.charts
     uv = np.zeros((len(V), 2)) if surface.uv is None else np.asarray(surface.uv, dtype=np.float64)
-    faces, attributes, same = tessellated(
-        V,
-        F,
-        surface.sphere,
+    finer = tessellated(
+        Mesh(V, F),
+        charts,
         smooth=smooth,
         max_length=max_length,
         max_faces=int(np.clip(max_faces, _LEAST_FACES, _MOST_FACES)),
         baked=np.stack(occlusion.bake(V, F, smooth), axis=1),
         corner_uv=uv[F] if uv.ndim == 2 else uv,
     )
+    faces, attributes, same, chart = split_at_charts(finer, VertexColumns(POSITION, NORMAL, COORDINATES), charts)
     edges = edges_of(faces, same)
     attributes = np.concatenate([attributes, midpoints(edges, attributes, POSITION, NORMAL)])
     length = np.linalg.norm(attributes[:, DIRECTION], axis=1, keepdims=True)
     attributes[:, DIRECTION] /= np.maximum(length, 1e-12)
-    return faces, attributes, edges
-
-
-def packed(vertices: NDArray[np.float64], *columns: slice) -> bytes:
-    """Some columns of the vertices, side by side, as float32."""
-    return np.concatenate([vertices[:, c] for c in columns], axis=1).astype(np.float32).tobytes()
+    chart = np.concatenate([chart, chart[edges.ends[:, 0]]])
+    chart_uv = charts.map.uv(attributes[:, COORDINATES], chart)
+    places = charts.page.places(chart, chart_uv)
+    points = attributes[:, [*range(POSITION.start, DIRECTION.stop)]]
+    return SurfaceVertices(faces, attributes, edges, places, shared_places(chart_uv, places, points))
 
 
 def mapped_coordinates(vertices: NDArray[np.float64], mapping: Mapping) -> NDArray[np.float64]:

@@ -18,20 +18,27 @@ class SplitMesh(NamedTuple):
     F : int64 [m, 3]
     normals : float64 [n, 3]
     uv : float64 [n, 2]
+    coordinates : float64 [n, d]
     """
 
     vertices: NDArray[np.int64]
     F: NDArray[np.int64]
     normals: NDArray[np.float64]
     uv: NDArray[np.float64]
+    coordinates: NDArray[np.float64]
 
 
-def split_corners(V: NDArray, F: NDArray, corner_uv: NDArray | None = None) -> SplitMesh:
-    """Split vertices where normals or texture coordinates [m, 3, 2] jump."""
+def split_corners(
+    V: NDArray, F: NDArray, corner_uv: NDArray | None = None, coordinates: NDArray | None = None
+) -> SplitMesh:
+    """Split vertices where normals, texture coordinates [m, 3, 2] or other coordinates [m, 3, d] jump."""
     uv = np.zeros((*F.shape, 2)) if corner_uv is None else corner_uv
-    corners = np.concatenate([F[:, :, None], corner_normals(V, F), uv], axis=2).reshape(-1, 6)
-    unique, index = np.unique(corners, axis=0, return_inverse=True)
-    return SplitMesh(unique[:, 0].astype(np.int64), index.reshape(F.shape), unique[:, 1:4], unique[:, 4:])
+    others = np.zeros((*F.shape, 0)) if coordinates is None else coordinates
+    corners = np.concatenate([F[:, :, None], corner_normals(V, F), uv, others], axis=2)
+    unique, index = np.unique(corners.reshape(F.size, -1), axis=0, return_inverse=True)
+    return SplitMesh(
+        unique[:, 0].astype(np.int64), index.reshape(F.shape), unique[:, 1:4], unique[:, 4:6], unique[:, 6:]
+    )
 
 
 def smooth_normals(V: NDArray, F: NDArray) -> NDArray[np.float64]:

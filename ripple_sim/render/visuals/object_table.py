@@ -30,19 +30,18 @@ class ObjectTable:
         opacity: float = 1.0,
         size: float = 1.0,
         heatmap: bool = False,
-        height_map: tuple[int, int] = (0, 0),
+        height_map: int | None = None,
     ) -> int:
         """Append a row and return its number.
 
         `size` [m] is how thick a transparent object is where its relative thickness is 1; `heatmap` says that colours
-        are shown as they are, but for shadows; `height_map` is the first layer of the object's height map and the
-        number of texels along an edge of a face, 0 without one.
+        are shown as they are, but for shadows; `height_map` is the layer of the object's height map.
         """
         row = np.zeros((), dtype=_ROW)
         row["base"] = look.roughness, look.metallic, look.sheen, look.coat
         row["volume"] = look.translucency, look.transparency, look.emission, opacity
         row["place"] = geom, size, 0.0, heatmap
-        row["height_map"][:2] = height_map
+        row["height_map"][:2] = (0, 0) if height_map is None else (height_map, 1)
         self._rows.append(row)
         return len(self._rows) - 1
 

@@ -7,6 +7,8 @@ from sphere_height_maps import N, constant_height_map, height_map_of
 from ripple_sim.render.surfaces.adaptive_tessellation import AdaptiveTessellation
 from ripple_sim.render.surfaces.tessellation import edges_of, midpoints
 from ripple_sim.render.visuals import primitives as meshes
+from ripple_sim.solver.cube_map.convention import cube_chart_points
+from ripple_sim.solver.texels.chart_page import ChartPage
 
 POSITION, NORMAL, SPHERE = slice(0, 3), slice(3, 6), slice(6, 9)
 
@@ -20,7 +22,10 @@ def ball(tolerance, min_length=0.0):
     attributes, F = np.concatenate([V, V, V], axis=1), np.arange(len(V)).reshape(-1, 3)
     edges = edges_of(F, same.ravel())
     vertices = np.concatenate([attributes, midpoints(edges, attributes, POSITION, NORMAL)])
-    adaptive = AdaptiveTessellation(F, edges, vertices[:, POSITION], vertices[:, SPHERE], N, tolerance, min_length)
+    page = ChartPage(6, N)
+    chart, row, column = cube_chart_points(vertices[:, SPHERE], N)
+    places = page.places(chart, (np.stack([column, row], axis=1) + 0.5) / N)
+    adaptive = AdaptiveTessellation(F, edges, vertices[:, POSITION], places, page, tolerance, min_length)
     return adaptive, vertices, F
 
 

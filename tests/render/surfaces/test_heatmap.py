@@ -14,8 +14,8 @@ COLORS = np.arange(9, dtype=np.uint8).reshape(3, 3)
 def test_what_is_no_heatmap_is_refused(gl) -> None:
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='.5'/><geom size='.1'/></worldbody></mujoco>")
     plain = ball_surface("clay")
-    mapped = Surface(plain.V, plain.F, plain.sphere, plain.resolution, heatmap_colors=COLORS)
-    halo = np.zeros((6, plain.resolution + 2, plain.resolution + 2), np.float32)
+    mapped = Surface(plain.V, plain.F, plain.charts, heatmap_colors=COLORS)
+    halo = np.zeros((6, plain.charts.page.block, plain.charts.page.block), np.float32)
     with Renderer(gl, model, {0: mapped}, size=(32, 24)) as renderer:
         renderer.set_heatmap(0, halo, 1.0)
         with pytest.raises(RippleError, match=r"shape \[6, 8, 8\]; valid is \[6, 10, 10\]"):

@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+from sphere_height_maps import cube_charts
 
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.visuals import primitives
@@ -22,7 +23,7 @@ def test_height_maps_of_different_resolutions_stay_apart(gl):
 
     def frame(radii: list[float], swell: tuple[float, float]) -> np.ndarray:
         surfaces = {
-            geom: Surface(radii[geom] * ball.shell, ball.faces, ball.shell, resolutions[geom], "clay")
+            geom: Surface(radii[geom] * ball.shell, ball.faces, cube_charts(ball.shell, resolutions[geom]), "clay")
             for geom in range(2)
         }
         height_maps = {

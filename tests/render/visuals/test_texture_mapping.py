@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
+from sphere_height_maps import cube_charts
 from textured import textured_model
 
 from ripple_sim.render import Camera, Renderer, Surface
@@ -95,10 +96,10 @@ def test_a_target_has_its_texture_as_other_geoms_do(gl, shape, look):
     ball = primitives.ball(12)
     V = 0.4 * ball.shell + (np.sign(ball.shell) * [0, 0, 0.2] if shape == "capsule" else 0.0)
     places = [*corners(5), *corners(12)]
-    surface = Surface(V, ball.faces, ball.shell, 8, look)
+    surface = Surface(V, ball.faces, cube_charts(ball.shell, 8), look)
     assert names(gl, model, places, targets={0: surface}) == names(gl, model, places)
     if look == "rubber":
-        plain = Surface(V, ball.faces, ball.shell, 8, look, color=(0.0, 0.8, 0.0))
+        plain = Surface(V, ball.faces, cube_charts(ball.shell, 8), look, color=(0.0, 0.8, 0.0))
         assert names(gl, model, corners(5), targets={0: plain}) == "gggg"
 
 

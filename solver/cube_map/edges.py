@@ -1,4 +1,4 @@
-"""Texture coordinates into the cube map, beside the object's own: a chart and a place in it at every corner.
+"""The edges of the cube: where they cut triangles, and where directions lie in the charts between them.
 
 A triangle that crosses an edge of the cube is cut along it. One coordinate pair a corner cannot do instead: equiangular
 coordinates continue smoothly beyond an edge, but there they leave the neighbour's grid (its rows are not the
@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Floats, Ints, kernel
-from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.texels.chart_map import TextureCoordinates
+from ripple_sim.solver.texels.chart_map import ChartPieces
 
 from .convention import CHART_NORMALS, CHART_U, CHART_V
 
@@ -26,25 +25,16 @@ _SIDES = np.stack(
 ).astype(np.float64)
 
 
-def texture_coordinates(mesh: Mesh, sphere: NDArray[np.float64]) -> TextureCoordinates:
-    """Coordinates into the cube map at every corner of every triangle of a mesh with a sphere map [vertex_count, 3].
-
-    They are exact at the corners. In between, linear interpolation of `uv` deviates from the sphere map's own place by
-    a share of about 0.1 s^2 of a chart, where s is the angle that the triangle spans on the sphere: refine a mesh whose
-    triangles span many texels before it is textured, or interpolate the map coordinates, which are directions.
-    """
-    corners = sphere[mesh.F]
+def split_at_edges(corners: NDArray[np.float64]) -> ChartPieces:
+    """Cut triangles with the directions [m, 3, 3] at their corners along the edges of the cube."""
     chart = _chart_of(corners.sum(axis=1))
     inside = (np.einsum("mki,msi->mks", corners, _SIDES[chart]) >= -_ROUND_OFF).all(axis=(1, 2))
     whole, crossing = np.flatnonzero(inside), np.flatnonzero(~inside)
     owner, piece_chart, pieces = _cut(corners[crossing], _SIDES)
     triangle = np.concatenate([whole, crossing[owner]])
     order = np.argsort(triangle, kind="stable")
-    triangle = triangle[order]
-    chart = np.concatenate([chart[whole], piece_chart])[order]
     barycentrics = np.concatenate([np.tile(np.eye(3), (len(whole), 1, 1)), pieces])[order]
-    directions = np.einsum("pij,pjk->pik", barycentrics, corners[triangle])
-    return TextureCoordinates(triangle, barycentrics, chart, directions, chart_uv(directions, chart))
+    return ChartPieces(triangle[order], barycentrics, np.concatenate([chart[whole], piece_chart])[order])
 
 
 def chart_uv(directions: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
