@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from ripple_sim.solver.kernel import Floats32, kernel
@@ -56,9 +58,11 @@ def flow(h: Floats32, plasticity: Plasticity) -> None:
 # A product and a sum may be contracted to one rounding.
 _FAST = {"contract"}
 
+Rows: TypeAlias = tuple[Floats32, ...]
+
 
 @kernel(inline="always")
-def _force(rows, links, c):
+def _force(rows: Rows, links: Rows, c: int) -> np.float32:
     """Sum over the eight links of weight (h_j - h_i) at column c.
 
     `rows` are those of the field below, at and above the texel; `links` those of this row's places, and of those below.
@@ -75,7 +79,7 @@ def _force(rows, links, c):
 
 
 @kernel(inline="always")
-def _links(w, chart, r):
+def _links(w: Floats32, chart: int, r: int) -> Rows:
     """Rows of a stencil's links that meet in row r."""
     return (
         w[chart, 0, r],
@@ -197,5 +201,6 @@ def _gather_extra(
 
 @kernel
 def _flow(h: Floats32, plasticity: Plasticity | None) -> None:
+    """`flow` where the material yields."""
     if plasticity is not None:
         flow(h, plasticity)

@@ -29,6 +29,7 @@ def texels_at(directions: Floats, n: int) -> Ints:
 
 @kernel
 def _direction(V: Floats, F: Ints, sphere: Floats, triangle: int, point: Floats) -> tuple[float, float, float]:
+    """Unit vector of a point [3] that lies on a triangle."""
     a, b, c = F[triangle, 0], F[triangle, 1], F[triangle, 2]
     uu = uv = vv = pu = pv = 0.0
     for k in range(3):
@@ -45,11 +46,13 @@ def _direction(V: Floats, F: Ints, sphere: Floats, triangle: int, point: Floats)
 
 @kernel
 def _mean(sphere: Floats, k: int, a: int, b: int, c: int, s: float, t: float) -> float:
+    """Coordinate k of the sphere map at barycentric coordinates 1 - s - t, s, t of the vertices a, b, c."""
     return (1 - s - t) * sphere[a, k] + s * sphere[b, k] + t * sphere[c, k]
 
 
 @kernel
 def _texel_at(direction: Floats, n: int) -> int:
+    """Flat index of the texel in which a direction [3] lies."""
     axis = 0
     for k in range(1, 3):
         if abs(direction[k]) > abs(direction[axis]):

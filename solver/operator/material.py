@@ -34,7 +34,7 @@ class Material:
     density : sigma [kg/m^2]
         Mass that takes part in the motion, for each area. An impulse J raises the momentum of the surface by J.
     bending : b [m^4/s^2]
-        Resistance of a plate to being bent, rigidity over density: omega = sqrt(b) q^2, short ripples are the faster ones.
+        Resistance of a plate to being bent, rigidity over density: omega = sqrt(b) q^2, short ripples are faster.
     yield_height : [m]
         Deformation beyond it is permanent (see `dent`). Infinite: fully elastic.
     fixed : bool

@@ -82,6 +82,7 @@ def _vertex_metrics(F: Ints32, V: Floats, S: Floats) -> tuple[Floats, Floats]:
 
 @kernel
 def _product(m: Floats, a: Vector, b: Vector) -> float:
+    """A . M b for a symmetric matrix M given as xx yy zz xy xz yz, [6]."""
     return (
         m[0] * a[0] * b[0]
         + m[1] * a[1] * b[1]

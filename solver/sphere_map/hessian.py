@@ -83,6 +83,7 @@ def assemble(
 
 @kernel
 def _slopes(grad_d: Vector, grad_j: Vector, half: float, x: Vector, y: Vector) -> Slopes:
+    """Slopes of D and J along the tangents x and y of a vertex, from their gradients."""
     return dot(grad_d, x), dot(grad_d, y), half * dot(grad_j, x), half * dot(grad_j, y)
 
 
@@ -96,6 +97,7 @@ def _combined(slopes: Slopes, shares: Shares) -> Slopes:
 
 @kernel
 def _add_vertex(v: int, at_v: Slopes, bend: float, shares: Shares, gradient: Floats, diagonal: Floats) -> None:
+    """Add what a triangle says about its vertex v to gradient [n, 2] and diagonal [n, 3]."""
     dx, dy, jx, jy = at_v
     gradient[v, 0] += shares[0] * dx + shares[1] * jx
     gradient[v, 1] += shares[0] * dy + shares[1] * jy

@@ -42,6 +42,7 @@ def build_level(table: CornerTable, vertices: NDArray[np.integer], triangles: ND
 
 @kernel
 def _gather_stars(vertices: Ints32, table: CornerTable, star_start: Ints32, star: Ints32) -> None:
+    """Fill `star` [3 m] with the half-edges round each vertex, from `star_start` [n + 1] on."""
     for i in range(len(vertices)):
         gather_star(table, vertices[i], star[star_start[i] : star_start[i + 1]])
 

@@ -35,6 +35,7 @@ class Source(NamedTuple):
 
 @kernel
 def _real_area(tail: Ints32, f: int, V: Floats) -> float:
+    """Real area of triangle f."""
     p = row(V, tail[3 * f])
     normal = cross(subtract(row(V, tail[3 * f + 1]), p), subtract(row(V, tail[3 * f + 2]), p))
     return 0.5 * np.sqrt(dot(normal, normal))

@@ -66,6 +66,7 @@ def _conductance(k: Floats, s: Floats, r: int, c: int) -> float:
 
 @kernel
 def _add_quad(x: Floats, k: Floats, s: Floats, r: int, c: int, link: Floats, area: Floats) -> None:
+    """The quad between the texels (r, c) and (r + 1, c + 1): link weights [4, n + 2, n + 2], areas [n + 2, n + 2]."""
     south_north, west_east, rising, falling, whole = quad(x[r, c], x[r, c + 1], x[r + 1, c], x[r + 1, c + 1])
     conductance = _conductance(k, s, r, c)
     link[0, r, c] += conductance * south_north

@@ -102,17 +102,20 @@ def _virtual_node(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @kernel(inline="always")
 def _dot(a: Point, b: Point) -> float:
+    """Inner product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel(inline="always")
 def _cross_length(a: Point, b: Point) -> float:
+    """Length of the vector product."""
     x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     return np.sqrt(x * x + y * y + z * z)
 
 
 @kernel(inline="always")
 def _between(a: Point, b: Point) -> tuple[float, float, float]:
+    """Difference b - a."""
     return (b[0] - a[0], b[1] - a[1], b[2] - a[2])
 
 

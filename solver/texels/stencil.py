@@ -75,6 +75,7 @@ def _gather(w: Floats, h: Floats, out: Floats) -> None:
 
 @kernel
 def _sum_absolute(w: Floats, out: Floats) -> None:
+    """Sum of |weight| over the links of every texel, [C, n, n]."""
     n = out.shape[1]
     for chart in range(len(out)):
         for r in range(1, n + 1):
