@@ -83,15 +83,15 @@ def split_at_charts(
     triangle, barycentrics, chart = charts.map.split(attributes[F][:, :, columns.coordinates])
     whole, corner = barycentrics.max(axis=2) == 1, barycentrics.argmax(axis=2)
     vertex = np.take_along_axis(F[triangle], corner, axis=1)
-    piece, place = np.nonzero(~whole)
-    cut = np.einsum("ci,cij->cj", barycentrics[piece, place], attributes[F[triangle[piece]]])
+    part, place = np.nonzero(~whole)
+    cut = np.einsum("ci,cij->cj", barycentrics[part, place], attributes[F[triangle[part]]])
     cut[:, columns.normal] /= np.maximum(np.linalg.norm(cut[:, columns.normal], axis=1, keepdims=True), 1e-12)
     _, point = np.unique(cut[:, [*_range(columns.position), *_range(columns.normal)]], axis=0, return_inverse=True)
     first = int(same.max()) + 1
     source = np.where(whole, vertex, 0)
-    source[piece, place] = len(attributes) + np.arange(len(cut))
+    source[part, place] = len(attributes) + np.arange(len(cut))
     alike = np.where(whole, vertex, 0)
-    alike[piece, place] = len(attributes) + point.ravel()
+    alike[part, place] = len(attributes) + point.ravel()
     key = alike * charts.shape[0] + chart[:, None]
     _, where, index = np.unique(key, return_index=True, return_inverse=True)
     return ChartedMesh(
