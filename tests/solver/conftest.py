@@ -6,8 +6,7 @@ import pytest
 import trimesh
 
 from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver import Atlas, Mesh, RippleError, build_atlas
-from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver import Atlas, Mesh, build_atlas
 
 
 @pytest.fixture(scope="session")
@@ -38,12 +37,8 @@ def animal_geodesics(animal: Atlas):
 
 
 @pytest.fixture
-def gl_backend() -> str:
+def gl_backend(opengl: None) -> str:
     """The GL backend; skipped where no context can be made."""
-    try:
-        shared_context()
-    except RippleError as error:
-        pytest.skip(str(error))
     return "gl"
 
 
