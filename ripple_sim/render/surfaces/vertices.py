@@ -15,6 +15,7 @@ from . import ambient_occlusion as occlusion
 from .charts import Charts, VertexColumns, shared_places, split_at_charts
 from .surface import Surface
 from .tessellation import Edges, edges_of, midpoints, tessellate
+from .vertex_order import in_memory_order
 
 _LEAST_FACES, _MOST_FACES = 20_000, 400_000
 # columns of the vertex attributes: along DIRECTION, the smooth normal, a vertex is displaced; COORDINATES are for the
@@ -110,7 +111,8 @@ def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Sur
         baked=np.stack(occlusion.bake(V, F, smooth), axis=1),
         corner_uv=uv[F] if uv.ndim == 2 else uv,
     )
-    faces, attributes, same, chart = split_at_charts(finer, VertexColumns(POSITION, NORMAL, COORDINATES), charts)
+    cut = split_at_charts(finer, VertexColumns(POSITION, NORMAL, COORDINATES), charts)
+    faces, attributes, same, chart = in_memory_order(cut, POSITION)
     edges = edges_of(faces, same)
     attributes = np.concatenate([attributes, midpoints(edges, attributes, POSITION, NORMAL)])
     length = np.linalg.norm(attributes[:, DIRECTION], axis=1, keepdims=True)
