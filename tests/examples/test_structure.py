@@ -17,7 +17,7 @@ TREE = {
     "ripple_sim/coupling/ripples.py": "from ripple_sim.solver import Material\nfrom . import load\n",
     "ripple_sim/coupling/load.py": "def late():\n    from .ripples import Ripples\n",
     "solver/__init__.py": "from .operator.material import Material\n",
-    "solver/waves/__init__.py": "",
+    "solver/operator/__init__.py": "",
     "solver/operator/material.py": "import numpy\nimport ripple_sim.solver.errors\n",
     "solver/errors.py": "",
     "scenes/__init__.py": "",
@@ -59,7 +59,7 @@ def test_cycles_are_found_and_counted_as_the_folders_stand(plots, root: Path) ->
     modules = plots.imports.read(root)
     assert plots.imports.cycles({name: set(each.imports) for name, each in modules.items()}) == [[LOAD, RIPPLES]]
     rooms = plots.imports.grouped(modules, {name: plots.structure.room(name) for name in modules})
-    assert rooms["ripple_sim.coupling"] == {"ripple_sim.solver.waves"}
+    assert rooms["ripple_sim.coupling"] == {"ripple_sim.solver.operator"}
     assert plots.imports.cycles(rooms) == []
 
 
