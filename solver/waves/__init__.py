@@ -1,1 +1,1 @@
-"""Waves on an atlas: the operator, the sources, the materials and the backends that step them."""
+"""Waves on an atlas: heights and velocities, the loads that raise them, and the solver that steps them."""
