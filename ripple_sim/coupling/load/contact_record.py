@@ -104,10 +104,11 @@ class ContactRecord(NamedTuple):
         """
         middles = self.patches.begins[:-1]
         points = in_world(self.surface[middles], self.pose)
-        at = zip(*(index.tolist() for index in np.unravel_index(self.texels[middles], shape)), strict=True)
         geom, forces = names[self.contacts.target], self.patches.forces.tolist()
-        for other, point, force, texel in zip(self.patches.geoms.tolist(), points, forces, at, strict=True):
-            yield Impulse(geom, names[other], point, force * timestep, texel)
+        texels, n = self.texels[middles].tolist(), shape[1]
+        for other, point, force, texel in zip(self.patches.geoms.tolist(), points, forces, texels, strict=True):
+            row = texel // n
+            yield Impulse(geom, names[other], point, force * timestep, (row // n, row % n, texel % n))
 
     def touches(self) -> Iterator[Touch]:
         """One record for each geom that touches."""
