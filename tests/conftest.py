@@ -9,8 +9,25 @@ import pytest
 if TYPE_CHECKING:
     from ripple_sim.solver import Atlas
 
+# reasons to skip a test that hold on a machine that has everything else: an extra under another licence, and data that
+# is not shipped
+_ALLOWED_SKIPS = ("pymeshfix", "known meshes")
+
 _cache = tempfile.TemporaryDirectory(prefix="ripple-sim-tests-")
 os.environ["XDG_CACHE_HOME"] = _cache.name
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Where everything is installed a skipped test is a failure."""
+    if os.environ.get("CI") != "true":
+        return
+    reporter = session.config.pluginmanager.getplugin("terminalreporter")
+    skipped = reporter.stats.get("skipped", ())
+    wrong = [report for report in skipped if not any(word in str(report.longrepr) for word in _ALLOWED_SKIPS)]
+    for report in wrong:
+        reporter.write_line(f"skipped where nothing may be: {report.nodeid}: {report.longrepr}", red=True)
+    if wrong:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 @pytest.fixture(scope="session")
