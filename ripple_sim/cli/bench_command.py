@@ -13,7 +13,7 @@ from tyro.conf import Positional, arg
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Bench:
-    """Measure the wave solver: speed against other solvers and the bound of memory, accuracy against exact solutions."""
+    """Measure the wave solver: speed against rivals and the bound of memory, accuracy against exact solutions."""
 
     meshes: Annotated[Positional[tuple[Path, ...]], arg(metavar="MESH", help_behavior_hint="(optional)")] = ()
     """Meshes on which to measure arrival times, in addition to the built-in one."""
