@@ -43,7 +43,7 @@ class ShutterTimes:
         data : mujoco.MjData
             State of the bodies, until the next iteration.
         heights : dict
-            By the geom's name [m], float32 [6, N, N]. The same object as before where no time has passed.
+            By the geom's name [m], float32 [C, n, n]. The same object as before where no time has passed.
         """
         simulation = self._simulation
         done = 0

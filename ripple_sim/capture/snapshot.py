@@ -32,7 +32,7 @@ class Snapshot:
     data : mujoco.MjData
         Copy of MuJoCo's state.
     heights, height_maps : dict
-        By the geom's name: height [m], float32 [6, N, N], and its height map (see `HeightMap`).
+        By the geom's name: height [m], float32 [C, n, n], and its height map (see `HeightMap`).
     impulses : list of Impulse
         Since the frame before, up to the frame's own time.
     """

@@ -40,7 +40,7 @@ class Notes:
     time : float
         [s].
     heatmaps : sequence of dict
-        By the geom's name: what its colours show, float32 [6, N + 2, N + 2], with halo.
+        By the geom's name: what its colours show, float32 [C, n + 2, n + 2], with halo.
     heatmap_scale, mark_scale, energy_scale : Scale
     marks : sequence of list of Mark
     energies : sequence of (times [s], energies [J])

@@ -104,7 +104,7 @@ class Renderer:
         ----------
         geom : int
             Geom id of the target.
-        values : float32 [6, N + 2, N + 2]
+        values : float32 [C, n + 2, n + 2]
             With a halo, as a height map has it.
         limit : float
             The colours range from -limit to limit.
@@ -127,7 +127,7 @@ class Renderer:
         data : mujoco.MjData
             Poses of the geoms, after `mj_forward` or `mj_step`.
         height_maps : mapping
-            Geom id to height map, shape [6, N + 2, N + 2, 4]: gradient of the height (xyz, in the geom's frame) and
+            Geom id to height map, shape [C, n + 2, n + 2, 4]: gradient of the height (xyz, in the geom's frame) and
             height [m] (w), each face with a halo of one texel. A target without one is flat.
         camera : Camera, FixedCamera or ThroughLens
         exposure : int

@@ -26,7 +26,9 @@ class Dispatch:
 
     def shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         """A shader that runs over a list."""
-        return self._gl.shared_compute_shader("ripple_sim.solver.backends.shaders", name, **defines)
+        return self._gl.shared_compute_shader(
+            "ripple_sim.solver.backends.shaders", name, LIST_GROUP=_LIST_GROUP, **defines
+        )
 
     def block_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         """A shader that walks up blocks of the fields, see block.glsl."""
@@ -36,7 +38,7 @@ class Dispatch:
         return self.shader(name, **strips, **block, **defines)
 
     def bind(self, *buffers: moderngl.Buffer | None) -> None:
-        """Bind buffers to 0, 1, 2 ...; None leaves a binding as it is."""
+        """Bind buffers to 0, 1, 2 ..., in the order in which the shader declares them; None leaves out a binding."""
         for binding, buffer in enumerate(buffers):
             if buffer is not None:
                 buffer.bind_to_storage_buffer(binding)

@@ -29,11 +29,11 @@ class NaiveLoop:
         self._update = _update_parallel if parallel else _update
 
     def set_height(self, height: Floats32) -> None:
-        """Replace the height [m], [6, N, N]."""
+        """Replace the height [m], [C, n, n]."""
         self._h[:, 1:-1, 1:-1] = height
 
     def state(self) -> tuple[Floats32, Floats32]:
-        """Height [m] and velocity [m/s], [6, N, N]."""
+        """Height [m] and velocity [m/s], [C, n, n]."""
         return self._h[:, 1:-1, 1:-1].copy(), self._v.copy()
 
     def advance(self, substeps: int, dt: float) -> None:
@@ -52,7 +52,7 @@ def _fill_halo(h: Floats32, halo: Ints, source: Ints) -> None:
 
 
 class Fields(NamedTuple):
-    """Weights [6, 4, N + 1, N + 1], heights with halo [6, N + 2, N + 2], velocity and gain [6, N, N]."""
+    """Weights [C, 4, n + 1, n + 1], heights with halo [C, n + 2, n + 2], velocity and gain [C, n, n]."""
 
     w: Floats32
     h: Floats32

@@ -31,13 +31,13 @@ class PlainShader:
         self._halo = self._gl.compute_shader("ripple_sim.bench.shaders", "plain_halo")
 
     def set_height(self, height: Floats32) -> None:
-        """Replace the height [m], [6, N, N]."""
+        """Replace the height [m], [C, n, n]."""
         with_halo = np.pad(height.astype(np.float32), ((0, 0), (1, 1), (1, 1)))
         with self._gl:
             self._h.write(with_halo.tobytes())
 
     def state(self) -> tuple[Floats32, Floats32]:
-        """Height [m] and velocity [m/s], [6, N, N]."""
+        """Height [m] and velocity [m/s], [C, n, n]."""
         shape = (6, self._n + 2, self._n + 2)
         with self._gl:
             h, v = (np.frombuffer(each.read(), np.float32).reshape(shape) for each in (self._h, self._v))

@@ -21,11 +21,11 @@ class SparseLeapfrog:
         self._h, self._v = np.zeros((2, operator.mass.size), np.float32)
 
     def set_height(self, height: Floats32) -> None:
-        """Replace the height [m], [6, N, N]."""
+        """Replace the height [m], [C, n, n]."""
         self._h[:] = height.ravel()
 
     def state(self) -> tuple[Floats32, Floats32]:
-        """Height [m] and velocity [m/s], [6, N, N]."""
+        """Height [m] and velocity [m/s], [C, n, n]."""
         return self._h.reshape(self._shape).copy(), self._v.reshape(self._shape).copy()
 
     def advance(self, substeps: int, dt: float) -> None:

@@ -1,6 +1,6 @@
 #version 430
 // v += shift where texels are movable, then h += dt v.
-layout(local_size_x = 64) in;
+layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) buffer Height { dvec4 h[]; };
 layout(std430, binding = 1) buffer Velocity { dvec4 v[]; };
 layout(std430, binding = 2) readonly buffer Movable { dvec4 movable[]; };

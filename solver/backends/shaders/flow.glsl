@@ -1,6 +1,6 @@
 #version 430
 // Hand the part of the elastic height that is beyond the yield height over to the permanent one.
-layout(local_size_x = 64) in;
+layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) buffer Height { dvec4 h[]; };
 layout(std430, binding = 1) buffer Dent { dvec4 dent[]; };
 layout(std430, binding = 2) readonly buffer YieldHeight { dvec4 limit[]; };

@@ -1,7 +1,7 @@
 #version 430
 // Forces along irregular links: each texel of a list gathers its own, so no two threads meet. With KICK they change the
 // velocity, and drift the height; otherwise they are added to a result.
-layout(local_size_x = 64) in;
+layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) readonly buffer Field { float x[]; };
 layout(std430, binding = 1) buffer Result { float result[]; };
 #if KICK
