@@ -12,7 +12,7 @@ from ripple_sim.solver.operator.wave_operator import WaveOperator
 
 MESHES = {
     "square": square(5),
-    "one texel": square(1),
+    "four texels": square(2),
     "corner of three": polygon(3, 4),
     "corner of five": polygon(5, 3),
     "torus": flat_torus(6),

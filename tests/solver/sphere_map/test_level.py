@@ -28,6 +28,9 @@ def test_a_level_has_the_triangles_that_collapses_left(count):
     level, vertices, triangles = partial_level(*icosphere(1), count)
     assert len(vertices) == count and len(triangles) == 2 * count - 4
     np.testing.assert_array_equal(vertices[level.tail.reshape(-1, 3)], triangles)
+    head = np.roll(level.tail.reshape(-1, 3), -1, axis=1).ravel()
+    np.testing.assert_array_equal(head[level.star], level.ring)
+    np.testing.assert_array_equal(level.tail[level.star], np.repeat(np.arange(count), np.diff(level.star_start)))
 
 
 @pytest.mark.parametrize("count", [4, 5, 20, 42])
