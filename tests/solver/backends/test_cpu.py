@@ -124,9 +124,10 @@ def test_a_velocity_that_is_set_replaces_kicks_that_wait() -> None:
     np.testing.assert_array_equal(backend.velocity(), noise(texels, 9))
 
 
-def test_reading_shows_copies_and_changes_nothing() -> None:
+@pytest.mark.parametrize("material", ["plain", "yields, partly fixed"])
+def test_reading_shows_copies_and_changes_nothing(material: str) -> None:
     texels = MESHES["square"]
-    operator = operator_of(texels, MATERIALS["yields, partly fixed"](texels))
+    operator = operator_of(texels, MATERIALS[material](texels))
     backend = started(operator, 0.1 * noise(texels, 1), noise(texels, 2))
     backend.kick(np.array([0]), np.array([1.0], np.float32), 0.5)
     before = [backend.height(), backend.velocity(), backend.dent()]
