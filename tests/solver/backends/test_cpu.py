@@ -1,0 +1,150 @@
+"""The CPU backend against whole matrices in double precision, and what it conserves."""
+
+import numpy as np
+import pytest
+from dense_waves import DenseWaves
+from hand_made import flat_torus, polygon, square, two_squares
+
+from ripple_sim.solver import Material, TexelMesh, texel_atlas
+from ripple_sim.solver.backends.cpu import CPUBackend
+from ripple_sim.solver.operator.assembly import build_operator
+from ripple_sim.solver.operator.wave_operator import WaveOperator
+
+MESHES = {
+    "square": square(5),
+    "four texels": square(2),
+    "corner of three": polygon(3, 4),
+    "corner of five": polygon(5, 3),
+    "torus": flat_torus(6),
+    "two squares": two_squares(3),
+}
+
+
+def ramp(texels: TexelMesh) -> np.ndarray:
+    return np.linspace(0.5, 1.5, texels.areas.size).reshape(texels.shape)
+
+
+MATERIALS = {
+    "plain": lambda texels: Material(speed=1.0),
+    "maps": lambda texels: Material(
+        speed=ramp(texels), damping=2 * ramp(texels), stiffness=5 * ramp(texels), density=ramp(texels)[:, ::-1]
+    ),
+    "viscous plate": lambda texels: Material(speed=0.5, bending=1e-3, viscosity=1e-2, damping=0.5),
+    "plate alone": lambda texels: Material(speed=0.0, bending=1e-3 * ramp(texels)),
+    "yields, partly fixed": lambda texels: Material(
+        speed=1.0, stiffness=3.0, yield_height=0.4 * ramp(texels), fixed=ramp(texels) > 1.3
+    ),
+}
+
+
+def operator_of(texels: TexelMesh, material: Material) -> WaveOperator:
+    return build_operator(texel_atlas(texels), material, "fem")
+
+
+def noise(texels: TexelMesh, seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(texels.shape).astype(np.float32)
+
+
+def started(operator: WaveOperator, height: np.ndarray, velocity: np.ndarray) -> CPUBackend:
+    backend = CPUBackend(operator)
+    backend.set_height(height)
+    backend.set_velocity(velocity)
+    return backend
+
+
+def step_of(operator: WaveOperator) -> float:
+    return min(0.5 * operator.stable_timestep, 0.05)
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("mesh", MESHES)
+@pytest.mark.parametrize("substeps", [1, 6])
+def test_waves_are_those_of_whole_matrices(mesh: str, material: str, substeps: int) -> None:
+    texels = MESHES[mesh]
+    operator = operator_of(texels, MATERIALS[material](texels))
+    height = noise(texels, 1) * operator.free
+    velocity = noise(texels, 2) * operator.free
+    dense, backend = DenseWaves(operator, height, velocity), started(operator, height, velocity)
+    loaded = np.unique([0, texels.areas.size // 2])
+    dense.forces[loaded], dense.acceleration = 0.3, -0.7
+    backend.load(loaded, np.full(len(loaded), 0.3), -0.7)
+    for _ in range(2):
+        for waves in (dense, backend):
+            waves.advance(substeps, step_of(operator))
+    expected = [(dense.h + dense.dent), dense.v, dense.dent]
+    for now, then in zip((backend.height(), backend.velocity(), backend.dent()), expected, strict=True):
+        np.testing.assert_allclose(now.ravel(), then, atol=2e-5 * max(1.0, np.abs(then).max()))
+
+
+@pytest.mark.parametrize("mesh", ["square", "corner of five", "torus"])
+def test_momentum_of_a_free_surface_is_what_kicks_and_loads_bring(mesh: str) -> None:
+    texels = MESHES[mesh]
+    operator = operator_of(texels, Material(speed=1.0, bending=1e-3, viscosity=1e-2))
+    backend, dt = started(operator, noise(texels, 3), 0 * noise(texels, 3)), step_of(operator)
+    kicked = np.array([1, 4])
+    backend.kick(kicked, np.array([2.0, -0.5], np.float32), 0.25)
+    backend.load(np.array([3]), np.array([0.8]), 0.0)
+    backend.advance(5, dt)
+    mass = operator.mass.ravel()
+    expected = 2 * mass[1] - 0.5 * mass[4] + 0.25 * mass.sum() + 0.8 * 5 * dt
+    assert (mass * backend.velocity().ravel()).sum() == pytest.approx(expected, abs=1e-5)
+
+
+def test_waves_without_damping_run_back_to_where_they_came_from() -> None:
+    texels = MESHES["corner of five"]
+    operator = operator_of(texels, Material(speed=1.0, stiffness=2.0, bending=1e-3))
+    height, velocity = noise(texels, 4), noise(texels, 5)
+    backend, dt = started(operator, height, velocity), step_of(operator)
+    backend.advance(50, dt)
+    assert np.abs(backend.height() - height).max() > 0.5
+    backend.set_velocity(-backend.velocity())
+    backend.advance(50, dt)
+    np.testing.assert_allclose(backend.height(), height, atol=2e-4)
+    np.testing.assert_allclose(backend.velocity(), -velocity, atol=2e-3)
+
+
+@pytest.mark.parametrize("first", [1, 3, 4])
+def test_substeps_in_two_calls_go_as_far_as_in_one(first: int) -> None:
+    texels = MESHES["torus"]
+    operator = operator_of(texels, MATERIALS["maps"](texels))
+    heights = []
+    for parts in ([7], [first, 7 - first]):
+        backend = started(operator, noise(texels, 6), noise(texels, 7))
+        for part in parts:
+            backend.advance(part, step_of(operator))
+        heights.append(backend.height())
+    np.testing.assert_allclose(*heights, atol=1e-5)
+
+
+def test_a_velocity_that_is_set_replaces_kicks_that_wait() -> None:
+    texels = MESHES["square"]
+    backend = started(operator_of(texels, Material(speed=1.0)), noise(texels, 8), noise(texels, 8))
+    backend.kick(np.array([2]), np.array([5.0], np.float32), 3.0)
+    backend.set_velocity(noise(texels, 9))
+    np.testing.assert_array_equal(backend.velocity(), noise(texels, 9))
+
+
+@pytest.mark.parametrize("material", ["plain", "yields, partly fixed"])
+def test_reading_shows_copies_and_changes_nothing(material: str) -> None:
+    texels = MESHES["square"]
+    operator = operator_of(texels, MATERIALS[material](texels))
+    backend = started(operator, 0.1 * noise(texels, 1), noise(texels, 2))
+    backend.kick(np.array([0]), np.array([1.0], np.float32), 0.5)
+    before = [backend.height(), backend.velocity(), backend.dent()]
+    for read in (backend.height, backend.velocity, backend.dent):
+        read()[:] = np.nan
+    for now, then in zip([backend.height(), backend.velocity(), backend.dent()], before, strict=True):
+        np.testing.assert_array_equal(now, then)
+
+
+@pytest.mark.parametrize("poison", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("texel", [(0, 0, 0), (4, 2, 2)])
+def test_one_height_that_is_no_number_is_noticed(poison: float, texel: tuple[int, int, int]) -> None:
+    texels = MESHES["corner of five"]
+    backend = CPUBackend(operator_of(texels, Material(speed=1.0)))
+    height = noise(texels, 1)
+    backend.set_height(height)
+    assert backend.finite()
+    height[texel] = poison
+    backend.set_height(height)
+    assert not backend.finite()

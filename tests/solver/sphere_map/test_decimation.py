@@ -1,0 +1,57 @@
+"""Collapses down to a tetrahedron, and what they keep for as long as possible."""
+
+import numpy as np
+import pytest
+from genus_zero import SHAPES, TETRAHEDRON, crumpled, icosphere
+
+from ripple_sim.solver.sphere_map.corner_table import corner_table, undo_collapse
+from ripple_sim.solver.sphere_map.decimation import decimate
+
+
+def decimated(V, F):
+    table = corner_table(F, len(V))
+    return table, decimate(table, V)
+
+
+def last_vertices(table, log):
+    return set(range(len(table.leaving))) - set(table.tail[log].tolist())
+
+
+@pytest.mark.parametrize("shape", sorted(set(SHAPES) - {"six limbs"}))
+def test_every_shape_collapses_to_a_tetrahedron_and_back(shape):
+    V, F = SHAPES[shape]()
+    table, log = decimated(V, F)
+    assert len(log) == len(V) - 4
+    assert len(set(table.tail[log])) == len(log)
+    gone = np.concatenate([log // 3, table.twin[log] // 3])
+    assert len(set(gone)) == len(F) - 4
+    left = table.tail.reshape(-1, 3)[np.setdiff1d(np.arange(len(F)), gone)]
+    last = last_vertices(table, log)
+    assert len({frozenset(t) for t in left.tolist()}) == 4
+    assert all(set(t) < last and len(set(t)) == 3 for t in left.tolist())
+    for h in log[::-1]:
+        undo_collapse(table, h)
+    np.testing.assert_array_equal(table.tail.reshape(-1, 3), F)
+    np.testing.assert_array_equal(table.twin, corner_table(F, len(V)).twin)
+
+
+def test_a_tetrahedron_has_nothing_to_collapse():
+    V, F = TETRAHEDRON
+    assert len(decimated(V, F)[1]) == 0
+
+
+def test_the_tip_of_a_needle_is_kept_to_the_end():
+    V, F = icosphere(2)
+    V[17] *= 20
+    assert 17 in last_vertices(*decimated(V, F))
+
+
+def test_size_of_the_mesh_does_not_change_the_order_of_its_collapses():
+    V, F = crumpled()
+    np.testing.assert_array_equal(decimated(4.0 * V, F)[1], decimated(V, F)[1])
+
+
+@pytest.mark.parametrize("place", [0.0, 1.0])
+def test_a_mesh_that_is_one_point_still_collapses(place):
+    V, F = icosphere(1)
+    assert len(decimated(np.full_like(V, place), F)[1]) == len(V) - 4

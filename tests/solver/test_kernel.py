@@ -1,0 +1,51 @@
+"""What every compiled kernel promises: numpy's division, no fast-math unless asked for, options handed on."""
+
+import numpy as np
+import pytest
+
+from ripple_sim.solver.kernel import kernel
+
+
+@kernel
+def quotient(a, b):
+    return a / b
+
+
+@kernel
+def compensated_sum(x):
+    """Kahan's sum, whose correction fast-math would strike out."""
+    total, lost = 0.0, 0.0
+    for each in x:
+        small = each - lost
+        grown = total + small
+        lost = (grown - total) - small
+        total = grown
+    return total
+
+
+@kernel(inline="always")
+def doubled(x):
+    return 2 * x
+
+
+@pytest.mark.parametrize(("a", "b", "expected"), [(1.0, 0.0, np.inf), (-1.0, 0.0, -np.inf), (0.0, 0.0, np.nan)])
+def test_division_by_zero_follows_numpy_and_raises_nothing(a: float, b: float, expected: float) -> None:
+    np.testing.assert_equal(quotient(a, b), expected)
+
+
+def test_sums_are_rounded_as_they_are_written() -> None:
+    x = np.full(1000, 0.1)
+    x[0] = 1e8
+    naive = 0.0
+    for each in x:
+        naive += each
+    assert compensated_sum(x) == pytest.approx(1e8 + 99.9, abs=2e-8)
+    assert naive != compensated_sum(x)
+
+
+def test_options_are_handed_to_the_compiler() -> None:
+    assert doubled.targetoptions["inline"] == "always"
+    assert doubled(21) == 42
+    for each in (quotient, doubled):
+        assert each.targetoptions["nogil"]
+        assert "fastmath" not in each.targetoptions
