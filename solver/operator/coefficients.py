@@ -30,7 +30,7 @@ def check_numbers(name: str, value: ArrayLike) -> None:
     wrong = small | np.isnan(numbers) | ((numbers > _HIGHEST) & ~(np.isinf(numbers) & endless))
     if wrong.any():
         worst = numbers.flat[np.argmax(wrong)]
-        bound = f"greater than {low:g}" if strict else f"{low:g} or greater"
+        bound = f"greater than {low:g} and at least {1 / _HIGHEST:g}" if strict else f"{low:g} or greater"
         raise SolverError(
             f"material {name} is {worst:g} {unit}; valid is a finite number, {bound}, up to {_HIGHEST:g}"
             f"{', or infinity' if endless else ''}"

@@ -1,0 +1,90 @@
+"""The kick of one substep, against the centred scheme that it stands for."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hand_made import square
+
+from ripple_sim.solver.operator.step_coefficients import number_or_field, step_coefficients
+from ripple_sim.solver.operator.wave_operator import WaveOperator
+
+SHAPE = (1, 4, 4)
+
+
+def operator(damping: float = 0.0, stiffness: float = 0.0, mass: float = 2.0) -> WaveOperator:
+    stencil = square(4).stencil(np.ones(SHAPE))
+    return WaveOperator(stencil, np.full(SHAPE, mass), np.full(SHAPE, damping), np.full(SHAPE, stiffness))
+
+
+@pytest.mark.parametrize(("damping", "stiffness"), [(0.0, 9.0), (0.7, 9.0), (30.0, 4.0)])
+def test_kicks_and_drifts_are_the_centred_difference_scheme(damping: float, stiffness: float) -> None:
+    dt, force, mass = 0.05, 1.3, 2.0
+    kick = step_coefficients(operator(damping, stiffness, mass), dt)
+    height, velocity, heights = 1.0, 0.4, [1.0]
+    for _ in range(50):
+        velocity = kick.decay * velocity + kick.gain[0, 1, 1] * force - kick.spring * height
+        height += dt * velocity
+        heights.append(height)
+    before, now, after = (np.array(heights[i : len(heights) - 2 + i]) for i in range(3))
+    acceleration, speed = (after - 2 * now + before) / dt**2, (after - before) / (2 * dt)
+    np.testing.assert_allclose(acceleration + damping * speed + stiffness * now, force / mass, atol=2e-4)
+
+
+def test_without_damping_a_lone_texel_swings_for_ever_at_the_leapfrogs_frequency() -> None:
+    dt, k = 0.1, 25.0
+    spring = float(step_coefficients(operator(stiffness=k), dt).spring)
+    phase = np.arccos(1 - k * dt**2 / 2)
+    # from the extremum: half a kick first
+    height, velocity, heights = 1.0, spring / 2, []
+    for _ in range(200):
+        velocity -= spring * height
+        height += dt * velocity
+        heights.append(height)
+    np.testing.assert_allclose(heights, np.cos(phase * np.arange(1, 201)), atol=1e-4)
+
+
+@pytest.mark.parametrize("rate", [0.01, 0.3, 2.0])
+def test_damping_decays_as_the_exponential_to_third_order(rate: float) -> None:
+    errors = [
+        abs(float(step_coefficients(operator(damping=rate), dt).decay) - np.exp(-rate * dt))
+        for dt in (0.4 / rate, 0.2 / rate)
+    ]
+    assert errors[0] / errors[1] == pytest.approx(8, rel=0.2)
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e3, 1e9])
+def test_no_damping_makes_a_velocity_grow(damping: float) -> None:
+    assert abs(step_coefficients(operator(damping=damping), 1.0).decay) <= 1
+
+
+def test_clamped_texels_take_no_force_and_no_source() -> None:
+    fixed = np.zeros(SHAPE, bool)
+    fixed[0, 1, 2] = True
+    kick = step_coefficients(dataclasses.replace(operator(), fixed=fixed), 0.1)
+    np.testing.assert_allclose(kick.gain, np.where(fixed, 0, 0.1 / 2.0), rtol=1e-6)
+    np.testing.assert_allclose(kick.span, np.where(fixed, 0, 0.1), rtol=1e-6)
+
+
+def test_sources_move_nothing_where_nothing_pulls_back() -> None:
+    coefficient = np.ones(SHAPE)
+    coefficient[:, :, 2:] = 0
+    rigid = dataclasses.replace(operator(), stencil=square(4).stencil(coefficient))
+    span = np.broadcast_to(step_coefficients(rigid, 0.1).span, SHAPE)
+    np.testing.assert_allclose(span[..., :2], 0.1, rtol=1e-6)
+    assert not span[..., 2:].any()
+    assert (step_coefficients(rigid, 0.1).gain > 0).all()
+
+
+def test_a_field_of_one_value_is_a_number_and_the_kick_is_in_float32() -> None:
+    assert number_or_field(np.full(SHAPE, 0.1)) == np.float32(0.1)
+    varied = np.full(SHAPE, 0.1)
+    varied[0, 3, 3] = 0.2
+    field = number_or_field(varied)
+    assert isinstance(field, np.ndarray) and field.dtype == np.float32
+    np.testing.assert_array_equal(field, varied.astype(np.float32))
+    # NaN equals nothing, not even itself: it must not be lost in a number
+    assert isinstance(number_or_field(np.array([[[np.nan, 1.0]]])), np.ndarray)
+    kick = step_coefficients(operator(damping=0.3, stiffness=2.0), 0.1)
+    assert kick.gain.shape == SHAPE and kick.gain.dtype == np.float32
+    assert all(type(each) is np.float32 for each in (kick.decay, kick.spring, kick.span))

@@ -1,0 +1,103 @@
+"""Atlas files: what comes back, and what is said of files that are none."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ripple_sim.solver import AtlasError
+from ripple_sim.solver.texels.array_file import write_arrays
+from ripple_sim.solver.texels.atlas_file import FORMAT, read_atlas_file, write_atlas_file
+
+
+@pytest.fixture
+def arrays() -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(0)
+    return {
+        "kind": np.array(["Atlas", "given"]),
+        "V": rng.standard_normal((4, 3)),
+        "F": np.array([[0, 1, 2], [0, 2, 3]]),
+        "glued": np.full((1, 4, 2), -1),
+        "positions": rng.standard_normal((1, 4, 4, 3)),
+        "normals": rng.standard_normal((1, 4, 4, 3)),
+        "areas": rng.uniform(size=(1, 4, 4)),
+        "triangles": rng.integers(0, 2, (1, 4, 4)),
+        "barycentrics": rng.uniform(size=(1, 4, 4, 3)),
+        "charts": np.zeros(2, np.int64),
+    }
+
+
+def test_arrays_come_back_as_they_were(tmp_path: Path, arrays: dict[str, np.ndarray]) -> None:
+    path = tmp_path / "new folder" / "an.atlas"
+    write_atlas_file(path, arrays)
+    found = read_atlas_file(path)
+    assert found.keys() == arrays.keys() | {"format"}
+    for name, array in arrays.items():
+        assert found[name].dtype == array.dtype, name
+        np.testing.assert_array_equal(found[name], array)
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_indices_take_half_the_room_in_the_file(tmp_path: Path, arrays: dict[str, np.ndarray]) -> None:
+    write_atlas_file(tmp_path / "an.atlas", arrays)
+    with np.load(tmp_path / "an.atlas") as file:
+        assert {file[name].dtype for name in ("F", "triangles", "glued", "charts")} == {np.dtype(np.int32)}
+        assert file["V"].dtype == np.float64
+
+
+def written(path: Path, arrays: dict[str, np.ndarray]) -> Path:
+    with path.open("wb") as file:
+        write_arrays(file, arrays)
+    return path
+
+
+def test_another_version_is_refused_with_the_advice_to_make_it_again(tmp_path: Path, arrays) -> None:
+    for version in (FORMAT - 1, FORMAT + 1):
+        path = written(tmp_path / "other.atlas", {**arrays, "format": np.array([version])})
+        with pytest.raises(
+            AtlasError, match=r"other\.atlas.* of another version; make it again with `ripple-sim atlas"
+        ):
+            read_atlas_file(path)
+
+
+@pytest.mark.parametrize("missing", ["V", "glued", "kind", "barycentrics", "format"])
+def test_a_file_that_lacks_an_array_is_not_an_atlas(tmp_path: Path, arrays, missing: str) -> None:
+    whole = {**arrays, "format": np.array([FORMAT])}
+    del whole[missing]
+    with pytest.raises(AtlasError, match=r"half\.atlas.* is not an atlas"):
+        read_atlas_file(written(tmp_path / "half.atlas", whole))
+
+
+def test_a_truncated_file_is_named_as_damaged(tmp_path: Path, arrays: dict[str, np.ndarray]) -> None:
+    path = tmp_path / "cut.atlas"
+    write_atlas_file(path, arrays)
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(AtlasError, match=r"cut\.atlas.* is damaged or not an atlas \(.+\); make it again"):
+        read_atlas_file(path)
+
+
+def test_a_missing_file_and_a_folder_are_told_apart(tmp_path: Path) -> None:
+    with pytest.raises(AtlasError, match=r"none\.atlas' does not exist; make one with"):
+        read_atlas_file(tmp_path / "none.atlas")
+    with pytest.raises(AtlasError, match="is not a file; make one with"):
+        read_atlas_file(tmp_path)
+
+
+def test_what_cannot_be_written_is_named_and_leaves_nothing_behind(tmp_path: Path, arrays) -> None:
+    folder = tmp_path / "folder.atlas"
+    folder.mkdir()
+    with pytest.raises(AtlasError, match=r"folder\.atlas' cannot be written: it exists and is not a regular file"):
+        write_atlas_file(folder, arrays)
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(AtlasError, match="cannot be written: "):
+        write_atlas_file(tmp_path / "file" / "an.atlas", arrays)
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["file", "folder.atlas"]
+
+
+def test_a_failed_write_keeps_the_old_file(tmp_path: Path, arrays: dict[str, np.ndarray]) -> None:
+    path = tmp_path / "an.atlas"
+    write_atlas_file(path, arrays)
+    with pytest.raises(ValueError, match="Object arrays"):
+        write_atlas_file(path, {**arrays, "V": np.array([{}], dtype=object)})
+    np.testing.assert_array_equal(read_atlas_file(path)["V"], arrays["V"])
+    assert list(tmp_path.iterdir()) == [path]

@@ -1,0 +1,62 @@
+"""The stencil as a sparse matrix: the same operator, symmetric, blind to constants."""
+
+import numpy as np
+import pytest
+from hand_made import flat_torus, polygon, square
+
+from ripple_sim.solver import TexelMesh
+from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
+
+MESHES = {
+    "square": lambda: square(5),
+    "torus": lambda: flat_torus(5),
+    "three charts round a point": lambda: polygon(3, 4),
+    "six charts round a point": lambda: polygon(6, 4),
+}
+
+
+@pytest.fixture(params=MESHES)
+def texels(request: pytest.FixtureRequest) -> TexelMesh:
+    return MESHES[request.param]()
+
+
+def test_the_product_is_minus_the_stencils_value(texels: TexelMesh) -> None:
+    rng = np.random.default_rng(0)
+    stencil = texels.stencil(rng.uniform(0.2, 3, texels.shape))
+    matrix = stiffness_matrix(stencil)
+    for field in rng.standard_normal((3, *texels.shape)):
+        np.testing.assert_allclose(matrix @ field.ravel(), -stencil(field).ravel(), atol=1e-12)
+
+
+def test_the_matrix_is_symmetric_and_constants_are_its_kernel(texels: TexelMesh) -> None:
+    dense = stiffness_matrix(texels.stencil(np.ones(texels.shape))).toarray()
+    assert dense.shape == (texels.topology.texel_count,) * 2
+    np.testing.assert_allclose(dense, dense.T, atol=1e-14)
+    np.testing.assert_allclose(dense.sum(axis=1), 0, atol=1e-12)
+    assert np.linalg.matrix_rank(dense, tol=1e-9) == len(dense) - 1
+
+
+def test_the_diagonal_is_the_sum_of_the_weights_that_meet_there(texels: TexelMesh) -> None:
+    stencil = texels.stencil(np.ones(texels.shape))
+    matrix = stiffness_matrix(stencil)
+    off = matrix.toarray() - np.diag(matrix.diagonal())
+    np.testing.assert_allclose(np.abs(off).sum(axis=1), stencil.absolute_sums().ravel(), atol=1e-12)
+    np.testing.assert_allclose(matrix.diagonal(), -off.sum(axis=1), atol=1e-12)
+
+
+@pytest.mark.parametrize("k", [1, 2, 4])
+def test_waves_along_the_grid_of_a_torus_have_the_eigenvalue_of_a_string_of_texels(k: int) -> None:
+    n = 8
+    column = np.indices((n, n))[1]
+    wave = np.cos(2 * np.pi * k * column / n).ravel()
+    np.testing.assert_allclose(flat_torus(n).stiffness() @ wave, (2 - 2 * np.cos(2 * np.pi * k / n)) * wave, atol=1e-12)
+
+
+def test_a_coefficient_of_0_cuts_a_texel_off() -> None:
+    texels = flat_torus(6)
+    coefficient = np.ones(texels.shape)
+    coefficient[0, 2, 3] = 0
+    matrix = stiffness_matrix(texels.stencil(coefficient)).toarray()
+    assert not matrix[15].any() and not matrix[:, 15].any()
+    # the others still hang together
+    assert np.linalg.matrix_rank(matrix, tol=1e-9) == 34
