@@ -19,9 +19,10 @@ class Owner:
 @pytest.fixture
 def resources(gl):
     owner = Owner()
-    made = Resources(gl, owner)
-    yield made
-    made.release()
+    with gl:  # as the renderer does
+        made = Resources(gl, owner)
+        yield made
+        made.release()
 
 
 def directions() -> np.ndarray:

@@ -31,9 +31,10 @@ class NoGeoms:
 @pytest.fixture
 def resources(gl):
     owner = Owner()
-    made = Resources(gl, owner)
-    yield made
-    made.release()
+    with gl:  # as the renderer does
+        made = Resources(gl, owner)
+        yield made
+        made.release()
 
 
 def vertices_at(chart, uv, positions=None, directions=None, midpoints=0) -> SurfaceVertices:
