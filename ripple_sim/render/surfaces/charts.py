@@ -12,6 +12,7 @@ from ripple_sim.solver.texels.chart_map import ChartMap
 from ripple_sim.solver.texels.chart_page import ChartPage
 
 _ON_BORDER = 1e-9  # of a chart
+_BITS = 36  # of the attributes of cut points: round-off is within their last one
 
 
 class Charts(NamedTuple):
@@ -86,20 +87,28 @@ def split_at_charts(
     part, place = np.nonzero(~whole)
     cut = np.einsum("ci,cij->cj", barycentrics[part, place], attributes[F[triangle[part]]])
     cut[:, columns.normal] /= np.maximum(np.linalg.norm(cut[:, columns.normal], axis=1, keepdims=True), 1e-12)
+    cut = _snapped(cut, attributes)
     _, point = np.unique(cut[:, [*_range(columns.position), *_range(columns.normal)]], axis=0, return_inverse=True)
-    first = int(same.max()) + 1
-    source = np.where(whole, vertex, 0)
+    _, distinct = np.unique(cut, axis=0, return_inverse=True)
+    source, alike = np.where(whole, vertex, 0), np.where(whole, vertex, 0)
     source[part, place] = len(attributes) + np.arange(len(cut))
-    alike = np.where(whole, vertex, 0)
-    alike[part, place] = len(attributes) + point.ravel()
+    alike[part, place] = len(attributes) + distinct.ravel()
     key = alike * charts.shape[0] + chart[:, None]
     _, where, index = np.unique(key, return_index=True, return_inverse=True)
+    row = source.ravel()[where]
     return ChartedMesh(
         index.reshape(-1, 3),
-        np.concatenate([attributes, cut])[source.ravel()[where]],
-        np.concatenate([same, first + np.arange(len(cut))])[alike.ravel()[where]],
+        np.concatenate([attributes, cut])[row],
+        np.concatenate([same, int(same.max()) + 1 + point.ravel()])[row],
         key.ravel()[where] % charts.shape[0],
     )
+
+
+def _snapped(cut: NDArray[np.float64], attributes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Attributes of cut points without the round-off by which two triangles differ in a point that they share."""
+    exponent = np.frexp(np.abs(attributes).max(axis=0))[1]
+    step = np.ldexp(1.0, exponent - _BITS)
+    return np.round(cut / step) * step
 
 
 def _range(columns: slice) -> range:

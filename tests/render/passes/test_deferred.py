@@ -1,0 +1,51 @@
+"""Deferred shading: which sizes a driver can draw, and that a frame is what its format says."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim.render import Camera, Renderer
+from ripple_sim.render.frame_format import FrameFormat
+from ripple_sim.solver import RippleError
+
+XML = '<mujoco><worldbody><geom type="sphere" size="1" rgba=".8 .2 .2 1"/></worldbody></mujoco>'
+CAMERA = Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0, 45.0)
+CLOSE = Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0, 20.0)  # the ball fills the frame
+
+
+def frame(gl, size, camera=CAMERA, **options):
+    model = mujoco.MjModel.from_xml_string(XML)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with Renderer(gl, model, {}, size=size, **options) as renderer:
+        return renderer.render(data, {}, camera)
+
+
+@pytest.mark.parametrize("size", [(0, 4), (4, 0), (-3, 5), (1_000_000, 4), (4, 1_000_000)])
+def test_a_size_that_the_driver_cannot_draw_is_refused(gl, size):
+    with pytest.raises(RippleError, match=rf"frame size is {size[0]}x{size[1]} pixels; valid .* are 1 to \d+"):
+        frame(gl, size)
+
+
+@pytest.mark.parametrize("size", [(1, 3)])
+@pytest.mark.parametrize("samples", [0, 4])
+def test_the_smallest_frames_are_drawn(gl, size, samples):
+    got = frame(gl, size, CLOSE, samples=samples)
+    assert got.shape[:2] == (size[1], size[0])
+    red = got[size[1] // 2, size[0] // 2].astype(int)
+    assert red[0] > red[2] + 40
+
+
+def test_samples_smooth_the_outline_and_leave_the_inside_as_it_is(gl):
+    hard, smooth = (frame(gl, (24, 24), samples=samples, alpha=True).astype(int) for samples in (0, 4))
+    inside = np.s_[9:15, 9:15]
+    assert np.abs(hard[inside] - smooth[inside]).max() <= 6
+    assert set(np.unique(hard[..., 3])) == {0, 255}
+    assert len(np.unique(smooth[..., 3])) > 2
+
+
+@pytest.mark.parametrize(("linear", "dtype"), [(False, "f1"), (True, "f2")])
+def test_a_format_knows_its_shape_and_channels(linear, dtype):
+    frame_format = FrameFormat((16, 9), linear=linear)
+    assert frame_format.aspect == pytest.approx(16 / 9)
+    assert frame_format.dtype == dtype

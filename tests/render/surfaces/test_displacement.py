@@ -1,0 +1,194 @@
+"""Displaced vertices: the GPU's spline against the CPU's and against a sum over texels, and the world they end in."""
+
+import numpy as np
+import pytest
+from sphere_height_maps import cube_charts, height_map_of
+
+from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.surfaces.adaptive_tessellation import _heights
+from ripple_sim.render.surfaces.displacement import Displacement, Place
+from ripple_sim.render.surfaces.height_maps import HeightMapTextures
+from ripple_sim.render.surfaces.tessellation import Edges
+from ripple_sim.render.surfaces.vertices import DIRECTION, POSITION, UV, SurfaceVertices
+from ripple_sim.render.visuals.occluders import Occluders
+from ripple_sim.solver.texels.chart_page import ChartPage
+
+N = 8
+PAGE = ChartPage(6, N)
+STILL = Place(np.eye(3), np.zeros(3), 0)
+
+
+class Owner:
+    pass
+
+
+class NoGeoms:
+    geom_aabb = np.zeros((0, 6))
+    geom_xmat = np.zeros((0, 9))
+    geom_xpos = np.zeros((0, 3))
+
+
+@pytest.fixture
+def resources(gl):
+    owner = Owner()
+    with gl:  # as the renderer does
+        made = Resources(gl, owner)
+        yield made
+        made.release()
+
+
+def vertices_at(chart, uv, positions=None, directions=None, midpoints=0) -> SurfaceVertices:
+    """Vertices at places in charts; the last of them are midpoints, at least one that is never used."""
+    chart, uv = np.append(chart, 0), np.concatenate([uv, [[0.5, 0.5]]])
+    positions, directions = (None if each is None else [*each, [0.0, 0.0, 1.0]] for each in (positions, directions))
+    count, midpoints = len(chart), midpoints + 1
+    attributes = np.zeros((count, UV.stop))
+    attributes[:, POSITION] = 0.0 if positions is None else positions
+    attributes[:, DIRECTION] = [0.0, 0.0, 1.0] if directions is None else directions
+    ends = np.zeros((midpoints, 2), dtype=np.int64)
+    edges = Edges(ends, np.zeros((0, 3), dtype=np.int64), ends[:, 0], np.zeros(midpoints, dtype=bool))
+    places = PAGE.places(np.asarray(chart), np.asarray(uv, dtype=float))
+    return SurfaceVertices(np.zeros((0, 3), dtype=np.int64), attributes, edges, places, places)
+
+
+def displaced(resources, vertices, height_map, place=STILL, used=(), layers=1, layer=0) -> np.ndarray:
+    """World positions and visibility [n, 4] as the GPU leaves them, NaN where it leaves nothing."""
+    height_maps = HeightMapTextures(resources, [PAGE] * layers)
+    Occluders(resources, NoGeoms, np.zeros(0, dtype=np.int64)).bind(NoGeoms, np.zeros(3))
+    with resources.gl as ctx:
+        for each in range(layers):
+            height_maps.write(each, height_map if each == layer else np.full_like(height_map, 1e6))
+        height_maps.bind()
+        displacement = Displacement(resources, vertices, geom=0, layer=layer)
+        displacement.moved.write(np.full(4 * len(vertices.attributes), np.nan, np.float32).tobytes())
+        displacement.run(ctx, place, np.array(used, dtype=np.int32))
+        return np.frombuffer(displacement.moved.read(), np.float32).reshape(-1, 4)[:-1]
+
+
+def random_height_map(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=(6, N + 2, N + 2, 4)).astype(np.float32)
+
+
+def random_places(count: int, seed: int):
+    """Charts and places in them, some on borders and in corners."""
+    rng = np.random.default_rng(seed)
+    uv = rng.random((count, 2))
+    uv[: count // 10, 0] = rng.integers(0, 2, count // 10)
+    uv[: count // 20, 1] = rng.integers(0, 2, count // 20)
+    return rng.integers(0, 6, count), uv
+
+
+def spline_sum(height_map: np.ndarray, chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """The quadratic B-spline as a sum over all texels of a chart with its halo, by its definition."""
+
+    def weight(x):
+        x = np.abs(x)
+        return np.where(x < 0.5, 0.75 - x**2, np.where(x < 1.5, 0.5 * (1.5 - x) ** 2, 0.0))
+
+    centres = np.arange(-1, N + 1)
+    column, row = (N * uv - 0.5).T
+    return np.einsum(
+        "ki,kj,kij->k",
+        weight(row[:, None] - centres),
+        weight(column[:, None] - centres),
+        height_map[chart, ..., 3].astype(np.float64),
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_gpu_and_cpu_look_up_the_same_height(resources, seed):
+    """Both against the definition; texture units of some drivers weigh texels with eight bits."""
+    chart, uv = random_places(400, seed)
+    height_map = random_height_map(seed)
+    expected = spline_sum(height_map, chart, uv)
+    height = displaced(resources, vertices_at(chart, uv), height_map)[:, 2]
+    np.testing.assert_allclose(height, expected, atol=0.02)
+    place = PAGE.places(chart, uv)
+    on_chart, row, column = PAGE.locate(np.minimum(place, place - 1e-9))  # a border belongs to its own chart
+    grid = np.stack([row, column], axis=1)
+    nearest = np.clip(np.floor(grid + 0.5), 0, N - 1)
+    texel = np.column_stack([on_chart, nearest]).astype(np.int32)
+    own = _heights(height_map, texel, (grid - nearest).astype(np.float32))
+    np.testing.assert_allclose(own, expected, atol=1e-5)
+
+
+def test_a_constant_and_a_linear_height_come_back_as_they_are(resources):
+    chart, uv = random_places(200, 7)
+    height_map = np.zeros((6, N + 2, N + 2, 4), np.float32)
+    height_map[..., 3] = 0.25
+    np.testing.assert_allclose(displaced(resources, vertices_at(chart, uv), height_map)[:, 2], 0.25, atol=1e-6)
+    slope = (np.arange(N + 2) - 0.5) / N
+    height_map[..., 3] = slope[:, None] - 2 * slope
+    expected = uv[:, 1] - 2 * uv[:, 0]
+    np.testing.assert_allclose(displaced(resources, vertices_at(chart, uv), height_map)[:, 2], expected, atol=2e-3)
+
+
+def test_the_height_is_the_same_from_both_charts_of_a_border(resources):
+    """With the halo that the charts of a cube have. The middle of charts 0 and 2's common edge, and its neighbours."""
+    directions = np.stack([np.ones(9), np.ones(9), np.linspace(-0.8, 0.8, 9)], axis=1)
+    charts = 0, 2
+    n = 24
+
+    def height(d):
+        return np.sin(5 * d[..., 0] - 3 * d[..., 1] + 4 * d[..., 2])
+
+    height_map = height_map_of(height, np.zeros_like)
+    chart_map = cube_charts(directions, n)
+    values = [
+        spline_on(resources, chart_map, height_map, np.full(9, chart), chart_map.map.uv(directions, np.full(9, chart)))
+        for chart in charts
+    ]
+    np.testing.assert_allclose(values[0], values[1], atol=1e-5)
+    unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    np.testing.assert_allclose(values[0], height(unit), atol=0.05)
+
+
+def spline_on(resources, charts, height_map, chart, uv) -> np.ndarray:
+    """Heights of a larger height map than the rest of the tests have."""
+    vertices = vertices_at(chart, uv)
+    places = charts.page.places(chart, uv)
+    height_maps = HeightMapTextures(resources, [charts.page])
+    Occluders(resources, NoGeoms, np.zeros(0, dtype=np.int64)).bind(NoGeoms, np.zeros(3))
+    with resources.gl as ctx:
+        height_maps.write(0, height_map)
+        height_maps.bind()
+        displacement = Displacement(
+            resources, vertices._replace(lookups=np.concatenate([places, places[:1]])), geom=0, layer=0
+        )
+        displacement.run(ctx, STILL, np.empty(0, np.int32))
+        return np.frombuffer(displacement.moved.read(), np.float32).reshape(-1, 4)[:-1, 2]
+
+
+def test_vertices_move_along_their_direction_and_then_into_the_world(resources):
+    rng = np.random.default_rng(4)
+    chart, uv = random_places(130, 4)  # over two work groups, the last of which is not full
+    positions, directions = rng.normal(size=(2, 130, 3))
+    rotation, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    origin = np.array([0.5, -2.0, 7.0])
+    height_map = np.zeros((6, N + 2, N + 2, 4), np.float32)
+    height_map[..., 3] = -0.3
+    moved = displaced(resources, vertices_at(chart, uv, positions, directions), height_map, Place(rotation, origin, 0))
+    expected = (positions - 0.3 * directions) @ rotation.T + origin
+    np.testing.assert_allclose(moved[:, :3], expected, atol=1e-5)
+    np.testing.assert_array_equal(moved[:, 3], 1.0)  # nothing hides the sky
+
+
+@pytest.mark.parametrize("used", [[], [67], [69, 64, 66]])
+def test_of_the_midpoints_only_those_in_use_are_displaced(resources, used):
+    chart, uv = random_places(70, 5)
+    height_map = random_height_map(5)
+    vertices = vertices_at(chart, uv, midpoints=6)
+    moved = displaced(resources, vertices, height_map, used=used)
+    done = np.isfinite(moved).all(axis=1)
+    np.testing.assert_array_equal(np.flatnonzero(done), [*range(64), *sorted(used)])
+    every = displaced(resources, vertices_at(chart, uv), height_map)
+    np.testing.assert_array_equal(moved[done], every[done])
+
+
+def test_each_target_reads_its_own_layer(resources):
+    chart, uv = random_places(50, 6)
+    height_map = random_height_map(6)
+    alone = displaced(resources, vertices_at(chart, uv), height_map)
+    for layer in range(3):
+        among = displaced(resources, vertices_at(chart, uv), height_map, layers=3, layer=layer)
+        np.testing.assert_array_equal(among, alone)

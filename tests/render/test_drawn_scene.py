@@ -1,0 +1,111 @@
+"""What is drawn of a model: targets, geoms and sites; their bounds, their order, and messages."""
+
+import mujoco
+import numpy as np
+import pytest
+from drawn import ball_surface
+
+from ripple_sim.render.camera import Camera
+from ripple_sim.render.drawn_scene import DrawnScene
+from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.visuals.assets import Assets
+from ripple_sim.solver import RippleError
+
+XML = """<mujoco><worldbody>
+<geom name="target" type="sphere" size=".5" pos="0 0 1"/>
+<geom name="far" type="box" size=".2 .2 .2" pos="0 5 0" rgba="1 0 0 .5"/>
+<geom name="near" type="sphere" size=".2" pos="0 -1 0" rgba="0 1 0 .5"/>
+<geom name="solid" type="capsule" size=".1 .3" pos="2 0 0"/>
+<geom name="wall" type="plane" size="1 1 .1" pos="0 0 -3"/>
+<site type="sphere" size=".1" pos="0 2 0" rgba="0 0 1 .5"/>
+</worldbody></mujoco>"""
+HEIGHT_MAP = np.zeros((6, 10, 10, 4), np.float32)
+POSE = Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0).pose()  # seen from -y
+
+
+class Owner:
+    pass
+
+
+@pytest.fixture(scope="module")
+def model():
+    return mujoco.MjModel.from_xml_string(XML)
+
+
+@pytest.fixture
+def data(model):
+    made = mujoco.MjData(model)
+    mujoco.mj_forward(model, made)
+    return made
+
+
+@pytest.fixture(scope="module", params=["clay", "water"])
+def scene(request, gl, model):
+    """A scene whose target is opaque, and one whose target is transparent."""
+    owner = Owner()
+    with gl:
+        resources = Resources(gl, owner)
+        target = model.geom("target").id
+        surfaces = {target: ball_surface(request.param)}
+        yield DrawnScene(
+            Assets.of(model, resources), surfaces, [g for g in range(model.ngeom) if g != target], (32, 24)
+        )
+        resources.release()
+
+
+def updated(gl, scene, data, height=0.0):
+    height_map = HEIGHT_MAP + np.array([0, 0, 0, height], dtype=np.float32)
+    with gl as ctx:
+        return scene.update(ctx, data, {0: height_map}, POSE)
+
+
+def test_transparent_things_come_with_the_furthest_first(gl, scene, data, model, request):
+    updated(gl, scene, data)
+    layers = scene.layers(data, POSE)
+    away = [np.linalg.norm(layer.balls.centres.mean(axis=0) - POSE.eye) for layer in layers]
+    assert away == sorted(away, reverse=True)
+    y = [round(float(layer.balls.centres[:, 1].mean()), 1) for layer in layers]
+    assert y == [5.0, 2.0, 0.0, -1.0] if len(layers) == 4 else [5.0, 2.0, -1.0]
+    assert len({layer.number for layer in layers}) == len(layers)
+
+
+def test_bounds_contain_the_waves_and_planes_are_without_end(gl, scene, data, model):
+    for height in (0.0, 0.2, -0.2):
+        updated(gl, scene, data, height)
+        balls = scene.balls(data)
+        assert np.isinf(balls.radii).sum() == 1
+        directions = np.random.default_rng(0).normal(size=(50, 3))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        finite = np.isfinite(balls.radii)
+        for point in np.array([0, 0, 1]) + (0.5 + height) * directions:
+            reach = np.linalg.norm(balls.centres[finite] - point, axis=1) - balls.radii[finite]
+            assert reach.min() < 0.01  # a facet's chord under the sphere
+
+
+def test_bounds_of_shadow_casters_stay_the_same_as_a_target_turns(gl, scene, model, data):
+    updated(gl, scene, data)
+    before = scene.casters(data)
+    data.geom_xmat[0] = [0, -1, 0, 1, 0, 0, 0, 0, 1]
+    updated(gl, scene, data)
+    for a, b in zip(before, scene.casters(data), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert np.isfinite(before.radii).all()  # planes cast no shadow
+
+
+def test_planes_and_sites_hide_no_sky(gl, scene, data):
+    assert updated(gl, scene, data) == 3
+
+
+@pytest.mark.parametrize(
+    ("geom", "message"),
+    [(2, r"geom 2 is no target; the targets' geoms are: 0$"), (0, "has no heatmap; give its `Surf")],
+)
+def test_a_heatmap_needs_a_target_that_shows_one(scene, geom, message):
+    with pytest.raises(RippleError, match=message):
+        scene.set_heatmap(geom, np.zeros((6, 10, 10), np.float32), 1.0)
+
+
+@pytest.mark.parametrize("shape", [(6, 8, 8, 4), (6, 10, 10), (5, 10, 10, 4)])
+def test_a_height_map_of_another_shape_is_refused(gl, scene, data, shape):
+    with pytest.raises(RippleError, match=r"geom 0 has shape .* valid is \[6, 10, 10, 4\]"), gl as ctx:
+        scene.update(ctx, data, {0: np.zeros(shape, np.float32)}, POSE)

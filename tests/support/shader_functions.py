@@ -1,0 +1,69 @@
+"""Functions of the renderer's shaders, called with many inputs."""
+
+import importlib
+import shutil
+import sys
+import tempfile
+import weakref
+from pathlib import Path
+
+import moderngl
+import numpy as np
+
+import ripple_sim.render
+from ripple_sim.render.gpu.contract import DEFINES
+from ripple_sim.solver.gl import GLContext, load_shader
+
+_PACKAGE = "shaders_under_test"
+_WIDTH = 256
+_VERTEX = """#version 430
+void main() { gl_Position = vec4(4.0 * vec2(gl_VertexID == 1, gl_VertexID == 2) - 1.0, 0.0, 1.0); }
+"""
+_FRAGMENT = """#version 430
+{include}
+uniform sampler2D given;
+out vec4 result;
+void main()
+{{
+    vec4 x = texelFetch(given, ivec2(gl_FragCoord.xy), 0);
+    result = {expression};
+}}
+"""
+_folder = tempfile.TemporaryDirectory(prefix="ripple-sim-shaders-")
+_cleanup = weakref.finalize(_folder, _folder.cleanup)
+
+
+def _source(include: str, expression: str, defines: dict[str, object]) -> str:
+    """Source of a fragment shader made here that includes one of the renderer's files, by the loader itself."""
+    package = Path(_folder.name, _PACKAGE)
+    if not package.exists():
+        shutil.copytree(Path(ripple_sim.render.__file__).parent, package, ignore=shutil.ignore_patterns("*.py", "__*"))
+        (package / "__init__.py").touch()
+        sys.path.append(_folder.name)
+        importlib.invalidate_caches()
+    text = _FRAGMENT.format(include=f'#include "{include}"', expression=expression)
+    (package / "under_test.glsl").write_text(text)
+    return load_shader(_PACKAGE, "under_test", **{**DEFINES, **defines})
+
+
+def evaluated(gl: GLContext, include: str, expression: str, inputs: np.ndarray, **defines: object) -> np.ndarray:
+    """Values [k, 4] of a GLSL expression of `x`, a vec4, at inputs [k, up to 4]; float32."""
+    count, columns = inputs.shape
+    rows = -(-count // _WIDTH)
+    given = np.zeros((rows * _WIDTH, 4), dtype=np.float32)
+    given[:count, :columns] = inputs
+    source = _source(include, expression, defines)
+    with gl as ctx:
+        program = ctx.program(vertex_shader=_VERTEX, fragment_shader=source)
+        texture = ctx.texture((_WIDTH, rows), 4, given.tobytes(), dtype="f4")
+        target = ctx.texture((_WIDTH, rows), 4, dtype="f4")
+        picture = ctx.framebuffer([target])
+        picture.use()
+        ctx.enable_only(0)
+        texture.use(0)
+        if "given" in program:  # an unused input is optimised away
+            program["given"] = 0
+        ctx.vertex_array(program, []).render(moderngl.TRIANGLES, vertices=3)
+        values = np.frombuffer(picture.read(components=4, dtype="f4"), dtype=np.float32)
+        ctx.detect_framebuffer(0).use()
+    return values.reshape(-1, 4)[:count]
