@@ -130,7 +130,7 @@ def test_reading_shows_copies_and_changes_nothing(material: str) -> None:
     operator = operator_of(texels, MATERIALS[material](texels))
     backend = started(operator, 0.1 * noise(texels, 1), noise(texels, 2))
     backend.kick(np.array([0]), np.array([1.0], np.float32), 0.5)
-    before = [backend.height(), backend.velocity(), backend.dent()]
+    before = [backend.height().copy(), backend.velocity().copy(), backend.dent().copy()]
     for read in (backend.height, backend.velocity, backend.dent):
         read()[:] = np.nan
     for now, then in zip([backend.height(), backend.velocity(), backend.dent()], before, strict=True):
