@@ -47,7 +47,7 @@ def test_the_point_lies_within_the_texel() -> None:
         record, pose = record_of({2: [(direction, 1.0)]})
         [impulse] = record.impulses(NAMES, SHAPE, DT)
         away = np.linalg.norm(atlas.positions[impulse.texel] - in_frame(impulse.point[None], pose))
-        # at the corners of the cube, texels are rhombi of 120 degrees: half their diagonal is 0.93 of the root of the area
+        # at the cube's corners texels are rhombi of 120 degrees: half the diagonal is 0.93 of the area's root
         assert away < 0.95 * np.sqrt(atlas.areas[impulse.texel])
 
 
