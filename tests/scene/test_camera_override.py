@@ -1,4 +1,4 @@
-"""A scene through another camera, or with another exposure: what is given changes, and what has no effect is refused."""
+"""A scene through another camera or with another exposure: what has no effect is refused."""
 
 import dataclasses
 
