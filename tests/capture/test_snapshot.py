@@ -1,0 +1,95 @@
+"""Snapshots hold the state of their time while the simulation goes on, and tell states apart bit for bit."""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+from exposed_scene import FPS, SPEED, THROW
+
+from ripple_sim.capture.snapshot import Snapshot, snapshots
+from ripple_sim.simulation import Simulation
+from ripple_sim.solver import HeightMap
+
+POKE = '[[poke]]\ngeom = "egg"\ntime = 0.01\npoint = [0.0, 0.0, 0.05]\nimpulse = 1e-4\nradius = 0.02\n'
+HITTING = '<body name="shot" pos="0 0 0.1005"><freejoint/><geom size="0.05" mass="0.1"/></body>'
+DOWN = '[[throw]]\nbody = "shot"\ntime = 0.0\nvelocity = [0, 0, -0.5]\n'
+
+
+def taken(scene, frames: int, alive: int | None = None) -> list[Snapshot]:
+    simulation = Simulation(scene, fps=FPS, backend="cpu")
+    return list(snapshots(simulation, frames, alive=frames if alive is None else alive))
+
+
+def test_each_frame_has_the_state_of_its_own_time(make_scene) -> None:
+    scene = make_scene(script=THROW + POKE)
+    alone = Simulation(scene, fps=FPS, backend="cpu")
+    for number, snapshot in enumerate(taken(scene, 4)):
+        if number:
+            alone.advance_frame()
+        assert (snapshot.number, snapshot.exposure) == (number, 0)
+        assert snapshot.data.time == pytest.approx(number / FPS, abs=1e-12)
+        np.testing.assert_array_equal(snapshot.data.qpos, alone.data.qpos)
+        np.testing.assert_array_equal(snapshot.heights["egg"], alone.ripples["egg"].height)
+        height_map = HeightMap(alone.ripples["egg"].atlas.texels)(snapshot.heights["egg"])
+        np.testing.assert_array_equal(snapshot.height_maps["egg"], height_map)
+    assert snapshot.heights["egg"].any()
+
+
+def test_only_as_many_snapshots_as_are_in_use_keep_their_bodies(make_scene) -> None:
+    states = taken(make_scene(), 5, alive=2)
+    assert len({id(state.data) for state in states}) == 2
+    times = [state.data.time for state in states]
+    np.testing.assert_allclose(times, np.array([4, 3, 4, 3, 4]) / FPS, atol=1e-12)
+
+
+def test_a_frame_without_time_between_its_exposures_is_copied_once(make_scene) -> None:
+    """A lens alone: all exposures show the same state, and share one copy of it."""
+    states = taken(make_scene(aperture=0.1, exposures=4), 3)
+    assert [(state.number, state.exposure) for state in states] == [(n, e) for n in range(3) for e in range(4)]
+    for n in range(3):
+        assert len({id(state.data) for state in states[4 * n : 4 * n + 4]}) == 1
+        assert len({state.digest() for state in states[4 * n : 4 * n + 4]}) == 1
+
+
+def test_bodies_fly_on_from_exposure_to_exposure_at_their_speed(make_scene) -> None:
+    states = taken(make_scene(shutter=180.0, exposures=4), 2, alive=8)[4:]
+    np.testing.assert_allclose([state.data.time for state in states], (1 + np.arange(4) / 8) / FPS, atol=1e-9)
+    places = [state.data.body("shot").xpos[1] for state in states]
+    np.testing.assert_allclose(np.diff(places), -SPEED / 8 / FPS, rtol=1e-6)
+
+
+def test_impulses_are_those_since_the_frame_before_and_none_is_told_twice(make_scene) -> None:
+    scene = make_scene(bodies=HITTING, script=DOWN)
+    alone, told = Simulation(scene, fps=FPS, backend="cpu"), 0
+    for number, snapshot in enumerate(taken(scene, 3)):
+        if number:
+            alone.advance_frame()
+        assert [each.impulse for each in snapshot.impulses] == [each.impulse for each in alone.impulses]
+        told += len(snapshot.impulses)
+    assert told > 0
+    shared = taken(make_scene(bodies=HITTING, script=DOWN, shutter=180.0, exposures=4), 3)
+    assert sum(len(each.impulses) for each in shared if each.exposure == 0) == told
+
+
+def test_the_digest_is_the_same_for_the_same_state_and_tells_every_bit(make_scene) -> None:
+    scene = make_scene(script=THROW + POKE)
+    one, same = taken(scene, 3), taken(scene, 3)
+    assert [each.digest() for each in one] == [each.digest() for each in same]
+    assert len({each.digest() for each in one}) == 3
+    last = one[-1]
+    for change in ("qpos", "qvel", "heights"):
+        data, heights = mujoco.MjData(scene.model), {name: each.copy() for name, each in last.heights.items()}
+        mujoco.mj_copyData(data, scene.model, last.data)
+        array = heights["egg"] if change == "heights" else getattr(data, change)
+        copied = dataclasses.replace(last, data=data, heights=heights)
+        assert copied.digest() == last.digest()
+        array.flat[-1] = np.nextafter(array.flat[-1], array.dtype.type(np.inf))
+        assert copied.digest() != last.digest()
+
+
+def test_no_frames_take_no_step(make_scene) -> None:
+    simulation = Simulation(make_scene(), fps=FPS, backend="cpu")
+    assert not list(snapshots(simulation, 0))
+    assert len(list(snapshots(simulation, 1))) == 1
+    assert simulation.data.time == 0

@@ -1,0 +1,109 @@
+"""Scene files and models are found, edited, varied and refused with the reason, in one line."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim.errors import SceneError
+from ripple_sim.scene.load_scene import load_model, load_scene, refusal_of
+from ripple_sim.scene.randomize import RandomEntry
+
+MJCF = """<mujoco><worldbody><geom name="egg" size="0.1"/>
+<body name="stone" pos="0 0 1"><freejoint/><geom size="0.05"/></body>
+<body name="brick" pos="1 0 1"><freejoint/><geom size="0.05"/></body></worldbody></mujoco>"""
+TOML = """model = "models/scene.xml"
+[[ripple]]
+geom = "egg"
+[[drop]]
+body = "stone"
+time = 0.1
+position = [1, 2, 3]
+[[drop]]
+body = "brick"
+time = 0.1
+[[throw]]
+body = "stone"
+time = 0.2
+velocity = [0, 0, 1]
+position = [4, 5, 6]
+[[place]]
+body = "stone"
+time = 0.3
+position = [7, 8, 9]
+"""
+
+
+def written(folder: Path, toml: str = TOML) -> Path:
+    (folder / "models").mkdir()
+    (folder / "models" / "scene.xml").write_text(MJCF)
+    (folder / "pond.toml").write_text(toml)
+    return folder / "pond.toml"
+
+
+def test_the_model_lies_relative_to_the_scene_file_wherever_it_is_read_from(tmp_path, monkeypatch) -> None:
+    path = written(tmp_path)
+    monkeypatch.chdir(tmp_path / "models")
+    for name in (path, str(path), "../pond.toml"):
+        scene = load_scene(name)
+        assert (scene.name, scene.model.ngeom) == ("pond", 3)
+
+
+def test_drops_and_throws_are_shifted_with_their_bodies_and_places_stay(tmp_path) -> None:
+    scene = load_scene(written(tmp_path, TOML + "[random]\nposition = 0.3\nseed = 5\n"))
+    shift = scene.model.body("stone").pos - [0, 0, 1]
+    assert 0 < np.abs(shift).max() <= 0.3
+    stone, brick = scene.events.drop
+    np.testing.assert_allclose(stone.position, np.add([1, 2, 3], shift))
+    assert brick.position is None
+    np.testing.assert_allclose(scene.events.throw[0].position, np.add([4, 5, 6], shift))
+    assert scene.events.place[0].position == (7, 8, 9)
+
+
+def test_an_edit_comes_after_chance_and_before_the_model_is_compiled(tmp_path) -> None:
+    seen = []
+
+    def edit(spec: mujoco.MjSpec) -> None:
+        seen.append(spec.body("stone").pos.copy())
+        spec.worldbody.add_geom(name="new", size=[0.2, 0, 0])
+
+    scene = load_scene(written(tmp_path, TOML + "[random]\nposition = 0.3\n"), edit)
+    assert scene.model.geom("new").size[0] == 0.2
+    np.testing.assert_allclose(seen, [scene.model.body("stone").pos])
+    assert not np.allclose(seen, [0, 0, 1])
+
+
+def test_without_chance_and_edit_no_body_is_shifted(tmp_path) -> None:
+    written(tmp_path)
+    path = tmp_path / "models" / "scene.xml"
+    model, shifts = load_model(path)
+    assert shifts == {}
+    still, shifts = load_model(path, RandomEntry())
+    assert list(shifts) == ["stone", "brick"]
+    np.testing.assert_array_equal(still.body_pos, model.body_pos)
+
+
+@pytest.mark.parametrize("broken", ["not toml = [", "\xff\xfe"])
+def test_a_file_that_is_no_toml_is_refused_by_its_name(tmp_path, broken: str) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_bytes(broken.encode("latin-1"))
+    with pytest.raises(SceneError, match=r"scene file '.*bad.toml' (is not valid TOML|cannot be read): "):
+        load_scene(path)
+
+
+def test_missing_scenes_and_models_are_told_apart_from_folders(tmp_path) -> None:
+    with pytest.raises(SceneError, match=r"there is no scene .*; shipped scenes are .*duck.*path of a TOML file"):
+        load_scene(tmp_path)
+    with pytest.raises(SceneError, match=r"none.xml' does not exist; `model` names it, relative to the scene file"):
+        load_model(tmp_path / "none.xml")
+    with pytest.raises(SceneError, match="is not a file"):
+        load_model(tmp_path)
+
+
+def test_mujocos_reason_is_told_in_one_line_and_other_errors_pass() -> None:
+    with pytest.raises(SceneError, match=r"^MuJoCo refuses 'a\.xml': first second$") as error, refusal_of("'a.xml'"):
+        raise ValueError("first\n   second\n")
+    assert isinstance(error.value.__cause__, ValueError)
+    with pytest.raises(KeyError), refusal_of("'a.xml'"):
+        raise KeyError("first")

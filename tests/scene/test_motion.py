@@ -1,0 +1,127 @@
+"""Bodies are held, dropped, thrown and placed as entries say, in MuJoCo's own state."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim.errors import SceneError
+from ripple_sim.scene.motion import DropEntry, Motions, PlaceEntry, ThrowEntry, check_time, free_joint
+
+MJCF = """<mujoco><option timestep="0.002"/><worldbody><geom name="ground" type="plane" size="9 9 1"/>
+<body name="post" pos="5 0 0"><joint type="hinge" axis="0 0 1"/><geom size="0.1"/></body>
+<body name="wall" pos="6 0 0"><geom size="0.1"/></body>
+<body name="stone" pos="0 0 3" quat="0.6 0 0.8 0"><freejoint/><geom size="0.1"/></body>
+<body name="brick" pos="2 0 3"><freejoint/><geom type="box" size="0.1 0.2 0.1"/></body></worldbody></mujoco>"""
+
+
+@pytest.fixture(scope="module")
+def model() -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(MJCF)
+
+
+def run(model: mujoco.MjModel, entries: list, seconds: float) -> mujoco.MjData:
+    data, motions = mujoco.MjData(model), Motions(model, entries)
+    while data.time < seconds - 1e-9:
+        motions.apply(data)
+        mujoco.mj_step(model, data)
+    return data
+
+
+def velocity(data: mujoco.MjData, name: str) -> np.ndarray:
+    """Angular and linear velocity of a body in the world."""
+    found = np.zeros(6)
+    mujoco.mj_forward(data.model, data)
+    mujoco.mj_objectVelocity(data.model, data, mujoco.mjtObj.mjOBJ_BODY, data.model.body(name).id, found, 0)
+    return found
+
+
+@pytest.mark.parametrize("entry", [DropEntry, ThrowEntry])
+def test_velocity_and_spin_are_those_of_the_world_whatever_the_orientation(model, entry: type) -> None:
+    data = mujoco.MjData(model)
+    turn = (0.5, -1.5, 2.0, 1.0)
+    motions = Motions(
+        model,
+        [entry("stone", 0.0, position=(1, 2, 3), orientation=turn, velocity=(4, 5, 6), angular_velocity=(-1, 2, 3))],
+    )
+    motions.apply(data)
+    np.testing.assert_allclose(velocity(data, "stone"), [-1, 2, 3, 4, 5, 6], atol=1e-12)
+    np.testing.assert_allclose(data.body("stone").xpos, [1, 2, 3])
+    np.testing.assert_allclose(data.body("stone").xquat, np.array(turn) / np.linalg.norm(turn))
+    assert not velocity(data, "brick").any()
+
+
+def test_without_place_and_orientation_a_throw_begins_where_the_body_is(model) -> None:
+    data = mujoco.MjData(model)
+    Motions(model, [ThrowEntry("stone", 0.0, velocity=(1, 0, 0), angular_velocity=(0, 0, 7))]).apply(data)
+    np.testing.assert_allclose(velocity(data, "stone"), [0, 0, 7, 1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(data.body("stone").xpos, [0, 0, 3])
+    np.testing.assert_allclose(data.body("stone").xquat, [0.6, 0, 0.8, 0])
+
+
+def test_a_placed_body_is_at_rest_and_only_it_is_touched(model) -> None:
+    data = mujoco.MjData(model)
+    data.qvel[:] = np.arange(1.0, model.nv + 1)
+    before = data.qvel.copy()
+    Motions(model, [PlaceEntry("brick", 0.0, position=(7, 8, 9))]).apply(data)
+    address = int(model.jnt_dofadr[model.body("brick").jntadr[0]])
+    assert not data.qvel[address : address + 6].any()
+    np.testing.assert_array_equal(np.delete(data.qvel, range(address, address + 6)), before[:address])
+
+
+def test_a_body_waits_at_home_for_its_drop_and_then_falls_freely(model) -> None:
+    held = run(model, [DropEntry("stone", 0.3)], 0.3)
+    np.testing.assert_allclose(held.qpos[1:8], [0, 0, 3, 0.6, 0, 0.8, 0], atol=1e-4)
+    fallen = run(model, [DropEntry("stone", 0.3)], 0.7)
+    assert 3 - fallen.qpos[3] == pytest.approx(9.81 / 2 * 0.4**2, rel=0.01)
+
+
+def test_a_body_may_be_dropped_again_from_its_first_place(model) -> None:
+    """Between its two drops it is held at home, for the second one already waits."""
+    data = run(model, [DropEntry("stone", 0.4), DropEntry("stone", 0.2, position=(0, 0, 8))], 0.3)
+    np.testing.assert_allclose(data.qpos[1:4], [0, 0, 3], atol=1e-3)
+
+
+def test_events_happen_once_and_in_the_order_of_time_not_of_the_file(model) -> None:
+    places = [PlaceEntry("stone", time, position=(time, 0, 3)) for time in (0.3, 0.1, 0.2)]
+    for seconds, expected in ((0.05, 0.0), (0.15, 0.1), (0.25, 0.2), (0.45, 0.3)):
+        data = run(model, places, seconds)
+        assert data.qpos[1] == pytest.approx(expected)
+    assert data.qvel[3] < -1, "after its last place it has fallen on, not been placed at each step"
+
+
+def test_a_time_within_round_off_of_a_step_belongs_to_it(model) -> None:
+    data = mujoco.MjData(model)
+    data.time = 0.1 + 0.2 - 1e-12
+    Motions(model, [PlaceEntry("stone", 0.3, position=(1, 1, 1))]).apply(data)
+    np.testing.assert_array_equal(data.qpos[1:4], 1)
+
+
+def test_free_joint_addresses_skip_the_joints_before(model) -> None:
+    assert free_joint(model, DropEntry("stone", 0.0)) == (1, 1)
+    assert free_joint(model, DropEntry("brick", 0.0)) == (8, 7)
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        (
+            DropEntry("rock", 0.0),
+            r"\[\[drop\]\] names the body 'rock'; the model's bodies are post, wall, stone, brick",
+        ),
+        (ThrowEntry("post", 0.0, (0, 0, 1)), r"\[\[throw\]\] .* 'post', which has no <freejoint/>; valid are free"),
+        (DropEntry("wall", 0.0), "'wall', which has no <freejoint/>; only free bodies can drop"),
+        (PlaceEntry("stone", -0.1, (0, 0, 0)), r"\[\[place\]\] of 'stone' has time -0.1 s; valid is 0 or greater"),
+        (DropEntry("stone", 0.0, orientation=(0, 0, 0, 0)), "orientation .*; valid is w x y z, not 0"),
+        (DropEntry("stone", 0.0, orientation=(np.nan, 0, 0, 1)), "valid is w x y z, not 0"),
+    ],
+)
+def test_entries_that_cannot_be_carried_out_are_refused_at_once(model, entry: object, message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        Motions(model, [entry])
+
+
+@pytest.mark.parametrize("time", [-1e-9, float("inf"), float("-inf"), float("nan")])
+def test_times_are_finite_and_not_negative(time: float) -> None:
+    with pytest.raises(SceneError, match=r"\[\[poke\]\] of 'egg' has time .*; valid is 0 or greater"):
+        check_time("poke", "egg", time)
+    check_time("poke", "egg", 0.0)

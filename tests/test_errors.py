@@ -1,0 +1,36 @@
+"""One `except RippleError` catches all that ripple-sim raises on purpose, and nothing else."""
+
+import inspect
+
+import pytest
+
+import ripple_sim
+from ripple_sim import errors as of_application
+from ripple_sim.solver import errors as of_solver
+from ripple_sim.solver.errors import RippleError
+
+CLASSES = sorted(
+    {each for module in (of_solver, of_application) for _, each in inspect.getmembers(module, inspect.isclass)},
+    key=lambda each: each.__name__,
+)
+ERRORS = [each for each in CLASSES if not issubclass(each, Warning)]
+
+
+def test_there_is_one_root_for_the_solver_and_the_application() -> None:
+    assert of_application.RippleError is of_solver.RippleError is ripple_sim.RippleError
+    assert len(ERRORS) >= 10
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda each: each.__name__)
+def test_every_error_is_caught_as_a_ripple_error_and_keeps_its_message(error: type[RippleError]) -> None:
+    with pytest.raises(RippleError, match=r"^height is nan; valid are numbers$"):
+        raise error("height is nan; valid are numbers")
+    siblings = [other for other in ERRORS if other not in (error, RippleError)]
+    assert error is RippleError or not issubclass(error, tuple(siblings))
+    # a mistake in the code itself must not look like one of the user
+    assert not issubclass(error, (ValueError, TypeError, OSError, RuntimeError))
+
+
+def test_a_warning_is_no_error_so_that_the_program_goes_on() -> None:
+    assert issubclass(of_application.RippleWarning, UserWarning)
+    assert not issubclass(of_application.RippleWarning, RippleError)
