@@ -15,8 +15,9 @@ def bump(middle: float, width: float = 0.3, height: float = 1.0) -> np.ndarray:
 def test_a_parabola_is_found_exactly_between_the_samples() -> None:
     times = np.arange(8.0)
     signal = (9 - (times - 3.3) ** 2)[:, None]
-    _, [crest] = front_and_crest(times, signal)
+    [front], [crest] = front_and_crest(times, signal)
     assert crest == pytest.approx(3.3, abs=1e-12)
+    assert front == pytest.approx(1 + (4.5 - signal[1, 0]) / (signal[2, 0] - signal[1, 0]), abs=1e-12)
 
 
 @pytest.mark.parametrize("middle", [1.5, 2.003, 2.718])

@@ -8,7 +8,6 @@ from scipy.special import i0e
 from ripple_sim.bench.first_crest import front_and_crest
 from ripple_sim.bench.plane_wave import NEAREST, plane_arrival
 
-
 FARTHEST = 20.0
 SLANTS = np.linspace(0, np.pi / 2, 2001)
 
