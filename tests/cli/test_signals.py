@@ -50,7 +50,7 @@ def test_before_a_command_and_during_imports_the_process_ends_with_one_line(
     take, then = ("end_in_good_order", "import slow") if importing else ("end_at_once", send)
     program = (
         f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\nfrom ripple_sim.cli import signals\n"
-        f"signals.{take}()\ntry:\n    exec({then!r})\nexcept BaseException as error:\n    print('caught', repr(error))\n"
+        f"signals.{take}()\ntry:\n    exec({then!r})\nexcept BaseException as error:\n    print(repr(error))\n"
     )
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert result.returncode == 128 + number
