@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from ripple_sim.coupling.ripples import Impulse
+from ripple_sim.overlay.arrows import draw_arrow
 from ripple_sim.overlay.contact_marks import MEMORY, ContactMarks, Mark
 from ripple_sim.overlay.layout import Layout
 from ripple_sim.overlay.marks import PlacedMark, draw_marks, place_marks
 from ripple_sim.overlay.projection import Projection
+from ripple_sim.overlay.sprite import Sprite
 from ripple_sim.render import Camera
 from ripple_sim.solver import sphere_atlas
 
@@ -118,3 +120,13 @@ def test_contacts_in_one_place_add_up_and_others_are_apart_the_weakest_first() -
     still.impulses.append(still.touch(0.7, (3, 2, 2)))
     found = ContactMarks(still, 1 / 60).follow()
     assert [mark.impulse for mark in found] == pytest.approx([0.5, 0.7, 3.0])
+
+
+def test_a_mark_is_the_whole_arrow_up_to_its_rim() -> None:
+    layout, tip, tail, opacity = Layout(1280, 720), np.array([60.0, 40.0]), np.array([20.0, 40.0]), np.ones(9)
+    frame, whole = (np.zeros((80, 90, 3), np.uint8) for _ in range(2))
+    draw_marks(frame, [PlacedMark(tip, tail, opacity)], layout)
+    sprite = Sprite(90, 80)
+    draw_arrow(sprite, tip, tail, layout.arrow_thickness, opacity)
+    sprite.over(whole, 0, 0)
+    np.testing.assert_array_equal(frame, whole)

@@ -91,3 +91,15 @@ def test_a_failure_to_write_ends_the_recording(recorder: Recorder, tmp_path: Pat
     assert not recorder.recording
     assert names(tmp_path) == ["duck-1.mp4"]
     assert names(tmp_path / "duck-1.mp4") == ["mine"]
+
+
+def test_a_frame_that_cannot_be_encoded_ends_the_recording_and_leaves_nothing(
+    recorder: Recorder, tmp_path: Path
+) -> None:
+    recorder.start(frame(0))
+    (tmp_path / "duck-1.mp4.part" / "frames" / ".unfinished.mp4").mkdir()  # in the way of the first clip
+    with pytest.raises(EncodingError, match=r"cannot write the video .*duck-1\.mp4"):
+        for _ in range(1000):  # more than the queue holds
+            recorder.add(frame(0))
+    assert not recorder.recording
+    assert names(tmp_path) == []
