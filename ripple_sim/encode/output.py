@@ -114,16 +114,27 @@ def _check_exr(overlaid: bool) -> None:
         )
 
 
+def check_replaceable(folder: Path) -> None:
+    """Make sure that a folder holds frames and nothing else.
+
+    Raises
+    ------
+    VideoError
+        Naming another file.
+    """
+    strangers = [entry.name for entry in folder.iterdir() if not _FRAME_PATTERN.fullmatch(entry.name)]
+    if strangers:
+        raise VideoError(f"cannot write frames to {folder}: it holds other files ({min(strangers)}); name a new folder")
+
+
 def _check_place(path: Path, form: str) -> None:
     is_file = form in ENDINGS
     if path.is_dir():
         if is_file:
             raise VideoError(f"cannot write {path}: it is a folder; name a file")
-        strangers = [entry.name for entry in path.iterdir() if not _FRAME_PATTERN.fullmatch(entry.name)]
-        if strangers:
-            raise VideoError(
-                f"cannot write frames to {path}: it holds other files ({sorted(strangers)[0]}); name a new folder"
-            )
+        if path.is_symlink():  # which no finished folder can replace
+            raise VideoError(f"cannot write frames to {path}: it is a link; name the folder {path.resolve()}")
+        check_replaceable(path)
     elif path.exists() and not (is_file and path.is_file()):
         raise VideoError(f"cannot write {path}: it exists and is not a {'file' if is_file else 'folder'}")
     folder = path.absolute().parent

@@ -17,6 +17,7 @@ from pathlib import Path
 from ripple_sim.errors import VideoError
 
 from .move import move
+from .output import check_replaceable
 from .record import SETTINGS, STATES, Record
 
 _FRAMES, _WHOLE = "frames", "whole"
@@ -102,8 +103,15 @@ class Part:
         self._record.check_state(self._states, frame, digest)
 
     def finish(self) -> None:
-        """Put the file, or else the folder of segments, in the video's place, and remove everything else."""
-        if self.video.is_dir():  # of frames and nothing else: `check_output` has looked
+        """Put the file, or else the folder of segments, in the video's place, and remove everything else.
+
+        Raises
+        ------
+        VideoError
+            If an older folder in that place holds other files by now.
+        """
+        if self.video.is_dir():
+            check_replaceable(self.video)  # again: a render takes long
             shutil.rmtree(self.video)
         move(self.whole if self.whole.exists() else self._segments, self.video)
         self.remove()

@@ -16,6 +16,9 @@ def level(camera: pv.Camera) -> None:
     """Keep the horizon level, and the camera off the vertical, where there is no horizon."""
     focus = np.array(camera.focal_point)
     x, y, z = np.array(camera.position) - focus
+    if x == y == 0:  # straight above or below: what is up in the frame tells where to go
+        up = np.array(camera.up[:2])
+        x, y = -1e-9 * z * (up if up.any() else np.array([0.0, 1.0]))
     across, most = math.hypot(x, y), math.tan(math.radians(_STEEPEST))
     if across > 0 and abs(z) > most * across:
         distance, slant = math.hypot(across, z), math.hypot(1.0, most)

@@ -1,0 +1,115 @@
+"""Outputs: which format a name means, and the limits of every format."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ripple_sim.encode import open_writer
+from ripple_sim.encode.output import ENDINGS, check_output, default_fps, video_format
+from ripple_sim.errors import EncodingError, VideoError
+
+
+@pytest.mark.parametrize(
+    ("name", "form"),
+    [
+        ("clip.mp4", ".mp4"),
+        ("CLIP.MP4", ".mp4"),
+        ("a.b.WebM", ".webm"),
+        ("frames", "png"),
+        ("folder.mp4/frames", "png"),
+        (".hidden", "png"),
+        (".hidden.gif", ".gif"),
+        ("v1.2", "png"),  # a folder that is there
+    ],
+)
+def test_the_last_ending_of_a_name_is_its_format(tmp_path: Path, name: str, form: str) -> None:
+    (tmp_path / "v1.2").mkdir()
+    assert video_format(tmp_path / name) == form
+    assert video_format(tmp_path / name, "exr") == ("exr" if form == "png" else form)
+
+
+@pytest.mark.parametrize("name", ["clip.avi", "v1.3", "clip.mp4.part", "clip.", ".gif", ".MP4", "", ".."])
+def test_other_names_are_refused_with_all_that_is_valid(name: str) -> None:
+    with pytest.raises(VideoError) as refusal:
+        video_format(Path(name))
+    assert all(ending in str(refusal.value) for ending in ENDINGS)
+    assert "folder" in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "fps"),
+    [
+        ("clip.mp4", (16, 8192), 240),
+        ("clip.gif", (8191, 17), 50),
+        ("clip.webp", (17, 17), 1),
+        ("frames", (8192, 16), 240),
+    ],
+)
+def test_the_limits_themselves_are_valid(tmp_path: Path, name: str, size: tuple[int, int], fps: int) -> None:
+    check_output(tmp_path / name, *size, fps)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "fps", "message"),
+    [
+        ("frames", (15, 16), 60, "15x16; valid is 16 to 8192"),
+        ("frames", (16, 8193), 60, "16x8193; valid is 16 to 8192"),
+        ("frames", (64.0, 48), 60, r"64\.0x48; valid is 16 to 8192"),
+        ("clip.gif", (64, 48), 51, "a GIF's frame rate is 51; .* 1 to 50"),
+        ("clip.webp", (64, 48), 241, "frame rate is 241; .* 1 to 240"),
+        ("frames", (64, 48), 30.0, r"frame rate is 30\.0; valid is a whole number"),
+        ("frames", (64, 48), -1, "frame rate is -1;"),
+    ],
+)
+def test_what_lies_beyond_the_limits_is_refused(
+    tmp_path: Path, name: str, size: tuple[int, int], fps: int, message: str
+) -> None:
+    with pytest.raises(VideoError, match=message):
+        check_output(tmp_path / name, *size, fps)
+
+
+@pytest.mark.parametrize("name", ["clip.mp4", "clip.webm", "clip.gif"])
+def test_opacity_is_refused_where_it_would_be_lost(tmp_path: Path, name: str) -> None:
+    with pytest.raises(VideoError, match=r"cannot be transparent; valid is \.webp or a folder"):
+        check_output(tmp_path / name, 64, 48, 25, transparent=True)
+    check_output(tmp_path / "clip.webp", 64, 48, 25, transparent=True)
+    check_output(tmp_path / "frames", 64, 48, 25, transparent=True)
+
+
+@pytest.mark.parametrize("name", ["frame_0000.png", "frame_00000.jpg", "frame_00000.png.bak", ".frame_00000.png", "a"])
+def test_a_folder_that_holds_anything_but_frames_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / "frame_00000.png").touch()
+    (tmp_path / "frame_100000.exr").touch()
+    check_output(tmp_path, 64, 48, 25)
+    (tmp_path / name).touch()
+    with pytest.raises(VideoError, match="it holds other files"):
+        check_output(tmp_path, 64, 48, 25)
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_a_link_to_a_folder_of_frames_is_refused_before_anything_is_rendered(tmp_path: Path) -> None:
+    """The finished folder takes the place of the older one by renaming, which a link does not allow."""
+    (tmp_path / "older").mkdir()
+    (tmp_path / "frames").symlink_to(tmp_path / "older")
+    with pytest.raises(VideoError, match=r"frames: it is a link; name the folder .*older"):
+        check_output(tmp_path / "frames", 64, 48, 25)
+    check_output(tmp_path / "older", 64, 48, 25)
+
+
+def test_a_file_that_appears_among_the_older_frames_meanwhile_is_not_deleted(tmp_path: Path) -> None:
+    frame = np.zeros((16, 16, 3), np.uint8)
+    with open_writer(tmp_path / "frames", width=16, height=16, fps=25) as writer:
+        writer.write(frame)
+    with (
+        pytest.raises(EncodingError, match=r"holds other files \(notes\.txt\)"),
+        open_writer(tmp_path / "frames", width=16, height=16, fps=25) as writer,
+    ):
+        writer.write(frame)
+        (tmp_path / "frames" / "notes.txt").write_text("mine")
+    assert sorted(path.name for path in (tmp_path / "frames").iterdir()) == ["frame_00000.png", "notes.txt"]
+
+
+def test_default_rates_are_valid_for_their_formats(tmp_path: Path) -> None:
+    for name in ("clip.mp4", "clip.webm", "clip.GIF", "clip.webp", "frames"):
+        check_output(tmp_path / name, 64, 48, default_fps(tmp_path / name))
