@@ -1,4 +1,4 @@
-"""Shapes of falling bodies, by name: MuJoCo's primitives of 0.6 to 1.2 times the volume of a ball."""
+"""Shapes of falling bodies, by name: MuJoCo's primitives of 0.6 to 1 times the volume of a ball."""
 
 from __future__ import annotations
 
