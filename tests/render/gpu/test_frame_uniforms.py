@@ -5,24 +5,10 @@ import pytest
 from shader_functions import evaluated
 
 from ripple_sim.render.camera import Camera, Pose
-from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
-from ripple_sim.render.gpu.resources import Resources
 
 POSE = Camera((0.3, -1.2, 0.7), 5.0, 130.0, -35.0, 50.0).pose()
 THROUGH_LENS = Pose(POSE.position, POSE.rotation, POSE.distance, POSE.fovy, (0.1, -0.2), 3.0)
 ASPECT = 1.6
-
-
-class Owner:
-    pass
-
-
-@pytest.fixture
-def frame(gl):
-    owner = Owner()
-    resources = Resources(gl, owner)
-    yield FrameUniforms(resources)
-    resources.release()
 
 
 @pytest.mark.parametrize("pose", [POSE, THROUGH_LENS], ids=["pinhole", "lens"])

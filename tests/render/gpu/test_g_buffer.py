@@ -6,23 +6,9 @@ import pytest
 from shader_functions import evaluated
 
 from ripple_sim.render.gpu.g_buffer import GBuffer
-from ripple_sim.render.gpu.resources import Resources
 
 FILE = "gpu/g_buffer.glsl"
 BITS = 65535
-
-
-class Owner:
-    pass
-
-
-@pytest.fixture
-def resources(gl):
-    owner = Owner()
-    with gl:  # as the renderer does
-        made = Resources(gl, owner)
-        yield made
-        made.release()
 
 
 def directions() -> np.ndarray:

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.gpu.textures import srgb_cube, srgb_texture
 
 SAMPLE = """#version 430
@@ -17,19 +16,6 @@ void main() {
     colors[i] = textureLod(image, places[i].COORDINATES, places[i].w);
 }
 """
-
-
-class Owner:
-    pass
-
-
-@pytest.fixture
-def resources(gl):
-    owner = Owner()
-    with gl:  # as the renderer does
-        made = Resources(gl, owner)
-        yield made
-        made.release()
 
 
 def sampled(resources, texture, places, kind="2D") -> np.ndarray:

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from shader_functions import evaluated
 
-from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.visuals.looks import LOOKS, Look, find_look
 from ripple_sim.render.visuals.object_table import ObjectTable
 from ripple_sim.solver import RippleError
@@ -12,16 +11,9 @@ from ripple_sim.solver import RippleError
 LOOK = Look((0.1, 0.2, 0.3), 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.5)
 
 
-class Owner:
-    pass
-
-
 @pytest.fixture
-def table(gl):
-    owner = Owner()
-    resources = Resources(gl, owner)
-    yield ObjectTable(resources)
-    resources.release()
+def table(resources):
+    return ObjectTable(resources)
 
 
 def read(gl, table, expression, count=1) -> np.ndarray:

@@ -6,21 +6,7 @@ import pytest
 from shader_functions import evaluated
 
 from ripple_sim.render.gpu.contract import MAX_OCCLUDERS
-from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.visuals.occluders import Occluders, _capsules
-
-
-class Owner:
-    pass
-
-
-@pytest.fixture
-def resources(gl):
-    owner = Owner()
-    with gl:  # as the renderer does
-        made = Resources(gl, owner)
-        yield made
-        made.release()
 
 
 def posed(geoms: str):

@@ -5,26 +5,12 @@ import pytest
 from shader_functions import evaluated
 
 from ripple_sim.render.camera import Camera
-from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
-from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.visuals.lights import Light, Lighting
 from ripple_sim.render.visuals.studio import SOFT_BOX_LIGHTS, set_lighting, studio_lighting
 
 POSES = [
     Camera((0.0, 0.0, 0.0), 2.0, azimuth, elevation).pose() for azimuth, elevation in ((0, 0), (70, -30), (200, 89))
 ]
-
-
-class Owner:
-    pass
-
-
-@pytest.fixture
-def frame(gl):
-    owner = Owner()
-    resources = Resources(gl, owner)
-    yield FrameUniforms(resources)
-    resources.release()
 
 
 def about_z(degrees: float) -> np.ndarray:
