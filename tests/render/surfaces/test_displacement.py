@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from sphere_height_maps import cube_charts, height_map_of
 
-from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.surfaces.adaptive_tessellation import _heights
 from ripple_sim.render.surfaces.displacement import Displacement, Place
 from ripple_sim.render.surfaces.height_maps import HeightMapTextures
@@ -18,23 +17,10 @@ PAGE = ChartPage(6, N)
 STILL = Place(np.eye(3), np.zeros(3), 0)
 
 
-class Owner:
-    pass
-
-
 class NoGeoms:
     geom_aabb = np.zeros((0, 6))
     geom_xmat = np.zeros((0, 9))
     geom_xpos = np.zeros((0, 3))
-
-
-@pytest.fixture
-def resources(gl):
-    owner = Owner()
-    with gl:  # as the renderer does
-        made = Resources(gl, owner)
-        yield made
-        made.release()
 
 
 def vertices_at(chart, uv, positions=None, directions=None, midpoints=0) -> SurfaceVertices:

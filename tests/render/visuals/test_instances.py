@@ -4,14 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.render.visuals.geom_visuals import GeomVisuals
-
-
-class Owner:
-    pass
-
 
 XML = """<mujoco><worldbody>
 <geom type="sphere" size=".3" pos="1 2 3" euler="10 20 30"/><geom type="ellipsoid" size=".3 .2 .1" pos="0 1 0"/>
@@ -20,15 +14,11 @@ XML = """<mujoco><worldbody>
 
 
 @pytest.fixture
-def visuals(gl):
-    owner = Owner()
+def visuals(resources):
     model = mujoco.MjModel.from_xml_string(XML)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    with gl:
-        resources = Resources(gl, owner)
-        yield GeomVisuals(Assets.of(model, resources), range(model.ngeom)), data
-        resources.release()
+    return GeomVisuals(Assets.of(model, resources), range(model.ngeom)), data
 
 
 def test_geoms_of_one_shape_are_drawn_together_and_transparent_ones_alone(visuals):
