@@ -16,6 +16,9 @@ BOTH = [signal.SIGINT, signal.SIGTERM]
 @pytest.fixture(autouse=True)
 def _left_as_found() -> Iterator[None]:
     handlers = {number: signal.getsignal(number) for number in BOTH}
+    # a shell in the background starts us with Ctrl-C ignored, which children would inherit
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     yield
     for number, handler in handlers.items():
         signal.signal(number, handler)

@@ -42,9 +42,9 @@ def test_two_hundred_solvers_leave_nothing_on_the_gpu(gl_backend: str) -> None:
 def test_a_shared_shader_is_compiled_once(gl_backend: str) -> None:
     gl = shared_context()
     package = "ripple_sim.solver.backends.shaders"
-    shaders = [gl.shared_compute_shader(package, name) for name in ("halo", "halo", "kick")]
+    shaders = [gl.shared_compute_shader(package, name, LIST_GROUP=64) for name in ("halo", "halo", "kick")]
     assert shaders[0] is shaders[1] and shaders[0] is not shaders[2]
-    assert gl.compute_shader(package, "halo") is not shaders[0]
+    assert gl.compute_shader(package, "halo", LIST_GROUP=64) is not shaders[0]
 
 
 def test_solvers_that_share_shaders_keep_their_own_coefficients(gl_backend: str) -> None:
