@@ -28,7 +28,7 @@ class PlainShader:
             self._pairs = ctx.buffer(np.stack([addresses.ghosts, addresses.sources], axis=1).astype(np.int32).tobytes())
         self._count = len(addresses.ghosts)
         self._update = self._gl.compute_shader("ripple_sim.bench.shaders", "plain_update", N=n)
-        self._halo = self._gl.compute_shader("ripple_sim.bench.shaders", "plain_halo")
+        self._halo = self._gl.compute_shader("ripple_sim.solver.backends.shaders", "halo", LIST_GROUP=_GROUP)
 
     def set_height(self, height: Floats32) -> None:
         """Replace the height [m], [C, n, n]."""
