@@ -110,7 +110,7 @@ class AtlasPainter:
 
     @functools.cached_property
     def _openness(self) -> NDArray[np.float64]:
-        return bake(self._vertices, self._atlas.mesh.F, self._atlas.mesh.vertex_normals)[0]
+        return bake(self._vertices, self._atlas.mesh.F, self._atlas.mesh.vertex_normals).visibility
 
     @functools.cached_property
     def _widths(self) -> NDArray[np.float64]:

@@ -100,7 +100,7 @@ class DrawnScene:
         """Draw the depth of everything that casts a shadow, under a matrix of 16 numbers, column by column."""
         for target in self._targets:
             if target.casts_shadow:
-                target.draw_depth(view_projection)
+                target.draw_shadow(view_projection)
         self._geoms.draw_depth(view_projection, sites=True)
 
     def draw_occluders(self, view_projection: tuple[float, ...]) -> None:

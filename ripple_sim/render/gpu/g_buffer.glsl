@@ -28,13 +28,20 @@ vec2 unpack_unorm8(float channel)
     return vec2(high, bits - 256.0 * high) / 255.0;
 }
 
-// Number of an object, in the table of objects.
-float pack_object(float number)
+// Number of an object, in the table of objects, and whether its inner side is seen.
+const int INNER_SIDE = 32768;
+
+float pack_object(float number, bool inner)
 {
-    return number / UNORM16;
+    return (number + (inner ? float(INNER_SIDE) : 0.0)) / UNORM16;
 }
 
 int unpack_object(float channel)
 {
-    return int(channel * UNORM16 + 0.5);
+    return int(channel * UNORM16 + 0.5) & INNER_SIDE - 1;
+}
+
+bool unpack_inner(float channel)
+{
+    return int(channel * UNORM16 + 0.5) >= INNER_SIDE;
 }

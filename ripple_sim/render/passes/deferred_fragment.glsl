@@ -54,7 +54,7 @@ SurfaceSample surface_sample(ivec2 pixel, int s)
     Object object = objects[surface.object];
     vec2 place = color.xy * vec2(textureSize(height_maps, 0).xy);
     vec4 ripple = spline_at(height_maps, vec3(place, object.height_map.x));
-    ripple *= object.height_map.y > 0.0 ? 1.0 : 0.0;
+    ripple *= object.height_map.y > 0.0 ? (unpack_inner(normal.z) ? -1.0 : 1.0) : 0.0;
     surface.rippled = normalize(surface.normal - object.rotation * ripple.xyz);
     // cavity occlusion: less light reaches the troughs
     surface.visibility = baked.x * (1.0 - 0.4 * smoothstep(0.0, 0.03, -ripple.w / object.place.y));

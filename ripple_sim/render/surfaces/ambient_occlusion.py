@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
@@ -10,16 +12,26 @@ from numpy.typing import NDArray
 _RAYS = 1_000_000
 
 
-def bake(V: NDArray, F: NDArray, normals: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Cast cosine-distributed rays from every vertex, outwards and inwards.
+class Baked(NamedTuple):
+    """What rays from every vertex found, each float64 [n].
 
-    Returns
-    -------
-    visibility : array, shape [n]
+    Attributes
+    ----------
+    visibility : float64 [n]
         Ambient visibility, 1 - occlusion: share of the outer hemisphere from which light arrives.
-    thickness : array, shape [n]
+    thickness : float64 [n]
         Mean length of the inner rays over the mesh's bounding radius.
+    inner_visibility : float64 [n]
+        Ambient visibility of the inner side, which an open surface shows.
     """
+
+    visibility: NDArray[np.float64]
+    thickness: NDArray[np.float64]
+    inner_visibility: NDArray[np.float64]
+
+
+def bake(V: NDArray, F: NDArray, normals: NDArray) -> Baked:
+    """Cast cosine-distributed rays from every vertex, outwards and inwards."""
     count = int(np.clip(_RAYS // (2 * len(V)), 16, 64))
     radius = np.linalg.norm(V - V.mean(axis=0), axis=1).max()
     scene = EmbreeScene()
@@ -32,8 +44,9 @@ def bake(V: NDArray, F: NDArray, normals: NDArray) -> tuple[NDArray[np.float64],
         return np.minimum(hits / radius, 4.0).reshape(len(V), count)
 
     # nearby walls hide the light, those further than a radius away reflect some themselves
-    visibility = np.minimum(distances(1.0), 1.0).mean(axis=1)
-    return _smoothed(visibility, F), _smoothed(distances(-1.0).mean(axis=1), F)
+    outer, inner = distances(1.0), distances(-1.0)
+    values = (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0))
+    return Baked(*(_smoothed(each.mean(axis=1), F) for each in values))
 
 
 def _hemisphere(normals: NDArray, count: int) -> NDArray[np.float64]:

@@ -59,6 +59,13 @@ class Surface:
     heatmap_colors: NDArray[np.uint8] | None = None
     grid: int = 0
 
+    @property
+    def open(self) -> bool:
+        """Whether it has a rim."""
+        F = np.asarray(self.F, dtype=np.int64)
+        ends = np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        return bool((np.unique(ends, axis=0, return_counts=True)[1] == 1).any())
+
 
 def appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[np.float64], Mapping]:
     """Look, linear colour under the texture, and how the texture lies on the surface."""

@@ -62,7 +62,7 @@ class SurfaceDrawing:
         columns = [attributes[:, NORMAL], vertices.places, attributes[:, BAKED], mapped]
         still = resources.buffer(np.concatenate(columns, axis=1).astype("f4").tobytes())
         names = ("in_normal", "in_place", "in_baked", "in_mapped")
-        content = [(moved, "4f", "in_moved"), (still, "3f 2f 2f 3f", *names)]
+        content = [(moved, "4f", "in_moved"), (still, "3f 2f 3f 3f", *names)]
         # what a program does not use is optimised away
         self._solid = resources.vertex_array(self._program, content, indices, skip_errors=True)
         self._depth = resources.vertex_array(depth, content[:1], indices)

@@ -12,7 +12,7 @@ uniform float resolution;  // texels along a chart's side
 in vec3 normal;
 in vec2 place;
 flat in vec2 chart;
-in vec2 baked;
+in vec3 baked;
 in vec3 mapped;
 
 void main()
@@ -27,5 +27,7 @@ void main()
 #if GRID
     ink = grid_ink(place, resolution);
 #endif
-    write_g_buffer(normal, inside / vec2(textureSize(height_maps, 0).xy), shown, color.w, vec2(baked.x, 0.5 * baked.y), ink);
+    bool inner = !gl_FrontFacing;  // of an open surface: closed ones show their outer side alone
+    write_g_buffer(inner ? -normal : normal, inside / vec2(textureSize(height_maps, 0).xy), shown,
+                   pack_object(color.w, inner), vec2(inner ? baked.z : baked.x, 0.5 * baked.y), ink);
 }

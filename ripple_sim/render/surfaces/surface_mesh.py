@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
+
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +32,7 @@ _HIGHEST_BIAS = 0.05  # of shadows, in radii
 class SurfaceMesh:
     """A target on the GPU: triangles of a few pixels, so that it is round in outline and displaces smoothly.
 
-    Where waves are sharp, a frame has up to four triangles in place of one.
+    Where waves are sharp, a frame has up to four triangles in place of one. An open surface shows both of its sides.
 
     Parameters
     ----------
@@ -60,7 +63,7 @@ class SurfaceMesh:
         index: int,
         size: tuple[int, int],
     ) -> None:
-        self.geom, self._charts = geom, surface.charts
+        self.geom, self._charts, self._open, self._gl = geom, surface.charts, surface.open, assets.resources.gl
         self._objects, self._height_maps, self._layer = assets.objects, height_maps, index
         self._radius = float(np.linalg.norm(surface.V, axis=1).max())
         look, rgb, mapping = appearance(assets.model, geom, surface)
@@ -136,11 +139,27 @@ class SurfaceMesh:
 
     def draw(self) -> None:
         """Draw into the G-buffer."""
-        self._drawing.draw(self._pose[0], self._index_count)
+        with self._sides():
+            self._drawing.draw(self._pose[0], self._index_count)
+
+    def draw_shadow(self, view_projection: tuple[float, ...]) -> None:
+        """Draw the depth of the sides that are shown, as `draw_depth` does without culling."""
+        with self._sides():
+            self.draw_depth(view_projection)
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth only, under a matrix of 16 numbers, column by column."""
         self._drawing.draw_depth(view_projection, self._index_count)
+
+    @contextlib.contextmanager
+    def _sides(self) -> Iterator[None]:
+        """Where back faces are culled: cull none of an open surface."""
+        with self._gl as ctx:
+            if self._open:
+                ctx.disable(moderngl.CULL_FACE)
+            yield
+            if self._open:
+                ctx.enable(moderngl.CULL_FACE)
 
 
 def _adaptive(vertices: SurfaceVertices, charts: Charts, pixel: float) -> AdaptiveTessellation:

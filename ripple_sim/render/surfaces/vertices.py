@@ -21,7 +21,7 @@ _LEAST_FACES, _MOST_FACES = 20_000, 400_000
 # columns of the vertex attributes: along DIRECTION, the smooth normal, a vertex is displaced; COORDINATES are for the
 # chart map
 POSITION, DIRECTION, COORDINATES, NORMAL, BAKED, UV = (
-    slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 14), slice(14, 16),
+    slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15), slice(15, 17),
 )  # fmt: skip
 
 
@@ -45,8 +45,8 @@ def tessellated(
         Smooth normals of the vertices.
     max_length, max_faces
         As for `tessellate`.
-    baked : array, shape [n, 2], optional
-        Ambient visibility and thickness.
+    baked : array, shape [n, 3], optional
+        Ambient visibility, thickness and inner ambient visibility.
     corner_uv : array, shape [m, 3, 2], optional
         Texture coordinates of the triangles' corners.
 
@@ -58,7 +58,7 @@ def tessellated(
     V, F = mesh.V, mesh.F
     coordinates = charts.map.corner_coordinates(mesh)
     split = split_corners(V, F, corner_uv, coordinates)
-    baked = np.zeros((len(V), 2)) if baked is None else baked
+    baked = np.zeros((len(V), 3)) if baked is None else baked
     _, same = np.unique(np.column_stack([split.vertices, split.normals]), axis=0, return_inverse=True)
     each = split.vertices
     attributes = [V[each], smooth[each], split.coordinates, split.normals, baked[each], split.uv]

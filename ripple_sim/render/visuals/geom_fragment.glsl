@@ -10,5 +10,5 @@ flat in vec4 tiling;
 void main()
 {
     vec3 albedo = textured(color.rgb, mapped, tiling);
-    write_g_buffer(normal, vec2(0.0), sqrt(albedo), color.w, vec2(1.0), 0.0);
+    write_g_buffer(normal, vec2(0.0), sqrt(albedo), pack_object(color.w, false), vec2(1.0), 0.0);
 }

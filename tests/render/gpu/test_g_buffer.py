@@ -63,11 +63,15 @@ def test_values_beyond_zero_to_one_are_packed_as_the_nearest(gl):
     np.testing.assert_allclose(255 * back, [[0, 255], [255, 0], [255, 255], [0, 1]], atol=1e-4)
 
 
-def test_every_number_of_an_object_comes_back(gl):
-    given = np.arange(BITS + 1)[:, None]
-    channel = f"round({BITS}.0 * pack_object(x.x)) / {BITS}.0"
-    back = evaluated(gl, FILE, f"vec4(float(unpack_object({channel})), 0.0, 0.0, 0.0)", given)[:, 0]
-    np.testing.assert_array_equal(back, given[:, 0])
+@pytest.mark.parametrize("inner", [0, 1])
+def test_every_number_of_an_object_comes_back_with_its_side(gl, inner):
+    given = np.arange((BITS + 1) // 2)[:, None]
+    channel = f"round({BITS}.0 * pack_object(x.x, {inner} == 1)) / {BITS}.0"
+    back = evaluated(
+        gl, FILE, f"vec4(float(unpack_object({channel})), float(unpack_inner({channel})), 0.0, 0.0)", given
+    )
+    np.testing.assert_array_equal(back[:, 0], given[:, 0])
+    np.testing.assert_array_equal(back[:, 1], inner)
 
 
 @pytest.mark.parametrize(("wanted", "got"), [(0, 1), (1, 1), (2, 2), (4, 4), (10_000, None)])

@@ -10,7 +10,7 @@ from ripple_sim.render.visuals.corners import smooth_normals
 
 def test_nothing_hides_the_sky_from_a_ball():
     ball = primitives.ball(8)
-    visibility, thickness = bake(3.0 * ball.shell, ball.faces, ball.shell)
+    visibility, thickness, _ = bake(3.0 * ball.shell, ball.faces, ball.shell)
     np.testing.assert_allclose(visibility, 1.0, atol=1e-6)
     # the mean chord of cosine-distributed rays into a ball is 4/3 of its radius
     np.testing.assert_allclose(thickness, 4 / 3, atol=0.04)
@@ -46,6 +46,15 @@ def test_a_wall_close_above_hides_the_sky_and_one_further_than_the_radius_does_n
     assert near[inner].max() < 0.9
     assert near[inner].mean() < near[~inner].mean() - 0.1
     assert far.min() > 0.99
+
+
+def test_the_inner_side_of_an_open_surface_sees_what_the_outer_side_of_the_turned_one_sees():
+    ball = primitives.ball(8)
+    bowl = ball.faces[(ball.shell[ball.faces][:, :, 2] < 0.1).all(axis=1)]
+    one, turned = bake(ball.shell, bowl, ball.shell), bake(ball.shell, bowl[:, ::-1], -ball.shell)
+    used = np.unique(bowl)
+    np.testing.assert_allclose(one.inner_visibility[used], turned.visibility[used], atol=0.02)
+    assert one.inner_visibility[used].max() < 0.97 < one.visibility[used].min()
 
 
 @pytest.mark.parametrize("count", [16, 64])
