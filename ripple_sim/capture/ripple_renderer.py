@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.model.geoms import ByGeom, by_name
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
 from ripple_sim.render.gpu.contract import MappingKind
@@ -32,15 +31,15 @@ class RippleRenderer:
     width, height : int
         [pixels].
     looks : mapping
-        Geom name to the look of its surface: rubber (the default), jelly, clay and so on. Its colour is the geom's,
-        where the model gives it a texture or a colour.
+        Geom, by its name or id, to the look of its surface: rubber (the default), jelly, clay and so on. Its colour is
+        the geom's, where the model gives it a texture or a colour.
     gl : GLContext, optional
         By default the process's shared one.
 
     Raises
     ------
     RippleError
-        For an unknown look, or if the driver cannot render frames of this size.
+        For an unknown look or geom, or if the driver cannot render frames of this size.
     """
 
     def __init__(
@@ -50,14 +49,14 @@ class RippleRenderer:
         *,
         width: int = 1280,
         height: int = 720,
-        looks: Mapping[str, str] | None = None,
+        looks: ByGeom[str] | None = None,
         gl: GLContext | None = None,
     ) -> None:
         self._model, self._ripples = model, ripples
         self._height_maps = {name: HeightMap(ripples[name].atlas.texels) for name in ripples}
-        looks = looks or {}
+        named = by_name(model, looks or {}, "looks")
         surfaces = {
-            geom: surface_of(ripples[name], looks.get(name, "rubber"), _color(model, geom))
+            geom: surface_of(ripples[name], named.get(name, "rubber"), _color(model, geom))
             for name, geom in ripples.geom_ids.items()
         }
         self._renderer = Renderer(gl or shared_context(), model, surfaces, size=(width, height))

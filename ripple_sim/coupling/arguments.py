@@ -2,35 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import mujoco
 
+from ripple_sim.coupling.model.geoms import ByGeom, by_name, find_target
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
 
 
-def check_arguments(
-    model: mujoco.MjModel, materials: Mapping[str, Material], resolution: int | Mapping[str, int]
-) -> None:
-    """Refuse arguments of a wrong type, and a target without a resolution.
+def checked_materials(model: mujoco.MjModel, materials: ByGeom[Material]) -> dict[str, Material]:
+    """Materials by the names of their geoms.
 
     Raises
     ------
     SceneError
+        For arguments of a wrong type, a geom that cannot ripple, or one that has two materials.
     """
     if not isinstance(model, mujoco.MjModel):
         raise SceneError(f"model is {type(model).__name__}; valid is a compiled mujoco.MjModel")
     if not isinstance(materials, Mapping):
         raise SceneError(f"materials is {type(materials).__name__}; valid is a mapping of geom names to Material")
-    for name in materials:
-        if not isinstance(materials[name], Material):
-            raise SceneError(f"material of geom {name!r} is {materials[name]!r}; valid is a Material")
-        if isinstance(resolution, Mapping) and name not in resolution:
+    for key, material in materials.items():
+        find_target(model, key)
+        if not isinstance(material, Material):
+            raise SceneError(f"material of geom {key!r} is {material!r}; valid is a Material")
+    return by_name(model, materials, "materials")
+
+
+def resolutions(model: mujoco.MjModel, names: Iterable[str], resolution: int | ByGeom[int]) -> dict[str, int]:
+    """Resolution of each target, by name.
+
+    Raises
+    ------
+    SceneError
+        For a target without one.
+    """
+    if not isinstance(resolution, Mapping):
+        return dict.fromkeys(names, resolution)
+    given = by_name(model, resolution, "resolution")
+    for name in names:
+        if name not in given:
             raise SceneError(
-                f"resolution has no entry for geom {name!r}; it has {', '.join(map(repr, resolution)) or 'none'}: "
+                f"resolution has no entry for geom {name!r}; it has {', '.join(map(repr, given)) or 'none'}: "
                 "give every rippling geom one, or one number for all"
             )
+    return {name: given[name] for name in names}
 
 
 def integrator_warning(model: mujoco.MjModel) -> str | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import mujoco
@@ -15,12 +15,12 @@ from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
 from ripple_sim.coupling.load.contact_loads import ContactLoads
 from ripple_sim.coupling.load.contact_record import Impulse
 from ripple_sim.coupling.model.coupled_model import CoupledModel
-from ripple_sim.coupling.model.geoms import find_target
+from ripple_sim.coupling.model.geoms import ByGeom, GeomKey, find_geom, geom_name
 from ripple_sim.coupling.two_way.push_back import PushBack
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Load, Material, WaveSolver
 
-from .arguments import check_arguments, integrator_warning
+from .arguments import checked_materials, integrator_warning, resolutions
 from .clock import StepClock
 from .target import Target
 
@@ -36,12 +36,13 @@ class Ripples:
     ----------
     model : mujoco.MjModel
     materials : mapping
-        Geom name to its `Material`. Geoms of type mesh, sdf, sphere, ellipsoid, capsule, cylinder and box can ripple.
+        Geom to its `Material`: by its name, for unnamed geoms by "body/index" (index among the geoms of its body), or
+        by its id. Geoms of type mesh, sdf, sphere, ellipsoid, capsule, cylinder and box can ripple.
         Note that MuJoCo collides a mesh geom as its convex hull. A geom of type="sdf" collides as the true surface, and
         so does a mesh geom with a rigid flex of the same name on the same body, which collides in its place; see
         `make_collidable`. Impulses are exact with every integrator but RK4.
     resolution : int or mapping
-        Texels along an edge of the atlas's charts, for all targets or by geom name.
+        Texels along an edge of the atlas's charts, for all targets or by geom.
     backend, operator, conserve_volume
         As for `WaveSolver`.
     two_way : bool
@@ -59,23 +60,23 @@ class Ripples:
     def __init__(
         self,
         model: mujoco.MjModel,
-        materials: Mapping[str, Material],
+        materials: ByGeom[Material],
         *,
-        resolution: int | Mapping[str, int] = 128,
+        resolution: int | ByGeom[int] = 128,
         backend: str = "auto",
         operator: str = "fem",
         conserve_volume: bool = True,
         two_way: bool = False,
     ) -> None:
-        check_arguments(model, materials, resolution)
+        named = checked_materials(model, materials)
+        texels = resolutions(model, named, resolution)
         self.model = model
         coupled = CoupledModel(model)
         options = {"backend": backend, "operator": operator, "conserve_volume": conserve_volume}
-        geoms = {name: find_target(model, name) for name in materials}
         self._targets: dict[str, Target] = {}
-        for name, geom in geoms.items():
-            n = resolution[name] if isinstance(resolution, Mapping) else resolution
-            self._targets[name] = Target(model, geom, materials[name], n, options)
+        for name, material in named.items():
+            geom = find_geom(model, name)
+            self._targets[name] = Target(model, geom, material, texels[name], options)
             _warn(collision_warning(coupled, geom, self._targets[name].waves.atlas))
         _warn(integrator_warning(model))
         # shared with the steps below, which see new waves as soon as they are in here
@@ -85,8 +86,8 @@ class Ripples:
         self._push_back = PushBack(coupled, self._waves) if two_way else None
         self._clock = StepClock()
 
-    def __getitem__(self, name: str) -> WaveSolver:
-        """Waves of a geom, by name."""
+    def __getitem__(self, name: GeomKey) -> WaveSolver:
+        """Waves of a geom, by name or id."""
         return self._target(name).waves
 
     def __iter__(self) -> Iterator[str]:
@@ -133,7 +134,7 @@ class Ripples:
         self._clock.reset()
         self._flatten()
 
-    def change_material(self, name: str, **coefficients: Any) -> None:
+    def change_material(self, name: GeomKey, **coefficients: Any) -> None:
         """Change coefficients of a geom's material, by their names in `Material`; height and velocity stay.
 
         Raises
@@ -146,12 +147,12 @@ class Ripples:
         self._target(name).change_material(**coefficients)
         self._waves_changed(name)
 
-    def make_rigid(self, name: str, point: ArrayLike, radius: float) -> None:
+    def make_rigid(self, name: GeomKey, point: ArrayLike, radius: float) -> None:
         """Hold a disc of a geom's surface still: waves go round it, and contacts there move nothing.
 
         Parameters
         ----------
-        name : str
+        name : str or int
             Geom.
         point : [3]
             In the frame of the geom [m]; the nearest surface point is taken.
@@ -161,12 +162,12 @@ class Ripples:
         self._target(name).make_rigid(point, radius)
         self._waves_changed(name)
 
-    def hold(self, name: str, region: ArrayLike) -> None:
+    def hold(self, name: GeomKey, region: ArrayLike) -> None:
         """Hold a region of a geom's surface still, as `make_rigid` does with a disc.
 
         Parameters
         ----------
-        name : str
+        name : str or int
             Geom.
         region : bool or float [C, n, n]
             The texels to hold; from 0 to 1 for a share of a texel.
@@ -191,20 +192,23 @@ class Ripples:
             target.change_operator(operator)
             self._waves_changed(name)
 
-    def to_geom(self, name: str, point: ArrayLike) -> NDArray[np.float64]:
+    def to_geom(self, name: GeomKey, point: ArrayLike) -> NDArray[np.float64]:
         """Carry a point [m] from the frame of a geom's body to that of the geom, which MuJoCo chooses for meshes."""
         return self._target(name).to_geom(point)
 
-    def _target(self, name: str) -> Target:
-        if name not in self._targets:
+    def _target(self, name: GeomKey) -> Target:
+        target = self._targets.get(name) if isinstance(name, str) else None
+        if target is None:
+            target = self._targets.get(geom_name(self.model, find_geom(self.model, name)))
+        if target is None:
             raise SceneError(
                 f"geom {name!r} does not ripple; the rippling geoms are {', '.join(map(repr, self._targets))}"
             )
-        return self._targets[name]
+        return target
 
-    def _waves_changed(self, name: str) -> None:
+    def _waves_changed(self, name: GeomKey) -> None:
         """Hand a target's new waves to everybody."""
-        target = self._targets[name]
+        target = self._target(name)
         self._waves[target.geom] = target.waves
         self._loads.waves_changed(target.geom)
 

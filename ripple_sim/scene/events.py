@@ -9,6 +9,7 @@ import msgspec
 import mujoco
 import numpy as np
 
+from ripple_sim.coupling.model.geoms import find_geom, geom_name
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
 
@@ -70,14 +71,14 @@ class Script:
     def __init__(self, model: mujoco.MjModel, events: Events, targets: Sequence[str]) -> None:
         self._motions = Motions(model, [*events.drop, *events.throw, *events.place])
         for poke in events.poke:
-            _check_target("poke", poke.geom, poke.time, targets)
+            _check_target(model, "poke", poke, targets)
             if not (np.isfinite([poke.impulse, *poke.point]).all() and 0 <= poke.radius < np.inf):
                 raise SceneError(
                     f"[[poke]] of {poke.geom!r} has point {poke.point} m, impulse {poke.impulse!r} N s, radius "
                     f"{poke.radius!r} m; valid are finite numbers, the radius 0 or greater"
                 )
         for change in events.change:
-            _check_target("change", change.geom, change.time, targets)
+            _check_target(model, "change", change, targets)
         self._controls = [(entry, _actuator(model, entry)) for entry in sorted(events.control, key=lambda e: e.time)]
         surface_events: list[PokeEntry | ChangeEntry] = [*events.poke, *events.change]
         self._surface_events = sorted(surface_events, key=lambda event: event.time)
@@ -97,11 +98,11 @@ class Script:
                 ripples.change_material(event.geom, **given_fields(event.material))
 
 
-def _check_target(verb: str, geom: str, time: float, targets: Sequence[str]) -> None:
-    check_time(verb, geom, time)
-    if geom not in targets:
+def _check_target(model: mujoco.MjModel, verb: str, entry: PokeEntry | ChangeEntry, targets: Sequence[str]) -> None:
+    check_time(verb, entry.geom, entry.time)
+    if geom_name(model, find_geom(model, entry.geom)) not in targets:
         raise SceneError(
-            f"[[{verb}]] names the geom {geom!r}, which does not ripple; the rippling geoms are "
+            f"[[{verb}]] names the geom {entry.geom!r}, which does not ripple; the rippling geoms are "
             f"{', '.join(map(repr, targets))}"
         )
 

@@ -13,6 +13,7 @@ import msgspec
 import mujoco
 import numpy as np
 
+from ripple_sim.coupling.model.geoms import find_target, geom_name
 from ripple_sim.errors import SceneError
 
 from .check_scene import check_scene
@@ -20,7 +21,7 @@ from .events import Events
 from .motion import DropEntry, ThrowEntry
 from .randomize import RandomEntry, randomize
 from .scene import Scene
-from .scene_file import SceneFile, parse_scene
+from .scene_file import RippleEntry, SceneFile, parse_scene
 
 Moved = TypeVar("Moved", DropEntry, ThrowEntry)
 Edit = Callable[[mujoco.MjSpec], None]
@@ -53,7 +54,7 @@ def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
     scene = Scene(
         name=path.stem,
         model=model,
-        targets=tuple(entry.located(path.parent) for entry in content.ripple),
+        targets=tuple(_target(model, entry.located(path.parent)) for entry in content.ripple),
         camera=content.camera,
         duration=content.duration,
         events=Events(
@@ -70,6 +71,11 @@ def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
     )
     check_scene(scene)
     return scene
+
+
+def _target(model: mujoco.MjModel, entry: RippleEntry) -> RippleEntry:
+    """The entry with its geom called as everybody calls it."""
+    return msgspec.structs.replace(entry, geom=geom_name(model, find_target(model, entry.geom)))
 
 
 def _read(path: Path) -> SceneFile:

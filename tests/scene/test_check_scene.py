@@ -42,7 +42,7 @@ def test_a_scene_without_mistakes_passes() -> None:
         ((EGG,), {"duration": float("nan")}, "duration is nan"),
         ((EGG,), {"duration": float(MAX_DURATION)}, "duration is 86400.0"),
         ((EGG, EGG), {}, r"geom 'egg' has two \[\[ripple\]\] entries; valid is one"),
-        ((RippleEntry(geom="leg"),), {}, "no geom 'leg'; its named geoms are 'egg', 'floor', 'pea'"),
+        ((RippleEntry(geom="leg"),), {}, "no geom 'leg'; its geoms are 'egg', 'floor', 'pea'"),
         ((RippleEntry(geom="floor"),), {}, "geom 'floor' is a plane, which cannot ripple"),
         ((RippleEntry(geom="egg", look="lead"),), {}, "look 'lead' does not exist; valid are .*rubber"),
         ((RippleEntry(geom="egg", color=(0, 0, 1.1)),), {}, "color of geom 'egg' is .*three numbers from 0 to 1"),

@@ -63,7 +63,7 @@ def test_values_arrive_where_they_belong(tmp_path: Path) -> None:
         ("speed = 0.5", 'speed = "fast"', r"ripple.*speed"),
         ("speed = 0.5", "speed = -1", r"speed is -1 m/s; valid"),
         ("[[ripple]]", "[[ripple", "not valid TOML"),
-        ('geom = "egg"', 'geom = "eg"', "named geoms are 'floor', 'egg', 'stone'"),
+        ('geom = "egg"', 'geom = "eg"', "its geoms are 'floor', 'egg', 'stone'"),
         ('geom = "egg"', 'geom = "floor"', "is a plane, which cannot ripple"),
         ('geom = "egg"', 'geom = "egg"\nlook = "shiny"', "valid are .*rubber"),
         ('name = "eye"', 'name = "ear"', "its cameras are eye"),

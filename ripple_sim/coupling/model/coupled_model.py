@@ -31,7 +31,7 @@ class CoupledModel:
     ----------
     model : mujoco.MjModel
     names : list of str
-        Of all geoms; "geom <id>" for those without one.
+        Of all geoms; see `geom_name`.
     flex_colliders : dict of int to int
         Geom id to the id of its flex collider.
     has_flex : bool [ngeom]

@@ -1,8 +1,12 @@
-"""Geoms of a MuJoCo model: their names, and which of them can ripple."""
+"""Geoms of a MuJoCo model: what they are called, and which of them can ripple."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import TypeVar
+
 import mujoco
+import numpy as np
 
 from ripple_sim.errors import SceneError
 
@@ -10,29 +14,87 @@ TARGET_TYPES = {
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}")): name
     for name in ("mesh", "sdf", "sphere", "ellipsoid", "capsule", "cylinder", "box")
 }
+# So many geoms are listed in a message.
+_LISTED = 40
+
+GeomKey = str | int
+Value = TypeVar("Value")
+# values by geom; a mapping of names alone, or of ids alone, is another type than one of both
+ByGeom = Mapping[str, Value] | Mapping[int, Value] | Mapping[GeomKey, Value]
 
 
 def geom_name(model: mujoco.MjModel, geom: int) -> str:
-    """Name of a geom, or "geom <id>" where it has none."""
-    return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom) or f"geom {geom}"
+    """Name of a geom; without one "body/index", its index among the geoms of its body; or else "geom <id>"."""
+    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)
+    if name:
+        return str(name)
+    body = int(model.geom_bodyid[geom])
+    body_name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body)
+    place = f"{body_name}/{geom - int(model.body_geomadr[body])}"
+    # another geom may be called so
+    taken = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, place) >= 0
+    return place if body_name and not taken else f"geom {geom}"
 
 
-def find_target(model: mujoco.MjModel, name: str) -> int:
-    """Id of the geom that is to ripple.
+def find_geom(model: mujoco.MjModel, key: GeomKey) -> int:
+    """Id of a geom, by its name, "body/index" (also where it has a name), "geom <id>", or its id.
+
+    Raises
+    ------
+    SceneError
+        If there is no such geom.
+    """
+    if isinstance(key, (int, np.integer)) and 0 <= key < model.ngeom:
+        return int(key)
+    if isinstance(key, str):
+        geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, key)
+        geom = _by_place(model, key) if geom < 0 else geom
+        if geom >= 0:
+            return int(geom)
+    names = [repr(geom_name(model, geom)) for geom in range(model.ngeom)]
+    more = f" and {model.ngeom - _LISTED} more" if model.ngeom > _LISTED else ""
+    raise SceneError(
+        f"the model has no geom {key!r}; its geoms are {', '.join(names[:_LISTED]) or 'none'}{more}: give a name, "
+        '"body/index", or an id'
+    )
+
+
+def find_target(model: mujoco.MjModel, key: GeomKey) -> int:
+    """Id of the geom that is to ripple; see `find_geom`.
 
     Raises
     ------
     SceneError
         If there is no such geom, or its type has no closed surface.
     """
-    geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
-    if geom < 0:
-        names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, i) for i in range(model.ngeom)]
-        known = ", ".join(repr(n) for n in names if n) or "none (give the geom a name in the MJCF)"
-        raise SceneError(f"the model has no geom {name!r}; its named geoms are {known}")
+    geom = find_geom(model, key)
     if int(model.geom_type[geom]) not in TARGET_TYPES:
         kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
-        raise SceneError(
-            f"geom {name!r} is a {kind}, which cannot ripple; valid are {', '.join(TARGET_TYPES.values())}"
-        )
+        raise SceneError(f"geom {key!r} is a {kind}, which cannot ripple; valid are {', '.join(TARGET_TYPES.values())}")
     return geom
+
+
+def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str, Value]:
+    """Values by the names that `geom_name` gives to their geoms.
+
+    Raises
+    ------
+    SceneError
+        If a geom is missing, or has two values.
+    """
+    found: dict[str, Value] = {}
+    for key, value in values.items():
+        name = geom_name(model, find_geom(model, key))
+        if name in found:
+            raise SceneError(f"{what} has two entries for geom {name!r}, one of them as {key!r}; valid is one")
+        found[name] = value
+    return found
+
+
+def _by_place(model: mujoco.MjModel, key: str) -> int:
+    """Geom called "body/index" or "geom <id>", or -1."""
+    body_name, slash, index = key.rpartition("/")
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body_name) if slash else -1
+    if body >= 0 and index.isdecimal() and int(index) < model.body_geomnum[body]:
+        return int(model.body_geomadr[body]) + int(index)
+    return next((geom for geom in range(model.ngeom) if geom_name(model, geom) == key), -1)
