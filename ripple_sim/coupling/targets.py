@@ -1,0 +1,141 @@
+"""`Targets`: the rippling geoms of a model, and what may be changed on them while their waves run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ripple_sim.coupling.model.geoms import ByGeom, GeomKey, find_geom, geom_name
+from ripple_sim.errors import SceneError
+from ripple_sim.solver import Material, WaveSolver
+
+from .arguments import checked_materials, resolutions
+from .target import Target
+
+
+class Targets:
+    """The rippling geoms of a model.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    materials : mapping
+        Geom to its `Material`.
+    resolution : int or mapping
+        Of the atlases, for all targets or by geom.
+    options : mapping
+        Keyword arguments of `WaveSolver`.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        materials: ByGeom[Material],
+        resolution: int | ByGeom[int],
+        options: Mapping[str, Any],
+    ) -> None:
+        named = checked_materials(model, materials)
+        texels = resolutions(model, named, resolution)
+        self.model = model
+        self._targets = {
+            name: Target(model, find_geom(model, name), material, texels[name], options)
+            for name, material in named.items()
+        }
+        # by geom id; shared with all who load or read the waves, and see new ones as soon as they are in here
+        self._waves = {target.geom: target.waves for target in self._targets.values()}
+
+    def __getitem__(self, name: GeomKey) -> WaveSolver:
+        """Waves of a geom, by name or id."""
+        return self._target(name).waves
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._targets)
+
+    def __len__(self) -> int:
+        return len(self._targets)
+
+    @property
+    def geom_ids(self) -> dict[str, int]:
+        """Geom id of every target, by name."""
+        return {name: target.geom for name, target in self._targets.items()}
+
+    def change_material(self, name: GeomKey, **coefficients: Any) -> None:
+        """Change coefficients of a geom's material, by their names in `Material`; height and velocity stay.
+
+        Raises
+        ------
+        SceneError
+            For an unknown geom.
+        SolverError
+            For an unknown or invalid coefficient.
+        """
+        self._target(name).change_material(**coefficients)
+        self._waves_changed(name)
+
+    def make_rigid(self, name: GeomKey, point: ArrayLike, radius: float) -> None:
+        """Hold a disc of a geom's surface still: waves go round it, and contacts there move nothing.
+
+        Parameters
+        ----------
+        name : str or int
+            Geom.
+        point : [3]
+            In the frame of the geom [m]; the nearest surface point is taken.
+        radius : float
+            Along the surface [m].
+        """
+        self._target(name).make_rigid(point, radius)
+        self._waves_changed(name)
+
+    def hold(self, name: GeomKey, region: ArrayLike) -> None:
+        """Hold a region of a geom's surface still, as `make_rigid` does with a disc.
+
+        Parameters
+        ----------
+        name : str or int
+            Geom.
+        region : bool or float [C, n, n]
+            The texels to hold; from 0 to 1 for a share of a texel.
+
+        Raises
+        ------
+        SolverError
+            If the region has another shape, or numbers that are not from 0 to 1.
+        """
+        self._target(name).hold(region)
+        self._waves_changed(name)
+
+    def change_operator(self, operator: str) -> None:
+        """Change the wave operator on all surfaces, by its name in `WaveSolver`; height and velocity stay.
+
+        Raises
+        ------
+        SolverError
+            For an unknown operator.
+        """
+        for name, target in self._targets.items():
+            target.change_operator(operator)
+            self._waves_changed(name)
+
+    def to_geom(self, name: GeomKey, point: ArrayLike) -> NDArray[np.float64]:
+        """Carry a point [m] from the frame of a geom's body to that of the geom, which MuJoCo chooses for meshes."""
+        return self._target(name).to_geom(point)
+
+    def _target(self, name: GeomKey) -> Target:
+        target = self._targets.get(name) if isinstance(name, str) else None
+        if target is None:
+            target = self._targets.get(geom_name(self.model, find_geom(self.model, name)))
+        if target is None:
+            raise SceneError(
+                f"geom {name!r} does not ripple; the rippling geoms are {', '.join(map(repr, self._targets))}"
+            )
+        return target
+
+    def _waves_changed(self, name: GeomKey) -> None:
+        """Hand a target's new waves to everybody."""
+        target = self._target(name)
+        self._waves[target.geom] = target.waves
