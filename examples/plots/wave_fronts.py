@@ -21,7 +21,7 @@ from ripple_sim.figures.view import View
 from ripple_sim.overlay.colormap import color_table, colors
 from ripple_sim.scene.up_axis import usual_up
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
-from ripple_sim.solver.cube_map.convention import cube_chart_points, texel_directions
+from ripple_sim.solver.cube_map.convention import texel_directions
 from ripple_sim.solver.texels.sampling import sampling_matrix
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
@@ -37,13 +37,11 @@ class FrontPainter(AtlasPainter):
     def __init__(self, atlas: Atlas, distance: np.ndarray, gone: np.ndarray, spacing: float, nearest: float) -> None:
         super().__init__(atlas, np.ones((*distance.shape, 3)))
         self._fields = np.stack([distance.ravel(), gone.ravel()], axis=1)
-        self._resolution, self._spacing, self._nearest = atlas.resolution, spacing, nearest
+        self._spacing, self._nearest = spacing, nearest
         self._topology = atlas.texels.topology
 
-    def paint(self, directions: np.ndarray) -> np.ndarray:
-        distance, gone = (
-            sampling_matrix(self._topology, *cube_chart_points(directions, self._resolution)) @ self._fields
-        ).T
+    def paint(self, chart: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        distance, gone = (sampling_matrix(self._topology, chart, row, column) @ self._fields).T
         far = distance > self._nearest
         painted = colors(np.where(far, gone / np.maximum(distance, 1e-9) - 1, 0), LIMIT) / 255
         # the gradient of a distance is 1: lines between two of its values have one width

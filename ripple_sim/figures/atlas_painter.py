@@ -1,6 +1,6 @@
-"""Images of an atlas, ray by ray: the mesh and the sphere with the texel grid on them, and the six charts as a cross.
+"""Images of an atlas, ray by ray: the mesh with the texel grid on it.
 
-Every pixel is traced to its direction on the sphere and from there to its texel, so the grid is exactly the atlas's.
+Every pixel is traced to its place on the charts, so the grid is exactly the atlas's.
 """
 
 from __future__ import annotations
@@ -12,23 +12,14 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from ripple_sim.render.surfaces.ambient_occlusion import bake
+from ripple_sim.render.surfaces.ambient_occlusion import Baked, bake
 from ripple_sim.render.visuals.corners import corner_normals
-from ripple_sim.solver import Atlas, sphere_atlas
-from ripple_sim.solver.cube_map.convention import cube_chart_points
+from ripple_sim.solver import Atlas
 
 from .view import OVERSAMPLING, View, antialiased, lit, screen
 
-# The belt of four charts from left to right, the second in the middle of the cross, and those above and below it.
-BELT, ABOVE, BELOW = (1, 3, 0, 2), 4, 5
-GRID_CELLS = 16  # along a chart
+_GRID_CELLS = 39  # along the side of a square that holds all charts
 _INK = np.array([0.10, 0.13, 0.20])
-
-
-def texel_stretch(atlas: Atlas) -> NDArray[np.float64]:
-    """Stretch at every texel: sqrt(real area over area on the sphere), the real area scaled to 4 pi, [6, N, N]."""
-    sphere = sphere_atlas(1.0, atlas.resolution).areas
-    return np.sqrt((atlas.areas / atlas.areas.sum()) / (sphere / sphere.sum()))
 
 
 class AtlasPainter:
@@ -37,7 +28,7 @@ class AtlasPainter:
     Parameters
     ----------
     atlas : Atlas
-    colors : [6, N, N, 3]
+    colors : [C, n, n, 3]
         Colour of every texel, 0 to 1.
     """
 
@@ -58,39 +49,42 @@ class AtlasPainter:
         triangle = hit["primID"][seen].astype(np.int64)
         u, v = hit["u"][seen].astype(np.float64), hit["v"][seen].astype(np.float64)
         weights = np.stack([1 - u - v, u, v], axis=1)
-        corners = self._atlas.mesh.F[triangle]
-        directions = np.einsum("ki,kij->kj", weights, self._atlas.sphere[corners])
+        mesh = self._atlas.mesh
+        corners = mesh.F[triangle]
+        points = np.einsum("ki,kij->kj", weights, mesh.V[corners])
         normals = np.einsum("ki,kij->kj", weights, self._corner_normals[triangle])
-        openness = np.einsum("ki,ki->k", weights, self._openness[corners])
-        return antialiased(x.shape, seen, lit(self.paint(directions), normals, openness, view))
+        # an open surface shows its inner side too
+        flat = np.cross(*np.moveaxis(self._vertices[corners[:, 1:]] - self._vertices[corners[:, :1]], 1, 0))
+        inner = flat @ eye < 0
+        baked = np.where(inner[:, None], self._baked.inner_visibility[corners], self._baked.visibility[corners])
+        normals[inner] *= -1
+        coordinates = self._atlas.chart_map.coordinates(mesh, triangle, points)
+        colors = self.paint(*self._atlas.chart_map.chart_points(coordinates, self._atlas.resolution))
+        return antialiased(x.shape, seen, lit(colors, normals, np.einsum("ki,ki->k", weights, baked), view))
 
-    def sphere(self, view: View, size: int) -> NDArray[np.float64]:
-        """RGBA image of the unit sphere that the mesh is mapped onto, [size, size, 4]."""
-        x, y = screen(size * OVERSAMPLING, 1.01)
-        seen = np.flatnonzero((x**2 + y**2).ravel() < 1)
-        local = np.stack([x.ravel()[seen], y.ravel()[seen]], axis=1)
-        local = np.column_stack([local, np.sqrt(1 - (local**2).sum(axis=1))])
-        directions = local @ view.axes
-        colors = self._grid(*cube_chart_points(directions, self._atlas.resolution))
-        return antialiased(x.shape, seen, lit(colors, directions, np.ones(len(seen)), view))
+    def paint(
+        self, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Colours [k, 3] of places on the charts, each [k]; override it to paint others."""
+        return self.grid(chart, row, column, on_surface=True)
 
-    def cross(self, size: int) -> NDArray[np.float64]:
-        """RGBA image of the six charts unfolded, [3 size, 4 size, 4]: the belt, and a chart above and below it."""
-        n, fine = self._atlas.resolution, size * OVERSAMPLING
-        place = (np.arange(fine) + 0.5) / fine * n - 0.5
-        row, column = np.meshgrid(place[::-1], place, indexing="ij")
-        image = np.zeros((3 * size, 4 * size, 4))
-        layout = [(chart, 1, k) for k, chart in enumerate(BELT)] + [(ABOVE, 0, 1), (BELOW, 2, 1)]
-        for chart, i, k in layout:
-            colors = self._grid(np.full(row.size, chart), row.ravel(), column.ravel())
-            image[i * size : (i + 1) * size, k * size : (k + 1) * size] = antialiased(
-                row.shape, np.arange(row.size), colors
-            )
-        return image
+    def grid(
+        self, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64], *, on_surface: bool
+    ) -> NDArray[np.float64]:
+        """Colours of places on the charts [k, 3]: the texel's, under a grid of fine lines and the charts' borders.
 
-    def paint(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Colours [k, 3] of the surface in directions [k, 3] from the cube's centre; override it to paint others."""
-        return self._grid(*cube_chart_points(directions, self._atlas.resolution), self._widths)
+        The lines are equally wide on the surface, or else in the charts.
+        """
+        n = self._atlas.resolution
+        i, j = (np.clip(np.rint(x).astype(np.int64), 0, n - 1) for x in (row, column))
+        colors = self._colors[chart, i, j]
+        cells = min(max(1, round(_GRID_CELLS / len(self._colors) ** 0.5)), n)
+        along = np.stack([row, column]) + 0.5
+        scale = cells / n * (self._widths[:, chart, i, j] if on_surface else 1.0)
+        to_line = (np.abs((along * (cells / n) + 0.5) % 1 - 0.5) * (n / cells) * scale).min(axis=0)
+        to_edge = (np.minimum(along, n - along) * scale).min(axis=0)
+        ink = np.where(to_edge < 0.09, 0.85, np.where(to_line < 0.04, 0.42, 0.0))[:, None]
+        return colors * (1 - ink) + _INK * ink
 
     @functools.cached_property
     def _vertices(self) -> NDArray[np.float64]:
@@ -109,36 +103,27 @@ class AtlasPainter:
         return corner_normals(self._vertices, self._atlas.mesh.F)
 
     @functools.cached_property
-    def _openness(self) -> NDArray[np.float64]:
-        return bake(self._vertices, self._atlas.mesh.F, self._atlas.mesh.vertex_normals).visibility
+    def _baked(self) -> Baked:
+        return bake(self._vertices, self._atlas.mesh.F, self._atlas.mesh.vertex_normals)
 
     @functools.cached_property
     def _widths(self) -> NDArray[np.float64]:
-        """Width of rows and of columns on the surface, in units of an even spread's, [2, 6, N, N]."""
+        """Width of rows and of columns on the surface, in units of an even spread's, [2, C, n, n]."""
         with_halo, areas = self._atlas.texels.halo_positions, self._atlas.areas
-        along_columns = np.linalg.norm(with_halo[:, 1:-1, 2:] - with_halo[:, 1:-1, :-2], axis=-1) / 2
-        along_rows = np.linalg.norm(with_halo[:, 2:, 1:-1] - with_halo[:, :-2, 1:-1], axis=-1) / 2
+        own = with_halo[:, 1:-1, 1:-1]
         even = np.sqrt(areas.mean())
-        return np.stack([areas / np.maximum(side, 1e-6 * even) for side in (along_columns, along_rows)]) / even
 
-    def _grid(
-        self,
-        chart: NDArray[np.int64],
-        row: NDArray[np.float64],
-        column: NDArray[np.float64],
-        widths: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]:
-        """Colours of places in the charts [k, 3]: the texel's, under a grid of fine lines and the cube's edges.
+        def width(before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
+            sides = np.stack([np.linalg.norm(each - own, axis=-1) for each in (before, after)])
+            side = np.where(np.isfinite(sides), sides, 0.0).sum(axis=0) / np.isfinite(sides).sum(axis=0).clip(1)
+            return areas / np.maximum(side, 1e-6 * even)
 
-        With `widths` the lines are equally wide on the surface, without it in the charts.
-        """
-        n = self._atlas.resolution
-        i, j = (np.clip(np.rint(x).astype(np.int64), 0, n - 1) for x in (row, column))
-        colors = self._colors[chart, i, j]
-        cells = min(GRID_CELLS, n)
-        along = np.stack([row, column]) + 0.5
-        scale = cells / n * (1.0 if widths is None else widths[:, chart, i, j])
-        to_line = (np.abs((along * (cells / n) + 0.5) % 1 - 0.5) * (n / cells) * scale).min(axis=0)
-        to_edge = (np.minimum(along, n - along) * scale).min(axis=0)
-        ink = np.where(to_edge < 0.09, 0.85, np.where(to_line < 0.04, 0.42, 0.0))[:, None]
-        return colors * (1 - ink) + _INK * ink
+        return (
+            np.stack(
+                [
+                    width(with_halo[:, 1:-1, :-2], with_halo[:, 1:-1, 2:]),
+                    width(with_halo[:, :-2, 1:-1], with_halo[:, 2:, 1:-1]),
+                ]
+            )
+            / even
+        )

@@ -1,4 +1,4 @@
-"""A figure of an atlas: the mesh and the sphere with the texel grid, the six charts unfolded, and its quality."""
+"""A figure of an atlas: the mesh with the texel grid, the charts, stretch and quality."""
 
 from __future__ import annotations
 
@@ -6,20 +6,16 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure  # without pyplot, which would look for a display
 from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas, AtlasError
 
-from .atlas_painter import AtlasPainter, texel_stretch
+from .atlas_painter import AtlasPainter
+from .chart_images import cross, sphere_image, squares
+from .texel_colors import STRETCH_COLORS, STRETCH_RANGE, chart_colors, stretch_colors, stretch_shade, texel_stretch
 from .view import View
 
-# Finer than an even spread is blue, coarser is red; the ends stand for a factor of 2.
-_COLORS = LinearSegmentedColormap.from_list(
-    "stretch", ["#1f4e8c", "#3f8fc0", "#8fd0d4", "#f6f1df", "#f4b46f", "#dd6247", "#8c1d40"], N=512
-)
-_RANGE = 2.0
 _ENDINGS = (".png", ".jpg", ".pdf", ".svg")
 _TEXT, _FAINT = "#1b2432", "#6b7685"
 _DPI = 120
@@ -53,26 +49,31 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
     """
     check_plot_path(path)
     stretch = texel_stretch(atlas)
-    painter = AtlasPainter(atlas, _COLORS(_shade(stretch))[..., :3])
     figure = Figure(figsize=(16, 9), dpi=_DPI, facecolor="white")
     figure.text(0.03, 0.945, title, fontsize=25, fontweight="bold", color=_TEXT, va="center")
     figure.text(0.03, 0.903, subtitle, fontsize=12.5, color=_FAINT, va="center")
+    painter = AtlasPainter(atlas, stretch_colors(stretch))
     front, back = View(up=up), View(azimuth=View.azimuth + 180, up=up)
-    _show(figure, (0.025, 0.05, 0.37, 0.82), painter.mesh(front, 800))
-    _show(figure, (0.42, 0.50, 0.20, 0.38), painter.mesh(back, 400), "the other side")
-    _show(figure, (0.42, 0.07, 0.20, 0.355), painter.sphere(front, 380), "on the sphere")
-    _show(figure, (0.635, 0.455, 0.35, 0.47), painter.cross(160), "the six charts, unfolded")
+    if atlas.layout == "cube":
+        _show(figure, (0.025, 0.05, 0.37, 0.82), painter.mesh(front, 800))
+        _show(figure, (0.42, 0.50, 0.20, 0.38), painter.mesh(back, 400), "the other side")
+        sphere = sphere_image(painter, atlas.resolution, front, 380)
+        _show(figure, (0.42, 0.07, 0.20, 0.355), sphere, "on the sphere")
+        _show(figure, (0.635, 0.455, 0.35, 0.47), cross(painter, atlas.resolution, 160), "the six charts, unfolded")
+    else:
+        colors = np.broadcast_to(chart_colors(atlas.texels.topology)[:, None, None], (*atlas.texels.shape, 3))
+        charts = AtlasPainter(atlas, colors)
+        _show(figure, (0.025, 0.05, 0.37, 0.82), charts.mesh(front, 800))
+        _show(figure, (0.42, 0.50, 0.20, 0.38), charts.mesh(back, 400), "the other side")
+        _show(figure, (0.42, 0.07, 0.20, 0.355), painter.mesh(front, 380), "stretch")
+        page = squares(painter, atlas.texels.shape, 672, 508)
+        _show(figure, (0.635, 0.455, 0.35, 0.47), page, f"the {atlas.texels.shape[0]} charts, side by side")
     _histogram(figure.add_axes((0.655, 0.300, 0.31, 0.105)), stretch, atlas.areas)
     _figures(figure, atlas)
     try:
         figure.savefig(path, dpi=_DPI, metadata={"Date": None} if Path(path).suffix.lower() == ".svg" else None)
     except OSError as error:
         raise AtlasError(f"plot file {str(path)!r} cannot be written: {error.strerror or error}") from error
-
-
-def _shade(stretch: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Place on the colour scale, 0 to 1."""
-    return np.clip(0.5 + 0.5 * np.log(stretch) / np.log(_RANGE), 0, 1)
 
 
 def _show(figure: Figure, place: tuple[float, float, float, float], image: NDArray, caption: str = "") -> None:
@@ -85,10 +86,10 @@ def _show(figure: Figure, place: tuple[float, float, float, float], image: NDArr
 
 def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
     """Share of the surface over stretch, in the colours of the images, as their legend."""
-    bins = np.geomspace(1 / _RANGE, _RANGE, 121)
+    bins = np.geomspace(1 / STRETCH_RANGE, STRETCH_RANGE, 121)
     share, _ = np.histogram(stretch.clip(bins[0], bins[-1]), bins, weights=areas)
     middles = np.sqrt(bins[1:] * bins[:-1])
-    colors = _COLORS(_shade(middles))
+    colors = STRETCH_COLORS(stretch_shade(middles))
     axes.bar(bins[:-1], share / share.max(), np.diff(bins), align="edge", color=colors, edgecolor="none")
     axes.stairs(share / share.max(), bins, color=_FAINT, linewidth=0.7)  # pale bars need an outline
     axes.bar(bins[:-1], -0.14, np.diff(bins), bottom=-0.03, align="edge", color=colors, edgecolor="none")
@@ -108,19 +109,20 @@ def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float
 def _figures(figure: Figure, atlas: Atlas) -> None:
     quality = atlas.quality()
     even = np.sqrt(atlas.mesh.area / atlas.areas.size)
-    columns = [
-        [
-            ("folded triangles", f"{quality['flipped']}"),
-            ("area starved (stretch over 4)", f"{100 * quality['starved']:.2f} %"),
-            ("texel area / mesh area", f"{quality['coverage']:.4f}"),
-        ],
-        [
-            ("stretch, median", f"{quality['q50']:.2f}"),
-            ("stretch, 0.1 % to 99.9 %", f"{quality['q001']:.2f} to {quality['q999']:.2f}"),
-            ("texel edges / even grid", f"{quality['edge_min'] / even:.2f} to {quality['edge_max'] / even:.2f}"),
-        ],
-    ]
-    for left, rows in zip((0.655, 0.83), columns, strict=True):
-        for k, (name, value) in enumerate(rows):
-            figure.text(left, 0.196 - 0.062 * k, value, fontsize=16, fontweight="bold", color=_TEXT, va="center")
-            figure.text(left, 0.170 - 0.062 * k, name, fontsize=11, color=_FAINT, va="center")
+    shown = {
+        "folded triangles": ("{flipped}", 1.0),
+        "area starved (stretch over 4)": ("{starved:.2f} %", 100.0),
+        "texel area / mesh area": ("{coverage:.4f}", 1.0),
+        "stretch, median": ("{q50:.2f}", 1.0),
+        "stretch, 0.1 % to 99.9 %": ("{q001:.2f} to {q999:.2f}", 1.0),
+        "texel edges / even grid": ("{edge_min:.2f} to {edge_max:.2f}", 1 / even),
+    }
+    for index, (name, (form, unit)) in enumerate(shown.items()):
+        left, k = (0.655, 0.83)[index // 3], index % 3
+        values = {key: value if unit == 1.0 else value * unit for key, value in quality.items()}
+        try:
+            text = form.format(**values)
+        except KeyError:  # the layout does not know it
+            text = "-"
+        figure.text(left, 0.196 - 0.062 * k, text, fontsize=16, fontweight="bold", color=_TEXT, va="center")
+        figure.text(left, 0.170 - 0.062 * k, name, fontsize=11, color=_FAINT, va="center")

@@ -2,9 +2,13 @@
 
 import numpy as np
 import pytest
+from hand_made import polygon, square
 
-from ripple_sim.figures.atlas_painter import AtlasPainter, texel_stretch
-from ripple_sim.solver import sphere_atlas
+from ripple_sim.figures.atlas_painter import AtlasPainter
+from ripple_sim.figures.chart_images import cross, squares
+from ripple_sim.figures.texel_colors import chart_colors, texel_stretch
+from ripple_sim.figures.view import View
+from ripple_sim.solver import sphere_atlas, texel_atlas
 
 
 def test_stretch_is_one_on_a_sphere_and_even_on_average(animal):
@@ -23,21 +27,53 @@ def test_pictures_show_the_texel_that_lies_there():
     atlas = sphere_atlas(1.0, n)
     numbers = np.arange(6 * n * n).reshape(6, n, n)
     colors = np.stack([numbers % 16, numbers // 16 % 16, numbers // 256], axis=-1) / 16
-    cross = AtlasPainter(atlas, colors).cross(64)
-    assert cross.shape == (192, 256, 4)
+    image = cross(AtlasPainter(atlas, colors), n, 64)
+    assert image.shape == (192, 256, 4)
     # face -y stands in the middle of the cross, second from the left, row 0 at the bottom
     for row, column in ((0, 0), (3, 5), (7, 7)):
-        pixel = cross[127 - (row * 8 + 4), 64 + column * 8 + 4]
+        pixel = image[127 - (row * 8 + 4), 64 + column * 8 + 4]
         np.testing.assert_allclose(pixel[:3], colors[3, row, column], atol=1e-9)
-    assert cross[10, 10, 3] == 0
+    assert image[10, 10, 3] == 0
 
 
 def test_neighbouring_faces_of_the_cross_belong_together():
     atlas = sphere_atlas(1.0, 16)
     smooth = (atlas.positions + 1) / 2
-    cross = AtlasPainter(atlas, smooth).cross(32)[..., :3]
-    middle = cross[48, 4::8]  # along the belt, where colours go round the sphere and are slot_scratch far apart
+    image = cross(AtlasPainter(atlas, smooth), 16, 32)[..., :3]
+    middle = image[48, 4::8]  # along the belt, where colours go round the sphere and are far apart
     assert np.abs(np.diff(middle, axis=0)).max() < 0.4
     # above and below the face -y
-    np.testing.assert_allclose(cross[30, 48], cross[33, 48], atol=0.2)
-    np.testing.assert_allclose(cross[62, 48], cross[66, 48], atol=0.2)
+    np.testing.assert_allclose(image[30, 48], image[33, 48], atol=0.2)
+    np.testing.assert_allclose(image[62, 48], image[66, 48], atol=0.2)
+
+
+def test_squares_stand_side_by_side_with_every_texel_in_its_place():
+    atlas = texel_atlas(polygon(5, 8))
+    numbers = np.arange(5 * 64).reshape(5, 8, 8)
+    colors = np.stack([numbers % 16, numbers // 16 % 16, numbers // 256], axis=-1) / 16
+    image = squares(AtlasPainter(atlas, colors), (5, 8, 8), 300, 200)
+    pitch = 100  # three columns, two rows
+    assert image.shape == (200, 300, 4)
+    side = 88
+    for chart, (top, left) in ((0, (0, 0)), (2, (0, 2)), (4, (1, 1))):
+        pixel = image[top * pitch + side - 1 - int(2.5 / 8 * side), left * pitch + int(5.5 / 8 * side)]
+        np.testing.assert_allclose(pixel[:3], colors[chart, 2, 5], atol=1e-9)
+    assert image[150, 250, 3] == 0
+
+
+@pytest.mark.parametrize("texels", [polygon(5, 4), polygon(7, 4), square(4)])
+def test_charts_that_meet_have_different_colours(texels):
+    colors = chart_colors(texels.topology)
+    meet = (texels.topology.corners[:, None, :, None] == texels.topology.corners[None, :, None, :]).any(axis=(2, 3))
+    different = np.abs(colors[:, None] - colors[None]).max(axis=2) > 0.05
+    assert (different | ~meet | np.eye(len(colors), dtype=bool)).all()
+
+
+def test_an_open_surface_is_painted_on_both_sides():
+    atlas = texel_atlas(square(8))
+    colors = np.broadcast_to([0.9, 0.2, 0.1], (1, 8, 8, 3))
+    for elevation in (60.0, -60.0):
+        image = AtlasPainter(atlas, colors).mesh(View(elevation=elevation, up="z"), 40)
+        red, green = image[image[..., 3] > 0.99][:, 0].mean(), image[image[..., 3] > 0.99][:, 1].mean()
+        assert red > 2 * green
+        assert red > 0.4
