@@ -69,6 +69,7 @@ class Simulation:
             backend=backend,
             operator=operator,
             two_way=scene.two_way,
+            contacts=scene.contacts,
         )
         self._apply_maps()
         self._materials = {name: self.ripples[name].material for name in self.ripples}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 
 import mujoco
 
@@ -10,6 +11,7 @@ from ripple_sim.coupling.colliders.collision_warnings import collision_warning
 from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
 from ripple_sim.coupling.load.contact_loads import ContactLoads
 from ripple_sim.coupling.load.contact_record import Impulse
+from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
 from ripple_sim.coupling.model.coupled_model import CoupledModel
 from ripple_sim.coupling.model.geoms import ByGeom, GeomKey
 from ripple_sim.coupling.two_way.push_back import PushBack
@@ -45,10 +47,16 @@ class Ripples(Targets):
         Let the moving surfaces push back on the bodies that touch them or are within reach of them while risen, through
         `data.xfrc_applied`. Forces of others stay there, as long as they are added or are set before `step`.
 
+    contacts : mapping, optional
+        Geom to the geoms that collide for it, where a visible geom ripples and others, on its body or on bodies welded
+        to it, collide. A target that neither collides nor is named here takes the contacts of all geoms of its body
+        that collide and do not ripple. A contact loads the surface where this is nearest and faces it; of several
+        targets that share a geom, the nearest.
+
     Raises
     ------
     SceneError
-        For an unknown geom or one that cannot ripple, or a geom without a material or resolution.
+        For an unknown geom or one that cannot ripple, a geom without a material or resolution, or invalid contacts.
     RippleError
         If a geom's mesh is not a closed genus-0 surface, or a wave parameter is invalid.
     """
@@ -63,10 +71,11 @@ class Ripples(Targets):
         operator: str = "fem",
         conserve_volume: bool = True,
         two_way: bool = False,
+        contacts: ByGeom[Sequence[GeomKey]] | None = None,
     ) -> None:
         options = {"backend": backend, "operator": operator, "conserve_volume": conserve_volume}
         super().__init__(model, materials, resolution, options)
-        coupled = CoupledModel(model)
+        coupled = CoupledModel(model, self._waves, named_collision_geoms(model, self, contacts or {}))
         for geom, waves in self._waves.items():
             _warn(collision_warning(coupled, geom, waves.atlas))
         _warn(integrator_warning(model))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import mujoco
 
+from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
 from ripple_sim.coupling.model.geoms import find_target
 from ripple_sim.errors import SceneError
 
@@ -37,6 +38,7 @@ def check_scene(scene: Scene) -> None:
             raise SceneError(f"geom {entry.geom!r} has two [[ripple]] entries; valid is one")
         seen.add(entry.geom)
         _check_target(scene.model, entry)
+    named_collision_geoms(scene.model, [entry.geom for entry in scene.targets], scene.contacts)
     parse_request(scene.overlay)
     if scene.lighting not in LIGHTING:
         raise SceneError(f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")

@@ -44,3 +44,8 @@ class Scene:
     two_way: bool = False
     overlay: tuple[str, ...] = ()
     lighting: str = "auto"
+
+    @property
+    def contacts(self) -> dict[str, list[str]]:
+        """Geoms that collide for targets which name them, see `Ripples`."""
+        return {entry.geom: entry.contacts for entry in self.targets if entry.contacts is not None}

@@ -29,7 +29,8 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     """`[[ripple]]`: one target, its material and its look.
 
     `color` (sRGB, 0 to 1) replaces the look's own colour, or the texture of the geom's material. `still_map` is the
-    path of an image in the mesh's own texture coordinates: there are no waves where it is black.
+    path of an image in the mesh's own texture coordinates: there are no waves where it is black. `contacts` names the
+    geoms that collide for a geom that is only visible; by default those of its body.
     """
 
     geom: str
@@ -39,6 +40,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     material: MaterialEntry = msgspec.field(default_factory=MaterialEntry)
     still: list[StillEntry] = []
     still_map: str | None = None
+    contacts: list[str] | None = None
 
     def located(self, folder: Path) -> RippleEntry:
         """The same with the images' paths made relative to a folder."""

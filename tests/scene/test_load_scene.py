@@ -6,9 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from ripple_sim import RippleError
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.load_scene import load_model, load_scene, refusal_of
 from ripple_sim.scene.randomize import RandomEntry
+from ripple_sim.simulation import Simulation
 
 MJCF = """<mujoco><worldbody><geom name="egg" size="0.1"/>
 <body name="stone" pos="0 0 1"><freejoint/><geom size="0.05"/></body>
@@ -107,3 +109,28 @@ def test_mujocos_reason_is_told_in_one_line_and_other_errors_pass() -> None:
     assert isinstance(error.value.__cause__, ValueError)
     with pytest.raises(KeyError), refusal_of("'a.xml'"):
         raise KeyError("first")
+
+
+LINK = """<mujoco><worldbody><body name="link">
+<geom name="shell" size="0.3" contype="0" conaffinity="0"/><geom name="core" size="0.29"/><geom size="0.1"/></body>
+<body name="ball" pos="0 0 0.36"><freejoint/><geom name="ball" size="0.05"/></body></worldbody></mujoco>"""
+
+
+def test_a_scene_names_geoms_by_their_place_and_those_that_collide_for_a_target(tmp_path: Path) -> None:
+    (tmp_path / "link.xml").write_text(LINK)
+    (tmp_path / "link.toml").write_text(
+        'model = "link.xml"\n[[ripple]]\ngeom = "link/0"\nresolution = 8\ncontacts = ["core"]\n'
+        '[[poke]]\ngeom = "link/0"\ntime = 0.0\npoint = [0, 0, 0.3]\nimpulse = 0.1\n'
+    )
+    simulation = Simulation(load_scene(tmp_path / "link.toml"), backend="cpu")
+    assert list(simulation.ripples) == ["shell"]
+    while simulation.data.time < 0.2:
+        simulation.advance_frame()
+    assert {(each.geom, each.other) for each in simulation.impulses} == {("shell", "ball")}
+
+
+def test_collision_geoms_that_cannot_be_are_named_when_the_scene_is_read(tmp_path: Path) -> None:
+    (tmp_path / "link.xml").write_text(LINK)
+    (tmp_path / "link.toml").write_text('model = "link.xml"\n[[ripple]]\ngeom = "shell"\ncontacts = ["ball"]\n')
+    with pytest.raises(RippleError, match="names geom 'ball' on body 'ball', which moves by itself"):
+        load_scene(tmp_path / "link.toml")

@@ -4,37 +4,65 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-import trimesh
 
 from ripple_sim.coupling.model.coupled_model import CoupledModel
 from ripple_sim.coupling.model.flex_colliders import flex_thickness
 from ripple_sim.solver import Atlas
 
 from .flex_collider import GAP_TOLERANCE
+from .surface_gap import collision_gap, hull_gap
+
+# The tolerance for geoms that were made to collide in place of a finer one.
+COARSE_TOLERANCE = 0.1
 
 _GEOM = mujoco.mjtGeom
 
 
 def collision_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
-    """What to warn of where a target collides other than as its true surface, else None."""
+    """What to warn of where nothing touches a target, or it collides other than as its true surface, else None."""
+    if coupled.out_of_touch(geom):
+        return _touch_warning(coupled, geom)
+    if any(each != geom for each in coupled.collision_geoms(geom)):
+        return _gap_warning(coupled, geom, atlas)
     if coupled.has_flex[geom]:
         return _flex_warning(coupled, geom)
     if _collides_as_hull(coupled.model, geom):
         return _hull_warning(coupled.names[geom], atlas)
-    return None
-
-
-def hull_gap(atlas: Atlas) -> float:
-    """Greatest distance from the convex hull of a mesh to its surface [m], on points 1/24 of its size apart."""
-    hull = trimesh.Trimesh(atlas.mesh.V, atlas.mesh.F, process=False).convex_hull
-    points, _ = trimesh.remesh.subdivide_to_size(hull.vertices, hull.faces, max_edge=float(hull.extents.max()) / 24)
-    closest, _ = atlas.project(points)
-    return float(np.linalg.norm(points - closest, axis=1).max())
+    return _distance_warning(coupled, geom)
 
 
 def _collides_as_hull(model: mujoco.MjModel, geom: int) -> bool:
     collides = model.geom_contype[geom] or model.geom_conaffinity[geom]
     return bool(collides) and int(model.geom_type[geom]) == int(_GEOM.mjGEOM_MESH)
+
+
+def _touch_warning(coupled: CoupledModel, geom: int) -> str:
+    """Of a target that nothing can touch."""
+    model, name, colliders = coupled.model, coupled.names[geom], coupled.collision_geoms(geom)
+    if not colliders:
+        return (
+            f"nothing can touch geom {name!r}: it does not collide (contype and conaffinity are 0), nor does another "
+            f"geom of its body; name the geoms that collide for it, contacts={{{name!r}: [...]}}, or give it a contype"
+        )
+    masks = ", ".join(
+        f"{coupled.names[each]!r} has contype {model.geom_contype[each]} and conaffinity {model.geom_conaffinity[each]}"
+        for each in colliders
+    )
+    return f"nothing can touch geom {name!r}: {masks}, which match no geom of a body that is not welded to its own"
+
+
+def _gap_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
+    """Of collision geoms that are visibly off the surface."""
+    colliders, name = coupled.collision_geoms(geom), coupled.names[geom]
+    gap, size = collision_gap(coupled, geom, atlas, colliders), float(np.ptp(atlas.mesh.V, axis=0).max())
+    if gap <= COARSE_TOLERANCE * size:
+        return None
+    names = ", ".join(repr(coupled.names[each]) for each in colliders)
+    return (
+        f"geom {name!r} collides as {names}, up to {gap:.3g} m ({gap / size:.0%} of its size) off the surface that "
+        f"ripples: contacts load it where it is nearest to them; name other geoms in contacts=, or call "
+        f"make_collidable(spec, {name!r})"
+    )
 
 
 def _hull_warning(name: str, atlas: Atlas) -> str | None:
@@ -78,6 +106,19 @@ def _flex_warning(coupled: CoupledModel, geom: int) -> str | None:
     return (
         f'geom {name!r} collides through a flex: {"; ".join(found)}; call make_collidable(spec, {name!r}, "sdf"), or '
         "choose contype and conaffinity so that they do not meet"
+    )
+
+
+def _distance_warning(coupled: CoupledModel, geom: int) -> str | None:
+    """Of what an SDF geom does not meet."""
+    model, name = coupled.model, coupled.names[geom]
+    hills = coupled.can_collide(geom) & (model.geom_type == int(_GEOM.mjGEOM_HFIELD))
+    if int(model.geom_type[geom]) != int(_GEOM.mjGEOM_SDF) or not hills.any():
+        return None
+    names = ", ".join(repr(coupled.names[other]) for other in np.flatnonzero(hills).tolist())
+    return (
+        f"MuJoCo finds no contacts of the SDF geom {name!r} with height fields ({names}): call "
+        f'make_collidable(spec, {name!r}, "flex"), or choose contype and conaffinity so that they do not meet'
     )
 
 

@@ -95,13 +95,13 @@ class TunnellingCheck:
 
 
 def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void]:
-    """Pairs of a target and another geom that may tunnel, `APPROACH` [p]."""
+    """Pairs of a geom that collides for a target and another geom, which may tunnel, `APPROACH` [p]."""
     model, extents, flex = coupled.model, coupled.collider_extents, coupled.has_flex
     sdf, cylinder = model.geom_type == _SDF, model.geom_type == _CYLINDER
     unchecked = sdf | flex if model.opt.enableflags & SPECULATIVE else np.ones(model.ngeom, dtype=bool)
     pairs = [
         (target, other)
-        for target in targets
+        for target in dict.fromkeys(geom for each in targets for geom in coupled.collision_geoms(each))
         for other in np.flatnonzero(coupled.can_collide(target)).tolist()
         if np.isfinite(extents[other]) and (unchecked[target] or unchecked[other])
     ]

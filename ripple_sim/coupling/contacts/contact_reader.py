@@ -1,4 +1,4 @@
-"""All contacts on all targets, with geoms and with flex colliders."""
+"""All contacts on all targets, with geoms, flex colliders and collision geoms."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import mujoco
 import numpy as np
 
 from ripple_sim.coupling.model.coupled_model import CoupledModel
-from ripple_sim.solver import Mesh
+from ripple_sim.coupling.model.target_mesh import target_mesh
+from ripple_sim.solver import Atlas
 
+from .collision_contacts import CollisionContacts
 from .flex_contacts import FlexContacts
 from .geom_contacts import geom_contacts
 from .target_contacts import TargetContacts
@@ -21,24 +23,30 @@ class ContactReader:
     Parameters
     ----------
     coupled : CoupledModel
-    meshes : mapping
-        Geom id of every target to its surface, in the geom's frame [m].
+    atlases : mapping
+        Geom id of every target to its atlas, in the geom's frame [m].
     """
 
-    def __init__(self, coupled: CoupledModel, meshes: Mapping[int, Mesh]) -> None:
+    def __init__(self, coupled: CoupledModel, atlases: Mapping[int, Atlas]) -> None:
         self._coupled = coupled
-        self._is_target = np.zeros(coupled.model.ngeom, dtype=np.bool_)
-        self._is_target[list(meshes)] = True
+        self._collision_contacts = CollisionContacts(coupled, atlases)
+        meshes = {target: atlas.mesh for target, atlas in atlases.items()}
+        for geom in coupled.flex_colliders.keys() & self._collision_contacts.geoms:
+            meshes[geom] = target_mesh(coupled.model, geom)
+        self._is_read = np.zeros(coupled.model.ngeom, dtype=np.bool_)
+        self._is_read[[*meshes, *self._collision_contacts.geoms]] = True
         self._flexes = None
         if coupled.flex_colliders:
             self._flexes = FlexContacts(coupled, meshes)
-            self._is_target[self._flexes.targets] = False
+            self._is_read[self._flexes.targets] = False
 
     def read(self, data: mujoco.MjData) -> dict[int, TargetContacts]:
         """Contacts of each target that is touched, by geom id."""
         model, extents = self._coupled.model, self._coupled.extents
         if self._flexes is None:
-            return geom_contacts(model, data, self._is_target, extents)
-        geoms = self._flexes.geoms(data)
-        contacts = geom_contacts(model, data, self._is_target, extents, geoms)
-        return contacts | self._flexes.contacts(data, geoms, extents)
+            contacts = geom_contacts(model, data, self._is_read, extents)
+        else:
+            geoms = self._flexes.geoms(data)
+            contacts = geom_contacts(model, data, self._is_read, extents, geoms)
+            contacts |= self._flexes.contacts(data, geoms, extents)
+        return self._collision_contacts.hand_over(data, contacts)

@@ -27,7 +27,7 @@ class ContactLoads:
 
     def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
         self._coupled, self._waves = coupled, waves
-        self._contacts = ContactReader(coupled, {geom: each.atlas.mesh for geom, each in waves.items()})
+        self._contacts = ContactReader(coupled, {geom: each.atlas for geom, each in waves.items()})
         self.clear()
 
     def clear(self) -> None:

@@ -12,7 +12,9 @@ _CYLINDER_SIDES = 96
 
 
 def primitive_triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices [m], [n, 3], on an ellipsoid, capsule, cylinder or box of a MuJoCo size, [3], and triangles, [m, 3]."""
+    """Vertices [m], [n, 3], on a primitive geom of a MuJoCo size, [3], and triangles, [m, 3]."""
+    if kind == "sphere":
+        kind, size = "ellipsoid", np.full(3, size[0])
     if kind == "ellipsoid":
         solid = trimesh.creation.icosphere(subdivisions=4)
         solid.apply_scale(size)

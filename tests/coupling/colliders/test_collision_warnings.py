@@ -5,10 +5,10 @@ import warnings
 import mujoco
 import numpy as np
 import pytest
-from mujoco_models import add_ball, mesh_spec
+from mujoco_models import BALL, add_ball, mesh_spec, model_of
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling.colliders.collision_warnings import hull_gap
+from ripple_sim.coupling.colliders.surface_gap import hull_gap
 from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import limbed, peanut
 from ripple_sim.solver import Mesh, build_atlas
@@ -64,4 +64,56 @@ def test_geoms_that_a_flex_meets_badly_are_named() -> None:
         spec.geom(geom).contype = spec.geom(geom).conaffinity = 0
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")
+
+
+SEEN = 'contype="0" conaffinity="0"'
+LINK = '<body name="link">{}</body>' + BALL.format("0 0 2")
+
+
+@pytest.mark.parametrize(
+    ("link", "contacts", "message"),
+    [
+        (f'<geom name="shell" size="0.3" {SEEN}/>', {}, r"does not collide .*contacts=\{'shell': \[\.\.\.\]\}"),
+        ('<geom name="shell" size="0.3" contype="4" conaffinity="4"/>', {}, "'shell' has contype 4 and conaffinity 4"),
+        (
+            f'<geom name="shell" size="0.3" {SEEN}/><geom name="core" size="0.29" contype="0" conaffinity="2"/>',
+            {},
+            "nothing can touch geom 'shell': 'core' has contype 0 and conaffinity 2, which match no geom",
+        ),
+        (f'<geom name="shell" size="0.3" {SEEN}/><geom size="0.3"/>', {"shell": []}, "nothing can touch geom 'shell'"),
+    ],
+)
+def test_target_that_nothing_can_touch_says_so(link: str, contacts: dict, message: str) -> None:
+    with pytest.warns(RippleWarning, match=message):
+        Ripples(model_of(LINK.format(link)), {"shell": Material()}, contacts=contacts, resolution=8, backend="cpu")
+
+
+@pytest.mark.parametrize(
+    ("core", "gap"),
+    [
+        ('<geom name="core" size="0.2"/>', "0.1 m"),
+        ('<geom name="core" size="0.4"/>', "0.1 m"),
+        ('<geom name="core" size="0.3" pos="0 0 0.12"/>', "0.12 m"),
+        ('<geom name="core" type="box" size="0.28 0.28 0.28"/>', None),
+        ('<geom name="core" size="0.3" pos="0 0 0.02"/><geom name="other" size="0.2"/>', None),
+    ],
+)
+def test_collision_geoms_off_the_surface_are_warned_of(core: str, gap: str | None) -> None:
+    model = model_of(LINK.format(f'<geom name="shell" size="0.3" {SEEN}/>{core}'))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        Ripples(model, {"shell": Material()}, resolution=16, backend="cpu")
+    messages = [str(each.message) for each in caught]
+    assert len(messages) == (gap is not None)
+    if gap is not None:
+        assert "'shell' collides as 'core'" in messages[0]
+        assert float(messages[0].split("up to ")[1].split()[0]) == pytest.approx(float(gap.split()[0]), rel=0.05)
+
+
+def test_sdf_geoms_that_height_fields_let_through_are_warned_of() -> None:
+    spec = mesh_spec(peanut(0.06), "free", "sdf")
+    spec.add_hfield(name="hills", nrow=2, ncol=2, size=[1, 1, 0.1, 0.1], userdata=[0, 1, 1, 0])
+    spec.worldbody.add_geom(name="hills", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="hills")
+    with pytest.warns(RippleWarning, match=r"SDF geom 'target' with height fields \('hills'\).*\"flex\""):
         Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")

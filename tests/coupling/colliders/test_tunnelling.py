@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from mujoco_models import mesh_asset
+from mujoco_models import BALL, mesh_asset, model_of
 
-from ripple_sim import make_collidable
+from ripple_sim import Material, Ripples, make_collidable
 from ripple_sim.coupling.colliders import tunnelling
 from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
 from ripple_sim.coupling.model.coupled_model import CoupledModel
@@ -159,3 +159,18 @@ def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: p
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         TunnellingCheck(CoupledModel(model), [0])(data)
+
+
+@pytest.mark.filterwarnings("ignore:geom 'shell' collides as 'core'")
+def test_geoms_that_collide_for_a_target_are_watched() -> None:
+    seen = 'contype="0" conaffinity="0"'
+    model = model_of(
+        f'<body name="link"><geom name="shell" size="0.3" {seen}/><geom name="core" type="box" size="0.3 0.3 0.01"/>'
+        "</body>" + BALL.format("0 0 0.5")
+    )
+    data = mujoco.MjData(model)
+    data.qvel[2] = -80.0
+    ripples = Ripples(model, {"shell": Material()}, contacts={"shell": ["core"]}, resolution=8, backend="cpu")
+    mujoco.mj_step(model, data)
+    with pytest.warns(RippleWarning, match="body 'ball' meets geom 'core' at 80 m/s"):
+        ripples.step(data)

@@ -11,7 +11,7 @@ from ripple_sim.coupling.contacts.contact_reader import ContactReader
 from ripple_sim.coupling.contacts.geom_contacts import geom_contacts
 from ripple_sim.coupling.contacts.target_contacts import TargetContacts
 from ripple_sim.coupling.model.coupled_model import CoupledModel
-from ripple_sim.coupling.model.target_mesh import target_mesh
+from ripple_sim.coupling.model.target_mesh import target_atlas
 
 PLANK = """<body name="plank" pos="0.3 0 0.232"><freejoint/>
 <geom name="plank" type="box" size="0.3 0.1 0.03" mass="2"/></body>"""
@@ -33,7 +33,7 @@ def slab_and_table(bodies: str, slab: str = "") -> mujoco.MjModel:
 
 def reader_of(model: mujoco.MjModel, *targets: str) -> ContactReader:
     geoms = [model.geom(name).id for name in targets]
-    return ContactReader(CoupledModel(model), {geom: target_mesh(model, geom) for geom in geoms})
+    return ContactReader(CoupledModel(model), {geom: target_atlas(model, geom, 8) for geom in geoms})
 
 
 def after(model: mujoco.MjModel, steps: int) -> mujoco.MjData:

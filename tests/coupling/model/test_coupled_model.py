@@ -13,7 +13,7 @@ from ripple_sim.scenes.shapes import peanut
 @pytest.fixture(scope="module")
 def coupled() -> CoupledModel:
     """A mesh with a flex collider, and a ball, a plane and an SDF geom beside it."""
-    spec = mesh_spec(peanut(0.06), contype=2, conaffinity=5, solref=[0.03, 1.0])
+    spec = mesh_spec(peanut(0.06), "free", contype=2, conaffinity=5, solref=[0.03, 1.0])
     add_ball(spec, "ball", [0, 0, 2], contype=1, conaffinity=0, solref=[0.01, 1.0])
     add_ball(spec, "", [0, 0, 3], contype=0, conaffinity=0)
     add_ball(spec, "pebble", [0, 0, 4], type=mujoco.mjtGeom.mjGEOM_SDF, meshname="shape", contype=8, conaffinity=8)

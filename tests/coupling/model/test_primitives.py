@@ -8,6 +8,7 @@ import trimesh
 from ripple_sim.coupling.model.primitives import primitive_triangles
 
 SOLIDS = [
+    ("sphere", (0.2,)),
     ("ellipsoid", (0.3, 0.2, 0.1)),
     ("ellipsoid", (0.02, 0.5, 0.5)),
     ("capsule", (0.1, 0.2)),
@@ -26,8 +27,8 @@ def triangles(kind: str, size: tuple[float, ...]) -> tuple[np.ndarray, np.ndarra
 
 def distances(kind: str, size: tuple[float, ...], points: np.ndarray) -> np.ndarray:
     """Signed distances from the exact solid [m]; for an ellipsoid in units of its own half-axes."""
-    if kind == "ellipsoid":
-        return np.linalg.norm(points / size, axis=1) - 1
+    if kind in ("sphere", "ellipsoid"):
+        return np.linalg.norm(points / np.resize(size, 3), axis=1) - 1
     around = np.linalg.norm(points[:, :2], axis=1)
     if kind == "capsule":
         along = np.maximum(np.abs(points[:, 2]) - size[1], 0)

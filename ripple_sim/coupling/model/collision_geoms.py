@@ -1,0 +1,114 @@
+"""Collision geoms: those that collide in place of a target, as models of robots have them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.errors import SceneError
+
+from .geoms import ByGeom, GeomKey, by_name, find_geom, geom_name
+
+_ENDLESS = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+
+
+def named_collision_geoms(
+    model: mujoco.MjModel, targets: Iterable[str], contacts: ByGeom[Sequence[GeomKey]]
+) -> dict[int, tuple[int, ...]]:
+    """Ids of the geoms that a user names to collide for targets, by the targets' ids.
+
+    Raises
+    ------
+    SceneError
+        For a geom that does not exist, on a body that moves by itself, or that ripples itself; and for contacts of a
+        geom that does not ripple.
+    """
+    if not isinstance(contacts, Mapping):
+        raise SceneError(f"contacts is {contacts!r}; valid is a mapping of rippling geoms to lists of geoms")
+    rippling = {find_geom(model, name): name for name in targets}
+    found = {}
+    for name, keys in by_name(model, contacts, "contacts").items():
+        target = find_geom(model, name)
+        if target not in rippling:
+            raise SceneError(
+                f"contacts names geom {name!r}, which does not ripple; the rippling geoms are "
+                f"{', '.join(map(repr, rippling.values())) or 'none'}"
+            )
+        if isinstance(keys, str) or not isinstance(keys, Iterable):
+            raise SceneError(f"contacts of geom {name!r} is {keys!r}; valid is a list of geoms")
+        found[target] = tuple(dict.fromkeys(find_geom(model, key) for key in keys))
+        for geom in found[target]:
+            _check_collision_geom(model, target, geom, rippling)
+    return found
+
+
+def find_collision_geoms(
+    model: mujoco.MjModel, collides: NDArray[np.bool_], targets: Iterable[int], named: Mapping[int, Sequence[int]]
+) -> dict[int, tuple[int, ...]]:
+    """Geoms whose contacts load each target, by the target's geom id.
+
+    Those that a target names, and itself where it collides. A target that does neither takes the geoms of its body that
+    collide, but for planes, height fields, those that ripple themselves, and those that others name. Where there are
+    none, or in the world, it takes those of bodies welded to its own; in the world, whose geoms need not belong
+    together, only those whose middle lies in the box around the target.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    collides : bool [ngeom]
+        Whether a geom collides.
+    targets : iterable of int
+        Geom ids.
+    named : mapping
+        Of some targets' ids to the ids that they name.
+    """
+    targets = list(targets)
+    free = collides & ~np.isin(model.geom_type, _ENDLESS)
+    free[[*targets, *(geom for geoms in named.values() for geom in geoms)]] = False
+    found = {}
+    for target in targets:
+        own = (target,) if collides[target] else ()
+        if target in named:
+            found[target] = tuple(dict.fromkeys((*own, *named[target])))
+        else:
+            found[target] = own or tuple(np.flatnonzero(free & _kin(model, target, free)).tolist())
+    return found
+
+
+def _kin(model: mujoco.MjModel, target: int, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Geoms that may collide for a target, [ngeom]: on its body, or on bodies welded to it."""
+    body = model.geom_bodyid[target]
+    same_body = model.geom_bodyid == body
+    if body and (same_body & free).any():
+        return same_body
+    weld = model.body_weldid[model.geom_bodyid]
+    kin = weld == weld[target]
+    return kin if weld[target] else kin & _inside(model, target)
+
+
+def _inside(model: mujoco.MjModel, target: int) -> NDArray[np.bool_]:
+    """Static geoms, [ngeom], whose middle lies in the box around a static target."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    rotation, box = data.geom_xmat.reshape(-1, 3, 3), model.geom_aabb
+    middles = data.geom_xpos + np.einsum("gij,gj->gi", rotation, box[:, :3])
+    away = (middles - data.geom_xpos[target]) @ rotation[target] - box[target, :3]
+    return np.asarray((np.abs(away) <= box[target, 3:]).all(axis=1))
+
+
+def _check_collision_geom(model: mujoco.MjModel, target: int, geom: int, rippling: Mapping[int, str]) -> None:
+    weld, name, other = model.body_weldid[model.geom_bodyid], geom_name(model, target), geom_name(model, geom)
+    if weld[geom] != weld[target]:
+        raise SceneError(
+            f"contacts of geom {name!r} names geom {other!r} on body {model.body(model.geom_bodyid[geom]).name!r}, "
+            f"which moves by itself; valid are geoms of body {model.body(model.geom_bodyid[target]).name!r} and of "
+            "those welded to it"
+        )
+    if geom != target and geom in rippling:
+        raise SceneError(
+            f"contacts of geom {name!r} names geom {other!r}, which ripples itself and keeps its contacts; take it out "
+            "of one of the two"
+        )
