@@ -9,7 +9,7 @@ class RippleError(Exception):
 
 
 class MeshError(RippleError):
-    """The mesh is not a closed, orientable, connected surface of genus 0, or cannot be read."""
+    """The mesh cannot be read, is no surface, or does not suit the layout."""
 
 
 class SphereMapError(RippleError):

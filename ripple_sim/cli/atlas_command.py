@@ -33,7 +33,7 @@ class Atlas:
     up: UpAxis = None
     """Axis of the mesh that points up in the image."""
     repair: bool = False
-    """Repair an open or non-manifold mesh (needs the package pymeshfix)."""
+    """Close the mesh's holes (needs the package pymeshfix)."""
     json: bool = False
     """Print JSON."""
 

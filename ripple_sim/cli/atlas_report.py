@@ -1,4 +1,4 @@
-"""The report of `ripple-sim atlas`: the mesh, its repairs, the quality of the atlas, the time of each stage."""
+"""The report of `ripple-sim atlas`: the mesh, what was done to it, the quality of the atlas, the time of each stage."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def atlas_report(path: Path, atlas: Atlas, method: str, seconds: dict[str, float
     Returns
     -------
     dict
-        `mesh`, `vertices`, `triangles`, `size` of the bounding box [m], `area` [m^2], `volume` [m^3], `fixes` (repairs,
-        one phrase each), `resolution`, `method`, `quality` (see `Atlas.quality`) and `seconds`.
+        `mesh`, `vertices`, `triangles`, `size` of the bounding box [m], `area` [m^2], `volume` [m^3], `notes` (what was
+        done to it, one line each), `resolution`, `method`, `quality` (see `Atlas.quality`) and `seconds`.
     """
     mesh = atlas.mesh
     return {
@@ -37,7 +37,7 @@ def atlas_report(path: Path, atlas: Atlas, method: str, seconds: dict[str, float
         "size": np.ptp(mesh.V, axis=0).tolist(),
         "area": mesh.area,
         "volume": mesh.volume,
-        "fixes": list(mesh.fixes),
+        "notes": list(mesh.notes),
         "resolution": atlas.resolution,
         "method": method,
         "quality": atlas.quality(),
@@ -53,7 +53,7 @@ def report_text(report: dict[str, Any]) -> str:
         ("size", f"{' x '.join(f'{x:.4g}' for x in report['size'])} m"),
         ("area", f"{report['area']:.6g} m^2"),
         ("volume", f"{report['volume']:.6g} m^3"),
-        *(("repaired", fix) for fix in report["fixes"]),
+        *(("note", note) for note in report["notes"]),
         ("atlas", f"6 x {n} x {n} texels, {report['method']} sphere map"),
         *((name, f"{value:.6g}") for name, value in report["quality"].items()),
         *((f"{stage.replace('_', ' ')} time", f"{seconds:.3f} s") for stage, seconds in report["seconds"].items()),

@@ -80,7 +80,7 @@ class Drop(_VideoCommand):
     texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
     """Image in the mesh's own texture coordinates; by default the one that the file names, or NAME_texture.png."""
     repair: bool = False
-    """Repair an open or non-manifold mesh (needs the package pymeshfix)."""
+    """Close the mesh's holes (needs the package pymeshfix)."""
 
     def load(self) -> Scene:
         """Build a scene around the mesh."""

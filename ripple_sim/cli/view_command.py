@@ -36,7 +36,7 @@ class View:
     up: UpAxis = None
     """Axis of the mesh that points up."""
     repair: bool = False
-    """Repair an open or non-manifold mesh (needs the package pymeshfix)."""
+    """Close the mesh's holes (needs the package pymeshfix)."""
     folder: Annotated[Path, arg(metavar="FOLDER")] = Path()
     """Folder for screenshots and videos."""
     web: bool = False

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh, load_mesh
+from ripple_sim.solver.mesh.genus_zero import check_genus_zero
 
 from .camera import CameraEntry
 from .drop_model import drop_model
@@ -51,7 +52,7 @@ def drop_scene(
     texture : path, optional
         Image in place of the look's colour; by default see `mesh_image`.
     repair : bool
-        Repair an open or non-manifold mesh (needs the package pymeshfix).
+        Close the mesh's holes (needs the package pymeshfix).
     edit : callable, optional
         Changes the model's specification in place, before it is compiled.
 
@@ -68,6 +69,7 @@ def drop_scene(
     if up not in UP_AXES:
         raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
     mesh = load_mesh(mesh_path, repair=repair)
+    check_genus_zero(mesh)
     V = _standing(mesh, up)
     spec, drops = drop_model(V, mesh.F, bodies, np.random.default_rng(seed))
     paint_target(spec, mesh, mesh_path, texture)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver.cube_map.convention import check_resolution
 from ripple_sim.solver.cube_map.cube_atlas import atlas_from_sphere_map
 from ripple_sim.solver.errors import AtlasError
+from ripple_sim.solver.mesh.genus_zero import check_genus_zero
 from ripple_sim.solver.mesh.mesh import Mesh
 from ripple_sim.solver.sphere_map import conformal_sphere_map, progressive_sphere_map
 from ripple_sim.solver.texels.atlas import Atlas
@@ -48,12 +49,15 @@ def build_atlas(mesh: Mesh, resolution: int = 128, method: str = "progressive", 
     ------
     AtlasError
         For an invalid resolution or method.
+    MeshError
+        If the mesh is not a closed surface of genus 0 in one part, as the cube layout needs.
     SphereMapError
         If no certified sphere map is found.
     """
     resolution = check_resolution(resolution)
     if method not in SPHERE_MAPS:
         raise AtlasError(f"sphere map method {method!r} does not exist; valid are {', '.join(map(repr, SPHERE_MAPS))}")
+    check_genus_zero(mesh)
     start = time.perf_counter()
     path = _cache_path(mesh, method) if cache else None
     stored = None if path is None else _read_cache(path, mesh)

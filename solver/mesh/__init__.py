@@ -1,1 +1,1 @@
-"""Triangle meshes: reading files, mending what is safe to mend, refusing surfaces that are not of genus 0."""
+"""Triangle meshes: read from files, cleaned, cut to manifold sheets, repaired or wrapped on request."""

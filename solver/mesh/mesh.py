@@ -1,4 +1,4 @@
-"""Triangle meshes: cleaned where that is safe, otherwise refused with the name of the defect."""
+"""Triangle meshes: manifold and oriented surfaces of any kind, made from any triangle soup."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver.errors import MeshError
 
-from .cleaning import merge_vertices, orient_outward, signed_volume
-from .topology import check_topology, distinct
+from .cleaning import cleaned
+from .orientation import part_volumes
+from .topology import distinct, genera, rims_of, sides_of
+from .winding import labels
 
 # Lengths whose squares and cubes are far from the limits of float64, in either direction.
 _SMALLEST, _LARGEST = 1e-12, 1e12
@@ -19,38 +21,49 @@ _SMALLEST, _LARGEST = 1e-12, 1e12
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Mesh:
-    """A closed, connected, outward-oriented triangle mesh of genus 0.
+    """A manifold, oriented triangle mesh: closed or open, of any genus, in one part or several.
 
-    Make one with `load_mesh` or `Mesh.from_arrays`; both validate.
+    Make one with `load_mesh` or `Mesh.from_arrays`, which mend what they are given. Every edge belongs to two
+    triangles or, on a rim, to one; the triangles at a vertex form one fan; every triangle has an area. Where surfaces
+    touch, each has vertices of its own at the same place.
 
     Attributes
     ----------
     V : float64 [vertex_count, 3]
         Vertices [m].
     F : int64 [triangle_count, 3]
-        Triangles, counter-clockwise seen from outside.
+        Triangles, counter-clockwise seen from outside, or, on an open part, from the side from which most were.
     uv : float64 [vertex_count, 2] or None
         The object's own texture coordinates, one pair a vertex (at a UV seam, one of the pairs that meet there).
     corner_uv : float64 [triangle_count, 3, 2] or None
         The object's own texture coordinates at every corner of every triangle: exact at seams.
-    fixes : tuple of str
-        Repairs made on reading, one phrase each.
+    notes : tuple of str
+        What was done to it on reading, one line each.
+    name : str
+        Its name in messages.
     """
 
     V: NDArray[np.float64]
     F: NDArray[np.int64]
     uv: NDArray[np.float64] | None = None
     corner_uv: NDArray[np.float64] | None = None
-    fixes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    name: str = "mesh"
 
     @classmethod
     def from_arrays(cls, V: ArrayLike, F: ArrayLike, uv: ArrayLike | None = None, name: str = "mesh") -> Mesh:
-        """Validate and clean a triangle soup.
+        """Make a mesh of any triangle soup.
+
+        Equal positions are merged, hairline cracks closed, and triangles that repeat or have no area dropped. Where
+        more than two triangles meet along an edge, or fans of them at a vertex, the sheets are cut apart. A one-sided
+        surface, such as a Moebius band, is cut open along a path. Then each part is wound alike: outwards if it is
+        closed, as most of its triangles were if it is open. Nothing is filled. A mesh made from the arrays of another
+        is the same mesh, without notes.
 
         Parameters
         ----------
         V : [vertex_count, 3]
-            Vertices [m]. Equal positions are merged.
+            Vertices [m].
         F : [triangle_count, 3]
             Triangles in any winding.
         uv : [vertex_count, 2] or [triangle_count, 3, 2], optional
@@ -61,21 +74,42 @@ class Mesh:
         Raises
         ------
         MeshError
-            If the surface is not finite, not closed, not manifold, not orientable, in several parts, of genus > 0, or
-            degenerate.
+            If there is no triangle with an area, or a vertex is not finite.
         """
         points, triangles = _checked(V, F, name)
         corner_uv = None if uv is None else _corner_uv(uv, points, triangles, name)
-        fixes: list[str] = []
-        points, triangles, keep = merge_vertices(points, triangles, fixes)
-        check_topology(points, triangles, name)
-        corner_uv = None if corner_uv is None else corner_uv[keep]
-        triangles, corner_uv = orient_outward(points, triangles, corner_uv, fixes, name)
+        with np.errstate(under="ignore"):
+            points, corners, notes = cleaned(points, triangles, corner_uv, name)
         vertex_uv = None
-        if corner_uv is not None:
+        if corners.uv is not None:
             vertex_uv = np.zeros((len(points), 2))
-            vertex_uv[triangles[::-1].ravel()] = corner_uv[::-1].reshape(-1, 2)
-        return cls(points, triangles, vertex_uv, corner_uv, tuple(fixes))
+            vertex_uv[corners.F[::-1].ravel()] = corners.uv[::-1].reshape(-1, 2)
+        return cls(points, corners.F, vertex_uv, corners.uv, notes, name)
+
+    @functools.cached_property
+    def components(self) -> NDArray[np.int64]:
+        """Part to which each triangle belongs, numbered from 0 by their first triangles, shape [triangle_count]."""
+        return labels(sides_of(self.F)[0] // 3, len(self.F))
+
+    @property
+    def component_count(self) -> int:
+        """Number of parts."""
+        return int(self.components.max()) + 1
+
+    @functools.cached_property
+    def rims(self) -> tuple[NDArray[np.int64], ...]:
+        """Boundary loops: vertices of each in order, the surface to their left seen from outside."""
+        return rims_of(self.F)
+
+    @property
+    def closed(self) -> bool:
+        """Whether there is no rim."""
+        return not self.rims
+
+    @functools.cached_property
+    def genus(self) -> NDArray[np.int64]:
+        """Number of handles of every part, shape [component_count]; an open part has those that it has with lids."""
+        return genera(self.F, self.components, self.rims)
 
     @functools.cached_property
     def triangle_areas(self) -> NDArray[np.float64]:
@@ -89,8 +123,10 @@ class Mesh:
 
     @property
     def volume(self) -> float:
-        """Enclosed volume [m^3]."""
-        return signed_volume(self.V, self.F)
+        """Volume that the closed parts enclose [m^3]; open ones enclose none."""
+        volume, _ = part_volumes(self.V, self.F, self.components)
+        volume[self.components[sides_of(self.F)[1] // 3]] = 0
+        return float(volume.sum())
 
     @functools.cached_property
     def vertex_normals(self) -> NDArray[np.float64]:

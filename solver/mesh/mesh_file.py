@@ -11,6 +11,7 @@ import trimesh
 
 from ripple_sim.solver.errors import MeshError
 
+from .counting import counted
 from .mesh import Mesh
 from .ply_format import read_ply
 from .polygons import Soup
@@ -26,29 +27,31 @@ _READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
 def load_mesh(path: str | Path, repair: bool = False) -> Mesh:
     """Read a mesh file: OBJ, OFF, PLY, STL, GLB, or any other format that trimesh reads.
 
-    All parts of the file (objects, materials, nodes, each where its transform puts it) make one mesh.
+    All parts of the file (objects, materials, nodes, each where its transform puts it) make one mesh. It may be open, of
+    any genus, and in several parts. `Mesh.from_arrays` says what is done to it; the mesh's `notes` tell it.
 
     Parameters
     ----------
     path : path
     repair : bool
-        Mend a surface that is open, not manifold or in several parts (needs the package pymeshfix).
+        Close the holes, part by part (needs the package pymeshfix).
 
     Raises
     ------
     MeshError
-        If the file is missing, cannot be read, or is not a closed genus-0 surface (see `Mesh.from_arrays`).
+        If the file is missing, cannot be read, or holds no triangle with an area.
     """
     path = Path(path)
     soup = _read(path)
     if len(soup.F) == 0:
-        raise MeshError(f"mesh file {str(path)!r} holds no triangles")
-    try:
-        return Mesh.from_arrays(soup.V, soup.F, soup.corner_uv, name=path.name)
-    except MeshError as defect:
-        if not repair:
-            raise
-        return repaired(soup.V, soup.F, path.name, defect)
+        raise MeshError(f"mesh file {str(path)!r} holds no triangles{_points_only(soup)}")
+    if repair:
+        return repaired(soup, path.name)
+    return Mesh.from_arrays(soup.V, soup.F, soup.corner_uv, name=path.name)
+
+
+def _points_only(soup: Soup) -> str:
+    return f", only {counted(len(soup.V), 'point')}; make a surface of them first" if len(soup.V) else ""
 
 
 def _read(path: Path) -> Soup:

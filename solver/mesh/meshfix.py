@@ -11,7 +11,7 @@ import numpy as np
 
 
 def main(source: str, target: str) -> None:
-    """Fill the holes, keep the largest part, cut away what overlaps. The files hold V [n, 3] and F [m, 3]."""
+    """Fill the holes of all parts. The files hold V [n, 3] and F [m, 3]."""
     from pymeshfix import PyTMesh
 
     with np.load(source) as arrays:
@@ -20,8 +20,6 @@ def main(source: str, target: str) -> None:
     surface.set_quiet(True)
     surface.load_array(V, F.astype(np.int32))
     surface.fill_small_boundaries(nbe=0, refine=True)
-    surface.remove_smallest_components()
-    surface.clean(max_iters=10, inner_loops=3)
     V, F = surface.return_arrays()
     np.savez(target, V=V, F=F)
 

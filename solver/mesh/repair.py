@@ -1,7 +1,8 @@
-"""Open and non-manifold meshes mended, on request, by pymeshfix (Attene 2010, a package of its own under the GPL)."""
+"""Holes of a mesh closed, on request, by pymeshfix (Attene 2010, a package of its own under the GPL)."""
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import subprocess
 import sys
@@ -10,50 +11,87 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from ripple_sim.solver.errors import MeshError
 
+from .counting import counted, place
 from .mesh import Mesh
+from .polygons import Soup
 
 _INSTALL = "pip install 'ripple-sim[repair]' (it adds the package pymeshfix, which is under the GPL)"
 _TIME_LIMIT = 120  # [s]; a hundred thousand triangles take a few, hopeless cases hours
+_TOLD = 8  # holes named one by one
 
 
-def repaired(V: NDArray[np.float64], F: NDArray[np.int64], name: str, defect: MeshError) -> Mesh:
-    """Fill holes, cut away non-manifold parts, keep the largest part, and validate the result.
+def repaired(soup: Soup, name: str) -> Mesh:
+    """Make a mesh of a triangle soup, and close the holes of each of its parts by itself.
 
-    Texture coordinates do not survive. Handles and tunnels stay as they are.
+    Nothing else changes: every part stays, with its texture coordinates; those of a new triangle are the ones at the
+    nearest vertex of the rim. Triangles with vertices that are not finite are dropped.
 
     Parameters
     ----------
-    V, F : [vertex_count, 3], [triangle_count, 3]
-        The surface as given.
+    soup : Soup
     name : str
         Its name in messages.
-    defect : MeshError
-        Why it was refused.
 
     Raises
     ------
     MeshError
-        If pymeshfix is not installed, or the mended surface is refused too.
+        If no mesh can be made, pymeshfix is not installed, or it fails.
     """
+    finite = np.isfinite(soup.V[soup.F]).all(axis=(1, 2))
+    if not finite.any():
+        raise MeshError(f"{name}: nothing is left to repair: every triangle has a vertex that is NaN or infinite")
+    uv = None if soup.corner_uv is None else soup.corner_uv[finite]
+    mesh = Mesh.from_arrays(soup.V, soup.F[finite], uv, name)
+    if not finite.all():
+        dropped = f"{counted(int((~finite).sum()), 'triangle')} with vertices that are NaN or infinite dropped"
+        mesh = dataclasses.replace(mesh, notes=(dropped, *mesh.notes))
+    return mesh if mesh.closed else _closed(mesh)
+
+
+def _closed(mesh: Mesh) -> Mesh:
     if importlib.util.find_spec("pymeshfix") is None:
-        raise MeshError(f"{defect}; for --repair, run {_INSTALL}")
-    F = F[np.isfinite(V[F]).all(axis=(1, 2))]
-    if len(F) == 0:
-        raise MeshError(f"{defect}; nothing is left to repair")
-    corners, inverse = np.unique(V[F].reshape(-1, 3), axis=0, return_inverse=True)
+        holes = f"{counted(sum(map(len, mesh.rims)), 'boundary edge')} round {counted(len(mesh.rims), 'hole')}"
+        raise MeshError(f"{mesh.name} is open: {holes}; for --repair, run {_INSTALL}")
+    with_rims = np.isin(mesh.F, np.concatenate(mesh.rims)).any(axis=1)
+    open_part = np.isin(mesh.components, np.unique(mesh.components[with_rims]))
+    vertices, F = np.unique(mesh.F[open_part], return_inverse=True)
     try:
-        mesh = Mesh.from_arrays(*_mended(corners, inverse.reshape(-1, 3)), name=name)
+        new_V, lids = _lids(mesh.V[vertices], F.reshape(-1, 3))
     except MeshError as error:
-        reason = str(error).removeprefix(f"{defect}").removeprefix(f"{name} ")
-        raise MeshError(f"{defect}; pymeshfix cannot repair that{f' ({reason})' if reason else ''}") from error
-    said = f"repaired by pymeshfix: {len(F)} triangles became {len(mesh.F)}, texture coordinates dropped ({defect})"
-    return Mesh(mesh.V, mesh.F, fixes=(said, *mesh.fixes))
+        raise MeshError(f"{mesh.name}: pymeshfix cannot repair it ({error})") from error
+    lids = np.append(vertices, len(mesh.V) + np.arange(len(new_V)))[lids]
+    V = np.vstack([mesh.V, new_V])
+    uv = None
+    if mesh.uv is not None and mesh.corner_uv is not None:
+        rim = np.concatenate(mesh.rims)
+        uv = np.concatenate([mesh.corner_uv, mesh.uv[rim[cKDTree(V[rim]).query(V[lids])[1]]]])
+    result = Mesh.from_arrays(V, np.vstack([mesh.F, lids]), uv, mesh.name)
+    return dataclasses.replace(result, notes=(*mesh.notes, *_told(mesh, result), *result.notes))
 
 
-def _mended(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _told(mesh: Mesh, result: Mesh) -> list[str]:
+    """What was closed, hole by hole, and what stays open."""
+    left = {tuple(point) for rim in result.rims for point in result.V[rim].tolist()}
+    closed = [rim for rim in mesh.rims if not left.issuperset(map(tuple, mesh.V[rim].tolist()))]
+    closed.sort(key=len, reverse=True)
+    notes = [
+        f"hole closed: {counted(len(rim), 'edge')}, {np.ptp(mesh.V[rim], axis=0).max():.3g} m wide, "
+        f"round {place(mesh.V[rim].mean(axis=0))}"
+        for rim in closed[:_TOLD]
+    ]
+    if len(closed) > _TOLD:
+        notes.append(f"{counted(len(closed) - _TOLD, 'smaller hole')} closed")
+    if result.rims:
+        notes.append(f"{counted(len(result.rims), 'rim')} left open: a flat part cannot be closed")
+    return notes
+
+
+def _lids(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """New vertices, and triangles of old and new ones that close the holes."""
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "source.npz", Path(folder) / "target.npz"
         np.savez(source, V=V, F=F)
@@ -66,7 +104,13 @@ def _mended(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.fl
         except (OSError, subprocess.CalledProcessError) as error:
             raise MeshError("it failed") from error
         with np.load(target) as arrays:
-            V, F = arrays["V"], arrays["F"].astype(np.int64)
-    if len(F) == 0:
-        raise MeshError("nothing was left")
-    return V, F
+            filled_V, filled_F = arrays["V"], arrays["F"].astype(np.int64)
+    # it puts new vertices in front of the old ones, and new triangles anywhere
+    added = len(filled_V) - len(V)
+    if added < 0 or not np.array_equal(filled_V[added:], V):
+        raise MeshError("it changed the surface itself")
+    old_first = np.roll(np.arange(len(filled_V)), -added)
+    numbers = np.argsort(old_first)[filled_F]
+    known = {tuple(triangle) for triangle in np.sort(F, axis=1).tolist()}
+    new = [tuple(triangle) not in known for triangle in np.sort(numbers, axis=1).tolist()]
+    return filled_V[:added], numbers[np.array(new, dtype=bool)]

@@ -1,60 +1,9 @@
-"""Checks of a surface's topology: closed, manifold, one part, genus 0. Defects come with numbers and places."""
+"""What a surface is: its edges, parts, rims and handles."""
 
 from __future__ import annotations
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-
-from ripple_sim.solver.errors import MeshError
-
-
-def check_topology(V: NDArray[np.float64], F: NDArray[np.int64], name: str) -> None:
-    """Raise `MeshError`, naming every defect, unless the triangles are a closed, connected, manifold, genus-0 surface.
-
-    Parameters
-    ----------
-    V : [vertex_count, 3]
-        Vertices, all of them in use.
-    F : [triangle_count, 3]
-    name : str
-        Its name in messages.
-    """
-    if len(F) == 0:
-        raise MeshError(f"{name} is not a closed genus-0 surface: no triangle of it has three different corners")
-    edges, counts = edges_of(F)
-    defects = []
-    parts = igl.facet_components(F)[0]
-    if parts > 1:
-        defects.append(f"in {parts} separate parts (valid is one; keep the part you want, or join them)")
-    crowded = edges[counts > 2]
-    if len(crowded):
-        where = _place(V[crowded[0]].mean(axis=0))
-        defects.append(f"non-manifold: {_count(len(crowded), 'edge')} in more than two triangles (one near {where})")
-    boundary = edges[counts == 1]
-    if len(boundary):
-        holes = _loops(boundary, len(V))
-        where = _place(V[boundary[0]].mean(axis=0))
-        defects.append(
-            f"open: {_count(len(boundary), 'boundary edge')} round {_count(holes, 'hole')} (one near {where})"
-        )
-    if not defects:
-        pinched = _pinched_vertices(F, len(V))
-        if len(pinched):
-            where = _place(V[pinched[0]])
-            defects.append(
-                f"non-manifold: {_count(len(pinched), 'vertex')} where the surface touches itself (one near {where})"
-            )
-    if not defects:
-        euler = len(V) - len(edges) + len(F)
-        if euler % 2:
-            defects.append(f"one-sided, with an Euler characteristic of {euler} (valid is 2)")
-        elif euler != 2:
-            defects.append(f"of genus {(2 - euler) // 2} (valid is genus 0: no handles or tunnels)")
-    if defects:
-        raise MeshError(f"{name} is not a closed genus-0 surface: it is {', and '.join(defects)}")
 
 
 def edges_of(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -71,32 +20,59 @@ def distinct(values: NDArray[np.int64]) -> NDArray[np.int64]:
     return ordered[np.append(True, ordered[1:] != ordered[:-1])]
 
 
-def _loops(edges: NDArray[np.int64], vertex_count: int) -> int:
-    graph = coo_array((np.ones(len(edges)), edges.T), shape=(vertex_count, vertex_count))
-    _, label = connected_components(graph, directed=False)
-    return len(np.unique(label[edges[:, 0]]))
+def sides_of(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Sides of a manifold mesh, numbered 3 x triangle + side: pairs that lie together [k, 2], and those on rims [j]."""
+    a, b = F.ravel(), np.roll(F, -1, axis=1).ravel()
+    key = np.minimum(a, b) * (F.max() + 1) + np.maximum(a, b)
+    order = np.argsort(key, kind="stable")
+    second = np.flatnonzero(key[order[1:]] == key[order[:-1]]) + 1
+    alone = np.ones(len(key), dtype=bool)
+    alone[second], alone[second - 1] = False, False
+    return np.stack([order[second - 1], order[second]], axis=1), np.sort(order[alone])
 
 
-def _pinched_vertices(F: NDArray[np.int64], vertex_count: int) -> NDArray[np.int64]:
-    """Vertices whose triangles form more than one fan, on a mesh whose edges all have two triangles."""
-    # Each triangle corner is a node; corners of one vertex in two triangles that share an edge at it are linked.
-    corner = np.arange(3 * len(F)).reshape(-1, 3)
-    edge_ends = F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    edge_corners = corner[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    swap = edge_ends[:, 0] > edge_ends[:, 1]
-    edge_ends[swap], edge_corners[swap] = edge_ends[swap][:, ::-1], edge_corners[swap][:, ::-1]
-    order = np.argsort(edge_ends[:, 0] * vertex_count + edge_ends[:, 1], kind="stable")
-    pairs = edge_corners[order].reshape(-1, 2, 2)
-    rows, columns = pairs[:, 0].ravel(), pairs[:, 1].ravel()
-    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(corner.size, corner.size))
-    _, fan = connected_components(graph, directed=False)
-    fans = distinct(F.ravel() * corner.size + fan) // corner.size
-    return np.flatnonzero(np.bincount(fans, minlength=vertex_count) > 1)
+def genera(F: NDArray[np.int64], part: NDArray[np.int64], rims: tuple[NDArray[np.int64], ...]) -> NDArray[np.int64]:
+    """Number of handles of every part of a manifold, oriented mesh.
+
+    By Euler's formula V - E + F = 2 - 2 genus - rims.
+
+    Parameters
+    ----------
+    F : [triangle_count, 3]
+    part : [triangle_count]
+        Part of every triangle, numbered from 0.
+    rims : tuple of [k]
+        See `rims_of`.
+    """
+    count = int(part.max()) + 1
+    of_vertex = np.full(F.max() + 1, -1)
+    of_vertex[F] = part[:, None]
+    vertices = np.bincount(of_vertex[of_vertex >= 0], minlength=count)
+    triangles = np.bincount(part)
+    # every triangle has three sides; each inner edge has two of them, each edge of a rim one
+    on_rims = np.zeros(count, dtype=np.int64)
+    loops = np.zeros(count, dtype=np.int64)
+    for rim in rims:
+        on_rims[of_vertex[rim[0]]] += len(rim)
+        loops[of_vertex[rim[0]]] += 1
+    edges = (3 * triangles + on_rims) // 2
+    return (2 - (vertices - edges + triangles) - loops) // 2
 
 
-def _count(number: int, thing: str) -> str:
-    return f"{number} {thing if number == 1 else {'vertex': 'vertices'}.get(thing, thing + 's')}"
+def rims_of(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], ...]:
+    """Boundary loops of a manifold, oriented mesh: vertices in the order in which the triangles run along them.
 
-
-def _place(point: NDArray[np.float64]) -> str:
-    return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"
+    Each begins at its lowest vertex; they are sorted by it.
+    """
+    alone = sides_of(F)[1]
+    starts, ends = F.ravel()[alone], np.roll(F, -1, axis=1).ravel()[alone]
+    following = dict(zip(starts.tolist(), ends.tolist(), strict=True))
+    rims = []
+    for start in sorted(following):
+        rim = []
+        while start in following:
+            rim.append(start)
+            start = following.pop(start)
+        if rim:
+            rims.append(np.array(rim, dtype=np.int64))
+    return tuple(rims)

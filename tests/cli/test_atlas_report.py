@@ -24,17 +24,17 @@ def test_the_figures_of_a_box_are_those_of_its_sides_and_survive_json(box: Atlas
     assert report["area"] == pytest.approx(2 * (2 + 1 + 0.5))
     assert report["volume"] == pytest.approx(1.0)
     assert report["vertices"] - report["triangles"] / 2 == 2  # Euler, of a sphere
-    assert (report["mesh"], report["resolution"], report["method"], report["fixes"]) == ("box.obj", 8, "direct", [])
+    assert (report["mesh"], report["resolution"], report["method"], report["notes"]) == ("box.obj", 8, "direct", [])
 
 
 def test_the_text_has_a_line_for_every_figure_with_values_in_one_column(box: Atlas) -> None:
     report = atlas_report(Path("box.obj"), box, "direct", {"sphere_map": 0.25, "texels": 1.0})
-    report["fixes"] = ["2 vertices merged", "orientation reversed"]
+    report["notes"] = ["2 vertices merged", "orientation reversed"]
     title, *lines = report_text(report).splitlines()
     assert title == "box.obj"
     assert "size" in lines[1]
     assert "2 x 1 x 0.5 m" in lines[1]
-    assert [line.split(None, 1)[1] for line in lines if line.startswith("repaired")] == report["fixes"]
+    assert [line.split(None, 1)[1] for line in lines if line.startswith("note")] == report["notes"]
     assert any(line.startswith("sphere map time") and line.endswith("0.250 s") for line in lines)
     assert any("6 x 8 x 8 texels, direct sphere map" in line for line in lines)
     assert len(lines) == 4 + 2 + 1 + len(report["quality"]) + 2

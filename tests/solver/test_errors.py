@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ripple_sim.solver import Material, Mesh, WaveSolver, load_mesh, sphere_atlas
+from ripple_sim.solver import Material, Mesh, WaveSolver, build_atlas, load_mesh, sphere_atlas
 from ripple_sim.solver.errors import AtlasError, MeshError, RippleError, SolverError
 
 OPEN = np.eye(3), np.array([[0, 1, 2]])
@@ -15,7 +15,7 @@ OPEN = np.eye(3), np.array([[0, 1, 2]])
 @pytest.mark.parametrize(
     ("call", "error", "value"),
     [
-        (lambda: Mesh.from_arrays(*OPEN), MeshError, "boundary edges"),
+        (lambda: build_atlas(Mesh.from_arrays(*OPEN)), MeshError, "boundary edges"),
         (lambda: sphere_atlas(1.0, -3), AtlasError, "-3"),
         (lambda: load_mesh(Path("none.obj")), MeshError, "none.obj"),
         (lambda: WaveSolver(sphere_atlas(1.0, 8), Material(speed=-2.0), backend="cpu"), SolverError, "-2"),

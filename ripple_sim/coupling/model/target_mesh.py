@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +18,7 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int) -> Atlas:
     Raises
     ------
     MeshError
-        If the geom's mesh is not a closed genus-0 surface.
+        If the geom's mesh does not suit the layout.
     """
     if TARGET_TYPES[int(model.geom_type[geom])] == "sphere":
         return sphere_atlas(float(model.geom_size[geom, 0]), resolution)
@@ -38,7 +36,7 @@ def target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
     first_vertex, first_triangle = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
     V = model.mesh_vert[first_vertex : first_vertex + model.mesh_vertnum[mesh]]
     F = model.mesh_face[first_triangle : first_triangle + model.mesh_facenum[mesh]]
-    return _textured(Mesh.from_arrays(V, F, name=name), F, _texture_coordinates(model, mesh))
+    return Mesh.from_arrays(V, F, _texture_coordinates(model, mesh), name)
 
 
 def _texture_coordinates(model: mujoco.MjModel, mesh: int) -> NDArray[np.float64] | None:
@@ -53,12 +51,3 @@ def _texture_coordinates(model: mujoco.MjModel, mesh: int) -> NDArray[np.float64
     corners = model.mesh_facetexcoord[first_triangle : first_triangle + model.mesh_facenum[mesh]]
     uv = pairs[corners].astype(np.float64)
     return np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1)
-
-
-def _textured(mesh: Mesh, F: NDArray[np.int32], corner_uv: NDArray[np.float64] | None) -> Mesh:
-    """The mesh with texture coordinates, unless its triangles had to be repaired."""
-    if corner_uv is None or not np.array_equal(mesh.F, F):
-        return mesh
-    uv = np.zeros((len(mesh.V), 2))
-    uv[F] = corner_uv
-    return dataclasses.replace(mesh, uv=uv, corner_uv=corner_uv)

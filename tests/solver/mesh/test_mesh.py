@@ -13,7 +13,7 @@ def test_clean_mesh_comes_through_unchanged() -> None:
     mesh = Mesh.from_arrays(V, F)
     np.testing.assert_array_equal(mesh.V, V)
     np.testing.assert_array_equal(mesh.F, F)
-    assert mesh.fixes == ()
+    assert mesh.notes == ()
     assert mesh.volume == pytest.approx(1)
     assert mesh.area == pytest.approx(6)
 

@@ -1,4 +1,4 @@
-"""Mesh files: every format, nodes and transforms; and what is refused, always with one line."""
+"""Mesh files: every format, nodes and transforms; known meshes; and what is refused, always with one line."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import pytest
 import trimesh
 from known_meshes import known_mesh
 from scipy.spatial import cKDTree
+from sound import assert_sound, assert_unchanged_when_read_again
 
 from ripple_sim.solver import MeshError, load_mesh
+from ripple_sim.solver.mesh.genus_zero import check_genus_zero
 
 
 def test_files_of_every_format_give_the_same_surface(tmp_path: Path) -> None:
@@ -33,18 +35,29 @@ def test_missing_and_broken_files_are_one_line_errors(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("file", "name"),
+    ("file", "said"),
     [
         ("genus1-rocker-arm.obj", "genus 1"),
         ("genus3-3holes.off", "genus 3"),
-        ("nonmanifold-cow.obj", "non-manifold"),
-        ("open-camelhead.off", "open"),
-        ("several-parts-teapot.obj", "separate parts"),
+        ("open-camelhead.off", "open: 56 boundary edges round 1 hole"),
+        ("several-parts-teapot.obj", "4 separate parts.*open: 160 boundary edges round 6 holes"),
+        ("suzanne.obj", "separate parts.*cut apart along 1 edge"),
     ],
 )
-def test_public_meshes_with_defects(file: str, name: str) -> None:
-    with pytest.raises(MeshError, match=name):
-        load_mesh(known_mesh(f"bad/{file}"))
+def test_public_meshes_that_the_cube_does_not_fit(file: str, said: str) -> None:
+    mesh = load_mesh(known_mesh(f"bad/{file}"))
+    assert_sound(mesh)
+    assert_unchanged_when_read_again(mesh)
+    with pytest.raises(MeshError, match=rf"{file}.*{said}"):
+        check_genus_zero(mesh)
+
+
+@pytest.mark.parametrize("file", ["nonmanifold-cow.obj", "nonmanifold-camel_b.obj"])
+def test_public_meshes_that_touch_themselves_in_one_vertex_fit_the_cube_once_cut(file: str) -> None:
+    mesh = load_mesh(known_mesh(f"bad/{file}"))
+    assert_unchanged_when_read_again(mesh)
+    assert mesh.notes[-1] == "cut apart at 1 vertex where the surface touched itself"
+    check_genus_zero(mesh)
 
 
 def test_nodes_of_a_scene_are_put_where_their_transforms_say(tmp_path: Path) -> None:

@@ -8,9 +8,12 @@ import sys
 import numpy as np
 import pytest
 import trimesh
-from solids import BALL, is_closed_sphere
+from known_meshes import known_mesh
+from solids import BALL
+from sound import assert_sound
 
-from ripple_sim.solver import Mesh, MeshError
+from ripple_sim.solver import MeshError, load_mesh
+from ripple_sim.solver.mesh.polygons import Soup
 from ripple_sim.solver.mesh.repair import repaired
 
 
@@ -21,48 +24,70 @@ class TestRepair:
     def _pymeshfix(self) -> None:
         pytest.importorskip("pymeshfix")
 
-    @pytest.mark.parametrize("name", ["open", "non-manifold", "self-touching", "NaN", "two parts"])
-    def test_a_damaged_ball_becomes_a_ball(self, name: str) -> None:
+    @pytest.mark.parametrize("name", ["open", "NaN", "two parts", "ring"])
+    def test_holes_are_closed_and_all_else_stays(self, name: str) -> None:
         V, F = np.array(BALL.vertices), np.array(BALL.faces)
         if name == "open":
             F = F[6:]
-        elif name == "non-manifold":
-            V, F = np.vstack([V, [[2.0, 0, 0]]]), np.vstack([F, [[F[0, 0], F[0, 1], len(V)]]])
-        elif name == "self-touching":
-            V[np.linalg.norm(V - V[0], axis=1).argmax()] = V[0]
         elif name == "NaN":
             V[3] = np.nan
+        elif name == "two parts":
+            V, F = np.vstack([V, 0.1 * V + 5]), np.vstack([F[4:], F + len(V)])
         else:
-            V, F = np.vstack([V, 0.1 * V + 5]), np.vstack([F, F + len(V)])
-        with pytest.raises(MeshError) as refused:
-            Mesh.from_arrays(V, F)
-        mesh = repaired(V, F, "ball", refused.value)
-        assert is_closed_sphere(mesh)
-        assert mesh.volume == pytest.approx(BALL.volume, rel=0.4)
-        assert mesh.fixes[0].startswith("repaired by pymeshfix")
-        again = repaired(V, F, "ball", refused.value)
+            ring = trimesh.creation.torus(1.0, 0.3)
+            V, F = np.array(ring.vertices), np.array(ring.faces)[3:]
+        uv = np.random.default_rng(0).uniform(size=(len(F), 3, 2))
+        mesh = repaired(Soup(V, F, uv), "ball")
+        assert_sound(mesh)
+        assert mesh.closed
+        assert mesh.component_count == (2 if name == "two parts" else 1)
+        assert mesh.genus[0] == (name == "ring")
+        if name != "ring":
+            assert mesh.volume == pytest.approx(BALL.volume * (1.001 if name == "two parts" else 1), rel=0.25)
+        assert any(note.startswith("hole closed: ") for note in mesh.notes)
+        finite = np.isfinite(V[F]).all(axis=(1, 2))
+        given = {(tuple(p), tuple(t)) for p, t in zip(V[F[finite]].reshape(-1, 3), uv[finite].reshape(-1, 2))}
+        assert mesh.corner_uv is not None
+        assert given <= {
+            (tuple(p), tuple(t)) for p, t in zip(mesh.V[mesh.F].reshape(-1, 3), mesh.corner_uv.reshape(-1, 2))
+        }
+        assert len(mesh.F) > finite.sum()
+        again = repaired(Soup(V, F, uv), "ball")
         np.testing.assert_array_equal(mesh.V, again.V)
         np.testing.assert_array_equal(mesh.F, again.F)
 
-    def test_handles_stay_and_are_named(self) -> None:
-        torus = trimesh.creation.torus(1.0, 0.3)
-        with pytest.raises(MeshError, match=r"genus 1.*pymeshfix cannot"):
-            repaired(np.array(torus.vertices), np.array(torus.faces), "ring", MeshError("ring is of genus 1"))
+    def test_the_teapot_keeps_its_spout_its_handle_and_its_lid(self) -> None:
+        path = known_mesh("bad/several-parts-teapot.obj")
+        before, mesh = load_mesh(path), load_mesh(path, repair=True)
+        assert mesh.closed
+        assert mesh.component_count == before.component_count == 4
+        np.testing.assert_allclose(np.ptp(mesh.V, axis=0), np.ptp(before.V, axis=0))
+        assert sum(note.startswith("hole closed: ") for note in mesh.notes) == 6
+
+    def test_a_single_triangle_stays_open_and_that_is_said(self) -> None:
+        mesh = repaired(Soup(np.eye(3), np.array([[0, 1, 2]])), "tile")
+        assert not mesh.closed
+        assert mesh.notes == ("1 rim left open: a flat part cannot be closed",)
 
     def test_a_crash_of_pymeshfix_is_one_line(self, monkeypatch: pytest.MonkeyPatch) -> None:
         # the program that runs it is replaced by one that kills itself
         real = subprocess.run
         suicide = [sys.executable, "-c", "import os; os.abort()"]
         monkeypatch.setattr(subprocess, "run", lambda program, **options: real(suicide, **options))
-        with pytest.raises(MeshError, match=r"open; pymeshfix cannot repair that \(it failed\)$"):
-            repaired(np.array(BALL.vertices), np.array(BALL.faces)[1:], "ball", MeshError("ball is open"))
+        with pytest.raises(MeshError, match=r"ball: pymeshfix cannot repair it \(it failed\)$"):
+            repaired(Soup(np.array(BALL.vertices), np.array(BALL.faces)[1:]), "ball")
 
     def test_what_is_hopeless_is_refused(self) -> None:
         with pytest.raises(MeshError, match="nothing is left"):
-            repaired(np.full((3, 3), np.nan), np.array([[0, 1, 2]]), "dust", MeshError("dust"))
+            repaired(Soup(np.full((3, 3), np.nan), np.array([[0, 1, 2]])), "dust")
 
 
 def test_without_pymeshfix_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pymeshfix", None)
     with pytest.raises(MeshError, match=r"open.*pip install 'ripple-sim\[repair\]'"):
-        repaired(np.array(BALL.vertices), np.array(BALL.faces)[1:], "ball", MeshError("ball is open"))
+        repaired(Soup(np.array(BALL.vertices), np.array(BALL.faces)[1:]), "ball")
+
+
+def test_a_closed_surface_needs_no_repair(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pymeshfix", None)
+    assert repaired(Soup(np.array(BALL.vertices), np.array(BALL.faces)), "ball").notes == ()

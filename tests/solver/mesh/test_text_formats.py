@@ -34,7 +34,7 @@ def test_a_box_of_quads_is_read(tmp_path: Path, name: str, text: str) -> None:
     mesh = load_mesh(written(tmp_path, name, text))
     assert (len(mesh.V), len(mesh.F)) == (8, 12)
     assert mesh.volume == pytest.approx(1)
-    assert mesh.fixes == ()
+    assert mesh.notes == ()
 
 
 def test_negative_indices_count_back_from_their_own_line(tmp_path: Path) -> None:
