@@ -27,8 +27,8 @@ _READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
 def load_mesh(path: str | Path, repair: bool = False) -> Mesh:
     """Read a mesh file: OBJ, OFF, PLY, STL, GLB, or any other format that trimesh reads.
 
-    All parts of the file (objects, materials, nodes, each where its transform puts it) make one mesh. It may be open, of
-    any genus, and in several parts. `Mesh.from_arrays` says what is done to it; the mesh's `notes` tell it.
+    All parts of the file (objects, materials, nodes, each where its transform puts it) make one mesh. It may be open,
+    of any genus, and in several parts. `Mesh.from_arrays` says what is done to it; the mesh's `notes` tell it.
 
     Parameters
     ----------

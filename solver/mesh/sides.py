@@ -63,7 +63,7 @@ def join_sides(V: NDArray[np.float64], corners: Corners) -> Joints:
 
 @dataclasses.dataclass(frozen=True)
 class _Edges:
-    """Sides sorted by edge: `order[first[e] : first[e] + size[e]]` lie on e; `forward` ones run to the higher vertex."""
+    """Sides sorted by edge: `order[first[e] : first[e] + size[e]]` lie on e; `forward` ones run up in number."""
 
     order: NDArray[np.int64]
     first: NDArray[np.int64]
