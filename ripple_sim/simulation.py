@@ -10,6 +10,7 @@ from collections.abc import Callable
 import mujoco
 
 from ripple_sim.coupling.ripples import Impulse, Ripples
+from ripple_sim.coupling.stepping.divergence import divergence
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
 
@@ -158,16 +159,12 @@ class Simulation:
         mujoco.mj_forward(self.model, self.data)
 
     def _check_state(self) -> None:
-        for kind in (
-            mujoco.mjtWarning.mjWARN_BADQPOS,
-            mujoco.mjtWarning.mjWARN_BADQVEL,
-            mujoco.mjtWarning.mjWARN_BADQACC,
-        ):
-            if self.data.warning[kind].number:
-                raise SimulationError(
-                    f"the physics became unstable at {self.data.time:.4g} s ({mujoco.mjtWarning(kind).name}); "
-                    "use a shorter time step in the MJCF's <option>, or softer contacts"
-                )
+        broken = divergence(self.data)
+        if broken is not None:
+            raise SimulationError(
+                f"the physics became unstable at {self.data.time:.4g} s ({broken}); "
+                "use a shorter time step in the MJCF's <option>, or softer contacts"
+            )
 
 
 def _steps_per_frame(fps: float, timestep: float) -> int:

@@ -1,14 +1,60 @@
-"""Checks of what a user gives to `Ripples`."""
+"""What a user gives to `Ripples`: checked, and taken out of other libraries' wrappers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import mujoco
 
 from ripple_sim.coupling.model.geoms import ByGeom, by_name, find_target
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
+
+# Numbers that two models of one signature share.
+_SIZES = ("nq", "nv", "nu", "nbody", "ngeom")
+
+
+def own_model(model: Any) -> mujoco.MjModel:
+    """MuJoCo's model itself, also of dm_control's wrapper.
+
+    Raises
+    ------
+    SceneError
+        If it is something else.
+    """
+    found = getattr(model, "ptr", model)
+    if not isinstance(found, mujoco.MjModel):
+        raise SceneError(f"model is {type(model).__name__}; valid is a compiled mujoco.MjModel, or dm_control's")
+    return found
+
+
+def own_data(model: mujoco.MjModel, data: Any) -> mujoco.MjData:
+    """MuJoCo's data itself, also of dm_control's wrapper.
+
+    Raises
+    ------
+    SceneError
+        If it is something else, or belongs to another model.
+    """
+    found = data if isinstance(data, mujoco.MjData) else getattr(data, "ptr", None)
+    if not isinstance(found, mujoco.MjData):
+        raise SceneError(f"data is {type(data).__name__}; valid is a mujoco.MjData, or dm_control's")
+    # MuJoCo drops signatures in pickling; then sizes have to do
+    if found.signature != model.signature and (
+        (found.signature and model.signature) or _sizes(found.model) != _sizes(model)
+    ):
+        raise SceneError(
+            f"data belongs to another model ({_sizes(found.model)}) than that of the ripples ({_sizes(model)}): give "
+            "step the data of the latter, or make new Ripples for the former"
+        )
+    return found
+
+
+def _sizes(model: mujoco.MjModel) -> str:
+    """What tells models apart: name, and how much they have of everything."""
+    name = model.names.split(b"\0", 1)[0].decode()
+    return ", ".join([repr(name), *(f"{size} {getattr(model, size)}" for size in _SIZES)])
 
 
 def checked_materials(model: mujoco.MjModel, materials: ByGeom[Material]) -> dict[str, Material]:
@@ -19,8 +65,6 @@ def checked_materials(model: mujoco.MjModel, materials: ByGeom[Material]) -> dic
     SceneError
         For arguments of a wrong type, a geom that cannot ripple, or one that has two materials.
     """
-    if not isinstance(model, mujoco.MjModel):
-        raise SceneError(f"model is {type(model).__name__}; valid is a compiled mujoco.MjModel")
     if not isinstance(materials, Mapping):
         raise SceneError(f"materials is {type(materials).__name__}; valid is a mapping of geom names to Material")
     for key, material in materials.items():

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import mujoco
 
@@ -18,8 +19,11 @@ from ripple_sim.coupling.two_way.push_back import PushBack
 from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Load, Material
 
-from .arguments import integrator_warning
-from .clock import StepClock
+from .arguments import integrator_warning, own_data, own_model
+from .stepping.clock import StepClock, missed_warning
+from .stepping.divergence import divergence_warning, goes_on_broken
+from .stepping.followed import followed
+from .stepping.solved import UNSOLVED_WARNING, SolvedForces
 from .targets import Targets
 
 __all__ = ["Impulse", "Ripples"]
@@ -28,11 +32,12 @@ __all__ = ["Impulse", "Ripples"]
 class Ripples(Targets):
     """Ripples on geoms of a MuJoCo model, driven by its contact forces.
 
-    Call `step(data)` after each `mujoco.mj_step(model, data)`.
+    Call `step(data)` after each `mujoco.mj_step(model, data)`, or `mj_step(data)` instead of both.
 
     Parameters
     ----------
     model : mujoco.MjModel
+        Or dm_control's wrapper of one; likewise the data of each step.
     materials : mapping
         Geom to its `Material`: by its name, for unnamed geoms by "body/index" (index among the geoms of its body), or
         by its id. Geoms of type mesh, sdf, sphere, ellipsoid, capsule, cylinder and box can ripple.
@@ -44,9 +49,9 @@ class Ripples(Targets):
     backend, operator, conserve_volume
         As for `WaveSolver`.
     two_way : bool
-        Let the moving surfaces push back on the bodies that touch them or are within reach of them while risen, through
-        `data.xfrc_applied`. Forces of others stay there, as long as they are added or are set before `step`.
-
+        Let the moving surfaces push back on the bodies that touch them or are within reach of them while risen. Each
+        `step` hands on the momentum at once, as a change of `data.qvel`: it acts exactly once, and `xfrc_applied` and
+        the other forces in `data` are yours alone.
     contacts : mapping, optional
         Geom to the geoms that collide for it, where a visible geom ripples and others, on its body or on bodies welded
         to it, collide. A target that neither collides nor is named here takes the contacts of all geoms of its body
@@ -74,48 +79,105 @@ class Ripples(Targets):
         contacts: ByGeom[Sequence[GeomKey]] | None = None,
     ) -> None:
         options = {"backend": backend, "operator": operator, "conserve_volume": conserve_volume}
-        super().__init__(model, materials, resolution, options)
-        coupled = CoupledModel(model, self._waves, named_collision_geoms(model, self, contacts or {}))
+        super().__init__(own_model(model), materials, resolution, options)
+        coupled = CoupledModel(self.model, self._waves, named_collision_geoms(self.model, self, contacts or {}))
         for geom, waves in self._waves.items():
             _warn(collision_warning(coupled, geom, waves.atlas))
-        _warn(integrator_warning(model))
+        _warn(integrator_warning(self.model))
         self._loads = ContactLoads(coupled, self._waves)
         self._check_tunnelling = TunnellingCheck(coupled, list(self._waves))
         self._push_back = PushBack(coupled, self._waves) if two_way else None
-        self._clock = StepClock()
+        self._clock, self._solved = StepClock(), SolvedForces(self.model)
+        self._warned: set[str] = set()
 
     @property
     def last_impulses(self) -> list[Impulse]:
-        """The impulses given to the surfaces in the latest step, one record for each pair of geoms."""
+        """The impulses given to the surfaces in the latest call of `step` or `mj_step`, or within `following`.
+
+        One record for each pair of geoms and each physics step.
+        """
         return self._loads.impulses
 
     def step(self, data: mujoco.MjData) -> None:
         """Apply the contact forces of the latest physics step to the surfaces, and advance the waves to `data.time`.
 
         The forces and poses in `data` after `mj_step` are those at the beginning of that step, over which MuJoCo holds
-        the forces: each contact gives normal force times time step. If time has gone backwards (the simulation was
-        reset) the waves are reset too; if it stands still, nothing happens.
+        the forces: each contact gives normal force times time step. Of several steps since the last call only the
+        latest gives its impulses, and a warning says so; see `mj_step`. If time stands still, nothing happens.
+
+        If the simulation was reset (`mj_resetData`, a keyframe, MuJoCo's automatic reset of a simulation that diverges,
+        or a time that went back), the waves are reset too, and of the steps since then only the latest counts, as at
+        the first call.
+
+        Raises
+        ------
+        SceneError
+            If `data` belongs to another model.
         """
-        elapsed, set_back = self._clock.elapsed(data.time, self.model.opt.timestep)
-        if set_back:
-            self._flatten()
-        if elapsed == 0:
-            self._loads.skip()
-            return
-        self._check_tunnelling(data)
-        loads = self._loads.loads(data, elapsed)
-        if self._push_back is not None:
-            for geom, load in self._push_back.withdraw(data):
-                loads[geom] = Load.together([loads[geom], load])
-        for geom, waves in self._waves.items():
-            waves.step(elapsed, load=loads[geom])
-        if self._push_back is not None:
-            self._push_back.apply(data, self._loads.touches, self._waves)
+        self._loads.skip()
+        self._follow(own_data(self.model, data))
+
+    def mj_step(self, data: mujoco.MjData, nstep: int = 1) -> None:
+        """Take physics steps as `mujoco.mj_step` does, and `step` after each of them.
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+        nstep : int
+            How many.
+
+        Raises
+        ------
+        SceneError
+            If `data` belongs to another model.
+        """
+        self._loads.skip()
+        data = own_data(self.model, data)
+        for _ in range(nstep):
+            mujoco.mj_step(self.model, data)
+            self._follow(data)
+
+    @contextlib.contextmanager
+    def following(self, data: mujoco.MjData) -> Iterator[None]:
+        """Follow the physics steps that other code takes, such as an environment's `step`: a context manager.
+
+        Within the context each `mujoco.mj_step` or `mujoco.mj_step2` on this data is followed by a `step`, whoever
+        calls it, and however many steps are taken at once.
+
+        Raises
+        ------
+        SceneError
+            If `data` belongs to another model.
+        """
+        self._loads.skip()
+        data = own_data(self.model, data)
+        with followed(data, lambda: self._follow(data)):
+            yield
+        self._follow(data)  # what was stepped in other ways is warned of
 
     def reset(self) -> None:
         """Flatten all surfaces, and let time begin anew."""
-        self._clock.reset()
+        self._clock.restart()
         self._flatten()
+
+    def _follow(self, data: mujoco.MjData) -> None:
+        passed = self._clock.look(self.model, data)
+        broken = goes_on_broken(self.model, data)
+        if passed.reset or broken:
+            self._flatten()
+            self._warn_once("divergence", divergence_warning(self.model, data))
+        self._warn_once("missed", missed_warning(passed.missed))
+        if broken or not passed.elapsed:
+            return
+        solved, solved_here = self._solved.of(data)
+        self._warn_once("unsolved", UNSOLVED_WARNING if solved_here else None)
+        self._check_tunnelling(solved)
+        loads = self._loads.loads(solved, passed.elapsed)
+        if self._push_back is not None:
+            for geom, load in self._push_back.exchange(data, self._loads.touches, self._waves, passed.elapsed):
+                loads[geom] = Load.together([loads[geom], load])
+        for geom, waves in self._waves.items():
+            waves.step(passed.elapsed, load=loads[geom])
 
     def _waves_changed(self, name: GeomKey) -> None:
         super()._waves_changed(name)
@@ -123,12 +185,15 @@ class Ripples(Targets):
 
     def _flatten(self) -> None:
         self._loads.clear()
-        if self._push_back is not None:
-            self._push_back.forget()
         for waves in self._waves.values():
             waves.reset()
 
+    def _warn_once(self, kind: str, message: str | None) -> None:
+        if message is not None and kind not in self._warned:
+            self._warned.add(kind)
+            _warn(message, stacklevel=5)
 
-def _warn(message: str | None) -> None:
+
+def _warn(message: str | None, stacklevel: int = 3) -> None:
     if message is not None:
-        warnings.warn(message, RippleWarning, stacklevel=3)
+        warnings.warn(message, RippleWarning, stacklevel=stacklevel)

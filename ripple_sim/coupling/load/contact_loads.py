@@ -39,8 +39,9 @@ class ContactLoads:
         self.skip()
 
     def skip(self) -> None:
-        """Forget the latest step: nothing was given since."""
+        """Forget the latest steps: nothing was given since."""
         self._records: list[ContactRecord] = []
+        self._touching: list[ContactRecord] = []
         self._impulses: list[Impulse] | None = None
 
     def waves_changed(self, geom: int) -> None:
@@ -50,7 +51,7 @@ class ContactLoads:
     def loads(self, data: mujoco.MjData, elapsed: float) -> dict[int, Load]:
         """Load on each target over a time [s], from the contact forces that MuJoCo held over its latest time step."""
         loads = {}
-        self.skip()
+        self._impulses, self._touching = None, []
         self._timestep = self._coupled.model.opt.timestep
         contacts = self._contacts.read(data)
         for geom, target in self._targets.items():
@@ -59,13 +60,14 @@ class ContactLoads:
                 pose = Pose(data.geom_xpos[geom].copy(), data.geom_xmat[geom].reshape(3, 3).copy())
                 loads[geom], record = target.touched(contacts[geom], pose, self._timestep, elapsed)
                 self._records.append(record)
+                self._touching.append(record)
             else:
                 loads[geom] = target.untouched(elapsed)
         return loads
 
     @property
     def impulses(self) -> list[Impulse]:
-        """The impulses given in the latest step, one record for each pair."""
+        """The impulses given since `skip`, one record for each pair and step."""
         if self._impulses is None:
             self._impulses = [
                 impulse
@@ -79,4 +81,4 @@ class ContactLoads:
     @property
     def touches(self) -> list[Touch]:
         """The pairs that touched in the latest step."""
-        return [touch for record in self._records for touch in record.touches()]
+        return [touch for record in self._touching for touch in record.touches()]

@@ -25,13 +25,15 @@ class _Patch(NamedTuple):
 
 
 class PushBack:
-    """Forces between moving surfaces and the bodies that touch them, held over the next physics step.
+    """Exchanges momentum between moving surfaces and the bodies that touch them.
 
     MuJoCo sees a target's undeformed surface, which stops what comes in. So only the surface's own outward motion is
     left to pass on, to bodies that touch that surface or are within reach of the displaced one: a patch of mass m_s
     that moves outwards at u meets a body of effective mass m_b that moves along the normal at w >= 0, both relative to
     the target. As in a perfectly inelastic collision, which cannot create energy, they exchange
     J = (u - w) m_s m_b / (m_s + m_b) if u > w: +J on the body, -J on the surface and on the target's body.
+
+    The bodies receive J at once, as a change of `data.qvel`: forces in `data` are the user's, and none is left there.
 
     Parameters
     ----------
@@ -43,52 +45,55 @@ class PushBack:
     def __init__(self, coupled: CoupledModel, targets: Iterable[int]) -> None:
         self._model = coupled.model
         self._reach = Reach(coupled, targets)
-        self._applied = np.zeros((coupled.model.nbody, 6))
-        self._loads: list[tuple[int, Load]] = []
 
-    def withdraw(self, data: mujoco.MjData) -> list[tuple[int, Load]]:
-        """Take back the forces on the bodies, and give those on the targets over the latest step, by geom id."""
-        data.xfrc_applied -= self._applied
-        return self.forget()
+    def exchange(
+        self, data: mujoco.MjData, touches: Sequence[Touch], waves: Mapping[int, WaveSolver], elapsed: float
+    ) -> list[tuple[int, Load]]:
+        """Push the bodies, and return the loads that push the targets, by geom id, over the elapsed time [s].
 
-    def forget(self) -> list[tuple[int, Load]]:
-        """As `withdraw`, where MuJoCo has cleared its forces already."""
-        self._applied[:] = 0
-        loads, self._loads = self._loads, []
-        return loads
-
-    def apply(self, data: mujoco.MjData, touches: Sequence[Touch], waves: Mapping[int, WaveSolver]) -> None:
-        """Set the forces for the next step, from the pairs that touch and the waves of each target, by geom id."""
+        Parameters
+        ----------
+        data : mujoco.MjData
+        touches : sequence of Touch
+            The pairs that touch.
+        waves : mapping
+            Waves of each target before the step, by geom id.
+        elapsed : float
+        """
         pairs = {(touch.target, touch.other) for touch in touches}
         touches = [*touches, *self._reach.reached(data, waves, pairs)]
         velocities = {touch.target: waves[touch.target].velocity.reshape(-1) for touch in touches}
+        loads = []
         for touch in touches:
-            patch = _patch(touch, waves[touch.target], velocities[touch.target])
-            if patch is not None and patch.velocity > 0:
-                self._exchange(data, touch, patch)
-        data.xfrc_applied += self._applied
+            mass, velocity = waves[touch.target].operator.mass.reshape(-1), velocities[touch.target]
+            patch = _patch(touch, mass, velocity)
+            impulse = 0.0 if patch is None else self._push(data, touch, patch)
+            if patch is not None and impulse:
+                texels, impulses = patch.shares.texels, impulse * patch.shares.forces
+                velocity[texels] -= impulses / mass[texels]  # what the next touch meets
+                loads.append((touch.target, Load(texels, impulses / elapsed)))
+        return loads
 
-    def _exchange(self, data: mujoco.MjData, touch: Touch, patch: _Patch) -> None:
-        model, point, normal = self._model, touch.point, touch.normal
+    def _push(self, data: mujoco.MjData, touch: Touch, patch: _Patch) -> float:
+        """Push the bodies with the impulse that they exchange with a patch, and return it [N s]."""
+        if patch.velocity <= 0:
+            return 0.0
+        model, point = self._model, touch.point
         body, base = int(model.geom_bodyid[touch.other]), int(model.geom_bodyid[touch.target])
-        along = normal @ (_jacobian(model, data, body, point) - _jacobian(model, data, base, point))
+        along = touch.normal @ (_jacobian(model, data, body, point) - _jacobian(model, data, base, point))
         response = np.zeros((1, model.nv))
         mujoco.mj_solveM(model, data, response, along[None])
         inverse_mass = float(along @ response[0])
         approach = patch.velocity - max(0.0, float(along @ data.qvel))
         if inverse_mass <= 0 or approach <= 0:
-            return
-        force = approach / (1 / patch.mass + inverse_mass) / model.opt.timestep
-        for index, sign in ((body, 1.0), (base, -1.0)):
-            if index:
-                self._applied[index, :3] += sign * force * normal
-                self._applied[index, 3:] += sign * force * np.cross(point - data.xipos[index], normal)
-        self._loads.append((touch.target, Load(patch.shares.texels, force * patch.shares.forces)))
+            return 0.0
+        impulse = approach / (1 / patch.mass + inverse_mass)
+        data.qvel += impulse * response[0]
+        return impulse
 
 
-def _patch(touch: Touch, waves: WaveSolver, velocity: NDArray[np.float32]) -> _Patch | None:
-    """The patch under a touch, from the velocity of all texels [m/s], [C n n]; None where nothing is movable."""
-    mass = waves.operator.mass.reshape(-1)
+def _patch(touch: Touch, mass: NDArray[np.float64], velocity: NDArray[np.float32]) -> _Patch | None:
+    """The patch under a touch, from mass [kg] and velocity [m/s] of all texels; None where nothing is movable."""
     load = touch.load.merged(mass.size)
     total = load.forces.sum()
     if total <= 0:

@@ -1,5 +1,7 @@
 """Two-way coupling: a passing ripple kicks a resting ball, and what one gains the other loses."""
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 from ring_under_ball import GRAVITY, run
@@ -42,7 +44,8 @@ def test_ball_is_never_thrown_faster_than_the_surface_moves() -> None:
     assert 0.5 * surface < fastest < surface
 
 
-def test_forces_of_others_stay() -> None:
+def pushed(force: Callable[[mujoco.MjData], None]) -> tuple[mujoco.MjData, Ripples]:
+    """A ball on a block whose surface comes up, and the same forces of others at each step."""
     model = mujoco.MjModel.from_xml_string(
         """<mujoco><worldbody><geom name="block" type="box" size="0.5 0.5 0.2"/>
         <body name="ball" pos="0 0 0.2499"><freejoint/><geom size="0.05" mass="0.2"/></body></worldbody></mujoco>"""
@@ -50,14 +53,59 @@ def test_forces_of_others_stay() -> None:
     data = mujoco.MjData(model)
     ripples = Ripples(model, {"block": Material(density=20.0)}, resolution=16, backend="cpu", two_way=True)
     ripples["block"].velocity = np.ones((6, 16, 16))
-    data.xfrc_applied[1, 0] = 0.25
     highest = 0.0
+    data.xfrc_applied[1] = FORCE
     for _ in range(100):
+        force(data)
         mujoco.mj_step(model, data)
         ripples.step(data)
         highest = max(highest, data.qpos[2])
     assert highest > 0.2505  # it was pushed
-    data.qpos[2] = 1.0  # out of reach, where nothing pushes any more
+    return data, ripples
+
+
+FORCE = np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_forces_of_others_stay_theirs() -> None:
+    """Set once, or assigned before each step, which wiped out the push, or taken back and added anew."""
+
+    def assigned(data: mujoco.MjData) -> None:
+        data.xfrc_applied[:] = 0.0
+        data.xfrc_applied[1] = FORCE
+
+    def added(data: mujoco.MjData) -> None:
+        data.xfrc_applied[1] -= FORCE
+        data.xfrc_applied[1] += FORCE
+
+    once, _ = pushed(lambda data: None)
+    for force in (assigned, added):
+        data, _ = pushed(force)
+        np.testing.assert_array_equal(data.qpos, once.qpos)
+        np.testing.assert_array_equal(data.xfrc_applied[1], FORCE)
+
+
+def test_nothing_is_left_after_a_reset() -> None:
+    data, ripples = pushed(lambda data: None)
+    ripples.reset()
+    np.testing.assert_array_equal(data.xfrc_applied, [[0.0] * 6, FORCE])
+    data.time = 0.001  # earlier than the ripples have seen
+    ripples.step(data)
+    np.testing.assert_array_equal(data.xfrc_applied, [[0.0] * 6, FORCE])
+
+
+def test_a_body_that_touches_twice_is_pushed_once() -> None:
+    """Two of its geoms on the same patch together do not make it faster than the surface."""
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><option gravity="0 0 0"/><worldbody><geom name="block" type="box" size="0.5 0.5 0.2"/>
+        <body name="ball" pos="0 0 0.2499"><freejoint/><geom size="0.05" mass="0.001"/><geom size="0.05" mass="0.001"/>
+        </body></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    ripples = Ripples(
+        model, {"block": Material(density=20.0)}, resolution=16, backend="cpu", two_way=True, conserve_volume=False
+    )
+    ripples["block"].velocity = np.ones((6, 16, 16))
     mujoco.mj_step(model, data)
     ripples.step(data)
-    np.testing.assert_allclose(data.xfrc_applied[1], [0.25, 0, 0, 0, 0, 0], atol=1e-12)
+    assert 0.9 < data.qvel[2] <= 1.0

@@ -1,0 +1,216 @@
+"""The loops that people write: whatever way the steps are taken, the waves get each impulse once, and resets reset."""
+
+import types
+import warnings
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim import Material, RippleError, Ripples, RippleWarning
+
+N = 16
+GRAVITY = 9.81
+MASS = 0.3
+BALL = f"""<mujoco model="bounce"><option timestep="0.001"/><worldbody>
+<geom name="block" type="box" size="0.5 0.5 0.2" pos="0 0 -0.2" solref="0.01 0.3"/>
+<body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
+</worldbody><keyframe><key name="late" time="3" qpos="0 0 0.049 1 0 0 0"/></keyframe></mujoco>"""
+
+Loop = Callable[[Ripples, mujoco.MjModel, mujoco.MjData], None]
+
+
+def bounce(**options: object) -> tuple[Ripples, mujoco.MjModel, mujoco.MjData]:
+    """A ball about to fall on a block."""
+    model = mujoco.MjModel.from_xml_string(BALL)
+    material = Material(speed=1.0, density=20.0)
+    return Ripples(model, {"block": material}, resolution=N, backend="cpu", **options), model, mujoco.MjData(model)
+
+
+def plain(ripples: Ripples, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    for _ in range(5):
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+
+
+def own_steps(ripples: Ripples, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    ripples.mj_step(data, nstep=5)
+
+
+def in_halves(ripples: Ripples, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    for _ in range(5):
+        mujoco.mj_step1(model, data)
+        mujoco.mj_step2(model, data)
+        ripples.step(data)
+
+
+def followed(ripples: Ripples, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    with ripples.following(data):
+        mujoco.mj_step(model, data, nstep=4)
+        mujoco.mj_step1(model, data)
+        mujoco.mj_step2(model, data)
+        mujoco.mj_step1(model, data)
+
+
+def wrapped(ripples: Ripples, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    ripples.mj_step(types.SimpleNamespace(ptr=data), nstep=5)
+
+
+@pytest.mark.parametrize("two_way", [False, True])
+@pytest.mark.parametrize("loop", [own_steps, in_halves, followed, wrapped])
+def test_every_loop_makes_the_waves_of_the_plain_one(loop: Loop, two_way: bool) -> None:
+    expected = bounce(two_way=two_way)
+    found = bounce(two_way=two_way)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RippleWarning)
+        for _ in range(40):
+            plain(*expected)
+            loop(*found)
+    assert np.abs(expected[0]["block"].height).max() > 1e-4
+    np.testing.assert_array_equal(found[0]["block"].height, expected[0]["block"].height)
+    np.testing.assert_array_equal(found[2].qpos, expected[2].qpos)
+
+
+@pytest.mark.parametrize("loop", [own_steps, followed])
+def test_impulses_of_several_steps_are_those_of_each(loop: Loop) -> None:
+    ripples, model, data = bounce()
+    given = 0.0
+    for _ in range(30):
+        loop(ripples, model, data)
+        given += sum(impulse.impulse for impulse in ripples.last_impulses)
+    gained = MASS * (data.qvel[2] + GRAVITY * data.time)
+    assert given == pytest.approx(gained, rel=2e-3)
+
+
+def test_missed_steps_are_counted_and_told_once() -> None:
+    ripples, model, data = bounce()
+    given = 0.0
+    with pytest.warns(
+        RippleWarning, match=r"5 physics steps .* other 4; call `ripples.mj_step\(data, nstep=5\)`"
+    ) as told:
+        for _ in range(30):
+            mujoco.mj_step(model, data, nstep=5)
+            ripples.step(data)
+            given += sum(impulse.impulse for impulse in ripples.last_impulses)
+    assert len(told) == 1
+    assert told[0].filename == __file__
+    # what is known is given: the force of the latest step over this step
+    assert given == pytest.approx(MASS * (data.qvel[2] + GRAVITY * data.time) / 5, rel=0.3)
+    assert ripples["block"].time == pytest.approx(data.time - 4 * model.opt.timestep)
+
+
+def test_mujocos_functions_are_its_own_again() -> None:
+    ripples, model, data = bounce()
+    before = mujoco.mj_step, mujoco.mj_step2
+    with pytest.raises(ZeroDivisionError), ripples.following(data):
+        assert mujoco.mj_step is not before[0]
+        with ripples.following(data):
+            mujoco.mj_step(model, data)
+        1 / 0  # noqa: B018
+    assert (mujoco.mj_step, mujoco.mj_step2) == before
+
+
+def test_only_the_data_that_is_followed_is() -> None:
+    ripples, model, data = bounce()
+    other = mujoco.MjData(model)
+    with ripples.following(data):
+        mujoco.mj_step(model, other, nstep=3)
+    assert other.time == pytest.approx(3 * model.opt.timestep)
+    assert ripples["block"].time == 0
+
+
+def test_forces_that_are_not_solved_yet_are_solved_for() -> None:
+    """As in dm_control's loop, which ends with mj_step1: the contacts are those of the next step already."""
+    ripples, model, data = bounce()
+    given = 0.0
+    mujoco.mj_step1(model, data)
+    with pytest.warns(RippleWarning, match="between `mj_step1` and `mj_step2`") as told:
+        for _ in range(150):
+            mujoco.mj_step2(model, data)
+            mujoco.mj_step1(model, data)
+            ripples.step(data)
+            given += sum(impulse.impulse for impulse in ripples.last_impulses)
+    assert len(told) == 1
+    mujoco.mj_step2(model, data)  # with the forces that the ripples knew already
+    assert given == pytest.approx(MASS * (data.qvel[2] + GRAVITY * data.time), rel=2e-3)
+
+
+def test_data_of_another_model_is_refused() -> None:
+    ripples, _, _ = bounce()
+    other = mujoco.MjModel.from_xml_string('<mujoco model="chair"><worldbody><geom size="1"/></worldbody></mujoco>')
+    data = mujoco.MjData(other)
+    for call in (ripples.step, ripples.mj_step):
+        with pytest.raises(RippleError, match=r"another model \('chair', nq 0.*\) than .* \('bounce', nq 7"):
+            call(data)
+    with pytest.raises(RippleError, match="data is NoneType"):
+        ripples.step(None)
+    same = mujoco.MjModel.from_xml_string(BALL)
+    ripples.step(mujoco.MjData(same))
+
+
+def spoilt(ripples: Ripples) -> None:
+    """Waves that no simulation made."""
+    ripples["block"].velocity = np.random.default_rng(3).standard_normal((6, N, N))
+
+
+@pytest.mark.parametrize("unseen", [1, 2, 60])
+@pytest.mark.parametrize("keyframe", [None, 0])
+def test_waves_begin_anew_with_the_simulation(unseen: int, keyframe: int | None) -> None:
+    """Even where the time after the reset is that before it, or later."""
+    ripples, model, data = bounce()
+    mujoco.mj_step(model, data)
+    ripples.step(data)
+    spoilt(ripples)
+    if keyframe is None:
+        mujoco.mj_resetData(model, data)
+    else:
+        mujoco.mj_resetDataKeyframe(model, data, keyframe)
+    mujoco.mj_step(model, data, nstep=unseen)
+    ripples.step(data)
+    fresh = bounce()[0]
+    fresh.step(data)
+    np.testing.assert_array_equal(ripples["block"].velocity, fresh["block"].velocity)
+    assert ripples["block"].time == model.opt.timestep
+
+
+def test_a_simulation_that_diverges_takes_the_waves_along_and_says_so(in_tmp_path: None) -> None:
+    ripples, model, data = bounce()
+    own_steps(ripples, model, data)
+    with pytest.warns(RippleWarning, match=r"diverged \(mjWARN_BADQVEL\): MuJoCo reset it") as told:
+        for _ in range(2):
+            spoilt(ripples)
+            data.qvel[0] = 1e12
+            mujoco.mj_step(model, data)
+            ripples.step(data)
+            assert not ripples["block"].velocity.any()
+            plain(ripples, model, data)
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize("two_way", [False, True])
+def test_a_broken_state_makes_no_waves_where_mujoco_goes_on_with_it(two_way: bool, in_tmp_path: None) -> None:
+    """With its automatic reset disabled: NaN positions once ended in an error about points."""
+    ripples, model, data = bounce(two_way=two_way)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    plain(ripples, model, data)
+    spoilt(ripples)
+    data.qpos[2] = np.nan
+    with pytest.warns(RippleWarning, match=r"diverged \(mjWARN_BADQPOS\): its automatic reset is disabled") as told:
+        plain(ripples, model, data)
+    assert len(told) == 1
+    assert not ripples["block"].velocity.any()
+    mujoco.mj_resetData(model, data)
+    for _ in range(40):
+        plain(ripples, model, data)
+    assert ripples["block"].velocity.any()
+
+
+def test_a_teleported_body_is_no_reset() -> None:
+    ripples, model, data = bounce()
+    own_steps(ripples, model, data)
+    spoilt(ripples)
+    data.qpos[:3] = 0.0, 0.0, 5.0
+    mujoco.mj_step(model, data)
+    ripples.step(data)
+    assert ripples["block"].velocity.any()
