@@ -10,7 +10,7 @@ from .counting import counted
 from .topology import sides_of
 from .winding import labels, turned
 
-# A part that encloses less, relative to the cube of its size, has no inside.
+# A part that encloses less, relative to its area, has no inside.
 _FLAT = 1e-12
 
 
@@ -25,10 +25,10 @@ def oriented(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, list[st
     count = int(part.max()) + 1
     start = F.ravel()
     flip = turned(pairs // 3, start[pairs[:, 0]] == start[pairs[:, 1]], len(F))
-    volume, cube = part_volumes(V, np.where(flip[:, None], F[:, ::-1], F), part)
+    volume, area = part_volumes(V, np.where(flip[:, None], F[:, ::-1], F), part)
     closed = np.bincount(part[rim // 3], minlength=count) == 0
     sizes, turns = np.bincount(part), np.bincount(part, weights=flip)
-    solid = closed & (np.abs(volume) > _FLAT * cube)
+    solid = closed & (np.abs(volume) > _FLAT * area**1.5)
     over = np.where(solid, volume < 0, 2 * turns > sizes)
     flip ^= over[part]
     whole = np.bincount(part, weights=flip, minlength=count) == sizes
@@ -45,7 +45,7 @@ def oriented(V: NDArray[np.float64], corners: Corners) -> tuple[Corners, list[st
 def part_volumes(
     V: NDArray[np.float64], F: NDArray[np.int64], part: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Signed volume of every part [m^3], exact where it is closed, and the cube of its longest extent [m^3].
+    """Signed volume of every part [m^3], exact where it is closed, and its area [m^2].
 
     Parameters
     ----------
@@ -53,11 +53,10 @@ def part_volumes(
     part : [triangle_count]
         Part of every triangle, numbered from 0.
     """
-    count = int(part.max()) + 1
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    count, size = int(part.max()) + 1, np.bincount(part)
     corners = V[F]
-    np.minimum.at(low, part, corners.min(axis=1))
-    np.maximum.at(high, part, corners.max(axis=1))
-    a, b, c = np.moveaxis(corners - ((low + high) / 2)[part][:, None], 1, 0)
+    middle = np.stack([np.bincount(part, weights=x) / size for x in corners.mean(axis=1).T], axis=1)
+    a, b, c = np.moveaxis(corners - middle[part][:, None], 1, 0)
     volume = np.bincount(part, weights=np.einsum("ij,ij->i", a, np.cross(b, c)), minlength=count) / 6
-    return volume, (high - low).max(axis=1) ** 3
+    area = np.bincount(part, weights=np.linalg.norm(np.cross(b - a, c - a), axis=1), minlength=count) / 2
+    return volume, area

@@ -20,10 +20,15 @@ def distinct(values: NDArray[np.int64]) -> NDArray[np.int64]:
     return ordered[np.append(True, ordered[1:] != ordered[:-1])]
 
 
+def undirected(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Number of the edge on which each side lies [3 m], and whether the side ends at the edge's higher vertex [3 m]."""
+    a, b = F.ravel(), np.roll(F, -1, axis=1).ravel()
+    return np.minimum(a, b) * (F.max() + 1) + np.maximum(a, b), a < b
+
+
 def sides_of(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Sides of a manifold mesh, numbered 3 x triangle + side: pairs that lie together [k, 2], and those on rims [j]."""
-    a, b = F.ravel(), np.roll(F, -1, axis=1).ravel()
-    key = np.minimum(a, b) * (F.max() + 1) + np.maximum(a, b)
+    key, _ = undirected(F)
     order = np.argsort(key, kind="stable")
     second = np.flatnonzero(key[order[1:]] == key[order[:-1]]) + 1
     alone = np.ones(len(key), dtype=bool)
