@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import mujoco
 
-from ripple_sim.coupling.colliders.collision_warnings import collision_warning
+from ripple_sim.coupling.colliders.collision_warnings import collision_warnings
 from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
 from ripple_sim.coupling.load.contact_loads import ContactLoads
 from ripple_sim.coupling.load.contact_record import Impulse
@@ -82,7 +82,8 @@ class Ripples(Targets):
         super().__init__(own_model(model), materials, resolution, options)
         coupled = CoupledModel(self.model, self._waves, named_collision_geoms(self.model, self, contacts or {}))
         for geom, waves in self._waves.items():
-            _warn(collision_warning(coupled, geom, waves.atlas))
+            for message in collision_warnings(coupled, geom, waves.atlas):
+                _warn(message)
         _warn(integrator_warning(self.model))
         self._loads = ContactLoads(coupled, self._waves)
         self._check_tunnelling = TunnellingCheck(coupled, list(self._waves))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import mujoco
 import numpy as np
 
@@ -18,11 +20,26 @@ COARSE_TOLERANCE = 0.1
 _GEOM = mujoco.mjtGeom
 
 
-def collision_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
-    """What to warn of where nothing touches a target, or it collides other than as its true surface, else None."""
-    if coupled.out_of_touch(geom):
+def collision_warnings(coupled: CoupledModel, geom: int, atlas: Atlas) -> Iterator[str]:
+    """What to warn of where nothing touches a target, it collides off its surface, or contacts tell no forces."""
+    message = _shape_warning(coupled, geom, atlas)
+    if message is not None:
+        yield message
+    passive = getattr(coupled.model, "flex_passive", np.zeros(coupled.model.nflex))  # not in MuJoCo's older versions
+    for flex in coupled.masks.soft_flexes(coupled.collision_geoms(geom)).tolist():
+        if passive[flex]:
+            name = coupled.names[coupled.model.ngeom + flex]
+            yield (
+                f"MuJoCo tells no forces of the passive contacts of flex {name!r}, under which geom "
+                f'{coupled.names[geom]!r} will not ripple; set passive="false" in the flex\'s <contact>'
+            )
+
+
+def _shape_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
+    colliders = coupled.collision_geoms(geom)
+    if coupled.masks.out_of_touch(geom, colliders):
         return _touch_warning(coupled, geom)
-    if any(each != geom for each in coupled.collision_geoms(geom)):
+    if any(each != geom for each in colliders):
         return _gap_warning(coupled, geom, atlas)
     if coupled.has_flex[geom]:
         return _flex_warning(coupled, geom)

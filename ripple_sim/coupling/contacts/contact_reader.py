@@ -1,4 +1,4 @@
-"""All contacts on all targets, with geoms, flex colliders and collision geoms."""
+"""All contacts on all targets, with geoms, flexes and collision geoms."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from ripple_sim.coupling.model.coupled_model import CoupledModel
 from ripple_sim.coupling.model.target_mesh import target_mesh
 from ripple_sim.solver import Atlas
 
+from .collider_ids import ColliderIds
 from .collision_contacts import CollisionContacts
 from .flex_contacts import FlexContacts
 from .geom_contacts import geom_contacts
@@ -33,7 +34,8 @@ class ContactReader:
         meshes = {target: atlas.mesh for target, atlas in atlases.items()}
         for geom in coupled.flex_colliders.keys() & self._collision_contacts.geoms:
             meshes[geom] = target_mesh(coupled.model, geom)
-        self._is_read = np.zeros(coupled.model.ngeom, dtype=np.bool_)
+        self._colliders = ColliderIds(coupled)
+        self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[[*meshes, *self._collision_contacts.geoms]] = True
         self._flexes = None
         if coupled.flex_colliders:
@@ -42,11 +44,8 @@ class ContactReader:
 
     def read(self, data: mujoco.MjData) -> dict[int, TargetContacts]:
         """Contacts of each target that is touched, by geom id."""
-        model, extents = self._coupled.model, self._coupled.extents
-        if self._flexes is None:
-            contacts = geom_contacts(model, data, self._is_read, extents)
-        else:
-            geoms = self._flexes.geoms(data)
-            contacts = geom_contacts(model, data, self._is_read, extents, geoms)
-            contacts |= self._flexes.contacts(data, geoms, extents)
+        model, extents, colliders = self._coupled.model, self._coupled.extents, self._colliders(data)
+        contacts = geom_contacts(model, data, colliders, self._is_read, extents)
+        if self._flexes is not None:
+            contacts |= self._flexes.contacts(data, colliders, extents)
         return self._collision_contacts.hand_over(data, contacts)

@@ -40,23 +40,15 @@ class FlexContacts:
 
     def __init__(self, coupled: CoupledModel, meshes: Mapping[int, Mesh]) -> None:
         self._model, model, flexes = coupled.model, coupled.model, coupled.flex_colliders
-        # the last entry is for no flex, whose id is -1
-        self._geom_of = np.full(model.nflex + 1, -1)
-        self._geom_of[list(flexes.values())] = list(flexes)
         self.targets = sorted(flexes.keys() & meshes.keys())
-        self._normals = FlexNormals(np.full(model.ngeom, -1), np.zeros((model.nflexelem, 3)))
+        self._normals = FlexNormals(np.full(len(coupled.owners), -1), np.zeros((model.nflexelem, 3)))
         for geom in self.targets:
             first = self._normals.first[geom] = model.flex_elemadr[flexes[geom]]
             normals = _outward_normals(model, geom, flexes[geom], meshes[geom])
             self._normals.normals[first : first + len(normals)] = normals
 
-    def geoms(self, data: mujoco.MjData) -> NDArray[np.int64]:
-        """Geom ids of each contact, [ncon, 2], with those of the flex colliders; -1 for other flexes."""
-        contacts = data.contact
-        return np.where(contacts.geom >= 0, contacts.geom, self._geom_of[contacts.flex])
-
     def contacts(
-        self, data: mujoco.MjData, geoms: NDArray[np.int64], extents: NDArray[np.float64]
+        self, data: mujoco.MjData, colliders: NDArray[np.int64], extents: NDArray[np.float64]
     ) -> dict[int, TargetContacts]:
         """As `geom_contacts`, for these targets."""
         if not data.ncon:
@@ -75,7 +67,7 @@ class FlexContacts:
             data.geom_xmat,
         )
         pyramidal = self._model.opt.cone == PYRAMIDAL
-        return summed_contacts(geoms, contacts, self._normals, extents, pyramidal).by_target()
+        return summed_contacts(colliders, contacts, self._normals, extents, pyramidal).by_target()
 
 
 def _outward_normals(model: mujoco.MjModel, geom: int, flex: int, mesh: Mesh) -> NDArray[np.float64]:

@@ -20,8 +20,8 @@ class FlexNormals(NamedTuple):
 
     Attributes
     ----------
-    first : int64 [ngeom]
-        Row of the first triangle of a target among the normals; -1 for other geoms.
+    first : int64 [c]
+        Row of the first triangle of a target among the normals; -1 for all other colliders.
     normals : float64 [nflexelem, 3]
         In the frames of the geoms.
     """
@@ -47,22 +47,22 @@ class MujocoFlexContacts(NamedTuple):
 
 @kernel
 def summed_contacts(
-    geoms: Ints, contacts: MujocoFlexContacts, flex: FlexNormals, extents: Floats, pyramidal: bool
+    colliders: Ints, contacts: MujocoFlexContacts, flex: FlexNormals, extents: Floats, pyramidal: bool
 ) -> PairContacts:
     """Contacts that share the sum of the whole forces of their pair; pairs whose sum does not push are left out.
 
     Parameters
     ----------
-    geoms : int64 [ncon, 2]
-        Geom ids of each contact, also for flex colliders; -1 for other flexes.
+    colliders : int64 [ncon, 2]
+        Collider ids of each contact.
     contacts : MujocoFlexContacts
     flex : FlexNormals
-    extents : float64 [ngeom]
+    extents : float64 [c]
         Smallest half-extents [m].
     pyramidal : bool
         Whether MuJoCo's friction cones are.
     """
-    pairs, forces = group_by_pair(geoms, contacts.efc_address, flex.first >= 0), _whole_forces(contacts, pyramidal)
+    pairs, forces = group_by_pair(colliders, contacts.efc_address, flex.first >= 0), _whole_forces(contacts, pyramidal)
     found, found_pairs, row = room_for(pairs), 0, 0
     for pair in range(len(pairs.targets)):
         target, other = pairs.targets[pair], pairs.others[pair]

@@ -29,9 +29,9 @@ class _MujocoContacts(NamedTuple):
 def geom_contacts(
     model: mujoco.MjModel,
     data: mujoco.MjData,
+    colliders: NDArray[np.int64],
     is_target: NDArray[np.bool_],
     extents: NDArray[np.float64],
-    geoms: NDArray[np.int64] | None = None,
 ) -> dict[int, TargetContacts]:
     """Contacts that load each target that is touched, by its geom id in ascending order.
 
@@ -40,27 +40,26 @@ def geom_contacts(
     Parameters
     ----------
     model, data
-    is_target : bool [ngeom]
-        By geom id.
-    extents : float64 [ngeom]
+    colliders : int64 [ncon, 2]
+        Collider ids of each contact, see `CoupledModel`.
+    is_target : bool [c]
+        By collider id.
+    extents : float64 [c]
         Smallest half-extents [m].
-    geoms : int64 [ncon, 2]
-        Geom ids of each contact, where they are not MuJoCo's own.
     """
     if not data.ncon:
         return {}
     each = data.contact
-    geoms = each.geom.astype(np.int64) if geoms is None else geoms
     contacts = _MujocoContacts(each.efc_address, each.dim, each.frame, each.pos, each.dist, data.efc_force)
-    return _normal_contacts(geoms, contacts, is_target, extents, model.opt.cone == PYRAMIDAL).by_target()
+    return _normal_contacts(colliders, contacts, is_target, extents, model.opt.cone == PYRAMIDAL).by_target()
 
 
 @kernel
 def _normal_contacts(
-    geoms: Ints, contacts: _MujocoContacts, is_target: Bools, extents: Floats, pyramidal: bool
+    colliders: Ints, contacts: _MujocoContacts, is_target: Bools, extents: Floats, pyramidal: bool
 ) -> PairContacts:
     """Contacts whose normal force pushes; pairs without one are left out."""
-    pairs = group_by_pair(geoms, contacts.efc_address, is_target)
+    pairs = group_by_pair(colliders, contacts.efc_address, is_target)
     found, found_pairs, row = room_for(pairs), 0, 0
     for pair in range(len(pairs.targets)):
         first = row

@@ -18,7 +18,7 @@ class TargetContacts(NamedTuple):
     target : int
         Geom id.
     others : int64 [p]
-        Ids of the geoms that touch it, ascending.
+        Collider ids of what touches it, ascending; see `CoupledModel`.
     begins : int64 [p + 1]
         The contacts with others[i] are those from begins[i] to begins[i + 1].
     points : float64 [k, 3]
@@ -71,7 +71,7 @@ class Pairs(NamedTuple):
     Attributes
     ----------
     targets, others : int64 [p]
-        Geom ids.
+        Collider ids.
     begins : int64 [p + 1]
         Pair i has the rows from begins[i] to begins[i + 1].
     contacts : int64 [k]
@@ -88,25 +88,25 @@ class Pairs(NamedTuple):
 
 
 @kernel
-def group_by_pair(geoms: Ints, address: Ints32, is_target: Bools) -> Pairs:
+def group_by_pair(colliders: Ints, address: Ints32, is_target: Bools) -> Pairs:
     """Group the contacts that bear on targets.
 
     Parameters
     ----------
-    geoms : int64 [ncon, 2]
-        Geom ids, -1 for a flex that stands for no geom.
+    colliders : int64 [ncon, 2]
+        Collider ids.
     address : int32 [ncon]
         Their rows in the constraint solver. A contact without one (excluded, or in the margin only) carries no force.
-    is_target : bool [ngeom]
+    is_target : bool [c]
     """
-    ngeom, count = len(is_target), 0
-    keys, sources = np.empty(2 * len(geoms), np.int64), np.empty(2 * len(geoms), np.int64)
-    for i in range(len(geoms)):
-        if address[i] < 0 or geoms[i, 0] < 0 or geoms[i, 1] < 0:
+    size, count = len(is_target), 0
+    keys, sources = np.empty(2 * len(colliders), np.int64), np.empty(2 * len(colliders), np.int64)
+    for i in range(len(colliders)):
+        if address[i] < 0:
             continue
         for side in range(2):
-            if is_target[geoms[i, side]]:
-                keys[count], sources[count] = geoms[i, side] * ngeom + geoms[i, 1 - side], 2 * i + side
+            if is_target[colliders[i, side]]:
+                keys[count], sources[count] = colliders[i, side] * size + colliders[i, 1 - side], 2 * i + side
                 count += 1
     # a stable sort keeps the contacts of a pair in their order
     order = np.argsort(keys[:count], kind="mergesort")
@@ -116,7 +116,7 @@ def group_by_pair(geoms: Ints, address: Ints32, is_target: Bools) -> Pairs:
     for j in range(count):
         if keys[order[j]] != latest:
             latest = keys[order[j]]
-            targets[pairs], others[pairs] = divmod(latest, ngeom)
+            targets[pairs], others[pairs] = divmod(latest, size)
             begins[pairs] = j
             pairs += 1
         contacts[j], sides[j] = divmod(sources[order[j]], 2)

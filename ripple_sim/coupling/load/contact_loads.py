@@ -73,7 +73,10 @@ class ContactLoads:
                 impulse
                 for record in self._records
                 for impulse in record.impulses(
-                    self._coupled.names, self._waves[record.contacts.target].atlas.areas.shape, self._timestep
+                    self._coupled.names,
+                    self._coupled.owners,
+                    self._waves[record.contacts.target].atlas,
+                    self._timestep,
                 )
             ]
         return self._impulses

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.contacts.target_contacts import TargetContacts
 from ripple_sim.coupling.patches.contact_patches import LoadPoints, Patches
 from ripple_sim.coupling.patches.pose import Pose, in_world
-from ripple_sim.solver import Load
+from ripple_sim.solver import Atlas, Load
 from ripple_sim.solver.kernel import Floats, Ints
 
 from .footprint_cache import FootprintCache
@@ -26,7 +26,7 @@ class Impulse:
     Attributes
     ----------
     geom, other : str
-        Names of the target and of the geom that touches it.
+        Names of the target and of the geom or flex that touches it.
     point : float64 [3]
         Force-weighted contact point on the target's true surface, in the world [m].
     impulse : float
@@ -50,7 +50,7 @@ class Touch:
     Attributes
     ----------
     target, other : int
-        Geom ids.
+        Geom id, and collider id, see `CoupledModel`.
     point : float64 [3]
         Force-weighted contact point in the world [m].
     normal : float64 [3]
@@ -90,23 +90,28 @@ class ContactRecord(NamedTuple):
     points: LoadPoints
     cache: FootprintCache
 
-    def impulses(self, names: list[str], shape: tuple[int, ...], timestep: float) -> Iterator[Impulse]:
-        """One record for each geom that touches.
+    def impulses(self, names: Sequence[str], owners: Ints, atlas: Atlas, timestep: float) -> Iterator[Impulse]:
+        """One record for each geom or flex that touches.
 
         Parameters
         ----------
-        names : list of str
-            Of all geoms.
-        shape : (C, n, n)
-            Of the target's texels.
+        names, owners
+            See `CoupledModel`.
+        atlas : Atlas
+            Of the target.
         timestep : float
             How long the forces were held [s].
         """
-        middles = self.patches.begins[:-1]
-        points = in_world(self.surface[middles], self.pose)
-        geom, forces = names[self.contacts.target], self.patches.forces.tolist()
-        texels, n = self.texels[middles].tolist(), shape[1]
-        for other, point, force, texel in zip(self.patches.geoms.tolist(), points, forces, texels, strict=True):
+        middles, forces = self.patches.begins[:-1], self.patches.forces
+        places, texels, mine = self.surface[middles], self.texels[middles], owners[self.patches.geoms]
+        first = np.flatnonzero(np.diff(mine, prepend=-1))
+        if len(first) < len(mine):
+            # the vertices of a flex touch for themselves, and are told of together
+            weighted = np.add.reduceat(forces[:, None] * places, first)
+            forces, mine = np.add.reduceat(forces, first), mine[first]
+            places, texels = atlas.nearest(weighted / forces[:, None])
+        points, n, geom = in_world(places, self.pose), atlas.areas.shape[1], names[self.contacts.target]
+        for other, point, force, texel in zip(mine.tolist(), points, forces.tolist(), texels.tolist(), strict=True):
             row = texel // n
             yield Impulse(geom, names[other], point, force * timestep, (row // n, row % n, texel % n))
 

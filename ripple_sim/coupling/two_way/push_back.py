@@ -43,7 +43,7 @@ class PushBack:
     """
 
     def __init__(self, coupled: CoupledModel, targets: Iterable[int]) -> None:
-        self._model = coupled.model
+        self._model, self._bodies = coupled.model, coupled.bodies
         self._reach = Reach(coupled, targets)
 
     def exchange(
@@ -76,10 +76,10 @@ class PushBack:
 
     def _push(self, data: mujoco.MjData, touch: Touch, patch: _Patch) -> float:
         """Push the bodies with the impulse that they exchange with a patch, and return it [N s]."""
-        if patch.velocity <= 0:
+        if patch.velocity <= 0 or self._bodies[touch.other] < 0:
             return 0.0
         model, point = self._model, touch.point
-        body, base = int(model.geom_bodyid[touch.other]), int(model.geom_bodyid[touch.target])
+        body, base = int(self._bodies[touch.other]), int(self._bodies[touch.target])
         along = touch.normal @ (_jacobian(model, data, body, point) - _jacobian(model, data, base, point))
         response = np.zeros((1, model.nv))
         mujoco.mj_solveM(model, data, response, along[None])

@@ -97,9 +97,10 @@ def test_a_flex_that_does_not_ripple_goes_by_its_geom() -> None:
 def test_without_flexes_the_contacts_are_those_of_geoms() -> None:
     model = model_of('<geom name="target" type="box" size="0.5 0.5 0.5"/>' + BALL.format("0.1 0 0.53"))
     data = after(model, 1)
+    ids = data.contact.geom.astype(int)
     [found], [expected] = (
         reader_of(model, "target").read(data).values(),
-        geom_contacts(model, data, np.array([True, False]), CoupledModel(model).extents).values(),
+        geom_contacts(model, data, ids, np.array([True, False]), CoupledModel(model).extents).values(),
     )
     wrench = np.zeros(6)
     mujoco.mj_contactForce(model, data, 0, wrench)

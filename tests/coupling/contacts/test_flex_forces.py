@@ -7,6 +7,7 @@ import trimesh
 from mujoco_models import mesh_asset
 
 from ripple_sim import make_collidable
+from ripple_sim.coupling.contacts.collider_ids import ColliderIds
 from ripple_sim.coupling.contacts.flex_contacts import FlexContacts
 from ripple_sim.coupling.contacts.flex_forces import FlexNormals, MujocoFlexContacts, summed_contacts
 from ripple_sim.coupling.contacts.target_contacts import PairContacts
@@ -149,7 +150,7 @@ def test_the_load_is_the_force_with_which_mujoco_moves_the_body(cone: str, condi
     data.qvel[:] = [0.4, 0.2, -1.0, 4.0, 2.0, 5.0]
     for _ in range(100):
         mujoco.mj_step(model, data)
-        found = reader.contacts(data, reader.geoms(data), coupled.extents)
+        found = reader.contacts(data, ColliderIds(coupled)(data), coupled.extents)
         mean = np.zeros(3)
         for i, contact in enumerate(data.contact):
             mujoco.mj_contactForce(model, data, i, wrench)

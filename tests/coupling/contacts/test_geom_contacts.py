@@ -46,7 +46,7 @@ def test_every_contact_with_a_force_is_found_once_for_each_target_it_touches(con
     model, data = pit(seed, cone)
     is_target = np.zeros(model.ngeom, dtype=bool)
     is_target[[5, 6, 8, 9, 11]] = True
-    found = geom_contacts(model, data, is_target, CoupledModel(model).extents)
+    found = geom_contacts(model, data, data.contact.geom.astype(int), is_target, CoupledModel(model).extents)
     expected: dict[int, dict[int, list[tuple[float, np.ndarray, np.ndarray]]]] = {}
     for i, contact in enumerate(data.contact):
         wrench = np.zeros(6)
@@ -74,9 +74,9 @@ def test_what_touches_no_target_is_left_out() -> None:
     model, data = pit(0, "pyramidal")
     extents = CoupledModel(model).extents
     assert data.ncon > 0
-    assert not geom_contacts(model, data, np.zeros(model.ngeom, dtype=bool), extents)
+    assert not geom_contacts(model, data, data.contact.geom.astype(int), np.zeros(model.ngeom, dtype=bool), extents)
     data.contact.efc_address[:] = -1
-    assert not geom_contacts(model, data, np.ones(model.ngeom, dtype=bool), extents)
+    assert not geom_contacts(model, data, data.contact.geom.astype(int), np.ones(model.ngeom, dtype=bool), extents)
 
 
 def test_speculative_contact_loads_the_target_where_it_is() -> None:
@@ -85,8 +85,8 @@ def test_speculative_contact_loads_the_target_where_it_is() -> None:
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data)
     is_target, extents = np.array([True, False]), CoupledModel(model).extents
-    [before] = geom_contacts(model, data, is_target, extents).values()
+    [before] = geom_contacts(model, data, data.contact.geom.astype(int), is_target, extents).values()
     data.contact.dist[:] = -7.0
-    [after] = geom_contacts(model, data, is_target, extents).values()
+    [after] = geom_contacts(model, data, data.contact.geom.astype(int), is_target, extents).values()
     np.testing.assert_array_equal(after.forces, before.forces)
     assert np.linalg.norm(after.points - before.points) < 1.5 * 0.05

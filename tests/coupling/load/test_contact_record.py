@@ -8,7 +8,8 @@ from ripple_sim.coupling.load.contact_record import ContactRecord
 from ripple_sim.coupling.patches.pose import Pose, in_frame
 from ripple_sim.solver import sphere_atlas
 
-DT, SHAPE, NAMES = 0.002, (6, 16, 16), ["globe", "one", "two", "three"]
+DT = 0.002
+TOLD = ["globe", "one", "two", "three"], np.arange(4), sphere_atlas(1.0, 16), DT
 EACH = {1: [((0, 0, 1), 5.0)], 3: [((1, 0, 0.1), 2.0), ((1, 0.2, 0), 1.0)]}
 
 
@@ -19,7 +20,7 @@ def record_of(each: dict = EACH, elapsed: float = DT) -> tuple[ContactRecord, Po
 
 def test_there_is_one_impulse_for_each_geom_with_its_name_and_all_of_its_force() -> None:
     record, _ = record_of()
-    impulses = list(record.impulses(NAMES, SHAPE, DT))
+    impulses = list(record.impulses(*TOLD))
     assert [(each.geom, each.other) for each in impulses] == [("globe", "one"), ("globe", "three")]
     assert [each.impulse for each in impulses] == pytest.approx([5.0 * DT, 3.0 * DT])
 
@@ -27,12 +28,12 @@ def test_there_is_one_impulse_for_each_geom_with_its_name_and_all_of_its_force()
 def test_impulses_do_not_depend_on_how_the_load_is_spread_over_time() -> None:
     for elapsed in (DT, 4 * DT):
         record, _ = record_of(elapsed=elapsed)
-        assert sum(each.impulse for each in record.impulses(NAMES, SHAPE, DT)) == pytest.approx(8.0 * DT)
+        assert sum(each.impulse for each in record.impulses(*TOLD)) == pytest.approx(8.0 * DT)
 
 
 def test_points_lie_on_the_surface_in_the_world_under_the_middle_of_the_contacts() -> None:
     record, pose = record_of()
-    for impulse, contacts in zip(record.impulses(NAMES, SHAPE, DT), EACH.values(), strict=True):
+    for impulse, contacts in zip(record.impulses(*TOLD), EACH.values(), strict=True):
         [local] = in_frame(impulse.point[None], pose)
         assert np.linalg.norm(local) == pytest.approx(1.0, abs=1e-6), "on a sphere of 1 m"
         normals = np.array([np.array(normal) / np.linalg.norm(normal) for normal, _ in contacts])
@@ -45,7 +46,7 @@ def test_the_point_lies_within_the_texel() -> None:
     atlas = sphere_atlas(1.0, 16)
     for direction in directions:
         record, pose = record_of({2: [(direction, 1.0)]})
-        [impulse] = record.impulses(NAMES, SHAPE, DT)
+        [impulse] = record.impulses(*TOLD)
         away = np.linalg.norm(atlas.positions[impulse.texel] - in_frame(impulse.point[None], pose))
         # at the cube's corners texels are rhombi of 120 degrees: half the diagonal is 0.93 of the area's root
         assert away < 0.95 * np.sqrt(atlas.areas[impulse.texel])
@@ -72,3 +73,15 @@ def test_the_loads_of_all_touches_make_up_the_whole_load_while_geoms_strike() ->
     for touch in record.touches():
         parts += np.bincount(touch.load.texels, touch.load.forces, 1536)
     np.testing.assert_allclose(parts, whole, rtol=1e-12)
+
+
+def test_parts_of_one_flex_are_told_of_together_at_their_middle_on_the_surface() -> None:
+    record, pose = record_of()
+    names, owners = ["globe", "cloth"], np.array([0, 1, 1, 1])
+    [impulse] = record.impulses(names, owners, sphere_atlas(1.0, 16), DT)
+    assert (impulse.geom, impulse.other) == ("globe", "cloth")
+    assert impulse.impulse == pytest.approx(8.0 * DT)
+    [local] = in_frame(impulse.point[None], pose)
+    places = [in_frame(each.point[None], pose)[0] for each in record.impulses(*TOLD)]
+    middle = np.average(places, axis=0, weights=[5.0, 3.0])
+    np.testing.assert_allclose(local, middle / np.linalg.norm(middle), atol=2e-3)

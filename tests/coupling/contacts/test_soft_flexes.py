@@ -1,0 +1,117 @@
+"""Soft flexes load a surface as geoms do: with all of their force, vertex by vertex, under the flex's name."""
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco_models import mesh_asset
+
+from ripple_sim import Material, Ripples, make_collidable
+from ripple_sim.errors import RippleWarning
+from ripple_sim.scenes.shapes import limbed
+
+MASS, DT = 0.5, 0.002
+BOX = '<geom name="target" type="box" size="0.4 0.4 0.2"/>'
+SEEN = 'contype="0" conaffinity="0"'
+
+
+def draped(target: str, body: str = "", flex: str = "", contact: str = "", kind: str = "2", integrator: str = "Euler"):
+    """A cloth of 0.4 m, or a soft cube, over a target whose top is at 0.2 m."""
+    count = "11 11 1" if kind == "2" else "4 4 4"
+    edge = '<edge equality="true" damping="0.01"/>' if kind == "2" else '<elasticity young="2e4" poisson="0.2"/>'
+    return mujoco.MjSpec.from_string(
+        f"""<mujoco><option timestep="{DT}" solver="CG" tolerance="1e-6" integrator="{integrator}"/>
+        <asset>{mesh_asset("animal", *limbed(0.05))}</asset><worldbody><body name="link">{body}{target}</body>
+        <flexcomp name="cloth" type="grid" count="{count}" spacing="0.04 0.04 0.04" pos="0.03 0 0.3" dim="{kind}"
+          mass="{MASS}" radius="0.005" {flex}>{edge}
+        <contact selfcollide="none" condim="1" solref="0.01 1" {contact}/></flexcomp>
+        </worldbody></mujoco>"""
+    )
+
+
+def play(spec: mujoco.MjSpec, seconds: float, **options: object) -> tuple[Ripples, list, float, mujoco.MjData]:
+    """The ripples, the records, the sum of MuJoCo's normal forces times time step [N s], and the data."""
+    model = spec.compile()
+    data, wrench, told = mujoco.MjData(model), np.zeros(6), 0.0
+    options = {"resolution": 24, "backend": "cpu", "conserve_volume": False, **options}
+    ripples, record = Ripples(model, {"target": Material(density=50.0)}, **options), []
+    while data.time < seconds - 1e-9:
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+        record.append(ripples.last_impulses)
+        for i in range(data.ncon):
+            mujoco.mj_contactForce(model, data, i, wrench)
+            told += wrench[0] * DT
+    return ripples, record, told, data
+
+
+@pytest.mark.parametrize("kind", ["2", "3"])
+def test_cloth_and_soft_cube_give_a_flat_top_all_the_momentum_that_they_lose(kind: str) -> None:
+    """37,103 contacts of a cloth once gave nothing."""
+    ripples, record, told, data = play(draped(BOX, kind=kind), 0.3)
+    assert {(each.geom, each.other) for step in record for each in step} == {("target", "cloth")}
+    assert max(map(len, record)) == 1, "one record a step"
+    given = sum(each.impulse for step in record for each in step)
+    velocity = data.qvel.reshape(-1, 3)[:, 2].mean()
+    assert given == pytest.approx(MASS * (velocity + 9.81 * data.time), rel=0.01)
+    assert given == pytest.approx(told, rel=1e-6)
+    assert -ripples["target"].momentum() == pytest.approx(given, rel=0.01)
+    for each in record[-1]:
+        np.testing.assert_allclose(each.point, [0.03, 0, 0.2], atol=0.02)
+
+
+def test_cloth_presses_evenly_where_it_lies() -> None:
+    ripples, _, _, _ = play(draped(BOX), 0.16)
+    waves = ripples["target"]
+    positions = waves.atlas.positions
+    top = positions[..., 2] > 0.199
+    away = np.abs(positions[..., :2] - [0.03, 0]).max(axis=-1)
+    velocity = waves.velocity
+    under = velocity[top & (away < 0.15)]
+    assert (under < 0).all()
+    assert under.std() < 0.25 * abs(under.mean())
+    assert np.abs(velocity[top & (away > 0.26)]).max() < 0.2 * abs(under.mean())
+
+
+def test_cloth_loads_a_round_a_rippling_mesh_and_a_moving_target_with_what_mujoco_tells() -> None:
+    ball = '<geom name="target" size="0.2" mass="2"/>'
+    mesh = '<geom name="target" type="{}" mesh="animal" pos="0 0 -0.25" mass="2"/>'
+    flexed = draped(mesh.format("mesh"))
+    make_collidable(flexed, "target", "flex")
+    seen = f'<geom name="target" size="0.2" {SEEN}/><geom type="capsule" size="0.19 0.001"/>'
+    for spec, tolerance in (
+        (draped(ball), 1e-6),
+        (draped(ball, '<joint type="slide" axis="0 0 1" stiffness="400"/>'), 1e-6),
+        (draped(mesh.format("sdf")), 1e-6),
+        (draped(seen), 1e-6),
+        # its contacts push sideways too, and are summed as vectors
+        (flexed, 0.03),
+    ):
+        _, record, told, _ = play(spec, 0.25)
+        given = sum(each.impulse for step in record for each in step)
+        assert {each.other for step in record for each in step} == {"cloth"}
+        assert told > 0.3
+        assert given == pytest.approx(told, rel=tolerance)
+
+
+def test_risen_surface_pushes_a_cloth_up() -> None:
+    heights = []
+    for two_way in (False, True):
+        spec = draped(BOX)
+        spec.body("link").pos = [0, 0, 0.09]
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        material = Material(speed=0.3, density=200.0)
+        ripples = Ripples(model, {"target": material}, resolution=24, backend="cpu", two_way=two_way)
+        while data.time < 0.2:
+            mujoco.mj_step(model, data)
+            ripples.step(data)
+            if abs(data.time - 0.1) < DT / 2:
+                ripples["target"].add_impulse([0.03, 0, 0.2], -5.0, 0.1)
+        heights.append(data.flexvert_xpos[:, 2].max())
+    assert heights[1] > heights[0] + 0.002
+
+
+def test_passive_contacts_which_tell_no_force_are_warned_of() -> None:
+    spec = draped(BOX, contact='passive="true"', integrator="discrete")
+    with pytest.warns(RippleWarning, match="passive contacts of flex 'cloth', under which geom 'target' will"):
+        Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")
