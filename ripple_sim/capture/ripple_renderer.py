@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.arguments import own_data, own_model
 from ripple_sim.coupling.model.geoms import ByGeom, by_name
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
@@ -26,6 +27,7 @@ class RippleRenderer:
     Parameters
     ----------
     model : mujoco.MjModel
+        Or dm_control's wrapper of one; likewise the data of each frame.
     ripples : Ripples
         Whose targets are drawn with their ripples.
     width, height : int
@@ -52,14 +54,14 @@ class RippleRenderer:
         looks: ByGeom[str] | None = None,
         gl: GLContext | None = None,
     ) -> None:
-        self._model, self._ripples = model, ripples
+        self._model, self._ripples = own_model(model), ripples
         self._height_maps = {name: HeightMap(ripples[name].atlas.texels) for name in ripples}
-        named = by_name(model, looks or {}, "looks")
+        named = by_name(self._model, looks or {}, "looks")
         surfaces = {
-            geom: surface_of(ripples[name], named.get(name, "rubber"), _color(model, geom))
+            geom: surface_of(ripples[name], named.get(name, "rubber"), _color(self._model, geom))
             for name, geom in ripples.geom_ids.items()
         }
-        self._renderer = Renderer(gl or shared_context(), model, surfaces, size=(width, height))
+        self._renderer = Renderer(gl or shared_context(), self._model, surfaces, size=(width, height))
 
     def render(self, data: mujoco.MjData, camera: Camera | FixedCamera | str | None = None) -> NDArray[np.uint8]:
         """Render the present state to pixels, uint8 [height, width, 3].
@@ -71,6 +73,7 @@ class RippleRenderer:
         camera : Camera, FixedCamera or str, optional
             A camera, or the name of one in the MJCF; by default MuJoCo's free camera, aimed at the model's middle.
         """
+        data = own_data(self._model, data)
         if camera is None or isinstance(camera, str):
             free = self._model.vis.global_
             entry = CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)

@@ -1,0 +1,82 @@
+"""dm_control's `Physics` ripples, though it ends its steps with the beginning of the next one."""
+
+import types
+import warnings
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim import Material, RippleRenderer, Ripples, RippleWarning
+from ripple_sim.dm_control import couple
+
+MASS, GRAVITY = 0.3, 9.81
+MODEL = f"""<mujoco><option timestep="0.002"/><worldbody>
+<geom name="block" type="box" size="0.3 0.3 0.1" pos="0 0 -0.1" solref="0.01 0.3"/>
+<body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
+</worldbody></mujoco>"""
+MATERIALS = {"block": Material(speed=1.0, density=20.0)}
+OPTIONS: dict[str, Any] = {"resolution": 16, "backend": "cpu"}
+
+
+class StandIn:
+    """Steps and wraps as dm_control's `Physics` does, where that is not installed."""
+
+    legacy_step = True
+
+    def __init__(self) -> None:
+        model = mujoco.MjModel.from_xml_string(MODEL)
+        self.model, self.data = types.SimpleNamespace(ptr=model), types.SimpleNamespace(ptr=mujoco.MjData(model))
+        self.reset()
+
+    def reset(self) -> None:
+        mujoco.mj_resetData(self.model.ptr, self.data.ptr)
+        mujoco.mj_forward(self.model.ptr, self.data.ptr)
+
+    def step(self, nstep: int = 1) -> None:
+        if not self.legacy_step:
+            mujoco.mj_step(self.model.ptr, self.data.ptr, nstep)
+            return
+        mujoco.mj_step2(self.model.ptr, self.data.ptr)
+        if nstep > 1:
+            mujoco.mj_step(self.model.ptr, self.data.ptr, nstep - 1)
+        mujoco.mj_step1(self.model.ptr, self.data.ptr)
+
+
+def dm_control_physics() -> Any:
+    return pytest.importorskip("dm_control.mujoco").Physics.from_xml_string(MODEL)
+
+
+@pytest.mark.parametrize("make", [StandIn, dm_control_physics])
+@pytest.mark.parametrize("legacy", [True, False])
+def test_each_physics_step_counts(make: Any, legacy: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "disable")
+    physics = make()
+    physics.legacy_step = legacy
+    ripples = couple(physics, MATERIALS, **OPTIONS)
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    data, plain = mujoco.MjData(model), Ripples(model, MATERIALS, **OPTIONS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RippleWarning)
+        for _ in range(2):
+            given = 0.0
+            for _ in range(20):
+                physics.step(5)
+                physics.step()
+                given += sum(impulse.impulse for impulse in ripples.last_impulses)
+                physics.step(nstep=4)
+                given += sum(impulse.impulse for impulse in ripples.last_impulses)
+                plain.mj_step(data, nstep=10)
+            np.testing.assert_array_equal(ripples["block"].height, plain["block"].height)
+            physics.reset()
+            assert not ripples["block"].height.any()
+            mujoco.mj_resetData(model, data)
+    assert given > 0
+
+
+def test_its_wrappers_are_drawn_as_they_are() -> None:
+    physics = StandIn()
+    ripples = couple(physics, MATERIALS, **OPTIONS)
+    frame = RippleRenderer(physics.model, ripples, width=32, height=24).render(physics.data)
+    assert frame.shape == (24, 32, 3)
