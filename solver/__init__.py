@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .errors import AtlasError, GLError, MeshError, RippleError, SolverError, SphereMapError
     from .mesh.mesh import Mesh
     from .mesh.mesh_file import load_mesh
+    from .mesh.wrap import Wrap, wrap
     from .operator.absorbing import absorbing_damping
     from .operator.material import Material
     from .texels.atlas import Atlas
@@ -45,6 +46,7 @@ _HOME = {
     "TexelMesh": "texels.texel_mesh",
     "TexelTopology": "texels.topology",
     "WaveSolver": "waves.wave_solver",
+    "Wrap": "mesh.wrap",
     "absorbing_damping": "operator.absorbing",
     "build_atlas": "atlas.build",
     "glue": "texels.glue",
@@ -54,6 +56,7 @@ _HOME = {
     "texel_atlas": "texels.texel_atlas",
     "texture_map": "texels.maps",
     "vertex_map": "texels.maps",
+    "wrap": "mesh.wrap",
 }
 
 __all__ = [
@@ -73,6 +76,7 @@ __all__ = [
     "TexelMesh",
     "TexelTopology",
     "WaveSolver",
+    "Wrap",
     "absorbing_damping",
     "build_atlas",
     "glue",
@@ -82,6 +86,7 @@ __all__ = [
     "texel_atlas",
     "texture_map",
     "vertex_map",
+    "wrap",
 ]
 
 

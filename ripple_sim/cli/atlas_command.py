@@ -34,6 +34,8 @@ class Atlas:
     """Axis of the mesh that points up in the image."""
     repair: bool = False
     """Close the mesh's holes (needs the package pymeshfix)."""
+    wrap: bool = False
+    """Take a closed surface round the mesh: for parts that pass through each other, or scans in pieces."""
     json: bool = False
     """Print JSON."""
 
@@ -48,7 +50,7 @@ class Atlas:
 
             check_plot_path(self.plot)  # before anything that takes time
         start = time.perf_counter()
-        mesh = load_mesh(self.mesh, repair=self.repair)
+        mesh = load_mesh(self.mesh, repair=self.repair, wrap=self.wrap)
         loaded = time.perf_counter()
         atlas = build_atlas(mesh, resolution=self.resolution, method=self.method)
         seconds = {"load": loaded - start, **atlas.timings}

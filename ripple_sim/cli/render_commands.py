@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -81,14 +82,25 @@ class Drop(_VideoCommand):
     """Image in the mesh's own texture coordinates; by default the one that the file names, or NAME_texture.png."""
     repair: bool = False
     """Close the mesh's holes (needs the package pymeshfix)."""
+    wrap: bool = False
+    """Take a closed surface round the mesh: for parts that pass through each other, or scans in pieces."""
 
     def load(self) -> Scene:
         """Build a scene around the mesh."""
         from ripple_sim.scene.drop import drop_scene
 
-        return drop_scene(
-            self.mesh, bodies=self.bodies, seed=self.seed, up=self.up, texture=self.texture, repair=self.repair
+        scene = drop_scene(
+            self.mesh,
+            bodies=self.bodies,
+            seed=self.seed,
+            up=self.up,
+            texture=self.texture,
+            repair=self.repair,
+            wrap=self.wrap,
         )
+        for note in scene.notes:
+            print(f"{self.mesh.name}: {note}", file=sys.stderr)
+        return scene
 
 
 def _summary_text(summary: Summary) -> str:

@@ -37,6 +37,8 @@ class View:
     """Axis of the mesh that points up."""
     repair: bool = False
     """Close the mesh's holes (needs the package pymeshfix)."""
+    wrap: bool = False
+    """Take a closed surface round the mesh: for parts that pass through each other, or scans in pieces."""
     folder: Annotated[Path, arg(metavar="FOLDER")] = Path()
     """Folder for screenshots and videos."""
     web: bool = False
@@ -70,7 +72,9 @@ class View:
         from ripple_sim.viewer.opening import open_scene
         from ripple_sim.viewer.session import Session
 
-        scene = open_scene(self.scene, bodies=self.bodies, seed=self.seed, up=self.up, repair=self.repair)
+        scene = open_scene(
+            self.scene, bodies=self.bodies, seed=self.seed, up=self.up, repair=self.repair, wrap=self.wrap
+        )
         session = Session(scene, resolution=self.resolution)
 
         from ripple_sim.viewer.window import Window

@@ -33,8 +33,8 @@ def drop_scene(
     up: str | None = None,
     look: str = "rubber",
     texture: str | Path | None = None,
-    repair: bool = False,
     edit: Edit | None = None,
+    **reading: bool,
 ) -> Scene:
     """Scene in which bodies of several shapes drop on a mesh.
 
@@ -51,10 +51,10 @@ def drop_scene(
         Of the target.
     texture : path, optional
         Image in place of the look's colour; by default see `mesh_image`.
-    repair : bool
-        Close the mesh's holes (needs the package pymeshfix).
     edit : callable, optional
         Changes the model's specification in place, before it is compiled.
+    **reading : bool
+        `repair` and `wrap`, as for `load_mesh`.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def drop_scene(
     up = up or usual_up(mesh_path)
     if up not in UP_AXES:
         raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
-    mesh = load_mesh(mesh_path, repair=repair)
+    mesh = load_mesh(mesh_path, **reading)
     check_genus_zero(mesh)
     V = _standing(mesh, up)
     spec, drops = drop_model(V, mesh.F, bodies, np.random.default_rng(seed))
@@ -84,6 +84,7 @@ def drop_scene(
         camera=_camera(float(V[:, 2].max())),
         duration=DURATION,
         events=Events(drop=tuple(drops)),
+        notes=mesh.notes,
     )
 
 

@@ -33,6 +33,8 @@ class Scene:
         Overlays of the frames, see `parse_request`.
     lighting : str
         One of `LIGHTING`: "auto", "model" or "studio", see `Renderer`.
+    notes : tuple of str
+        What was done to its mesh on reading, one line each, where it was made from one.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Scene:
     two_way: bool = False
     overlay: tuple[str, ...] = ()
     lighting: str = "auto"
+    notes: tuple[str, ...] = ()
 
     @property
     def contacts(self) -> dict[str, list[str]]:

@@ -65,6 +65,7 @@ def open_scene(
     seed: int = 0,
     up: str | None = None,
     repair: bool = False,
+    wrap: bool = False,
 ) -> Scene:
     """Scene by name, TOML file or mesh file, with balls to throw.
 
@@ -72,7 +73,7 @@ def open_scene(
     ----------
     target : str or path
         A shipped scene's name, the path of a scene file (.toml), or that of a mesh.
-    bodies, seed, up, repair
+    bodies, seed, up, repair, wrap
         For a mesh, as for `drop_scene`.
 
     Raises
@@ -80,13 +81,13 @@ def open_scene(
     SceneError
         If there is no such scene or file, or it is invalid.
     MeshError
-        If a mesh is not a closed genus-0 surface.
+        If a mesh cannot be read or does not suit the layout.
     """
     path = Path(target)
     if str(target) in shipped_scenes() or path.suffix.lower() == ".toml":
         load = functools.partial(load_scene, target)
     elif path.is_file():
-        load = functools.partial(drop_scene, path, bodies=bodies, seed=seed, up=up, repair=repair)
+        load = functools.partial(drop_scene, path, bodies=bodies, seed=seed, up=up, repair=repair, wrap=wrap)
     else:
         raise SceneError(
             f"there is no scene or mesh {str(target)!r}; shipped scenes are {', '.join(shipped_scenes())}, or give the "

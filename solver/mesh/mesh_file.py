@@ -17,6 +17,7 @@ from .ply_format import read_ply
 from .polygons import Soup
 from .repair import repaired
 from .text_formats import read_obj, read_off
+from .wrap import wrap as wrapped
 
 # trimesh logs whole tracebacks; without a handler Python prints them to stderr
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
@@ -24,7 +25,7 @@ logging.getLogger("trimesh").addHandler(logging.NullHandler())
 _READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
 
 
-def load_mesh(path: str | Path, repair: bool = False) -> Mesh:
+def load_mesh(path: str | Path, repair: bool = False, wrap: bool = False) -> Mesh:
     """Read a mesh file: OBJ, OFF, PLY, STL, GLB, or any other format that trimesh reads.
 
     All parts of the file (objects, materials, nodes, each where its transform puts it) make one mesh. It may be open,
@@ -35,6 +36,8 @@ def load_mesh(path: str | Path, repair: bool = False) -> Mesh:
     path : path
     repair : bool
         Close the holes, part by part (needs the package pymeshfix).
+    wrap : bool
+        Take a closed surface round the mesh in its place, see `wrap`.
 
     Raises
     ------
@@ -45,9 +48,8 @@ def load_mesh(path: str | Path, repair: bool = False) -> Mesh:
     soup = _read(path)
     if len(soup.F) == 0:
         raise MeshError(f"mesh file {str(path)!r} holds no triangles{_points_only(soup)}")
-    if repair:
-        return repaired(soup, path.name)
-    return Mesh.from_arrays(soup.V, soup.F, soup.corner_uv, name=path.name)
+    mesh = repaired(soup, path.name) if repair else Mesh.from_arrays(soup.V, soup.F, soup.corner_uv, path.name)
+    return wrapped(mesh).mesh if wrap else mesh
 
 
 def _points_only(soup: Soup) -> str:

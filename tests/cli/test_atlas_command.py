@@ -116,6 +116,19 @@ def test_repair_says_what_it_did(capsys, tmp_path):
     assert [note[:11] for note in json.loads(capsys.readouterr().out)["notes"]] == ["1 unreferen", "hole closed"]
 
 
+def test_wrapped_balls_get_one_atlas_and_a_line_that_says_so(capsys, tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    trimesh.util.concatenate([ball, ball.copy().apply_translation([1, 0, 0])]).export(tmp_path / "balls.off")
+    command = ["atlas", str(tmp_path / "balls.off"), "--resolution", "8"]
+    assert "2 separate parts" in refusal(capsys, *command)
+    assert cli.main([*command, "--wrap"]) == 0
+    assert re.search(
+        r"^note +wrapped, 0\.045 m off: 2 parts in 1 closed surface with 0 handles, [\d,]+ triangles$",
+        capsys.readouterr().out,
+        re.MULTILINE,
+    )
+
+
 def test_a_wrong_method_is_refused(animal):
     with pytest.raises(AtlasError, match="'progressive', 'conformal'"):
         build_atlas(animal.mesh, 8, method="mercator")

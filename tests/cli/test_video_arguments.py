@@ -80,8 +80,10 @@ def test_a_usage_error_is_one_line_with_the_cause_and_the_help(words: list[str],
 
 
 def test_the_commands_have_their_own_arguments() -> None:
-    drop = parse(["drop", "m.obj", "-o", "a.mp4", "--bodies", "3", "--seed", "7", "--up", "y", "--repair"])
-    assert (drop.mesh, drop.bodies, drop.seed, drop.up, drop.repair) == (Path("m.obj"), 3, 7, "y", True)
+    drop = parse(["drop", "m.obj", "-o", "a.mp4", "--bodies", "3", "--seed", "7", "--up", "y", "--repair", "--wrap"])
+    assert (drop.mesh, drop.bodies, drop.seed, drop.up) == (Path("m.obj"), 3, 7, "y")
+    assert drop.repair
+    assert drop.wrap
     render = parse(["render", "duck", "-o", "a.mp4", "--camera", "side", "--device", "1"])
     assert (render.scene, render.camera, render.device) == ("duck", "side", 1)
     view = parse(["view", "duck", "--bodies", "0", "--size", "320x200", "--web", "--port", "9000"])

@@ -1,0 +1,126 @@
+"""A closed surface round whatever is given, at the distance that was asked for."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+import pytest
+import trimesh
+from known_meshes import known_mesh
+from solids import BALL, cube, torus
+from sound import assert_sound
+
+from ripple_sim.solver import Mesh, MeshError, Wrap, load_mesh, wrap
+
+
+def ball(centre, radius=1.0, subdivisions=3) -> tuple[np.ndarray, np.ndarray]:
+    made = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
+    return np.array(made.vertices) + centre, np.array(made.faces)
+
+
+def together(*bodies) -> Mesh:
+    V, F = zip(*bodies, strict=True)
+    first = np.cumsum([0, *map(len, V[:-1])])
+    return Mesh.from_arrays(np.vstack(V), np.vstack([f + at for f, at in zip(F, first, strict=True)]))
+
+
+def distances(wrapped: Wrap) -> np.ndarray:
+    """Of the surface from the object, in offsets."""
+    found = igl.point_mesh_squared_distance(wrapped.mesh.V, wrapped.wrapped.V, wrapped.wrapped.F)[0]
+    return np.sqrt(found) / wrapped.offset
+
+
+def test_a_ball_gets_a_larger_ball() -> None:
+    found = wrap(together(ball(0)), 0.05)
+    assert found.offset == pytest.approx(0.1, rel=1e-3)
+    assert_sound(found.mesh)
+    assert found.mesh.closed
+    assert found.mesh.genus.tolist() == [0]
+    # the grid's linear interpolation errs by an eighth of the spacing squared over the radius
+    np.testing.assert_allclose(np.linalg.norm(found.mesh.V, axis=1), 1.1, atol=0.01)
+    np.testing.assert_allclose(distances(found), 1, atol=0.1)
+
+
+def test_bodies_that_pass_through_each_other_get_one_surface_without_what_lies_inside() -> None:
+    found = wrap(together(ball([0, 0, 0]), ball([1, 0, 0]), ball([0.4, 0.3, 0], 0.4)), 0.03)
+    assert found.mesh.component_count == 1
+    assert found.mesh.genus.tolist() == [0]
+    apart = np.linalg.norm(found.mesh.V, axis=1), np.linalg.norm(found.mesh.V - [1, 0, 0], axis=1)
+    assert np.minimum(*apart).min() > 1
+    volume = 2 * 4 / 3 * np.pi * 1.09**3 - np.pi / 12 * (4 * 1.09 + 1) * (2 * 1.09 - 1) ** 2
+    assert found.mesh.volume == pytest.approx(volume, rel=0.02)
+
+
+def test_pieces_that_are_far_apart_get_a_surface_each_and_near_ones_share_one() -> None:
+    near, far = 2.1, 2.8
+    for centre, parts in (near, 1), (far, 2):
+        found = wrap(together(ball([0, 0, 0]), ball([centre, 0, 0])), 0.04)
+        assert found.mesh.component_count == parts
+    assert found.mesh.notes[-1].startswith("wrapped, 0.192 m off: 2 parts in 2 closed surfaces with 0 handles, ")
+
+
+def test_a_shell_with_a_small_hole_is_solid_and_one_with_a_wide_hole_stays_hollow() -> None:
+    V, F = ball(0, subdivisions=4)
+    top = V[F].mean(axis=1)[:, 2]
+    solid = wrap(Mesh.from_arrays(V, F[top < 0.997]), 0.05).mesh
+    hollow = wrap(Mesh.from_arrays(V, F[top < 0.7]), 0.05).mesh
+    assert solid.volume == pytest.approx(4 / 3 * np.pi * 1.1**3, rel=0.02)
+    assert hollow.volume < 0.6 * solid.volume
+    assert hollow.genus.tolist() == [0]
+
+
+@pytest.mark.parametrize("cracked", [False, True])
+def test_a_ring_keeps_its_hole_even_as_a_thousand_bits(cracked: bool) -> None:
+    V, F = torus()
+    if cracked:
+        middle = V[F].mean(axis=1, keepdims=True)
+        V, F = (middle + 0.95 * (V[F] - middle)).reshape(-1, 3), np.arange(F.size).reshape(-1, 3)
+    mesh = Mesh.from_arrays(V, F)
+    found = wrap(mesh, 0.03)
+    assert mesh.component_count == (len(F) if cracked else 1)
+    assert found.mesh.genus.tolist() == [1]
+
+
+def test_a_lone_triangle_and_a_needle_are_wrapped() -> None:
+    for points in (np.eye(3), np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-9, 0]])):
+        found = wrap(Mesh.from_arrays(points, [[0, 1, 2]]), 0.05)
+        assert_sound(found.mesh)
+        assert found.mesh.genus.tolist() == [0]
+        assert distances(found).max() < 1.5
+
+
+def test_the_surface_carries_the_object_along() -> None:
+    mesh = together(cube(), ball([0.2, 0, 0], 0.4))
+    found = wrap(mesh, 0.05)
+    assert found.triangles.shape == (len(mesh.V),)
+    np.testing.assert_allclose(found.barycentrics.sum(axis=1), 1)
+    assert found.barycentrics.min() > -1e-9
+    nearest = np.sqrt(igl.point_mesh_squared_distance(mesh.V, found.mesh.V, found.mesh.F)[0])
+    np.testing.assert_allclose(np.linalg.norm(found.interpolate(found.mesh.V) - mesh.V, axis=1), nearest, atol=1e-12)
+    # a linear field is interpolated without error
+    slope = np.array([0.3, -0.2, 0.5])
+    np.testing.assert_allclose(
+        found.interpolate(found.mesh.V @ slope), found.interpolate(found.mesh.V) @ slope, atol=1e-12
+    )
+
+
+def test_units_and_place_do_not_matter() -> None:
+    V, F = np.array(BALL.vertices) * [1, 2, 0.5], np.array(BALL.faces)
+    for scale, shift in (1e-3, 0), (1e3, 5e3):
+        here, there = wrap(Mesh.from_arrays(V, F), 0.05), wrap(Mesh.from_arrays(V * scale + shift, F), 0.05)
+        assert there.mesh.area == pytest.approx(here.mesh.area * scale**2, rel=1e-3)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.003, 0.5, float("nan")])
+def test_an_offset_out_of_range_is_refused(offset: float) -> None:
+    with pytest.raises(MeshError, match=rf"{offset}; valid is 0\.004 to 0\.2"):
+        wrap(Mesh.from_arrays(*cube()), offset)
+
+
+@pytest.mark.parametrize("name", ["suzanne.obj", "several-parts-teapot.obj"])
+def test_known_meshes_in_several_open_parts_get_one_closed_surface(name: str) -> None:
+    mesh = load_mesh(known_mesh(f"bad/{name}"), wrap=True)
+    assert mesh.closed
+    assert mesh.component_count == 1
+    assert mesh.genus[0] == ("teapot" in name)  # its handle
+    assert mesh.name == name
