@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import mujoco
 
+from ripple_sim.coupling.model.geoms import find_geom, geom_name
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.coupling.stepping.divergence import divergence
 from ripple_sim.scene.events import Script
@@ -42,6 +43,8 @@ class Simulation:
     ----------
     steps_per_frame : int
         Physics steps in a frame.
+    limited : dict of str to bool
+        Whether heights are limited where they are drawn, by geom.
     impulses : list of Impulse
         Of the present frame, so far.
     """
@@ -73,6 +76,7 @@ class Simulation:
             contacts=scene.contacts,
         )
         self._apply_maps()
+        self._apply_limits()
         self._materials = {name: self.ripples[name].material for name in self.ripples}
         self._script = Script(self.model, scene.events, list(self.ripples))
         self.physics_seconds = self.wave_seconds = 0.0
@@ -150,6 +154,13 @@ class Simulation:
                 self.ripples.hold(entry.geom, 1.0 - texture_map(atlas, entry.still_map, 0.0, 1.0))
             for disc in entry.still:
                 self.ripples.make_rigid(entry.geom, self.ripples.to_geom(entry.geom, disc.point), disc.radius)
+
+    def _apply_limits(self) -> None:
+        self.limited = {}
+        for entry in self.scene.targets:
+            self.limited[geom_name(self.model, find_geom(self.model, entry.geom))] = entry.limit
+            if not entry.limit:
+                self.ripples.allow_any_height(entry.geom)
 
     def _reset_bodies(self) -> None:
         if self.model.nkey:

@@ -37,6 +37,9 @@ class RippleRenderer:
         the geom's, where the model gives it a texture or a colour.
     gl : GLContext, optional
         By default the process's shared one.
+    limit : bool
+        Whether heights that are too large for the object are drawn smaller, so that its surface does not pass through
+        itself; see `DisplacementLimit`.
 
     Raises
     ------
@@ -53,9 +56,10 @@ class RippleRenderer:
         height: int = 720,
         looks: ByGeom[str] | None = None,
         gl: GLContext | None = None,
+        limit: bool = True,
     ) -> None:
         self._model, self._ripples = own_model(model), ripples
-        self._height_maps = {name: HeightMap(ripples[name].atlas.texels) for name in ripples}
+        self._height_maps = {name: HeightMap.drawn(ripples[name].atlas, limit) for name in ripples}
         named = by_name(self._model, looks or {}, "looks")
         surfaces = {
             geom: surface_of(ripples[name], named.get(name, "rubber"), _color(self._model, geom))

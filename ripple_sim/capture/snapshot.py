@@ -66,7 +66,7 @@ def snapshots(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterato
     """
     states = itertools.cycle([mujoco.MjData(simulation.model) for _ in range(alive)])
     ripples = simulation.ripples
-    height_map_of = {name: HeightMap(ripples[name].atlas.texels) for name in ripples}
+    height_map_of = {name: HeightMap.drawn(ripples[name].atlas, simulation.limited[name]) for name in ripples}
     shutter_times = ShutterTimes(simulation, Exposures.of(simulation.scene.camera).times)
     for number in range(frames):
         if number:

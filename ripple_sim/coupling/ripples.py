@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import mujoco
 
+from ripple_sim.coupling.amplitude.amplitude_check import AmplitudeCheck
 from ripple_sim.coupling.colliders.collision_warnings import collision_warnings
 from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
 from ripple_sim.coupling.load.contact_loads import ContactLoads
@@ -87,6 +88,7 @@ class Ripples(Targets):
         _warn(integrator_warning(self.model))
         self._loads = ContactLoads(coupled, self._waves)
         self._check_tunnelling = TunnellingCheck(coupled, list(self._waves))
+        self._check_amplitude = AmplitudeCheck(self._waves, coupled.names)
         self._push_back = PushBack(coupled, self._waves) if two_way else None
         self._clock, self._solved = StepClock(), SolvedForces(self.model)
         self._warned: set[str] = set()
@@ -161,6 +163,10 @@ class Ripples(Targets):
         self._clock.restart()
         self._flatten()
 
+    def allow_any_height(self, name: GeomKey) -> None:
+        """Give no warning of waves on a geom that are too high or too steep for it."""
+        self._check_amplitude.ignore(self._target(name).geom)
+
     def _follow(self, data: mujoco.MjData) -> None:
         passed = self._clock.look(self.model, data)
         broken = goes_on_broken(self.model, data)
@@ -179,12 +185,14 @@ class Ripples(Targets):
                 loads[geom] = Load.together([loads[geom], load])
         for geom, waves in self._waves.items():
             waves.step(passed.elapsed, load=loads[geom])
+        self._check_amplitude()
 
     def _waves_changed(self, name: GeomKey) -> None:
         super()._waves_changed(name)
         self._loads.waves_changed(self._target(name).geom)
 
     def _flatten(self) -> None:
+        self._check_amplitude.flush()
         self._loads.clear()
         for waves in self._waves.values():
             waves.reset()

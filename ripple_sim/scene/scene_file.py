@@ -31,6 +31,8 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     `color` (sRGB, 0 to 1) replaces the look's own colour, or the texture of the geom's material. `still_map` is the
     path of an image in the mesh's own texture coordinates: there are no waves where it is black. `contacts` names the
     geoms that collide for a geom that is only visible; by default those of its body.
+    `limit` bends heights that are too large for the object where they are drawn, see `DisplacementLimit`, and warns of
+    them; False: neither.
     """
 
     geom: str
@@ -41,6 +43,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     still: list[StillEntry] = []
     still_map: str | None = None
     contacts: list[str] | None = None
+    limit: bool = True
 
     def located(self, folder: Path) -> RippleEntry:
         """The same with the images' paths made relative to a folder."""

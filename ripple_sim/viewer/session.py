@@ -61,7 +61,8 @@ class Session:
         self.simulation = Simulation(scene, fps=fps, resolution=resolution, backend="cpu", on_step=self._before_step)
         self._balls = Balls(self.simulation.model)
         self._material: dict[str, float] = {}
-        self.skins = {name: Skin(self.simulation.ripples[name].atlas) for name in self.simulation.ripples}
+        ripples, limited = self.simulation.ripples, self.simulation.limited
+        self.skins = {name: Skin(ripples[name].atlas, limited[name]) for name in ripples}
         self._picker = Picker(self.simulation)
         self._size = surface_size(scene)
         self._strength = poke_strength(scene.targets[0].material.material(), self._size)

@@ -23,6 +23,8 @@ class Skin:
     Parameters
     ----------
     atlas : Atlas
+    limit : bool
+        Whether heights that are too large for the object are bent, see `DisplacementLimit`.
 
     Attributes
     ----------
@@ -36,7 +38,7 @@ class Skin:
         [m].
     """
 
-    def __init__(self, atlas: Atlas) -> None:
+    def __init__(self, atlas: Atlas, limit: bool = True) -> None:
         mesh, charts = atlas.mesh, Charts.of(atlas)
         self.F, vertices, _ = tessellated(
             mesh,
@@ -52,7 +54,7 @@ class Skin:
         )
         chart_points = charts.map.chart_points(vertices[:, COORDINATES], atlas.resolution)
         self._rest = _Rest(rest, direction, normals, *_bilinear(*chart_points, atlas.resolution))
-        self._height_map = HeightMap(atlas.texels)
+        self._height_map = HeightMap.drawn(atlas, limit)
         self.points, self.normals = rest.copy(), normals.copy()
         self.height = np.zeros(len(vertices), np.float32)
 

@@ -6,8 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Floats32, kernel
+from ripple_sim.solver.texels.atlas import Atlas
 from ripple_sim.solver.texels.halo import fill_halo
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
+
+from .displacement_limit import DisplacementLimit
 
 # Weight of the second-order terms' regularisation, relative to the squared distances that they multiply.
 _REGULARISATION = 1e-4
@@ -22,11 +25,19 @@ class HeightMap:
     Parameters
     ----------
     texels : TexelMesh
+    limit : DisplacementLimit, optional
+        Of the heights; the gradient is that of the limited ones. By default there is none.
     """
 
-    def __init__(self, texels: TexelMesh) -> None:
+    def __init__(self, texels: TexelMesh, limit: DisplacementLimit | None = None) -> None:
         self._topology = texels.topology
+        self._limit = limit
         self._weights = _gradient_weights(texels).astype(np.float32)
+
+    @classmethod
+    def drawn(cls, atlas: Atlas, limit: bool = True) -> HeightMap:
+        """Height map for drawing the surface of an atlas: with its `DisplacementLimit`, unless that is turned off."""
+        return cls(atlas.texels, DisplacementLimit(atlas) if limit else None)
 
     def __call__(self, height: NDArray[np.float32]) -> NDArray[np.float32]:
         """Height map of a height field.
@@ -43,7 +54,7 @@ class HeightMap:
             [m]. For the halo see `fill_halo`.
         """
         around = np.zeros(self._topology.halo.shape, np.float32)
-        around[:, 1:-1, 1:-1] = height
+        around[:, 1:-1, 1:-1] = height if self._limit is None else self._limit(height)
         fill_halo(self._topology, around)
         height_map = np.empty((*around.shape, 4), np.float32)
         _differentiate(self._weights, around, height_map)

@@ -1,0 +1,1 @@
+"""Waves too high or too steep for the object that carries them."""
