@@ -15,6 +15,7 @@ from .collider_ids import ColliderIds
 from .collision_contacts import CollisionContacts
 from .flex_contacts import FlexContacts
 from .geom_contacts import geom_contacts
+from .solver_balance import SolverBalance
 from .target_contacts import TargetContacts
 
 
@@ -37,6 +38,7 @@ class ContactReader:
         self._colliders = ColliderIds(coupled)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[[*meshes, *self._collision_contacts.geoms]] = True
+        self._check_solver = SolverBalance(coupled)
         self._flexes = None
         if coupled.flex_colliders:
             self._flexes = FlexContacts(coupled, meshes)
@@ -48,4 +50,6 @@ class ContactReader:
         contacts = geom_contacts(model, data, colliders, self._is_read, extents)
         if self._flexes is not None:
             contacts |= self._flexes.contacts(data, colliders, extents)
-        return self._collision_contacts.hand_over(data, contacts)
+        contacts = self._collision_contacts.hand_over(data, contacts)
+        self._check_solver(data, contacts)
+        return contacts

@@ -15,6 +15,14 @@ def primitive_triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[n
     """Vertices [m], [n, 3], on a primitive geom of a MuJoCo size, [3], and triangles, [m, 3]."""
     if kind == "sphere":
         kind, size = "ellipsoid", np.full(3, size[0])
+    # trimesh merges vertices within a fixed distance: triangles are made at a size of about 1
+    scale = 2.0 ** np.floor(np.log2(size.max()))
+    V, F = _triangles(kind, size / scale)
+    return scale * V, F
+
+
+def _triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Triangles on a primitive whose largest size is from 1 to 2."""
     if kind == "ellipsoid":
         solid = trimesh.creation.icosphere(subdivisions=4)
         solid.apply_scale(size)

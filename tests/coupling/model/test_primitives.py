@@ -87,3 +87,12 @@ def test_volume_area_and_moments_are_those_of_the_solid(
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody><body><freejoint/>{geom}</body></worldbody></mujoco>")
     assert mesh.volume == pytest.approx(model.body_mass[1], rel=3e-3)
     np.testing.assert_allclose(np.sort(np.diag(mesh.moment_inertia)), np.sort(model.body_inertia[1]), rtol=6e-3)
+
+
+@pytest.mark.parametrize("scale", [2.0**-17, 2.0**17])
+@every_solid
+def test_triangles_are_alike_at_every_scale(kind: str, size: tuple[float, ...], scale: float) -> None:
+    V, F = triangles(kind, size)
+    scaled, same = triangles(kind, tuple(scale * x for x in size))
+    np.testing.assert_array_equal(F, same)
+    np.testing.assert_allclose(scaled, scale * V, rtol=0, atol=1e-12 * scale)
