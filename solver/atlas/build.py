@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.cube_map.convention import check_resolution
 from ripple_sim.solver.cube_map.cube_atlas import atlas_from_sphere_map
-from ripple_sim.solver.errors import AtlasError
+from ripple_sim.solver.errors import AtlasError, MeshError
 from ripple_sim.solver.mesh.genus_zero import check_genus_zero
 from ripple_sim.solver.mesh.mesh import Mesh
+from ripple_sim.solver.patches.patch_atlas import patch_atlas
 from ripple_sim.solver.sphere_map import conformal_sphere_map, progressive_sphere_map
 from ripple_sim.solver.texels.atlas import Atlas
 from ripple_sim.solver.texels.atlas_file import FORMAT
@@ -30,44 +31,53 @@ SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {
 }
 
 
-def build_atlas(mesh: Mesh, resolution: int = 128, method: str = "progressive", cache: bool = True) -> Atlas:
-    """Build the cube-map atlas of a mesh.
+LAYOUTS = ("auto", "cube", "patches")
+
+
+def build_atlas(
+    mesh: Mesh, resolution: int = 128, method: str = "progressive", cache: bool = True, layout: str = "auto"
+) -> Atlas:
+    """Build the atlas of a mesh.
 
     Parameters
     ----------
     mesh : Mesh
         From `load_mesh` or `Mesh.from_arrays`.
     resolution : int
-        Texels along a chart's side, N; 6 N^2 texels in all.
+        Texels along a chart's side of the cube layout, N; 6 N^2 texels in all, and about as many in every layout.
     method : str
-        Sphere map: "progressive" (fold-free, spreads area evenly) or "conformal" (keeps angles but starves limbs; the
-        choice of the paper).
+        Sphere map of the cube layout: "progressive" (fold-free, spreads area evenly) or "conformal" (keeps angles but
+        starves limbs; the choice of the paper).
     cache : bool
         Keep the result in the user's cache folder and take it from there the next time.
+    layout : str
+        "cube": six charts of N x N texels, for a closed mesh of genus 0 in one part. "patches": many small charts, for
+        any mesh. "auto": cube where it fits.
 
     Raises
     ------
     AtlasError
-        For an invalid resolution or method.
+        For an invalid resolution, method or layout, or a mesh of which the patch layout finds no charts.
     MeshError
-        If the mesh is not a closed surface of genus 0 in one part, as the cube layout needs.
+        For the cube layout, if the mesh is not a closed surface of genus 0 in one part.
     SphereMapError
-        If no certified sphere map is found.
+        For the cube layout, if no certified sphere map is found.
     """
     resolution = check_resolution(resolution)
-    if method not in SPHERE_MAPS:
-        raise AtlasError(f"sphere map method {method!r} does not exist; valid are {', '.join(map(repr, SPHERE_MAPS))}")
-    check_genus_zero(mesh)
+    for kind, name, valid in (("sphere map method", method, tuple(SPHERE_MAPS)), ("layout", layout, LAYOUTS)):
+        if name not in valid:
+            raise AtlasError(f"{kind} {name!r} does not exist; valid are {', '.join(map(repr, valid))}")
+    if layout == "cube":
+        check_genus_zero(mesh)
+    cube = layout == "cube" or (layout == "auto" and _fits_cube(mesh))
     start = time.perf_counter()
-    path = _cache_path(mesh, method) if cache else None
+    path = _cache_path(mesh, method if cube else f"patches {resolution}") if cache else None
     stored = None if path is None else _read_cache(path, mesh)
-    if stored is not None and stored.resolution == resolution:
+    # charts of the patch layout have a resolution of their own, and a file for each of the atlas's
+    if stored is not None and (not cube or stored.resolution == resolution):
         stored.timings["cache"] = time.perf_counter() - start
         return stored
-    sphere = SPHERE_MAPS[method](mesh.V, mesh.F) if stored is None else stored.sphere
-    mapped = time.perf_counter()
-    atlas = atlas_from_sphere_map(mesh, sphere, resolution)
-    atlas.timings.update(sphere_map=mapped - start, rays=time.perf_counter() - mapped)
+    atlas = _cube(mesh, resolution, method, stored) if cube else patch_atlas(mesh, resolution)
     if path is not None:
         # a folder that cannot be written costs the next call its time, nothing else
         with contextlib.suppress(AtlasError):
@@ -75,9 +85,27 @@ def build_atlas(mesh: Mesh, resolution: int = 128, method: str = "progressive", 
     return atlas
 
 
-def _cache_path(mesh: Mesh, method: str) -> Path:
-    """One file for each mesh and method: the sphere map does not depend on the resolution, and rays are quick."""
-    key = hashlib.sha256(f"{FORMAT} {method} {mesh.V.shape} {mesh.F.shape}".encode())
+def _fits_cube(mesh: Mesh) -> bool:
+    try:
+        check_genus_zero(mesh)
+    except MeshError:
+        return False
+    return True
+
+
+def _cube(mesh: Mesh, resolution: int, method: str, stored: Atlas | None) -> Atlas:
+    """Atlas of the cube layout; the sphere map is taken from one that is stored."""
+    start = time.perf_counter()
+    sphere = SPHERE_MAPS[method](mesh.V, mesh.F) if stored is None else stored.sphere
+    mapped = time.perf_counter()
+    atlas = atlas_from_sphere_map(mesh, sphere, resolution)
+    atlas.timings.update(sphere_map=mapped - start, rays=time.perf_counter() - mapped)
+    return atlas
+
+
+def _cache_path(mesh: Mesh, kind: str) -> Path:
+    """One file for each mesh and sphere map: that does not depend on the resolution, and rays are quick."""
+    key = hashlib.sha256(f"{FORMAT} {kind} {mesh.V.shape} {mesh.F.shape}".encode())
     key.update(np.ascontiguousarray(mesh.V).data)
     key.update(np.ascontiguousarray(mesh.F).data)
     return Path(platformdirs.user_cache_dir("ripple-sim")) / f"{key.hexdigest()[:32]}.npz"

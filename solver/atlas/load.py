@@ -11,6 +11,8 @@ from ripple_sim.solver.cube_map.cube_chart_map import CubeChartMap
 from ripple_sim.solver.cube_map.sphere_atlas import SphereAtlas
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.mesh.mesh import Mesh
+from ripple_sim.solver.patches.patch_chart_map import PatchChartMap
+from ripple_sim.solver.patches.pieces import Pieces
 from ripple_sim.solver.texels.atlas import Atlas
 from ripple_sim.solver.texels.atlas_file import ADVICE, read_atlas_file
 from ripple_sim.solver.texels.chart_map import ChartMap
@@ -22,6 +24,7 @@ Arrays = dict[str, NDArray]
 
 _CHART_MAPS: dict[str, Callable[[Arrays], ChartMap]] = {
     "cube": lambda arrays: CubeChartMap(arrays["sphere"]),
+    "patches": lambda arrays: PatchChartMap(Pieces(*(arrays[f"piece_{name}"] for name in Pieces._fields))),
     "given": lambda arrays: LinearChartMap(arrays["charts"], arrays["corners"], arrays["positions"].shape[1]),
 }
 

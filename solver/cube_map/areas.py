@@ -1,10 +1,4 @@
-"""Area of the surface that belongs to each texel.
-
-The texel mesh cuts corners where the surface is creased, and spans twists that the surface has not: its area is up to
-2 % too small or too large at N = 96. The sphere map knows better: a texel's share is its solid angle times the real
-area for each unit of it in the texel's triangle. Alone that is one sample a texel, exact in the mean and noisy where
-triangles are uneven; so the texel mesh gives the shape of the field, the sphere map its level in every neighbourhood.
-"""
+"""Area of the surface that belongs to each texel, from the sphere map: see `texels.areas`."""
 
 from __future__ import annotations
 
@@ -12,11 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.texels.smoothing import smoothed
+from ripple_sim.solver.texels.areas import levelled_areas
 from ripple_sim.solver.texels.topology import TexelTopology
-
-# Least and most area in units of what the texel mesh spans. A limb that falls between the texels is not theirs.
-_LEAST, _MOST = 0.5, 1.2
 
 
 def texel_areas(
@@ -38,9 +29,7 @@ def texel_areas(
     triangles, barycentrics
         Where the texels lie; see `Atlas`.
     """
-    sampled = smoothed(topology, _sampled_areas(mesh, sphere, triangles, barycentrics))
-    level = sampled / np.maximum(smoothed(topology, spanned), 1e-300)
-    return spanned * np.clip(level, _LEAST, _MOST)
+    return levelled_areas(topology, spanned, _sampled_areas(mesh, sphere, triangles, barycentrics))
 
 
 def solid_angles(resolution: int) -> NDArray[np.float64]:

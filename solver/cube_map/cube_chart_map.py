@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.texels.chart_map import ChartPieces
+from ripple_sim.solver.texels.chart_map import ChartPieces, LinearParts
 from ripple_sim.solver.texels.topology import TexelTopology
 
 from .convention import cube_chart_points
@@ -48,9 +48,9 @@ class CubeChartMap:
         """Flat index of the texel in which each direction lies, [k]."""
         return texels_at(coordinates, topology.shape[1])
 
-    def corner_coordinates(self, mesh: Mesh) -> NDArray[np.float64]:
-        """Directions [face_count, 3, 3] of the triangles' corners."""
-        return self.sphere[mesh.F]
+    def linear_parts(self, mesh: Mesh) -> LinearParts:
+        """The triangles, with the directions of their corners."""
+        return LinearParts.whole(self.sphere[mesh.F])
 
     def split(self, corners: NDArray[np.float64]) -> ChartPieces:
         """Cut triangles with the directions [m, 3, 3] at their corners along the edges of the cube."""

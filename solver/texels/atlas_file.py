@@ -12,12 +12,12 @@ from ripple_sim.solver.errors import AtlasError
 
 from .array_file import read_arrays, write_arrays
 
-# Raise it when the sphere map or the file's contents change: older files are rebuilt.
-FORMAT = 9
+# Raise it when a layout's map or the file's contents change: older files are rebuilt.
+FORMAT = 10
 ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
 
 _NEEDED = {"V", "F", "kind", "format", "glued", "positions", "normals", "areas", "triangles", "barycentrics"}
-_INDICES = {"F", "triangles", "glued", "charts"}  # in 32 bits
+_INDICES = {"F", "triangles", "glued", "charts", "piece_triangle", "piece_chart"}  # in 32 bits
 
 
 def write_atlas_file(path: Path, arrays: dict[str, NDArray]) -> None:

@@ -16,8 +16,8 @@ from .topology import TexelTopology
 class ChartMap(Protocol):
     """Maps the triangles of a mesh to charts.
 
-    Within a triangle everything is linear in *map coordinates*, of which only the layout knows the meaning: directions
-    on the sphere, or rows and columns.
+    Within a triangle, or a part of it, everything is linear in *map coordinates*, of which only the layout knows the
+    meaning: directions on the sphere, or rows and columns.
     """
 
     @property
@@ -35,8 +35,8 @@ class ChartMap(Protocol):
     def nearest_texels(self, coordinates: NDArray[np.float64], topology: TexelTopology) -> NDArray[np.int64]:
         """Flat index of the texel in which map coordinates lie, [k]."""
 
-    def corner_coordinates(self, mesh: Mesh) -> NDArray[np.float64]:
-        """Map coordinates [face_count, 3, d] of the corners of a mesh's triangles."""
+    def linear_parts(self, mesh: Mesh) -> LinearParts:
+        """Parts of the mesh's triangles in which map coordinates are linear."""
 
     def split(self, corners: NDArray[np.float64]) -> ChartPieces:
         """Cut triangles with the map coordinates [m, 3, d] at their corners where they leave a chart."""
@@ -66,6 +66,35 @@ class ChartPieces(NamedTuple):
     triangle: NDArray[np.int64]
     barycentrics: NDArray[np.float64]
     chart: NDArray[np.int64]
+
+    @classmethod
+    def uncut(cls, chart: NDArray[np.int64]) -> ChartPieces:
+        """Triangles that each lie in one chart [m]."""
+        return cls(np.arange(len(chart)), np.tile(np.eye(3), (len(chart), 1, 1)), chart)
+
+
+class LinearParts(NamedTuple):
+    """Parts of a mesh's triangles in which map coordinates are linear.
+
+    Attributes
+    ----------
+    triangle : int64 [part_count]
+        Of which each is a part, in ascending order.
+    barycentrics : float64 [part_count, 3, 3]
+        Where in that triangle the part's three corners lie, in its winding.
+    coordinates : float64 [part_count, 3, d]
+        Map coordinates of the corners.
+    """
+
+    triangle: NDArray[np.int64]
+    barycentrics: NDArray[np.float64]
+    coordinates: NDArray[np.float64]
+
+    @classmethod
+    def whole(cls, coordinates: NDArray[np.float64]) -> LinearParts:
+        """Triangles with the map coordinates [face_count, 3, d] at their corners, each one part."""
+        count = len(coordinates)
+        return cls(np.arange(count), np.broadcast_to(np.eye(3), (count, 3, 3)), coordinates)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -110,7 +139,8 @@ class TextureCoordinates:
 
 def texture_coordinates(chart_map: ChartMap, mesh: Mesh) -> TextureCoordinates:
     """Coordinates into the atlas at every corner of every triangle of a mesh; see `Atlas.texture_coordinates`."""
-    corners = chart_map.corner_coordinates(mesh)
-    triangle, barycentrics, chart = chart_map.split(corners)
-    coordinates = np.einsum("pij,pjk->pik", barycentrics, corners[triangle])
-    return TextureCoordinates(triangle, barycentrics, chart, coordinates, chart_map.uv(coordinates, chart))
+    parts = chart_map.linear_parts(mesh)
+    part, within, chart = chart_map.split(parts.coordinates)
+    coordinates = np.einsum("pij,pjk->pik", within, parts.coordinates[part])
+    barycentrics = np.einsum("pij,pjk->pik", within, parts.barycentrics[part])
+    return TextureCoordinates(parts.triangle[part], barycentrics, chart, coordinates, chart_map.uv(coordinates, chart))

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.mesh.mesh import Mesh
 
-from .chart_map import ChartPieces
+from .barycentrics import barycentrics_in
+from .chart_map import ChartPieces, LinearParts
 from .topology import TexelTopology
 
 
@@ -38,7 +39,7 @@ class LinearChartMap:
 
     def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Chart, row and column, [k, 3], of points [k, 3] [m] that lie on triangles [k]."""
-        weights = _barycentrics(mesh.V[mesh.F[triangles]], points)
+        weights = barycentrics_in(mesh.V[mesh.F[triangles]], points)
         places = np.einsum("kc,kcj->kj", weights, self.corners[triangles])
         return np.concatenate([self.charts[triangles, None], places], axis=1)
 
@@ -54,16 +55,14 @@ class LinearChartMap:
         chart, row, column = np.rint(coordinates).astype(np.int64).T
         return (chart * n + row.clip(0, n - 1)) * n + column.clip(0, n - 1)
 
-    def corner_coordinates(self, mesh: Mesh) -> NDArray[np.float64]:
-        """Chart, row and column [face_count, 3, 3] of the triangles' corners."""
+    def linear_parts(self, mesh: Mesh) -> LinearParts:
+        """The triangles, with chart, row and column of their corners."""
         chart = np.broadcast_to(self.charts[:, None, None], (len(self.charts), 3, 1))
-        return np.concatenate([chart, self.corners], axis=2)
+        return LinearParts.whole(np.concatenate([chart, self.corners], axis=2))
 
     def split(self, corners: NDArray[np.float64]) -> ChartPieces:
         """The triangles as they are: each lies in one chart."""
-        count = len(corners)
-        whole = np.tile(np.eye(3), (count, 1, 1))
-        return ChartPieces(np.arange(count), whole, corners[:, 0, 0].astype(np.int64))
+        return ChartPieces.uncut(corners[:, 0, 0].astype(np.int64))
 
     def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
         """Place [k, ..., 2] in the charts, 0 to 1, of map coordinates [k, ..., 3]."""
@@ -76,16 +75,3 @@ class LinearChartMap:
     def arrays(self) -> dict[str, NDArray]:
         """Charts and corners of the triangles."""
         return {"charts": self.charts, "corners": self.corners}
-
-
-def _barycentrics(corners: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Barycentric coordinates [k, 3], not negative, of points [k, 3] in triangles [k, 3, 3]."""
-    u, v, p = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
-    uu, uv, vv, pu, pv = (np.einsum("ij,ij->i", a, b) for a, b in ((u, u), (u, v), (v, v), (p, u), (p, v)))
-    area = uu * vv - uv * uv
-    # a triangle without area has no barycentrics: its middle is as good as any point of it
-    flat = area <= 0
-    scale = np.where(flat, 1.0, area)
-    s = np.where(flat, 1 / 3, np.clip((vv * pu - uv * pv) / scale, 0.0, 1.0))
-    t = np.where(flat, 1 / 3, np.clip((uu * pv - uv * pu) / scale, 0.0, 1.0 - s))
-    return np.stack([1 - s - t, s, t], axis=1)

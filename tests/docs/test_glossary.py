@@ -64,6 +64,7 @@ ALLOWED = [
     ("solver/sphere_map/", "carried", "area of collapsed vertices, which the kept ones stand for"),
     ("solver/sphere_map/", "ahead", "a trial step of the descent"),
     ("solver/sphere_map/", "folded", "a triangle that the map turns over"),
+    ("solver/patch_map/", "folded", "a triangle that the map turns over"),
     ("solver/mesh/", "folded", "a polygon that turns over"),
     ("solver/", "piece", "part of a triangle, cut at the edges of the cube"),
     ("solver/", "pieces", "parts of a triangle"),

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.visuals.corners import smooth_normals, split_corners
+from ripple_sim.render.visuals.corners import normalized, smooth_normals, split_corners
 from ripple_sim.render.visuals.texture_mapping import Mapping
 from ripple_sim.solver import Mesh
+from ripple_sim.solver.texels.parts_mesh import parts_mesh
 
 from . import ambient_occlusion as occlusion
 from .charts import Charts, VertexColumns, shared_places, split_at_charts
@@ -55,10 +56,14 @@ def tessellated(
     F, attributes, same
         As for `tessellate`; the attributes' columns are named above.
     """
-    V, F = mesh.V, mesh.F
-    coordinates = charts.map.corner_coordinates(mesh)
-    split = split_corners(V, F, corner_uv, coordinates)
-    baked = np.zeros((len(V), 3)) if baked is None else baked
+    parts = parts_mesh(charts.map, mesh)
+    V, F = parts.V, parts.F
+    split = split_corners(V, F, None if corner_uv is None else parts.carry(corner_uv), parts.coordinates)
+    baked = np.zeros((len(mesh.V), 3)) if baked is None else baked
+    if V is not mesh.V:
+        at_parts = np.zeros((len(V), 6))
+        at_parts[F] = parts.carry(np.concatenate([smooth, baked], axis=1)[mesh.F])
+        smooth, baked = normalized(at_parts[:, :3]), at_parts[:, 3:]
     _, same = np.unique(np.column_stack([split.vertices, split.normals]), axis=0, return_inverse=True)
     each = split.vertices
     attributes = [V[each], smooth[each], split.coordinates, split.normals, baked[each], split.uv]

@@ -5,7 +5,8 @@ import pytest
 from genus_zero import TETRAHEDRON, icosphere
 
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.cube_map.quality import QUANTILES, sphere_map_quality
+from ripple_sim.solver.cube_map.quality import sphere_map_quality
+from ripple_sim.solver.texels.stretch import QUANTILES
 
 
 def unit(V: np.ndarray) -> np.ndarray:

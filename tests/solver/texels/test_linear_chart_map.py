@@ -58,7 +58,7 @@ def test_the_nearest_texel_is_the_one_whose_centre_is_nearest(texels) -> None:
 
 
 def test_texture_coordinates_are_column_and_row_from_0_to_1() -> None:
-    coordinates = MAP.corner_coordinates(MESH)
+    coordinates = MAP.linear_parts(MESH).coordinates
     uv = MAP.uv(coordinates, MAP.charts)
     np.testing.assert_allclose(uv[0], [[0, 0], [1, 0], [1, 1]])
     np.testing.assert_allclose(uv[1], [[0.375, 0.125], [0.125, 0.625], [0.875, 0.375]])
@@ -69,4 +69,4 @@ def test_texture_coordinates_are_column_and_row_from_0_to_1() -> None:
 
 def test_stored_arrays_make_the_same_map_again() -> None:
     again = LinearChartMap(**MAP.arrays(), resolution=4)
-    np.testing.assert_array_equal(again.corner_coordinates(MESH), MAP.corner_coordinates(MESH))
+    np.testing.assert_array_equal(again.linear_parts(MESH).coordinates, MAP.linear_parts(MESH).coordinates)

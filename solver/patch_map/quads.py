@@ -1,0 +1,195 @@
+"""Cells cut into square charts: one for each corner of a cell, from its middle to the middles of its sides.
+
+Sides and corners of charts are numbered as in `texels.topology`. Corner 0 of a chart lies in the middle of its cell,
+corner 2 in the corner of the cell, 1 and 3 in the middles of the cell's sides before and behind that corner.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ripple_sim.solver.errors import AtlasError
+
+from .borders import BorderedCells
+from .flatten import Border, along, flattened, signed_areas
+from .rays import Flat, central_vertices, cut_ray
+from .refine import halved, halved_chords
+from .surface import Surface
+
+# column and row of a chart's corners, counter-clockwise
+CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+
+Path = NDArray[np.int64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Quads:
+    """A surface laid out on charts, without a fold.
+
+    Attributes
+    ----------
+    surface : Surface
+    chart : int64 [m]
+        On which each triangle lies.
+    places : float64 [m, 3, 2]
+        Column and row of its corners, from 0 to 1 across the chart.
+    glued : int64 [C, 4, 2]
+        Chart and side beyond each side; -1 at a rim.
+    """
+
+    surface: Surface
+    chart: NDArray[np.int64]
+    places: NDArray[np.float64]
+    glued: NDArray[np.int64]
+
+
+def cut_into_quads(cells: BorderedCells) -> Quads:
+    """Lay out each cell as a regular polygon, cut that into quads, and lay out each of them as a square.
+
+    Raises
+    ------
+    AtlasError
+        If round-off folds a triangle: they are too thin.
+    """
+    cells, halves = _with_middles(cells)
+    flat, paths = _cut_polygons(cells, halves)
+    first = np.cumsum([0, *map(len, halves)])
+    sides = _chart_sides(halves, paths, first)
+    surface, chart = _charts(flat, sides, first)
+    on_border = np.zeros(len(surface.V), bool)
+    on_border[np.concatenate([path for each in sides for path in each])] = True
+    finer = halved_chords(surface, chart, on_border)
+    surface, chart = finer.surface, chart[finer.origin]
+    places = flattened(surface, chart, _square_border(surface, sides))
+    folded = int((signed_areas(places) <= 0).sum())
+    if folded:
+        raise AtlasError(f"{folded} triangles of the surface are too thin to be laid out flat")
+    return Quads(surface, chart, places, _glued(sides, first))
+
+
+def _with_middles(cells: BorderedCells) -> tuple[BorderedCells, list[list[tuple[Path, Path]]]]:
+    """Cells with a vertex in the middle of each arc, at which it is cut in half, and with inner vertices."""
+    surface = cells.surface
+    single = np.array([arc for each in cells.arcs for arc in each if len(arc) == 2]).reshape(-1, 2)
+    size = len(surface.V)
+    low_high = surface.edges.ends @ [size, 1]
+    chosen = np.isin(low_high, np.sort(single, axis=1) @ [size, 1])
+    finer = halved(surface, chosen)
+    middle = dict(zip(map(tuple, surface.edges.ends[chosen].tolist()), finer.middles[chosen].tolist(), strict=True))
+    arcs = [
+        [arc if len(arc) > 2 else np.insert(arc, 1, middle[min(arc), max(arc)]) for arc in each] for each in cells.arcs
+    ]
+    on_border = np.zeros(len(finer.surface.V), bool)
+    on_border[np.concatenate([arc for each in arcs for arc in each])] = True
+    cell = cells.cell[finer.origin]
+    split = halved_chords(finer.surface, cell, on_border)
+    halves = [[_halves(split.surface.V, arc) for arc in each] for each in arcs]
+    return BorderedCells(split.surface, cell[split.origin], arcs), halves
+
+
+def _halves(V: NDArray[np.float64], arc: Path) -> tuple[Path, Path]:
+    """Cut an arc in two at the vertex nearest to its middle; the same from either side."""
+    flipped = arc[0] > arc[-1] or (arc[0] == arc[-1] and arc[1] > arc[-2])
+    way = arc[::-1] if flipped else arc
+    at = 1 + int(np.abs(along(V, way)[1:-1] - 0.5).argmin())
+    return (way[: at + 1], way[at:]) if not flipped else (way[at:][::-1], way[: at + 1][::-1])
+
+
+def _cut_polygons(cells: BorderedCells, halves: list[list[tuple[Path, Path]]]) -> tuple[Flat, list[list[Path]]]:
+    """Cells as regular polygons about the origin, cut from their middles; the paths of those cuts."""
+    surface = cells.surface
+    on_border = np.zeros(len(surface.V), bool)
+    on_border[np.concatenate([arc for each in cells.arcs for arc in each])] = True
+    flat = Flat(surface, cells.cell, flattened(surface, cells.cell, _polygon_border(surface, halves)))
+    centre = central_vertices(flat, on_border)
+    most = max(map(len, halves))
+    paths: list[list[Path]] = [[] for _ in halves]
+    for i in range(most):
+        has = np.array([len(each) > i for each in halves])
+        end = np.array([each[i][0][-1] if len(each) > i else -1 for each in halves])
+        border = np.zeros(len(flat.surface.V), bool)
+        border[: len(on_border)] = on_border
+        flat, lines = cut_ray(flat, np.where(has, centre, -1), end, border)
+        for path, line in zip(paths, lines, strict=True):
+            if len(line):
+                path.append(line)
+    return flat, paths
+
+
+def _polygon_border(surface: Surface, halves: list[list[tuple[Path, Path]]]) -> Border:
+    """Cells as regular polygons: corners on the unit circle, arcs along the sides."""
+    parts, vertices, places = [], [], []
+    for cell, arcs in enumerate(halves):
+        tips = np.exp(2j * np.pi * np.arange(len(arcs) + 1) / len(arcs))
+        for i, (first, second) in enumerate(arcs):
+            middle = (tips[i] + tips[i + 1]) / 2
+            for path, a, b in ((first, tips[i], middle), (second, middle, tips[i + 1])):
+                z = a + (b - a) * along(surface.V, path)
+                parts.append(np.full(len(path), cell))
+                vertices.append(path)
+                places.append(np.stack([z.real, z.imag], axis=1))
+    return Border(np.concatenate(parts), np.concatenate(vertices), np.concatenate(places))
+
+
+def _chart_sides(
+    halves: list[list[tuple[Path, Path]]], paths: list[list[Path]], first: NDArray[np.int64]
+) -> list[tuple[Path, Path, Path, Path]]:
+    """The four sides of each chart, counter-clockwise; chart first[c] + i lies at corner i of cell c."""
+    sides = []
+    for arcs, rays in zip(halves, paths, strict=True):
+        for i in range(len(arcs)):
+            sides.append((rays[i - 1], arcs[i - 1][1], arcs[i][0], rays[i][::-1]))
+    return sides
+
+
+def _charts(
+    flat: Flat, sides: list[tuple[Path, Path, Path, Path]], first: NDArray[np.int64]
+) -> tuple[Surface, NDArray[np.int64]]:
+    """The chart of each triangle: those not parted by a side of a chart hang together."""
+    surface = flat.surface
+    size = len(surface.V)
+    walls = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for each in sides for path in each])
+    wall = np.isin(surface.edges.ends @ [size, 1], np.sort(walls, axis=1) @ [size, 1])
+    beside = surface.edges.sides[~wall] // 3
+    links = coo_array((np.ones(len(beside)), tuple(beside.T)), shape=(len(surface.F),) * 2)
+    number, part = connected_components(links, directed=False)
+    if number != len(sides):
+        raise AtlasError(f"{len(sides)} charts came out as {number}: triangles of the surface are too thin")
+    # the triangle on the inner side of the first edge of a chart's second side
+    triangle, k = np.divmod(surface.edges.sides.ravel(), 3)
+    tail, head = surface.F[triangle, k], surface.F[triangle, (k + 1) % 3]
+    key = np.where(surface.edges.sides.ravel() >= 0, tail * size + head, -1)
+    order = np.argsort(key)
+    wanted = np.array([each[1][0] * size + each[1][1] for each in sides])
+    owner = triangle[order[np.searchsorted(key[order], wanted)]]
+    chart = np.full(number, -1)
+    chart[part[owner]] = np.arange(len(sides))
+    return surface, chart[part]
+
+
+def _square_border(surface: Surface, sides: list[tuple[Path, Path, Path, Path]]) -> Border:
+    parts, vertices, places = [], [], []
+    for chart, each in enumerate(sides):
+        for side, path in enumerate(each):
+            a, b = CORNERS[side], CORNERS[(side + 1) % 4]
+            parts.append(np.full(len(path), chart))
+            vertices.append(path)
+            places.append(a + (b - a) * along(surface.V, path)[:, None])
+    return Border(np.concatenate(parts), np.concatenate(vertices), np.concatenate(places))
+
+
+def _glued(sides: list[tuple[Path, Path, Path, Path]], first: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Charts that share a side have its first edge the other way round."""
+    table = np.full((len(sides), 4, 2), -1)
+    seen = {(int(path[0]), int(path[1])): (chart, s) for chart, each in enumerate(sides) for s, path in enumerate(each)}
+    for chart, each in enumerate(sides):
+        for s, path in enumerate(each):
+            other = seen.get((int(path[-1]), int(path[-2])))
+            if other is not None:
+                table[chart, s] = other
+    return table

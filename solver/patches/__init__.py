@@ -1,0 +1,1 @@
+"""The patch layout: the texels of charts on any surface."""

@@ -1,0 +1,20 @@
+"""Stretch in figures: how much wider than in an even spread texels are."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+QUANTILES = {"q001": 0.001, "q01": 0.01, "q50": 0.5, "q99": 0.99, "q999": 0.999}
+STARVED = 4.0
+
+
+def stretch_summary(stretch: NDArray[np.float64], areas: NDArray[np.float64]) -> dict[str, float]:
+    """Quantiles of the stretch over the real areas, both [m], and the starved share; see `Atlas.quality`."""
+    order = np.argsort(stretch, kind="stable")
+    share = np.cumsum(areas[order]) / areas.sum()
+    at = np.minimum(np.searchsorted(share, list(QUANTILES.values())), len(order) - 1)
+    return {
+        **{name: float(value) for name, value in zip(QUANTILES, stretch[order][at], strict=True)},
+        "starved": float(areas[stretch > STARVED].sum() / areas.sum()),
+    }
