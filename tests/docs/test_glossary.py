@@ -69,6 +69,7 @@ ALLOWED = [
     ("solver/", "piece", "part of a triangle, cut at the edges of the cube"),
     ("solver/", "pieces", "parts of a triangle"),
     ("ripple_sim/cli/", "shell", "bash, zsh, fish"),
+    ("ripple_sim/coupling/colliders/", "shell", "MuJoCo's name for the inertia of a hollow mesh"),
     (
         "ripple_sim/render/",
         "shell",

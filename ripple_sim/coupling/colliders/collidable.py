@@ -6,11 +6,12 @@ import mujoco
 
 from ripple_sim.errors import SceneError
 
+from .convex_collider import add_convex_collider, remove_convex_collider
 from .flex_collider import add_flex_collider, remove_flex_collider
 from .tunnelling import SPECULATIVE
 
 _GEOM = mujoco.mjtGeom
-ROUTES = ("sdf", "flex", "hull")
+ROUTES = ("sdf", "flex", "convex", "hull")
 
 # Starting points of MuJoCo's search for contacts with a signed distance. Fewer miss contacts; its default of 40 takes
 # five times as long.
@@ -28,7 +29,8 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "sdf") -> mujoc
     spec : mujoco.MjSpec
         Changed in place, before it is compiled. A route taken earlier is undone.
     geom : str
-        Name of a geom.
+        Name of a geom, or "body/index" of an unnamed one, which gets that name. One that collides with nothing gets a
+        contype and a conaffinity of 1; other geoms of its body go on colliding.
     route : str
         "sdf": as a signed distance, which MuJoCo computes when it compiles the model. For moving targets too, and right
         for geoms of all shapes. Only planes meet the mesh's convex hull, and height fields nothing at all.
@@ -37,6 +39,10 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "sdf") -> mujoc
         distance with up to ten thousand triangles, and as long with forty thousand. Right for spheres, capsules and
         ellipsoids, and for cylinders and meshes that sink in by less than 0.7 of the flex's thickness (2 to 5 % of the
         mesh's size). Boxes may be thrown aside, and SDF geoms sink in; a warning names both. See `add_flex_collider`.
+        "convex": as the convex parts of its mesh, geoms of their own without mass, which CoACD finds in some ten
+        seconds and which are then kept in the user's cache (needs the package coacd). The most robust: boxes stack on
+        it, and all geoms meet it. Bodies are held up to 2.5 % of the mesh's size off the surface. See
+        `add_convex_collider`.
         "hull": as its convex hull, MuJoCo's way for mesh geoms: fast, and right for convex meshes only.
 
     Returns
@@ -47,24 +53,42 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "sdf") -> mujoc
     Raises
     ------
     SceneError
-        For an unknown route or geom, or a specification from which no flex can be made.
+        For an unknown route or geom, a specification from which no collider can be made, or a package that is missing.
     MeshError
-        If the mesh of a flex is not a closed genus-0 surface.
+        If the mesh cannot be used.
     """
     if route not in ROUTES:
         raise SceneError(f"collision route {route!r} is not known; valid are {', '.join(map(repr, ROUTES))}")
-    found = spec.geom(geom)
-    if found is None:
-        names = ", ".join(repr(g.name) for g in spec.geoms if g.name)
-        raise SceneError(f"the specification has no geom {geom!r}; its named geoms are {names or 'none'}")
-    if not found.meshname or route == "hull":
+    found = _find(spec, geom)
+    if not found.meshname or route in ("convex", "hull"):
         spec.option.enableflags |= SPECULATIVE
+    if found.meshname:
+        remove_flex_collider(spec, found)
+        remove_convex_collider(spec, found)
+    if not (found.contype or found.conaffinity):
+        found.contype = found.conaffinity = 1
     if not found.meshname:
         return found
-    remove_flex_collider(spec, found)
     found.type = _GEOM.mjGEOM_SDF if route == "sdf" else _GEOM.mjGEOM_MESH
     if route == "sdf":
         spec.option.sdf_initpoints = min(spec.option.sdf_initpoints, SDF_INITPOINTS)
     elif route == "flex":
         add_flex_collider(spec, found)
+    elif route == "convex":
+        add_convex_collider(spec, found)
     return found
+
+
+def _find(spec: mujoco.MjSpec, key: str) -> mujoco.MjsGeom:
+    """The geom of a name, or of a place among the geoms of its body, which it is then called by."""
+    found = spec.geom(key)
+    if found is not None:
+        return found
+    body_name, _, index = key.rpartition("/")
+    body = spec.body(body_name) if body_name else None
+    if body is not None and index.isdecimal() and int(index) < len(body.geoms):
+        found = body.geoms[int(index)]
+        found.name = found.name or key
+        return found
+    names = ", ".join(repr(each.name) for each in spec.geoms if each.name)
+    raise SceneError(f"the specification has no geom {key!r}; its named geoms are {names or 'none'}")

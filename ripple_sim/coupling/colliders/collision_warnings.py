@@ -39,7 +39,7 @@ def _shape_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None
     colliders = coupled.collision_geoms(geom)
     if coupled.masks.out_of_touch(geom, colliders):
         return _touch_warning(coupled, geom)
-    if any(each != geom for each in colliders):
+    if any(each != geom for each in colliders) or geom in coupled.convex_colliders:
         return _gap_warning(coupled, geom, atlas)
     if coupled.has_flex[geom]:
         return _flex_warning(coupled, geom)
@@ -70,7 +70,8 @@ def _touch_warning(coupled: CoupledModel, geom: int) -> str:
 
 def _gap_warning(coupled: CoupledModel, geom: int, atlas: Atlas) -> str | None:
     """Of collision geoms that are visibly off the surface."""
-    colliders, name = coupled.collision_geoms(geom), coupled.names[geom]
+    name, solids = coupled.names[geom], coupled.collision_geoms(geom)
+    colliders = [part for each in solids for part in coupled.convex_colliders.get(each, [each])]
     gap, size = collision_gap(coupled, geom, atlas, colliders), float(np.ptp(atlas.mesh.V, axis=0).max())
     if gap <= COARSE_TOLERANCE * size:
         return None

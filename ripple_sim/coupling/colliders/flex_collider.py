@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import igl
@@ -12,9 +11,9 @@ from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.model.target_mesh import target_mesh
-from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh
+
+from .mesh_in_spec import LISTS, SETTINGS, mesh_on_body
 
 # A collision surface off the true one by this share of the target's size shows: bodies stop in mid-air.
 GAP_TOLERANCE = 0.02
@@ -26,9 +25,6 @@ _SHARPEST = 2.0
 _ROUNDING = 1e-3
 # Vertices move by this share of the local thickness at most, so that opposite sides of a thin part stay apart.
 _DEEPEST = 0.45
-
-_SETTINGS = ("contype", "conaffinity", "condim", "priority", "solmix", "gap")
-_LISTS = ("friction", "solref", "solimp")
 
 
 def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
@@ -53,14 +49,9 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     MeshError
         If the mesh is not a closed genus-0 surface.
     """
-    if spec.compiler.discardvisual:
-        raise SceneError(
-            f"geom {geom.name!r} cannot collide through a flex: with discardvisual the compiler would discard the "
-            "geom; set spec.compiler.discardvisual = False"
-        )
     body = geom.parent
     body.name = body.name or f"body of {geom.name}"
-    mesh = _mesh_on_body(spec, geom.name)
+    mesh = mesh_on_body(spec, geom)
     core, thickness = _core(mesh)
     spec.add_flex(
         name=geom.name,
@@ -72,8 +63,8 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
         margin=geom.margin + thickness,
         # MuJoCo's own viewer does not show this group
         group=3,
-        **{name: getattr(geom, name) for name in _SETTINGS},
-        **{name: np.array(getattr(geom, name)) for name in _LISTS},
+        **{name: getattr(geom, name) for name in SETTINGS},
+        **{name: np.array(getattr(geom, name)) for name in LISTS},
     )
     geom.contype = geom.conaffinity = 0
 
@@ -122,20 +113,6 @@ def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
     outward /= length[:, None]
     moved = np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * _thickness(V, F, -outward, 1e-3 * depth))
     return V - moved[:, None] * outward
-
-
-def _mesh_on_body(spec: mujoco.MjSpec, geom: str) -> Mesh:
-    """A geom's mesh in the frame of its body, as MuJoCo compiles it."""
-    try:
-        model = spec.copy().compile()
-    except ValueError as error:
-        raise SceneError(
-            f"the flex of geom {geom!r} is made from its compiled mesh, but the specification does not compile: {error}"
-        ) from error
-    index = model.geom(geom).id
-    mesh, rotation = target_mesh(model, index), np.zeros(9)
-    mujoco.mju_quat2Mat(rotation, model.geom_quat[index])
-    return dataclasses.replace(mesh, V=model.geom_pos[index] + mesh.V @ rotation.reshape(3, 3).T)
 
 
 def _thickness(V: NDArray[np.float64], F: NDArray[np.int64], inward: NDArray[Any], start: float) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""What touches in each of MuJoCo's contacts: a geom, also by its flex collider, or a vertex of a soft flex."""
+"""What touches in MuJoCo's contacts: geoms, also by their flex or convex colliders, and vertices of soft flexes."""
 
 from __future__ import annotations
 
@@ -54,7 +54,10 @@ class ColliderIds:
         geoms = np.full(model.nflex, -1)
         geoms[list(coupled.flex_colliders.values())] = list(coupled.flex_colliders)
         first = model.ngeom + model.flex_vertadr.astype(np.int64)
-        self._plain = not model.nflex
+        self._plain = not (model.nflex or coupled.convex_colliders)
+        self._whole = np.arange(model.ngeom)
+        for geom, parts in coupled.convex_colliders.items():
+            self._whole[parts] = geom
         self._flexes = _Flexes(
             geoms, first, model.flex_vertadr, model.flex_elemdataadr, model.flex_elem, model.flex_dim
         )
@@ -65,18 +68,18 @@ class ColliderIds:
         if self._plain:
             return contacts.geom.astype(np.int64)
         sides = _Sides(contacts.geom, contacts.flex, contacts.elem, contacts.vert, contacts.pos)
-        return _collider_ids(sides, self._flexes, data.flexvert_xpos)
+        return _collider_ids(sides, self._whole, self._flexes, data.flexvert_xpos)
 
 
 @kernel
-def _collider_ids(sides: _Sides, flexes: _Flexes, vertices: Floats) -> Ints:
+def _collider_ids(sides: _Sides, whole: Ints, flexes: _Flexes, vertices: Floats) -> Ints:
     """Collider ids, [ncon, 2]; of a contact with an element, of the vertex nearest to the contact."""
     found = np.empty(sides.geom.shape, np.int64)
     for i in range(len(found)):
         for side in range(2):
             flex = sides.flex[i, side]
             if sides.geom[i, side] >= 0:
-                found[i, side] = sides.geom[i, side]
+                found[i, side] = whole[sides.geom[i, side]]
             elif flexes.geoms[flex] >= 0:
                 found[i, side] = flexes.geoms[flex]
             elif sides.vert[i, side] >= 0:

@@ -37,7 +37,7 @@ class CollisionContacts:
     Attributes
     ----------
     geoms : list of int
-        Ids of the geoms that collide for others, ascending.
+        Ids of the geoms that collide for others, or through their convex parts, ascending.
     """
 
     def __init__(self, coupled: CoupledModel, atlases: Mapping[int, Atlas]) -> None:
@@ -45,7 +45,7 @@ class CollisionContacts:
         self._targets_of: dict[int, list[int]] = {}
         for target in atlases:
             for geom in coupled.collision_geoms(target):
-                if geom != target:
+                if geom != target or geom in coupled.convex_colliders:
                     self._targets_of.setdefault(geom, []).append(target)
         self.geoms = sorted(self._targets_of)
 

@@ -17,20 +17,27 @@ class ContactMasks:
     model : mujoco.MjModel
     flex_colliders : mapping
         Geom id to the id of its flex collider, whose masks are the geom's.
+    convex_colliders : mapping
+        Geom id to the ids of its convex colliders, whose masks are the geom's alone.
 
     Attributes
     ----------
     contype, conaffinity : int32 [ngeom]
-        Of what collides, the geom or its flex.
+        Of what collides: the geom, its flex, or its convex colliders.
     collides : bool [ngeom]
         Whether anything at all may touch a geom.
     """
 
-    def __init__(self, model: mujoco.MjModel, flex_colliders: Mapping[int, int]) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, flex_colliders: Mapping[int, int], convex_colliders: Mapping[int, Sequence[int]]
+    ) -> None:
         self._model = model
         self.contype, self.conaffinity = model.geom_contype.copy(), model.geom_conaffinity.copy()
         for geom, flex in flex_colliders.items():
             self.contype[geom], self.conaffinity[geom] = model.flex_contype[flex], model.flex_conaffinity[flex]
+        for geom, parts in convex_colliders.items():
+            self.contype[geom], self.conaffinity[geom] = model.geom_contype[parts[0]], model.geom_conaffinity[parts[0]]
+            self.contype[parts] = self.conaffinity[parts] = 0
         self._soft = np.setdiff1d(np.arange(model.nflex), list(flex_colliders.values()))
         paired = np.isin(np.arange(model.ngeom), [model.pair_geom1, model.pair_geom2])
         self.collides = (self.contype | self.conaffinity).astype(np.bool_) | paired

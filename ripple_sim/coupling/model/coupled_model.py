@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .collision_geoms import find_collision_geoms
 from .contact_masks import ContactMasks
+from .convex_colliders import find_convex_colliders
 from .flex_colliders import find_flex_colliders, flex_thickness
 from .flex_vertices import flex_name, vertex_flexes, vertex_spacing
 from .geoms import geom_name
@@ -29,9 +30,10 @@ _NONE_NAMED: Mapping[int, Sequence[int]] = MappingProxyType({})
 class CoupledModel:
     """The geoms of a MuJoCo model as the coupling sees them.
 
-    A mesh geom may collide through a flex, its flex collider: then the flex's contact settings are the geom's. Of any
-    other flex each vertex is a collider. Collider ids are those of the geoms, and after them one for each vertex; there
-    are c of them. A target may have collision geoms, whose contacts load it; see `find_collision_geoms`.
+    A mesh geom may collide through a flex, its flex collider: then the flex's contact settings are the geom's. It may
+    collide through its convex parts, which then touch as that geom. Of any other flex each vertex is a collider.
+    Collider ids are those of the geoms, and after them one for each vertex; there are c of them. A target may have
+    collision geoms, whose contacts load it; see `find_collision_geoms`.
 
     Parameters
     ----------
@@ -52,6 +54,8 @@ class CoupledModel:
         The body of each collider, -1 for vertices between several.
     flex_colliders : dict of int to int
         Geom id to the id of its flex collider.
+    convex_colliders : dict of int to list of int
+        Geom id to the ids of its convex colliders.
     has_flex : bool [ngeom]
         Whether a geom collides through a flex.
     extents : float64 [c]
@@ -79,6 +83,7 @@ class CoupledModel:
         self.owners = np.concatenate([geoms, model.ngeom + vertex_flexes(model)]).astype(np.int64)
         self.bodies = np.concatenate([model.geom_bodyid, model.flex_vertbodyid]).astype(np.int64)
         self.flex_colliders = find_flex_colliders(model)
+        self.convex_colliders = find_convex_colliders(model)
         self.has_flex = np.zeros(model.ngeom, dtype=np.bool_)
         self.has_flex[list(self.flex_colliders)] = True
         extents = np.where(np.isin(model.geom_type, _ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1))
@@ -89,8 +94,9 @@ class CoupledModel:
         self.extents = np.concatenate([extents, spacing])
         self.footprint_radii = np.concatenate([_FOOTPRINT * extents, spacing])
         convex = ~np.isin(model.geom_type, _NOT_CONVEX) & ~self.has_flex
+        convex[[geom for geom, parts in self.convex_colliders.items() if len(parts) > 1]] = False
         self.convex = np.concatenate([convex, np.zeros(model.nflexvert, dtype=np.bool_)])
-        self.masks = ContactMasks(model, self.flex_colliders)
+        self.masks = ContactMasks(model, self.flex_colliders, self.convex_colliders)
         self._collision_geoms = find_collision_geoms(model, self.masks.collides, targets, named)
 
     def collision_geoms(self, geom: int) -> tuple[int, ...]:
