@@ -11,6 +11,7 @@ from ripple_sim.coupling.model.coupled_model import CoupledModel
 from ripple_sim.coupling.model.target_mesh import target_mesh
 from ripple_sim.solver import Atlas
 
+from .adhesion import Adhesion
 from .collider_ids import ColliderIds
 from .collision_contacts import CollisionContacts
 from .flex_contacts import FlexContacts
@@ -38,6 +39,7 @@ class ContactReader:
         self._colliders = ColliderIds(coupled)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[[*meshes, *self._collision_contacts.geoms]] = True
+        self._adhesion = Adhesion(coupled.model)
         self._check_solver = SolverBalance(coupled)
         self._flexes = None
         if coupled.flex_colliders:
@@ -47,7 +49,7 @@ class ContactReader:
     def read(self, data: mujoco.MjData) -> dict[int, TargetContacts]:
         """Contacts of each target that is touched, by geom id."""
         model, extents, colliders = self._coupled.model, self._coupled.extents, self._colliders(data)
-        contacts = geom_contacts(model, data, colliders, self._is_read, extents)
+        contacts = geom_contacts(model, data, colliders, self._is_read, extents, self._adhesion(data))
         if self._flexes is not None:
             contacts |= self._flexes.contacts(data, colliders, extents)
         contacts = self._collision_contacts.hand_over(data, contacts)

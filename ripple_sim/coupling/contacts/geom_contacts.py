@@ -16,7 +16,7 @@ PYRAMIDAL = int(mujoco.mjtCone.mjCONE_PYRAMIDAL)
 
 
 class _MujocoContacts(NamedTuple):
-    """MuJoCo's arrays of contacts, of the same names, and the forces of its constraint solver."""
+    """MuJoCo's arrays of contacts, of the same names, forces of its constraint solver, and pulls; see `Adhesion`."""
 
     efc_address: Ints32
     dim: Ints32
@@ -24,6 +24,7 @@ class _MujocoContacts(NamedTuple):
     pos: Floats
     dist: Floats
     efc_force: Floats
+    pulls: Floats
 
 
 def geom_contacts(
@@ -32,10 +33,12 @@ def geom_contacts(
     colliders: NDArray[np.int64],
     is_target: NDArray[np.bool_],
     extents: NDArray[np.float64],
+    pulls: NDArray[np.float64] | None = None,
 ) -> dict[int, TargetContacts]:
     """Contacts that load each target that is touched, by its geom id in ascending order.
 
-    Where two targets touch, their contacts are reported for each of them.
+    Where two targets touch, their contacts are reported for each of them. What sticks to a target and pulls more than
+    it pushes has negative forces, at all contacts of the pair.
 
     Parameters
     ----------
@@ -46,11 +49,14 @@ def geom_contacts(
         By collider id.
     extents : float64 [c]
         Smallest half-extents [m].
+    pulls : float64 [ncon], optional
+        Of the contacts [N]; see `Adhesion`.
     """
     if not data.ncon:
         return {}
     each = data.contact
-    contacts = _MujocoContacts(each.efc_address, each.dim, each.frame, each.pos, each.dist, data.efc_force)
+    pulls = np.zeros(data.ncon) if pulls is None else pulls
+    contacts = _MujocoContacts(each.efc_address, each.dim, each.frame, each.pos, each.dist, data.efc_force, pulls)
     return _normal_contacts(colliders, contacts, is_target, extents, model.opt.cone == PYRAMIDAL).by_target()
 
 
@@ -58,17 +64,20 @@ def geom_contacts(
 def _normal_contacts(
     colliders: Ints, contacts: _MujocoContacts, is_target: Bools, extents: Floats, pyramidal: bool
 ) -> PairContacts:
-    """Contacts whose normal force pushes; pairs without one are left out."""
-    pairs = group_by_pair(colliders, contacts.efc_address, is_target)
+    """Contacts that push or pull; pairs without one are left out."""
+    # those within the gap pull without a row in the constraint solver
+    address = np.where(contacts.pulls > 0, np.int32(0), contacts.efc_address)
+    pairs = group_by_pair(colliders, address, is_target)
     found, found_pairs, row = room_for(pairs), 0, 0
     for pair in range(len(pairs.targets)):
-        first = row
+        first, pull, whole = row, 0.0, 0.0
         for j in range(pairs.begins[pair], pairs.begins[pair + 1]):
             i, frame = pairs.contacts[j], contacts.frame
-            force = _normal_force(contacts, i, pyramidal)
+            force = _normal_force(contacts, i, pyramidal) + contacts.pulls[i]
             if not force > 0:
                 continue
             found.forces[row] = force
+            pull, whole = pull + 2 * contacts.pulls[i], whole + force
             # an overlap deeper than a geom is not real: a speculative contact's `dist` only says how hard to stop
             depth = min(abs(contacts.dist[i]), extents[pairs.targets[pair]], extents[pairs.others[pair]])
             for k in range(3):
@@ -78,10 +87,15 @@ def _normal_contacts(
                 found.normals[row, k] = normal
                 found.points[row, k] = contacts.pos[i, k] + 1.5 * depth * normal
             row += 1
-        if row > first:
+        if pull > 0:
+            # the pair's own force, shared among its contacts by how much they bear
+            found.forces[first:row] *= (whole - pull) / whole
+        if row > first and pull != whole:
             found.targets[found_pairs], found.others[found_pairs] = pairs.targets[pair], pairs.others[pair]
             found.begins[found_pairs] = first
             found_pairs += 1
+        else:
+            row = first
     return trimmed(found, found_pairs, row)
 
 
@@ -89,6 +103,8 @@ def _normal_contacts(
 def _normal_force(contacts: _MujocoContacts, i: int, pyramidal: bool) -> float:
     """Normal force of a contact [N]."""
     address, dim = contacts.efc_address[i], contacts.dim[i]
+    if address < 0:
+        return 0.0
     # the edges of a friction pyramid share the normal force among them
     edges = 2 * (dim - 1) if pyramidal and dim > 1 else 1
     return contacts.efc_force[address : address + edges].sum()

@@ -24,7 +24,7 @@ class TargetContacts(NamedTuple):
     points : float64 [k, 3]
         Contact points in the world [m], just outside the target's surface.
     forces : float64 [k]
-        Normal forces [N], all positive.
+        Normal forces [N]: positive, or all negative with a geom that sticks to the target and pulls.
     normals : float64 [k, 3]
         Unit normals in the world, from the target to the other geom.
     """

@@ -30,8 +30,8 @@ class Impulse:
     point : float64 [3]
         Force-weighted contact point on the target's true surface, in the world [m].
     impulse : float
-        Sum of normal force times time step [N s], not negative; it pushes inwards. Through a flex collider, of the
-        whole force along the surface's normal.
+        Sum of normal force times time step [N s]; it pushes inwards, or is negative where something sticks and pulls.
+        Through a flex collider, of the whole force along the surface's normal.
     texel : tuple of int
         Chart, row and column of the texel nearest to the point.
     """
@@ -120,7 +120,7 @@ class ContactRecord(NamedTuple):
         contacts, forces = self.contacts, texel_forces(self.patches, self.points, self.cache)
         for i, other in enumerate(contacts.others.tolist()):
             rows = slice(*contacts.begins[i : i + 2].tolist())
-            of_contacts = contacts.forces[rows]
+            of_contacts = np.abs(contacts.forces[rows])
             point = of_contacts @ contacts.points[rows] / of_contacts.sum()
             normal = of_contacts @ contacts.normals[rows]
             at = slice(*forces.begins[i : i + 2].tolist())

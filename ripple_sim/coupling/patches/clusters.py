@@ -21,7 +21,7 @@ def cluster(points: Floats, forces: Floats, radius: float) -> tuple[Floats, Floa
     points : float64 [k, 3]
         [m].
     forces : float64 [k]
-        Positive [N].
+        All of one sign [N].
     radius : float
     """
     owner = np.full(len(forces), -1)
@@ -30,7 +30,7 @@ def cluster(points: Floats, forces: Floats, radius: float) -> tuple[Floats, Floa
     while count < MAX_CLUSTERS:
         seed = -1
         for i in range(len(forces)):
-            if owner[i] < 0 and (seed < 0 or forces[i] > forces[seed]):
+            if owner[i] < 0 and (seed < 0 or abs(forces[i]) > abs(forces[seed])):
                 seed = i
         if seed < 0:
             break
