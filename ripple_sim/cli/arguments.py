@@ -12,6 +12,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 
 from ripple_sim.overlay.comparison import BASELINES
 from ripple_sim.scene.up_axis import UP_AXES
+from ripple_sim.solver.atlas.layouts import LAYOUTS
 
 
 def parse_size(word: str) -> tuple[int, int]:
@@ -98,6 +99,13 @@ def parse_axis(word: str) -> str:
     return word
 
 
+def parse_layout(word: str) -> str:
+    """Read the name of a layout."""
+    if word not in LAYOUTS:
+        raise ValueError(f"{word!r} is not valid; it must be {', '.join(LAYOUTS[:-1])} or {LAYOUTS[-1]}")
+    return word
+
+
 def parse_overlay(word: str) -> tuple[str, ...]:
     """Read a list of overlays, separated by commas; the names are checked later."""
     return tuple(part.strip() for part in word.split(",")) if word.strip() else ()
@@ -143,3 +151,4 @@ Focus = Annotated[
 Exposures = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's, or 32)")]
 Device = Annotated[int | None, _one_word(parse_seed, "N"), arg(help_behavior_hint="(default: the first that works)")]
 UpAxis = Annotated[str | None, _one_word(parse_axis, "{y,z}"), arg(help_behavior_hint="(default: z for STL, else y)")]
+LayoutName = Annotated[str, _one_word(parse_layout, "{auto,cube,patches}")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ def atlas_report(path: Path, atlas: Atlas, method: str, seconds: dict[str, float
         The mesh's file.
     atlas : Atlas
     method : str
-        Its sphere map.
+        Its sphere map; counts for the cube layout only.
     seconds : dict
         Wall time of each stage [s].
 
@@ -27,7 +28,8 @@ def atlas_report(path: Path, atlas: Atlas, method: str, seconds: dict[str, float
     -------
     dict
         `mesh`, `vertices`, `triangles`, `size` of the bounding box [m], `area` [m^2], `volume` [m^3], `notes` (what was
-        done to it, one line each), `resolution`, `method`, `quality` (see `Atlas.quality`) and `seconds`.
+        done to it, one line each), `layout`, `method`, `charts` (C, n, n), `resolution` n, `quality` (see
+        `Atlas.quality`) and `seconds`.
     """
     mesh = atlas.mesh
     return {
@@ -39,22 +41,28 @@ def atlas_report(path: Path, atlas: Atlas, method: str, seconds: dict[str, float
         "volume": mesh.volume,
         "notes": list(mesh.notes),
         "resolution": atlas.resolution,
-        "method": method,
+        "layout": atlas.layout,
+        "method": method if atlas.layout == "cube" else None,
+        "charts": list(atlas.texels.shape),
         "quality": atlas.quality(),
         "seconds": seconds,
     }
 
 
+def charts_text(shape: Sequence[int], method: str | None) -> str:
+    """Number and size of charts of a shape (C, n, n), and the sphere map that the cube layout has, as text."""
+    return f"{' x '.join(map(str, shape))} texels, {'patches' if method is None else f'{method} sphere map'}"
+
+
 def report_text(report: dict[str, Any]) -> str:
     """Format a report as text."""
-    n = report["resolution"]
     rows = [
         ("mesh", f"{report['vertices']} vertices, {report['triangles']} triangles"),
         ("size", f"{' x '.join(f'{x:.4g}' for x in report['size'])} m"),
         ("area", f"{report['area']:.6g} m^2"),
         ("volume", f"{report['volume']:.6g} m^3"),
         *(("note", note) for note in report["notes"]),
-        ("atlas", f"6 x {n} x {n} texels, {report['method']} sphere map"),
+        ("atlas", charts_text(report["charts"], report["method"])),
         *((name, f"{value:.6g}") for name, value in report["quality"].items()),
         *((f"{stage.replace('_', ' ')} time", f"{seconds:.3f} s") for stage, seconds in report["seconds"].items()),
     ]

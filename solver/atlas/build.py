@@ -23,15 +23,13 @@ from ripple_sim.solver.sphere_map import conformal_sphere_map, progressive_spher
 from ripple_sim.solver.texels.atlas import Atlas
 from ripple_sim.solver.texels.atlas_file import FORMAT
 
+from .layouts import LAYOUTS
 from .load import load_atlas
 
 SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {
     "progressive": progressive_sphere_map,
     "conformal": conformal_sphere_map,
 }
-
-
-LAYOUTS = ("auto", "cube", "patches")
 
 
 def build_atlas(

@@ -96,14 +96,14 @@ def test_the_axis_is_checked(capsys):
     assert "'x'" in refusal(capsys, "atlas", "mesh.obj", "--up", "x")
 
 
-@pytest.mark.parametrize("command", [["atlas"], ["drop", "-o", "clip.mp4"]])
-def test_repair_mends_or_says_what_to_install(capsys, monkeypatch, tmp_path, command):
+def test_repair_closes_or_says_what_to_install(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "pymeshfix", None)
     ball = trimesh.creation.icosphere(subdivisions=2)
     trimesh.Trimesh(ball.vertices, ball.faces[3:], process=False).export(tmp_path / "open.off")
-    assert "boundary edges" in refusal(capsys, *command, "open.off")
-    assert "pip install 'ripple-sim[repair]'" in refusal(capsys, *command, "open.off", "--repair")
+    assert "boundary edges" in refusal(capsys, "atlas", "open.off", "--layout", "cube")
+    for command in (["atlas"], ["drop", "-o", "clip.mp4"]):
+        assert "pip install 'ripple-sim[repair]'" in refusal(capsys, *command, "open.off", "--repair")
 
 
 def test_repair_says_what_it_did(capsys, tmp_path):
@@ -120,13 +120,28 @@ def test_wrapped_balls_get_one_atlas_and_a_line_that_says_so(capsys, tmp_path):
     ball = trimesh.creation.icosphere(subdivisions=2)
     trimesh.util.concatenate([ball, ball.copy().apply_translation([1, 0, 0])]).export(tmp_path / "balls.off")
     command = ["atlas", str(tmp_path / "balls.off"), "--resolution", "8"]
-    assert "2 separate parts" in refusal(capsys, *command)
+    assert "2 separate parts" in refusal(capsys, *command, "--layout", "cube")
     assert cli.main([*command, "--wrap"]) == 0
     assert re.search(
         r"^note +wrapped, 0\.045 m off: 2 parts in 1 closed surface with 0 handles, [\d,]+ triangles$",
         capsys.readouterr().out,
         re.MULTILINE,
     )
+
+
+def test_an_open_mesh_gets_patches(capsys, tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    trimesh.Trimesh(ball.vertices, ball.faces[3:], process=False).export(tmp_path / "open.off")
+    assert cli.main(["atlas", str(tmp_path / "open.off"), "--resolution", "32", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert (report["layout"], report["method"], report["quality"]["flipped"]) == ("patches", None, 0)
+    charts, n, _ = report["charts"]
+    assert charts * n * n == pytest.approx(6 * 32**2, rel=0.2)
+
+
+def test_a_layout_that_does_not_exist_is_refused(capsys, tmp_path):
+    message = refusal(capsys, "atlas", str(tmp_path / "any.off"), "--layout", "octahedron")
+    assert "'octahedron' is not valid; it must be auto, cube or patches" in message
 
 
 def test_a_wrong_method_is_refused(animal):

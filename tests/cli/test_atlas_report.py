@@ -40,3 +40,12 @@ def test_the_text_has_a_line_for_every_figure_with_values_in_one_column(box: Atl
     assert len(lines) == 4 + 2 + 1 + len(report["quality"]) + 2
     width = max(len(name) for name in (*report["quality"], "sphere map time"))
     assert all(line[width : width + 2] == "  " and line[width + 2] != " " for line in lines)
+
+
+def test_the_patches_of_an_open_mesh_are_counted_and_have_no_sphere_map() -> None:
+    bowl = trimesh.creation.box((2.0, 1.0, 0.5)).subdivide()
+    atlas = build_atlas(Mesh.from_arrays(np.array(bowl.vertices), np.array(bowl.faces)[:-8]), 12, cache=False)
+    report = atlas_report(Path("bowl.obj"), atlas, "progressive", {})
+    charts, n, _ = atlas.texels.shape
+    assert (report["layout"], report["method"], report["charts"]) == ("patches", None, [charts, n, n])
+    assert f"{charts} x {n} x {n} texels, patches" in report_text(report)
