@@ -12,6 +12,8 @@ from .topology import distinct, edges_of
 
 # Relative to the size of the mesh: above the round-off of a file in float32, far below any gap that is meant.
 _CRACK = 1e-6
+# In widths of a crack: a triangle that is longer does not vanish with it.
+_NEEDLE = 10
 
 
 def merged_vertices(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
@@ -54,9 +56,14 @@ def _joined_cracks(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.i
     rim = np.unique(edges[(counts == 1) & (edges[:, 0] != edges[:, 1])])
     if len(rim) == 0:
         return F
-    pairs = cKDTree(V[rim]).query_pairs(_CRACK * np.ptp(V[F.ravel()], axis=0).max(), output_type="ndarray")
+    width = _CRACK * np.ptp(V[F.ravel()], axis=0).max()
+    pairs = cKDTree(V[rim]).query_pairs(width, output_type="ndarray")
     graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(rim), len(rim)))
     _, label = connected_components(graph, directed=False)
     target = np.arange(len(V))
     target[rim] = rim[np.unique(label, return_index=True)[1]][label]
-    return target[F]
+    # a needle is as thin as a crack, but no crack
+    lost = collapsed(target[F]) & ~collapsed(F)
+    length = np.linalg.norm(V[F[lost]] - V[np.roll(F[lost], 1, axis=1)], axis=-1).max(axis=1)
+    needles = np.isin(target, target[F[lost][length > _NEEDLE * width]])
+    return np.where(needles, np.arange(len(V)), target)[F]
