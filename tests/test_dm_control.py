@@ -16,7 +16,7 @@ MODEL = f"""<mujoco><option timestep="0.002"/><worldbody>
 <geom name="block" type="box" size="0.3 0.3 0.1" pos="0 0 -0.1" solref="0.01 0.3"/>
 <body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
 </worldbody></mujoco>"""
-MATERIALS = {"block": Material(speed=1.0, density=20.0)}
+MATERIALS = {"block": Material(speed=1.0, density=100.0)}
 OPTIONS: dict[str, Any] = {"resolution": 16, "backend": "cpu"}
 
 

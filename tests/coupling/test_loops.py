@@ -24,7 +24,7 @@ Loop = Callable[[Ripples, mujoco.MjModel, mujoco.MjData], None]
 def bounce(**options: object) -> tuple[Ripples, mujoco.MjModel, mujoco.MjData]:
     """A ball about to fall on a block."""
     model = mujoco.MjModel.from_xml_string(BALL)
-    material = Material(speed=1.0, density=20.0)
+    material = Material(speed=1.0, density=100.0)
     return Ripples(model, {"block": material}, resolution=N, backend="cpu", **options), model, mujoco.MjData(model)
 
 

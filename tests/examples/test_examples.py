@@ -29,10 +29,14 @@ def run(name: str, monkeypatch, folder: Path, *arguments: str) -> None:
         ("several_targets", []),
         ("painted_speed", []),
         ("own_deformation", []),
+        ("gymnasium_ant", []),
+        ("gymnasium_humanoid", []),
         ("random_batch", ["--scenes", "2", "--seconds", "0.8"]),
     ],
 )
 def test_an_example_makes_its_picture(name, arguments, monkeypatch, tmp_path, capsys):
+    if name.startswith("gymnasium"):
+        pytest.importorskip("gymnasium")
     run(name, monkeypatch, tmp_path, *arguments)
     assert f"out/{name}.png" in capsys.readouterr().out
     with Image.open(tmp_path / "out" / f"{name}.png") as picture:

@@ -25,7 +25,7 @@ MODEL = f"""<mujoco><option timestep="0.002"/><worldbody><light pos="0 0 3"/>
 <body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
 <body pos="0 0 2"><joint name="idle"/><geom size="0.01"/></body></worldbody>
 <actuator><motor joint="idle" ctrlrange="-1 1"/></actuator></mujoco>"""
-MATERIALS = {"block": Material(speed=1.0, density=20.0)}
+MATERIALS = {"block": Material(speed=1.0, density=100.0)}
 OPTIONS: dict[str, Any] = {"resolution": N, "backend": "cpu"}
 SPACE = gymnasium.spaces.Box(-np.inf, np.inf, (8,))
 
@@ -140,7 +140,7 @@ def test_environments_in_parallel(path: Path) -> None:
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_gymnasium_finds_no_fault_with_its_own_ant() -> None:
-    env = RippleWrapper(gymnasium.make("Ant-v5"), {"torso_geom": Material(density=20.0)}, **OPTIONS)
+    env = RippleWrapper(gymnasium.make("Ant-v5"), {"torso_geom": Material(density=100.0)}, **OPTIONS)
     check_env(env, skip_render_check=True)
     made = gymnasium.make(env.spec)
     assert isinstance(made, RippleWrapper)
@@ -149,7 +149,7 @@ def test_gymnasium_finds_no_fault_with_its_own_ant() -> None:
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_a_pickled_environment_begins_anew() -> None:
-    env = RippleWrapper(gymnasium.make("Ant-v5"), {"torso_geom": Material(density=20.0)}, **OPTIONS)
+    env = RippleWrapper(gymnasium.make("Ant-v5"), {"torso_geom": Material(density=100.0)}, **OPTIONS)
     env.reset(seed=0)
     env.step(env.action_space.sample())
     again = pickle.loads(pickle.dumps(env))
