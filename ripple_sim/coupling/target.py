@@ -88,6 +88,5 @@ class Target:
         if held is not None:
             held_material = hold(old.atlas, material, held)
         new = WaveSolver(old.atlas, held_material, **options)
-        new.height, new.velocity, new.pressure = old.height, old.velocity, old.pressure
-        new.time, new.substeps_taken = old.time, old.substeps_taken
+        new.state = old.state
         self.waves, self._material, self._held, self._options = new, material, held, options

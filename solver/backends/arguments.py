@@ -6,9 +6,12 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats32, Ints
+from ripple_sim.solver.kernel import Floats, Floats32, Ints, Ints32
 
 Coefficient: TypeAlias = Floats32 | np.float32
+
+# Of the operator's `response`: a number, or one for each of its parts.
+Amplitude: TypeAlias = float | Floats
 
 
 class State(NamedTuple):
@@ -47,6 +50,17 @@ class Weights(NamedTuple):
     irregular: Links
 
 
+class ByPart(NamedTuple):
+    """A number for each part of the surface: part of each texel, [C, n, n], and values [p]; see `floating_parts`."""
+
+    parts: Ints32
+    values: Floats32
+
+
+# one number, one for each chart, or one for each part
+Pressure: TypeAlias = ByPart | Floats32 | np.float32
+
+
 class Kick(NamedTuple):
     """v = decay v + gain (force + extra) - spring h + span acceleration; see `StepCoefficients`."""
 
@@ -56,7 +70,24 @@ class Kick(NamedTuple):
     spring: Coefficient
     span: Coefficient
     extra: Coefficient
-    acceleration: np.float32
+    acceleration: Pressure
+
+
+class Balance(NamedTuple):
+    """What keeps the volume, see `VolumeRate`: factors of texels that lie side by side in runs.
+
+    Where the runs of each part begin, [p + 1], the address of each run, [r], and where its factors begin, [r + 1]; what
+    the load asks for and the sum, each [p]; the part of each chart.
+    """
+
+    begins: Ints
+    addresses: Ints
+    runs: Ints
+    heights: Floats32
+    velocities: Floats32
+    loaded: Floats32
+    total: Floats32
+    chart_parts: Ints
 
 
 class Loads(NamedTuple):

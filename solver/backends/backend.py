@@ -10,27 +10,34 @@ from numpy.typing import NDArray
 from ripple_sim.solver.errors import GLError, SolverError
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 
+from .arguments import Amplitude
+
 BACKENDS = ("auto", "gl", "cpu")
 
 
 class Backend(Protocol):
-    """A backend holds height and velocity as float32, kicks texels, and takes leapfrog substeps."""
+    """A backend holds height and velocity as float32, kicks texels, and takes leapfrog substeps.
+
+    Where it keeps the volume, forces inside a surface of uneven density do not change it either; see `volume_rate`.
+    """
 
     name: str
+    keeps_volume: bool
 
     def height(self) -> NDArray[np.float32]: ...  # noqa: D102
     def velocity(self) -> NDArray[np.float32]: ...  # noqa: D102
+    def elastic(self) -> NDArray[np.float32]: ...  # noqa: D102
     def dent(self) -> NDArray[np.float32]: ...  # noqa: D102
     def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None: ...  # noqa: D102
     def set_velocity(self, velocity: NDArray[np.float32]) -> None: ...  # noqa: D102
-    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: float) -> None: ...  # noqa: D102
-    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: float) -> None: ...  # noqa: D102
+    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None: ...  # noqa: D102
+    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None: ...  # noqa: D102
     def advance(self, substeps: int, dt: float) -> None: ...  # noqa: D102
     def wait(self) -> None: ...  # noqa: D102
     def finite(self) -> bool: ...  # noqa: D102
 
 
-def make_backend(name: str, operator: WaveOperator) -> Backend:
+def make_backend(name: str, operator: WaveOperator, *, keeps_volume: bool = False) -> Backend:
     """Backend by name; "auto" takes GL where the driver is hardware, else the CPU.
 
     Raises
@@ -47,10 +54,10 @@ def make_backend(name: str, operator: WaveOperator) -> Backend:
     if name == "gl":
         from .gl import GLBackend
 
-        return GLBackend(operator)
+        return GLBackend(operator, keeps_volume=keeps_volume)
     from .cpu import CPUBackend
 
-    return CPUBackend(operator)
+    return CPUBackend(operator, keeps_volume=keeps_volume)
 
 
 def auto_backend() -> str:

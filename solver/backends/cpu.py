@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.operator.step_coefficients import StepCoefficients, number_or_field, step_coefficients
+from ripple_sim.solver.operator.volume_rate import volume_rate
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 
 from . import kernels, threads
-from .arguments import Bending, Kick, Loads, Plasticity, State
+from .arguments import Amplitude, Balance, Bending, ByPart, Kick, Loads, Plasticity, Pressure, State
 from .cpu_fields import LARGE, LINE, PAGE, FieldLayout, aligned
 
 
@@ -26,33 +27,40 @@ class CPUBackend:
     ----------
     operator : WaveOperator
     thread_count : int, optional
-        How many share out the charts, where the material neither bends, drags nor yields; by default as many as can be
-        of use from N = 512 on. The numbers do not depend on it.
+        How many share out the charts, where the material neither bends, drags nor yields and the volume needs no
+        keeping; by default as many as can be of use from N = 512 on. The numbers do not depend on it.
+    keeps_volume : bool
+        See `backends.Backend`.
     """
 
     name = "cpu"
 
-    def __init__(self, operator: WaveOperator, thread_count: int | None = None) -> None:
+    def __init__(self, operator: WaveOperator, thread_count: int | None = None, *, keeps_volume: bool = False) -> None:
         self._operator = operator
+        self.keeps_volume = keeps_volume
         self._fields = fields = FieldLayout(operator.topology)
         self._stencil = fields.weights(operator.stencil)
         self._viscous = None if operator.viscous_stencil is None else fields.weights(operator.viscous_stencil)
         # the processor takes a store to one field and a load from another at the same place of a page for a conflict:
         # each field begins elsewhere in its page
         self._h, self._h_next, self._v = (fields.zeros(shift * PAGE // 3 // LINE * LINE) for shift in range(3))
-        self._bending = self._plasticity = None
+        self._bending = self._plasticity = self._dent = None
         if operator.laplace_stencil is not None and operator.rigidity is not None:
             rigidity = operator.rigidity.astype(np.float32)
             self._bending = Bending(fields.weights(operator.laplace_stencil), rigidity, fields.zeros())
         if operator.yield_height is not None:
-            self._plasticity = Plasticity(number_or_field(operator.yield_height), fields.zeros())
+            self._dent = fields.zeros()
+            self._plasticity = Plasticity(number_or_field(operator.yield_height), self._dent)
         drags = self._bending is not None or self._viscous is not None
         self._extra = fields.zeros() if drags else np.float32(0)
         if thread_count is None:
             thread_count = threads.available() if fields.n >= LARGE else 1
         self._threads = 1 if drags or self._plasticity is not None else thread_count
-        self._movable = number_or_field(operator.movable)
-        self._shift = self._prepared_dt = 0.0
+        self._response = number_or_field(operator.response)
+        self._chart_parts, self._parts = _parts_by_chart(operator)
+        self._balance: Balance | None = None
+        self._shift: Amplitude = 0.0
+        self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
     @property
@@ -62,14 +70,18 @@ class CPUBackend:
 
     def height(self) -> NDArray[np.float32]:
         """Copy of the height [m], [C, n, n]."""
-        elastic = self._fields.texels(self._h)
-        return elastic.copy() if self._plasticity is None else elastic + self.dent()
+        elastic = self.elastic()
+        return elastic if self._dent is None else elastic + self.dent()
+
+    def elastic(self) -> NDArray[np.float32]:
+        """Copy of the part of the height that springs back [m], [C, n, n]."""
+        return self._fields.texels(self._h).copy()
 
     def dent(self) -> NDArray[np.float32]:
         """The part of the height that stays [m], [C, n, n]."""
-        if self._plasticity is None:
+        if self._dent is None:
             return np.zeros(self._operator.mass.shape, np.float32)
-        return self._fields.texels(self._plasticity.dent).copy()
+        return self._fields.texels(self._dent).copy()
 
     def velocity(self) -> NDArray[np.float32]:
         """Copy of the velocity [m/s], [C, n, n]."""
@@ -79,24 +91,27 @@ class CPUBackend:
     def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
         """Replace the elastic height, and the permanent one: 0 unless given."""
         self._fields.texels(self._h)[:] = height
-        if self._plasticity is not None:
-            self._fields.texels(self._plasticity.dent)[:] = 0 if dent is None else dent
+        if self._dent is None and dent is not None and dent.any():
+            # what another material has left, in a surface that does not yield itself
+            self._dent = self._fields.zeros()
+        if self._dent is not None:
+            self._fields.texels(self._dent)[:] = 0 if dent is None else dent
 
     def set_velocity(self, velocity: NDArray[np.float32]) -> None:
         """Replace the velocity."""
         self._fields.texels(self._v)[:] = velocity
         self._shift = 0.0
 
-    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: float) -> None:
-        """Add velocities [m/s] to some texels (each named once), and one to all movable texels.
+    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None:
+        """Add velocities [m/s] to some texels (each named once), and one to all, as they respond.
 
         The latter is only noted: the next drift, which touches every texel anyway, adds it.
         """
         self._v.reshape(-1)[self._fields.addresses[texels]] += velocities
-        self._shift += everywhere
+        self._shift = self._shift + everywhere
 
-    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: float) -> None:
-        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all movable texels, until the next call."""
+    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None:
+        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all, until the next call."""
         self._loaded, self._forces, self._acceleration = texels, forces, everywhere
         self._load_is_new = True
 
@@ -105,16 +120,15 @@ class CPUBackend:
         k = self._prepare(dt)
         self._drift(dt / 2)
         state = State(self._h, self._v, self._h_next)
-        acceleration = np.float32(self._acceleration)
-        kick = Kick(self._stencil, k.gain, k.decay, k.spring, k.span, self._extra, acceleration)
+        kick = Kick(self._stencil, k.gain, k.decay, k.spring, k.span, self._extra, self._pressure(self._acceleration))
         step = (np.float32(dt), state, self._fields.halo, kick, self._loads)
-        if self._threads > 1:
+        if self._threads > 1 and self._balance is None:
             kernels.fill(self._h, self._fields.halo)
             threads.advance(self._threads, substeps, *step)
         else:
             if self._plasticity is not None:
                 kernels.flow(self._h, self._plasticity)
-            kernels.advance(substeps, *step, self._viscous, (self._bending, self._plasticity))
+            kernels.advance(substeps, *step, self._viscous, (self._bending, self._plasticity, self._balance))
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
 
@@ -127,22 +141,64 @@ class CPUBackend:
             return bool(np.isfinite(self._h.sum()))
 
     def _drift(self, dt: float) -> None:
-        if dt or self._shift:
-            kernels.drift(self._h, self._v, self._movable, np.float32(self._shift), np.float32(dt))
+        if dt or np.any(self._shift):
+            kernels.drift(self._h, self._v, self._response, self._pressure(self._shift), np.float32(dt))
         self._shift = 0.0
+
+    def _pressure(self, amplitude: Amplitude) -> Pressure:
+        """An amplitude as the loops take it."""
+        if self._operator.parts is None and self._balance is None:
+            return np.float32(amplitude)
+        amplitudes = np.full(int(self._chart_parts.max()) + 1, amplitude, np.float32)
+        if self._parts is None:
+            return amplitudes[self._chart_parts]
+        return ByPart(self._parts, amplitudes)
 
     def _prepare(self, dt: float) -> StepCoefficients:
         """Coefficients of the kick, computed once a step length, and the load's, once a load as well."""
-        new_length = self._prepared_dt != dt
+        new_length = self._prepared != (dt, self.keeps_volume)
         if new_length:
             k = step_coefficients(self._operator, dt)
             gain = aligned(k.gain.shape, 0)
             gain[:] = k.gain
             self._coefficients = dataclasses.replace(k, gain=gain)
-            self._prepared_dt = dt
+            self._balance = self._keep_volume(dt)
+            self._prepared = (dt, self.keeps_volume)
         k = self._coefficients
         if new_length or self._load_is_new:
             kicks = k.gain.reshape(-1)[self._loaded] * self._forces.astype(np.float32)
             self._loads = Loads(self._fields.addresses[self._loaded], kicks)
+            if self._balance is not None:
+                self._balance.loaded[:] = self._acceleration
             self._load_is_new = False
         return k
+
+    def _keep_volume(self, dt: float) -> Balance | None:
+        rate = volume_rate(self._operator, dt) if self.keeps_volume else None
+        if rate is None:
+            return None
+        addresses = self._fields.addresses[rate.texels]
+        follows = np.append(False, np.diff(addresses) == 1)
+        follows[rate.begins[:-1][rate.begins[:-1] < len(follows)]] = False
+        runs = np.flatnonzero(~follows)
+        begins = np.searchsorted(runs, rate.begins)
+        loaded, total = np.zeros((2, len(rate.begins) - 1), np.float32)
+        return Balance(
+            begins,
+            addresses[runs],
+            np.append(runs, len(addresses)),
+            rate.heights,
+            rate.velocities,
+            loaded,
+            total,
+            self._chart_parts,
+        )
+
+
+def _parts_by_chart(operator: WaveOperator) -> tuple[NDArray[np.int64], NDArray[np.int32] | None]:
+    """Part of each chart, [C], and, where parts share a chart, that of each texel, [C, n, n]."""
+    parts = operator.parts
+    if parts is None:
+        return np.zeros(len(operator.mass), np.int64), None
+    greatest = parts.max(axis=(1, 2))
+    return greatest.astype(np.int64), None if (parts == greatest[:, None, None]).all() else parts

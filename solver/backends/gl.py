@@ -8,10 +8,13 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.operator.step_coefficients import step_coefficients
+from ripple_sim.solver.operator.volume_rate import volume_rate
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 
+from .arguments import Amplitude
 from .gl_dispatch import Dispatch
 from .gl_fields import FieldLayout, LinkBuffers, TexelList
+from .gl_pressure import Pressure, VolumeKeeper
 
 
 class GLBackend:
@@ -19,15 +22,19 @@ class GLBackend:
 
     name = "gl"
 
-    def __init__(self, operator: WaveOperator, gl: GLContext | None = None) -> None:
+    def __init__(self, operator: WaveOperator, gl: GLContext | None = None, *, keeps_volume: bool = False) -> None:
+        self.keeps_volume = keeps_volume
         self._gl = gl if gl is not None else shared_context()
         self._operator = operator
         self._fields = fields = FieldLayout(self._gl, operator.topology)
         self._dispatch = Dispatch(self._gl, fields)
-        self._viscous = self._laplace = self._dent = self._extra = None
+        self._viscous = self._laplace = self._dent = self._yield = self._extra = None
         self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
         self._stencil = fields.upload_stencil(operator.stencil)
-        self._movable = fields.upload(operator.movable)
+        self._response = fields.upload(operator.response)
+        # a number for each part, where there are several: held by the load, and given at once
+        self._held = None if operator.parts is None else Pressure(self._gl, fields, operator)
+        self._given = None if operator.parts is None else Pressure(self._gl, fields, operator)
         self._kicks, self._forces = TexelList(self._gl), TexelList(self._gl)
         if operator.viscous_stencil is not None:
             self._viscous = fields.upload_stencil(operator.viscous_stencil)
@@ -44,14 +51,19 @@ class GLBackend:
         if operator.yield_height is not None:
             self._dent, self._yield = fields.zeros(), fields.upload(operator.yield_height)
         self._compile()
-        self._shift = self._prepared_dt = 0.0
+        self._shift: Amplitude = 0.0
+        self._prepared = (0.0, keeps_volume)
         self._waiting: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = []
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
     def height(self) -> NDArray[np.float32]:
         """Copy of the height [m], [C, n, n]."""
-        height = self._fields.read(self._h)
-        return height if self._dent is None else height + self.dent()
+        elastic = self.elastic()
+        return elastic if self._dent is None else elastic + self.dent()
+
+    def elastic(self) -> NDArray[np.float32]:
+        """Copy of the part of the height that springs back [m], [C, n, n]."""
+        return self._fields.read(self._h)
 
     def dent(self) -> NDArray[np.float32]:
         """The part of the height that stays [m], [C, n, n]."""
@@ -66,6 +78,9 @@ class GLBackend:
     def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
         """Replace the elastic height, and the permanent one: 0 unless given."""
         self._fields.write(self._h, height)
+        if self._dent is None and dent is not None and dent.any():
+            # what another material has left, in a surface that does not yield itself
+            self._dent = self._fields.zeros()
         if self._dent is not None:
             self._fields.write(self._dent, np.zeros_like(height) if dent is None else dent)
 
@@ -74,16 +89,16 @@ class GLBackend:
         self._fields.write(self._v, velocity)
         self._waiting, self._shift = [], 0.0
 
-    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: float) -> None:
-        """Add velocities [m/s] to some texels, and one to all movable texels.
+    def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None:
+        """Add velocities [m/s] to some texels, and one to all, as they respond.
 
         They are collected, and uploaded together before the next step or read of the velocity.
         """
         self._waiting.append((texels, velocities))
-        self._shift += everywhere
+        self._shift = self._shift + everywhere
 
-    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: float) -> None:
-        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all movable texels, until the next call."""
+    def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None:
+        """Hold forces [N] on some texels, and one acceleration [m/s^2] on all, until the next call."""
         self._loaded, self._load_forces, self._acceleration = texels, forces, everywhere
         self._load_is_new = True
 
@@ -97,8 +112,13 @@ class GLBackend:
                 drift = dt if step < substeps - 1 else dt / 2
                 self._fill_halo(self._h)
                 self._gather_extra_forces()
+                if isinstance(self._held, VolumeKeeper):
+                    self._held.follow(self._h, self._v)
                 kick_drift["dt"] = drift
-                self._dispatch.bind(self._h, self._v, self._h_next, self._stencil, self._coefficients, self._extra)
+                pressure = (self._held.parts, self._held.amplitudes) if self._held is not None else ()
+                self._dispatch.bind(
+                    self._h, self._v, self._h_next, self._stencil, self._coefficients, self._extra, *pressure
+                )
                 self._dispatch.run_blocks(kick_drift)
                 self._kick_irregular(drift)
                 self._h, self._h_next = self._h_next, self._h
@@ -114,7 +134,8 @@ class GLBackend:
         return True
 
     def _compile(self) -> None:
-        self._drift, self._halo, self._kick = (self._dispatch.shader(name) for name in ("drift", "halo", "kick"))
+        self._halo, self._kick = (self._dispatch.shader(name) for name in ("halo", "kick"))
+        self._drift = self._dispatch.shader("drift", **({} if self._given is None else {"PARTS": 1}))
         if self._viscous:
             self._apply_viscous = self._dispatch.block_shader("apply")
         if self._laplace:
@@ -123,7 +144,7 @@ class GLBackend:
                 "apply", SUBTRACT=1, **({"ADD": 1} if self._viscous else {})
             )
         self._irregular_kick, self._irregular_apply = (self._dispatch.shader("irregular", KICK=kick) for kick in (1, 0))
-        if self._dent:
+        if self._yield:
             self._yielding = self._dispatch.shader("flow")
 
     def _start(self, dt: float) -> None:
@@ -134,14 +155,19 @@ class GLBackend:
             self._kicks.set(self._fields.texels[texels], kicks)
             self._waiting = []
             self._kick_texels(self._kicks, 0.0)
-        if dt or self._shift:
-            self._drift["dt"], self._drift["shift"] = dt, self._shift
-            self._dispatch.bind(self._h, self._v, self._movable)
+        if dt or np.any(self._shift):
+            self._drift["dt"] = dt
+            if self._given is None:
+                self._drift["shift"] = self._shift
+                self._dispatch.bind(self._h, self._v, self._response)
+            else:
+                self._given.set(self._shift)
+                self._dispatch.bind(self._h, self._v, self._response, self._given.parts, self._given.amplitudes)
             self._dispatch.run_list(self._drift, self._fields.eights)
         self._shift = 0.0
 
     def _flow(self) -> None:
-        if self._dent is not None:
+        if self._dent is not None and self._yield is not None:
             self._dispatch.bind(self._h, self._dent, self._yield)
             self._dispatch.run_list(self._yielding, self._fields.eights)
 
@@ -176,24 +202,36 @@ class GLBackend:
 
     def _prepare(self, dt: float) -> moderngl.ComputeShader:
         """Compile the kick for this material; upload its coefficients once a step length, and the load once."""
-        new_length = self._prepared_dt != dt
+        new_length = self._prepared != (dt, self.keeps_volume)
         if new_length:
             self._step = k = step_coefficients(self._operator, dt)
             self._maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
             self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
             self._links = LinkBuffers(self._gl, self._fields, self._operator.stencil, k.gain)
-            self._prepared_dt = dt
+            self._keep_volume(dt)
+            self._prepared = (dt, self.keeps_volume)
         k = self._step
         if new_length or self._load_is_new:
             kicks = k.gain.reshape(-1)[self._loaded] * self._load_forces.astype(np.float32)
             self._forces.set(self._fields.texels[self._loaded], kicks)
+            if self._held is not None:
+                self._held.set(self._acceleration)
             self._load_is_new = False
-        defines = {"EXTRA": self._extra, "MAPS": self._maps}
+        defines = {"EXTRA": self._extra, "MAPS": self._maps, "PARTS": self._held}
         kick_drift = self._dispatch.block_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
-        kick_drift["acceleration"] = self._acceleration
+        if self._held is None:
+            kick_drift["acceleration"] = self._acceleration
         if not self._maps:
             kick_drift["decay"], kick_drift["spring"], kick_drift["span"] = k.decay, k.spring, k.span
         return kick_drift
+
+    def _keep_volume(self, dt: float) -> None:
+        operator = self._operator
+        rate = volume_rate(operator, dt) if self.keeps_volume else None
+        if rate is not None:
+            self._held = VolumeKeeper(self._gl, self._fields, operator, self._dispatch, rate)
+        elif isinstance(self._held, VolumeKeeper):
+            self._held = None if operator.parts is None else Pressure(self._gl, self._fields, operator)
 
     def _kick_texels(self, kicks: TexelList, dt: float) -> None:
         if kicks.count:

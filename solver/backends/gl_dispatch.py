@@ -50,6 +50,11 @@ class Dispatch:
         shader.run(-(-fields.width // (EIGHT * columns)), -(-fields.n // (self._rows * rows)), fields.strips)
         self._gl.barrier()
 
+    def run_groups(self, shader: moderngl.ComputeShader, count: int) -> None:
+        """Run so many groups of threads."""
+        shader.run(count)
+        self._gl.barrier()
+
     def run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
         """Run a shader over a list of so many entries."""
         shader.run(-(-count // _LIST_GROUP))

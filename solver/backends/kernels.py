@@ -8,8 +8,20 @@ import numpy as np
 
 from ripple_sim.solver.kernel import Floats32, kernel
 
-from .arguments import Bending, Coefficient, Halo, Kick, Links, Loads, Plasticity, State, Weights
-from .coefficients import row_of, value_at, value_in
+from .arguments import (
+    Balance,
+    Bending,
+    Coefficient,
+    Halo,
+    Kick,
+    Links,
+    Loads,
+    Plasticity,
+    Pressure,
+    State,
+    Weights,
+)
+from .coefficients import row_of, spread, value_at, value_in
 
 
 @kernel
@@ -30,13 +42,15 @@ def kick_texels(h: Floats32, v: Floats32, loads: Loads, dt: np.float32) -> None:
 
 
 @kernel
-def drift(h: Floats32, v: Floats32, movable: Coefficient, shift: np.float32, dt: np.float32) -> None:
-    """Add the shift to v where texels are movable, then dt v to h."""
+def drift(h: Floats32, v: Floats32, response: Coefficient, shift: Pressure, dt: np.float32) -> None:
+    """Add the shift to v, as far as texels respond to it, then dt v to h."""
     n = h.shape[1] - 2
     for i in range(len(h) * n):
         chart, r = i // n, i % n + 1
         for c in range(1, n + 1):
-            v[chart, r, c] += shift * value_in(row_of(movable, chart, r - 1), c - 1)
+            v[chart, r, c] += value_in(row_of(shift, chart, r - 1), c - 1) * value_in(
+                row_of(response, chart, r - 1), c - 1
+            )
             h[chart, r, c] += dt * v[chart, r, c]
 
 
@@ -127,11 +141,12 @@ def kick_drift(state: State, kick: Kick, dt: np.float32, first: int, last: int) 
             row = h[chart, r]
             rows, links = (h[chart, r - 1], row, h[chart, r + 1]), _links(kick.stencil.rows, chart, r)
             velocity, gains, result = v[chart, r], kick.gain[chart, r - 1], h_next[chart, r]
-            more, decays, springs, spans = (
+            more, decays, springs, spans, accelerations = (
                 row_of(kick.extra, chart, r),
                 row_of(kick.decay, chart, r - 1),
                 row_of(kick.spring, chart, r - 1),
                 row_of(kick.span, chart, r - 1),
+                row_of(kick.acceleration, chart, r - 1),
             )
             for c in range(1, n + 1):
                 force = _force(rows, links, c)
@@ -139,7 +154,7 @@ def kick_drift(state: State, kick: Kick, dt: np.float32, first: int, last: int) 
                     value_in(decays, c - 1) * velocity[c]
                     + gains[c - 1] * (force + value_in(more, c))
                     - value_in(springs, c - 1) * row[c]
-                    + value_in(spans, c - 1) * kick.acceleration
+                    + value_in(spans, c - 1) * value_in(accelerations, c - 1)
                 )
                 velocity[c] = kicked
                 result[c] = row[c] + dt * kicked
@@ -165,18 +180,19 @@ def advance(
     kick: Kick,
     loads: Loads,
     viscous: Weights | None,
-    bends_yields: tuple[Bending | None, Plasticity | None],
+    features: tuple[Bending | None, Plasticity | None, Balance | None],
 ) -> None:
     """Substeps of dt, from the first half drift to the last; the height ends in `h_next` where their number is odd.
 
     Features that a material lacks are None, and compiled away.
     """
-    bending, plasticity = bends_yields
+    bending, plasticity, balance = features
     half = dt / np.float32(2)
     h, v, h_next = state
     for step in range(substeps):
         fill(h, halo)
         _gather_extra(h, v, halo, kick, viscous, bending)
+        _balance(h, v, balance, kick.acceleration)
         drifted = dt if step < substeps - 1 else half
         kick_drift(State(h, v, h_next), kick, drifted, 0, len(h))
         kick_irregular(State(h, v, h_next), kick, drifted)
@@ -197,6 +213,31 @@ def _gather_extra(
         apply(bending.laplace, h, bending.rigidity, False, bending.moment)
         fill(bending.moment, halo)
         apply(bending.laplace, bending.moment, np.float32(-1), viscous is not None, kick.extra)
+
+
+@kernel(fastmath=_FAST | {"reassoc"})
+def _weighed(factors: Floats32, field: Floats32) -> float:
+    """Sum of factor times field over texels side by side."""
+    total = 0.0
+    for i in range(len(factors)):
+        total += np.float64(factors[i] * field[i])
+    return total
+
+
+@kernel
+def _balance(h: Floats32, v: Floats32, balance: Balance | None, acceleration: Pressure) -> None:
+    """The pressure that keeps the volume of each part, where the density varies."""
+    if balance is not None:
+        heights, velocities = h.reshape(-1), v.reshape(-1)
+        for part in range(len(balance.loaded)):
+            total = 0.0
+            for run in range(balance.begins[part], balance.begins[part + 1]):
+                first, last, address = balance.runs[run], balance.runs[run + 1], balance.addresses[run]
+                total += _weighed(balance.heights[first:last], heights[address:])
+                if len(balance.velocities):
+                    total += _weighed(balance.velocities[first:last], velocities[address:])
+            balance.total[part] = balance.loaded[part] + np.float32(total)
+        spread(balance.total, balance.chart_parts, acceleration)
 
 
 @kernel

@@ -19,6 +19,9 @@ from .wave_operator import WaveOperator
 
 OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
 
+# Below this share of the greatest pull on the surface sources lose their grip: where waves run at 3 % of the speed.
+_FAINT = 1e-3
+
 # No texel may be this much faster (by the sum of its weights over its area) than this share of all texels.
 _FASTER, _BULK = 1.2, 0.99
 
@@ -66,7 +69,22 @@ def build_operator(atlas: Atlas, material: Material, kind: str) -> WaveOperator:
         rigidity=density * field["bending"] / area if bends else None,
         yield_height=field["yield_height"] if yields else None,
         fixed=field["fixed"] if field["fixed"].any() else None,
+        density=density if np.ptp(density) else None,
+        grip=source_grip(field["speed"] ** 2, field["stiffness"], field["bending"]),
     )
+
+
+def source_grip(*pulls: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Share of a source that sets each texel in motion, [C, n, n], by what pulls it back, each [C, n, n]; None: all.
+
+    A texel without a pull is rigid. One with next to none would sink ever deeper under a load: as the strongest pull
+    on a texel fades, against the greatest of its kind on the surface, so does the grip of sources. The deflection under
+    a load then stays in proportion to that elsewhere.
+    """
+    strongest = np.max([pull / pull.max() for pull in pulls if pull.any()], axis=0, initial=0.0)
+    if not strongest.any() or strongest.min() >= _FAINT:
+        return None
+    return np.minimum(1.0, strongest / _FAINT)
 
 
 def softening(texels: TexelMesh) -> NDArray[np.float64]:

@@ -24,7 +24,9 @@ class Material:
     ----------
     speed : c [m/s]
         Wave speed of tension. Where it is 0 nothing propagates: waves reflect as from a free rim, and a region
-        without tension, bending and stiffness is rigid, so that sources do not move it.
+        without tension, bending and stiffness is rigid, so that sources do not move it. Where it fades below 3 % of the
+        greatest, with the other two, so does the share of a source that moves the surface; what lies below takes the
+        rest, and loads do not sink in for ever.
     damping : zeta [1/s]
         The amplitude of every wave falls as exp(-zeta t / 2).
     stiffness : k [1/s^2]

@@ -14,7 +14,8 @@ from .wave_operator import WaveOperator
 class StepCoefficients:
     """The kick of a step dt: v = decay v + gain force - spring h.
 
-    Damping is implicit (centred): decay = (1 - zeta dt/2) / (1 + zeta dt/2).
+    Damping is implicit (centred): decay = (1 - zeta dt/2) / (1 + zeta dt/2), and 0 where that would be negative, zeta
+    dt > 2: the velocity is then what the forces sustain against the damping, and does not change its sign each substep.
 
     Attributes
     ----------
@@ -22,7 +23,7 @@ class StepCoefficients:
         [s/kg]; 0 where the surface is clamped.
     decay, spring, span : float32 or float32 [C, n, n]
         One number where a coefficient is uniform, which saves the kernel's reads. The spring is in 1/s; the span [s] is
-        how long an acceleration that acts everywhere counts: 0 where sources move nothing.
+        how long the acceleration of a pressure that acts everywhere counts: 0 where sources move nothing.
     """
 
     gain: NDArray[np.float32]
@@ -33,14 +34,19 @@ class StepCoefficients:
 
 def step_coefficients(operator: WaveOperator, dt: float) -> StepCoefficients:
     """Coefficients of the kick of one substep of dt [s]."""
-    half = operator.damping * (dt / 2)
-    span = dt / (1 + half)
+    decay, span = damped_step(operator, dt)
     return StepCoefficients(
         gain=np.where(operator.free, span / operator.mass, 0).astype(np.float32),
-        decay=number_or_field((1 - half) / (1 + half)),
+        decay=number_or_field(decay),
         spring=number_or_field(span * operator.stiffness),
-        span=number_or_field(span * operator.movable),
+        span=number_or_field(span * operator.response),
     )
+
+
+def damped_step(operator: WaveOperator, dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Decay of the velocity over a substep of dt [s], and how long a force counts [s], each [C, n, n]."""
+    half = operator.damping * (dt / 2)
+    return np.maximum((1 - half) / (1 + half), 0), dt / (1 + np.maximum(half, 2 * half - 1))
 
 
 def number_or_field(field: NDArray) -> NDArray[np.float32] | np.float32:

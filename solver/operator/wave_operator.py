@@ -13,6 +13,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from ripple_sim.solver.texels.stencil import Stencil
 from ripple_sim.solver.texels.topology import TexelTopology
 
+from .components import Ties, floating_parts
+
 # Share of the theoretical stability limit that is used: round-off in float32 must not cross it.
 SAFETY = 0.99
 
@@ -40,8 +42,12 @@ class WaveOperator:
         B = sigma b / A [kg/s^2]: L B L is the bi-Laplacian's symmetric form, B L h a plate's moments.
     yield_height : float64 [C, n, n] or None
         [m]; None where everything is elastic.
-    fixed : bool [C, n, n]
+    fixed : bool [C, n, n] or None
         Texels that are clamped.
+    grip : float64 [C, n, n] or None
+        Share of a source that sets a texel in motion, where it is movable; None: 1 everywhere.
+    density : float64 [C, n, n] or None
+        sigma [kg/m^2], in any unit; None where it is uniform.
     """
 
     stencil: Stencil
@@ -53,6 +59,8 @@ class WaveOperator:
     rigidity: NDArray[np.float64] | None = None
     yield_height: NDArray[np.float64] | None = None
     fixed: NDArray[np.bool_] | None = None
+    grip: NDArray[np.float64] | None = None
+    density: NDArray[np.float64] | None = None
 
     @property
     def topology(self) -> TexelTopology:
@@ -73,9 +81,48 @@ class WaveOperator:
         movable = pulled & self.free
         return movable if movable.any() else self.free
 
+    @functools.cached_property
+    def anchored(self) -> NDArray[np.bool_]:
+        """Free texels that a link ties to what is clamped, [C, n, n]."""
+        free = self.free.astype(np.float64)
+        tied = self.stencil(free) != 0
+        if self.laplace_stencil is not None:
+            tied |= self.laplace_stencil(free) != 0
+        return tied & self.free
+
+    @functools.cached_property
+    def source_share(self) -> NDArray[np.float64]:
+        """Share of a source that sets each texel in motion, [C, n, n]; what lies below the surface takes the rest."""
+        return np.where(self.movable, 1.0 if self.grip is None else self.grip, 0.0)
+
+    @functools.cached_property
+    def lightness(self) -> NDArray[np.float64]:
+        """Greatest density over that of each texel, [C, n, n]: how much more a pressure moves it."""
+        return np.ones(self.mass.shape) if self.density is None else self.density.max() / self.density
+
+    @functools.cached_property
+    def response(self) -> NDArray[np.float64]:
+        """How the surface moves under a pressure that acts everywhere, [C, n, n]; 1 where all of it is alike."""
+        return self.source_share * self.lightness
+
+    @functools.cached_property
+    def parts(self) -> NDArray[np.int32] | None:
+        """Number of the freely floating part to which each texel belongs, [C, n, n], or None: `floating_parts`."""
+        ties = [Ties(self.stencil)]
+        if self.laplace_stencil is not None and self.rigidity is not None:
+            ties.append(Ties(self.laplace_stencil, self.rigidity))
+        return floating_parts(ties, (self.stiffness > 0) | self.anchored, self.movable)
+
     def elastic_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
         """-(K + L B L + M k) h [N], float64 [C, n, n]; what holds the clamped texels is left out."""
-        return self._tension_force(height) - self.mass * self.stiffness * height
+        return self.link_force(height) - self.mass * self.stiffness * height
+
+    def link_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
+        """-(K + L B L) h [N], float64 [C, n, n]: what neighbours exert on each other, by tension and bending."""
+        force = self.stencil(height)
+        if self.laplace_stencil is not None and self.rigidity is not None:
+            force -= self.laplace_stencil(self.rigidity * self.laplace_stencil(height))
+        return force
 
     @functools.cached_property
     def stable_timestep(self) -> float:
@@ -88,19 +135,13 @@ class WaveOperator:
         if self.laplace_stencil is not None and self.rigidity is not None:
             bending = self._rate_bound(self.laplace_stencil)
             bound += bending * float((self.rigidity * self.mass).max()) * bending
-        wave = self._largest_eigenvalue(self._tension_force, bound) + self.stiffness.max()
+        wave = self._largest_eigenvalue(self.link_force, bound) + self.stiffness.max()
         viscous = 0.0
         if self.viscous_stencil is not None:
             viscous = self._largest_eigenvalue(self.viscous_stencil, self._rate_bound(self.viscous_stencil))
         # the positive root, written so that nothing cancels
         rate = viscous + np.sqrt(viscous**2 + 4 * wave)
         return np.inf if rate == 0 else float(SAFETY * 4 / rate)
-
-    def _tension_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
-        force = self.stencil(height)
-        if self.laplace_stencil is not None and self.rigidity is not None:
-            force -= self.laplace_stencil(self.rigidity * self.laplace_stencil(height))
-        return force
 
     def _rate_bound(self, stencil: Stencil) -> float:
         """Gershgorin's bound of the largest eigenvalue of M^-1 K."""

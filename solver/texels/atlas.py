@@ -176,6 +176,10 @@ class Atlas:
         optional = {"uv": mesh.uv, "corner_uv": mesh.corner_uv, "beyond": texels.beyond}
         write_atlas_file(Path(path), arrays | {name: each for name, each in optional.items() if each is not None})
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What `copy` and `pickle` keep: the search tree cannot be copied, and is made again when it is needed."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
     @functools.cached_property
     def _tree(self) -> Any:
         tree = igl.AABB()

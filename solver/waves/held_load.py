@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from ripple_sim.solver.errors import SolverError
 
 from .load import Load
 
+Counterpart: TypeAlias = Callable[[NDArray[np.int64], NDArray[np.float64]], "float | NDArray[np.float64]"]
+
 
 class HeldLoad:
     """Forces that a backend holds over its steps.
@@ -19,14 +22,15 @@ class HeldLoad:
     Parameters
     ----------
     backend : Backend
-    shape : tuple
-        Of a field, (C, n, n).
+    share : float64 [C, n, n]
+        Of a force that sets a texel in motion.
     """
 
-    def __init__(self, backend: Backend, shape: tuple[int, ...]) -> None:
+    def __init__(self, backend: Backend, share: NDArray[np.float64]) -> None:
         self._backend = backend
-        self._shape = shape
-        self._size = int(np.prod(shape))
+        self._shape = share.shape
+        self._share = share.reshape(-1)
+        self._size = share.size
         self._held = Load.none()
         self._uploaded = self._held
 
@@ -35,22 +39,28 @@ class HeldLoad:
         forces = np.bincount(self._held.texels, self._held.forces, self._size).astype(np.float64, copy=False)
         return forces.reshape(self._shape)
 
-    def clear(self) -> None:
-        """Hold nothing."""
-        self._held = Load.none()
+    @property
+    def load(self) -> Load:
+        """What is held; assign to change it."""
+        return self._held
+
+    @load.setter
+    def load(self, load: Load) -> None:
+        self._held = load
 
     def add(self, load: Load) -> None:
         """Hold a load beside what is held."""
         self._held = Load.together([self._held, load]).merged(self._size)
 
-    def upload(self, extra: Load | None, counterpart: Callable[[float], float]) -> None:
+    def upload(self, extra: Load | None, counterpart: Counterpart) -> None:
         """Hand the backend the load of the coming step, with `extra` for that step alone, unless it has it already.
 
         Parameters
         ----------
         extra : Load or None
         counterpart : callable
-            From the force [N] that enters to the acceleration [m/s^2] of all movable texels that balances it.
+            From texels and the forces on them, outwards [N], to the acceleration that balances them; see
+            `VolumeBalance.counterpart`.
 
         Raises
         ------
@@ -61,8 +71,9 @@ class HeldLoad:
         if load is self._uploaded or not (len(load.texels) or len(self._uploaded.texels)):
             return
         once = load.merged(self._size)
-        total = float(once.forces.sum())
+        forces = -once.forces * self._share[once.texels]
+        total = float(forces.sum())
         if not np.isfinite(total):
-            raise SolverError(f"the forces of a load add up to {total!r} N; valid are finite numbers")
-        self._backend.load(once.texels, -once.forces, counterpart(-total))
+            raise SolverError(f"the forces of a load add up to {-total!r} N; valid are finite numbers")
+        self._backend.load(once.texels, forces, counterpart(once.texels, forces))
         self._uploaded = load

@@ -44,7 +44,7 @@ class WaveField:
         """Displacement along the outward normal [m], float32 [C, n, n]: a copy; assign to change it.
 
         `waves.height = field` and `waves.height += field` work, also with one number; `waves.height[0] = x` changes the
-        copy only.
+        copy only. A height that is assigned is elastic: dents are gone.
 
         Reading raises `SolverError` if the GPU has met a value that is not finite.
         """
@@ -68,7 +68,7 @@ class WaveField:
 
     @velocity.setter
     def velocity(self, value: ArrayLike) -> None:
-        self._backend.set_velocity(as_field(value, "velocity", self.operator.mass.shape) * self.operator.free)
+        self._backend.set_velocity(as_field(value, "velocity", self.operator.mass.shape) * self.operator.movable)
 
     def energy(self) -> float:
         """Kinetic plus potential energy [J] of the discrete system.
@@ -77,7 +77,9 @@ class WaveField:
         1/2 v' (M - dt^2/4 K) v + 1/2 h' K h, with dt the latest substep and K all elastic forces. It differs from the
         continuous energy by O(dt^2). Energy spent on dents is not included.
         """
-        height, velocity = self.height.astype(np.float64) - self.dent, self.velocity.astype(np.float64)
+        elastic = self._backend.elastic()
+        self._check_finite(elastic)
+        height, velocity = elastic.astype(np.float64), self.velocity.astype(np.float64)
         with np.errstate(invalid="ignore"):  # NaN says enough
             kinetic = float((self.operator.mass * velocity**2).sum()) / 2
             return kinetic + self._elastic_energy(height) - self._substep**2 / 4 * self._elastic_energy(velocity)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,6 +11,7 @@ from ripple_sim.solver.backends.backend import make_backend
 from ripple_sim.solver.errors import SolverError
 from ripple_sim.solver.operator.assembly import build_operator
 from ripple_sim.solver.operator.material import Material
+from ripple_sim.solver.operator.wave_operator import WaveOperator
 from ripple_sim.solver.texels.atlas import Atlas
 
 from .finite import as_field, require_finite
@@ -16,7 +19,9 @@ from .footprint import Footprint, footprint
 from .held_load import HeldLoad
 from .load import Load
 from .substeps import count_substeps
+from .volume_balance import VolumeBalance
 from .wave_field import WaveField
+from .wave_state import WaveState
 
 
 class WaveSolver(WaveField):
@@ -35,7 +40,10 @@ class WaveSolver(WaveField):
         "fem", or a baseline: "paper", "uncorrected", "dynamic-paint" (see `build_operator`).
     conserve_volume : bool
         Remove the mean of every source, so that a net push does not move the surface as a whole. On a closed surface
-        without stiffness nothing else would stop it.
+        without stiffness nothing else would stop it; there, the mean is the volume. On an open surface it is the mean
+        height. Each part of a mesh, and each region that rigid texels cut off, has a mean of its own. Where the density
+        varies, a uniform pressure keeps the volume while the waves run as well, unless something holds the surface: a
+        clamp, a fixed rim, or stiffness that varies.
 
     Raises
     ------
@@ -57,11 +65,60 @@ class WaveSolver(WaveField):
         if not (material is None or isinstance(material, Material)):
             raise SolverError(f"material is {material!r}; valid is a Material, for instance Material(speed=1.0)")
         self.material = material if material is not None else Material()
-        wave_operator = build_operator(atlas, self.material, operator)
-        super().__init__(atlas, wave_operator, make_backend(backend, wave_operator))
-        self.conserve_volume = conserve_volume
-        self._movable_mass = float(wave_operator.mass[wave_operator.movable].sum())
-        self._held = HeldLoad(self._backend, wave_operator.mass.shape)
+        self._begin(atlas, build_operator(atlas, self.material, operator), backend, conserve_volume)
+
+    def _begin(self, atlas: Atlas, operator: WaveOperator, backend: str, conserve_volume: bool) -> None:
+        """At rest, at time 0."""
+        super().__init__(atlas, operator, make_backend(backend, operator, keeps_volume=conserve_volume))
+        self._balance = VolumeBalance(operator)
+        self._held = HeldLoad(self._backend, operator.source_share)
+
+    def __getstate__(self) -> tuple[Any, ...]:
+        """What `copy` and `pickle` keep: a copy goes on as the original does, bit for bit."""
+        return self.atlas, self.material, self.operator, self.backend, self.conserve_volume, self.state
+
+    def __setstate__(self, kept: tuple[Any, ...]) -> None:
+        atlas, self.material, operator, backend, conserve_volume, state = kept
+        self._begin(atlas, operator, backend, conserve_volume)
+        self.state = state
+
+    @property
+    def state(self) -> WaveState:
+        """All that decides how the waves go on, but for atlas and material; assign it to another solver.
+
+        Assigning raises `SolverError` for a state of another resolution. Where the solver's own material clamps the
+        surface or carries no waves, it takes over dents alone, and comes to rest.
+        """
+        backend = self._backend
+        return WaveState(
+            backend.elastic(),
+            backend.dent(),
+            backend.velocity(),
+            self._held.load,
+            self.time,
+            self._substep,
+            self.substeps_taken,
+        )
+
+    @state.setter
+    def state(self, state: WaveState) -> None:
+        shape = self.operator.mass.shape
+        if state.elastic.shape != shape:
+            raise SolverError(f"the state of waves has shape {state.elastic.shape}; valid is {shape}")
+        self._backend.set_height(state.elastic * self.operator.free, state.dent)
+        self._backend.set_velocity(state.velocity * self.operator.movable)
+        self._held.load = state.held
+        self.time, self._substep, self.substeps_taken = state.time, state.substep, state.substeps_taken
+        self._reported = False
+
+    @property
+    def conserve_volume(self) -> bool:
+        """Whether sources are rid of their mean; may be changed while the waves run."""
+        return self._backend.keeps_volume
+
+    @conserve_volume.setter
+    def conserve_volume(self, value: bool) -> None:
+        self._backend.keeps_volume = value
 
     @property
     def pressure(self) -> NDArray[np.float64]:
@@ -73,7 +130,7 @@ class WaveSolver(WaveField):
 
     @pressure.setter
     def pressure(self, value: ArrayLike) -> None:
-        self._held.clear()
+        self._held.load = Load.none()
         self.add_pressure(value)
 
     @property
@@ -90,7 +147,7 @@ class WaveSolver(WaveField):
             Where [m], in the frame of the mesh; the nearest surface point is taken.
         impulse : float
             J [N s]. Positive presses inwards: the sum of sigma A dv over the texels is -J (before the mean is removed,
-            where volume is conserved). The part on clamped or rigid texels is lost to their support.
+            where volume is conserved). The part on clamped or rigid texels is lost to what supports them.
         radius : float
             Footprint radius [m], along the surface; at least two texels are used.
 
@@ -105,11 +162,11 @@ class WaveSolver(WaveField):
             If the impulse or the radius is not finite, the radius is negative, or there are several points.
         """
         where, impulses = self._spread("impulse", impulse, "N s", point, radius)
-        momentum = -impulses
+        momentum = -impulses * self.operator.source_share.reshape(-1)[where.texels]
         velocities = momentum / self.operator.mass.reshape(-1)[where.texels]
         # values too large for float32 become infinite here, and are reported by the next step
         with np.errstate(over="ignore"):
-            self._backend.kick(where.texels, velocities.astype(np.float32), self._counterpart(momentum.sum()))
+            self._backend.kick(where.texels, velocities.astype(np.float32), self._counterpart(where.texels, momentum))
         return where
 
     def add_force(self, point: ArrayLike, force: float, radius: float) -> Footprint:
@@ -137,20 +194,23 @@ class WaveSolver(WaveField):
         """Add a pressure field [Pa], a number or [C, n, n], positive inwards, that is held from now on."""
         shape = self.operator.mass.shape
         field = as_field(np.broadcast_to(pressure, shape), "pressure", shape)
-        force = (field * self.atlas.areas * self.operator.movable).reshape(-1)
+        force = (field * self.atlas.areas).reshape(-1)
         texels = np.flatnonzero(force)
         self._held.add(Load(texels, force[texels]))
 
     def add_height(self, height: ArrayLike) -> None:
         """Raise the surface by a field [m], [C, n, n]; where volume is conserved its mean over the area is removed."""
-        field = self._source(height, "height", self.atlas.areas)
-        dent = self._backend.dent()
-        self._backend.set_height(self._backend.height() - dent + field, dent)
+        field = as_field(height, "height", self.operator.mass.shape).astype(np.float64) * self.operator.free
+        if self.conserve_volume:
+            field = self._balance.balanced_height(field, self.atlas.areas)
+        self._backend.set_height(self._backend.elastic() + field.astype(np.float32), self._backend.dent())
 
     def add_velocity(self, velocity: ArrayLike) -> None:
-        """Add a field [m/s], [C, n, n], to the velocity; where volume is conserved its net momentum is removed."""
-        field = self._source(velocity, "velocity", self.operator.mass)
-        self._backend.set_velocity(self._backend.velocity() + field)
+        """Add a field [m/s], [C, n, n], to the velocity; where volume is conserved its volume rate is removed."""
+        field = as_field(velocity, "velocity", self.operator.mass.shape).astype(np.float64) * self.operator.movable
+        if self.conserve_volume:
+            field = self._balance.balanced_velocity(field)
+        self._backend.set_velocity(self._backend.velocity() + field.astype(np.float32))
 
     def step(self, dt: float, substeps: int | None = None, load: Load | None = None) -> None:
         """Advance by dt [s] in equal substeps, as many as stability asks for.
@@ -195,20 +255,11 @@ class WaveSolver(WaveField):
     def _spread(
         self, name: str, value: float, unit: str, point: ArrayLike, radius: float
     ) -> tuple[Footprint, NDArray[np.float64]]:
-        """Footprint of a point source, and the part of its value on each texel, [k]; 0 on texels that do not move."""
+        """Footprint of a point source, and the part of its value on each texel, [k]."""
         require_finite(name, value, unit)
         where = footprint(self.atlas, point, radius)
-        area, movable = self.atlas.areas.reshape(-1), self.operator.movable.reshape(-1)
-        return where, value * (where.weights * area[where.texels] * movable[where.texels])
+        return where, value * (where.weights * self.atlas.areas.reshape(-1)[where.texels])
 
-    def _counterpart(self, momentum: float) -> float:
-        """Velocity of all movable texels that balances the momentum of a source; acceleration, for a force."""
-        return -float(momentum) / self._movable_mass if self.conserve_volume and self._movable_mass else 0.0
-
-    def _source(self, value: ArrayLike, name: str, weight: NDArray[np.float64]) -> NDArray[np.float32]:
-        """A field that is added, without its weighted mean where volume is conserved."""
-        field = as_field(value, name, self.operator.mass.shape).astype(np.float64) * self.operator.free
-        movable = self.operator.movable
-        if self.conserve_volume and movable.any():
-            field -= movable * ((weight * field).sum() / weight[movable].sum())
-        return field.astype(np.float32)
+    def _counterpart(self, texels: NDArray[np.int64], momenta: NDArray[np.float64]) -> float | NDArray[np.float64]:
+        """What balances the momenta of a source on some texels, or the forces of a load, where volume is conserved."""
+        return self._balance.counterpart(texels, momenta) if self.conserve_volume else 0.0

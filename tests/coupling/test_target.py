@@ -1,6 +1,11 @@
 """A target whose material changes while its waves run."""
 
+import copy
+import pickle
+from collections.abc import Callable
+
 import mujoco
+import numpy as np
 import pytest
 from mujoco_models import BALL, model_of
 
@@ -25,3 +30,68 @@ def test_material_may_change_under_a_body_at_rest() -> None:
     assert momenta[1] == pytest.approx(momenta[0], rel=1e-4)
     with pytest.raises(RippleError, match="no coefficient 'sped'; valid are speed, damping"):
         ripples.change_material("target", sped=1.0)
+
+
+def ball_on_sphere(material: Material) -> tuple[mujoco.MjModel, mujoco.MjData, Ripples]:
+    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 0.6"))
+    ripples = Ripples(model, {"target": material}, resolution=16, backend="cpu", conserve_volume=False)
+    return model, mujoco.MjData(model), ripples
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda ripples: ripples.change_material("target", damping=1.0),
+        lambda ripples: ripples.change_material("target", yield_height=np.inf),
+        lambda ripples: ripples.hold("target", ripples["target"].atlas.positions[..., 2] < 0),
+        lambda ripples: ripples.make_rigid("target", [0, 0, 0.5], 0.2),
+        lambda ripples: ripples.change_operator("paper"),
+    ],
+    ids=["damping", "yield height", "hold", "make rigid", "operator"],
+)
+def test_a_dent_outlives_a_change_of_the_material(change: Callable[[Ripples], None]) -> None:
+    _, _, ripples = ball_on_sphere(Material.dent(yield_height=1e-3, stiffness=2000.0, damping=20.0))
+    ripples["target"].add_impulse([0, 0, 0.5], 0.3, 0.2)
+    ripples["target"].step(2.0)
+    dent = ripples["target"].dent
+    assert np.abs(dent).max() > 2e-3
+    change(ripples)
+    waves = ripples["target"]
+    assert (waves.dent == dent).all()
+    waves.step(1.0)
+    assert (waves.dent == dent).all()
+    assert np.abs(waves.height - dent).max() < 1e-4
+
+
+def test_texels_without_waves_do_not_drift_under_a_body_at_rest() -> None:
+    """They were given their velocity, and a share in the forces to come, before they became rigid."""
+    model, data, ripples = ball_on_sphere(Material(density=50.0, stiffness=50.0, damping=5.0))
+    for _ in range(1500):
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+    z = ripples["target"].atlas.positions[..., 2]
+    ripples.change_material("target", speed=np.where(z > 0.4, 0.0, 1.0), stiffness=0.0, damping=0.0)
+    before = ripples["target"].height
+    for _ in range(1000):
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+    rigid = ~ripples["target"].operator.movable
+    assert rigid[z > 0.4].all()
+    assert (ripples["target"].height == before)[rigid].all()
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda ripples: pickle.loads(pickle.dumps(ripples))])
+def test_copied_ripples_go_on_as_the_original(copied: Callable[[Ripples], Ripples]) -> None:
+    model = model_of('<geom name="target" type="box" size="0.5 0.5 0.5"/>' + BALL.format("0 0 0.6"))
+    data = mujoco.MjData(model)
+    ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=16, backend="cpu")
+    for _ in range(150):
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+    twin, twin_data = copied(ripples), copy.copy(data)
+    for each, state in ((ripples, data), (twin, twin_data)):
+        for _ in range(50):
+            mujoco.mj_step(model, state)
+            each.step(state)
+    assert np.abs(ripples["target"].height).max() > 0
+    assert (twin["target"].height == ripples["target"].height).all()

@@ -40,7 +40,7 @@ class DenseWaves:
                 (1 - half) / (1 + half) * self.v
                 + gain * (force + self.forces)
                 - span * operator.stiffness.ravel() * self.h
-                + span * operator.movable.ravel() * self.acceleration
+                + span * operator.response.ravel() * self.acceleration
             )
             self.h += (dt if step < substeps - 1 else dt / 2) * self.v
             self._flow()

@@ -8,7 +8,13 @@ layout(std430, binding = 4) readonly buffer Coefficients { dvec4 coefficients[];
 #ifdef EXTRA
 layout(std430, binding = 5) readonly buffer ExtraForce { dvec4 extra[]; };
 #endif
-uniform float dt, acceleration;
+#ifdef PARTS
+layout(std430, binding = 6) readonly buffer Parts { dvec4 parts[]; };
+layout(std430, binding = 7) readonly buffer Accelerations { float accelerations[]; };
+#else
+uniform float acceleration;
+#endif
+uniform float dt;
 #ifndef MAPS
 uniform float decay, spring, span;
 #endif
@@ -24,12 +30,18 @@ void emit(int eight, float here[8], float force[8]) {
     float decays[8] = unpack(coefficients[eight + FIELD]), springs[8] = unpack(coefficients[eight + 2 * FIELD]);
     float spans[8] = unpack(coefficients[eight + 3 * FIELD]);
 #endif
+#ifdef PARTS
+    float part[8] = unpack(parts[eight]);
+#endif
     for (int i = 0; i < 8; i++) {
 #ifdef EXTRA
         force[i] += more[i];
 #endif
 #ifdef MAPS
         float decay = decays[i], spring = springs[i], span = spans[i];
+#endif
+#ifdef PARTS
+        float acceleration = accelerations[int(part[i])];
 #endif
         velocity[i] = decay * velocity[i] + gain[i] * force[i] - spring * here[i] + span * acceleration;
         drifted[i] = here[i] + dt * velocity[i];

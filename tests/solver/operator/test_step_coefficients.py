@@ -88,3 +88,17 @@ def test_a_field_of_one_value_is_a_number_and_the_kick_is_in_float32() -> None:
     kick = step_coefficients(operator(damping=0.3, stiffness=2.0), 0.1)
     assert kick.gain.shape == SHAPE and kick.gain.dtype == np.float32
     assert all(type(each) is np.float32 for each in (kick.decay, kick.spring, kick.span))
+
+
+@pytest.mark.parametrize("half", [1.0, 1.5, 40.0])
+def test_strong_damping_lets_the_velocity_change_its_sign_no_more(half: float) -> None:
+    dt, zeta = 0.1, 20 * half
+    kick = step_coefficients(operator(damping=zeta), dt)
+    assert kick.decay == 0
+    # what a force sustains against the damping
+    assert kick.span == pytest.approx(1 / zeta, rel=1e-6)
+
+
+def test_weaker_damping_is_the_centred_scheme() -> None:
+    kick = step_coefficients(operator(damping=19.9), 0.1)
+    assert kick.decay == np.float32((1 - 0.995) / (1 + 0.995)) and kick.span == np.float32(0.1 / 1.995)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
+import pickle
 
 import numpy as np
 import pytest
@@ -75,3 +77,13 @@ def test_quality_of_a_limbed_atlas(animal: Atlas) -> None:
     assert quality["coverage"] == pytest.approx(1, abs=0.02)
     assert animal.areas.sum() == pytest.approx(quality["coverage"] * animal.mesh.area)
     assert 0 < quality["edge_min"] < quality["edge_max"]
+
+
+def test_an_atlas_that_has_located_points_can_be_copied_and_pickled() -> None:
+    mesh = Mesh.from_arrays(BALL.vertices, BALL.faces)
+    atlas = atlas_from_sphere_map(mesh, mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), 8)
+    expected = atlas.locate(DIAGONALS)
+    for twin in (copy.copy(atlas), copy.deepcopy(atlas), pickle.loads(pickle.dumps(atlas))):
+        np.testing.assert_array_equal(twin.locate(DIAGONALS), expected)
+        assert type(twin) is Atlas
+        np.testing.assert_array_equal(twin.positions, atlas.positions)
