@@ -12,7 +12,13 @@ from .mesh import Mesh
 # A surface that encloses less, relative to the cube of its size, has no inside.
 _FLAT = 1e-12
 # Parts beyond which a surface round all of them serves better than each by itself.
-MANY_PARTS = 100
+_MANY_PARTS = 100
+
+
+def many_parts(mesh: Mesh) -> str:
+    """Advice for a mesh of very many parts; none, "", for others."""
+    parts = mesh.component_count
+    return f"wrap (--wrap) would put one closed surface round its {parts:,} parts" if parts > _MANY_PARTS else ""
 
 
 def check_genus_zero(mesh: Mesh) -> None:
@@ -31,8 +37,8 @@ def check_genus_zero(mesh: Mesh) -> None:
     handles = int(mesh.genus.sum())
     if parts == 1 and handles:
         defects.append(f"of genus {handles} (valid is genus 0: no handles or tunnels)")
-    if parts > MANY_PARTS:
-        advice = "; wrap (--wrap) puts one closed surface round many parts"
+    if many_parts(mesh):
+        advice = f"; {many_parts(mesh)}"
     if defects:
         cuts = "".join(f"; {note}" for note in mesh.notes if note.startswith("cut "))
         raise MeshError(f"{mesh.name} is not a closed genus-0 surface: it is {', and '.join(defects)}{cuts}{advice}")

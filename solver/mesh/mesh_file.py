@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import warnings
 from pathlib import Path
@@ -12,6 +13,7 @@ import trimesh
 from ripple_sim.solver.errors import MeshError
 
 from .counting import counted
+from .genus_zero import many_parts
 from .mesh import Mesh
 from .ply_format import read_ply
 from .polygons import Soup
@@ -49,7 +51,11 @@ def load_mesh(path: str | Path, repair: bool = False, wrap: bool = False) -> Mes
     if len(soup.F) == 0:
         raise MeshError(f"mesh file {str(path)!r} holds no triangles{_points_only(soup)}")
     mesh = repaired(soup, path.name) if repair else Mesh.from_arrays(soup.V, soup.F, soup.corner_uv, path.name)
-    return wrapped(mesh).mesh if wrap else mesh
+    mesh = dataclasses.replace(mesh, notes=(*soup.notes, *mesh.notes))
+    if wrap:
+        return wrapped(mesh).mesh
+    advice = many_parts(mesh)
+    return dataclasses.replace(mesh, notes=(*mesh.notes, advice)) if advice else mesh
 
 
 def _points_only(soup: Soup) -> str:
@@ -95,9 +101,10 @@ def _parts(scene: trimesh.Scene) -> Soup:
         transform, name = scene.graph[node]
         part = scene.geometry[name]
         triangles = np.asarray(getattr(part, "faces", ()), dtype=np.int64)
-        if len(triangles) == 0:
-            continue
         vertices = np.asarray(part.vertices, dtype=np.float64)
+        if len(triangles) == 0:
+            V.append(vertices.reshape(-1, 3))  # points, or lines
+            continue
         if triangles.min() < 0 or triangles.max() >= len(vertices):
             raise MeshError(f"a triangle refers to vertex {triangles.max()}; valid is 0 to {len(vertices) - 1}")
         uv = np.asarray(getattr(part.visual, "uv", None), dtype=np.float64)

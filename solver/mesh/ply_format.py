@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver.errors import MeshError
 
 from .ply_rows import Element, read_binary, read_text
-from .polygons import Soup, triangulate
+from .polygons import Soup, too_small, triangulate
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -58,7 +58,7 @@ def read_ply(content: bytes) -> Soup:
     index = corners.astype(np.int64)
     triangles = triangulate(V[index], sizes)
     uv = _corner_uv(vertex, faces, index, sizes)
-    return Soup(V, index[triangles], None if uv is None else uv[triangles])
+    return Soup(V, index[triangles], None if uv is None else uv[triangles], too_small(sizes))
 
 
 def _corner_uv(

@@ -7,6 +7,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from .counting import counted
+
 
 @dataclasses.dataclass(frozen=True)
 class Soup:
@@ -18,11 +20,20 @@ class Soup:
     F : int64 [triangle_count, 3]
     corner_uv : float64 [triangle_count, 3, 2] or None
         Texture coordinates of the corners; 0 where the file has none for some of them.
+    notes : tuple of str
+        What was left out, one line each.
     """
 
     V: NDArray[np.float64]
     F: NDArray[np.int64]
     corner_uv: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
+
+
+def too_small(sizes: NDArray[np.int64]) -> tuple[str, ...]:
+    """Note on faces of fewer than three corners [face_count], if there are any."""
+    count = int((sizes < 3).sum())
+    return (f"{counted(count, 'face')} with fewer than three corners left out",) if count else ()
 
 
 def triangulate(points: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:

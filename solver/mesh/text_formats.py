@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.errors import MeshError
 
-from .polygons import Soup, triangulate
+from .polygons import Soup, too_small, triangulate
 
 _CORNER = re.compile(r"(-?\d{1,15})(?:/(-?\d{1,15})?(?:/(?:-?\d+)?)?)?", flags=re.ASCII)
 _WHOLE = re.compile(r"-?\d{1,15}", flags=re.ASCII)
@@ -61,13 +61,14 @@ def read_obj(content: bytes) -> Soup:
         raise MeshError(
             f"line {number} refers to vertex {vertex[np.argmax(wrong)] + 1}; valid is 1 to {len(V)}, the vertices given"
         )
-    triangles = triangulate(V[vertex], np.array(sizes, dtype=np.int64))
+    counts = np.array(sizes, dtype=np.int64)
+    triangles = triangulate(V[vertex], counts)
     uv = _numbers(pairs).reshape(-1, 2)
     given = (pair >= 0) & (pair < len(uv))
     corner_uv = None
     if given.any():
         corner_uv = np.where(given[:, None], uv[np.where(given, pair, 0)], 0.0)[triangles]
-    return Soup(V, vertex[triangles], corner_uv)
+    return Soup(V, vertex[triangles], corner_uv, too_small(counts))
 
 
 def read_off(content: bytes) -> Soup:
@@ -104,7 +105,7 @@ def read_off(content: bytes) -> Soup:
         polygons.append(corners)
     vertex = np.array(list(itertools.chain.from_iterable(polygons)), dtype=np.int64)
     sizes = np.array([len(corners) for corners in polygons], dtype=np.int64)
-    return Soup(V, vertex[triangulate(V[vertex], sizes)])
+    return Soup(V, vertex[triangulate(V[vertex], sizes)], None, too_small(sizes))
 
 
 def _decoded(content: bytes) -> str:

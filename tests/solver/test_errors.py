@@ -15,7 +15,7 @@ OPEN = np.eye(3), np.array([[0, 1, 2]])
 @pytest.mark.parametrize(
     ("call", "error", "value"),
     [
-        (lambda: build_atlas(Mesh.from_arrays(*OPEN)), MeshError, "boundary edges"),
+        (lambda: build_atlas(Mesh.from_arrays(*OPEN), layout="cube"), MeshError, "boundary edges"),
         (lambda: sphere_atlas(1.0, -3), AtlasError, "-3"),
         (lambda: load_mesh(Path("none.obj")), MeshError, "none.obj"),
         (lambda: WaveSolver(sphere_atlas(1.0, 8), Material(speed=-2.0), backend="cpu"), SolverError, "-2"),

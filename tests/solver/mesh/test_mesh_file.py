@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from all_kinds import crumbs
 from known_meshes import known_mesh
 from scipy.spatial import cKDTree
 from sound import assert_sound, assert_unchanged_when_read_again
@@ -58,6 +59,15 @@ def test_public_meshes_that_touch_themselves_in_one_vertex_fit_the_cube_once_cut
     assert_unchanged_when_read_again(mesh)
     assert mesh.notes[-1] == "cut apart at 1 vertex where the surface touched itself"
     check_genus_zero(mesh)
+
+
+def test_many_parts_are_advised_to_be_wrapped(tmp_path: Path) -> None:
+    V, F = crumbs(101)
+    trimesh.Trimesh(V, F, process=False).export(tmp_path / "crumbs.off")
+    assert (
+        load_mesh(tmp_path / "crumbs.off").notes[-1] == "wrap (--wrap) would put one closed surface round its 101 parts"
+    )
+    assert load_mesh(tmp_path / "crumbs.off", wrap=True).notes[-1].startswith("wrapped, ")
 
 
 def test_nodes_of_a_scene_are_put_where_their_transforms_say(tmp_path: Path) -> None:

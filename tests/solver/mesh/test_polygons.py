@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mesh_text import L_SHAPE, obj, off, prism, written
+from mesh_text import CORNERS, L_SHAPE, QUADS, obj, off, prism, written
 
 from ripple_sim.solver import load_mesh
 from ripple_sim.solver.mesh.polygons import triangulate
@@ -43,3 +43,10 @@ def test_triangulation_keeps_the_winding_of_turned_polygons() -> None:
     assert (normals @ rotation[:, 2] > 0).all()
     shoelace = np.cross(star, np.roll(star, -1, axis=0))[:, 2].sum()
     assert np.linalg.norm(normals, axis=1).sum() == pytest.approx(shoelace)
+
+
+@pytest.mark.parametrize("write", [obj, off])
+def test_faces_of_two_corners_are_left_out_and_counted(tmp_path: Path, write) -> None:
+    mesh = load_mesh(written(tmp_path, f"box.{write.__name__}", write(CORNERS, [*QUADS, (0, 1), (2, 3)])))
+    assert mesh.closed
+    assert mesh.notes == ("2 faces with fewer than three corners left out",)
