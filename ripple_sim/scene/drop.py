@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.colliders.collidable import make_collidable
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh, load_mesh
-from ripple_sim.solver.mesh.genus_zero import check_genus_zero
 
+from .body_shapes import BODY_SHAPES
 from .camera import CameraEntry
 from .drop_model import drop_model
 from .events import Events
@@ -38,7 +39,8 @@ def drop_scene(
 ) -> Scene:
     """Scene in which bodies of several shapes drop on a mesh.
 
-    The mesh is scaled to a longest extent of 1 m and stands on a floor; bodies collide with its true surface.
+    The mesh is scaled to a longest extent of 1 m and stands on a floor; bodies collide with its true surface, as a
+    signed distance if it is closed, as a sheet with two sides if it is open.
 
     Parameters
     ----------
@@ -59,7 +61,7 @@ def drop_scene(
     Raises
     ------
     MeshError
-        If the mesh cannot be read, or is not closed and of genus 0.
+        If the mesh cannot be read.
     SceneError
         For any other invalid argument, or if MuJoCo refuses the mesh.
     """
@@ -69,9 +71,12 @@ def drop_scene(
     if up not in UP_AXES:
         raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
     mesh = load_mesh(mesh_path, **reading)
-    check_genus_zero(mesh)
     V = _standing(mesh, up)
-    spec, drops = drop_model(V, mesh.F, bodies, np.random.default_rng(seed))
+    # MuJoCo may throw boxes aside from a sheet
+    shapes = [shape for shape in BODY_SHAPES if mesh.closed or shape != "box"]
+    spec, drops = drop_model(V, mesh.F, [shapes[i % len(shapes)] for i in range(bodies)], np.random.default_rng(seed))
+    if not mesh.closed:
+        make_collidable(spec, "target", "flex")
     paint_target(spec, mesh, mesh_path, texture)
     if edit is not None:
         edit(spec)

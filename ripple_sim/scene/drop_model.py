@@ -18,7 +18,7 @@ _HUES = (0.01, 0.48, 0.60, 0.08, 0.82, 0.36)
 
 
 def drop_model(
-    V: NDArray[np.float64], F: NDArray[np.int64], bodies: int, rng: np.random.Generator
+    V: NDArray[np.float64], F: NDArray[np.int64], shapes: list[str], rng: np.random.Generator
 ) -> tuple[mujoco.MjSpec, list[DropEntry]]:
     """Model of a mesh on a floor, with bodies, and when and where these drop.
 
@@ -27,7 +27,8 @@ def drop_model(
     V : float64 [n, 3]
         Vertices of the target [m], standing on z = 0.
     F : int64 [m, 3]
-    bodies : int
+    shapes : list of str
+        Of the bodies; see `BODY_SHAPES`.
     rng : numpy.random.Generator
         Of the bodies' sizes, places and colours.
     """
@@ -49,16 +50,16 @@ def drop_model(
         condim=6,
         friction=[0.8, 0.01, 0.02],
     )
-    landing = _landing_points(V, F, bodies, rng)
-    times = 0.1 + 3.4 * np.arange(bodies) / max(bodies, 1)
-    return spec, [_add_body(spec, i, float(times[i]), landing[i], rng) for i in range(bodies)]
+    landing = _landing_points(V, F, len(shapes), rng)
+    times = 0.1 + 3.4 * np.arange(len(shapes)) / max(len(shapes), 1)
+    return spec, [_add_body(spec, i, shape, float(times[i]), landing[i], rng) for i, shape in enumerate(shapes)]
 
 
 def _add_body(
-    spec: mujoco.MjSpec, number: int, time: float, landing: NDArray[np.float64], rng: np.random.Generator
+    spec: mujoco.MjSpec, number: int, shape: str, time: float, landing: NDArray[np.float64], rng: np.random.Generator
 ) -> DropEntry:
-    """Add a body that drops at a time [s] on a landing point [m]."""
-    kind, proportions = list(BODY_SHAPES.values())[number % len(BODY_SHAPES)]
+    """Add a body of a shape that drops at a time [s] on a landing point [m]."""
+    kind, proportions = BODY_SHAPES[shape]
     radius = rng.uniform(0.05, 0.085)
     name = f"body_{number}"
     # parked high above until it drops, out of sight and out of reach of the others

@@ -18,7 +18,8 @@ def table() -> tuple[np.ndarray, np.ndarray]:
 
 
 def compiled(bodies: int, seed: int) -> tuple[mujoco.MjModel, list[DropEntry]]:
-    spec, drops = drop_model(*table(), bodies, np.random.default_rng(seed))
+    shapes = [list(BODY_SHAPES)[i % len(BODY_SHAPES)] for i in range(bodies)]
+    spec, drops = drop_model(*table(), shapes, np.random.default_rng(seed))
     return spec.compile(), drops
 
 

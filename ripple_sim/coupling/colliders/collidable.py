@@ -8,17 +8,18 @@ from ripple_sim.errors import SceneError
 
 from .convex_collider import add_convex_collider, remove_convex_collider
 from .flex_collider import add_flex_collider, remove_flex_collider
+from .mesh_in_spec import is_closed
 from .tunnelling import SPECULATIVE
 
 _GEOM = mujoco.mjtGeom
-ROUTES = ("sdf", "flex", "convex", "hull")
+ROUTES = ("auto", "sdf", "flex", "convex", "hull")
 
 # Starting points of MuJoCo's search for contacts with a signed distance. Fewer miss contacts; its default of 40 takes
 # five times as long.
 SDF_INITPOINTS = 10
 
 
-def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "sdf") -> mujoco.MjsGeom:
+def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujoco.MjsGeom:
     """Let a mesh geom collide as its true surface.
 
     Primitive geoms do so by themselves and are left as they are. For them and for hulls MuJoCo's speculative contacts
@@ -32,10 +33,12 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "sdf") -> mujoc
         Name of a geom, or "body/index" of an unnamed one, which gets that name. One that collides with nothing gets a
         contype and a conaffinity of 1; other geoms of its body go on colliding.
     route : str
+        "auto": "sdf" for a closed mesh, "flex" for an open one.
         "sdf": as a signed distance, which MuJoCo computes when it compiles the model. For moving targets too, and right
         for geoms of all shapes. Only planes meet the mesh's convex hull, and height fields nothing at all.
         "flex": through a rigid flex of its triangles, with the geom's name and on its body; the geom itself keeps its
-        looks and mass. Planes and height fields meet it too. A step takes half to a sixth of the time of a signed
+        looks and mass. Planes and height fields meet it too, and an open mesh is met from both
+        sides. A step takes half to a sixth of the time of a signed
         distance with up to ten thousand triangles, and as long with forty thousand. Right for spheres, capsules and
         ellipsoids, and for cylinders and meshes that sink in by less than 0.7 of the flex's thickness (2 to 5 % of the
         mesh's size). Boxes may be thrown aside, and SDF geoms sink in; a warning names both. See `add_flex_collider`.
@@ -69,8 +72,11 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "sdf") -> mujoc
         found.contype = found.conaffinity = 1
     if not found.meshname:
         return found
-    found.type = _GEOM.mjGEOM_SDF if route == "sdf" else _GEOM.mjGEOM_MESH
+    found.type = _GEOM.mjGEOM_MESH
+    if route == "auto":
+        route = "sdf" if is_closed(spec, found) else "flex"
     if route == "sdf":
+        found.type = _GEOM.mjGEOM_SDF
         spec.option.sdf_initpoints = min(spec.option.sdf_initpoints, SDF_INITPOINTS)
     elif route == "flex":
         add_flex_collider(spec, found)

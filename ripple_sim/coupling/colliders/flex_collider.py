@@ -19,6 +19,8 @@ from .mesh_in_spec import LISTS, SETTINGS, mesh_on_body
 GAP_TOLERANCE = 0.02
 # Thicknesses over the mesh's size: the first within the tolerance is taken, or else the last.
 _THICKNESSES = (0.05, 0.04, 0.03, 0.02)
+# Thickness of a sheet over its size, on either side.
+_SHEET = 0.01
 # Vertices at sharp corners move by this many thicknesses at most; those of a cube need 1.73.
 _SHARPEST = 2.0
 # Weight of the isotropic term over that of the triangles' planes: it settles the directions that they leave open.
@@ -36,6 +38,9 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     thickness holds other geoms off: they meet the true surface. Sharp edges become rounded and thin parts thicker; the
     flex is as thick as possible (2 to 5 % of the mesh's size) without putting either off by more than 2 %.
 
+    An open mesh is a sheet that can be hit from both sides: the triangles are its own, and the margin, 1 % of its size,
+    holds geoms off either side.
+
     Parameters
     ----------
     spec : mujoco.MjSpec
@@ -47,7 +52,7 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     SceneError
         If the specification does not compile as it is, or discards geoms that do not collide.
     MeshError
-        If the mesh is not a closed genus-0 surface.
+        If the mesh has no triangle with an area.
     """
     body = geom.parent
     body.name = body.name or f"body of {geom.name}"
@@ -80,6 +85,8 @@ def remove_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
 def _core(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
     """Vertices of the flex inside a mesh [m], [n, 3], and the margin that reaches from them to its surface [m]."""
     size = float(np.ptp(mesh.V, axis=0).max())
+    if not mesh.closed:
+        return mesh.V, _SHEET * size
     points = np.concatenate([mesh.V, mesh.V[mesh.F].mean(axis=1)])
     for share in _THICKNESSES:
         thickness = share * size

@@ -29,14 +29,24 @@ def mesh_on_body(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Mesh:
             f"geom {geom.name!r} cannot have others collide for it: with discardvisual the compiler would discard it; "
             "set spec.compiler.discardvisual = False"
         )
+    model = _compiled(spec, geom)
+    index = model.geom(geom.name).id
+    mesh, rotation = target_mesh(model, index), np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, model.geom_quat[index])
+    return dataclasses.replace(mesh, V=model.geom_pos[index] + mesh.V @ rotation.reshape(3, 3).T)
+
+
+def is_closed(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
+    """Whether a geom's mesh has no rim; raises SceneError if the specification does not compile."""
+    model = _compiled(spec, geom)
+    return target_mesh(model, model.geom(geom.name).id).closed
+
+
+def _compiled(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjModel:
     try:
-        model = spec.copy().compile()
+        return spec.copy().compile()
     except ValueError as error:
         raise SceneError(
             f"the colliders of geom {geom.name!r} are made from its compiled mesh, but the specification does not "
             f"compile: {error}"
         ) from error
-    index = model.geom(geom.name).id
-    mesh, rotation = target_mesh(model, index), np.zeros(9)
-    mujoco.mju_quat2Mat(rotation, model.geom_quat[index])
-    return dataclasses.replace(mesh, V=model.geom_pos[index] + mesh.V @ rotation.reshape(3, 3).T)

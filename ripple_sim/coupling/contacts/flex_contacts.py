@@ -41,11 +41,13 @@ class FlexContacts:
     def __init__(self, coupled: CoupledModel, meshes: Mapping[int, Mesh]) -> None:
         self._model, model, flexes = coupled.model, coupled.model, coupled.flex_colliders
         self.targets = sorted(flexes.keys() & meshes.keys())
-        self._normals = FlexNormals(np.full(len(coupled.owners), -1), np.zeros((model.nflexelem, 3)))
+        count = len(coupled.owners)
+        self._normals = FlexNormals(np.full(count, -1), np.zeros((model.nflexelem, 3)), np.zeros(count, np.bool_))
         for geom in self.targets:
             first = self._normals.first[geom] = model.flex_elemadr[flexes[geom]]
             normals = _outward_normals(model, geom, flexes[geom], meshes[geom])
             self._normals.normals[first : first + len(normals)] = normals
+            self._normals.sheet[geom] = not meshes[geom].closed
 
     def contacts(
         self, data: mujoco.MjData, colliders: NDArray[np.int64], extents: NDArray[np.float64]
@@ -82,5 +84,5 @@ def _outward_normals(model: mujoco.MjModel, geom: int, flex: int, mesh: Mesh) ->
     corners = V[F]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # they point outwards where the volume that they enclose is positive
-    outward = np.sign(np.einsum("ij,ij->", normals, corners[:, 0]))
+    outward = np.sign(np.einsum("ij,ij->", normals, corners[:, 0])) if mesh.closed else 1.0
     return outward * normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Ints, Ints32, kernel
+from ripple_sim.solver.kernel import Bools, Floats, Ints, Ints32, kernel
 
 from .target_contacts import PairContacts, group_by_pair, room_for, trimmed
 
@@ -24,10 +24,13 @@ class FlexNormals(NamedTuple):
         Row of the first triangle of a target among the normals; -1 for all other colliders.
     normals : float64 [nflexelem, 3]
         In the frames of the geoms.
+    sheet : bool [c]
+        Targets that are open: they can be touched from the inner side too.
     """
 
     first: Ints
     normals: Floats
+    sheet: Bools
 
 
 class MujocoFlexContacts(NamedTuple):
@@ -79,6 +82,8 @@ def summed_contacts(
                 normal = rotation @ flex.normals[flex.first[target] + contacts.elem[i, side]]
             whole += sign * forces[i]
             force, along = (forces[i] * contacts.frame[i, :3]).sum(), (outward * normal).sum()
+            if flex.sheet[target] and along < 0:
+                normal, along = -normal, -along
             if force <= 0 or along <= _SIDEWAYS:
                 continue
             mean += force * outward
