@@ -100,7 +100,7 @@ def test_fast_bodies_are_stopped_by_speculative_contacts_where_there_are_any(mon
     ("geom", "route", "message"),
     [
         ("nose", "sdf", "geoms are 'target', 'knob'"),
-        ("target", "ghost", "valid are 'sdf', 'flex', 'convex', 'hull'"),
+        ("target", "ghost", "valid are 'auto', 'sdf', 'flex', 'convex', 'hull'"),
     ],
 )
 def test_unknown_names_are_refused(geom: str, route: str, message: str) -> None:
