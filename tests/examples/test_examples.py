@@ -27,6 +27,7 @@ def run(name: str, monkeypatch, folder: Path, *arguments: str) -> None:
     [
         ("own_loop", []),
         ("several_targets", []),
+        ("robot_arm", []),
         ("painted_speed", []),
         ("own_deformation", []),
         ("gymnasium_ant", []),
