@@ -35,7 +35,7 @@ def humanoid_and_balls() -> str:
     for place in BALLS:
         ball = spec.worldbody.add_body(pos=place)
         ball.add_freejoint()
-        ball.add_geom(size=(0.025, 0, 0), mass=0.1, rgba=(0.8, 0.3, 0.2, 1), solref=(0.003, 0.6))
+        ball.add_geom(size=(0.028, 0, 0), mass=0.08, rgba=(0.8, 0.3, 0.2, 1), solref=(0.003, 0.6))
     return spec.to_xml()
 
 
@@ -53,8 +53,11 @@ def main() -> None:
             height=400,
             default_camera_config=CAMERA,
         )
-    material = Material(speed=0.35, damping=1.0, stiffness=100.0, viscosity=1e-4, density=800.0)
+    material = Material(speed=0.35, damping=1.0, stiffness=100.0, viscosity=1e-4, density=700.0)
     env = RippleWrapper(humanoid, dict.fromkeys(TORSO, material), resolution=96)
+
+    for name in TORSO:
+        env.ripples.allow_any_height(name)  # the dents under the balls are meant to be deep
 
     env.reset(seed=0)
     world = humanoid.unwrapped
