@@ -10,6 +10,9 @@ from .counting import counted
 from .sides import join_sides
 from .winding import labels
 
+# Where a vertex is put into an edge, counted from the lower one: not in the middle, where another may lie already.
+_BETWEEN = 0.382
+
 
 def cut_apart(
     V: NDArray[np.float64], corners: Corners, first_given: NDArray[np.int64]
@@ -72,7 +75,7 @@ def _ends(F: NDArray[np.int64], sides: NDArray[np.int64]) -> NDArray[np.int64]:
 def _without_double_edges(
     V: NDArray[np.float64], corners: Corners, pairs: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], Corners]:
-    """Where two edges have both vertices in common, all but the first get a vertex in the middle."""
+    """Where two edges have both vertices in common, all but the first get a vertex of their own in between."""
     F = corners.F
     mate = np.arange(F.size)
     mate[pairs[:, 0]], mate[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
@@ -89,6 +92,7 @@ def _without_double_edges(
     leaders, number = np.unique(leader[again], return_inverse=True)
     point, given = np.full((2, *F.shape), -1)
     point.flat[again] = len(V) + number
-    middle = V[a[leaders]] / 2 + V[b[leaders]] / 2
-    split = corners.split(point, given, np.full(F.shape, 0.5))
-    return np.vstack([V, middle]), split
+    low, high = np.minimum(a, b)[leaders], np.maximum(a, b)[leaders]
+    between = (1 - _BETWEEN) * V[low] + _BETWEEN * V[high]
+    share = np.where(a < b, _BETWEEN, 1 - _BETWEEN).reshape(F.shape)
+    return np.vstack([V, between]), corners.split(point, given, share)
