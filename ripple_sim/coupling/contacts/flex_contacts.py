@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 
 import mujoco
@@ -9,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.model.coupled_model import CoupledModel
+from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Mesh
 
 from .flex_forces import FlexNormals, MujocoFlexContacts, summed_contacts
 from .geom_contacts import PYRAMIDAL
 from .target_contacts import TargetContacts
 
+# Share of the forces on a target that may be pushes sideways; old ones count less with each step.
+_UNEXPLAINED, _MEMORY = 0.01, 0.99
 _TINY = np.finfo(np.float64).tiny
 
 
@@ -42,6 +46,7 @@ class FlexContacts:
         self._model, model, flexes = coupled.model, coupled.model, coupled.flex_colliders
         self.targets = sorted(flexes.keys() & meshes.keys())
         count = len(coupled.owners)
+        self._names, self._warned, self._amounts = coupled.names, set[int](), np.zeros((count, 2))
         self._normals = FlexNormals(np.full(count, -1), np.zeros((model.nflexelem, 3)), np.zeros(count, np.bool_))
         for geom in self.targets:
             first = self._normals.first[geom] = model.flex_elemadr[flexes[geom]]
@@ -65,11 +70,32 @@ class FlexContacts:
             each.pos,
             each.dist,
             each.includemargin,
+            each.adhesion,
             data.efc_force,
             data.geom_xmat,
         )
         pyramidal = self._model.opt.cone == PYRAMIDAL
-        return summed_contacts(colliders, contacts, self._normals, extents, pyramidal).by_target()
+        found, amounts = summed_contacts(colliders, contacts, self._normals, extents, pyramidal)
+        self._judge(amounts)
+        return found.by_target()
+
+    def _judge(self, amounts: NDArray[np.float64]) -> None:
+        """Warn, once for each, of targets whose forces are not those of a contact; see `summed_contacts`."""
+        self._amounts = _MEMORY * self._amounts + amounts
+        whole, unexplained = self._amounts[self.targets].T
+        for i in np.flatnonzero(unexplained > _UNEXPLAINED * whole).tolist():
+            target = self.targets[i]
+            if target in self._warned:
+                continue
+            self._warned.add(target)
+            name, share = self._names[target], unexplained[i] / whole[i]
+            warnings.warn(
+                f"the impulses on geom {name!r} are wrong by about {share:.1%}: MuJoCo pushes sideways what touches "
+                "its flex, where a geom has sunk in or edges and corners meet; use a shorter time step, no override of "
+                f'contact margins, or make_collidable(spec, {name!r}, "sdf")',
+                RippleWarning,
+                stacklevel=7,
+            )
 
 
 def _outward_normals(model: mujoco.MjModel, geom: int, flex: int, mesh: Mesh) -> NDArray[np.float64]:

@@ -44,6 +44,7 @@ class MujocoFlexContacts(NamedTuple):
     pos: Floats
     dist: Floats
     includemargin: Floats
+    adhesion: Floats
     efc_force: Floats
     geom_xmat: Floats
 
@@ -51,8 +52,11 @@ class MujocoFlexContacts(NamedTuple):
 @kernel
 def summed_contacts(
     colliders: Ints, contacts: MujocoFlexContacts, flex: FlexNormals, extents: Floats, pyramidal: bool
-) -> PairContacts:
+) -> tuple[PairContacts, Floats]:
     """Contacts that share the sum of the whole forces of their pair; pairs whose sum does not push are left out.
+
+    Beside them, for each target, the amount of these sums [N], and the part of it that neither a normal force nor
+    friction explains [N]: float64 [c, 2], by collider id.
 
     Parameters
     ----------
@@ -66,10 +70,10 @@ def summed_contacts(
         Whether MuJoCo's friction cones are.
     """
     pairs, forces = group_by_pair(colliders, contacts.efc_address, flex.first >= 0), _whole_forces(contacts, pyramidal)
-    found, found_pairs, row = room_for(pairs), 0, 0
+    found, found_pairs, row, amounts = room_for(pairs), 0, 0, np.zeros((len(flex.first), 2))
     for pair in range(len(pairs.targets)):
         target, other = pairs.targets[pair], pairs.others[pair]
-        first, sum_of_weights = row, 0.0
+        first, sum_of_weights, friction = row, 0.0, 0.0
         whole, mean = np.zeros(3), np.zeros(3)
         for k in range(pairs.begins[pair], pairs.begins[pair + 1]):
             i, side = pairs.contacts[k], pairs.sides[k]
@@ -81,6 +85,8 @@ def summed_contacts(
                 rotation = contacts.geom_xmat[target].copy().reshape(3, 3)
                 normal = rotation @ flex.normals[flex.first[target] + contacts.elem[i, side]]
             whole += sign * forces[i]
+            if contacts.dim[i] > 1:
+                friction = max(friction, contacts.friction[i, 0], contacts.friction[i, 1])
             force, along = (forces[i] * contacts.frame[i, :3]).sum(), (outward * normal).sum()
             if flex.sheet[target] and along < 0:
                 normal, along = -normal, -along
@@ -95,14 +101,18 @@ def summed_contacts(
             met = contacts.pos[i] - sign * contacts.dist[i] / 2 * contacts.frame[i, :3]
             found.points[row], found.normals[row], found.forces[row] = met + outside * normal, normal, weight
             row += 1
-        length = np.sqrt((mean**2).sum())
-        if row == first or -(whole * mean).sum() <= 0:
+        length, amount = np.sqrt((mean**2).sum()), np.sqrt((whole**2).sum())
+        force = -(whole * mean).sum() / length if row > first else 0.0
+        across = min(np.sqrt(max(amount**2 - force**2, 0.0)), friction * force)
+        amounts[target, 0] += amount
+        amounts[target, 1] += amount - np.hypot(force, across) if force > 0 else amount
+        if force <= 0:
             row = first
             continue
-        found.forces[first:row] *= -(whole * mean).sum() / length / sum_of_weights
+        found.forces[first:row] *= force / sum_of_weights
         found.targets[found_pairs], found.others[found_pairs], found.begins[found_pairs] = target, other, first
         found_pairs += 1
-    return trimmed(found, found_pairs, row)
+    return trimmed(found, found_pairs, row), amounts
 
 
 @kernel
@@ -125,6 +135,7 @@ def _whole_forces(contacts: MujocoFlexContacts, pyramidal: bool) -> Floats:
         else:
             for k in range(min(dim[i], 3)):
                 along[k] = efc_force[address[i] + k]
+        along[0] -= contacts.adhesion[i]
         for k in range(3):
             for j in range(3):
                 forces[i, j] += along[k] * frame[i, 3 * k + j]

@@ -1,11 +1,14 @@
 """Contacts with flex colliders: the right place, the right amount, under the right name."""
 
+import warnings
+
 import mujoco
 import numpy as np
 import pytest
 from mujoco_models import add_ball, mesh_spec
 
 from ripple_sim import Material, Ripples, make_collidable
+from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import limbed, peanut
 
 GEOM = mujoco.mjtGeom
@@ -155,3 +158,35 @@ def test_flex_written_by_hand_is_known_by_its_name() -> None:
     lost = 0.2 * np.linalg.norm(data.body("ball").cvel[3:] + np.array([0, 0, 9.81]) * data.time)
     assert sum(impulse.impulse for impulse in impulses) == pytest.approx(lost, rel=0.03)
     assert -ripples["target"].momentum() == pytest.approx(lost, rel=0.05)
+
+
+def cylinder_on_flex(speed: float) -> tuple[list[str], float, float]:
+    """Warnings of pushes sideways, impulses, and the momentum that a cylinder lost."""
+    spec = mesh_spec(limbed(0.04), condim=1)
+    spec.option.gravity, spec.option.timestep = [0, 0, 0], 0.002
+    add_ball(spec, "body", [0.1, -0.2, 1.4], condim=1, type=GEOM.mjGEOM_CYLINDER, size=[0.05, 0.03, 0])
+    model = spec.compile()
+    data, given, lost = mujoco.MjData(model), 0.0, 0.0
+    mujoco.mj_forward(model, data)
+    data.qpos[:3], data.qvel[:3] = data.geom("target").xpos, [0, 0, -speed]
+    data.qpos[2] += 0.8
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RippleWarning)
+        ripples = Ripples(model, {"target": Material(density=50)}, resolution=12, backend="cpu")
+        while data.time < 1.5 / speed:
+            before = data.qvel[:3].copy()
+            mujoco.mj_step(model, data)
+            ripples.step(data)
+            given += sum(impulse.impulse for impulse in ripples.last_impulses)
+            lost += 0.2 * np.linalg.norm(data.qvel[:3] - before)
+    return [str(each.message) for each in caught if "sideways" in str(each.message)], given, lost
+
+
+def test_what_sinks_into_a_flex_and_is_pushed_sideways_is_warned_of() -> None:
+    messages, given, lost = cylinder_on_flex(4.0)
+    assert given == pytest.approx(lost, rel=1e-3)
+    assert not messages
+    messages, given, lost = cylinder_on_flex(30.0)
+    assert abs(given - lost) > 0.05 * lost
+    assert len(messages) == 1
+    assert "the impulses on geom 'target' are wrong by about" in messages[0]

@@ -44,6 +44,7 @@ def contacts_of(
         pos=np.arange(3.0 * k).reshape(k, 3),
         dist=np.full(k, -0.002),
         includemargin=np.zeros(k),
+        adhesion=np.zeros(k),
         efc_force=np.einsum("kij,kj->ki", frames.reshape(k, 3, 3), forces).ravel(),
         geom_xmat=np.tile(np.eye(3).ravel(), (2, 1)),
     )
@@ -51,7 +52,7 @@ def contacts_of(
 
 def summed(geoms: np.ndarray, contacts: MujocoFlexContacts, normals: np.ndarray | None = None) -> PairContacts:
     flex = FlexNormals(np.array([0, -1]), np.zeros((1, 3)) if normals is None else normals)
-    return summed_contacts(geoms, contacts, flex, EXTENTS, False)
+    return summed_contacts(geoms, contacts, flex, EXTENTS, False)[0]
 
 
 def test_friction_of_contacts_that_push_sideways_counts_along_the_normal() -> None:
@@ -165,3 +166,24 @@ def test_the_load_is_the_force_with_which_mujoco_moves_the_body(cone: str, condi
         else:
             assert not found
     assert steps > 20
+
+
+@pytest.mark.parametrize(
+    ("contacts", "unexplained"),
+    [
+        # a normal force, and friction of up to its own amount beside it
+        ([(UP, (0, 0, 4))], 0.0),
+        ([(UP, (3, 0, 4))], 0.0),
+        # two slanted pushes that balance: their sum is the whole
+        ([((0.6, 0, 0.8), (3, 0, 4)), ((-0.6, 0, 0.8), (-3, 0, 4))], 0.0),
+        # 4 N up, with friction of 4 N at most, where 12 N push sideways
+        ([(UP, (0, 0, 4)), (ASIDE, (12, 0, 0))], np.hypot(12, 4) - np.hypot(4, 4)),
+        # nothing pushes along the surface's normal
+        ([(ASIDE, (5, 0, 0))], 5.0),
+    ],
+)
+def test_pushes_sideways_beyond_friction_are_told(contacts: list, unexplained: float) -> None:
+    flex = FlexNormals(np.array([0, -1]), np.array([UP]))
+    _, amounts = summed_contacts(*contacts_of(*contacts, elem=0), flex, EXTENTS, False)
+    whole = np.linalg.norm(sum(np.array(force, dtype=float) for _, force in contacts))
+    np.testing.assert_allclose(amounts, [[whole, unexplained], [0, 0]], atol=1e-12)
