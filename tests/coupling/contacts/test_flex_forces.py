@@ -51,7 +51,7 @@ def contacts_of(
 
 
 def summed(geoms: np.ndarray, contacts: MujocoFlexContacts, normals: np.ndarray | None = None) -> PairContacts:
-    flex = FlexNormals(np.array([0, -1]), np.zeros((1, 3)) if normals is None else normals)
+    flex = FlexNormals(np.array([0, -1]), np.zeros((1, 3)) if normals is None else normals, np.zeros(2, bool))
     return summed_contacts(geoms, contacts, flex, EXTENTS, False)[0]
 
 
@@ -183,7 +183,7 @@ def test_the_load_is_the_force_with_which_mujoco_moves_the_body(cone: str, condi
     ],
 )
 def test_pushes_sideways_beyond_friction_are_told(contacts: list, unexplained: float) -> None:
-    flex = FlexNormals(np.array([0, -1]), np.array([UP]))
+    flex = FlexNormals(np.array([0, -1]), np.array([UP]), np.zeros(2, bool))
     _, amounts = summed_contacts(*contacts_of(*contacts, elem=0), flex, EXTENTS, False)
     whole = np.linalg.norm(sum(np.array(force, dtype=float) for _, force in contacts))
     np.testing.assert_allclose(amounts, [[whole, unexplained], [0, 0]], atol=1e-12)
