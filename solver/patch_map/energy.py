@@ -15,13 +15,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, kernel
+from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.sphere_map.vectors import cross, dot, row, subtract
 
 from .seamless import SeamlessMap, corner_place
-from .surface import Surface
 
 FOLDED = 1e-15  # the area of a triangle on the charts must exceed this
-_FLATTEST = 0.02  # sine of the least angle that the energy believes in
+_FLATTEST = 0.02  # least double area over squared length that the energy believes in
+_LEAST_AREA = 1e-6  # of a triangle, in units of their mean
+_MOST_LOAD = 20.0  # area that a vertex stands for over that of its triangles
 
 
 class Reference(NamedTuple):
@@ -51,21 +53,38 @@ def density_derivatives(
     return w, slope_d, slope_j, bend_d, mixed, 2.0 * p * (2.0 * p + 1.0) * inverse / (jacobian * jacobian)
 
 
-def reference_of(surface: Surface, charts: int, power: int) -> Reference:
-    """The surface's own triangles, scaled to `charts` in all."""
-    total = surface.areas.sum()
-    scale = charts / total
-    cotangent = np.empty((len(surface.F), 3))
-    least = np.finfo(np.float64).tiny
-    longest = np.zeros(len(surface.F))
-    for k in range(3):
-        a, b = (surface.V[surface.F[:, (k + j) % 3]] for j in (0, 1))
-        longest = np.maximum(longest, ((b - a) ** 2).sum(axis=1))
-    doubled = np.maximum(2 * surface.areas, _FLATTEST * longest + least)
-    for k in range(3):
-        a, b, c = (surface.V[surface.F[:, (k + j) % 3]] for j in range(3))
-        cotangent[:, k] = np.einsum("ij,ij->i", b - a, c - a) / doubled
-    return Reference(scale * np.maximum(surface.areas, 1e-9 * total / len(surface.F)), cotangent, power)
+def reference_of(V: Floats, F: Ints, carried: Floats, charts: int, power: int) -> Reference:
+    """The shapes of the triangles F [m, 3], with the areas that their vertices stand for [n], `charts` in all."""
+    count = len(carried)
+    tiny = np.finfo(np.float64).tiny
+    areas, cotangent = _shapes(V, F, tiny)
+    lumped = np.bincount(F.ravel(), np.repeat(areas / 3, 3), count)
+    load = np.clip(carried / np.maximum(lumped, tiny), 1.0 / _MOST_LOAD, _MOST_LOAD)
+    areas = areas * load[F].mean(axis=1)
+    areas = np.maximum(areas, _LEAST_AREA * areas.mean())
+    return Reference(areas * (charts / areas.sum()), cotangent, power)
+
+
+@kernel
+def _shapes(V: Floats, F: Ints, tiny: float) -> tuple[Floats, Floats]:
+    """Areas [m] and cotangents [m, 3] of triangles."""
+    areas, cotangent = np.empty(len(F)), np.empty((len(F), 3))
+    for f in range(len(F)):
+        a, b, c = row(V, F[f, 0]), row(V, F[f, 1]), row(V, F[f, 2])
+        ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
+        normal = cross(ab, ac)
+        double = np.sqrt(dot(normal, normal))
+        squares = (dot(bc, bc), dot(ac, ac), dot(ab, ab))
+        dots = (dot(ab, ac), -dot(ab, bc), dot(ac, bc))
+        top = 0 if squares[0] >= max(squares[1], squares[2]) else (1 if squares[1] >= squares[2] else 2)
+        left, right = (top + 1) % 3, (top + 2) % 3
+        areas[f] = max(double / 2, tiny)
+        # needles count as a little thicker: the corner opposite to their longest side stands higher
+        double = max(double, _FLATTEST * squares[top], tiny)
+        cotangent[f, left], cotangent[f, right] = dots[left] / double, dots[right] / double
+        total = max(cotangent[f, left] + cotangent[f, right], tiny)
+        cotangent[f, top] = (1.0 - cotangent[f, left] * cotangent[f, right]) / total
+    return areas, cotangent
 
 
 @kernel

@@ -11,7 +11,8 @@ import numpy as np
 from ripple_sim.solver.kernel import Floats, Ints, kernel
 
 from .energy import Reference, density_derivatives
-from .seamless import COLUMN, FREE, ROW, SeamlessMap, corner_place, turned
+from .frames import turned
+from .seamless import COLUMN, FREE, ROW, SeamlessMap, corner_place
 
 
 @kernel

@@ -8,8 +8,9 @@ from ripple_sim.solver.kernel import Floats, kernel
 from ripple_sim.solver.sphere_map.conjugate_gradients import solve
 
 from .energy import Reference, total_energy
+from .frames import turned
 from .hessian import assemble
-from .seamless import SeamlessMap, Transitions, corner_place, turned
+from .seamless import SeamlessMap, Transitions, corner_place
 from .surface import Edges
 from .wander import rehome
 

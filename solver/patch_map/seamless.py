@@ -15,6 +15,7 @@ import numpy as np
 
 from ripple_sim.solver.kernel import Floats, Ints, kernel
 
+from .frames import Frame, turned
 from .quads import CORNERS, Quads
 
 FIXED, COLUMN, ROW, FREE = range(4)  # in which directions a vertex may move
@@ -28,6 +29,7 @@ class SeamlessMap(NamedTuple):
     chart: Ints  # [n], in which each vertex lies
     x: Floats  # [n, 2], its place there
     freedom: Ints  # [n]
+    moved: Ints  # [n, 3], change from the frame that it had at first
     turn: Ints  # [m, 3], right angles from the vertex's frame to the triangle's
     shift: Ints  # [m, 3, 2], after that
     glued: Ints  # [C, 4, 2]
@@ -43,14 +45,14 @@ def seamless_map(quads: Quads) -> SeamlessMap:
     sides = surface.edges.sides
     joined = sides[:, 1] >= 0
     twin[sides[joined, 0]], twin[sides[joined, 1]] = sides[joined, 1], sides[joined, 0]
-    star = np.argsort(F.ravel(), kind="stable")
-    star_start = np.concatenate([[0], np.cumsum(np.bincount(F.ravel(), minlength=count))])
+    star_start, star = stars(F, count)
     seamless = SeamlessMap(
         F,
         quads.chart,
         np.zeros(count, np.int64),
         np.zeros((count, 2)),
         np.full(count, FREE),
+        np.zeros((count, 3), np.int64),
         np.zeros((len(F), 3), np.int64),
         np.zeros((len(F), 3, 2), np.int64),
         quads.glued,
@@ -59,6 +61,23 @@ def seamless_map(quads: Quads) -> SeamlessMap:
     )
     _connect(seamless, twin, np.ascontiguousarray(quads.places), transitions(quads.glued))
     return seamless
+
+
+@kernel
+def stars(F: Ints, count: int) -> tuple[Ints, Ints]:
+    """Corners 3 triangle + k of the triangles F [m, 3] by vertex: where those of each begin [n + 1], and all [3 m]."""
+    start, star = np.zeros(count + 1, np.int64), np.empty(3 * len(F), np.int64)
+    for f in range(len(F)):
+        for k in range(3):
+            start[F[f, k] + 1] += 1
+    for v in range(count):
+        start[v + 1] += start[v]
+    place = start[:-1].copy()
+    for f in range(len(F)):
+        for k in range(3):
+            star[place[F[f, k]]] = 3 * f + k
+            place[F[f, k]] += 1
+    return start, star
 
 
 class Transitions(NamedTuple):
@@ -80,15 +99,9 @@ def transitions(glued: Ints) -> Transitions:
 
 
 @kernel(inline="always")
-def turned(x: float, y: float, turn: int) -> tuple[float, float]:
-    """A vector after a turn by right angles, counter-clockwise."""
-    if turn == 0:
-        return x, y
-    if turn == 1:
-        return -y, x
-    if turn == 2:
-        return -x, -y
-    return y, -x
+def frame_of(seamless: SeamlessMap, f: int, k: int) -> Frame:
+    """Change from the frame of corner k of triangle f to that of the triangle."""
+    return seamless.turn[f, k], seamless.shift[f, k, 0], seamless.shift[f, k, 1]
 
 
 @kernel(inline="always")

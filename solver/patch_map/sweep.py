@@ -10,14 +10,15 @@ import numpy as np
 from ripple_sim.solver.kernel import Floats, kernel
 
 from .energy import FOLDED, Reference, density, density_derivatives
-from .seamless import COLUMN, FIXED, FREE, SeamlessMap, corner_place, turned
+from .frames import turned
+from .seamless import COLUMN, FIXED, FREE, SeamlessMap, corner_place
 
 _ARMIJO = 1e-4
 _REACH = 0.3  # of a chart
 _MOST_TRIALS = 14
 # what is known of a triangle of the star: the place of its next corner and of the one before, in the vertex's frame,
 # their cotangents, and its area
-_TERMS = 7
+TERMS = 7
 
 
 @kernel
@@ -27,18 +28,19 @@ def sweep(seamless: SeamlessMap, reference: Reference, backwards: bool) -> float
     largest = 0
     for v in range(count):
         largest = max(largest, seamless.star_start[v + 1] - seamless.star_start[v])
-    star = np.empty((largest, _TERMS))
+    star = np.empty((largest, TERMS))
     fall = 0.0
     for i in range(count):
         v = count - 1 - i if backwards else i
         if seamless.freedom[v] != FIXED:
-            fall += _relax_vertex(seamless, reference, v, star)
+            fall += relax_vertex(seamless, reference, v, star)
     return fall
 
 
 @kernel
-def _relax_vertex(seamless: SeamlessMap, reference: Reference, v: int, star: Floats) -> float:
-    degree = _gather(seamless, reference, v, star)
+def relax_vertex(seamless: SeamlessMap, reference: Reference, v: int, star: Floats) -> float:
+    """Move one vertex by a Newton step inside its star; return by how much the energy fell. `star` is room."""
+    degree = gather(seamless, reference, v, star)
     x, y, freedom = seamless.x[v, 0], seamless.x[v, 1], seamless.freedom[v]
     energy, gx, gy, hxx, hxy, hyy = _slopes(star, degree, x, y, reference.power)
     if not energy < np.inf:
@@ -54,12 +56,12 @@ def _relax_vertex(seamless: SeamlessMap, reference: Reference, v: int, star: Flo
         return 0.0
     step = min(1.0, _REACH / np.sqrt(sx * sx + sy * sy))
     for _ in range(_MOST_TRIALS):
-        lower = _star_energy(star, degree, x + step * sx, y + step * sy, reference.power)
+        lower = star_energy(star, degree, x + step * sx, y + step * sy, reference.power)
         if lower < energy - _ARMIJO * step * descent:
             # high up a wall a Newton step is far too short
             further = 2.0 * lower < energy
             while further and step * np.hypot(sx, sy) < _REACH:
-                least = _star_energy(star, degree, x + 2 * step * sx, y + 2 * step * sy, reference.power)
+                least = star_energy(star, degree, x + 2 * step * sx, y + 2 * step * sy, reference.power)
                 further = 2.0 * least < lower
                 if least < lower:
                     step, lower = 2 * step, least
@@ -72,7 +74,8 @@ def _relax_vertex(seamless: SeamlessMap, reference: Reference, v: int, star: Flo
 
 
 @kernel
-def _gather(seamless: SeamlessMap, reference: Reference, v: int, star: Floats) -> int:
+def gather(seamless: SeamlessMap, reference: Reference, v: int, star: Floats) -> int:
+    """Fill in the star of a vertex, see above, and return how many triangles it has."""
     first, last = seamless.star_start[v], seamless.star_start[v + 1]
     for i in range(first, last):
         f, k = seamless.star[i] // 3, seamless.star[i] % 3
@@ -89,7 +92,8 @@ def _gather(seamless: SeamlessMap, reference: Reference, v: int, star: Floats) -
 
 
 @kernel
-def _star_energy(star: Floats, degree: int, x: float, y: float, power: int) -> float:
+def star_energy(star: Floats, degree: int, x: float, y: float, power: int) -> float:
+    """Energy of a star whose vertex lies at x, y; infinite if a triangle is folded."""
     total = 0.0
     for i in range(degree):
         bx, by, cx, cy, cot_b, cot_c, area = star[i]

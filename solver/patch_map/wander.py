@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from ripple_sim.solver.kernel import Floats, kernel
 
-from .seamless import COLUMN, FIXED, FREE, ROW, SeamlessMap, Transitions, turned
+from .frames import after, inverse, turned
+from .seamless import COLUMN, FIXED, FREE, ROW, SeamlessMap, Transitions, frame_of
 
 _MOST_CHARTS = 64
 
@@ -13,26 +14,28 @@ _MOST_CHARTS = 64
 def rehome(seamless: SeamlessMap, across: Transitions, before: Floats) -> None:
     """Follow each vertex from where it was [n, 2], straight to where it is, over the borders of charts."""
     for v in range(len(seamless.x)):
-        if seamless.freedom[v] == FIXED:
-            continue
-        px, py = before[v]
-        qx, qy = seamless.x[v]
-        chart, turn, sx, sy, _, _ = follow(seamless.chart[v], px, py, qx, qy, seamless.glued, across)
-        if chart == seamless.chart[v]:
-            continue
-        x, y = turned(qx, qy, turn)
-        seamless.x[v, 0], seamless.x[v, 1] = x + sx, y + sy
-        seamless.chart[v] = chart
-        if turn % 2 == 1 and seamless.freedom[v] != FREE:
-            seamless.freedom[v] = COLUMN + ROW - seamless.freedom[v]
-        back = (4 - turn) % 4
-        for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
-            f, k = seamless.star[i] // 3, seamless.star[i] % 3
-            # the inverse of the move, before the frame change from the old chart
-            seamless.turn[f, k] = (seamless.turn[f, k] + back) % 4
-            dx, dy = turned(float(sx), float(sy), seamless.turn[f, k])
-            seamless.shift[f, k, 0] -= int(dx)
-            seamless.shift[f, k, 1] -= int(dy)
+        if seamless.freedom[v] != FIXED:
+            rehome_vertex(seamless, across, v, before[v, 0], before[v, 1])
+
+
+@kernel
+def rehome_vertex(seamless: SeamlessMap, across: Transitions, v: int, px: float, py: float) -> None:
+    """Follow one vertex from p, in its chart."""
+    qx, qy = seamless.x[v, 0], seamless.x[v, 1]
+    if 0.0 <= qx <= 1.0 and 0.0 <= qy <= 1.0:
+        return
+    chart, turn, sx, sy, x, y = follow(seamless.chart[v], px, py, qx, qy, seamless.glued, across)
+    seamless.chart[v], seamless.x[v, 0], seamless.x[v, 1] = chart, x, y
+    change = turn, sx, sy
+    moved = seamless.moved[v]
+    seamless.moved[v, 0], seamless.moved[v, 1], seamless.moved[v, 2] = after((moved[0], moved[1], moved[2]), change)
+    if turn % 2 == 1 and seamless.freedom[v] != FREE:
+        seamless.freedom[v] = COLUMN + ROW - seamless.freedom[v]
+    back = inverse(change)
+    for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
+        f, k = seamless.star[i] // 3, seamless.star[i] % 3
+        frame = after(back, frame_of(seamless, f, k))
+        seamless.turn[f, k], seamless.shift[f, k, 0], seamless.shift[f, k, 1] = frame
 
 
 @kernel

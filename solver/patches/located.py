@@ -6,7 +6,8 @@ import numpy as np
 
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.kernel import Floats, Ints, kernel
-from ripple_sim.solver.patch_map.seamless import FIXED, SeamlessMap, Transitions, corner_place, transitions, turned
+from ripple_sim.solver.patch_map.frames import turned
+from ripple_sim.solver.patch_map.seamless import FIXED, SeamlessMap, Transitions, corner_place, transitions
 from ripple_sim.solver.patch_map.wander import follow
 
 _ROUND_OFF = 1e-7  # barycentric coordinates of a texel outside of all triangles may be so far below 0

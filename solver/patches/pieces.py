@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.patch_map.frames import turned
 from ripple_sim.solver.patch_map.layout import PatchMap
-from ripple_sim.solver.patch_map.seamless import SeamlessMap, Transitions, transitions, turned
+from ripple_sim.solver.patch_map.seamless import SeamlessMap, Transitions, transitions
 from ripple_sim.solver.patch_map.wander import follow
 
 from .located import anchor, corners_in_frame_of
