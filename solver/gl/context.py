@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -11,9 +12,12 @@ import moderngl
 from ripple_sim.solver.errors import GLError
 
 from .drivers import is_software
-from .egl import create_context, current_context, load_egl
+from .egl import create_context, current_context, load_egl, release_current
 from .fence import Fences
 from .shader import load_shader
+
+# How long a thread waits for another to leave the context [s]: longer than any frame takes.
+_PATIENCE = 120.0
 
 
 class GLContext:
@@ -21,7 +25,7 @@ class GLContext:
 
     Use it as a context manager: entering makes the context current, frees the objects that Python has collected, and
     returns the `moderngl.Context`; leaving the outermost block restores the previous context and raises `GLError` if
-    the driver recorded an error meanwhile.
+    the driver recorded an error meanwhile. Any thread may enter: one at a time, the others wait.
 
     Parameters
     ----------
@@ -31,10 +35,12 @@ class GLContext:
     Raises
     ------
     GLError
-        If no EGL device gives an OpenGL 4.3 core context; at entering, if the context was lost.
+        If no EGL device gives an OpenGL 4.3 core context; at entering, if the context was lost, if another thread does
+        not leave it, or in a process that was forked.
     """
 
     def __init__(self, device: int | None = None) -> None:
+        self._process, self._lock, self._owner = os.getpid(), threading.RLock(), ""
         self._ctx = create_context(device)
         # objects may be collected in any thread, at any time; they are freed when the context is next entered
         self._ctx.gc_mode = "context_gc"
@@ -46,6 +52,8 @@ class GLContext:
         self._depth = 0
         self._fences = Fences(load_egl().eglGetProcAddress)
         self._shared_shaders: dict[str, moderngl.ComputeShader] = {}
+        self._before: int | None = None
+        release_current()
 
     @property
     def software(self) -> bool:
@@ -53,23 +61,53 @@ class GLContext:
         return is_software(self.renderer)
 
     def __enter__(self) -> moderngl.Context:
-        if self._depth == 0:
-            self._ctx.__enter__()
-            if current_context() != self._handle:
-                raise GLError(
-                    f"the OpenGL context on {self.renderer} is lost; something else in this process has shut EGL "
-                    "down (a pyvista or VTK window does): run one of the two in a process of its own"
-                )
-            self._free()
+        self.check_process()
+        if not self._lock.acquire(timeout=_PATIENCE):
+            raise GLError(
+                f"thread {self._owner!r} has held the OpenGL context on {self.renderer} for {_PATIENCE:g} s, and "
+                f"thread {threading.current_thread().name!r} cannot enter it; leave the context's `with` block before "
+                "waiting for another thread that needs it"
+            )
+        try:
+            if self._depth == 0:
+                self._take()
+        except BaseException:
+            self._lock.release()
+            raise
         self._depth += 1
         return self._ctx
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, traceback: Any) -> None:
         self._depth -= 1
-        if self._depth:
-            return
+        try:
+            if not self._depth:
+                self._leave(error)
+        finally:
+            self._lock.release()
+
+    def check_process(self) -> None:
+        """Raise `GLError` in a process that was forked: a context does not survive that."""
+        if os.getpid() != self._process:
+            raise GLError(
+                f"the OpenGL context belongs to process {self._process}, of which this one ({os.getpid()}) is a fork; "
+                "start processes with multiprocessing's method 'spawn', or take backend 'cpu'"
+            )
+
+    def _take(self) -> None:
+        self._owner, self._before = threading.current_thread().name, current_context()
+        self._ctx.__enter__()
+        if current_context() != self._handle:
+            raise GLError(
+                f"the OpenGL context on {self.renderer} is lost; something else in this process has shut EGL "
+                "down (a pyvista or VTK window does): run one of the two in a process of its own"
+            )
+        self._free()
+
+    def _leave(self, error: BaseException | None) -> None:
         recorded = self._ctx.error
-        self._ctx.__exit__(kind, error, traceback)
+        self._ctx.__exit__(None, None, None)
+        if self._before is None:
+            release_current()
         if recorded == "GL_OUT_OF_MEMORY":
             raise GLError(
                 f"{self.renderer} is out of memory: take a lower resolution or smaller frames, or backend 'cpu'"
@@ -160,4 +198,5 @@ def shared_context(device: int | None = None) -> GLContext:
         device = _selected if device is None else device
         if device not in _shared:
             _shared[device] = GLContext(device)
+        _shared[device].check_process()
         return _shared[device]

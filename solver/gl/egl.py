@@ -43,12 +43,20 @@ def current_context() -> int | None:
     return load_egl().eglGetCurrentContext()
 
 
+def release_current() -> None:
+    """Leave this thread without a current context, so that another thread may take it."""
+    egl = load_egl()
+    egl.eglMakeCurrent(egl.eglGetCurrentDisplay(), None, None, None)
+
+
 @functools.cache
 def load_egl() -> ctypes.CDLL:
     """The EGL library that moderngl has loaded already."""
     for libraries in _LIBRARIES:
         with contextlib.suppress(OSError):
             egl = ctypes.CDLL(libraries.get("libegl", "libEGL.so"))
-            egl.eglGetCurrentContext.restype = egl.eglGetProcAddress.restype = ctypes.c_void_p
+            for function in (egl.eglGetCurrentContext, egl.eglGetCurrentDisplay, egl.eglGetProcAddress):
+                function.restype = ctypes.c_void_p
+            egl.eglMakeCurrent.argtypes = [ctypes.c_void_p] * 4
             return egl
     raise GLError("the EGL library is gone since the context was created; see `ripple-sim info`")

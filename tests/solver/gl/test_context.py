@@ -1,9 +1,12 @@
 """The OpenGL context: what it frees, and how it says that something went wrong."""
 
+import os
 import resource
 import subprocess
 import sys
 import textwrap
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -126,3 +129,71 @@ def test_lost_context_is_reported() -> None:
         pytest.skip("no OpenGL")
     assert result.returncode == 0, result.stderr
     assert "is lost" in result.stdout
+
+
+def test_solvers_in_several_threads_take_turns(gl_backend: str) -> None:
+    def run(speed: float) -> np.ndarray:
+        waves = WaveSolver(sphere_atlas(1.0, 8), Material(speed=speed), backend=gl_backend)
+        waves.add_impulse([0, 0, 1], 1.0, 0.5)
+        for _ in range(20):
+            waves.step(0.02)
+        return waves.height
+
+    speeds = [0.5, 1.0, 1.5]
+    alone = [run(speed) for speed in speeds]
+    with ThreadPoolExecutor(3) as threads:
+        together = list(threads.map(run, speeds))
+    for a, b in zip(alone, together, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_thread_that_never_leaves_the_context_is_named(gl_backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ripple_sim.solver.gl.context._PATIENCE", 0.05)
+    errors = []
+
+    def enter() -> None:
+        try:
+            with shared_context():
+                pass
+        except GLError as error:
+            errors.append(str(error))
+
+    with shared_context():
+        other = threading.Thread(target=enter, name="painter")
+        other.start()
+        other.join()
+    assert len(errors) == 1
+    assert threading.current_thread().name in errors[0] and "'painter' cannot enter it" in errors[0]
+    enter()
+    assert len(errors) == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_a_fork_is_told_to_be_spawned_and_auto_takes_the_cpu() -> None:
+    script = """
+        import os, sys
+        from ripple_sim.solver import GLError, WaveSolver, sphere_atlas
+        try:
+            waves = WaveSolver(sphere_atlas(1.0, 8), backend="gl")
+        except GLError:
+            sys.exit(77)
+        if os.fork():
+            os.wait()
+            sys.exit(0)
+        for backend in ("gl", "auto"):
+            try:
+                print(WaveSolver(sphere_atlas(1.0, 8), backend=backend).backend, flush=True)
+            except GLError as error:
+                print(error, flush=True)
+        try:
+            waves.height
+        except GLError as error:
+            print(error, flush=True)
+    """
+    result = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=60)
+    if result.returncode == 77:
+        pytest.skip("no OpenGL")
+    assert result.returncode == 0, result.stderr
+    lines = result.stdout.splitlines()
+    assert len(lines) == 3 and lines[1] == "cpu"
+    assert all("is a fork; start processes with multiprocessing's method 'spawn'" in lines[i] for i in (0, 2))
