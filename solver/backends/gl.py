@@ -240,6 +240,7 @@ class GLBackend:
             self._dispatch.run_list(self._kick, kicks.count)
 
     def _fill_halo(self, field: moderngl.Buffer) -> None:
-        self._dispatch.bind(field, self._fields.halo_pairs)
-        self._halo["count"] = self._fields.halo_count
-        self._dispatch.run_list(self._halo, self._fields.halo_count)
+        if self._fields.halo_count:
+            self._dispatch.bind(field, self._fields.halo_pairs)
+            self._halo["count"] = self._fields.halo_count
+            self._dispatch.run_list(self._halo, self._fields.halo_count)

@@ -46,7 +46,9 @@ class FieldLayout:
         self.texels, ghosts, sources = self._addresses()
         self.halo_count = len(ghosts)
         with gl as ctx:
-            self.halo_pairs = ctx.buffer(np.stack([ghosts, sources], axis=1).astype(np.int32).tobytes())
+            pairs = np.stack([ghosts, sources], axis=1).astype(np.int32)
+            # one chart within fixed rims has none
+            self.halo_pairs = ctx.buffer(pairs.tobytes() or bytes(8))
 
     def zeros(self) -> moderngl.Buffer:
         """A field of zeros."""
@@ -115,7 +117,7 @@ class FieldLayout:
             columns = slice(first, last + 2)
             own = np.zeros((self._charts, n + 2, last + 2 - first), bool)
             own[:, 1:-1, 1:-1] = True
-            exists = ~own & (shown[:, :, columns] >= 0)
+            exists = ~own & (self._topology.ghosts | self._topology.own)[:, :, columns]
             ghosts.append(place[:, strip, :, EIGHT - 1 : EIGHT + last - first + 1][exists])
             sources.append(texels.reshape(-1)[shown[:, :, columns][exists]])
         return texels.reshape(-1), np.concatenate(ghosts), np.concatenate(sources)

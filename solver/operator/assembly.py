@@ -17,6 +17,7 @@ from ripple_sim.solver.texels.texel_mesh import TexelMesh
 from .material import Material
 from .wave_operator import WaveOperator
 
+RIMS = ("free", "fixed")
 OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
 
 # Below this share of the greatest pull on the surface sources lose their grip: where waves run at 3 % of the speed.
@@ -26,7 +27,7 @@ _FAINT = 1e-3
 _FASTER, _BULK = 1.2, 0.99
 
 
-def build_operator(atlas: Atlas, material: Material, kind: str) -> WaveOperator:
+def build_operator(atlas: Atlas, material: Material, kind: str, rim: str = "free") -> WaveOperator:
     """Assemble the operator of a material on an atlas.
 
     Parameters
@@ -39,21 +40,29 @@ def build_operator(atlas: Atlas, material: Material, kind: str) -> WaveOperator:
         (d/s)^2 put right); "uncorrected": the same with one mean distance everywhere (their figure 6a);
         "dynamic-paint": the same sum at real distances over 8 neighbours, as Blender's Dynamic Paint takes it.
 
+    rim : str
+        "free", or "fixed": heights are 0 at rims, and so are a plate's moments.
+
     Raises
     ------
     SolverError
-        For an unknown kind or a material of another resolution.
+        For an unknown kind or rim, or a material of another resolution.
     """
+    if rim not in RIMS:
+        raise SolverError(f"rim {rim!r} does not exist; valid are {', '.join(map(repr, RIMS))}")
     if kind not in OPERATORS:
         raise SolverError(f"operator {kind!r} does not exist; valid are {', '.join(map(repr, OPERATORS))}")
     field = {each.name: material.texels(each.name, atlas.areas.shape) for each in dataclasses.fields(material)}
-    density, area = field["density"], atlas.areas
+    density, area, texels = field["density"], atlas.areas, atlas.texels
+    if rim == "fixed":
+        texels = texels.with_fixed_rim()
+        field["fixed"] |= texels.bare_rim
     if kind == "fem":
-        assemble = functools.partial(atlas.texels.stencil, softening=softening(atlas.texels))
+        assemble = functools.partial(texels.stencil, softening=softening(texels))
     else:
         # these formulas give accelerations without masses: one area for all keeps the units, one density as well
         area, density = np.full_like(area, area.mean()), np.full_like(density, density.mean())
-        assemble = functools.partial(_difference_stencil, atlas.texels, kind, area[0, 0, 0])
+        assemble = functools.partial(_difference_stencil, texels, kind, area[0, 0, 0])
     # rigid texels are not dragged along by their neighbours either
     moves = (field["speed"] > 0) | (field["stiffness"] > 0) | (field["bending"] > 0)
     if moves.any():

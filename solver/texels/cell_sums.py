@@ -21,6 +21,7 @@ class Cells(NamedTuple):
     halo: Ints
     rim: Bools
     valence: Ints
+    fixed_rim: bool
 
 
 @kernel
@@ -39,7 +40,7 @@ def assemble(cells: Cells, weights: Floats, areas: Floats) -> None:
             for c in range(n + 1):
                 if halo[r, c] >= 0 and halo[r, c + 1] >= 0 and halo[r + 1, c] >= 0 and halo[r + 1, c + 1] >= 0:
                     if rim[r, c] or rim[r, c + 1] or rim[r + 1, c] or rim[r + 1, c + 1]:
-                        _add_strip(x, k, s, rim, halo, r, c, (link, area))
+                        _add_strip(x, k, s, rim, halo, r, c, (link, area), cells.fixed_rim)
                     else:
                         _add_quad(x, k, s, r, c, link, area)
                 elif cells.valence[chart, _corner(r, c)] == TRIANGLE:
@@ -97,9 +98,9 @@ def _add_triangle(x: Floats, k: Floats, s: Floats, r: int, c: int, link: Floats,
 
 @kernel
 def _add_strip(
-    x: Floats, k: Floats, s: Floats, rim: Bools, halo: Ints, r: int, c: int, sums: tuple[Floats, Floats]
+    x: Floats, k: Floats, s: Floats, rim: Bools, halo: Ints, r: int, c: int, sums: tuple[Floats, Floats], fixed: bool
 ) -> None:
-    """A cell at a rim: each of its corners beyond the rim moves as the texel beside it.
+    """A cell at a rim: each of its corners beyond the rim moves as the texel beside it, or is fixed.
 
     Nothing is known of a strip where the rim has no positions.
     """
@@ -120,7 +121,7 @@ def _add_strip(
     for i, j, weight in (
         (0, 1, south_north), (2, 3, south_north), (0, 2, west_east), (1, 3, west_east), (0, 3, rising), (1, 2, falling)
     ):  # fmt: skip
-        a, b = min(moves[i], moves[j]), max(moves[i], moves[j])
+        a, b = (i, j) if fixed else (min(moves[i], moves[j]), max(moves[i], moves[j]))
         if a == b:
             continue
         if b - a == 2:

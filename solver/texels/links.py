@@ -26,7 +26,7 @@ def link_lengths(topology: TexelTopology, halo_positions: NDArray[np.float64]) -
     charts, n, _ = topology.shape
     lengths = np.full((charts, 4, n + 1, n + 1), np.inf)
     for link, (a, b) in enumerate(LINK_ENDS):
-        exists = link_exists(topology, link)
+        exists = link_exists(topology, link) | ties_to_rim(topology, link)
         lengths[:, link][exists] = np.linalg.norm(halo_positions[a] - halo_positions[b], axis=-1)[exists]
     return mean_of_copies(topology, lengths)
 
@@ -36,6 +36,13 @@ def link_exists(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
     a, b = LINK_ENDS[link]
     there = (topology.halo >= 0) & ~topology.rim
     return there[a] & there[b] & (topology.own[a] | topology.own[b])
+
+
+def ties_to_rim(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
+    """Where a link joins one of the chart's own texels to a fixed rim, [C, n + 1, n + 1]."""
+    a, b = LINK_ENDS[link]
+    own, rim = topology.own, topology.rim & topology.fixed_rim
+    return (own[a] & rim[b]) | (rim[a] & own[b])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -80,7 +87,7 @@ class CrossingLinks:
 def mean_of_copies(topology: TexelTopology, weights: NDArray[np.float64]) -> NDArray[np.float64]:
     """Give both copies of every link that crosses a glued side their mean; clear entries that are not links."""
     for link in range(4):
-        exists = link_exists(topology, link)
+        exists = link_exists(topology, link) | ties_to_rim(topology, link)
         weights[:, link][~exists & np.isfinite(weights[:, link])] = 0
     crossing = CrossingLinks.of(topology)
     if not len(crossing.keys):

@@ -3,6 +3,7 @@
 Layout. A stencil's weights are [C, 4, n + 1, n + 1]: those of the links of place (r, c) of a chart with halo to the
 east (r, c)-(r, c + 1), north (r, c)-(r + 1, c), north-east (r, c)-(r + 1, c + 1), and its other diagonal
 (r, c + 1)-(r + 1, c). A link that crosses a glued side is stored on both charts, with the same value to the last bit.
+Links to places beyond a fixed rim, where heights are 0, tie the last texels down; a free rim has none.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ class Stencil:
     def __call__(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sum over the links of w (h_j - h_i) at every texel of a field, float64 [C, n, n]."""
         result = np.empty(self.topology.shape)
-        _gather(self.weights, self.topology.with_halo(field), result)
+        _gather(self.weights, self.topology.with_boundary(field), result)
         if self.irregular is not None:
             gather_links(self.irregular, field.reshape(-1), result.reshape(-1))
         return result

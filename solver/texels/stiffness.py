@@ -66,7 +66,9 @@ def _assembled(
     weights, areas = np.zeros((charts, 4, n + 1, n + 1)), np.zeros((charts, n, n))
     ones = np.ones(topology.halo.shape)
     k, s = (ones if field is None else topology.with_halo(field) for field in (coefficient, softening))
-    assemble(Cells(halo_positions, k, s, topology.halo, topology.rim, topology.valence), weights, areas)
+    assemble(
+        Cells(halo_positions, k, s, topology.halo, topology.rim, topology.valence, topology.fixed_rim), weights, areas
+    )
     if topology.polygons:
         points = _texel_positions(halo_positions)
         for texels in topology.polygons:

@@ -102,6 +102,21 @@ class TexelMesh:
             self.topology.halo, self.positions.reshape(-1, 3), self.normals.reshape(-1, 3), self.areas.reshape(-1)
         )
 
+    def with_fixed_rim(self) -> TexelMesh:
+        """The same with heights of 0 at its rims."""
+        return dataclasses.replace(self, topology=dataclasses.replace(self.topology, fixed_rim=True))
+
+    @property
+    def bare_rim(self) -> NDArray[np.bool_]:
+        """Texels in whose centres the surface ends: a rim beside them has no positions; [C, n, n]."""
+        bare = self.topology.rim & ~np.isfinite(self.halo_positions[..., 0])
+        ends = np.zeros(self.shape, bool)
+        ends[:, 0] |= bare[:, 0, 1:-1]
+        ends[:, -1] |= bare[:, -1, 1:-1]
+        ends[:, :, 0] |= bare[:, 1:-1, 0]
+        ends[:, :, -1] |= bare[:, 1:-1, -1]
+        return ends
+
     def stencil(self, coefficient: NDArray[np.float64], softening: NDArray[np.float64] | None = None) -> Stencil:
         """Stiffness weights of -div(coefficient grad); see `stiffness_stencil`."""
         return stiffness_stencil(self.topology, self.halo_positions, coefficient, softening)

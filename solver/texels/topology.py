@@ -37,6 +37,8 @@ class TexelTopology:
     polygons : tuple of int64 [k]
         The cells that do not fit the nine-point stencil: the texels round each corner of five charts and more, and of
         three and more at a rim, counter-clockwise.
+    fixed_rim : bool
+        Whether heights are 0 at rims; else rims are free, and heights beyond them those of the texels beside.
     """
 
     glued: NDArray[np.int64]
@@ -45,6 +47,7 @@ class TexelTopology:
     valence: NDArray[np.int64]
     corners: NDArray[np.int64]
     polygons: tuple[NDArray[np.int64], ...]
+    fixed_rim: bool = False
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -65,17 +68,30 @@ class TexelTopology:
         own[:, 1:-1, 1:-1] = True
         return own
 
+    @functools.cached_property
+    def ghosts(self) -> NDArray[np.bool_]:
+        """Places of the halo that show a texel, [C, n + 2, n + 2]; those beyond a fixed rim show nothing."""
+        ghosts = ~self.own & (self.halo >= 0)
+        return ghosts & ~self.rim if self.fixed_rim else ghosts
+
     def with_halo(self, field: NDArray) -> NDArray:
         """Surround each chart of a field [C, n, n, ...] by its halo; 0 where no texel lies."""
         texels = field.reshape(self.texel_count, *field.shape[3:])[self.halo]
         texels[self.halo < 0] = 0
         return texels
 
+    def with_boundary(self, field: NDArray) -> NDArray:
+        """A height with its halo, as `with_halo`; beyond a fixed rim it is 0."""
+        around = self.with_halo(field)
+        if self.fixed_rim:
+            around[self.rim] = 0
+        return around
+
     @functools.cached_property
     def addresses(self) -> HaloAddresses:
         """Where texels and halo lie in a field with halo."""
         address = np.arange(self.halo.size).reshape(self.halo.shape)
-        ghosts = ~self.own & (self.halo >= 0)
+        ghosts = self.ghosts
         texels = address[self.own]
         return HaloAddresses(texels, address[ghosts], texels[self.halo[ghosts]])
 

@@ -38,6 +38,9 @@ class WaveSolver(WaveField):
         "gl" (compute shaders), "cpu" (numba), or "auto": GL on a hardware driver, else the CPU.
     operator : str
         "fem", or a baseline: "paper", "uncorrected", "dynamic-paint" (see `build_operator`).
+    rim : str
+        At the rims of an open surface waves come back upright from a "free" one, inverted from a "fixed" one, as on a
+        drum skin: there the height is 0, and the moment of a surface that bends. A closed surface has none.
     conserve_volume : bool
         Remove the mean of every source, so that a net push does not move the surface as a whole. On a closed surface
         without stiffness nothing else would stop it; there, the mean is the volume. On an open surface it is the mean
@@ -60,12 +63,13 @@ class WaveSolver(WaveField):
         *,
         backend: str = "auto",
         operator: str = "fem",
+        rim: str = "free",
         conserve_volume: bool = True,
     ) -> None:
         if not (material is None or isinstance(material, Material)):
             raise SolverError(f"material is {material!r}; valid is a Material, for instance Material(speed=1.0)")
         self.material = material if material is not None else Material()
-        self._begin(atlas, build_operator(atlas, self.material, operator), backend, conserve_volume)
+        self._begin(atlas, build_operator(atlas, self.material, operator, rim), backend, conserve_volume)
 
     def _begin(self, atlas: Atlas, operator: WaveOperator, backend: str, conserve_volume: bool) -> None:
         """At rest, at time 0."""

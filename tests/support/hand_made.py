@@ -64,6 +64,28 @@ def polygon(sides: int, n: int) -> TexelMesh:
     return flat_charts(corners, glued, n)
 
 
+def disk(n: int) -> TexelMesh:
+    """Unit disk with a free edge: a square of one chart in the middle, and four charts round it."""
+    inner = 0.45 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    t = (np.arange(n) + 0.5) / n
+    u, v = np.meshgrid(t, t)
+    charts = [np.stack([0.9 * u - 0.45, 0.9 * v - 0.45], axis=-1)]
+    for side in range(4):
+        first, last = inner[(side + 1) % 4], inner[side]
+        angle = (side * 0.5 - 0.25 - 0.5 * u) * np.pi
+        rim = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        charts.append((1 - v[..., None]) * (first + u[..., None] * (last - first)) + v[..., None] * rim)
+    glued = [[(side + 1, 0) for side in range(4)]]
+    glued += [[(0, side), ((side - 1) % 4 + 1, 3), RIM, ((side + 1) % 4 + 1, 1)] for side in range(4)]
+    topology = glue(np.array(glued), n)
+    flat = np.stack(charts)
+    positions = np.concatenate([flat, np.zeros_like(flat[..., :1])], axis=-1)
+    places = topology.with_halo(positions)
+    places[topology.halo < 0] = np.nan
+    places[topology.rim] /= np.linalg.norm(places[topology.rim], axis=-1, keepdims=True)
+    return TexelMesh.of(topology, positions, beyond=places)
+
+
 def flat_torus(n: int) -> TexelMesh:
     """Unit square whose opposite sides are one: a chart that is glued to itself."""
     topology = glue(np.array([[(0, 2), (0, 3), (0, 0), (0, 1)]]), n)
