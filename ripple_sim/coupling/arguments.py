@@ -74,8 +74,10 @@ def checked_materials(model: mujoco.MjModel, materials: ByGeom[Material]) -> dic
     return by_name(model, materials, "materials")
 
 
-def resolutions(model: mujoco.MjModel, names: Iterable[str], resolution: int | ByGeom[int]) -> dict[str, int]:
-    """Resolution of each target, by name.
+def resolutions(
+    model: mujoco.MjModel, names: Iterable[str], resolution: int | ByGeom[int | None] | None
+) -> dict[str, int | None]:
+    """Resolution of each target, by name; None where the model is to choose it.
 
     Raises
     ------

@@ -44,9 +44,12 @@ class Ripples(Targets):
         by its id. Geoms of type mesh, sdf, sphere, ellipsoid, capsule, cylinder and box can ripple.
         Note that MuJoCo collides a mesh geom as its convex hull. A geom of type="sdf" collides as the true surface, and
         so does a mesh geom with a rigid flex of the same name on the same body, which collides in its place; see
-        `make_collidable`. Impulses are exact with every integrator but RK4.
-    resolution : int or mapping
-        Texels along an edge of the atlas's charts, for all targets or by geom.
+        `make_collidable`. Impulses are exact with every integrator but RK4. Of a material without a density,
+        this and the speed, damping and stiffness that it does not give are chosen by the model, see `suited_material`;
+        they stand in `ripples[geom].material`.
+    resolution : int, None or mapping
+        Texels along an edge of the atlas's charts, for all targets or by geom. None: 32 to 256, by what touches the
+        target and by the time step, see `suited_resolution`.
     backend, operator, conserve_volume
         As for `WaveSolver`.
     two_way : bool
@@ -72,7 +75,7 @@ class Ripples(Targets):
         model: mujoco.MjModel,
         materials: ByGeom[Material],
         *,
-        resolution: int | ByGeom[int] = 128,
+        resolution: int | ByGeom[int | None] | None = None,
         backend: str = "auto",
         operator: str = "fem",
         conserve_volume: bool = True,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.model.geoms import ByGeom, GeomKey, find_geom, geom_name
+from ripple_sim.coupling.model.suited_target import suited_targets
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, WaveSolver
 
@@ -24,9 +25,9 @@ class Targets:
     ----------
     model : mujoco.MjModel
     materials : mapping
-        Geom to its `Material`.
-    resolution : int or mapping
-        Of the atlases, for all targets or by geom.
+        Geom to its `Material`; what that leaves unset is chosen by the model, see `suited_material`.
+    resolution : int, None or mapping
+        Of the atlases, for all targets or by geom. None: chosen by the model, see `suited_resolution`.
     options : mapping
         Keyword arguments of `WaveSolver`.
     """
@@ -35,11 +36,11 @@ class Targets:
         self,
         model: mujoco.MjModel,
         materials: ByGeom[Material],
-        resolution: int | ByGeom[int],
+        resolution: int | ByGeom[int | None] | None,
         options: Mapping[str, Any],
     ) -> None:
         named = checked_materials(model, materials)
-        texels = resolutions(model, named, resolution)
+        named, texels = suited_targets(model, named, resolutions(model, named, resolution))
         self.model = model
         self._targets = {
             name: Target(model, find_geom(model, name), material, texels[name], options)

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.colliders.collidable import make_collidable
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Mesh, load_mesh
+from ripple_sim.solver import Material, Mesh, load_mesh
 
 from .body_shapes import BODY_SHAPES
 from .camera import CameraEntry
-from .drop_model import drop_model
+from .drop_model import TYPICAL_FOOTPRINT, TYPICAL_HIT, drop_model
 from .events import Events
 from .load_scene import Edit, refusal_of
-from .material_entry import MaterialEntry
+from .material_entry import COEFFICIENTS, MaterialEntry
 from .paint import paint_target
 from .scene import Scene
 from .scene_file import RippleEntry
@@ -85,7 +85,7 @@ def drop_scene(
     return Scene(
         name=Path(mesh_path).stem,
         model=model,
-        targets=(RippleEntry(geom="target", resolution=128, look=look, material=_material()),),
+        targets=(RippleEntry(geom="target", look=look, material=_material()),),
         camera=_camera(float(V[:, 2].max())),
         duration=DURATION,
         events=Events(drop=tuple(drops)),
@@ -94,7 +94,9 @@ def drop_scene(
 
 
 def _material() -> MaterialEntry:
-    return MaterialEntry(speed=0.6, damping=1.2, stiffness=1000.0, viscosity=3e-4, density=180.0)
+    """Waves slow enough to watch, that suit a target on which typical bodies fall."""
+    suited = Material.suited(SIZE, TYPICAL_HIT, radius=TYPICAL_FOOTPRINT, crossing=1.0)
+    return MaterialEntry(**{name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))})
 
 
 def _camera(height: float) -> CameraEntry:

@@ -16,6 +16,14 @@ from .motion import DropEntry
 _GEOM = mujoco.mjtGeom
 _HUES = (0.01, 0.48, 0.60, 0.08, 0.82, 0.36)
 
+# Of the bodies [m], [kg/m^3], and how high above the target they start [m].
+_RADII, _DENSITY, _HEIGHTS = (0.05, 0.085), 400.0, (0.8, 1.2)
+
+# Mass [kg] and speed [m/s] with which a ball of mean radius falls on the target, and its footprint's radius [m].
+_MEAN_RADIUS = (_RADII[0] + _RADII[1]) / 2
+TYPICAL_HIT = (_DENSITY * 4 / 3 * np.pi * _MEAN_RADIUS**3, float(np.sqrt(2 * 9.81 * sum(_HEIGHTS) / 2)))
+TYPICAL_FOOTPRINT = _MEAN_RADIUS / 2
+
 
 def drop_model(
     V: NDArray[np.float64], F: NDArray[np.int64], shapes: list[str], rng: np.random.Generator
@@ -60,14 +68,14 @@ def _add_body(
 ) -> DropEntry:
     """Add a body of a shape that drops at a time [s] on a landing point [m]."""
     kind, proportions = BODY_SHAPES[shape]
-    radius = rng.uniform(0.05, 0.085)
+    radius = rng.uniform(*_RADII)
     name = f"body_{number}"
     # parked high above until it drops, out of sight and out of reach of the others
     body = spec.worldbody.add_body(name=name, pos=[0.0, 0.0, 20.0 + number], quat=rng.standard_normal(4))
     body.add_freejoint()
     color = colorsys.hsv_to_rgb(_HUES[number % len(_HUES)], rng.uniform(0.6, 0.8), rng.uniform(0.7, 0.95))
-    body.add_geom(name=name, type=kind, size=[radius * p for p in proportions], density=400, rgba=[*color, 1.0])
-    height = rng.uniform(0.8, 1.2)
+    body.add_geom(name=name, type=kind, size=[radius * p for p in proportions], density=_DENSITY, rgba=[*color, 1.0])
+    height = rng.uniform(*_HEIGHTS)
     x, y, z = landing
     return DropEntry(body=name, time=time, position=(float(x), float(y), float(z + height)))
 

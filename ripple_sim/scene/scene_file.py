@@ -28,6 +28,7 @@ class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
 class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     """`[[ripple]]`: one target, its material and its look.
 
+    `resolution` is chosen by the model where it is left out, see `suited_resolution`.
     `color` (sRGB, 0 to 1) replaces the look's own colour, or the texture of the geom's material. `still_map` is the
     path of an image in the mesh's own texture coordinates: there are no waves where it is black. `contacts` names the
     geoms that collide for a geom that is only visible; by default those of its body.
@@ -36,7 +37,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     """
 
     geom: str
-    resolution: int = 128
+    resolution: int | None = None
     look: str = "rubber"
     color: Color | None = None
     material: MaterialEntry = msgspec.field(default_factory=MaterialEntry)

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from ripple_sim.coupling.model.geoms import find_target
+from ripple_sim.coupling.model.suited_target import suited_targets
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.load_scene import load_scene, shipped_scenes
@@ -95,7 +96,9 @@ def open_scene(
         )
     scene = load()
     size = surface_size(scene)
-    impulse = poke_strength(scene.targets[0].material.material(), size).impulse
+    first = scene.targets[0]
+    materials, _ = suited_targets(scene.model, {first.geom: first.material.material()}, {first.geom: 1})
+    impulse = poke_strength(materials[first.geom], size).impulse
     # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of a poke
     mass = impulse / (1.5 * _THROW * size / FLIGHT)
 

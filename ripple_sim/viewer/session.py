@@ -65,7 +65,7 @@ class Session:
         self.skins = {name: Skin(ripples[name].atlas, limited[name]) for name in ripples}
         self._picker = Picker(self.simulation)
         self._size = surface_size(scene)
-        self._strength = poke_strength(scene.targets[0].material.material(), self._size)
+        self._strength = poke_strength(ripples[scene.targets[0].geom].material, self._size)
         self.poke_impulse = self._strength.impulse
         self.operator = OPERATORS[0]
         self.paused = False

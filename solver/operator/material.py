@@ -10,6 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from ripple_sim.solver.errors import SolverError
 
 from .coefficients import LIMITS, check_mask, check_numbers, require_positive
+from .suited import suited_coefficients
+from .unset import Unset
+
+_ZERO, _ONE = Unset(0.0), Unset(1.0)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -41,16 +45,65 @@ class Material:
         Deformation beyond it is permanent (see `dent`). Infinite: fully elastic.
     fixed : bool
         Where True, the surface is clamped: its height stays 0 and waves come back inverted.
+
+    A density that is not given is 1 to `WaveSolver`, which knows nothing of a scale. `Ripples` takes it from the model,
+    and with it those of speed, damping and stiffness that are not given; see `suited_material`.
     """
 
-    speed: float | ArrayLike = 1.0
-    damping: float | ArrayLike = 0.0
-    stiffness: float | ArrayLike = 0.0
+    speed: float | ArrayLike = _ONE
+    damping: float | ArrayLike = _ZERO
+    stiffness: float | ArrayLike = _ZERO
     viscosity: float | ArrayLike = 0.0
-    density: float | ArrayLike = 1.0
+    density: float | ArrayLike = _ONE
     bending: float | ArrayLike = 0.0
     yield_height: float | ArrayLike = np.inf
     fixed: bool | ArrayLike = False
+
+    @classmethod
+    def suited(
+        cls,
+        size: float,
+        hit: float | tuple[float, float],
+        *,
+        radius: float | None = None,
+        amplitude: float = 0.03,
+        crossing: float = 0.5,
+        decay: float = 1.5,
+    ) -> Material:
+        """Ripples that look right on an object of any size, from a marble to a building.
+
+        The time that waves take is what the eye sees, so speed and the like follow from times, and the density from how
+        hard the object is hit:
+
+        - speed c = size / crossing;
+        - density: a short hit J on a footprint of radius r makes a dent of amplitude times size at most, see
+          `density_for`: sigma = 0.385 J / (c r amplitude size);
+        - stiffness k = (16 c / size)^2, so that a dent is narrow, and crest follows crest; more where the body of the
+          hit would otherwise sink by more than half of that amplitude when it rests;
+        - damping zeta = 2 ln(10) / decay: waves fall to a tenth in that time;
+        - viscosity nu = 0.001 c size: ripples shorter than a tenth of the size die on their way across it.
+
+        Parameters
+        ----------
+        size : float
+            Of the object, its longest extent [m].
+        hit : float or (float, float)
+            A typical hit: its impulse [N s], or the mass [kg] and the speed [m/s] of a body, which then gives 1.5 m v.
+        radius : float, optional
+            Of a typical footprint [m], about half the radius of what hits; by default a twentieth of the size.
+        amplitude : float
+            Deepest dent of a typical hit, over the size.
+        crossing : float
+            Time in which waves cross the object [s].
+        decay : float
+            Time in which they fall to a tenth [s].
+
+        Raises
+        ------
+        SolverError
+            If a number is not finite and greater than 0.
+        """
+        return cls(**suited_coefficients(size, hit, radius, amplitude, crossing, decay))
 
     @classmethod
     def membrane(cls, tension: float = 1.0, density: float = 1.0, damping: float = 0.0) -> Material:
@@ -152,6 +205,13 @@ class Material:
         for name in LIMITS:
             check_numbers(name, getattr(self, name))
         check_mask("fixed", self.fixed)
+
+    @property
+    def unset(self) -> tuple[str, ...]:
+        """Names of the coefficients that are left to the model: none where the density is given."""
+        if not isinstance(self.density, Unset):
+            return ()
+        return tuple(name for name in LIMITS if isinstance(getattr(self, name), Unset))
 
     def texels(self, name: str, shape: tuple[int, int, int]) -> NDArray:
         """One coefficient at every texel, [C, n, n], float64 (bool for `fixed`).

@@ -21,7 +21,7 @@ def test_the_least_scene_has_the_defaults_that_are_written_down() -> None:
     assert scene.camera == CameraEntry()
     assert scene.random is None
     [entry] = scene.ripple
-    assert (entry.geom, entry.resolution, entry.look, entry.color, entry.still) == ("egg", 128, "rubber", None, [])
+    assert (entry.geom, entry.resolution, entry.look, entry.color, entry.still) == ("egg", None, "rubber", None, [])
 
 
 def test_entries_of_one_scene_share_no_lists_with_another() -> None:

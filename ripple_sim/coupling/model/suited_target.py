@@ -1,0 +1,39 @@
+"""The materials and resolutions of all targets, with what is not given chosen by the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+
+from ripple_sim.solver import Material
+
+from .coupled_model import CoupledModel
+from .geoms import find_geom
+from .suited_material import Extent, suited_material
+from .suited_resolution import suited_resolution
+from .target_mesh import target_mesh
+
+
+def suited_targets(
+    model: mujoco.MjModel, materials: Mapping[str, Material], resolutions: Mapping[str, int | None]
+) -> tuple[dict[str, Material], dict[str, int]]:
+    """Materials without unset coefficients, and resolutions, by the names of the targets.
+
+    Raises
+    ------
+    MeshError
+        If a target's mesh cannot ripple.
+    """
+    suited, texels = dict(materials), {name: n for name, n in resolutions.items() if n is not None}
+    geoms = {name: find_geom(model, name) for name in materials}
+    left = [name for name in materials if materials[name].unset or name not in texels]
+    if not left:
+        return suited, texels
+    coupled = CoupledModel(model, geoms.values())
+    for name in left:
+        extent = Extent.of(target_mesh(model, geoms[name]))
+        suited[name] = suited_material(coupled, geoms[name], extent, materials[name])
+        if name not in texels:
+            texels[name] = suited_resolution(coupled, geoms[name], extent, suited[name])
+    return suited, texels
