@@ -24,7 +24,7 @@ RETIRED = {
     "hovering": "reach",
     "nowhere": "scratch",
     "everywhere_infinite": "scratch",
-    "felt": "filtered force",
+    "felt": "contact load",
     "owed": "deficit",
     "owing": "deficit",
     "debt": "deficit",

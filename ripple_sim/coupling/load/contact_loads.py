@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import mujoco
 
 from ripple_sim.coupling.contacts.contact_reader import ContactReader
+from ripple_sim.coupling.contacts.sleeping_contacts import SleepingContacts
 from ripple_sim.coupling.model.coupled_model import CoupledModel
 from ripple_sim.coupling.patches.pose import Pose
 from ripple_sim.solver import Load, WaveSolver
@@ -32,6 +33,7 @@ class ContactLoads:
 
     def clear(self) -> None:
         """Forget all contacts."""
+        self._sleeping = SleepingContacts(self._coupled)
         self._targets = {
             geom: TargetLoad(waves, self._coupled.footprint_radii, self._coupled.convex)
             for geom, waves in self._waves.items()
@@ -49,11 +51,14 @@ class ContactLoads:
         self._targets[geom].set_waves(self._waves[geom])
 
     def loads(self, data: mujoco.MjData, elapsed: float) -> dict[int, Load]:
-        """Load on each target over a time [s], from the contact forces that MuJoCo held over its latest time step."""
+        """Load on each target over a time [s], from the contact forces that MuJoCo held over its latest time step.
+
+        Bodies that sleep press as before.
+        """
         loads = {}
         self._impulses, self._touching = None, []
         self._timestep = self._coupled.model.opt.timestep
-        contacts = self._contacts.read(data)
+        contacts = self._sleeping.add(data, self._contacts.read(data))
         for geom, target in self._targets.items():
             if geom in contacts:
                 # copies, since MuJoCo's own arrays will move on

@@ -67,7 +67,7 @@ class Touch:
 
 
 class ContactRecord(NamedTuple):
-    """The contacts on one target in a step, with their forces before the low-pass filter.
+    """The contacts on one target in a step, with their forces before the rest filter.
 
     Attributes
     ----------

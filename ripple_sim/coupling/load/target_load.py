@@ -17,9 +17,10 @@ from ripple_sim.solver.texels.texel_mesh import TexelGrid
 from ripple_sim.solver.waves.load import slot_scratch
 
 from .contact_record import ContactRecord
+from .contact_state import CONTACT_STATE
 from .footprint_cache import EMPTY_CACHE, FootprintCache, rebuild, reusable
-from .low_pass import CONTACT_STATE, low_pass
-from .texel_forces import NO_FILTERED_FORCES, NO_FORCES, FilteredForces, texel_forces
+from .rest_filter import rest_filter
+from .texel_forces import NO_FORCES, NO_SHARES, MeanShares, texel_forces
 
 
 class _State(NamedTuple):
@@ -27,7 +28,7 @@ class _State(NamedTuple):
 
     cache: FootprintCache
     geoms: np.ndarray
-    filtered: FilteredForces
+    mean: MeanShares
     over: bool
 
 
@@ -55,13 +56,15 @@ class TargetLoad:
 
     def __init__(self, waves: WaveSolver, radii: NDArray[np.float64], convex: NDArray[np.bool_]) -> None:
         self._atlas, self._grid, self._radii, self._convex = waves.atlas, waves.atlas.texels.grid, radii, convex
-        self._state = _State(EMPTY_CACHE, np.zeros(len(radii), CONTACT_STATE), NO_FILTERED_FORCES, True)
+        self._state = _State(EMPTY_CACHE, np.zeros(len(radii), CONTACT_STATE), NO_SHARES, True)
         self.set_waves(waves)
 
     def set_waves(self, waves: WaveSolver) -> None:
         """Go on with new waves on the same atlas; deficits stay."""
         self._movable_area = (waves.atlas.areas * waves.operator.movable).reshape(-1)
         self._state = self._state._replace(cache=EMPTY_CACHE)
+        # texels that carry no load any more are forgotten at the next touch
+        self._state.geoms["memory"] = 0.0
 
     def touched(
         self, contacts: TargetContacts, pose: Pose, timestep: float, elapsed: float
@@ -85,16 +88,16 @@ class TargetLoad:
         mine = _Texels(self._grid, self._movable_area, distance_scratch(size), slot_scratch(size))
         self._state, given = _load(self._state, patches, points, rows, mine, elapsed)
         record = ContactRecord(contacts, pose, patches, surface, texels, points, self._state.cache)
-        return Load(self._state.filtered.texels, given), record
+        return Load(self._state.mean.texels, given), record
 
     def untouched(self, elapsed: float) -> Load:
         """Load over a time [s] in which no geom touches."""
         if self._state.over:
             return Load.none()
         state, scratch = self._state, slot_scratch(len(self._movable_area))
-        filtered, given, over = low_pass(state.geoms, state.filtered, NO_FORCES, elapsed, scratch)
-        self._state = state._replace(filtered=filtered, over=over)
-        return Load(filtered.texels, given)
+        mean, given, over = rest_filter(state.geoms, state.mean, NO_FORCES, elapsed, scratch)
+        self._state = state._replace(mean=mean, over=over)
+        return Load(mean.texels, given)
 
 
 @kernel
@@ -111,8 +114,8 @@ def _load_points(
 def _load(
     state: _State, patches: Patches, points: LoadPoints, rows: Ints, texels: _Texels, dt: float
 ) -> tuple[_State, Floats]:
-    """State after a step, and forces given to its filtered texels [N]."""
+    """State after a step, and forces given to its texels [N]."""
     cache = rebuild(state.cache, points, rows, texels.grid, texels.movable_area, texels.distance_scratch)
     forces = texel_forces(patches, points, cache)
-    filtered, given, over = low_pass(state.geoms, state.filtered, forces, dt, texels.slot_scratch)
-    return _State(cache, state.geoms, filtered, over), given
+    mean, given, over = rest_filter(state.geoms, state.mean, forces, dt, texels.slot_scratch)
+    return _State(cache, state.geoms, mean, over), given

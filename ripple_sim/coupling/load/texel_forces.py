@@ -1,4 +1,4 @@
-"""Contact forces on the texels of a target: those of a step, and as the low-pass filter hands them on."""
+"""Contact forces on the texels of a target, and the shares of the texels in them."""
 
 from __future__ import annotations
 
@@ -44,15 +44,14 @@ NO_FORCES = TexelForces(
 )
 
 
-class FilteredForces(NamedTuple):
-    """Filtered forces at some texels [N], and the deficits there [N s]; each [k]."""
+class MeanShares(NamedTuple):
+    """Texels under the geoms, [k], and the mean share of each in the force of its geom; those of a geom add up to 1."""
 
     texels: Ints
-    forces: Floats
-    deficits: Floats
+    shares: Floats
 
 
-NO_FILTERED_FORCES = FilteredForces(np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+NO_SHARES = MeanShares(np.zeros(0, np.int64), np.zeros(0))
 
 
 @kernel

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from ripple_sim.coupling.load.contact_state import CONTACT_STATE
 from ripple_sim.coupling.load.footprint_cache import EMPTY_CACHE, FootprintCache, rebuild, reusable
-from ripple_sim.coupling.load.low_pass import CONTACT_STATE
 from ripple_sim.coupling.patches.contact_patches import LoadPoints
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.coupling.load.footprint_cache import FootprintCache
-from ripple_sim.coupling.load.texel_forces import NO_FILTERED_FORCES, NO_FORCES, texel_forces
+from ripple_sim.coupling.load.texel_forces import NO_FORCES, NO_SHARES, texel_forces
 from ripple_sim.coupling.patches.contact_patches import LoadPoints, Patches
 
 
@@ -65,4 +65,4 @@ def test_without_geoms_there_are_no_forces() -> None:
     for mine, none in zip(found, NO_FORCES, strict=True):
         assert mine.shape == none.shape
         assert mine.dtype == none.dtype
-    assert all(len(each) == 0 for each in NO_FILTERED_FORCES)
+    assert all(len(each) == 0 for each in NO_SHARES)
