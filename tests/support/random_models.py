@@ -1,0 +1,212 @@
+"""Random MuJoCo models: shapes, mounts, contact parameters, solvers, masses and scales of all kinds, by a seed."""
+
+from __future__ import annotations
+
+import functools
+
+import mujoco
+import numpy as np
+from mujoco_models import mesh_asset, vector
+
+from ripple_sim import make_collidable
+from ripple_sim.scenes.shapes import limbed, peanut
+
+# half-sizes of geoms that are about 1 in radius
+SHAPES = {
+    "sphere": (1.0,),
+    "capsule": (0.6, 0.5),
+    "ellipsoid": (1.0, 0.8, 0.6),
+    "cylinder": (0.9, 0.5),
+    "box": (0.9, 0.7, 0.5),
+    "egg": (),
+}
+# the convex hull, the signed distance field and the flex of a mesh that is not convex
+ANIMALS = {"hull": "mesh", "sdf": "sdf", "flex": "mesh"}
+MOUNTS = {
+    "static": "",
+    "mocap": "",
+    "free": "<freejoint/>",
+    "hinge": '<joint type="hinge" axis="{axis}" pos="{anchor}"/>',
+    "slide": '<joint type="slide" axis="{axis}" damping="{mass}"/>',
+    "ball": '<joint type="ball" pos="{anchor}"/>',
+    "chain": '<joint type="hinge" axis="{axis}" pos="{anchor}" stiffness="{mass}"/>',
+    "weld": "<freejoint/>",
+    "connect": "<freejoint/>",
+}
+HITTERS = ("free", "free", "free", "driven", "mocap", "second target")
+INTEGRATORS = {"Euler": 0.3, "implicit": 0.15, "implicitfast": 0.35, "RK4": 0.1, "discrete": 0.1}
+SCALES = (1e-3, 0.03, 1.0, 30.0, 1e3)
+
+
+class RandomModel:
+    """A model with a geom "target" and up to three more, "hitter 0" and so on, that are to meet it.
+
+    Parameters
+    ----------
+    seed : int
+
+    Attributes
+    ----------
+    kind, mount : str
+        Of the target.
+    hitters : list of str
+        What moves each of the others.
+    ground : str or None
+        Type of the geom "ground".
+    size : float
+        Half the target's size [m].
+    timestep, stopping : float
+        Time step, and time constant of the contacts [s].
+    speed : float
+        At which geoms meet [m/s].
+    rng : numpy.random.Generator
+    xml : str
+    """
+
+    def __init__(self, seed: int) -> None:
+        rng = self.rng = np.random.default_rng(seed)
+        self.kind = str(rng.choice([*SHAPES, *ANIMALS]))
+        self.mount = str(rng.choice(list(MOUNTS)))
+        self.size = float(rng.choice(SCALES))
+        self.timestep = float(10 ** rng.uniform(np.log10(2e-4), np.log10(8e-3)))
+        self.stopping = float(self.timestep * 10 ** rng.uniform(np.log10(2), np.log10(25)))
+        self.solref = self._solref()
+        # how deep a geom sinks in at most
+        depth = self.size * 10 ** rng.uniform(-3, -0.8)
+        self.speed = float(depth / (self.timestep + self.stopping))
+        self.hitters = [str(rng.choice(HITTERS)) for _ in range(rng.integers(1, 4))]
+        self.radii = rng.choice([0.15, 0.3, 0.45], 3) * self.size
+        self.ground = str(rng.choice(["plane", "hfield"])) if self.mount == "free" and rng.random() < 0.5 else None
+        if self.kind == "sdf" and self.ground == "hfield":
+            # which MuJoCo does not collide
+            self.ground = "plane"
+        self.condim = 1 if self.kind == "flex" else int(rng.choice([1, 3, 4, 6]))
+        self.xml = self._xml()
+
+    @property
+    def targets(self) -> list[str]:
+        """Geoms that are to ripple."""
+        return ["target", *(f"hitter {i}" for i, hitter in enumerate(self.hitters) if hitter == "second target")]
+
+    def compile(self) -> mujoco.MjModel:
+        """The model as MuJoCo compiles it."""
+        spec = mujoco.MjSpec.from_string(self.xml)
+        if self.kind == "flex":
+            make_collidable(spec, "target", "flex")
+        return spec.compile()
+
+    def _xml(self) -> str:
+        bodies, actuators, equality = self._target(), "", ""
+        if self.mount in ("weld", "connect"):
+            partner = self.rng.choice(["partner", "world"])
+            anchor = f'anchor="{self._vector(self.size)}"' if self.mount == "connect" else ""
+            equality = f'<equality><{self.mount} body1="target" body2="{partner}" {anchor}/></equality>'
+            bodies += f'<body name="partner" pos="0 0 {6 * self.size}"><freejoint/>{self._inertia()}</body>'
+        for i, hitter in enumerate(self.hitters):
+            body, motors = self._hitter(i, hitter)
+            bodies, actuators = bodies + body, actuators + motors
+        if self.ground:
+            shape = 'hfield="hills"' if self.ground == "hfield" else 'size="0 0 1"'
+            bodies += f'<geom name="ground" type="{self.ground}" {shape} {self._contact()}/>'
+        return f"""<mujoco><compiler boundinertia="1e-14" boundmass="1e-9"/>{self._option()}
+            <asset>{self._assets()}</asset><worldbody>{bodies}</worldbody>{equality}
+            <actuator>{actuators}</actuator></mujoco>"""
+
+    def _target(self) -> str:
+        shape = self._shape(self.kind, self.size, "egg")
+        geom = f'<geom name="target" {shape} mass="{self._mass()}" {self._contact()}/>'
+        joint = MOUNTS[self.mount].format(axis=self._vector(1.0), anchor=self._vector(self.size), mass=self._mass())
+        mocap = 'mocap="true"' if self.mount == "mocap" else ""
+        body = f'<body name="target" quat="{vector(self.rng.standard_normal(4))}" {mocap}>{joint}{geom}</body>'
+        if self.mount != "chain":
+            return body
+        return f'<body><joint type="slide" axis="{self._vector(1.0)}"/>{self._inertia()}{body}</body>'
+
+    def _hitter(self, i: int, hitter: str) -> tuple[str, str]:
+        """Body and actuators of what moves by itself, at a place of its own."""
+        name, place = f"hitter {i}", f'pos="{vector(3 * self.size * np.array([i, 1, 3]))}"'
+        shape = self._shape(str(self.rng.choice(list(SHAPES))), self.radii[i], f"egg {i}")
+        geom = f'<geom name="{name}" {shape} mass="{self._mass()}" {self._contact()}/>'
+        if hitter == "driven":
+            axes = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+            slides = "".join(f'<joint name="{x} {i}" type="slide" axis="{axis}"/>' for x, axis in axes.items())
+            force = float(self._mass()) * self.speed / self.stopping
+            motors = "".join(f'<motor joint="{x} {i}" gear="{force}"/>' for x in axes)
+            return f'<body name="{name}" {place}>{slides}{geom}</body>', motors
+        place += f' quat="{vector(self.rng.standard_normal(4))}"'
+        if hitter == "mocap":
+            return f'<body name="{name}" {place} mocap="true">{geom}</body>', ""
+        return f'<body name="{name}" {place}><freejoint/>{geom}</body>', ""
+
+    @staticmethod
+    def _shape(kind: str, radius: float, egg: str) -> str:
+        if kind in ANIMALS:
+            return f'type="{ANIMALS[kind]}" mesh="animal"'
+        if kind == "egg":
+            return f'type="mesh" mesh="{egg}"'
+        return f'type="{kind}" size="{vector(radius * np.array(SHAPES[kind]))}"'
+
+    def _assets(self) -> str:
+        scales = {"egg": self.size, **{f"egg {i}": radius for i, radius in enumerate(self.radii)}}
+        egg, animal = _meshes()
+        found = mesh_asset("animal", *animal, _scaled(self.size))
+        found += "".join(mesh_asset(name, *egg, _scaled(scale)) for name, scale in scales.items())
+        hills = " ".join(map(str, np.random.default_rng(1).integers(0, 3, 49)))
+        sizes = vector(self.size * np.array([9, 9, 1, 1]))
+        return found + f'<hfield name="hills" nrow="7" ncol="7" size="{sizes}" elevation="{hills}"/>'
+
+    def _vector(self, size: float) -> str:
+        return vector(size * self.rng.uniform(-1, 1, 3))
+
+    def _mass(self) -> str:
+        return f"{10 ** self.rng.uniform(-6, 6):.4g}"
+
+    def _inertia(self) -> str:
+        mass = self._mass()
+        inertia = vector(self.size**2 * float(mass) * np.ones(3))
+        return f'<inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia}"/>'
+
+    def _solref(self) -> str:
+        if self.rng.random() < 0.25:
+            # stiffness and damping of their own
+            omega, ratio = 1 / self.stopping, self.rng.uniform(0.05, 1.5)
+            return f"{-(omega**2):.5g} {-2 * ratio * omega:.5g}"
+        return f"{self.stopping:.5g} {self.rng.uniform(0.1, 1.5):.4g}"
+
+    def _contact(self) -> str:
+        rng, small = self.rng, 0.01 * self.size
+        margin, gap = (small * rng.random() if rng.random() < 0.3 else 0.0 for _ in range(2))
+        solimp = rng.choice(["0.9 0.95 0.001", f"0.8 0.99 {small:.4g}", "0.95 0.99 0.001 0.3 3", "0.5 0.9 0.01"])
+        friction = f"{rng.uniform(0, 1.5):.3g} {small * rng.uniform(0, 2):.3g} {small * rng.random():.3g}"
+        return (
+            f'condim="{self.condim}" solref="{self.solref}" solimp="{solimp}" margin="{margin:.4g}" gap="{gap:.4g}" '
+            f'friction="{friction}" priority="{int(rng.random() < 0.15)}" solmix="{rng.uniform(0, 2):.3g}"'
+        )
+
+    def _option(self) -> str:
+        rng = self.rng
+        solver, cone = rng.choice(["Newton", "CG", "PGS"], p=(0.5, 0.25, 0.25)), rng.choice(["pyramidal", "elliptic"])
+        integrator = rng.choice(list(INTEGRATORS), p=list(INTEGRATORS.values()))
+        if integrator == "discrete" and (solver == "PGS" or not hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE")):
+            integrator = "implicitfast"
+        # share of the models with each of them
+        shares = {"override": 0.1, "multiccd": 0.5, "nativeccd": 0.8, "warmstart": 0.8, "island": 0.8}
+        flags = {flag: rng.random() < share for flag, share in shares.items()}
+        text = " ".join(f'{flag}="{"enable" if on else "disable"}"' for flag, on in flags.items())
+        overrides = f'o_solref="{self._solref()}" o_solimp="0.9 0.95 0.001 0.5 2"' if flags["override"] else ""
+        gravity = vector(0.1 * self.speed / self.stopping * rng.standard_normal(3) * (rng.random() < 0.5))
+        return f"""<option timestep="{self.timestep:.6g}" integrator="{integrator}" solver="{solver}" cone="{cone}"
+            gravity="{gravity}" impratio="{rng.choice([1, 1, 10])}" {overrides}><flag {text}/></option>"""
+
+
+def _scaled(scale: float) -> str:
+    return f'scale="{vector(scale * np.ones(3))}" inertia="legacy"'
+
+
+@functools.cache
+def _meshes() -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """An egg and an animal of a half-size of about 1."""
+    V, F = peanut(0.08)
+    animal, triangles = limbed(0.06)
+    egg = V / np.linalg.norm(V, axis=1, keepdims=True) * [1.0, 0.8, 0.7]
+    return (egg, F), (2.0 * (animal - animal.mean(axis=0)), triangles)
