@@ -68,10 +68,10 @@ class Render(_VideoCommand):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Drop(_VideoCommand):
-    """Put a closed mesh on a floor, drop bodies on it, and render a video."""
+    """Put a mesh on a floor, drop bodies on it, and render a video."""
 
     mesh: Annotated[Positional[Path], arg(metavar="MESH")]
-    """Mesh file (OBJ, OFF, PLY, STL, GLB ...): closed, in one part, without handles."""
+    """Mesh file (OBJ, OFF, PLY, STL, GLB ...)."""
     bodies: Count = 12
     """Number of falling bodies."""
     seed: Seed = 0

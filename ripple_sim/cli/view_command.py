@@ -24,7 +24,7 @@ class View:
     """
 
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
-    """Name of a shipped scene, path of a scene file (TOML), or a closed mesh (OBJ, OFF, PLY, STL, GLB ...)."""
+    """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...)."""
     size: Size = (800, 600)
     """Window size in pixels."""
     resolution: Count = 64
