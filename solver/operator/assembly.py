@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver.errors import SolverError
 from ripple_sim.solver.texels.atlas import Atlas
 from ripple_sim.solver.texels.links import EAST, LINK_ENDS, NORTH, link_lengths, mean_of_copies
+from ripple_sim.solver.texels.softening import softening
 from ripple_sim.solver.texels.stencil import Stencil
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
@@ -22,9 +23,6 @@ OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
 
 # Below this share of the greatest pull on the surface sources lose their grip: where waves run at 3 % of the speed.
 _FAINT = 1e-3
-
-# No texel may be this much faster (by the sum of its weights over its area) than this share of all texels.
-_FASTER, _BULK = 1.2, 0.99
 
 
 def build_operator(atlas: Atlas, material: Material, kind: str, rim: str = "free") -> WaveOperator:
@@ -94,16 +92,6 @@ def source_grip(*pulls: NDArray[np.float64]) -> NDArray[np.float64] | None:
     if not strongest.any() or strongest.min() >= _FAINT:
         return None
     return np.minimum(1.0, strongest / _FAINT)
-
-
-def softening(texels: TexelMesh) -> NDArray[np.float64]:
-    """Factors that slow those few texels down that would set the time step for all others, [C, n, n].
-
-    Where the texel mesh crosses a crease, single texels are needles. Waves are through them in no time, even slowed
-    down. Smooth surfaces that the texels resolve have none: on the sphere all factors are 1.
-    """
-    rate = texels.stencil(np.ones_like(texels.areas)).absolute_sums() / texels.areas
-    return np.minimum(1, _FASTER * np.quantile(rate, _BULK) / rate)
 
 
 def _difference_stencil(texels: TexelMesh, kind: str, area: float, coefficient: NDArray[np.float64]) -> Stencil:

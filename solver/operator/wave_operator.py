@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.linalg import LinearOperator, eigsh
 
+from ripple_sim.solver.texels.spectrum import largest_eigenvalue
 from ripple_sim.solver.texels.stencil import Stencil
 from ripple_sim.solver.texels.topology import TexelTopology
 
@@ -17,9 +16,6 @@ from .components import Ties, floating_parts
 
 # Share of the theoretical stability limit that is used: round-off in float32 must not cross it.
 SAFETY = 0.99
-
-# On smaller charts Gershgorin's bound is as good.
-_LANCZOS_FROM = 6
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -135,10 +131,11 @@ class WaveOperator:
         if self.laplace_stencil is not None and self.rigidity is not None:
             bending = self._rate_bound(self.laplace_stencil)
             bound += bending * float((self.rigidity * self.mass).max()) * bending
-        wave = self._largest_eigenvalue(self.link_force, bound) + self.stiffness.max()
+        wave = largest_eigenvalue(self.link_force, self.mass, self.free, bound) + self.stiffness.max()
         viscous = 0.0
         if self.viscous_stencil is not None:
-            viscous = self._largest_eigenvalue(self.viscous_stencil, self._rate_bound(self.viscous_stencil))
+            bound = self._rate_bound(self.viscous_stencil)
+            viscous = largest_eigenvalue(self.viscous_stencil, self.mass, self.free, bound)
         # the positive root, written so that nothing cancels
         rate = viscous + np.sqrt(viscous**2 + 4 * wave)
         return np.inf if rate == 0 else float(SAFETY * 4 / rate)
@@ -146,21 +143,3 @@ class WaveOperator:
     def _rate_bound(self, stencil: Stencil) -> float:
         """Gershgorin's bound of the largest eigenvalue of M^-1 K."""
         return float((stencil.absolute_sums() * 2 / self.mass).max())
-
-    def _largest_eigenvalue(self, force: Callable[[NDArray[np.float64]], NDArray[np.float64]], bound: float) -> float:
-        """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
-
-        A bound that is always safe caps the estimate.
-        """
-        if bound == 0 or self.mass.shape[1] < _LANCZOS_FROM:
-            return bound
-        weight = self.free / np.sqrt(self.mass)
-
-        def multiply(x: NDArray) -> NDArray:
-            return -(force(x.reshape(weight.shape) * weight) * weight).ravel()
-
-        size = self.mass.size
-        start = np.random.default_rng(0).standard_normal(size)
-        matrix = LinearOperator((size, size), matvec=multiply, dtype=np.float64)
-        value = eigsh(matrix, k=1, which="LA", v0=start, tol=2e-3, return_eigenvectors=False, maxiter=size)
-        return float(np.clip(1.005 * value[0], 0, bound))

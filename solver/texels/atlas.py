@@ -148,7 +148,7 @@ class Atlas:
             quantiles `q001`, `q01`, `q50`, `q99`, `q999`, `starved` share of the area whose texels are over 4 times too
             wide. Of every layout: `edge_min` and `edge_max` [m], `coverage` (texel area over mesh area: 1 but for limbs
             that fall between the texels), `spanned` (area of the mesh of texel centres over mesh area: it cuts creases
-            short too).
+            short too), `timestep` (stable time step over that of an endless even grid of as many texels).
         """
         return {**self.chart_map.quality(self.mesh), **texel_quality(self.texels, self.mesh)}
 

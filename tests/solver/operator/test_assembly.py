@@ -4,10 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from hand_made import disk, flat_torus, polygon, square, two_squares
 from modes import mode_error
 
-from ripple_sim.solver import Material, SolverError, WaveSolver, sphere_atlas
-from ripple_sim.solver.operator.assembly import softening, source_grip
+from ripple_sim.solver import Material, SolverError, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
+from ripple_sim.solver.operator.assembly import source_grip
+from ripple_sim.solver.texels.softening import softening
 
 
 def test_baselines_do_not_converge() -> None:
@@ -62,3 +64,37 @@ def test_a_load_on_a_map_that_fades_to_zero_does_not_sink_in_for_ever(backend: s
     usual.step(20.0)
     assert not deepest[fading == 0].any()
     assert deepest.max() < 100 * np.abs(usual.height).max()
+
+
+@pytest.mark.parametrize("rim", ["free", "fixed"])
+@pytest.mark.parametrize("operator", ["paper", "uncorrected", "dynamic-paint"])
+@pytest.mark.parametrize(
+    "texels",
+    [square(8), disk(8), polygon(3, 8), polygon(6, 8), flat_torus(8), two_squares(8)],
+    ids=["square", "disk", "triple", "irregular", "periodic", "two parts"],
+)
+def test_baselines_run_on_any_texel_mesh(texels: TexelMesh, operator: str, rim: str, backend: str) -> None:
+    waves = WaveSolver(texel_atlas(texels), Material(damping=0.1), backend=backend, operator=operator, rim=rim)
+    waves.add_impulse(texels.positions[-1, 3, 4], 1.0, 0.3)
+    assert 0 < waves.stable_timestep < np.inf
+    waves.step(0.05)
+    first = np.abs(waves.height).max()
+    waves.step(300 * waves.stable_timestep)
+    assert 0 < np.abs(waves.height).max() < 10 * first
+    matrix = waves.operator.stencil
+    noise = np.random.default_rng(0).standard_normal((2, *texels.shape))
+    assert (noise[0] * matrix(noise[1])).sum() == pytest.approx((noise[1] * matrix(noise[0])).sum())
+
+
+def test_baselines_converge_where_the_texels_are_even_squares() -> None:
+    for operator in ("paper", "uncorrected"):
+        errors = []
+        for n in (12, 24):
+            texels = square(n)
+            x, y, _ = np.moveaxis(texels.positions, -1, 0)
+            mode = np.cos(np.pi * x) * np.cos(2 * np.pi * y)
+            waves = WaveSolver(texel_atlas(texels), backend="cpu", operator=operator, conserve_volume=False)
+            waves.height = mode
+            waves.step(2 / np.sqrt(5))
+            errors.append(np.abs(waves.height - mode).max())
+        assert np.log2(errors[0] / errors[1]) > 1.8
