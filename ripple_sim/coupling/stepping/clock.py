@@ -8,6 +8,8 @@ import mujoco
 
 from .reset_mark import ResetMark
 
+_ROUND_OFF = 1e-6  # of times, in time steps
+
 
 class Passed(NamedTuple):
     """What happened since the last look.
@@ -53,9 +55,11 @@ class StepClock:
         if before is None or reset:
             return Passed(timestep if time else 0.0, reset=reset)
         elapsed = time - before
-        steps = round(elapsed / timestep)
         # a step that equals the last one to the last bit saves the solver new coefficients
-        elapsed = steps * timestep if abs(elapsed - steps * timestep) < 1e-6 * timestep else elapsed
+        if abs(elapsed - timestep) < _ROUND_OFF * timestep:
+            return Passed(timestep)
+        steps = round(elapsed / timestep)
+        elapsed = steps * timestep if abs(elapsed - steps * timestep) < _ROUND_OFF * timestep else elapsed
         return Passed(elapsed, max(round(elapsed / longest) - 1, 0))
 
 
