@@ -25,7 +25,7 @@ def paint_target(spec: mujoco.MjSpec, mesh: Mesh, mesh_path: str | Path, texture
         if texture is not None:
             raise SceneError(
                 f"texture {str(texture)!r} cannot be shown on {str(mesh_path)!r}, which has no texture coordinates: "
-                "choose a mesh that has them (and needs no repair, which loses them)"
+                "choose a mesh that has them (a wrap has none)"
             )
         return
     pixels = mesh_image(mesh_path) if texture is None else load_image(texture)

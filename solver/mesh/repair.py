@@ -86,7 +86,7 @@ def _told(mesh: Mesh, result: Mesh) -> list[str]:
     if len(closed) > _TOLD:
         notes.append(f"{counted(len(closed) - _TOLD, 'smaller hole')} closed")
     if result.rims:
-        notes.append(f"{counted(len(result.rims), 'rim')} left open: a flat part cannot be closed")
+        notes.append(f"{counted(len(result.rims), 'rim')} left open, where a lid would lie on other triangles")
     return notes
 
 

@@ -69,7 +69,7 @@ class TestRepair:
     def test_a_single_triangle_stays_open_and_that_is_said(self) -> None:
         mesh = repaired(Soup(np.eye(3), np.array([[0, 1, 2]])), "tile")
         assert not mesh.closed
-        assert mesh.notes == ("1 rim left open: a flat part cannot be closed",)
+        assert mesh.notes == ("1 rim left open, where a lid would lie on other triangles",)
 
     def test_a_crash_of_pymeshfix_is_one_line(self, monkeypatch: pytest.MonkeyPatch) -> None:
         # the program that runs it is replaced by one that kills itself
