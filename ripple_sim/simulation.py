@@ -73,6 +73,7 @@ class Simulation:
             backend=backend,
             operator=operator,
             two_way=scene.two_way,
+            rim=scene.rim,
             contacts=scene.contacts,
         )
         self._apply_maps()

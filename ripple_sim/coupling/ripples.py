@@ -50,7 +50,7 @@ class Ripples(Targets):
     resolution : int, None or mapping
         Texels along an edge of the atlas's charts, for all targets or by geom. None: 32 to 256, by what touches the
         target and by the time step, see `suited_resolution`.
-    backend, operator, conserve_volume
+    backend, operator, rim, conserve_volume
         As for `WaveSolver`.
     two_way : bool
         Let the moving surfaces push back on the bodies that touch them or are within reach of them while risen. Each
@@ -78,11 +78,12 @@ class Ripples(Targets):
         resolution: int | ByGeom[int | None] | None = None,
         backend: str = "auto",
         operator: str = "fem",
+        rim: str = "free",
         conserve_volume: bool = True,
         two_way: bool = False,
         contacts: ByGeom[Sequence[GeomKey]] | None = None,
     ) -> None:
-        options = {"backend": backend, "operator": operator, "conserve_volume": conserve_volume}
+        options = {"backend": backend, "operator": operator, "rim": rim, "conserve_volume": conserve_volume}
         super().__init__(own_model(model), materials, resolution, options)
         coupled = CoupledModel(self.model, self._waves, named_collision_geoms(self.model, self, contacts or {}))
         for geom, waves in self._waves.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 
@@ -57,13 +57,15 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
 
     `overlay` names the overlays: "height" or "velocity" as a heatmap (with a fixed end of the colours in m or m/s as in
     "height=0.02"), "contacts", "grid", "time", "energy". `lighting` is "model" for the MJCF's lamps and skybox,
-    "studio" for a photo studio instead, or "auto": the studio if the MJCF has no lamp.
+    "studio" for a photo studio instead, or "auto": the studio if the MJCF has no lamp. `rim` says whether the rims of
+    open surfaces are "free" or "fixed".
     """
 
     model: str
     ripple: list[RippleEntry]
     duration: float = 5.0
     two_way: bool = False
+    rim: Literal["free", "fixed"] = "free"
     lighting: str = "auto"
     overlay: list[str] = []
     camera: CameraEntry = msgspec.field(default_factory=CameraEntry)

@@ -95,3 +95,13 @@ def test_copied_ripples_go_on_as_the_original(copied: Callable[[Ripples], Ripple
             each.step(state)
     assert np.abs(ripples["target"].height).max() > 0
     assert (twin["target"].height == ripples["target"].height).all()
+
+
+def test_the_rim_of_the_surfaces_is_handed_on_and_outlives_changes() -> None:
+    model = model_of('<geom name="target" type="sphere" size="0.5"/>')
+    ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=8, backend="cpu", rim="fixed")
+    assert ripples["target"].operator.topology.fixed_rim
+    ripples.change_material("target", speed=2.0)
+    assert ripples["target"].operator.topology.fixed_rim
+    with pytest.raises(RippleError, match="rim 'bent' does not exist"):
+        Ripples(model, {"target": Material()}, resolution=8, backend="cpu", rim="bent")
