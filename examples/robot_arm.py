@@ -40,8 +40,8 @@ MODEL = """<mujoco model="arm">
         <geom class="collision" type="sphere" size="0.1" pos="0 0 0.52"/>
       </body>
     </body>
-    <body pos="0.19 0.01 0.87"><freejoint/><geom name="blue" size="0.06" density="240" rgba="0.2 0.35 0.6 1"/></body>
-    <body pos="0.36 -0.01 0.98"><freejoint/><geom name="green" size="0.055" density="240" rgba="0.25 0.5 0.4 1"/></body>
+    <body pos="0.19 0.01 0.87"><freejoint/><geom name="blue" size="0.05" density="400" rgba="0.2 0.35 0.6 1"/></body>
+    <body pos="0.36 -0.01 0.98"><freejoint/><geom name="green" size="0.05" density="350" rgba="0.25 0.5 0.4 1"/></body>
   </worldbody>
   <actuator><position name="shoulder" joint="shoulder"/><position name="elbow" joint="elbow"/></actuator>
 </mujoco>"""
@@ -57,7 +57,7 @@ COVERS = {
         ellipsoid((0, 0, 0.52), (0.105, 0.09, 0.115)),
     ),
 }
-TIMES = (0.21, 0.25, 0.3)
+TIMES = (0.22, 0.26, 0.31)
 
 
 def add_cover(spec: mujoco.MjSpec, name: str, solids: tuple[Sdf, ...]) -> None:
@@ -71,11 +71,11 @@ def main() -> None:
         add_cover(spec, name, solids)
     model = spec.compile()
     data = mujoco.MjData(model)
-    skin = Material(speed=1.1, damping=1.0, stiffness=1500.0, viscosity=3e-4, density=140.0)
+    skin = Material(speed=1.0, damping=1.5, stiffness=7000.0, viscosity=2e-4, density=140.0)
     ripples = Ripples(model, {"upper cover": skin, "lower cover": skin}, resolution=96)
     looks = {"upper cover": "rubber", "lower cover": "jelly"}
     renderer = RippleRenderer(model, ripples, width=480, height=400, looks=looks)
-    camera = Camera(lookat=(0.2, 0.0, 0.55), distance=1.35, azimuth=115.0, elevation=-22.0)
+    camera = Camera(lookat=(0.2, 0.0, 0.55), distance=1.35, azimuth=115.0, elevation=-32.0)
 
     frames, given = [], dict.fromkeys(ripples, 0.0)
     while len(frames) < len(TIMES):
