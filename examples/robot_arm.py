@@ -71,7 +71,7 @@ def main() -> None:
         add_cover(spec, name, solids)
     model = spec.compile()
     data = mujoco.MjData(model)
-    skin = Material(speed=1.0, damping=1.5, stiffness=7000.0, viscosity=2e-4, density=140.0)
+    skin = Material(speed=1.0, damping=1.5, stiffness=8000.0, viscosity=2e-4, density=170.0)
     ripples = Ripples(model, {"upper cover": skin, "lower cover": skin}, resolution=96)
     looks = {"upper cover": "rubber", "lower cover": "jelly"}
     renderer = RippleRenderer(model, ripples, width=480, height=400, looks=looks)
