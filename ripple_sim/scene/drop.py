@@ -94,8 +94,8 @@ def drop_scene(
 
 
 def _material() -> MaterialEntry:
-    """Waves slow enough to watch, that suit a target on which typical bodies fall."""
-    suited = Material.suited(SIZE, TYPICAL_HIT, radius=TYPICAL_FOOTPRINT, crossing=1.0)
+    """Waves slow and high enough to watch on a target on which typical bodies fall."""
+    suited = Material.suited(SIZE, TYPICAL_HIT, radius=TYPICAL_FOOTPRINT, amplitude=0.2, crossing=1.5, decay=3.0)
     return MaterialEntry(**{name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))})
 
 

@@ -66,7 +66,7 @@ class Material:
         hit: float | tuple[float, float],
         *,
         radius: float | None = None,
-        amplitude: float = 0.03,
+        amplitude: float = 0.05,
         crossing: float = 0.5,
         decay: float = 1.5,
     ) -> Material:
