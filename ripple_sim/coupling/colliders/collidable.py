@@ -44,8 +44,8 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
         mesh's size). Boxes may be thrown aside, and SDF geoms sink in; a warning names both. See `add_flex_collider`.
         "convex": as the convex parts of its mesh, geoms of their own without mass, which CoACD finds in some ten
         seconds and which are then kept in the user's cache (needs the package coacd). The most robust: boxes stack on
-        it, and all geoms meet it. Bodies are held up to 2.5 % of the mesh's size off the surface. See
-        `add_convex_collider`.
+        it, and all geoms meet it. Bodies are held up to 2.5 % of the mesh's size off the surface. For closed meshes.
+        See `add_convex_collider`.
         "hull": as its convex hull, MuJoCo's way for mesh geoms: fast, and right for convex meshes only.
 
     Returns

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from ripple_sim.coupling.model.convex_colliders import part_name
+from ripple_sim.errors import SceneError
 
 from .convex_decomposition import convex_parts
 from .mesh_in_spec import LISTS, SETTINGS, mesh_on_body
@@ -28,9 +29,16 @@ def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     Raises
     ------
     SceneError
-        If the package coacd is missing, or the specification does not compile or discards geoms that do not collide.
+        If the mesh is open, the package coacd is missing, or the specification does not compile or discards geoms that
+        do not collide.
     """
-    for i, V in enumerate(convex_parts(mesh_on_body(spec, geom))):
+    mesh = mesh_on_body(spec, geom)
+    if not mesh.closed:
+        raise SceneError(
+            f"the mesh of geom {geom.name!r} is open and encloses no volume that has convex parts; valid routes for it "
+            "are 'flex' and 'hull'"
+        )
+    for i, V in enumerate(convex_parts(mesh)):
         name = part_name(geom.name, i)
         # a thin part may have too little volume for MuJoCo to take an inertia from it
         spec.add_mesh(name=name, uservert=V.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)

@@ -183,3 +183,19 @@ def test_two_convex_targets_give_each_other_one_momentum() -> None:
             given[each.geom] += each.impulse
     assert given["target"] > 0.5
     assert given["target"] == pytest.approx(given["other"], rel=1e-9)
+
+
+def test_an_open_mesh_is_refused_with_the_routes_that_take_it() -> None:
+    V, F = ell()
+    lid = V[F].mean(axis=1)[:, 2] > 0.3 - 1e-9
+    with pytest.raises(RippleError, match=r"mesh of geom 'target' is open .* routes for it are 'flex' and 'hull'"):
+        make_collidable(mesh_spec((V, F[~lid]), None, None), "target", "convex")
+
+
+def test_parts_leave_the_hole_of_a_ring_open() -> None:
+    ring = trimesh.creation.torus(0.3, 0.1, major_sections=16, minor_sections=8)
+    V, F = np.array(ring.vertices), np.array(ring.faces)
+    parts = [trimesh.convex.convex_hull(part) for part in convex_parts(Mesh.from_arrays(V, F))]
+    assert len(parts) > 3
+    assert not any(part.contains([[0.0, 0.0, 0.0], [0.05, 0.05, 0.0]]).any() for part in parts)
+    assert sum(part.volume for part in parts) == pytest.approx(ring.volume, rel=0.2)
