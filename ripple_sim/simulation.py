@@ -34,6 +34,8 @@ class Simulation:
         Frames per second of simulated time.
     resolution : int, optional
         Overrides the scene's atlas resolutions.
+    layout : str, optional
+        Overrides the scene's layouts.
     backend, operator : str
         As for `WaveSolver`.
     on_step : callable, optional
@@ -55,6 +57,7 @@ class Simulation:
         *,
         fps: float = 60,
         resolution: int | None = None,
+        layout: str | None = None,
         backend: str = "auto",
         operator: str = "fem",
         on_step: Callable[[Simulation], None] | None = None,
@@ -70,10 +73,11 @@ class Simulation:
             self.model,
             {entry.geom: entry.material.material() for entry in scene.targets},
             resolution={entry.geom: resolution or entry.resolution for entry in scene.targets},
+            layout={entry.geom: layout or entry.layout for entry in scene.targets},
+            rim={entry.geom: entry.rim for entry in scene.targets},
             backend=backend,
             operator=operator,
             two_way=scene.two_way,
-            rim=scene.rim,
             contacts=scene.contacts,
         )
         self._apply_maps()

@@ -152,3 +152,6 @@ Exposures = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior
 Device = Annotated[int | None, _one_word(parse_seed, "N"), arg(help_behavior_hint="(default: the first that works)")]
 UpAxis = Annotated[str | None, _one_word(parse_axis, "{y,z}"), arg(help_behavior_hint="(default: z for STL, else y)")]
 LayoutName = Annotated[str, _one_word(parse_layout, "{auto,cube,patches}")]
+SceneLayout = Annotated[
+    str | None, _one_word(parse_layout, "{auto,cube,patches}"), arg(help_behavior_hint="(default: the scene's)")
+]

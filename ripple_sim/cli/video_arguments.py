@@ -20,6 +20,7 @@ from .arguments import (
     FrameRate,
     Overlay,
     Resolution,
+    SceneLayout,
     Shutter,
     Size,
     Supersample,
@@ -39,6 +40,7 @@ _WORDS: dict[str, Any] = {
     "overlay": Overlay,
     "compare": Baseline,
     "resolution": Resolution,
+    "layout": SceneLayout,
 }
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import Any
 
 import mujoco
 
-from ripple_sim.coupling.model.geoms import ByGeom, by_name, find_target
+from ripple_sim.coupling.model.geoms import ByGeom, Value, by_name, find_target
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
 
@@ -74,24 +74,22 @@ def checked_materials(model: mujoco.MjModel, materials: ByGeom[Material]) -> dic
     return by_name(model, materials, "materials")
 
 
-def resolutions(
-    model: mujoco.MjModel, names: Iterable[str], resolution: int | ByGeom[int | None] | None
-) -> dict[str, int | None]:
-    """Resolution of each target, by name; None where the model is to choose it.
+def for_each(model: mujoco.MjModel, names: Iterable[str], what: str, value: Value | ByGeom[Value]) -> dict[str, Value]:
+    """What an argument says for each target, by name: one value for all, or a mapping.
 
     Raises
     ------
     SceneError
-        For a target without one.
+        For a target that a mapping leaves out.
     """
-    if not isinstance(resolution, Mapping):
-        return dict.fromkeys(names, resolution)
-    given = by_name(model, resolution, "resolution")
+    if not isinstance(value, Mapping):
+        return dict.fromkeys(names, value)
+    given = by_name(model, value, what)
     for name in names:
         if name not in given:
             raise SceneError(
-                f"resolution has no entry for geom {name!r}; it has {', '.join(map(repr, given)) or 'none'}: "
-                "give every rippling geom one, or one number for all"
+                f"{what} has no entry for geom {name!r}; it has {', '.join(map(repr, given)) or 'none'}: "
+                f"give every rippling geom one, or one {what} for all"
             )
     return {name: given[name] for name in names}
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import warnings
 from collections.abc import Iterator, Sequence
+from typing import TypedDict, Unpack
 
 import mujoco
 
@@ -30,6 +31,14 @@ from .targets import Targets
 __all__ = ["Impulse", "Ripples"]
 
 
+class WaveOptions(TypedDict, total=False):
+    """Keyword arguments that `Ripples` hands on to `WaveSolver`."""
+
+    backend: str
+    operator: str
+    conserve_volume: bool
+
+
 class Ripples(Targets):
     """Ripples on geoms of a MuJoCo model, driven by its contact forces.
 
@@ -50,8 +59,10 @@ class Ripples(Targets):
     resolution : int, None or mapping
         Texels along an edge of the atlas's charts, for all targets or by geom. None: 32 to 256, by what touches the
         target and by the time step, see `suited_resolution`.
-    backend, operator, rim, conserve_volume
-        As for `WaveSolver`.
+    layout : str or mapping
+        How surfaces get their charts: "auto", "cube" or "patches", for all targets or by geom; see `build_atlas`.
+    rim : str or mapping
+        "free" or "fixed" rims of open surfaces, likewise; see `WaveSolver`.
     two_way : bool
         Let the moving surfaces push back on the bodies that touch them or are within reach of them while risen. Each
         `step` hands on the momentum at once, as a change of `data.qvel`: it acts exactly once, and `xfrc_applied` and
@@ -61,13 +72,15 @@ class Ripples(Targets):
         to it, collide. A target that neither collides nor is named here takes the contacts of all geoms of its body
         that collide and do not ripple. A contact loads the surface where this is nearest and faces it; of several
         targets that share a geom, the nearest.
+    **wave_options
+        `backend`, `operator` and `conserve_volume`, as for `WaveSolver`.
 
     Raises
     ------
     SceneError
         For an unknown geom or one that cannot ripple, a geom without a material or resolution, or invalid contacts.
     RippleError
-        If a geom's mesh is not a closed genus-0 surface, or a wave parameter is invalid.
+        If a geom's mesh does not suit the layout, or a wave parameter is invalid.
     """
 
     def __init__(
@@ -76,15 +89,13 @@ class Ripples(Targets):
         materials: ByGeom[Material],
         *,
         resolution: int | ByGeom[int | None] | None = None,
-        backend: str = "auto",
-        operator: str = "fem",
-        rim: str = "free",
-        conserve_volume: bool = True,
+        layout: str | ByGeom[str] = "auto",
+        rim: str | ByGeom[str] = "free",
         two_way: bool = False,
         contacts: ByGeom[Sequence[GeomKey]] | None = None,
+        **wave_options: Unpack[WaveOptions],
     ) -> None:
-        options = {"backend": backend, "operator": operator, "rim": rim, "conserve_volume": conserve_volume}
-        super().__init__(own_model(model), materials, resolution, options)
+        super().__init__(own_model(model), materials, resolution, layout, rim, wave_options)
         coupled = CoupledModel(self.model, self._waves, named_collision_geoms(self.model, self, contacts or {}))
         for geom, waves in self._waves.items():
             for message in collision_warnings(coupled, geom, waves.atlas):

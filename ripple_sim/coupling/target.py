@@ -10,8 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.coupling.model.target_mesh import target_atlas
-from ripple_sim.solver import Material, SolverError, WaveSolver
+from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver
 from ripple_sim.solver.operator.holding import hold
 from ripple_sim.solver.waves.footprint import footprint
 
@@ -24,9 +23,9 @@ class Target:
     model : mujoco.MjModel
     geom : int
         Geom id.
+    atlas : Atlas
+        Of its surface, in the frame of the geom.
     material : Material
-    resolution : int
-        Of the atlas.
     options : mapping
         Keyword arguments of `WaveSolver`.
 
@@ -38,12 +37,12 @@ class Target:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, geom: int, material: Material, resolution: int, options: Mapping[str, Any]
+        self, model: mujoco.MjModel, geom: int, atlas: Atlas, material: Material, options: Mapping[str, Any]
     ) -> None:
         self.geom = geom
         self._model, self._material, self._options = model, material, dict(options)
         self._held: NDArray[np.float64] | None = None
-        self.waves = WaveSolver(target_atlas(model, geom, resolution), material, **options)
+        self.waves = WaveSolver(atlas, material, **options)
 
     def change_material(self, **coefficients: Any) -> None:
         """Change coefficients of the material, by their names in `Material`.

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.model.geoms import ByGeom, GeomKey, find_geom, geom_name
 from ripple_sim.coupling.model.suited_target import suited_targets
+from ripple_sim.coupling.model.target_mesh import target_atlas
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, WaveSolver
 
-from .arguments import checked_materials, resolutions
+from .arguments import checked_materials, for_each
 from .target import Target
 
 
@@ -28,8 +29,10 @@ class Targets:
         Geom to its `Material`; what that leaves unset is chosen by the model, see `suited_material`.
     resolution : int, None or mapping
         Of the atlases, for all targets or by geom. None: chosen by the model, see `suited_resolution`.
+    layout, rim : str or mapping
+        Of the atlases and their waves, likewise.
     options : mapping
-        Keyword arguments of `WaveSolver`.
+        Further keyword arguments of `WaveSolver`.
     """
 
     def __init__(
@@ -37,13 +40,23 @@ class Targets:
         model: mujoco.MjModel,
         materials: ByGeom[Material],
         resolution: int | ByGeom[int | None] | None,
+        layout: str | ByGeom[str],
+        rim: str | ByGeom[str],
         options: Mapping[str, Any],
     ) -> None:
         named = checked_materials(model, materials)
-        named, texels = suited_targets(model, named, resolutions(model, named, resolution))
+        given = for_each(model, named, "resolution", resolution)
+        layouts, rims = for_each(model, named, "layout", layout), for_each(model, named, "rim", rim)
+        named, texels = suited_targets(model, named, given)
         self.model = model
         self._targets = {
-            name: Target(model, find_geom(model, name), material, texels[name], options)
+            name: Target(
+                model,
+                (geom := find_geom(model, name)),
+                target_atlas(model, geom, texels[name], layouts[name]),
+                material,
+                {**options, "rim": rims[name]},
+            )
             for name, material in named.items()
         }
         # by geom id; shared with all who load or read the waves, and see new ones as soon as they are in here

@@ -9,6 +9,7 @@ import mujoco
 from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
 from ripple_sim.coupling.model.geoms import find_target
 from ripple_sim.errors import SceneError
+from ripple_sim.solver.atlas.layouts import LAYOUTS
 
 from .camera import check_camera
 from .events import Script
@@ -48,10 +49,12 @@ def check_scene(scene: Scene) -> None:
 
 def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
     from ripple_sim.render import LOOKS
+    from ripple_sim.solver.operator.assembly import RIMS
 
     find_target(model, entry.geom)
-    if entry.look not in LOOKS:
-        raise SceneError(f"look {entry.look!r} does not exist; valid are {', '.join(LOOKS)}")
+    for what, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS), ("rim", entry.rim, RIMS)):
+        if name not in valid:
+            raise SceneError(f"{what} {name!r} does not exist; valid are {', '.join(valid)}")
     if entry.color is not None and not all(0 <= part <= 1 for part in entry.color):
         raise SceneError(f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 (sRGB)")
     entry.material.material()

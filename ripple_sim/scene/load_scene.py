@@ -66,7 +66,6 @@ def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
             control=tuple(content.control),
         ),
         two_way=content.two_way,
-        rim=content.rim,
         overlay=tuple(content.overlay),
         lighting=content.lighting,
     )

@@ -35,8 +35,6 @@ class Scene:
         One of `LIGHTING`: "auto", "model" or "studio", see `Renderer`.
     notes : tuple of str
         What was done to its mesh on reading, one line each, where it was made from one.
-    rim : str
-        Of open surfaces, see `WaveSolver`.
     """
 
     name: str
@@ -49,7 +47,6 @@ class Scene:
     overlay: tuple[str, ...] = ()
     lighting: str = "auto"
     notes: tuple[str, ...] = ()
-    rim: str = "free"
 
     @property
     def contacts(self) -> dict[str, list[str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 
@@ -28,7 +28,8 @@ class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
 class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     """`[[ripple]]`: one target, its material and its look.
 
-    `resolution` is chosen by the model where it is left out, see `suited_resolution`.
+    `resolution` is chosen by the model where it is left out, see `suited_resolution`. `layout` is that of the atlas,
+    see `build_atlas`; the `rim` of an open surface is "free" or "fixed".
     `color` (sRGB, 0 to 1) replaces the look's own colour, or the texture of the geom's material. `still_map` is the
     path of an image in the mesh's own texture coordinates: there are no waves where it is black. `contacts` names the
     geoms that collide for a geom that is only visible; by default those of its body.
@@ -38,6 +39,8 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
 
     geom: str
     resolution: int | None = None
+    layout: str = "auto"
+    rim: str = "free"
     look: str = "rubber"
     color: Color | None = None
     material: MaterialEntry = msgspec.field(default_factory=MaterialEntry)
@@ -57,15 +60,13 @@ class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
 
     `overlay` names the overlays: "height" or "velocity" as a heatmap (with a fixed end of the colours in m or m/s as in
     "height=0.02"), "contacts", "grid", "time", "energy". `lighting` is "model" for the MJCF's lamps and skybox,
-    "studio" for a photo studio instead, or "auto": the studio if the MJCF has no lamp. `rim` says whether the rims of
-    open surfaces are "free" or "fixed".
+    "studio" for a photo studio instead, or "auto": the studio if the MJCF has no lamp.
     """
 
     model: str
     ripple: list[RippleEntry]
     duration: float = 5.0
     two_way: bool = False
-    rim: Literal["free", "fixed"] = "free"
     lighting: str = "auto"
     overlay: list[str] = []
     camera: CameraEntry = msgspec.field(default_factory=CameraEntry)

@@ -45,7 +45,9 @@ class VideoOptions:
     compare: str | None = None
     """Also run the scene with this wave operator and show both side by side."""
     resolution: int | None = None
-    """Texels along the edge of a chart; more resolve finer waves and take longer."""
+    """Texels along the edge of a cube's chart; more resolve finer waves and take longer."""
+    layout: str | None = None
+    """How surfaces get their charts: cube (closed, one part, no handles), patches (any), or auto."""
     backend: Backend = "auto"
     """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
     resume: bool = False

@@ -94,6 +94,7 @@ def _simulations(scene: Scene, options: VideoOptions, on_step: Callable[[Simulat
             scene,
             fps=options.rate,
             resolution=options.resolution,
+            layout=options.layout,
             backend=options.backend,
             operator=operator,
             on_step=on_step,

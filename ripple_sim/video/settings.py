@@ -73,6 +73,7 @@ def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLCont
         "the overlays": ",".join(options.overlay or ()),
         "the operators": ",".join(compared_operators(options.compare)),
         "the resolution": options.resolution or "the scene's",
+        "the layout": options.layout or "the scene's",
         "the wave solver": options.backend,
         **provenance(scene, gl),
         **({"the version of OpenEXR": version("OpenEXR")} if options.linear else {}),

@@ -18,7 +18,6 @@ def changed(**entries: object) -> dict:
 def test_the_least_scene_has_the_defaults_that_are_written_down() -> None:
     scene = parse_scene(LEAST, "a.toml")
     assert (scene.duration, scene.two_way, scene.lighting, scene.overlay) == (5.0, False, "auto", [])
-    assert scene.rim == "free"
     assert scene.camera == CameraEntry()
     assert scene.random is None
     [entry] = scene.ripple
@@ -36,7 +35,6 @@ def test_entries_of_one_scene_share_no_lists_with_another() -> None:
     ("table", "message"),
     [
         (changed(colour=1), "scene file 'a.toml': unknown key 'colour'; valid are model, ripple, duration"),
-        (changed(rim="clamped"), "'clamped'.*rim"),
         (changed(camera={"fov": 1}), r"unknown key 'fov' in \[camera\]; valid are name, track"),
         (
             changed(ripple=[{"geom": "egg"}, {"geo": "b"}]),

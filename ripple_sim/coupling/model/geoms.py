@@ -12,7 +12,7 @@ from ripple_sim.errors import SceneError
 
 TARGET_TYPES = {
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}")): name
-    for name in ("mesh", "sdf", "sphere", "ellipsoid", "capsule", "cylinder", "box")
+    for name in ("mesh", "sdf", "sphere", "ellipsoid", "capsule", "cylinder", "box", "hfield")
 }
 # So many geoms are listed in a message.
 _LISTED = 40

@@ -9,26 +9,29 @@ from numpy.typing import NDArray
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
 
 from .geoms import TARGET_TYPES, geom_name
+from .height_fields import height_field_triangles
 from .primitives import primitive_triangles
 
 
-def target_atlas(model: mujoco.MjModel, geom: int, resolution: int) -> Atlas:
-    """Atlas of a geom's surface in the geom's frame [m].
+def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str = "auto") -> Atlas:
+    """Atlas of a geom's surface in the geom's frame [m], in a layout of `build_atlas`.
 
     Raises
     ------
     MeshError
         If the geom's mesh does not suit the layout.
     """
-    if TARGET_TYPES[int(model.geom_type[geom])] == "sphere":
+    if TARGET_TYPES[int(model.geom_type[geom])] == "sphere" and layout != "patches":
         return sphere_atlas(float(model.geom_size[geom, 0]), resolution)
-    return build_atlas(target_mesh(model, geom), resolution)
+    return build_atlas(target_mesh(model, geom), resolution, layout=layout)
 
 
 def target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
     """Surface of a geom in the geom's frame [m]; see `target_atlas`."""
     kind = TARGET_TYPES[int(model.geom_type[geom])]
     name = f"mesh of geom {geom_name(model, geom)!r}"
+    if kind == "hfield":
+        return Mesh.from_arrays(*height_field_triangles(model, int(model.geom_dataid[geom])), name=name)
     if kind not in ("mesh", "sdf"):
         V, F = primitive_triangles(kind, model.geom_size[geom])
         return Mesh.from_arrays(V, F, name=name)
