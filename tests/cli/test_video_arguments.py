@@ -26,6 +26,7 @@ WORDS = {
     "overlay": ("height,time", ("height", "time")),
     "compare": ("paper", "paper"),
     "resolution": ("48", 48),
+    "layout": ("patches", "patches"),
     "backend": ("cpu", "cpu"),
     "resume": (None, True),
 }

@@ -48,7 +48,7 @@ def test_a_scene_without_mistakes_passes() -> None:
         (
             (RippleEntry(geom="egg", layout="octahedron"),),
             {},
-            "layout 'octahedron' does not exist; valid are auto, cube",
+            "layout .octahedron. does not exist; valid are auto",
         ),
         ((RippleEntry(geom="egg", rim="bent"),), {}, "rim 'bent' does not exist; valid are free, fixed"),
         ((RippleEntry(geom="egg", color=(0, 0, 1.1)),), {}, "color of geom 'egg' is .*three numbers from 0 to 1"),

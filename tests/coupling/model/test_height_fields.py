@@ -15,7 +15,9 @@ def land(rows: int, columns: int) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.option.timestep = 0.001
     spec.add_hfield(name="land", nrow=rows, ncol=columns, size=[1.2, 0.8, 0.3, 0.1], userdata=heights.ravel())
-    spec.worldbody.add_geom(name="land", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="land", pos=[0.1, 0.2, 0.3])
+    spec.worldbody.add_geom(
+        name="land", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="land", pos=[0.1, 0.2, 0.3], condim=1
+    )
     return spec
 
 
@@ -27,9 +29,8 @@ def test_triangles_lie_where_mujocos_rays_meet_the_field_and_face_up() -> None:
     rng = np.random.default_rng(0)
     for corners in V[F[rng.permutation(len(F))[:60]]] + model.geom_pos[0]:
         point = rng.dirichlet([1.0] * 3) @ corners
-        away = mujoco.mj_ray(
-            model, data, point + [0, 0, 5.0], np.array([0, 0, -1.0]), None, 1, -1, np.zeros(1, np.int32)
-        )
+        above, down = point + np.array([0, 0, 5.0]), np.array([0, 0, -1.0])
+        away = mujoco.mj_ray(model, data, above, down, None, 1, -1, np.zeros(1, np.int32))
         assert 5.0 - away == pytest.approx(0.0, abs=1e-6)
     assert (np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])[:, 2] > 0).all()
 
