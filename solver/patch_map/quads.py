@@ -48,32 +48,89 @@ class Quads:
     glued: NDArray[np.int64]
 
 
+Halves = list[tuple[Path, Path]]
+Sides = tuple[Path, Path, Path, Path]
+
+
 def cut_into_quads(cells: BorderedCells) -> Quads:
-    """Lay out each cell as a regular polygon, cut that into quads, and lay out each of them as a square.
+    """Cut cells into quads, even these out, and lay out each of them as a square.
 
     Raises
     ------
     AtlasError
         If round-off folds a triangle: they are too thin.
     """
-    cells, halves = _with_middles(cells)
-    flat, paths = _cut_polygons(cells, halves)
-    first = np.cumsum([0, *map(len, halves)])
-    sides = _chart_sides(halves, paths, first)
-    surface, chart = _charts(flat, sides, first)
-    on_border = np.zeros(len(surface.V), bool)
-    on_border[np.concatenate([path for each in sides for path in each])] = True
-    finer = halved_chords(surface, chart, on_border)
+    surface, cell, halves = _with_middles(cells)
+    flat, paths = _cut_polygons(surface, cell, halves)
+    sides = _chart_sides(halves, paths)
+    surface, chart = _charts(flat, sides)
+    surface, chart, sides = _with_even_corners(surface, chart, sides)
+    finer = halved_chords(surface, chart, _on_paths(surface, sides))
     surface, chart = finer.surface, chart[finer.origin]
     places = flattened(surface, chart, _square_border(surface, sides))
     folded = int((signed_areas(places) <= 0).sum())
     if folded:
         raise AtlasError(f"{folded} triangles of the surface are too thin to be laid out flat")
-    return Quads(surface, chart, places, _glued(sides, first))
+    return Quads(surface, chart, places, _glued(sides))
 
 
-def _with_middles(cells: BorderedCells) -> tuple[BorderedCells, list[list[tuple[Path, Path]]]]:
-    """Cells with a vertex in the middle of each arc, at which it is cut in half, and with inner vertices."""
+def _with_even_corners(
+    surface: Surface, chart: NDArray[np.int64], sides: list[Sides]
+) -> tuple[Surface, NDArray[np.int64], list[Sides]]:
+    """Move the corners in which three cells meet to the middle between the cells' middles.
+
+    Voronoi cells often have very short sides, along which texels would be tiny. So the three charts round a corner,
+    a triangle between three cells' middles, are joined and cut anew as the cells were.
+    """
+    glued = _glued(sides)
+    fans, rest = _fans(sides, glued)
+    part = np.empty(len(sides), np.int64)
+    for number, fan in enumerate([*fans, *([each] for each in rest)]):
+        part[fan] = number
+    inner = np.zeros(len(sides), bool)
+    inner[[each for fan in fans for each in fan]] = True
+    halves = []
+    for fan in fans:
+        following = [*fan[1:], fan[0]]
+        whole = [(sides[a][0], sides[b][3]) for a, b in zip(fan, following, strict=True)]
+        # the middle stays where the charts beyond do
+        shared = [inner[glued[a, 0, 0]] and inner[glued[b, 3, 0]] for a, b in zip(fan, following, strict=True)]
+        halves.append(
+            [
+                _halves(surface.V, np.concatenate([first, second[1:]])) if both else (first, second)
+                for (first, second), both in zip(whole, shared, strict=True)
+            ]
+        )
+    on_border = _on_paths(surface, sides)
+    split = halved_chords(surface, part[chart], on_border)
+    old = chart[split.origin]
+    flat, paths = _cut_polygons(split.surface, part[old], halves)
+    new_sides = [*_chart_sides(halves, paths), *(sides[each] for each in rest)]
+    surface, chart = _charts(flat, new_sides)
+    return surface, chart, new_sides
+
+
+def _fans(sides: list[Sides], glued: NDArray[np.int64]) -> tuple[list[list[int]], list[int]]:
+    """The three charts round each corner where three cells meet, counter-clockwise, and all other charts."""
+    fans: list[list[int]] = []
+    used = np.zeros(len(sides), bool)
+    for a in range(len(sides)):
+        b = int(glued[a, 1, 0])
+        c = int(glued[b, 1, 0]) if b >= 0 else -1
+        if not used[a] and c >= 0 and glued[c, 1, 0] == a and len({a, b, c}) == 3:
+            fans.append([a, b, c])
+            used[[a, b, c]] = True
+    return fans, np.flatnonzero(~used).tolist()
+
+
+def _on_paths(surface: Surface, sides: list[Sides]) -> NDArray[np.bool_]:
+    on_path = np.zeros(len(surface.V), bool)
+    on_path[np.concatenate([path for each in sides for path in each])] = True
+    return on_path
+
+
+def _with_middles(cells: BorderedCells) -> tuple[Surface, NDArray[np.int64], list[Halves]]:
+    """Cells [m] with a vertex in the middle of each arc, at which it is cut in half, and with inner vertices."""
     surface = cells.surface
     single = np.array([arc for each in cells.arcs for arc in each if len(arc) == 2]).reshape(-1, 2)
     size = len(surface.V)
@@ -89,7 +146,7 @@ def _with_middles(cells: BorderedCells) -> tuple[BorderedCells, list[list[tuple[
     cell = cells.cell[finer.origin]
     split = halved_chords(finer.surface, cell, on_border)
     halves = [[_halves(split.surface.V, arc) for arc in each] for each in arcs]
-    return BorderedCells(split.surface, cell[split.origin], arcs), halves
+    return split.surface, cell[split.origin], halves
 
 
 def _halves(V: NDArray[np.float64], arc: Path) -> tuple[Path, Path]:
@@ -100,28 +157,36 @@ def _halves(V: NDArray[np.float64], arc: Path) -> tuple[Path, Path]:
     return (way[: at + 1], way[at:]) if not flipped else (way[at:][::-1], way[: at + 1][::-1])
 
 
-def _cut_polygons(cells: BorderedCells, halves: list[list[tuple[Path, Path]]]) -> tuple[Flat, list[list[Path]]]:
-    """Cells as regular polygons about the origin, cut from their middles; the paths of those cuts."""
-    surface = cells.surface
+def _cut_polygons(surface: Surface, part: NDArray[np.int64], halves: list[Halves]) -> tuple[Flat, list[list[Path]]]:
+    """Lay out the first parts as regular polygons and cut them from their middles; return the paths of the cuts.
+
+    Parts beyond those that have a border are left alone.
+    """
     on_border = np.zeros(len(surface.V), bool)
-    on_border[np.concatenate([arc for each in cells.arcs for arc in each])] = True
-    flat = Flat(surface, cells.cell, flattened(surface, cells.cell, _polygon_border(surface, halves)))
-    centre = central_vertices(flat, on_border)
-    most = max(map(len, halves))
+    on_border[np.concatenate([half for each in halves for arc in each for half in arc])] = True
+    chosen = part < len(halves)
+    places = np.full((len(part), 3, 2), np.nan)
+    some = Surface(surface.V, surface.F[chosen], surface.parent[chosen], surface.inside[chosen])
+    places[chosen] = flattened(some, part[chosen], _polygon_border(surface, halves))
+    centre = central_vertices(Flat(some, part[chosen], places[chosen]), on_border)
+    count = int(part.max()) + 1
+    flat = Flat(surface, part, places)
     paths: list[list[Path]] = [[] for _ in halves]
-    for i in range(most):
-        has = np.array([len(each) > i for each in halves])
-        end = np.array([each[i][0][-1] if len(each) > i else -1 for each in halves])
+    for i in range(max(map(len, halves), default=0)):
+        start, end = np.full(count, -1), np.full(count, -1)
+        for number, each in enumerate(halves):
+            if len(each) > i:
+                start[number], end[number] = centre[number], each[i][0][-1]
         border = np.zeros(len(flat.surface.V), bool)
         border[: len(on_border)] = on_border
-        flat, lines = cut_ray(flat, np.where(has, centre, -1), end, border)
-        for path, line in zip(paths, lines, strict=True):
+        flat, lines = cut_ray(flat, start, end, border)
+        for path, line in zip(paths, lines, strict=False):
             if len(line):
                 path.append(line)
     return flat, paths
 
 
-def _polygon_border(surface: Surface, halves: list[list[tuple[Path, Path]]]) -> Border:
+def _polygon_border(surface: Surface, halves: list[Halves]) -> Border:
     """Cells as regular polygons: corners on the unit circle, arcs along the sides."""
     parts, vertices, places = [], [], []
     for cell, arcs in enumerate(halves):
@@ -136,10 +201,8 @@ def _polygon_border(surface: Surface, halves: list[list[tuple[Path, Path]]]) -> 
     return Border(np.concatenate(parts), np.concatenate(vertices), np.concatenate(places))
 
 
-def _chart_sides(
-    halves: list[list[tuple[Path, Path]]], paths: list[list[Path]], first: NDArray[np.int64]
-) -> list[tuple[Path, Path, Path, Path]]:
-    """The four sides of each chart, counter-clockwise; chart first[c] + i lies at corner i of cell c."""
+def _chart_sides(halves: list[Halves], paths: list[list[Path]]) -> list[Sides]:
+    """The four sides of each chart, counter-clockwise; a chart lies at each corner of each part."""
     sides = []
     for arcs, rays in zip(halves, paths, strict=True):
         for i in range(len(arcs)):
@@ -147,9 +210,7 @@ def _chart_sides(
     return sides
 
 
-def _charts(
-    flat: Flat, sides: list[tuple[Path, Path, Path, Path]], first: NDArray[np.int64]
-) -> tuple[Surface, NDArray[np.int64]]:
+def _charts(flat: Flat, sides: list[Sides]) -> tuple[Surface, NDArray[np.int64]]:
     """The chart of each triangle: those not parted by a side of a chart hang together."""
     surface = flat.surface
     size = len(surface.V)
@@ -172,7 +233,7 @@ def _charts(
     return surface, chart[part]
 
 
-def _square_border(surface: Surface, sides: list[tuple[Path, Path, Path, Path]]) -> Border:
+def _square_border(surface: Surface, sides: list[Sides]) -> Border:
     parts, vertices, places = [], [], []
     for chart, each in enumerate(sides):
         for side, path in enumerate(each):
@@ -183,7 +244,7 @@ def _square_border(surface: Surface, sides: list[tuple[Path, Path, Path, Path]])
     return Border(np.concatenate(parts), np.concatenate(vertices), np.concatenate(places))
 
 
-def _glued(sides: list[tuple[Path, Path, Path, Path]], first: NDArray[np.int64]) -> NDArray[np.int64]:
+def _glued(sides: list[Sides]) -> NDArray[np.int64]:
     """Charts that share a side have its first edge the other way round."""
     table = np.full((len(sides), 4, 2), -1)
     seen = {(int(path[0]), int(path[1])): (chart, s) for chart, each in enumerate(sides) for s, path in enumerate(each)}
