@@ -26,7 +26,7 @@ BALLS = ((0.04, -0.13, 1.6), (-0.07, -0.03, 2.0), (0.12, -0.01, 2.5))
 def ant_under_balls() -> str:
     """Gymnasium's model with balls above it, as MJCF."""
     spec = mujoco.MjSpec.from_file(str(Path(environments.__file__).parent / "assets" / "ant.xml"))
-    spec.option.timestep = 0.002
+    spec.option.timestep = 0.004
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST  # with Ant's own, RK4, impulses are not exact
     spec.geom("torso_geom").material, spec.geom("torso_geom").rgba = "", (0.35, 0.6, 0.75, 1)
     for place in BALLS:
@@ -43,7 +43,7 @@ def main() -> None:
         ant = gymnasium.make(
             "Ant-v5",
             xml_file=file.name,
-            frame_skip=10,
+            frame_skip=5,
             reset_noise_scale=0.0,
             render_mode="rgb_array",
             width=480,

@@ -54,7 +54,7 @@ def main() -> None:
             default_camera_config=CAMERA,
         )
     material = Material(speed=0.35, damping=1.0, stiffness=100.0, viscosity=1e-4, density=700.0)
-    env = RippleWrapper(humanoid, dict.fromkeys(TORSO, material), resolution=96)
+    env = RippleWrapper(humanoid, dict.fromkeys(TORSO, material), resolution=64)
 
     for name in TORSO:
         env.ripples.allow_any_height(name)  # the dents under the balls are meant to be deep
