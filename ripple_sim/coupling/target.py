@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver
 from ripple_sim.solver.operator.holding import hold
+from ripple_sim.solver.texels.atlas import check_points
 from ripple_sim.solver.waves.footprint import footprint
 
 
@@ -70,7 +71,10 @@ class Target:
 
     def hold(self, region: ArrayLike) -> None:
         """Hold a region still, bool or shares from 0 to 1, [C, n, n], beside those held already; see `hold`."""
-        held = np.asarray(region, dtype=np.float64)
+        try:
+            held = np.asarray(region, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise SolverError(f"region is {region!r}; valid are numbers from 0 to 1, one for each texel") from error
         if self._held is not None and held.shape == self._held.shape:
             held = np.maximum(held, self._held)
         self._rebuild(self._material, held, self._options)
@@ -79,7 +83,8 @@ class Target:
         """Carry a point [m] from the frame of the geom's body to that of the geom."""
         rotation = np.zeros(9)
         mujoco.mju_quat2Mat(rotation, self._model.geom_quat[self.geom])
-        return (np.asarray(point, dtype=np.float64) - self._model.geom_pos[self.geom]) @ rotation.reshape(3, 3)
+        places = check_points(point) - self._model.geom_pos[self.geom]
+        return (places @ rotation.reshape(3, 3)).reshape(np.shape(point))
 
     def _rebuild(self, material: Material, held: NDArray[np.float64] | None, options: dict[str, Any]) -> None:
         """Make a new solver in the old one's state; if that fails, nothing has changed."""

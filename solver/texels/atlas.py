@@ -189,7 +189,10 @@ class Atlas:
 
 def check_points(points: ArrayLike) -> NDArray[np.float64]:
     """Points as float64 [k, 3], or `AtlasError`."""
-    array = np.asarray(points, dtype=np.float64)
+    try:
+        array = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise AtlasError(f"points are {points!r}; valid are numbers of shape [3] or [k, 3], in metres") from error
     if array.ndim == 0 or array.shape[-1] != 3 or array.ndim > 2:
         raise AtlasError(f"points have shape {array.shape}; valid is [3] or [k, 3], in metres")
     if not (np.abs(array) < _FARTHEST).all():

@@ -26,3 +26,17 @@ def test_arguments_of_a_wrong_kind_are_named(materials, options: dict, message: 
     model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
     with pytest.raises(RippleError, match=message):
         Ripples(model, materials, backend="cpu", **options)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda ripples: ripples.make_rigid("target", "top", 0.1), "points are 'top'"),
+        (lambda ripples: ripples.to_geom("target", [1.0, 2.0]), "points have shape"),
+        (lambda ripples: ripples.hold("target", "all"), "region is 'all'"),
+    ],
+)
+def test_places_that_are_none_are_named(call, message: str) -> None:
+    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
+    with pytest.raises(RippleError, match=message):
+        call(Ripples(model, {"target": Material()}, resolution=8, backend="cpu"))
