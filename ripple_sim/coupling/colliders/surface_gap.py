@@ -49,12 +49,14 @@ def collision_gap(coupled: CoupledModel, target: int, atlas: Atlas, geoms: Itera
     points = atlas.positions.reshape(-1, 3)
     points = points[:: -(-len(points) // _POINTS)]
     points = data.geom_xpos[target] + points @ data.geom_xmat[target].reshape(3, 3).T
+    solids = [geom for geom in geoms if TARGET_TYPES.get(int(model.geom_type[geom]), "hfield") != "hfield"]
+    if not solids:
+        return 0.0
     outside = np.full(len(points), np.inf)
-    for geom in geoms:
-        if int(model.geom_type[geom]) in TARGET_TYPES:
-            V, F = _solid(coupled, geom)
-            local = (points - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
-            outside = np.minimum(outside, igl.signed_distance(local, V, F)[0])
+    for geom in solids:
+        V, F = _solid(coupled, geom)
+        local = (points - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
+        outside = np.minimum(outside, igl.signed_distance(local, V, F)[0])
     return float(max(outside.max(), -np.median(outside)))
 
 

@@ -97,13 +97,20 @@ def test_target_that_nothing_can_touch_says_so(link: str, contacts: dict, messag
         ('<geom name="core" size="0.3" pos="0 0 0.12"/>', "0.12 m"),
         ('<geom name="core" type="box" size="0.28 0.28 0.28"/>', None),
         ('<geom name="core" size="0.3" pos="0 0 0.02"/><geom name="other" size="0.2"/>', None),
+        # named below, since planes and height fields are not taken by themselves
+        ('<geom name="core" type="plane" size="1 1 1" pos="0 0 0.29"/>', None),
+        ('<geom name="core" type="hfield" hfield="flat" pos="0 0 0.29"/>', None),
     ],
 )
 def test_collision_geoms_off_the_surface_are_warned_of(core: str, gap: str | None) -> None:
-    model = model_of(LINK.format(f'<geom name="shell" size="0.3" {SEEN}/>{core}'))
+    model = model_of(
+        LINK.format(f'<geom name="shell" size="0.3" {SEEN}/>{core}'),
+        '<hfield name="flat" nrow="2" ncol="2" size="1 1 0.1 0.1"/>',
+    )
+    contacts = {"shell": ["core"]} if "plane" in core or "hfield" in core else None
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        Ripples(model, {"shell": Material()}, resolution=16, backend="cpu")
+        Ripples(model, {"shell": Material()}, contacts=contacts, resolution=16, backend="cpu")
     messages = [str(each.message) for each in caught]
     assert len(messages) == (gap is not None)
     if gap is not None:
