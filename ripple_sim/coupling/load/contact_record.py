@@ -104,9 +104,9 @@ class ContactRecord(NamedTuple):
         """
         middles, forces = self.patches.begins[:-1], self.patches.forces
         places, texels, mine = self.surface[middles], self.texels[middles], owners[self.patches.geoms]
-        first = np.flatnonzero(np.diff(mine, prepend=-1))
-        if len(first) < len(mine):
-            # the vertices of a flex touch for themselves, and are told of together
+        # the last ids are those of a flex's vertices, which touch for themselves and are told of together
+        if mine[-1] != self.patches.geoms[-1]:
+            first = np.flatnonzero(np.diff(mine, prepend=-1))
             weighted = np.add.reduceat(forces[:, None] * places, first)
             forces, mine = np.add.reduceat(forces, first), mine[first]
             places, texels = atlas.nearest(weighted / forces[:, None])
