@@ -84,6 +84,8 @@ def _with_even_corners(
     """
     glued = _glued(sides)
     fans, rest = _fans(sides, glued)
+    if not fans:
+        return surface, chart, sides
     part = np.empty(len(sides), np.int64)
     for number, fan in enumerate([*fans, *([each] for each in rest)]):
         part[fan] = number

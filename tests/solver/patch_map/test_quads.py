@@ -1,0 +1,45 @@
+"""Quads of cells: each laid out as a square without a fold, glued as the surface is."""
+
+import numpy as np
+import pytest
+from surfaces import disk, sphere, torus
+
+from ripple_sim.solver import glue
+from ripple_sim.solver.patch_map.cells import centred_cells, spread_seeds
+from ripple_sim.solver.patch_map.disks import disk_cells
+from ripple_sim.solver.patch_map.distances import distance_graph
+from ripple_sim.solver.patch_map.flatten import signed_areas
+from ripple_sim.solver.patch_map.quads import Quads, cut_into_quads
+from ripple_sim.solver.patch_map.surface import Surface
+
+MESHES = {"sphere": lambda: sphere(3), "torus": lambda: torus(24), "disk": lambda: disk(14)}
+EULER = {"sphere": 2, "torus": 0, "disk": 1}
+
+
+def quads_of(name: str, cells: int) -> Quads:
+    mesh = MESHES[name]()
+    surface = Surface.of(mesh.V, mesh.F)
+    graph = distance_graph(surface)
+    return cut_into_quads(disk_cells(surface, graph, centred_cells(surface, graph, spread_seeds(graph, cells))))
+
+
+@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("cells", [1, 6, 12])
+def test_quads_cover_the_surface_and_their_squares_once(name: str, cells: int) -> None:
+    quads = quads_of(name, cells)
+    areas = signed_areas(quads.places)
+    assert areas.min() > 0
+    np.testing.assert_allclose(np.bincount(quads.chart, areas), 1.0, atol=1e-9)
+    assert quads.surface.areas.sum() == pytest.approx(Surface.of(MESHES[name]().V, MESHES[name]().F).areas.sum())
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_glued_charts_have_the_topology_of_the_surface(name: str) -> None:
+    glued = quads_of(name, 10).glued
+    corners = len(np.unique(glue(glued, 2).corners))
+    sides = (glued[..., 0] >= 0).sum() / 2 + (glued[..., 0] < 0).sum()
+    assert corners - sides + len(glued) == EULER[name]
+
+
+def test_a_part_of_one_cell_has_charts() -> None:
+    assert len(quads_of("disk", 1).glued) == 4
