@@ -16,5 +16,5 @@ duration = 2.0
 [[ripple]]
 geom = "egg"
 resolution = 12
-material = {speed = 0.3, density = 20.0}
+material = {speed = 0.3, density = 1500.0}
 """
