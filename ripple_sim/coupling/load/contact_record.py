@@ -34,6 +34,8 @@ class Impulse:
         Through a flex collider, of the whole force along the surface's normal.
     texel : tuple of int
         Chart, row and column of the texel nearest to the point.
+    inner : bool
+        Whether the inner side of an open surface was touched: then it pushes outwards.
     """
 
     geom: str
@@ -41,6 +43,7 @@ class Impulse:
     point: NDArray[np.float64]
     impulse: float
     texel: tuple[int, int, int]
+    inner: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -103,17 +106,19 @@ class ContactRecord(NamedTuple):
             How long the forces were held [s].
         """
         middles, forces = self.patches.begins[:-1], self.patches.forces
+        inner = self.points.forces[self.points.begins[:-1]] * forces < 0
         places, texels, mine = self.surface[middles], self.texels[middles], owners[self.patches.geoms]
         # the last ids are those of a flex's vertices, which touch for themselves and are told of together
         if mine[-1] != self.patches.geoms[-1]:
             first = np.flatnonzero(np.diff(mine, prepend=-1))
             weighted = np.add.reduceat(forces[:, None] * places, first)
-            forces, mine = np.add.reduceat(forces, first), mine[first]
+            forces, mine, inner = np.add.reduceat(forces, first), mine[first], inner[first]
             places, texels = atlas.nearest(weighted / forces[:, None])
         points, n, geom = in_world(places, self.pose), atlas.areas.shape[1], names[self.contacts.target]
-        for other, point, force, texel in zip(mine.tolist(), points, forces.tolist(), texels.tolist(), strict=True):
+        rows = zip(mine.tolist(), points, forces.tolist(), texels.tolist(), inner.tolist(), strict=True)
+        for other, point, force, texel, behind in rows:
             row = texel // n
-            yield Impulse(geom, names[other], point, force * timestep, (row // n, row % n, texel % n))
+            yield Impulse(geom, names[other], point, force * timestep, (row // n, row % n, texel % n), behind)
 
     def touches(self) -> Iterator[Touch]:
         """One record for each geom that touches."""

@@ -39,6 +39,7 @@ CONTACT_STATE = np.dtype(
         ("unbroken", np.float64),  # how long it has touched since its last opening [s]
         ("chatters", np.bool_),
         ("springy", np.bool_),  # it has chattered before
+        ("side", np.float64),  # 1 where it pushes inwards, -1 outwards; forces are amounts along that
         ("level", np.float64),  # its force, averaged over chatter [N]
         ("deficit", np.float64),  # impulse that the target has not received yet [N s]
         ("memory", np.float64),  # time over which means are taken, short where something changes [s]
@@ -56,6 +57,14 @@ CONTACT_STATE = np.dtype(
 def has_left(state: Any, dt: float) -> bool:
     """Whether a geom is gone, and not open for a moment only."""
     return state.absent > max(_LEFT, 1.5 * dt)
+
+
+@kernel
+def turn(state: Any, side: float) -> None:
+    """Follow a geom that pushes inwards, 1, or outwards, -1: what the target has not received yet stays as it is."""
+    if state.side != side:
+        state.deficit = -state.deficit
+        state.side = side
 
 
 @kernel

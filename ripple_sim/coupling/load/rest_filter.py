@@ -17,7 +17,7 @@ import numpy as np
 from ripple_sim.solver.kernel import Floats, Ints, kernel
 from ripple_sim.solver.waves.load import add_up_by
 
-from .contact_state import miss, touch
+from .contact_state import miss, touch, turn
 from .texel_forces import MeanShares, TexelForces
 
 # Shares below this are dropped from a mean.
@@ -61,12 +61,13 @@ def rest_filter(
             i += 1
         old = slice(state.first, state.last)
         mean, now = MeanShares(before.texels[old], before.shares[old]), np.zeros(0)
-        if force > 0:
-            total = touch(state, force, present.middles[i - 1], present.place_radii[i - 1], dt)
+        if force != 0:
+            turn(state, 1.0 if force > 0 else -1.0)
+            total = state.side * touch(state, abs(force), present.middles[i - 1], present.place_radii[i - 1], dt)
             mean, now = _mean_shares(state, mean, present.texels[rows], present.forces[rows] / force, dt, scratch)
             state.active = True
         elif state.active:
-            total = miss(state, dt)
+            total = state.side * miss(state, dt)
         else:
             continue
         over = over and not state.active
@@ -74,7 +75,7 @@ def rest_filter(
         count = state.last
         new = slice(state.first, state.last)
         texels[new], shares[new] = mean.texels, mean.shares
-        steady = min(state.mean, total) if len(now) else total
+        steady = state.side * min(state.mean, state.side * total) if len(now) else total
         given[new] = steady * mean.shares
         if len(now):
             given[new] += (total - steady) * now

@@ -57,6 +57,7 @@ class TargetLoad:
     def __init__(self, waves: WaveSolver, radii: NDArray[np.float64], convex: NDArray[np.bool_]) -> None:
         self._atlas, self._grid, self._radii, self._convex = waves.atlas, waves.atlas.texels.grid, radii, convex
         self._state = _State(EMPTY_CACHE, np.zeros(len(radii), CONTACT_STATE), NO_SHARES, True)
+        self._open = not waves.atlas.mesh.closed
         self.set_waves(waves)
 
     def set_waves(self, waves: WaveSolver) -> None:
@@ -84,6 +85,10 @@ class TargetLoad:
         points, rows, lost = _load_points(self._state, patches, surface, texels, timestep / elapsed)
         if len(lost):
             points.places[lost], points.texels[lost] = self._atlas.nearest(points.points[lost])
+        if self._open:
+            points.forces[:] *= np.repeat(
+                _sides(contacts, pose, patches, self._grid.normals[texels]), np.diff(points.begins)
+            )
         size = len(self._movable_area)
         mine = _Texels(self._grid, self._movable_area, distance_scratch(size), slot_scratch(size))
         self._state, given = _load(self._state, patches, points, rows, mine, elapsed)
@@ -98,6 +103,12 @@ class TargetLoad:
         mean, given, over = rest_filter(state.geoms, state.mean, NO_FORCES, elapsed, scratch)
         self._state = state._replace(mean=mean, over=over)
         return Load(mean.texels, given)
+
+
+def _sides(contacts: TargetContacts, pose: Pose, patches: Patches, normals: Floats) -> Floats:
+    """Side from which each geom touches, [p]: 1 outside, -1 inside; the surface's normals are those at its patches."""
+    towards = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, contacts.begins[:-1]) @ pose.rotation
+    return np.where((towards * normals[patches.begins[:-1]]).sum(axis=1) < 0, -1.0, 1.0)
 
 
 @kernel

@@ -51,16 +51,20 @@ def test_a_ball_gives_a_sheet_the_momentum_that_it_loses_on_either_side(inside: 
     data.qvel[:3] = SPEED * (way if inside else -way)
     before = data.qvel[:3].copy()
     ripples = Ripples(model, {"target": Material(density=50)}, resolution=24, backend="cpu", conserve_volume=False)
-    given, points = 0.0, []
+    given, points, sides = 0.0, [], set()
     while data.time < 0.25:
         mujoco.mj_step(model, data)
         ripples.step(data)
         given += sum(each.impulse for each in ripples.last_impulses)
         points += [each.point for each in ripples.last_impulses]
+        sides |= {each.inner for each in ripples.last_impulses}
     lost = MASS * np.linalg.norm(data.qvel[:3] - before)
     assert lost > 1.2 * MASS * SPEED, "it bounced"
     assert given == pytest.approx(lost, rel=0.01)
     np.testing.assert_allclose(np.mean(points, axis=0), 0.5 * way, atol=0.02)
+    # what moves outwards there is pushed from the inner side
+    assert ripples["target"].momentum() == pytest.approx(given if inside else -given, rel=0.01)
+    assert sides == {inside}
 
 
 def test_bodies_drop_on_an_open_mesh(tmp_path) -> None:
