@@ -17,6 +17,8 @@ ROUTES = ("auto", "sdf", "flex", "convex", "hull")
 # Starting points of MuJoCo's search for contacts with a signed distance. Fewer miss contacts; its default of 40 takes
 # five times as long.
 SDF_INITPOINTS = 10
+# MuJoCo makes room for as many contacts of a pair, but finds up to 50 where the other geom is a mesh.
+_MESH_INITPOINTS = 50
 
 
 def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujoco.MjsGeom:
@@ -77,12 +79,20 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
         route = "sdf" if is_closed(spec, found) else "flex"
     if route == "sdf":
         found.type = _GEOM.mjGEOM_SDF
-        spec.option.sdf_initpoints = min(spec.option.sdf_initpoints, SDF_INITPOINTS)
+        spec.option.sdf_initpoints = _initpoints(spec, found)
     elif route == "flex":
         add_flex_collider(spec, found)
     elif route == "convex":
         add_convex_collider(spec, found)
     return found
+
+
+def _initpoints(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> int:
+    """Starting points for a geom of type sdf among the others of its specification."""
+    others = (each for each in spec.geoms if each.name != geom.name and (each.contype or each.conaffinity))
+    if any(each.meshname for each in others):
+        return max(spec.option.sdf_initpoints, _MESH_INITPOINTS)
+    return min(spec.option.sdf_initpoints, SDF_INITPOINTS)
 
 
 def _find(spec: mujoco.MjSpec, key: str) -> mujoco.MjsGeom:

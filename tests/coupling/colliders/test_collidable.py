@@ -3,11 +3,12 @@
 import mujoco
 import numpy as np
 import pytest
+from mujoco_models import add_ball, mesh_spec
 
 from ripple_sim import Material, Ripples, make_collidable
 from ripple_sim.coupling.colliders import collidable
 from ripple_sim.errors import SceneError
-from ripple_sim.scenes.shapes import peanut
+from ripple_sim.scenes.shapes import limbed, peanut
 
 
 def spec_of(V: np.ndarray, F: np.ndarray) -> mujoco.MjSpec:
@@ -106,3 +107,12 @@ def test_fast_bodies_are_stopped_by_speculative_contacts_where_there_are_any(mon
 def test_unknown_names_are_refused(geom: str, route: str, message: str) -> None:
     with pytest.raises(SceneError, match=message):
         make_collidable(spec_of(*peanut(0.05)), geom, route)
+
+
+@pytest.mark.parametrize(("mesh", "points"), [(False, 10), (True, 50)])
+def test_mujoco_has_room_for_the_contacts_of_meshes_with_a_signed_distance(mesh: bool, points: int) -> None:
+    spec = mesh_spec(limbed(0.1), route=None)
+    body = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": "shape"} if mesh else {}
+    add_ball(spec, "other", [0, 0, 2], **body)
+    make_collidable(spec, "target", "sdf")
+    assert spec.option.sdf_initpoints == points
