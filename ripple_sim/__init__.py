@@ -1,4 +1,4 @@
-"""Surface ripples on any genus-0 mesh, driven by the contact forces of a MuJoCo simulation."""
+"""Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation."""
 
 from __future__ import annotations
 

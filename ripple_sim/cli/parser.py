@@ -32,7 +32,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "completion": Completion,
 }
 
-_DESCRIPTION = "Surface ripples on any genus-0 mesh, driven by the contact forces of a MuJoCo simulation."
+_DESCRIPTION = "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation."
 
 
 class UsageError(Exception):
