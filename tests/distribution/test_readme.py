@@ -16,13 +16,12 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
 
 
-@pytest.mark.parametrize("number", range(2))
-def test_python_examples_run(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+@pytest.mark.parametrize(("number", "shown"), [(0, "N s at"), (1, ""), (2, "solid_angle")])
+def test_python_examples_run(number: int, shown: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     write_obj(tmp_path / "my_mesh.obj", *peanut())
     exec(compile(blocks("python")[number], f"README python block {number}", "exec"), {})
-    printed = capsys.readouterr().out
-    assert ("N s at" if number == 0 else "solid_angle") in printed
+    assert shown in capsys.readouterr().out
 
 
 def test_scene_example_is_valid() -> None:
