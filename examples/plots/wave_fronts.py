@@ -9,19 +9,18 @@ of exact geodesic distance that they should run along; colour tells where a fron
 import argparse
 from pathlib import Path
 
-import igl
 import numpy as np
 from figure import FAINT, FOLDER, NAMES, TEXT, save, sheet
 from matplotlib.colors import ListedColormap
 
 from ripple_sim.bench.arrival import arrival_times, ideal_width
+from ripple_sim.bench.geodesics import geodesic_distance
 from ripple_sim.bench.plane_wave import NEAREST, plane_arrival
 from ripple_sim.figures.atlas_painter import AtlasPainter
 from ripple_sim.figures.view import View
 from ripple_sim.overlay.colormap import color_table, colors
 from ripple_sim.scene.up_axis import usual_up
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
-from ripple_sim.solver.cube_map.convention import texel_directions
 from ripple_sim.solver.texels.sampling import sampling_matrix
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
@@ -56,14 +55,16 @@ class FrontPainter(AtlasPainter):
 def fields(atlas: Atlas, source: int, operator: str) -> tuple[np.ndarray, np.ndarray]:
     """Exact geodesic distance of the texels from a vertex, and the distance that the wave's front had gone."""
     mesh = atlas.mesh
-    vertices, none = np.arange(len(mesh.V)), np.empty(0, dtype=np.int64)
-    exact = igl.exact_geodesic(mesh.V, mesh.F, np.array([source]), none, vertices, none)
+    exact = geodesic_distance(mesh, source)
+    # NaN on other parts of the mesh, where no front ever comes and none is expected: they are painted plain
+    exact[~np.isfinite(exact)] = np.nan
     distance = (exact[mesh.F[atlas.triangles]] * atlas.barycentrics).sum(axis=-1)
+    farthest = float(np.nanmax(distance))
     width = ideal_width(atlas)
-    probes = texel_directions(atlas.resolution).reshape(-1, 3)
-    front, _ = arrival_times(atlas, mesh.V[source], probes, width, float(distance.max()), operator)
+    probes = atlas.chart_map.coordinates(mesh, atlas.triangles.ravel(), atlas.positions.reshape(-1, 3))
+    front, _ = arrival_times(atlas, mesh.V[source], probes, width, farthest, operator)
     # a front on the plane is a little behind its distance: read off where it would be by now
-    grid = np.linspace(NEAREST - 1, distance.max() / width * 1.3, 400)
+    grid = np.linspace(NEAREST - 1, farthest / width * 1.3, 400)
     gone = np.interp(front / width, plane_arrival(grid)[0], grid) * width
     return distance, np.where(np.isfinite(gone), gone, 0.0).reshape(distance.shape)
 
@@ -76,13 +77,13 @@ def make(folder: Path, mesh: Path = MESH, resolution: int = 96, up: str = "z", s
         16.0,
         5.6,
         "Wave fronts and geodesic circles",
-        f"{mesh.stem}, 6 x {resolution} x {resolution} texels; fronts at equal times (dark) over circles of exact "
-        "geodesic distance (yellow), from the black point",
+        f"{mesh.stem}, {' x '.join(map(str, atlas.areas.shape))} texels; fronts at equal times (dark) over circles of "
+        "exact geodesic distance (yellow), from the black point",
     )
     nearest = NEAREST * ideal_width(atlas)
     for column, operator in enumerate(NAMES):
         distance, gone = fields(atlas, source, operator)
-        painter = FrontPainter(atlas, distance, gone, float(distance.max()) / CIRCLES, nearest)
+        painter = FrontPainter(atlas, distance, gone, float(np.nanmax(distance)) / CIRCLES, nearest)
         left = 0.012 + 0.232 * column
         axes = figure.add_axes((left, 0.10, 0.225, 0.74))
         axes.imshow(painter.mesh(view, size), interpolation="antialiased")

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +19,7 @@ from ripple_sim.solver.texels.distance import distance_from_point
 from ripple_sim.solver.texels.sampling import sampling_matrix
 
 from .first_crest import front_and_crest
+from .geodesics import geodesic_distance
 from .plane_wave import NEAREST, plane_arrival
 
 # Width of the bump in texels of an ideal even grid: wide enough to be resolved, narrow beside the object's limbs.
@@ -67,20 +67,22 @@ class Arrival:
 
 
 def arrival_error(atlas: Atlas, source: int, operator: str = "fem") -> ArrivalError:
-    """Error of arrival at all vertices of the mesh, from the vertex `source`."""
+    """Error of arrival at all vertices that can be reached from the vertex `source`."""
     return arrival(atlas, source, operator).error()
 
 
 def arrival(atlas: Atlas, source: int, operator: str = "fem", speed: float = 1.0) -> Arrival:
-    """Arrival at all vertices of the mesh from the vertex `source`; expected is a wave speed of 1 m/s.
+    """Arrival at all vertices that can be reached from the vertex `source`; expected is a wave speed of 1 m/s.
 
     The solver's own speed [m/s] differs from that where a formula is calibrated.
     """
     mesh = atlas.mesh
-    vertices, none = np.arange(len(mesh.V)), np.empty(0, dtype=np.int64)
-    distance = igl.exact_geodesic(mesh.V, mesh.F, np.array([source]), none, vertices, none)
+    distance = geodesic_distance(mesh, source)
+    vertices = np.flatnonzero(np.isfinite(distance))
+    distance = distance[vertices]
     width = ideal_width(atlas)
-    front, crest = arrival_times(atlas, mesh.V[source], atlas.sphere, width, distance.max(), operator, speed)
+    probes = _vertex_coordinates(atlas)[vertices]
+    front, crest = arrival_times(atlas, mesh.V[source], probes, width, distance.max(), operator, speed)
     far = distance > NEAREST * width
     expected_front, expected_crest = plane_arrival(distance[far] / width)
     return Arrival(front[far] / (expected_front * width), crest[far] / (expected_crest * width))
@@ -88,15 +90,15 @@ def arrival(atlas: Atlas, source: int, operator: str = "fem", speed: float = 1.0
 
 def ideal_width(atlas: Atlas) -> float:
     """Width of the bump [m]."""
-    return WIDTH * float(np.sqrt(atlas.mesh.area / (6 * atlas.resolution**2)))
+    return WIDTH * float(np.sqrt(atlas.mesh.area / atlas.areas.size))
 
 
-def spread_sources(atlas: Atlas, count: int) -> list[int]:
-    """Vertices spread evenly over the atlas, the same for every call: nearest to a spiral on the sphere."""
-    k = np.arange(count) + 0.5
-    z, angle = 1 - 2 * k / count, k * np.pi * (3 - np.sqrt(5))
-    spiral = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z], axis=1)
-    return [int(vertex) for vertex in np.argmax(spiral @ atlas.sphere.T, axis=1)]
+def _vertex_coordinates(atlas: Atlas) -> NDArray[np.float64]:
+    """Map coordinates of the mesh's vertices, [vertex_count, d], each in a triangle of its own sheet."""
+    mesh = atlas.mesh
+    triangle = np.zeros(len(mesh.V), np.int64)
+    triangle[mesh.F] = np.arange(len(mesh.F))[:, None]
+    return atlas.chart_map.coordinates(mesh, triangle, mesh.V)
 
 
 def arrival_times(
@@ -115,7 +117,7 @@ def arrival_times(
     source : [3]
         Where the bump is [m].
     probes : [k, d]
-        Map coordinates, as `Atlas.project` gives them.
+        Map coordinates, as `Atlas.project` gives them: directions, or places on the charts.
     width : float
         Of the bump [m].
     distance : float

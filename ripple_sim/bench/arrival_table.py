@@ -17,7 +17,8 @@ from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, RippleError, build_atlas, load_mesh
 from ripple_sim.solver.operator.assembly import OPERATORS
 
-from .arrival import Arrival, arrival, spread_sources
+from .arrival import Arrival, arrival
+from .sources import spread_sources
 
 CALIBRATED = "dynamic-paint, calibrated"
 CONFORMAL = "paper, conformal map"
@@ -48,7 +49,7 @@ def _rows(mesh: Mesh, resolution: int, sources: int) -> dict[str, Row]:
     rows[CALIBRATED] = {**calibrated, "speed factor": factor}
     rows[CONFORMAL] = None
     try:
-        conformal = build_atlas(mesh, resolution, method="conformal")
+        conformal = build_atlas(mesh, resolution, method="conformal", layout="cube")
     except RippleError:
         return rows
     rows[CONFORMAL] = mean_error(_measure(conformal, vertices, "paper"))

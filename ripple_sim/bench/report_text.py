@@ -113,7 +113,7 @@ def _arrival(table: Mapping[str, Mapping[str, Mapping[str, float] | None]]) -> s
     for mesh, operators in table.items():
         for operator, row in operators.items():
             if row is None:
-                rows.append([mesh, operator, "refused: the sphere map folds", *[""] * 6])
+                rows.append([mesh, operator, "refused: no sphere map without folds", *[""] * 6])
                 continue
             errors = [f"{100 * value:.2f} %" for key, value in row.items() if key != "speed factor"]
             rows.append([mesh, operator, *errors, f"x {row['speed factor']:.3f}" if "speed factor" in row else ""])

@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 import trimesh
 from known_meshes import known_mesh
+from surfaces import disk, joined, moved, torus
 
-from ripple_sim.bench.arrival import arrival_error, arrival_times, ideal_width, spread_sources
+from ripple_sim.bench.arrival import arrival, arrival_error, arrival_times, ideal_width
+from ripple_sim.bench.geodesics import geodesic_distance
 from ripple_sim.bench.plane_wave import plane_arrival
+from ripple_sim.bench.sources import spread_sources
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas, load_mesh, sphere_atlas
 
@@ -75,3 +78,17 @@ def test_same_object_otherwise_presented_has_the_same_times() -> None:
         change = np.abs(times(*case) / reference - 1)[away]
         assert np.nanmedian(change) < 0.005, name
         assert np.nanquantile(change, 0.9) < 0.01, name
+
+
+def test_waves_arrive_in_time_on_any_surface_and_not_on_its_other_parts() -> None:
+    ring, drum = torus(24), moved(disk(12), (3, 0, 0))
+    atlas = build_atlas(joined(ring, drum), 64, cache=False, layout="patches")
+    sources = spread_sources(atlas, 3)
+    assert max(sources) < len(ring.V)  # on the larger part
+    other = len(ring.V) + np.argmin(np.linalg.norm(drum.V - drum.V.mean(axis=0), axis=1))
+    for source, own in ((sources[0], ring), (int(other), drum)):
+        times = arrival(atlas, source)
+        assert 0.5 * len(own.V) < len(times.front) < len(own.V)
+        assert np.isfinite(geodesic_distance(atlas.mesh, source)).sum() == len(own.V)
+        assert times.error().front_median < 0.01
+        assert times.error().front_under_3_percent > 0.8

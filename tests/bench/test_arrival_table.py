@@ -1,10 +1,15 @@
 """Calibration finds a known speed, and the paper's map stands beside ours."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import trimesh
+from surfaces import torus
 
-from ripple_sim.bench.arrival import Arrival, arrival, spread_sources
+from ripple_sim.bench.arrival import Arrival, arrival
 from ripple_sim.bench.arrival_table import CALIBRATED, CONFORMAL, arrivals, mean_error, speed_factor
+from ripple_sim.bench.sources import spread_sources
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas
 
@@ -53,3 +58,14 @@ def test_table_has_our_operator_and_its_rivals() -> None:
     assert conformal.keys() == rows["paper"].keys()
     assert conformal != rows["paper"]
     assert rows["fem"]["front_median"] < min(calibrated["front_median"], conformal["front_median"])
+
+
+def test_a_mesh_with_a_handle_has_no_sphere_map_and_all_else(tmp_path: Path) -> None:
+    ring = torus(16)
+    trimesh.Trimesh(ring.V, ring.F, process=False).export(tmp_path / "ring.obj")
+    rows = arrivals([tmp_path / "ring.obj"], resolution=24, sources=1)["ring"]
+    assert rows.pop(CONFORMAL) is None
+    assert len(rows) == 5
+    for name, row in rows.items():
+        assert np.isfinite(list(row.values())).all(), name
+    assert rows["fem"]["front_median"] < 0.5 * rows["paper"]["front_median"]
