@@ -99,9 +99,15 @@ def midpoints(edges: Edges, attributes: NDArray, position: slice, normal: slice)
     """Attributes of the midpoints of all edges, [k, ...]; see `tessellate`."""
     a, b = attributes[edges.ends[:, 0]], attributes[edges.ends[:, 1]]
     middle = (a + b) / 2
-    middle[:, position] += edges.inner[:, None] * _bulge(a[:, position], b[:, position], a[:, normal], b[:, normal])
+    middle[:, position] += bulges(edges, attributes, position, normal)
     middle[:, normal] /= np.maximum(_length(middle[:, normal]), 1e-12)[:, None]
     return middle
+
+
+def bulges(edges: Edges, attributes: NDArray, position: slice, normal: slice) -> NDArray[np.float64]:
+    """How far the midpoints of all edges move out [m], [k, 3]; see `tessellate`."""
+    a, b = attributes[edges.ends[:, 0]], attributes[edges.ends[:, 1]]
+    return edges.inner[:, None] * _bulge(a[:, position], b[:, position], a[:, normal], b[:, normal])
 
 
 def _length(vectors: NDArray) -> NDArray[np.float64]:

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from ripple_sim.render.visuals.corners import normalized, smooth_normals, split_corners
 from ripple_sim.render.visuals.texture_mapping import Mapping
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.texels.parts_mesh import parts_mesh
 
 from . import ambient_occlusion as occlusion
 from .charts import Charts, VertexColumns, shared_places, split_at_charts
+from .rounded_parts import rounded_parts
 from .surface import Surface
 from .tessellation import Edges, edges_of, midpoints, tessellate
 from .vertex_order import in_memory_order
@@ -56,11 +56,11 @@ def tessellated(
     F, attributes, same
         As for `tessellate`; the attributes' columns are named above.
     """
-    parts = parts_mesh(charts.map, mesh)
-    V, F = parts.V, parts.F
-    split = split_corners(V, F, None if corner_uv is None else parts.carry(corner_uv), parts.coordinates)
+    parts, V, normals = rounded_parts(mesh, charts.map)
+    F = parts.F
+    split = split_corners(V, F, None if corner_uv is None else parts.carry(corner_uv), parts.coordinates, normals)
     baked = np.zeros((len(mesh.V), 3)) if baked is None else baked
-    if V is not mesh.V:
+    if parts.V is not mesh.V:
         at_parts = np.zeros((len(V), 6))
         at_parts[F] = parts.carry(np.concatenate([smooth, baked], axis=1)[mesh.F])
         smooth, baked = normalized(at_parts[:, :3]), at_parts[:, 3:]

@@ -29,12 +29,20 @@ class SplitMesh(NamedTuple):
 
 
 def split_corners(
-    V: NDArray, F: NDArray, corner_uv: NDArray | None = None, coordinates: NDArray | None = None
+    V: NDArray,
+    F: NDArray,
+    corner_uv: NDArray | None = None,
+    coordinates: NDArray | None = None,
+    normals: NDArray | None = None,
 ) -> SplitMesh:
-    """Split vertices where normals, texture coordinates [m, 3, 2] or other coordinates [m, 3, d] jump."""
+    """Split vertices where normals, texture coordinates [m, 3, 2] or other coordinates [m, 3, d] jump.
+
+    The normals, [m, 3, 3], are those of `corner_normals` unless given.
+    """
+    normals = corner_normals(V, F) if normals is None else normals
     uv = np.zeros((*F.shape, 2)) if corner_uv is None else corner_uv
     others = np.zeros((*F.shape, 0)) if coordinates is None else coordinates
-    corners = np.concatenate([F[:, :, None], corner_normals(V, F), uv, others], axis=2)
+    corners = np.concatenate([F[:, :, None], normals, uv, others], axis=2)
     unique, index = np.unique(corners.reshape(F.size, -1), axis=0, return_inverse=True)
     return SplitMesh(
         unique[:, 0].astype(np.int64), index.reshape(F.shape), unique[:, 1:4], unique[:, 4:6], unique[:, 6:]
