@@ -9,10 +9,10 @@ from ripple_sim.scene.load_scene import load_scene, shipped_scenes
 from ripple_sim.scenes import shapes
 from ripple_sim.simulation import Simulation
 
-NAMES = ["animal", "duck", "finger", "heavy", "kick", "pair", "rolling", "sphere"]
+NAMES = ["animal", "duck", "finger", "heavy", "kick", "pair", "pretzel", "rolling", "sphere", "teapot"]
 
 
-def test_eight_scenes_are_shipped() -> None:
+def test_scenes_are_shipped() -> None:
     assert set(NAMES) <= set(shipped_scenes())
 
 
