@@ -9,6 +9,7 @@ from ripple_sim.solver.kernel import Floats32, kernel
 from ripple_sim.solver.texels.atlas import Atlas
 from ripple_sim.solver.texels.halo import fill_halo
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
+from ripple_sim.solver.texels.topology import TexelTopology
 
 from .displacement_limit import DisplacementLimit
 
@@ -51,7 +52,8 @@ class HeightMap:
         -------
         float32 [C, n + 2, n + 2, 4]
             Gradient of the height in the frame of the mesh (tangent to the surface, dimensionless), and the height
-            [m]. For the halo see `fill_halo`.
+            [m]. For the halo see `fill_halo`; beyond a fixed rim lie the negative heights, so that those drawn come
+            to 0 at the rim.
         """
         around = np.zeros(self._topology.halo.shape, np.float32)
         around[:, 1:-1, 1:-1] = height if self._limit is None else self._limit(height)
@@ -59,7 +61,22 @@ class HeightMap:
         height_map = np.empty((*around.shape, 4), np.float32)
         _differentiate(self._weights, around, height_map)
         fill_halo(self._topology, height_map)
+        if self._topology.fixed_rim:
+            _mirror_at_rim(self._topology, height_map)
         return height_map
+
+
+def _mirror_at_rim(topology: TexelTopology, height_map: NDArray[np.float32]) -> None:
+    """Fill in what lies beyond a fixed rim: the mirror image of the texels beside it, with heights below 0 for above."""
+    turned = np.array([1, 1, 1, -1], np.float32)
+    height_map[topology.rim] = height_map[:, 1:-1, 1:-1].reshape(-1, 4)[topology.halo[topology.rim]] * turned
+    last = height_map.shape[1] - 1
+    for corner, (r, c) in enumerate(((0, 0), (0, last), (last, last), (last, 0))):
+        # the four places round a corner in the rim have a mean height of 0
+        r_in, c_in = abs(r - 1), abs(c - 1)
+        ends = topology.valence[:, corner] == 0
+        heights = height_map[ends, ..., 3]
+        height_map[ends, r, c, 3] = -(heights[:, r_in, c_in] + heights[:, r_in, c] + heights[:, r, c_in])
 
 
 # the eight neighbours (row, column) in the order of the gradient weights
@@ -70,8 +87,9 @@ def _gradient_weights(texels: TexelMesh) -> NDArray[np.float64]:
     """Vectors g with gradient = sum over the 8 neighbours of g (h_j - h_i), shape [C n^2, 8, 3] in [1/m]."""
     n = texels.resolution
     around = texels.halo_positions.copy()
-    # beyond a rim the halo repeats heights: nothing is known there
-    around[texels.topology.rim] = np.nan
+    if not texels.topology.fixed_rim:
+        # beyond a free rim the halo repeats heights: nothing is known there; a fixed one's own points are at 0
+        around[texels.topology.rim] = np.nan
     center = texels.positions.reshape(-1, 3)
     normal = texels.normals.reshape(-1, 3)
     tangent = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))

@@ -33,7 +33,8 @@ class VolumeBalance:
         weighed = self._lightness[texels] * momenta
         if self._parts is None:
             return -float(weighed.sum()) / float(self._least) if self._least else 0.0
-        sums = np.bincount(self._parts[texels], weighed, len(self._least))
+        # of no texels, bincount makes integers
+        sums = np.bincount(self._parts[texels], weighed, len(self._least)).astype(np.float64)
         return np.divide(-sums, self._least, out=np.zeros_like(sums), where=self._least > 0)
 
     def balanced_velocity(self, field: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hand_made import two_squares
 
-from ripple_sim.solver import Material, WaveSolver, sphere_atlas, texel_atlas
+from ripple_sim.solver import Load, Material, WaveSolver, sphere_atlas, texel_atlas
 
 
 def volume_rate(waves: WaveSolver) -> float:
@@ -76,6 +76,13 @@ def test_what_is_done_to_one_part_of_a_mesh_leaves_the_others_at_rest(backend: s
     assert not waves.height[0].any() and not waves.velocity[0].any()
     assert np.abs(waves.height[1]).max() > 0.1
     assert abs(waves.volume()) < 1e-6
+
+
+def test_a_load_on_no_texel_leaves_a_mesh_of_two_parts_at_rest(backend: str) -> None:
+    atlas = texel_atlas(two_squares(12))
+    waves = WaveSolver(atlas, Material(speed=1.0), backend=backend)
+    waves.step(0.1, load=Load.none())
+    assert not waves.height.any()
 
 
 def test_an_island_among_rigid_texels_does_not_sink_under_a_load(backend: str) -> None:
