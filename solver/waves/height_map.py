@@ -58,7 +58,7 @@ class HeightMap:
         around = np.zeros(self._topology.halo.shape, np.float32)
         around[:, 1:-1, 1:-1] = height if self._limit is None else self._limit(height)
         fill_halo(self._topology, around)
-        height_map = np.empty((*around.shape, 4), np.float32)
+        height_map = np.zeros((*around.shape, 4), np.float32)
         _differentiate(self._weights, around, height_map)
         fill_halo(self._topology, height_map)
         if self._topology.fixed_rim:
@@ -67,7 +67,7 @@ class HeightMap:
 
 
 def _mirror_at_rim(topology: TexelTopology, height_map: NDArray[np.float32]) -> None:
-    """Fill in what lies beyond a fixed rim: the mirror image of the texels beside it, with heights below 0 for above."""
+    """Fill in what lies beyond a fixed rim: the texels' mirror image, with heights turned over."""
     turned = np.array([1, 1, 1, -1], np.float32)
     height_map[topology.rim] = height_map[:, 1:-1, 1:-1].reshape(-1, 4)[topology.halo[topology.rim]] * turned
     last = height_map.shape[1] - 1
