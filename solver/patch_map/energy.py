@@ -53,13 +53,13 @@ def density_derivatives(
     return w, slope_d, slope_j, bend_d, mixed, 2.0 * p * (2.0 * p + 1.0) * inverse / (jacobian * jacobian)
 
 
-def reference_of(V: Floats, F: Ints, carried: Floats, charts: int, power: int) -> Reference:
+def reference_of(V: Floats, F: Ints, gathered: Floats, charts: int, power: int) -> Reference:
     """The shapes of the triangles F [m, 3], with the areas that their vertices stand for [n], `charts` in all."""
-    count = len(carried)
+    count = len(gathered)
     tiny = np.finfo(np.float64).tiny
     areas, cotangent = _shapes(V, F, tiny)
     lumped = np.bincount(F.ravel(), np.repeat(areas / 3, 3), count)
-    load = np.clip(carried / np.maximum(lumped, tiny), 1.0 / _MOST_LOAD, _MOST_LOAD)
+    load = np.clip(gathered / np.maximum(lumped, tiny), 1.0 / _MOST_LOAD, _MOST_LOAD)
     areas = areas * load[F].mean(axis=1)
     areas = np.maximum(areas, _LEAST_AREA * areas.mean())
     return Reference(areas * (charts / areas.sum()), cotangent, power)

@@ -19,8 +19,10 @@ from .seamless import SeamlessMap
 from .surface import Surface
 
 CELLS = 24
-_TRIANGLES = 2000  # of a component, in units of the square of its longest edge
-_FEWEST_TRIANGLES = 40  # of a cell, likewise
+_MOST_CELLS = 96  # of a mesh in parts of uneven sizes
+_FEWEST = 0.5  # cells that the smallest part should have by its area; in truth it has four
+_NEGLIGIBLE = 2e-3  # share of the area of a part for which no others are cut smaller
+_TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -54,15 +56,18 @@ def _components(V: NDArray[np.float64], F: NDArray[np.int64]) -> list[tuple[NDAr
     links = coo_array((np.ones(F.size), (F.ravel(), np.roll(F, -1, axis=1).ravel())), shape=(len(V), len(V)))
     _, part = connected_components(links, directed=False)
     number, of = np.unique(part[F[:, 0]], return_inverse=True)
-    area = np.bincount(of, Surface.of(V, F).areas)
-    count = np.maximum(1, np.rint(CELLS * area / area.sum())).astype(int)
+    areas = Surface.of(V, F).areas
+    share = np.bincount(of, areas / areas.sum())
+    # a small part has a few cells at least; where others have more, its texels are less tiny beside theirs
+    small = share[share > _NEGLIGIBLE].min()
+    count = np.maximum(1, np.rint(np.clip(_FEWEST / small, CELLS, _MOST_CELLS) * share)).astype(int)
     return [(np.flatnonzero(of == each), int(count[each])) for each in range(len(number))]
 
 
 def _component_quads(V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArray[np.int64], count: int) -> Quads:
     used, corners = np.unique(F[faces], return_inverse=True)
     whole = Surface.of(V[used], corners.reshape(-1, 3))
-    longest = np.sqrt(whole.areas.sum() / max(_TRIANGLES * count / CELLS, _FEWEST_TRIANGLES * count))
+    longest = np.sqrt(whole.areas.sum() / (_TRIANGLES / CELLS * count))
     surface = refined(dataclasses.replace(whole, parent=faces), longest)
     graph = distance_graph(surface)
     cells = centred_cells(surface, graph, spread_seeds(graph, count))

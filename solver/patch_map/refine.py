@@ -17,7 +17,8 @@ _HALVES: dict[int, tuple[Triangle, ...]] = {
     5: ((CA, A, AB), (C, CA, AB), (C, AB, B)),
     7: ((A, AB, CA), (AB, B, BC), (CA, BC, C), (AB, BC, CA)),
 }
-_MOST_ROUNDS = 40
+_MOST_ROUNDS = 100
+_MOST_TRIANGLES, _MOST_GROWTH = 40_000, 3  # of a part; of one that has more to begin with, so many times as many
 
 
 def halved(surface: Surface, chosen: NDArray[np.bool_]) -> Subdivision:
@@ -33,10 +34,18 @@ def halved_chords(surface: Surface, part: NDArray[np.int64], on_border: NDArray[
 
 
 def refined(surface: Surface, longest: float) -> Surface:
-    """Split edges until none is longer than `longest` [m]."""
+    """Split edges until none is longer than `longest` [m], that of a triangle first, so that needles lose length.
+
+    Where that would take too many triangles, longer ones are left.
+    """
+    most = max(_MOST_TRIANGLES, _MOST_GROWTH * len(surface.F))
     for _ in range(_MOST_ROUNDS):
-        long = surface.edge_lengths > longest
-        if not long.any():
+        lengths = surface.edge_lengths
+        own = np.take_along_axis(surface.edges.of, lengths[surface.edges.of].argmax(axis=1)[:, None], axis=1)
+        chosen = np.zeros(len(lengths), bool)
+        chosen[own] = True
+        chosen &= lengths > longest
+        if not chosen.any() or len(surface.F) > most:
             break
-        surface = halved(surface, long).surface
+        surface = halved(surface, chosen).surface
     return surface

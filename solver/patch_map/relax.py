@@ -35,12 +35,12 @@ def relaxed(quads: Quads) -> SeamlessMap:
     start, across = seamless_map(quads), transitions(quads.glued)
     rounds, order, merged = thinned(start, quads.surface.V)
     V = quads.surface.V[order]
-    carried = _carried(quads.surface.V, quads.surface.F, order, merged, rounds)
+    gathered = _gathered(quads.surface.V, quads.surface.F, order, merged, rounds)
     whole = start._replace(
         x=start.x[order], chart=start.chart[order], freedom=start.freedom[order], moved=start.moved[order]
     )
     count = done = 0
-    for each, areas in zip(rounds[::-1], carried[::-1], strict=True):
+    for each, areas in zip(rounds[::-1], gathered[::-1], strict=True):
         level = _level(whole, each)
         reference = reference_of(V, each.F, areas, len(quads.glued), _POWER)
         if count:
@@ -85,7 +85,7 @@ def _catch_up(level: SeamlessMap) -> None:
             level.turn[f, k], level.shift[f, k, 0], level.shift[f, k, 1] = after(back, frame_of(level, f, k))
 
 
-def _carried(
+def _gathered(
     V: Floats, F: Ints, order: NDArray[np.int64], merged: NDArray[np.int64], rounds: list[Round]
 ) -> list[NDArray[np.float64]]:
     """Area that the vertices of each round stand for [m^2]."""

@@ -55,7 +55,7 @@ class Atlas:
 
     @property
     def layout(self) -> str:
-        """How the mesh got its charts: "cube"."""
+        """How the mesh got its charts: "cube", "patches", or "given"."""
         return self.chart_map.layout
 
     @property
@@ -144,10 +144,11 @@ class Atlas:
         Returns
         -------
         dict
-            Of the cube layout: `flipped` triangles, `solid_angle` [sr] (4 pi for a bijection), area-weighted stretch
-            quantiles `q001`, `q01`, `q50`, `q99`, `q999`, `starved` share of the area whose texels are over 4 times too
-            wide. Of every layout: `edge_min` and `edge_max` [m], `coverage` (texel area over mesh area: 1 but for limbs
-            that fall between the texels), `spanned` (area of the mesh of texel centres over mesh area: it cuts creases
+            Of the cube layout: `solid_angle` [sr] (4 pi for a bijection). Of cube and patches: `flipped` triangles,
+            area-weighted stretch quantiles `q001`, `q01`, `q50`, `q99`, `q999`, `starved` share of the area whose
+            texels are over 4 times too wide. Of every layout: `edge_min` and `edge_max` [m], `folded` texels (their
+            neighbours lie in the wrong order round them), `coverage` (texel area over mesh area: 1 but for limbs that
+            fall between the texels), `spanned` (area of the mesh of texel centres over mesh area: it cuts creases
             short too), `timestep` (stable time step over that of an endless even grid of as many texels).
         """
         return {**self.chart_map.quality(self.mesh), **texel_quality(self.texels, self.mesh)}

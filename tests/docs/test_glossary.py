@@ -65,6 +65,7 @@ ALLOWED = [
     ("solver/sphere_map/", "ahead", "a trial step of the descent"),
     ("solver/sphere_map/", "folded", "a triangle that the map turns over"),
     ("solver/patch_map/", "folded", "a triangle that the map turns over"),
+    ("solver/texels/quality.py", "folded", "a texel whose neighbours turn over"),
     ("solver/mesh/", "folded", "a polygon that turns over"),
     ("solver/", "piece", "part of a triangle, cut at the edges of the cube"),
     ("solver/", "pieces", "parts of a triangle"),

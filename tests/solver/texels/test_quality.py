@@ -16,7 +16,7 @@ def test_a_rectangle_is_covered_by_texels_as_long_and_as_wide_as_its_sides_say()
     texels = flat_charts([[[0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0]]], RIMS, 5)
     found = texel_quality(texels, texel_atlas(texels).mesh)
     timestep = found.pop("timestep")
-    assert found == pytest.approx({"edge_min": 1 / 5, "edge_max": 3 / 5, "coverage": 1, "spanned": 1})
+    assert found == pytest.approx({"edge_min": 1 / 5, "edge_max": 3 / 5, "folded": 0, "coverage": 1, "spanned": 1})
     # the shorter sides set it
     assert 1 / np.sqrt(3) < timestep < 1
 
