@@ -115,7 +115,7 @@ def test_the_same_mesh_gives_the_same_atlas() -> None:
     np.testing.assert_array_equal(one.areas, other.areas)
 
 
-@pytest.mark.parametrize("name", ["several-parts-teapot.obj", "genus3-3holes.off"])
+@pytest.mark.parametrize("name", ["several-parts-teapot.obj", "genus3-3holes.off", "genus1-rocker-arm.obj"])
 def test_known_meshes_that_no_cube_fits_carry_waves(name: str) -> None:
     atlas = build_atlas(load_mesh(known_mesh(f"bad/{name}")), 32, cache=False)
     assert atlas.quality()["flipped"] == 0

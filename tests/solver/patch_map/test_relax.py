@@ -1,0 +1,34 @@
+"""Relaxed maps: no fold, every chart covered once, less energy than in the beginning."""
+
+import numpy as np
+import pytest
+from surfaces import disk, torus
+
+from ripple_sim.solver.patch_map.cells import centred_cells, spread_seeds
+from ripple_sim.solver.patch_map.disks import disk_cells
+from ripple_sim.solver.patch_map.distances import distance_graph
+from ripple_sim.solver.patch_map.energy import reference_of, total_energy
+from ripple_sim.solver.patch_map.flatten import signed_areas
+from ripple_sim.solver.patch_map.quads import cut_into_quads
+from ripple_sim.solver.patch_map.relax import relaxed
+from ripple_sim.solver.patch_map.seamless import corner_places, seamless_map
+from ripple_sim.solver.patch_map.surface import Surface
+from ripple_sim.solver.patches.located import locate_texels
+
+
+@pytest.mark.parametrize("mesh", [torus(20), disk(14)], ids=["torus", "disk"])
+def test_a_relaxed_map_covers_the_charts_once_with_less_energy(mesh) -> None:
+    surface = Surface.of(mesh.V, mesh.F)
+    graph = distance_graph(surface)
+    quads = cut_into_quads(disk_cells(surface, graph, centred_cells(surface, graph, spread_seeds(graph, 8))))
+    seamless = relaxed(quads)
+    areas = signed_areas(corner_places(seamless))
+    assert areas.min() > 0
+    assert areas.sum() == pytest.approx(len(quads.glued))
+    assert (seamless.x >= 0).all() and (seamless.x <= 1).all()
+    F, V = quads.surface.F, quads.surface.V
+    own = np.bincount(F.ravel(), np.repeat(quads.surface.areas / 3, 3), len(V))
+    reference = reference_of(V, F, own, len(quads.glued), 2)
+    assert total_energy(seamless, reference) < 0.9 * total_energy(seamless_map(quads), reference)
+    triangles, _ = locate_texels(seamless, 16)
+    assert (triangles >= 0).all()
