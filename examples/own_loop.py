@@ -18,7 +18,7 @@ MODEL = """<mujoco>
     <geom name="floor" type="plane" size="0 0 1" rgba="0.87 0.9 0.92 1"/>
     <geom name="egg" type="ellipsoid" size="0.42 0.3 0.3" pos="0 0 0.3" rgba="0.93 0.6 0.35 1"/>
     <body pos="0.08 -0.05 0.9"><freejoint/>
-      <geom size="0.05" density="900" rgba="0.15 0.3 0.5 1" solref="0.005 0.3"/></body>
+      <geom size="0.07" density="350" rgba="0.15 0.3 0.5 1" solref="0.005 0.3"/></body>
   </worldbody>
 </mujoco>"""
 
@@ -26,10 +26,10 @@ MODEL = """<mujoco>
 def main() -> None:
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
-    material = Material(speed=0.6, damping=1.5, stiffness=1500.0, viscosity=3e-4, density=150.0)
+    material = Material(speed=0.6, damping=1.5, stiffness=1500.0, viscosity=3e-4, density=300.0)
     ripples = Ripples(model, {"egg": material}, resolution=96)
     renderer = RippleRenderer(model, ripples, width=480, height=400, looks={"egg": "jelly"})
-    camera = Camera(lookat=(0.0, 0.0, 0.33), distance=1.9, azimuth=120.0, elevation=-32.0)
+    camera = Camera(lookat=(0.0, 0.0, 0.36), distance=1.5, azimuth=50.0, elevation=-48.0)
 
     frames, hit = [], np.inf
     while len(frames) < 3:

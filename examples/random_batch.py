@@ -36,7 +36,7 @@ resolution = 64
 speed = 0.6
 damping = 1.5
 stiffness = 300
-density = 1500
+density = 2000
 [random]
 seed = {seed}
 position = 0.15

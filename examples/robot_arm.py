@@ -71,11 +71,11 @@ def main() -> None:
         add_cover(spec, name, solids)
     model = spec.compile()
     data = mujoco.MjData(model)
-    skin = Material(speed=1.0, damping=1.5, stiffness=8000.0, viscosity=2e-4, density=170.0)
+    skin = Material(speed=0.8, damping=1.5, stiffness=3000.0, viscosity=2e-4, density=220.0)
     ripples = Ripples(model, {"upper cover": skin, "lower cover": skin}, resolution=96)
     looks = {"upper cover": "rubber", "lower cover": "jelly"}
     renderer = RippleRenderer(model, ripples, width=480, height=400, looks=looks)
-    camera = Camera(lookat=(0.2, 0.0, 0.55), distance=1.35, azimuth=115.0, elevation=-32.0)
+    camera = Camera(lookat=(0.22, 0.0, 0.66), distance=0.95, azimuth=115.0, elevation=-38.0)
 
     frames, given = [], dict.fromkeys(ripples, 0.0)
     while len(frames) < len(TIMES):

@@ -29,11 +29,11 @@ TIMES = (0.3, 0.42, 0.55)
 def main() -> None:
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
-    soft = Material(speed=0.5, damping=3.0, stiffness=3000.0, viscosity=5e-4, density=600.0)
+    soft = Material(speed=0.6, damping=2.0, stiffness=1500.0, viscosity=3e-4, density=1600.0)
     ripples = Ripples(model, dict.fromkeys(("red", "blue", "yellow"), soft), resolution=64)
     looks = {"red": "rubber", "blue": "jelly", "yellow": "clay"}
     renderer = RippleRenderer(model, ripples, width=480, height=400, looks=looks)
-    camera = Camera(lookat=(0.0, 0.0, 0.3), distance=2.1, azimuth=80.0, elevation=-38.0)
+    camera = Camera(lookat=(0.0, 0.0, 0.36), distance=1.75, azimuth=80.0, elevation=-38.0)
 
     frames = []
     while len(frames) < len(TIMES):

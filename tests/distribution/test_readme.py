@@ -16,6 +16,7 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
 
 
+@pytest.mark.filterwarnings("error::ripple_sim.errors.RippleWarning")
 @pytest.mark.parametrize(("number", "shown"), [(0, "N s at"), (1, ""), (2, "solid_angle")])
 def test_python_examples_run(number: int, shown: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)

@@ -5,13 +5,17 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
+import mujoco
+
 from ripple_sim.coupling.model.flex_colliders import find_flex_colliders
 from ripple_sim.errors import RippleWarning
 
 
 def warn_of_unsupported(model: Any) -> None:
     """Warn once of what will be missing from the frames; flex colliders of targets are drawn as their geoms."""
-    kinds = {"tendons": model.ntendon, "flexes": model.nflex - len(find_flex_colliders(model)), "skins": model.nskin}
+    # fixed tendons tie joints together and have no path that could be drawn
+    spatial = int((model.wrap_type[model.tendon_adr] != mujoco.mjtWrap.mjWRAP_JOINT).sum())
+    kinds = {"tendons": spatial, "flexes": model.nflex - len(find_flex_colliders(model)), "skins": model.nskin}
     missing = [f"{count} {kind}" for kind, count in kinds.items() if count]
     if missing:
         warnings.warn(
