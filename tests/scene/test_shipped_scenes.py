@@ -9,7 +9,20 @@ from ripple_sim.scene.load_scene import load_scene, shipped_scenes
 from ripple_sim.scenes import shapes
 from ripple_sim.simulation import Simulation
 
-NAMES = ["animal", "duck", "finger", "heavy", "kick", "pair", "pretzel", "rolling", "sphere", "teapot"]
+NAMES = [
+    "animal",
+    "drum",
+    "duck",
+    "finger",
+    "heavy",
+    "kick",
+    "pair",
+    "pretzel",
+    "rolling",
+    "sphere",
+    "teapot",
+    "terrain",
+]
 
 
 def test_scenes_are_shipped() -> None:
