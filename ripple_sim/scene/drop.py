@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.colliders.collidable import make_collidable
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, Mesh, load_mesh
+from ripple_sim.solver.texels.thickness import half_thickness_at
 
 from .body_shapes import BODY_SHAPES
 from .camera import CameraEntry
@@ -24,6 +25,9 @@ from .up_axis import UP_AXES, usual_up
 
 SIZE = 1.0  # the target's longest edge of its bounding box [m]
 DURATION = 5.0
+
+# Depth of a typical hit over half the usual thickness of the target, and at most over its size.
+_AMPLITUDE, _DEEPEST = 0.9, 0.2
 
 
 def drop_scene(
@@ -85,7 +89,7 @@ def drop_scene(
     return Scene(
         name=Path(mesh_path).stem,
         model=model,
-        targets=(RippleEntry(geom="target", look=look, material=_material()),),
+        targets=(RippleEntry(geom="target", look=look, material=_material(mesh)),),
         camera=_camera(float(V[:, 2].max())),
         duration=DURATION,
         events=Events(drop=tuple(drops)),
@@ -93,10 +97,23 @@ def drop_scene(
     )
 
 
-def _material() -> MaterialEntry:
-    """Waves slow and high enough to watch on a target on which typical bodies fall."""
-    suited = Material.suited(SIZE, TYPICAL_HIT, radius=TYPICAL_FOOTPRINT, amplitude=0.2, crossing=1.5, decay=3.0)
+def _material(mesh: Mesh) -> MaterialEntry:
+    """Waves slow and high enough to watch under typical bodies, and lower on a thin target."""
+    amplitude = min(_AMPLITUDE * _usual_radius(mesh), _DEEPEST)
+    suited = Material.suited(SIZE, TYPICAL_HIT, radius=TYPICAL_FOOTPRINT, amplitude=amplitude, crossing=1.5, decay=3.0)
     return MaterialEntry(**{name: getattr(suited, name) for name in COEFFICIENTS if np.isfinite(getattr(suited, name))})
+
+
+def _usual_radius(mesh: Mesh) -> float:
+    """Median of the half thickness over the surface, as a share of the longest extent."""
+    corners = mesh.V[mesh.F]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    doubled = np.linalg.norm(normals, axis=1)
+    normals = normals / np.maximum(doubled, np.finfo(float).tiny)[:, None]
+    radius = half_thickness_at(mesh, corners.mean(axis=1), normals)
+    order = np.argsort(radius)
+    reached = np.cumsum(doubled[order])
+    return float(radius[order[np.searchsorted(reached, reached[-1] / 2)]] / np.ptp(mesh.V, axis=0).max())
 
 
 def _camera(height: float) -> CameraEntry:

@@ -7,6 +7,8 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from ripple_sim.solver.mesh.mesh import Mesh
+
 from .atlas import Atlas
 from .smoothing import smoothed
 
@@ -22,12 +24,16 @@ def half_thickness(atlas: Atlas) -> NDArray[np.float64]:
     the shape diameter function", with one ray a texel instead of a cone), and smoothed. Without another side it is
     about half of the longest extent.
     """
-    V, F = atlas.mesh.V, atlas.mesh.F
+    radius = half_thickness_at(atlas.mesh, atlas.positions.reshape(-1, 3), atlas.normals.reshape(-1, 3))
+    return 1 / smoothed(atlas.texels.topology, 1 / radius.reshape(atlas.areas.shape))
+
+
+def half_thickness_at(mesh: Mesh, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Half the way from points of the surface [m], [k, 3], to the other side [m], [k]; normals [k, 3] are outward."""
+    V, F = mesh.V, mesh.F
     middle, size = V.mean(axis=0), float(np.ptp(V, axis=0).max())
     scene = EmbreeScene()
     TriangleMesh(scene, np.ascontiguousarray(((V - middle) / size)[F], dtype=np.float32))
-    inward = -atlas.normals.reshape(-1, 3)
-    start = (atlas.positions.reshape(-1, 3) - middle) / size + _START * inward
-    distance = scene.run(start.astype(np.float32), inward.astype(np.float32), query="DISTANCE")
-    radius = np.clip((distance.astype(np.float64) + _START) / 2, _LEAST, _MOST)
-    return size / smoothed(atlas.texels.topology, 1 / radius.reshape(atlas.areas.shape))
+    start = (points - middle) / size - _START * normals
+    distance = scene.run(start.astype(np.float32), -normals.astype(np.float32), query="DISTANCE")
+    return size * np.clip((distance.astype(np.float64) + _START) / 2, _LEAST, _MOST)

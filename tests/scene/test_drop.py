@@ -75,3 +75,11 @@ def test_an_edit_changes_the_model_and_mujocos_refusal_of_it_is_named(tmp_path) 
 def test_invalid_options_are_named(tmp_path, options: dict, message: str) -> None:
     with pytest.raises(SceneError, match=message):
         drop_scene(cone(tmp_path, "a.stl"), **options)
+
+
+def test_waves_on_a_thinner_target_are_lower(tmp_path) -> None:
+    density = []
+    for thickness in (0.2, 0.1):
+        trimesh.creation.box((1.0, 1.0, thickness)).export(tmp_path / "slab.stl")
+        density.append(drop_scene(tmp_path / "slab.stl", bodies=0).targets[0].material.density)
+    assert density[1] == pytest.approx(2 * density[0], rel=0.01)
