@@ -1,0 +1,221 @@
+"""How exact are the eigenvalues of the patch layout's operator, where theory knows them?
+
+    python examples/benchmarks/eigenvalues.py [--resolutions 32 64 128]
+
+Mean relative error of the eigenvalues 2 to 20 (1 to 20 with a fixed rim, where none is zero) of five surfaces, at three
+resolutions, and its order by regression over the texels along a side. The meshes' vertices lie on the true surfaces,
+and so are the texels put there, so that no facet counts as an error. The last line is the cube layout of the same
+sphere, and how the patches' errors stand to it at equal texels.
+"""
+
+import argparse
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import trimesh
+from scipy.linalg import eigh
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import eigsh
+from scipy.spatial import Delaunay
+from scipy.special import jn_zeros, jnp_zeros
+
+from ripple_sim.solver import Atlas, Material, Mesh, build_atlas
+from ripple_sim.solver.operator.assembly import build_operator
+from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
+from ripple_sim.solver.texels.texel_mesh import TexelMesh
+
+COUNT = 20
+RING, TUBE = 1.0, 0.4  # radii of the torus and of its tube
+RINGS = 40  # of vertices on disk and hemisphere
+
+Points = Values = np.ndarray
+
+
+# Meshes -------------------------------------------------------------------------------------------------------------
+
+
+def grid(columns: int, rows: int, place: Callable, closed: bool = False) -> Mesh:
+    """Squares cut into triangles; place takes two arrays from 0 to 1 to points; a closed grid ends where it begins."""
+    a, b = np.meshgrid(np.arange(columns + 1) / columns, np.arange(rows + 1) / rows, indexing="ij")
+    V = np.stack(np.broadcast_arrays(*place(a, b)), axis=-1).reshape(-1, 3)
+    node = np.arange(len(V)).reshape(columns + 1, rows + 1)
+    if closed:
+        node[-1], node[:, -1] = node[0], node[:, 0]
+    p, q, r, s = node[:-1, :-1].ravel(), node[1:, :-1].ravel(), node[1:, 1:].ravel(), node[:-1, 1:].ravel()
+    F = np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
+    used, F = np.unique(F, return_inverse=True)
+    return Mesh.from_arrays(V[used], F.reshape(-1, 3))
+
+
+def rings(place: Callable) -> Mesh:
+    """Rings of 6, 12, 18 ... points around a centre; place takes radii from 0 to 1, cosines and sines to points."""
+    radius = np.repeat(np.arange(RINGS + 1), np.maximum(6 * np.arange(RINGS + 1), 1))
+    number = np.concatenate([np.arange(max(6 * k, 1)) for k in range(RINGS + 1)])
+    angle = number * 2 * np.pi / np.maximum(6 * radius, 1)
+    x, y, r = np.cos(angle), np.sin(angle), radius / RINGS
+    F = Delaunay(np.stack([r * x, r * y], axis=1)).simplices
+    u, v = (np.stack([(r * x)[F[:, k]] - (r * x)[F[:, 0]], (r * y)[F[:, k]] - (r * y)[F[:, 0]]]) for k in (1, 2))
+    F[u[0] * v[1] < u[1] * v[0]] = F[u[0] * v[1] < u[1] * v[0]][:, ::-1]
+    return Mesh.from_arrays(np.stack(place(r, x, y), axis=1), F)
+
+
+def sphere() -> Mesh:
+    solid = trimesh.creation.icosphere(5)
+    return Mesh.from_arrays(solid.vertices, solid.faces)
+
+
+def torus() -> Mesh:
+    def place(a: Points, b: Points) -> tuple[Points, Points, Points]:
+        u, v = 2 * np.pi * a, 2 * np.pi * b
+        rho = RING + TUBE * np.cos(v)
+        return rho * np.cos(u), rho * np.sin(u), TUBE * np.sin(v)
+
+    return grid(120, 48, place, closed=True)
+
+
+def hemisphere() -> Mesh:
+    return rings(lambda r, x, y: (np.sin(np.pi / 2 * r) * x, np.sin(np.pi / 2 * r) * y, np.cos(np.pi / 2 * r)))
+
+
+def disk() -> Mesh:
+    return rings(lambda r, x, y: (r * x, r * y, 0 * r))
+
+
+def square() -> Mesh:
+    return grid(40, 40, lambda a, b: (a, b, 0 * a))
+
+
+# The true surface nearest to a point of its mesh --------------------------------------------------------------------
+
+
+def on_sphere(points: Points) -> Points:
+    return points / np.linalg.norm(points, axis=-1, keepdims=True)
+
+
+def on_torus(points: Points) -> Points:
+    ring = points * [1, 1, 0]
+    ring *= RING / np.linalg.norm(ring, axis=-1, keepdims=True)
+    return ring + TUBE * on_sphere(points - ring)
+
+
+def on_disk(points: Points) -> Points:
+    """The regular polygon of the mesh's rim, stretched along its radii to the circle."""
+    side = np.pi / (3 * RINGS)
+    within = np.arctan2(points[..., 1], points[..., 0]) % side - side / 2
+    return points * (np.cos(within) / np.cos(side / 2))[..., None]
+
+
+# Exact eigenvalues --------------------------------------------------------------------------------------------------
+
+
+def degrees(multiplicity: Callable[[int], int]) -> Values:
+    return np.concatenate([np.full(multiplicity(d), d * (d + 1.0)) for d in range(40)])
+
+
+def torus_values() -> Values:
+    """Of the torus, whose modes are waves around the axis times a function around the tube; that, by Fourier series."""
+    n = 121
+    v = 2 * np.pi * np.arange(n) / n
+    apart = np.subtract.outer(np.arange(n), np.arange(n))
+    half = np.sin(np.pi * apart / n)
+    slope = np.where(apart, 0.5 * (-1.0) ** apart / np.where(apart, half, 1), 0)
+    rho = RING + TUBE * np.cos(v)
+    values = []
+    for m in range(40):
+        stiffness = slope.T @ np.diag(rho) @ slope / TUBE**2 + np.diag(m**2 / rho)
+        values.append(np.repeat(eigh(stiffness, np.diag(rho), eigvals_only=True)[:40], 1 if m == 0 else 2))
+    return np.concatenate(values)
+
+
+def disk_values(zeros: Callable, least: int = 0) -> Values:
+    """Squares of the zeros of Bessel functions or their derivatives, twice but for order 0."""
+    values = [np.repeat(zeros(m, 20) ** 2, 1 if m == 0 else 2) for m in range(20)]
+    return np.concatenate([np.zeros(least), *values])
+
+
+def square_values(first: int) -> Values:
+    a, b = np.meshgrid(np.arange(first, 30), np.arange(first, 30))
+    return np.pi**2 * (a**2 + b**2).ravel()
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A surface: its mesh, the way from that to the true surface, its rim, and what its eigenvalues are."""
+
+    mesh: Callable[[], Mesh]
+    project: Callable[[Points], Points]
+    rim: str
+    exact: Values
+
+
+def cases() -> dict[str, Case]:
+    return {
+        "sphere": Case(sphere, on_sphere, "free", degrees(lambda d: 2 * d + 1)),
+        "torus": Case(torus, on_torus, "free", torus_values()),
+        "hemisphere, free": Case(hemisphere, on_sphere, "free", degrees(lambda d: d + 1)),
+        "hemisphere, fixed": Case(hemisphere, on_sphere, "fixed", degrees(lambda d: d)),
+        "disk, free": Case(disk, on_disk, "free", disk_values(jnp_zeros, 1)),
+        "disk, fixed": Case(disk, on_disk, "fixed", disk_values(jn_zeros)),
+        "square, free": Case(square, lambda points: points, "free", square_values(0)),
+        "square, fixed": Case(square, lambda points: points, "fixed", square_values(1)),
+    }
+
+
+# Measured -----------------------------------------------------------------------------------------------------------
+
+
+def placed(atlas: Atlas, project: Callable[[Points], Points]) -> Atlas:
+    """The atlas with its texels on the true surface."""
+    texels = atlas.texels
+    beyond = None if texels.beyond is None else project(texels.beyond)
+    return dataclasses.replace(
+        atlas, texels=TexelMesh.of(texels.topology, project(texels.positions), normals=texels.normals, beyond=beyond)
+    )
+
+
+def mean_error(atlas: Atlas, case: Case) -> float:
+    """Mean relative error of the eigenvalues up to the twentieth but for that of the constant mode."""
+    placed_atlas = placed(atlas, case.project)
+    if case.rim == "free":
+        stiffness = placed_atlas.stiffness()
+    else:
+        stiffness = stiffness_matrix(build_operator(placed_atlas, Material(), "fem", "fixed").stencil)
+    mass = diags_array(placed_atlas.areas.ravel())
+    values = np.sort(eigsh(stiffness.tocsc(), COUNT, mass.tocsc(), sigma=-0.5, which="LM", return_eigenvectors=False))
+    exact = np.sort(case.exact)[:COUNT]
+    moving = exact > 1e-9
+    return float(np.abs(values[moving] / exact[moving] - 1).mean())
+
+
+def line(name: str, texels: list[int], errors: list[float]) -> str:
+    order = -np.polyfit(np.log(texels) / 2, np.log(errors), 1)[0]
+    figures = "".join(f"{count:>9,} {error:8.2e}" for count, error in zip(texels, errors, strict=True))
+    return f"{name:<20}{figures}  {order:5.2f}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Eigenvalues of the patch layout against exact ones.")
+    parser.add_argument("--resolutions", type=int, nargs="+", default=[32, 64, 128])
+    resolutions = parser.parse_args().resolutions
+    print(f"{'surface':<20}{'  texels    error' * len(resolutions)}  order")
+    patches = None
+    for name, case in cases().items():
+        mesh = case.mesh()
+        atlases = [build_atlas(mesh, n, layout="patches") for n in resolutions]
+        errors = [mean_error(atlas, case) for atlas in atlases]
+        texels = [atlas.areas.size for atlas in atlases]
+        print(line(name, texels, errors), flush=True)
+        if name == "sphere":
+            patches = np.multiply(texels, errors)
+            cube = [build_atlas(mesh, n, layout="cube") for n in resolutions]
+            reference = [mean_error(atlas, case) for atlas in cube]
+            sizes = [atlas.areas.size for atlas in cube]
+            print(line("sphere, cube layout", sizes, reference))
+            # errors go with the area of a texel, by which the few texels more or less are made up for
+            ratios = patches / np.multiply(sizes, reference)
+            print("patches over cube, at equal texels: " + ", ".join(f"{ratio:.2f}" for ratio in ratios))
+
+
+if __name__ == "__main__":
+    main()
