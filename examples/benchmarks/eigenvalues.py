@@ -4,7 +4,7 @@
 
 Mean relative error of the eigenvalues 2 to 20 (1 to 20 with a fixed rim, where none is zero) of five surfaces, at three
 resolutions, and its order by regression over the texels along a side. The meshes' vertices lie on the true surfaces,
-and so are the texels put there, so that no facet counts as an error. The last line is the cube layout of the same
+and the texels are put there too, so that no facet counts as an error. The last line is the cube layout of the same
 sphere, and how the patches' errors stand to it at equal texels.
 """
 
