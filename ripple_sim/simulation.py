@@ -164,7 +164,7 @@ class Simulation:
         self.limited = {}
         for entry in self.scene.targets:
             self.limited[geom_name(self.model, find_geom(self.model, entry.geom))] = entry.limit
-            if not entry.limit:
+            if not (entry.limit and entry.warn):
                 self.ripples.allow_any_height(entry.geom)
 
     def _reset_bodies(self) -> None:

@@ -89,7 +89,7 @@ def drop_scene(
     return Scene(
         name=Path(mesh_path).stem,
         model=model,
-        targets=(RippleEntry(geom="target", look=look, material=_material(mesh)),),
+        targets=(RippleEntry(geom="target", look=look, material=_material(mesh), warn=False),),
         camera=_camera(float(V[:, 2].max())),
         duration=DURATION,
         events=Events(drop=tuple(drops)),

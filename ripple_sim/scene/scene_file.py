@@ -34,7 +34,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     path of an image in the mesh's own texture coordinates: there are no waves where it is black. `contacts` names the
     geoms that collide for a geom that is only visible; by default those of its body.
     `limit` bends heights that are too large for the object where they are drawn, see `DisplacementLimit`, and warns of
-    them; False: neither.
+    them; False: neither. `warn` = False: limited without a warning.
     """
 
     geom: str
@@ -48,6 +48,7 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     still_map: str | None = None
     contacts: list[str] | None = None
     limit: bool = True
+    warn: bool = True
 
     def located(self, folder: Path) -> RippleEntry:
         """The same with the images' paths made relative to a folder."""
