@@ -1,4 +1,4 @@
-"""Shipped meshes of a drum: a flat skin, and the shell that it is stretched over.
+"""Shipped meshes of a drum: a flat skin, and the wall that it is stretched over.
 
 `python -m ripple_sim.scenes.drum` writes `meshes/drum_skin.obj` and `meshes/drum_shell.obj` again.
 """
@@ -13,13 +13,13 @@ from scipy.spatial import Delaunay
 from .shapes import Array, Triangles, write_obj
 
 SKIN_FILE = Path(__file__).parent / "meshes" / "drum_skin.obj"
-SHELL_FILE = SKIN_FILE.with_name("drum_shell.obj")
+WALL_FILE = SKIN_FILE.with_name("drum_shell.obj")
 
 RADIUS, HEIGHT = 0.4, 0.32  # of the skin's rim, and where it lies [m]
 _HOOP = 0.016  # radius of the rod round the rim [m]
 
 
-def skin(rings: int = 24) -> tuple[Array, Triangles]:
+def skin(circles: int = 24) -> tuple[Array, Triangles]:
     """Flat disk of even triangles at the drum's height, facing up: an open mesh.
 
     Returns
@@ -28,9 +28,9 @@ def skin(rings: int = 24) -> tuple[Array, Triangles]:
         Vertices [n, 3] float64 [m] and triangles [m, 3] int64.
     """
     points = [np.zeros((1, 2))]
-    for ring in range(1, rings + 1):
-        angle = 2 * np.pi * np.arange(6 * ring) / (6 * ring)
-        points.append(RADIUS * ring / rings * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    for circle in range(1, circles + 1):
+        angle = 2 * np.pi * np.arange(6 * circle) / (6 * circle)
+        points.append(RADIUS * circle / circles * np.stack([np.cos(angle), np.sin(angle)], axis=1))
     plane = np.concatenate(points)
     F = Delaunay(plane).simplices.astype(np.int64)
     a, b = plane[F[:, 1]] - plane[F[:, 0]], plane[F[:, 2]] - plane[F[:, 0]]
@@ -39,7 +39,7 @@ def skin(rings: int = 24) -> tuple[Array, Triangles]:
     return np.column_stack([plane, np.full(len(plane), HEIGHT)]), F
 
 
-def shell(segments: int = 72) -> tuple[Array, Triangles]:
+def wall(segments: int = 72) -> tuple[Array, Triangles]:
     """Tube that bulges a little, with a hoop round its upper end: closed, of genus 1; V and F as of `skin`."""
     angle = np.linspace(0, 2 * np.pi, 17)[:-1]
     hoop = np.stack([RADIUS + _HOOP * np.cos(angle), HEIGHT + _HOOP * np.sin(angle)], axis=1)
@@ -61,4 +61,4 @@ def shell(segments: int = 72) -> tuple[Array, Triangles]:
 
 if __name__ == "__main__":
     write_obj(SKIN_FILE, *skin())
-    write_obj(SHELL_FILE, *shell())
+    write_obj(WALL_FILE, *wall())
