@@ -42,7 +42,8 @@ def build_atlas(
     mesh : Mesh
         From `load_mesh` or `Mesh.from_arrays`.
     resolution : int
-        Texels along a chart's side of the cube layout, N; 6 N^2 texels in all, and about as many in every layout.
+        Texels along a chart's side of the cube layout, N; 6 N^2 texels in all, and about as many in every layout,
+        or more where charts would have less than 4 x 4.
     method : str
         Sphere map of the cube layout: "progressive" (fold-free, spreads area evenly) or "conformal" (keeps angles but
         starves limbs; the choice of the paper).
