@@ -70,7 +70,8 @@ def with_degenerate_triangles(V: np.ndarray, F: np.ndarray, count: int) -> tuple
 def test_triangles_without_area_and_slivers_get_an_atlas() -> None:
     V, F = with_degenerate_triangles(*limbed(), count=40)
     mesh = Mesh.from_arrays(V, F)
-    assert (mesh.triangle_areas < 1e-12 * mesh.area).sum() >= 40
+    assert mesh.triangle_areas.min() > 0, "those without area are left out"
+    assert mesh.closed and mesh.genus.tolist() == [0]
     atlas = build_atlas(mesh, 32, cache=False)
     quality = atlas.quality()
     assert quality["flipped"] == 0
