@@ -26,8 +26,9 @@ $(KERNELS): $(STAMP) $(shell find solver ripple_sim/coupling -name "*.py")
 demo: setup $(KERNELS)
 	$(BIN)/ripple-sim render duck -o out/demo.mp4
 
+# two processes, each with OpenGL and kernels of its own: as many as the smallest machine has cores
 test: setup $(KERNELS)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 # mypy and the documentation know nothing of setuptools' package-dir, so they are shown the package as it is installed,
 # made of links.
