@@ -51,7 +51,8 @@ def plain_user(tmp_path: Path) -> Iterator[None]:
     """For root everything is permitted: be nobody for a while."""
     root = os.geteuid() == 0
     if root:
-        for folder in (tmp_path, *list(tmp_path.parents)[:2]):
+        # up to the folder of the user's tests; a process among several has one of its own below
+        for folder in (tmp_path, *list(tmp_path.parents)[: 3 if "PYTEST_XDIST_WORKER" in os.environ else 2]):
             folder.chmod(0o755)
         os.seteuid(NOBODY)
     yield

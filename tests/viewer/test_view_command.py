@@ -92,8 +92,8 @@ def test_a_missing_scene_is_bad_input_and_named(capsys: pytest.CaptureFixture[st
 
 
 def test_an_invalid_mesh_is_bad_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    (tmp_path / "open.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    assert "open.obj" in complaint(capsys, 2, str(tmp_path / "open.obj"), "--benchmark")
+    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+    assert "flat.obj" in complaint(capsys, 2, str(tmp_path / "flat.obj"), "--benchmark")
 
 
 def test_without_trame_the_extra_is_named(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
