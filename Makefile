@@ -1,4 +1,4 @@
-# make demo   sets everything up, then renders out/demo.mp4
+# make demo   sets up what running needs, then renders out/demo.mp4
 # make test   sets everything up, then runs the tests
 # make lint   ruff, mypy and the layers of packages
 # make docs   the documentation, into build/docs
@@ -6,28 +6,34 @@
 # make clean  removes what was built and rendered, but not .venv
 
 BIN := .venv/bin
-STAMP := .venv/.installed
-KERNELS := .venv/.kernels
+RUNNING := .venv/.running
+ALL := .venv/.installed
+KERNELS := solver/__pycache__/.kernels
 TYPES := build/types
 
 .PHONY: setup demo test lint docs package types clean
 
-setup: $(STAMP)
+# what running needs; the targets for which that is too little set up the rest
+setup: $(RUNNING)
 
-$(STAMP): requirements.txt pyproject.toml .ci/setup .ci/egl.py
-	.ci/setup
+$(RUNNING): requirements.txt pyproject.toml .ci/setup .ci/egl.py
+	.ci/setup requirements.txt
 	@touch $@
+
+$(ALL): requirements.txt requirements-dev.txt pyproject.toml .ci/setup .ci/egl.py
+	.ci/setup requirements-dev.txt
+	@touch $(RUNNING) $@
 
 # numba notices a changed kernel only by its own file, not by the files of the kernels that it calls.
-$(KERNELS): $(STAMP) $(shell find solver ripple_sim/coupling -name "*.py")
+$(KERNELS): $(shell find solver ripple_sim/coupling -name "*.py")
 	@find solver ripple_sim -name '*.nb[ic]' -delete
-	@touch $@
+	@mkdir -p $(@D) && touch $@
 
 demo: setup $(KERNELS)
 	$(BIN)/ripple-sim render duck -o out/demo.mp4
 
 # two processes, each with OpenGL and kernels of its own: as many as the smallest machine has cores
-test: setup $(KERNELS)
+test: $(ALL) $(KERNELS)
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 # mypy and the documentation know nothing of setuptools' package-dir, so they are shown the package as it is installed,
@@ -36,16 +42,16 @@ types:
 	@rm -rf $(TYPES) && mkdir -p $(TYPES)/ripple_sim
 	@ln -s $(addprefix $(CURDIR)/,$(wildcard ripple_sim/*) solver scenes) $(TYPES)/ripple_sim
 
-lint: setup types
+lint: $(ALL) types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	MYPYPATH=$(TYPES) $(BIN)/mypy -p ripple_sim
 	cd $(TYPES) && $(CURDIR)/$(BIN)/lint-imports --config $(CURDIR)/pyproject.toml --no-cache
 
-docs: setup types
+docs: $(ALL) types
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir build/docs
 
-package: setup
+package: $(ALL)
 	.ci/package
 
 clean:
