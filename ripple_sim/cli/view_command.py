@@ -44,15 +44,19 @@ class View:
     web: bool = False
     """Serve a web page to a browser on this machine instead of a window (needs the extra ripple-sim[web])."""
     port: Count = 8080
-    """Port of the web page on 127.0.0.1."""
+    """Port of the web page."""
+    host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1"
+    """Address of the web page; any other than this machine's own lets other machines see and drive the viewer."""
     benchmark: bool = False
     """Measure the window's update rate, print it, and exit."""
 
     def run(self) -> None:
         """Show the scene until the user quits."""
+        from ripple_sim.encode.output import check_size
         from ripple_sim.viewer.display import check_display, display_problem
 
         # refuse what cannot work before anything that takes time
+        check_size(*self.size)
         if self.benchmark:
             from ripple_sim.viewer.desktop import benchmark
 
@@ -60,8 +64,8 @@ class View:
         elif self.web:
             from ripple_sim.viewer.web import check_web, serve
 
-            check_web(self.port)
-            serve(self._window(off_screen=True), self.port)
+            check_web(self.port, self.host)
+            serve(self._window(off_screen=True), self.port, self.host)
         else:
             from ripple_sim.viewer.desktop import run
 

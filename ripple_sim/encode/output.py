@@ -88,9 +88,20 @@ def check_output(
         ) from error
 
 
-def _check_size(form: str, width: int, height: int) -> None:
+def check_size(width: int, height: int) -> None:
+    """Make sure that frames of this size [pixels] can be drawn.
+
+    Raises
+    ------
+    VideoError
+        If a side is shorter than `MIN_SIZE` or longer than `MAX_SIZE`.
+    """
     if not all(isinstance(side, int) and MIN_SIZE <= side <= MAX_SIZE for side in (width, height)):
         raise VideoError(f"frame size is {width}x{height}; valid is {MIN_SIZE} to {MAX_SIZE} pixels along each side")
+
+
+def _check_size(form: str, width: int, height: int) -> None:
+    check_size(width, height)
     if form in _SUBSAMPLED and (width % 2 or height % 2):
         raise VideoError(
             f"frame size is {width}x{height}; {form} needs an even width and height, "

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkLogger, vtkUnsignedCharArray
 
+from ripple_sim.encode.output import check_size
 from ripple_sim.solver import RippleError
 
 from .controls import help_text
@@ -51,6 +52,11 @@ class Canvas:
         Time that drawing has taken so far [s].
     render : callable
         Draws the frame; a web page replaces it by its own, which also sends the frame.
+
+    Raises
+    ------
+    VideoError
+        If the size cannot be drawn.
     """
 
     def __init__(
@@ -61,6 +67,7 @@ class Canvas:
         off_screen: bool = False,
         folder: str | Path = ".",
     ) -> None:
+        check_size(*size)
         self.session = session
         self.message = ""
         self.seconds_drawing = 0.0

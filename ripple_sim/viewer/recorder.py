@@ -22,10 +22,14 @@ class Recorder:
         Files are called name-1.png, name-1.mp4 and so on.
     fps : int
         Frames a second of a video.
+
+    Attributes
+    ----------
+    folder : Path
     """
 
     def __init__(self, folder: Path, name: str, fps: int) -> None:
-        self._folder, self._name, self._fps = folder, name, fps
+        self.folder, self._name, self._fps = folder, name, fps
         self._writer: FrameWriter | None = None
 
     @property
@@ -95,7 +99,7 @@ class Recorder:
 
     def _free(self, ending: str) -> Path:
         number = 1
-        while (path := self._folder / f"{self._name}-{number}{ending}").exists():
+        while (path := self.folder / f"{self._name}-{number}{ending}").exists():
             number += 1
         return path
 

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import importlib.util
 import socket
+import sys
 import time
 from typing import Any
 
@@ -13,8 +14,6 @@ from ripple_sim.errors import DisplayError
 
 from .controls import CONTROLS
 from .window import Window
-
-HOST = "127.0.0.1"
 
 # Without an answer for this long [s] the browser may have been closed, or reopened.
 _PATIENCE = 1.0
@@ -30,13 +29,13 @@ output { display: block; margin-top: 8px; white-space: pre; }
 """
 
 
-def check_web(port: int) -> None:
+def check_web(port: int, host: str) -> None:
     """Make sure that the page can be served.
 
     Raises
     ------
     DisplayError
-        If trame is not installed, or the port is not free.
+        If trame is not installed, the port is not free, or the host is not of this machine.
     """
     missing = [name for name in ("trame", "trame_vtk") if importlib.util.find_spec(name) is None]
     if missing:
@@ -44,32 +43,45 @@ def check_web(port: int) -> None:
             f"--web needs {' and '.join(missing)}, which is not installed; install it with: "
             "pip install 'ripple-sim[web]'"
         )
-    with socket.socket() as trial:
-        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            trial.bind((HOST, port))
-        except (OSError, OverflowError) as error:
-            raise DisplayError(
-                f"cannot serve on port {port} of {HOST}: {error}; name another one with --port"
-            ) from error
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        with socket.socket(found[0][0]) as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            trial.bind(found[0][4])
+    except (OSError, OverflowError, UnicodeError) as error:
+        raise DisplayError(
+            f"cannot serve on port {port} of {host}: {error}; name another one with --port, or one of this machine's "
+            "addresses with --host"
+        ) from error
 
 
-def serve(window: Window, port: int) -> None:
-    """Serve an off-screen window until it is closed or the program is interrupted."""
+def serve(window: Window, port: int, host: str) -> None:
+    """Serve an off-screen window until it is closed or the program is interrupted.
+
+    Parameters
+    ----------
+    window : Window
+    port : int
+    host : str
+        Name or address to listen at.
+    """
     from trame.app import get_server
 
-    server = get_server("ripple-sim")
+    from .access import address, exposure, is_local, new_secret, restrict
+
+    server, secret = get_server("ripple-sim"), new_secret()
+    restrict(server, host=host, port=port, secret=secret)
     window.open()
     page = _Page(server, window)
+    if not is_local(host):
+        print(exposure(host, window.recorder.folder), file=sys.stderr)
 
     async def main() -> None:
         asyncio.get_running_loop().set_exception_handler(_report)
         serving = asyncio.ensure_future(
-            server.start(
-                port=port, host=HOST, exec_mode="coroutine", open_browser=False, show_connection_info=False, timeout=0
-            )
+            server.start(exec_mode="coroutine", open_browser=False, show_connection_info=False)
         )
-        print(f"http://{HOST}:{port}/ shows {window.plotter.title}; press Ctrl+C to stop", flush=True)
+        print(f"{address(host, port, secret)} shows {window.plotter.title}; press Ctrl+C to stop", flush=True)
         await page.animate()
         await server.stop()
         with contextlib.suppress(asyncio.CancelledError):

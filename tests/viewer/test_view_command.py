@@ -76,6 +76,8 @@ def test_a_missing_x11_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None
         (["sphere", "--resolution", "0"], "--resolution.*'0'"),
         (["sphere", "--bodies", "-1"], "--bodies"),
         (["sphere", "--port", "http"], "--port.*'http'"),
+        (["sphere", "--web", "--size", "0x0"], "0x0; valid is 16 to 8192"),
+        (["sphere", "--benchmark", "--size", "999999x999999"], "999999x999999; valid is 16 to 8192"),
     ],
 )
 def test_wrong_arguments_are_bad_input(capsys: pytest.CaptureFixture[str], argv: list[str], named: str) -> None:
@@ -110,6 +112,13 @@ def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:
         line = complaint(capsys, 1, "sphere", "--web", "--port", port)
     assert port in line
     assert "--port" in line
+
+
+def test_an_address_of_another_machine_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("trame_vtk")
+    line = complaint(capsys, 1, "sphere", "--web", "--host", "192.0.2.1")
+    assert "192.0.2.1" in line
+    assert "--host" in line
 
 
 def test_the_benchmark_runs_without_a_display() -> None:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -30,8 +31,8 @@ MIDDLE = (200, 130)  # of the sphere in the picture [pixels]
 
 
 @pytest.fixture(scope="module")
-def port() -> Iterator[int]:
-    """Port of a page that shows the scene "sphere"."""
+def address() -> Iterator[str]:
+    """Address of a page that shows the scene "sphere"."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         number = probe.getsockname()[1]
@@ -43,8 +44,9 @@ def port() -> Iterator[int]:
         text=True,
     )
     try:
-        assert f"http://127.0.0.1:{number}/" in server.stdout.readline()
-        yield number
+        line = server.stdout.readline()
+        assert line.startswith(f"http://127.0.0.1:{number}/?secret=")
+        yield line.split()[0]
     finally:
         server.terminate()
         server.wait(10)
@@ -61,9 +63,14 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture
-def page(browser: Any, port: int) -> Iterator[Page]:
+def port(address: str) -> int:
+    return urlsplit(address).port
+
+
+@pytest.fixture
+def page(browser: Any, address: str) -> Iterator[Page]:
     page = browser.new_page(viewport={"width": 500, "height": 500})
-    page.goto(f"http://127.0.0.1:{port}/")
+    page.goto(address)
     wait_for(lambda: colors(page) > 50)  # the first picture has come
     yield page
     page.close()
