@@ -2,6 +2,7 @@
 # make test   sets everything up, then runs the tests
 # make lint   ruff, mypy and the layers of packages
 # make docs   the documentation, into build/docs
+# make sphere-maps  writes the sphere maps of the shipped scenes again, after a change of a mesh or of the mapping
 # make package  builds the distributions and tries them on every Python that is here
 # make clean  removes what was built and rendered, but not .venv
 
@@ -11,7 +12,7 @@ ALL := .venv/.installed
 KERNELS := solver/__pycache__/.kernels
 TYPES := build/types
 
-.PHONY: setup demo test lint docs package types clean
+.PHONY: setup demo test lint docs package sphere-maps types clean
 
 # what running needs; the targets for which that is too little set up the rest
 setup: $(RUNNING)
@@ -53,6 +54,9 @@ docs: $(ALL) types
 
 package: $(ALL)
 	.ci/package
+
+sphere-maps: setup $(KERNELS)
+	$(BIN)/python .ci/sphere_maps.py
 
 clean:
 	rm -rf build dist out .mypy_cache .pytest_cache .ruff_cache

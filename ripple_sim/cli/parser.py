@@ -17,6 +17,7 @@ import tyro.extras
 
 from .atlas_command import Atlas
 from .bench_command import Bench
+from .cache_command import Cache
 from .completion_command import Completion
 from .info_command import Info
 from .render_commands import Drop, Render
@@ -29,6 +30,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "info": Info,
     "bench": Bench,
     "view": View,
+    "cache": Cache,
     "completion": Completion,
 }
 

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import hashlib
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import platformdirs
 from numpy.typing import NDArray
 
+from ripple_sim.solver.cache import cache_path, make_room, mark_used
 from ripple_sim.solver.cube_map.convention import check_resolution
 from ripple_sim.solver.cube_map.cube_atlas import atlas_from_sphere_map
-from ripple_sim.solver.errors import AtlasError, MeshError
+from ripple_sim.solver.errors import AtlasError, MeshError, SphereMapError
 from ripple_sim.solver.mesh.genus_zero import check_genus_zero
 from ripple_sim.solver.mesh.mesh import Mesh
 from ripple_sim.solver.patches.patch_atlas import patch_atlas
-from ripple_sim.solver.sphere_map import conformal_sphere_map, progressive_sphere_map
+from ripple_sim.solver.sphere_map import certify, conformal_sphere_map, progressive_sphere_map
 from ripple_sim.solver.texels.atlas import Atlas
 from ripple_sim.solver.texels.atlas_file import FORMAT
 
@@ -33,7 +32,12 @@ SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {
 
 
 def build_atlas(
-    mesh: Mesh, resolution: int = 128, method: str = "progressive", cache: bool = True, layout: str = "auto"
+    mesh: Mesh,
+    resolution: int = 128,
+    method: str = "progressive",
+    cache: bool = True,
+    layout: str = "auto",
+    sphere: NDArray[np.float64] | None = None,
 ) -> Atlas:
     """Build the atlas of a mesh.
 
@@ -48,10 +52,12 @@ def build_atlas(
         Sphere map of the cube layout: "progressive" (fold-free, spreads area evenly) or "conformal" (keeps angles but
         starves limbs; the choice of the paper).
     cache : bool
-        Keep the result in the user's cache folder and take it from there the next time.
+        Keep the result in the user's cache folder and take it from there the next time; see `cache_limit`.
     layout : str
         "cube": six charts of N x N texels, for a closed mesh of genus 0 in one part. "patches": many small charts, for
         any mesh. "auto": cube where it fits.
+    sphere : float64 [vertex_count, 3], optional
+        Sphere map of the cube layout, where it is known already; `method` is not asked then.
 
     Raises
     ------
@@ -60,7 +66,7 @@ def build_atlas(
     MeshError
         For the cube layout, if the mesh is not a closed surface of genus 0 in one part.
     SphereMapError
-        For the cube layout, if no certified sphere map is found.
+        For the cube layout, if no certified sphere map is found, or the given one is none of this mesh.
     """
     resolution = check_resolution(resolution)
     for kind, name, valid in (("sphere map method", method, tuple(SPHERE_MAPS)), ("layout", layout, LAYOUTS)):
@@ -70,17 +76,22 @@ def build_atlas(
         check_genus_zero(mesh)
     cube = layout == "cube" or (layout == "auto" and _fits_cube(mesh))
     start = time.perf_counter()
-    path = _cache_path(mesh, method if cube else f"patches {resolution}") if cache else None
+    path = _cache_path(mesh, method if cube else f"patches {resolution}", sphere if cube else None) if cache else None
     stored = None if path is None else _read_cache(path, mesh)
     # charts of the patch layout have a resolution of their own, and a file for each of the atlas's
     if stored is not None and (not cube or stored.resolution == resolution):
         stored.timings["cache"] = time.perf_counter() - start
         return stored
-    atlas = _cube(mesh, resolution, method, stored) if cube else patch_atlas(mesh, resolution)
+    if cube:
+        known = sphere if stored is None else stored.sphere
+        atlas = _cube(mesh, resolution, method, known)
+    else:
+        atlas = patch_atlas(mesh, resolution)
     if path is not None:
         # a folder that cannot be written costs the next call its time, nothing else
         with contextlib.suppress(AtlasError):
             atlas.save(path)
+            make_room(path)
     return atlas
 
 
@@ -92,22 +103,31 @@ def _fits_cube(mesh: Mesh) -> bool:
     return True
 
 
-def _cube(mesh: Mesh, resolution: int, method: str, stored: Atlas | None) -> Atlas:
-    """Atlas of the cube layout; the sphere map is taken from one that is stored."""
+def _cube(mesh: Mesh, resolution: int, method: str, known: NDArray[np.float64] | None) -> Atlas:
+    """Atlas of the cube layout, by way of a sphere map that is known already, or by a method."""
     start = time.perf_counter()
-    sphere = SPHERE_MAPS[method](mesh.V, mesh.F) if stored is None else stored.sphere
+    sphere = SPHERE_MAPS[method](mesh.V, mesh.F) if known is None else _certified(mesh, known)
     mapped = time.perf_counter()
     atlas = atlas_from_sphere_map(mesh, sphere, resolution)
     atlas.timings.update(sphere_map=mapped - start, rays=time.perf_counter() - mapped)
     return atlas
 
 
-def _cache_path(mesh: Mesh, kind: str) -> Path:
+def _certified(mesh: Mesh, sphere: NDArray[np.float64]) -> NDArray[np.float64]:
+    sphere = np.ascontiguousarray(sphere, dtype=np.float64)
+    if sphere.shape != mesh.V.shape or not np.isfinite(sphere).all() or not certify(mesh.F, sphere).valid:
+        raise SphereMapError(
+            f"sphere has the shape {sphere.shape} and is no fold-free sphere map of the mesh, which has "
+            f"{len(mesh.V)} vertices; leave it out to have one computed"
+        )
+    return sphere
+
+
+def _cache_path(mesh: Mesh, kind: str, sphere: NDArray[np.float64] | None) -> Path:
     """One file for each mesh and sphere map: that does not depend on the resolution, and rays are quick."""
-    key = hashlib.sha256(f"{FORMAT} {kind} {mesh.V.shape} {mesh.F.shape}".encode())
-    key.update(np.ascontiguousarray(mesh.V).data)
-    key.update(np.ascontiguousarray(mesh.F).data)
-    return Path(platformdirs.user_cache_dir("ripple-sim")) / f"{key.hexdigest()[:32]}.npz"
+    if sphere is not None:
+        return cache_path(f"{FORMAT} given", (mesh.V, mesh.F, sphere))
+    return cache_path(f"{FORMAT} {kind}", (mesh.V, mesh.F))
 
 
 def _read_cache(path: Path, mesh: Mesh) -> Atlas | None:
@@ -118,4 +138,5 @@ def _read_cache(path: Path, mesh: Mesh) -> Atlas | None:
         return None
     if not (np.array_equal(stored.mesh.V, mesh.V) and np.array_equal(stored.mesh.F, mesh.F)):
         return None
+    mark_used(path)
     return dataclasses.replace(stored, mesh=mesh, timings={})

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-SUFFIXES = {".py", ".glsl", ".toml", ".xml", ".obj", ".png", ".typed"}
+SUFFIXES = {".py", ".glsl", ".toml", ".xml", ".obj", ".png", ".npy", ".typed"}
 
 
 @pytest.fixture(scope="module")

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import importlib.metadata
-from pathlib import Path
 
 import numpy as np
-import platformdirs
 from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.atomic_file import atomic_write
+from ripple_sim.solver.cache import cache_path, make_room, mark_used
 from ripple_sim.solver.texels.array_file import read_arrays, write_arrays
 
 # CoACD's own threshold of concavity: parts then lie up to 2.5 % of a mesh's size off the surface. With a third of its
@@ -38,17 +36,16 @@ def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
             "the route 'convex' needs coacd, which is not installed; install it with: pip install "
             "'ripple-sim[convex]', or take another route, such as 'sdf'"
         ) from error
-    key = hashlib.sha256(f"convex parts {version} {_SETTINGS} {mesh.V.shape} {mesh.F.shape}".encode())
-    key.update(np.ascontiguousarray(mesh.V).data)
-    key.update(np.ascontiguousarray(mesh.F).data)
-    path = Path(platformdirs.user_cache_dir("ripple-sim")) / f"{key.hexdigest()[:32]}.npz"
+    path = cache_path(f"convex parts {version} {_SETTINGS}", (mesh.V, mesh.F))
     with contextlib.suppress(OSError, ValueError, KeyError):
         stored = read_arrays(path)
+        mark_used(path)
         return [stored[str(i)] for i in range(len(stored))]
     parts = _decompose(mesh)
     # a folder that cannot be written costs the next call its time, nothing else
     with contextlib.suppress(OSError), atomic_write(path) as unfinished, unfinished.open("wb") as file:
         write_arrays(file, {str(i): part for i, part in enumerate(parts)})
+    make_room(path)
     return parts
 
 

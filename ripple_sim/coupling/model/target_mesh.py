@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.scenes.sphere_maps import shipped_sphere_map
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
 
 from .geoms import TARGET_TYPES, geom_name
@@ -23,7 +24,8 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str 
     """
     if TARGET_TYPES[int(model.geom_type[geom])] == "sphere" and layout != "patches":
         return sphere_atlas(float(model.geom_size[geom, 0]), resolution)
-    return build_atlas(target_mesh(model, geom), resolution, layout=layout)
+    mesh = target_mesh(model, geom)
+    return build_atlas(mesh, resolution, layout=layout, sphere=shipped_sphere_map(mesh))
 
 
 def target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:

@@ -30,10 +30,10 @@ def ell() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_parts_of_a_mesh_are_the_same_each_time_and_come_from_the_cache(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(convex_decomposition.platformdirs, "user_cache_dir", lambda _: str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     mesh = Mesh.from_arrays(*ell())
     first = convex_parts(mesh)
-    [file] = tmp_path.iterdir()
+    [file] = (tmp_path / "ripple-sim").iterdir()
     file.unlink()
     second = convex_parts(mesh)
     assert len(first) == len(second) == 2

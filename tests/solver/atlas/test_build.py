@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver import Atlas, AtlasError, Mesh, build_atlas
+from ripple_sim.solver import Atlas, AtlasError, Mesh, SphereMapError, build_atlas
 
 
 def test_every_texel_lies_on_the_surface(animal: Atlas) -> None:
@@ -52,6 +52,23 @@ def test_unwritable_cache_only_costs_time(ball_mesh: Mesh, tmp_path: Path, monke
 def test_unknown_method_lists_the_valid_ones(ball_mesh: Mesh) -> None:
     with pytest.raises(AtlasError, match="'progressive'"):
         build_atlas(ball_mesh, 8, method="mercator")
+
+
+def test_a_known_sphere_map_is_taken_and_has_a_file_of_its_own(ball_mesh: Mesh, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    known = ball_mesh.V / np.linalg.norm(ball_mesh.V, axis=1, keepdims=True)
+    first, again = (build_atlas(ball_mesh, 8, sphere=known) for _ in range(2))
+    assert "cache" in again.timings
+    for atlas in (first, again):
+        np.testing.assert_array_equal(atlas.sphere, known)
+    assert "cache" not in build_atlas(ball_mesh, 8).timings
+
+
+@pytest.mark.parametrize("change", [lambda S: -S, lambda S: S[:-1], lambda S: 2 * S, lambda S: np.nan * S])
+def test_a_sphere_map_of_something_else_is_refused(change, ball_mesh: Mesh) -> None:
+    known = ball_mesh.V / np.linalg.norm(ball_mesh.V, axis=1, keepdims=True)
+    with pytest.raises(SphereMapError, match="no fold-free sphere map of the mesh"):
+        build_atlas(ball_mesh, 8, cache=False, sphere=change(known))
 
 
 def with_degenerate_triangles(V: np.ndarray, F: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,30 @@
+"""Writes the sphere maps of the shipped scenes' targets again, and removes those that no scene needs any more."""
+
+import numpy as np
+
+from ripple_sim.coupling.model.geoms import TARGET_TYPES, find_geom
+from ripple_sim.coupling.model.target_mesh import target_mesh
+from ripple_sim.scene.load_scene import load_scene, shipped_scenes
+from ripple_sim.scenes.sphere_maps import FOLDER, sphere_map_path
+from ripple_sim.solver.errors import MeshError
+from ripple_sim.solver.mesh.genus_zero import check_genus_zero
+from ripple_sim.solver.sphere_map import progressive_sphere_map
+
+needed = set()
+for name in shipped_scenes():
+    scene = load_scene(name)
+    for target in scene.targets:
+        geom = find_geom(scene.model, target.geom)
+        if TARGET_TYPES[int(scene.model.geom_type[geom])] == "sphere":
+            continue
+        mesh = target_mesh(scene.model, geom)
+        try:
+            check_genus_zero(mesh)
+        except MeshError:
+            continue  # its atlas has the patch layout
+        path = sphere_map_path(mesh)
+        np.save(path, progressive_sphere_map(mesh.V, mesh.F))
+        needed.add(path)
+        print(f"{path.name}  {path.stat().st_size / 1000:.0f} kB  {name}, {target.geom}")
+for path in set(FOLDER.glob("*.npy")) - needed:
+    path.unlink()

@@ -1,0 +1,118 @@
+"""The user's cache folder: what took long to make, under a hash of what it was made from.
+
+It is kept under a limit: what was used longest ago goes first. Several processes may use it at once: a file appears
+whole, and whoever finds one missing makes it again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import platformdirs
+from numpy.typing import ArrayLike
+
+from .errors import RippleError
+
+LIMIT = "RIPPLE_SIM_CACHE_LIMIT"  # the environment variable, in megabytes
+_USUAL_LIMIT = 500
+_MEGABYTE = 1_000_000
+
+# what is ours: files of `cache_path`, and those that a killed process left unfinished
+_OURS = re.compile(r"[0-9a-f]{32}\.npz|\.[0-9a-f]{32}\.npz\.[0-9]+\.part")
+
+
+class CachedFile(NamedTuple):
+    """A file in the cache: where, how large [bytes], and when it was last used [s since 1970]."""
+
+    path: Path
+    size: int
+    used: float
+
+
+def cache_folder() -> Path:
+    """Where the cache is; it need not exist."""
+    return Path(platformdirs.user_cache_dir("ripple-sim"))
+
+
+def cache_path(name: str, arrays: Iterable[ArrayLike]) -> Path:
+    """Place in the cache of what is made from arrays by the method `name`.
+
+    Raises
+    ------
+    RippleError
+        As `cache_limit`.
+    """
+    cache_limit()  # a mistake is told before anything that takes time
+    return cache_folder() / f"{content_key(name, arrays)}.npz"
+
+
+def content_key(name: str, arrays: Iterable[ArrayLike]) -> str:
+    """Hash of a name and the content of arrays, 32 hexadecimal digits."""
+    arrays = [np.ascontiguousarray(array) for array in arrays]
+    key = hashlib.sha256(" ".join([name, *(str(array.shape) for array in arrays)]).encode())
+    for array in arrays:
+        key.update(array.data)
+    return key.hexdigest()[:32]
+
+
+def cache_limit() -> int:
+    """How large the cache may grow [bytes]: RIPPLE_SIM_CACHE_LIMIT megabytes, or 500.
+
+    Raises
+    ------
+    RippleError
+        If the variable is not a number, or negative.
+    """
+    given = os.environ.get(LIMIT, "").strip()
+    try:
+        limit = float(given) if given else _USUAL_LIMIT
+        if not 0 <= limit < np.inf:
+            raise ValueError
+    except ValueError:
+        raise RippleError(f"{LIMIT} is {given!r}; valid is a number of megabytes, 0 or more") from None
+    return int(limit * _MEGABYTE)
+
+
+def cached_files() -> list[CachedFile]:
+    """The files in the cache that are ours, the one used longest ago first."""
+    files = []
+    with contextlib.suppress(OSError):  # no folder, or one that cannot be read
+        for path in cache_folder().iterdir():
+            with contextlib.suppress(OSError):  # another process has removed it
+                if _OURS.fullmatch(path.name) and path.is_file():
+                    status = path.stat()
+                    files.append(CachedFile(path, status.st_size, status.st_mtime))
+    return sorted(files, key=lambda file: (file.used, file.path.name))
+
+
+def mark_used(path: Path) -> None:
+    """Note that a file of the cache was used just now."""
+    with contextlib.suppress(OSError):
+        os.utime(path)
+
+
+def make_room(newest: Path) -> None:
+    """Remove what was used longest ago until the cache is under its limit; the newest file stays, unless that is 0."""
+    files, limit = cached_files(), cache_limit()
+    total = sum(file.size for file in files)
+    for file in files:
+        if total <= limit:
+            break
+        if limit == 0 or file.path.name != newest.name:
+            total -= remove(file)
+
+
+def remove(file: CachedFile) -> int:
+    """Remove a file from the cache; return how much room that made [bytes]."""
+    try:
+        file.path.unlink(missing_ok=True)
+    except OSError:
+        return 0
+    return file.size

@@ -1,0 +1,50 @@
+"""The shipped sphere maps: one for each target that needs one, and of that mesh alone."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from ripple_sim.coupling.model.geoms import TARGET_TYPES, find_geom
+from ripple_sim.coupling.model.target_mesh import target_atlas, target_mesh
+from ripple_sim.scene.load_scene import load_scene, shipped_scenes
+from ripple_sim.scenes.sphere_maps import FOLDER, shipped_sphere_map, sphere_map_path
+from ripple_sim.solver import Mesh
+from ripple_sim.solver.sphere_map import certify
+
+
+@pytest.fixture(scope="module")
+def meshes() -> list[Mesh]:
+    """The targets of the shipped scenes that are closed, one part and of genus 0, and no spheres."""
+    found = []
+    for name in shipped_scenes():
+        scene = load_scene(name)
+        for target in scene.targets:
+            geom = find_geom(scene.model, target.geom)
+            mesh = target_mesh(scene.model, geom)
+            if mesh.closed and mesh.genus.tolist() == [0] and TARGET_TYPES[scene.model.geom_type[geom]] != "sphere":
+                found.append(mesh)
+    return found
+
+
+def test_every_target_of_the_cube_layout_has_one_and_there_are_no_others(meshes: list[Mesh]) -> None:
+    assert {sphere_map_path(mesh) for mesh in meshes} == set(FOLDER.glob("*.npy"))
+
+
+def test_they_are_certified(meshes: list[Mesh]) -> None:
+    for mesh in meshes:
+        assert certify(mesh.F, shipped_sphere_map(mesh)).valid
+
+
+def test_a_changed_mesh_has_none(meshes: list[Mesh]) -> None:
+    V = meshes[0].V.copy()
+    V[0] += 1e-6
+    assert shipped_sphere_map(dataclasses.replace(meshes[0], V=V)) is None
+
+
+def test_a_shipped_scene_takes_it() -> None:
+    scene = load_scene("animal")
+    geom = find_geom(scene.model, scene.targets[0].geom)
+    np.testing.assert_array_equal(
+        target_atlas(scene.model, geom, 8).sphere, shipped_sphere_map(target_mesh(scene.model, geom))
+    )
