@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 import platformdirs
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from .errors import RippleError
 
@@ -41,7 +41,7 @@ def cache_folder() -> Path:
     return Path(platformdirs.user_cache_dir("ripple-sim"))
 
 
-def cache_path(name: str, arrays: Iterable[ArrayLike]) -> Path:
+def cache_path(name: str, arrays: Iterable[NDArray]) -> Path:
     """Place in the cache of what is made from arrays by the method `name`.
 
     Raises
@@ -53,11 +53,11 @@ def cache_path(name: str, arrays: Iterable[ArrayLike]) -> Path:
     return cache_folder() / f"{content_key(name, arrays)}.npz"
 
 
-def content_key(name: str, arrays: Iterable[ArrayLike]) -> str:
+def content_key(name: str, arrays: Iterable[NDArray]) -> str:
     """Hash of a name and the content of arrays, 32 hexadecimal digits."""
-    arrays = [np.ascontiguousarray(array) for array in arrays]
-    key = hashlib.sha256(" ".join([name, *(str(array.shape) for array in arrays)]).encode())
-    for array in arrays:
+    contents = [np.ascontiguousarray(array) for array in arrays]
+    key = hashlib.sha256(" ".join([name, *(str(array.shape) for array in contents)]).encode())
+    for array in contents:
         key.update(array.data)
     return key.hexdigest()[:32]
 
