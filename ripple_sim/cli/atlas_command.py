@@ -37,17 +37,26 @@ class Atlas:
     """Take a closed surface round the mesh: for parts that pass through each other, or scans in pieces."""
     json: bool = False
     """Print JSON."""
+    overwrite: bool = False
+    """Replace files that ripple-sim has not made; the mesh itself never."""
 
     def run(self) -> None:
         """Build the atlas, save and plot it if asked to, and print its figures."""
-        from ripple_sim.solver import build_atlas, load_mesh
+        from ripple_sim.solver import AtlasError, build_atlas, load_mesh
+        from ripple_sim.solver.texels.atlas_file import check_atlas_place
 
         from .atlas_report import atlas_report, charts_text, report_text
 
+        # before anything that takes time
+        for path in (self.output, self.plot):
+            if path is not None and path.exists() and self.mesh.exists() and path.samefile(self.mesh):
+                raise AtlasError(f"cannot write {path}: it is the mesh itself; name another file")
+        if self.output is not None:
+            check_atlas_place(self.output, self.overwrite)
         if self.plot is not None:
             from ripple_sim.figures.atlas_plot import check_plot_path
 
-            check_plot_path(self.plot)  # before anything that takes time
+            check_plot_path(self.plot, self.overwrite)
         start = time.perf_counter()
         mesh = load_mesh(self.mesh, repair=self.repair, wrap=self.wrap)
         loaded = time.perf_counter()
@@ -55,7 +64,7 @@ class Atlas:
         seconds = {"load": loaded - start, **atlas.timings}
         method = self.method if atlas.layout == "cube" else None
         if self.output is not None:
-            atlas.save(self.output)
+            atlas.save(self.output, self.overwrite)
         if self.plot is not None:
             from ripple_sim.figures.atlas_plot import plot_atlas
             from ripple_sim.scene.up_axis import usual_up

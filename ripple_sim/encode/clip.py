@@ -13,6 +13,8 @@ import numpy as np
 from av.video.reformatter import ColorPrimaries, ColorRange, Colorspace, ColorTrc
 from numpy.typing import NDArray
 
+from .mark import MARK
+
 # Fixed, since x264's output depends on it; small, since the renderer needs the processor too.
 THREADS = 2
 
@@ -106,7 +108,9 @@ def open_container(path: Path, container: str) -> Any:
     # bitexact: no random identifiers in Matroska and WebM. faststart: an MP4's index goes in front, so that playback
     # starts before the file is loaded.
     options = {"fflags": "+bitexact", **({"movflags": "+faststart"} if container == "mp4" else {})}
-    return av.open(str(path), "w", format=container, options=options)
+    opened = av.open(str(path), "w", format=container, options=options)
+    opened.metadata["comment"] = MARK
+    return opened
 
 
 def join_clips(clips: Sequence[tuple[Path, int]], path: Path, container: str, fps: int) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ripple_sim.errors import VideoError
 
 from .clip import Stream
+from .mark import MARK
 
 # ITU-R BT.709: x and y of red, green, blue and white
 _CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
@@ -46,6 +47,7 @@ class Exr:
             "type": OpenEXR.scanlineimage,
             "compression": OpenEXR.ZIP_COMPRESSION,
             "chromaticities": _CHROMATICITIES,
+            "software": MARK,
             "framesPerSecond": Fraction(self._rate),
         }
         # through memory: the library does not notice a disk that fills up with the last bytes of a file

@@ -14,6 +14,7 @@ from PIL import Image
 from .clip import H264, LOSSLESS, VP9, Clip, Codec, Stream, join_clips
 from .exr import Exr
 from .gif import join_gif
+from .mark import MARK, png_mark
 from .webp import join_webp
 
 # As many frames may be lost when a render is killed; each clip begins with a key frame.
@@ -95,13 +96,13 @@ FORMATS = {
     ".webp": Format(
         suffix=".webp",
         length=1,
-        start=lambda path, stream: Still(path, format="WEBP", quality=88, method=3),
+        start=lambda path, stream: Still(path, format="WEBP", quality=88, method=3, xmp=MARK.encode()),
         join=lambda stills, path, stream: join_webp([still for still, _ in stills], path, stream),
     ),
     "png": Format(
         suffix=".png",
         length=1,
-        start=lambda path, stream: Still(path, format="PNG", compress_level=3),
+        start=lambda path, stream: Still(path, format="PNG", compress_level=3, pnginfo=png_mark()),
         join=None,
     ),
     "exr": Format(suffix=".exr", length=1, start=Exr, join=None, linear=True),

@@ -15,6 +15,7 @@ import av
 from av.filter import Graph
 
 from .clip import GIF, Clip, Stream
+from .mark import mark_gif
 
 # Ordered dithering is the same from frame to frame: it does not shimmer, and it compresses well.
 _PALETTE_USE = "dither=bayer:bayer_scale=4:diff_mode=rectangle"
@@ -31,6 +32,7 @@ def join_gif(clips: Sequence[tuple[Path, int]], path: Path, stream: Stream) -> N
         gif.close()
         raise
     gif.finish()
+    mark_gif(path)
 
 
 def _images(clips: Sequence[tuple[Path, int]], fps: int) -> Iterator[av.VideoFrame]:

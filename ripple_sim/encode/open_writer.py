@@ -24,12 +24,14 @@ def open_writer(
     frame_format: str = "png",
     settings: Mapping[str, str | int | float] | None = None,
     resume: bool = False,
+    overwrite: bool = False,
 ) -> FrameWriter:
     """Start a video, or continue one; the ending of `path` chooses its format.
 
     `.mp4` is H.264, `.webm` VP9, `.gif` and `.webp` are animated images; a name without ending becomes a folder of PNG
     or EXR frames. Missing parent folders are created. Nothing appears at `path` before the video is complete; an
-    earlier file stays until then. Meanwhile the frames are in a folder beside it, `path` with `.part` appended, as
+    earlier file stays until then; one that was not written here is replaced only with `overwrite`. A link is written
+    through. Meanwhile the frames are in a folder beside it, `path` with `.part` appended, as
     playable clips or as images. They join to the same video, bit for bit, however often the work was interrupted.
 
     Parameters
@@ -48,6 +50,8 @@ def open_writer(
         Everything that decides the pixels, by name. With it, finished segments survive an interruption.
     resume : bool
         Continue an interrupted writer of the same settings: the next frame to write is number `frames`.
+    overwrite : bool
+        Replace an older file, or older frames, that were not written here.
 
     Raises
     ------
@@ -58,10 +62,17 @@ def open_writer(
         If the folder cannot be written.
     """
     path = Path(path)
-    check_output(path, width, height, fps, transparent=transparent, frame_format=frame_format)
+    check_output(path, width, height, fps, transparent=transparent, frame_format=frame_format, overwrite=overwrite)
     video = FORMATS[video_format(path, frame_format)]
     try:
-        part = Part(path, suffix=video.suffix, length=video.length, settings=settings or {}, resume=resume)
+        part = Part(
+            path.resolve(),
+            suffix=video.suffix,
+            length=video.length,
+            settings=settings or {},
+            resume=resume,
+            overwrite=overwrite,
+        )
     except OSError as error:
         raise EncodingError(f"cannot write the video {path}: {error.strerror}") from error
     shape = (height, width, 4 if transparent else 3)

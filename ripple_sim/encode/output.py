@@ -9,6 +9,7 @@ from pathlib import Path
 from ripple_sim.errors import EncodingError, VideoError
 
 from .exr import check_exr
+from .mark import MARK, made_here
 
 MIN_SIZE, MAX_SIZE = 16, 8192
 MAX_FPS = 240
@@ -58,6 +59,7 @@ def check_output(
     transparent: bool = False,
     frame_format: str = "png",
     overlaid: bool = False,
+    overwrite: bool = False,
 ) -> None:
     """Make sure that a video of this size and frame rate [1/s] can be written to `path`; leave nothing behind.
 
@@ -66,7 +68,7 @@ def check_output(
     VideoError
         If the ending is unknown, the size or rate is out of range, the size is odd in a format of halved colour
         resolution, the format supports no transparency or no overlays, EXR frames are not for a folder, or something
-        else stands in the output's place.
+        that was not made here stands in the output's place. With `overwrite` such a file or frames are no obstacle.
     EncodingError
         If the output cannot be written.
     """
@@ -81,7 +83,7 @@ def check_output(
             raise VideoError(f"{path} cannot be transparent; valid is .webp or a folder of frames")
         _check_size(form, width, height)
         _check_fps(form, fps)
-        _check_place(path, form)
+        _check_place(path, form, overwrite)
     except OSError as error:
         raise EncodingError(
             f"cannot write {path}: {error.strerror}; name a file in a folder you can write to"
@@ -125,29 +127,47 @@ def _check_exr(overlaid: bool) -> None:
         )
 
 
-def check_replaceable(folder: Path) -> None:
-    """Make sure that a folder holds frames and nothing else.
+def check_replaceable(path: Path, overwrite: bool) -> None:
+    """Make sure that a file was made here, or that a folder holds frames from here and nothing else.
 
     Raises
     ------
     VideoError
-        Naming another file.
+        If it is, or holds, anything else; with `overwrite` anything but a file or files with the names of frames.
     """
-    strangers = [entry.name for entry in folder.iterdir() if not _FRAME_PATTERN.fullmatch(entry.name)]
+    if path.is_file():
+        if not (overwrite or made_here(path)):
+            raise VideoError(
+                f"cannot write {path}: it exists and was not {MARK}; name another file, or add --overwrite"
+            )
+        return
+    strangers = [each.name for each in path.iterdir() if each.is_symlink() or not each.is_file() or not _is_frame(each)]
     if strangers:
-        raise VideoError(f"cannot write frames to {folder}: it holds other files ({min(strangers)}); name a new folder")
+        raise VideoError(f"cannot write frames to {path}: it holds other files ({min(strangers)}); name a new folder")
+    if not overwrite and (others := [each.name for each in path.iterdir() if not made_here(each)]):
+        raise VideoError(
+            f"cannot write frames to {path}: it holds frames that were not {MARK} ({min(others)}); name a new folder, "
+            "or add --overwrite"
+        )
 
 
-def _check_place(path: Path, form: str) -> None:
+def _is_frame(path: Path) -> bool:
+    return _FRAME_PATTERN.fullmatch(path.name) is not None
+
+
+def _check_place(path: Path, form: str, overwrite: bool) -> None:
     is_file = form in ENDINGS
     if path.is_dir():
         if is_file:
             raise VideoError(f"cannot write {path}: it is a folder; name a file")
         if path.is_symlink():  # which no finished folder can replace
             raise VideoError(f"cannot write frames to {path}: it is a link; name the folder {path.resolve()}")
-        check_replaceable(path)
-    elif path.exists() and not (is_file and path.is_file()):
-        raise VideoError(f"cannot write {path}: it exists and is not a {'file' if is_file else 'folder'}")
+        check_replaceable(path, overwrite)
+    elif path.exists():
+        if not (is_file and path.is_file()):
+            raise VideoError(f"cannot write {path}: it exists and is not a {'file' if is_file else 'folder'}")
+        check_replaceable(path.resolve(), overwrite)
+    path = path.resolve()  # a link is written through
     folder = path.absolute().parent
     while not folder.exists():
         folder = folder.parent

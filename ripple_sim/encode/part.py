@@ -16,11 +16,13 @@ from pathlib import Path
 
 from ripple_sim.errors import VideoError
 
+from .mark import made_here
 from .move import move
 from .output import check_replaceable
 from .record import SETTINGS, STATES, Record
 
 _FRAMES, _WHOLE = "frames", "whole"
+_SEGMENT = re.compile(r"frames?_(\d+)(?:-(\d+))?")
 
 
 class Part:
@@ -38,6 +40,8 @@ class Part:
         Everything that decides the pixels, by name.
     resume : bool
         Continue what is there, if anything is. Otherwise it is removed.
+    overwrite : bool
+        Replace an older video that was not written here.
 
     Raises
     ------
@@ -53,15 +57,24 @@ class Part:
     """
 
     def __init__(
-        self, video: Path, *, suffix: str, length: int, settings: Mapping[str, str | int | float], resume: bool
+        self,
+        video: Path,
+        *,
+        suffix: str,
+        length: int,
+        settings: Mapping[str, str | int | float],
+        resume: bool,
+        overwrite: bool = False,
     ) -> None:
-        self.video = video
+        self.video, self._overwrite = video, overwrite
         self.folder = video.with_name(video.name + ".part")
         self._suffix, self._length = suffix, length
         self._segments = self.folder / _FRAMES
         self._record = Record(video, self.folder)
+        if self.folder.is_symlink():
+            raise VideoError(f"cannot write {video}: its folder {self.folder.name} is a link; move it away")
         self.folder.mkdir(parents=True, exist_ok=True)
-        self._lock = os.open(self.folder, os.O_RDONLY)
+        self._lock = os.open(self.folder, os.O_RDONLY | os.O_NOFOLLOW)
         try:
             self._claim()
             if resume and self._record.exists:
@@ -108,11 +121,12 @@ class Part:
         Raises
         ------
         VideoError
-            If an older folder in that place holds other files by now.
+            If there is something in that place by now that was not made here.
         """
-        if self.video.is_dir():
-            check_replaceable(self.video)  # again: a render takes long
-            shutil.rmtree(self.video)
+        if self.video.exists():
+            check_replaceable(self.video, self._overwrite)  # again: a render takes long
+            if self.video.is_dir():
+                shutil.rmtree(self.video)
         move(self.whole if self.whole.exists() else self._segments, self.video)
         self.remove()
 
@@ -137,13 +151,25 @@ class Part:
             raise VideoError(
                 f"another process is writing {self.video}; wait until it is done, or name another file"
             ) from error
-        own = (SETTINGS, STATES, _FRAMES, _WHOLE)
-        strangers = sorted(entry.name for entry in self.folder.iterdir() if entry.name.lstrip(".") not in own)
+        strangers = sorted(name for entry in self.folder.iterdir() for name in self._strangers(entry))
         if strangers:
             raise VideoError(
                 f"cannot write {self.video}: its folder {self.folder.name} holds other files ({strangers[0]}); "
                 "move it away, or name another file"
             )
+
+    def _strangers(self, entry: Path) -> list[str]:
+        """Names of what no writer has put here, at and below an entry of the folder."""
+        if entry.name == _FRAMES and entry.is_dir() and not entry.is_symlink():
+            return [f"{_FRAMES}/{each.name}" for each in entry.iterdir() if not self._is_segment(each)]
+        own = entry.name.lstrip(".") in (SETTINGS, STATES, _WHOLE) and entry.is_file() and not entry.is_symlink()
+        return [] if own and (entry.name != SETTINGS or self._record.made_here) else [entry.name]
+
+    def _is_segment(self, path: Path) -> bool:
+        if path.name.startswith(".unfinished."):
+            return path.is_file() and not path.is_symlink()
+        own = path.is_file() and not path.is_symlink() and (self._record.made_here or made_here(path))
+        return own and _SEGMENT.fullmatch(path.stem) is not None
 
     def _clear(self) -> None:
         self._record.forget()
@@ -158,7 +184,7 @@ class Part:
         """Complete segments in their order, with first frame and number of frames, up to the first gap."""
         stored, expected = [], 0
         for path in sorted(self._segments.iterdir(), key=lambda path: (len(path.name), path.name)):
-            numbers = re.fullmatch(r"frames?_(\d+)(?:-(\d+))?", path.stem)
+            numbers = _SEGMENT.fullmatch(path.stem)
             if numbers is None or int(numbers[1]) != expected:
                 continue
             frames = int(numbers[2] or numbers[1]) + 1 - expected

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ripple_sim.errors import VideoError
 
+from .mark import MARK
 from .move import move
 
 SETTINGS, STATES = "settings.json", "states.txt"
@@ -35,9 +36,17 @@ class Record:
         """Whether there is a video to continue."""
         return self._settings.exists()
 
+    @property
+    def made_here(self) -> bool:
+        """Whether the settings were written by a record."""
+        try:
+            return MARK in json.loads(self._settings.read_text())
+        except (OSError, ValueError, TypeError):
+            return False
+
     def start(self, settings: Mapping[str, object]) -> None:
         """Write the settings. Call it last: while they are missing there is nothing to continue."""
-        self._unfinished.write_text(json.dumps(settings, indent=1))
+        self._unfinished.write_text(json.dumps({MARK: True, **settings}, indent=1))
         move(self._unfinished, self._settings)
 
     def forget(self) -> None:
@@ -52,7 +61,7 @@ class Record:
         VideoError
             Naming the first that differs.
         """
-        old, new = json.loads(self._settings.read_text()), json.loads(json.dumps(settings))
+        old, new = json.loads(self._settings.read_text()), json.loads(json.dumps({MARK: True, **settings}))
         for name in sorted({*old, *new}):
             before, now = old.get(name), new.get(name)
             if before != now:

@@ -1,7 +1,7 @@
 """Animated WebP, assembled from still images so that memory does not grow with the length of the video.
 
 The container is RIFF; see "WebP Container Specification" by Google: VP8X (size and flags), ANIM (background, loops),
-and an ANMF chunk per frame with the chunks of a still image.
+an ANMF chunk per frame with the chunks of a still image, and XMP with the mark.
 """
 
 from __future__ import annotations
@@ -11,14 +11,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .clip import Stream
+from .mark import MARK
 
-_ANIMATION, _OPACITY = 0x02, 0x10
+_ANIMATION, _METADATA, _OPACITY = 0x02, 0x04, 0x10
 _DO_NOT_BLEND = 0x02
 
 
 def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
     """Make an endlessly looping WebP of still ones, all of the stream's size."""
-    flags = _ANIMATION
+    flags = _ANIMATION | _METADATA
     with path.open("wb") as file:
         file.write(bytes(12 + 8 + 10))  # RIFF and VP8X, which come last: they hold the size and the flags
         file.write(_chunk(b"ANIM", struct.pack("<IH", 0, 0)))
@@ -30,6 +31,7 @@ def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
                 flags |= _OPACITY
             header = bytes(6) + _canvas(stream) + struct.pack("<I", end - begin)[:3] + bytes([_DO_NOT_BLEND])
             file.write(_chunk(b"ANMF", header + image))
+        file.write(_chunk(b"XMP ", MARK.encode()))
         size = file.tell()
         file.seek(0)
         file.write(struct.pack("<4sI4s", b"RIFF", size - 8, b"WEBP"))

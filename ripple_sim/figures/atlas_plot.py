@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure  # without pyplot, which would look for a display
 from numpy.typing import NDArray
 
+from ripple_sim.encode.mark import MARK, made_here
 from ripple_sim.solver import Atlas, AtlasError
 
 from .atlas_painter import AtlasPainter
@@ -21,13 +23,18 @@ _TEXT, _FAINT = "#1b2432", "#6b7685"
 _DPI = 120
 
 
-def check_plot_path(path: str | Path) -> None:
-    """Raise `AtlasError` if the ending is unknown, or the folder does not exist."""
+def check_plot_path(path: str | Path, overwrite: bool = True) -> None:
+    """Raise `AtlasError` if the ending is unknown, the folder missing, or the file another's that must not go."""
     path = Path(path)
     if path.suffix.lower() not in _ENDINGS:
         raise AtlasError(f"plot file {str(path)!r} has an unknown ending; valid are {', '.join(_ENDINGS)}")
     if not path.absolute().parent.is_dir() or path.is_dir():
         raise AtlasError(f"plot file {str(path)!r} cannot be written: name a file in a folder that exists")
+    if path.exists() and not (overwrite or made_here(path.resolve())):
+        raise AtlasError(
+            f"plot file {str(path)!r} cannot be written: it exists and was not {MARK}; name another file, or add "
+            "--overwrite"
+        )
 
 
 def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = "", up: str = "y") -> None:
@@ -71,9 +78,17 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
     _histogram(figure.add_axes((0.655, 0.300, 0.31, 0.105)), stretch, atlas.areas)
     _figures(figure, atlas)
     try:
-        figure.savefig(path, dpi=_DPI, metadata={"Date": None} if Path(path).suffix.lower() == ".svg" else None)
+        figure.savefig(path, dpi=_DPI, **_marked(Path(path).suffix.lower()))
     except OSError as error:
         raise AtlasError(f"plot file {str(path)!r} cannot be written: {error.strerror or error}") from error
+
+
+def _marked(ending: str) -> dict[str, Any]:
+    """How each format is told to hold the mark of files that were made here."""
+    if ending == ".jpg":
+        return {"pil_kwargs": {"comment": MARK.encode()}}
+    name = "Software" if ending == ".png" else "Creator"
+    return {"metadata": {name: MARK, **({"Date": None} if ending == ".svg" else {})}}
 
 
 def _show(figure: Figure, place: tuple[float, float, float, float], image: NDArray, caption: str = "") -> None:

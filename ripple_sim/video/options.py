@@ -52,6 +52,8 @@ class VideoOptions:
     """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
     resume: bool = False
     """Continue an interrupted render of the same scene with the same options."""
+    overwrite: bool = False
+    """Replace an output that ripple-sim has not made."""
 
     @property
     def rate(self) -> float:

@@ -80,6 +80,7 @@ def render_video(
         frame_format=options.frame_format,
         settings=render_settings(scene, options, frames, gl),
         resume=options.resume,
+        overwrite=options.overwrite,
     ) as writer:
         resumed_at = writer.frames
         film = Film(_simulations(scene, options, on_step), options, frames)

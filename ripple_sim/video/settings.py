@@ -96,6 +96,7 @@ def check_options(options: VideoOptions, output: Path) -> None:
         transparent=options.transparent,
         frame_format=options.frame_format,
         overlaid=bool(options.overlay) or len(operators) > 1,
+        overwrite=options.overwrite,
     )
 
 

@@ -90,7 +90,7 @@ def build_atlas(
     if path is not None:
         # a folder that cannot be written costs the next call its time, nothing else
         with contextlib.suppress(AtlasError):
-            atlas.save(path)
+            atlas.save(path, overwrite=True)
             make_room(path)
     return atlas
 

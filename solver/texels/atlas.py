@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.mesh.mesh import Mesh
 
-from .atlas_file import write_atlas_file
+from .atlas_file import check_atlas_place, write_atlas_file
 from .chart_map import ChartMap, TextureCoordinates, texture_coordinates
 from .quality import texel_quality
 from .sampling import sampling_matrix
@@ -153,14 +153,17 @@ class Atlas:
         """
         return {**self.chart_map.quality(self.mesh), **texel_quality(self.texels, self.mesh)}
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path, overwrite: bool = False) -> None:
         """Write the atlas to one file, which `load_atlas` reads. The file appears whole or not at all.
+
+        An older atlas there is replaced, any other file only with `overwrite`. A link is written through.
 
         Raises
         ------
         AtlasError
             If the file cannot be written.
         """
+        check_atlas_place(Path(path), overwrite)
         mesh, texels = self.mesh, self.texels
         arrays = {
             "kind": np.array([type(self).__name__, self.layout]),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +36,28 @@ def write_atlas_file(path: Path, arrays: dict[str, NDArray]) -> None:
             write_arrays(file, {**arrays, **small, "format": np.array([FORMAT])})
     except OSError as error:
         raise AtlasError(f"atlas file {str(path)!r} cannot be written: {error.strerror or error}") from error
+
+
+def check_atlas_place(path: Path, overwrite: bool) -> None:
+    """Make sure that an atlas may be written to a path.
+
+    Raises
+    ------
+    AtlasError
+        If another file is there, unless it is empty or `overwrite` says that it is to go.
+    """
+    if overwrite or not path.is_file() or path.stat().st_size == 0:
+        return
+    try:
+        with zipfile.ZipFile(path) as archive:
+            known = {"format.npy", "positions.npy"} <= set(archive.namelist())
+    except (OSError, zipfile.BadZipFile, NotImplementedError, struct.error):
+        known = False
+    if not known:
+        raise AtlasError(
+            f"atlas file {str(path)!r} cannot be written: it exists and is no atlas; name another file, or "
+            "ask to overwrite it"
+        )
 
 
 def read_atlas_file(path: Path) -> dict[str, NDArray]:

@@ -29,6 +29,7 @@ WORDS = {
     "layout": ("patches", "patches"),
     "backend": ("cpu", "cpu"),
     "resume": (None, True),
+    "overwrite": (None, True),
 }
 COMMANDS = {"render": ("duck", Render), "drop": ("mesh.obj", Drop)}
 

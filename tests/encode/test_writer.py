@@ -187,7 +187,10 @@ def test_an_error_while_rendering_leaves_nothing_behind(tmp_path, ending):
 def test_an_error_while_rendering_keeps_the_video_that_was_there(tmp_path):
     path = tmp_path / "clip.mp4"
     path.write_bytes(b"yesterday's")
-    with pytest.raises(ZeroDivisionError), open_writer(path, width=WIDTH, height=HEIGHT, fps=FPS) as writer:
+    with (
+        pytest.raises(ZeroDivisionError),
+        open_writer(path, width=WIDTH, height=HEIGHT, fps=FPS, overwrite=True) as writer,
+    ):
         writer.write(frames(1)[0])
         raise ZeroDivisionError
     assert path.read_bytes() == b"yesterday's"
