@@ -7,12 +7,12 @@ import functools
 from pathlib import Path
 from typing import Any
 
-import igl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.mesh.mesh import Mesh
+from ripple_sim.solver.mesh.triangle_tree import TriangleTree, closest_points, triangle_tree
 
 from .atlas_file import check_atlas_place, write_atlas_file
 from .chart_map import ChartMap, TextureCoordinates, texture_coordinates
@@ -100,8 +100,7 @@ class Atlas:
         AtlasError
             If the points are not finite or not of shape [k, 3] or [3].
         """
-        points = check_points(points)
-        _, triangle, closest = self._tree.squared_distance(self.mesh.V, self.mesh.F, points)
+        triangle, closest = closest_points(self.tree, check_points(points))
         return closest, self.chart_map.coordinates(self.mesh, triangle, closest)
 
     def locate(self, points: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
@@ -181,14 +180,13 @@ class Atlas:
         write_atlas_file(Path(path), arrays | {name: each for name, each in optional.items() if each is not None})
 
     def __getstate__(self) -> dict[str, Any]:
-        """What `copy` and `pickle` keep: the search tree cannot be copied, and is made again when it is needed."""
+        """What `copy` and `pickle` keep: the search tree is made again when it is needed."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     @functools.cached_property
-    def _tree(self) -> Any:
-        tree = igl.AABB()
-        tree.init(self.mesh.V, self.mesh.F)
-        return tree
+    def tree(self) -> TriangleTree:
+        """Search tree over the triangles of the mesh."""
+        return triangle_tree(self.mesh.V, self.mesh.F)
 
 
 def check_points(points: ArrayLike) -> NDArray[np.float64]:

@@ -1,0 +1,49 @@
+"""The tree of boxes finds the nearest points of a mesh: those that libigl finds."""
+
+import igl
+import numpy as np
+import pytest
+
+from ripple_sim.scenes.shapes import limbed
+from ripple_sim.solver.mesh.triangle_tree import closest_points, triangle_tree
+from ripple_sim.solver.texels.barycentrics import barycentrics_in
+
+
+def by_igl(V: np.ndarray, F: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    tree = igl.AABB()
+    tree.init(V, F)
+    squared, _, closest = tree.squared_distance(V, F, points)
+    return np.sqrt(squared), closest
+
+
+def check(V: np.ndarray, F: np.ndarray, points: np.ndarray) -> np.ndarray:
+    distances, expected = by_igl(V, F, points)
+    triangles, closest = closest_points(triangle_tree(V, F), points)
+    np.testing.assert_allclose(np.linalg.norm(closest - points, axis=1), distances, rtol=1e-12, atol=1e-14)
+    corners = V[F[triangles]]
+    on_them = np.einsum("kc,kcj->kj", barycentrics_in(corners, closest), corners)
+    np.testing.assert_allclose(on_them, closest, atol=1e-9)
+    return np.linalg.norm(closest - expected, axis=1)
+
+
+@pytest.mark.parametrize("away", [0.0, 1e-3, 0.1])
+def test_nearest_points_are_those_of_libigl(away: float) -> None:
+    V, F = limbed()
+    rng = np.random.default_rng(0)
+    points = V[F[rng.integers(len(F), size=2000)]].mean(axis=1) + away * rng.standard_normal((2000, 3))
+    assert check(V, F, points).max() < 1e-9
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 9, 100])
+def test_a_few_triangles_in_any_place(count: int) -> None:
+    rng = np.random.default_rng(count)
+    V, F = rng.uniform(-1, 1, (3 * count, 3)), np.arange(3 * count).reshape(-1, 3)
+    assert check(V, F, rng.uniform(-3, 3, (500, 3))).max() < 1e-9
+
+
+def test_triangles_without_area_and_triangles_in_one_place() -> None:
+    V = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
+    F = np.array([[0, 0, 0], [0, 1, 2], [1, 1, 2], *[[0, 1, 3]] * 9])
+    points = np.array([[0.0, 0, 1], [1.5, -1, 0], [3, 0, 0], [0.2, 0.2, -2], [-1, 5, 0]])
+    _, closest = closest_points(triangle_tree(V, F), points)
+    np.testing.assert_allclose(closest, [[0, 0, 0], [1.5, 0, 0], [2, 0, 0], [0.2, 0.2, 0], [0, 1, 0]], atol=1e-15)
