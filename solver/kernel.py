@@ -9,11 +9,13 @@ others call.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numba
 import numpy as np
+from numba.extending import overload
 from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -27,3 +29,20 @@ def kernel(function: Callable | None = None, **options: Any) -> Any:
     """Compile a function at its first call: `@kernel`, or `@kernel(inline="always")` with options of `numba.njit`."""
     compiler = numba.njit(cache=True, nogil=True, error_model="numpy", **options)
     return compiler if function is None else compiler(function)
+
+
+def variant(declared: Callable, first: type) -> Callable[[Callable], Callable]:
+    """Decorate the version of a declared function that kernels call where its first argument is of this NamedTuple.
+
+    So compiled code is open to kinds that it does not know: whoever declares the function need not import them.
+    """
+
+    def register(version: Callable) -> Callable:
+        @overload(declared)
+        @functools.wraps(version)
+        def choose(*arguments: Any) -> Callable | None:
+            return version if getattr(arguments[0], "instance_class", None) is first else None
+
+        return version
+
+    return register

@@ -13,7 +13,7 @@ from ripple_sim.solver.texels.topology import TexelTopology
 
 from .convention import cube_chart_points
 from .edges import chart_uv, split_at_edges
-from .nearest import sphere_directions, texels_at
+from .nearest import SphereCharts, sphere_directions
 from .quality import sphere_map_quality
 
 
@@ -44,9 +44,9 @@ class CubeChartMap:
         """Chart, row and column of directions, each [k]."""
         return cube_chart_points(coordinates, resolution)
 
-    def nearest_texels(self, coordinates: NDArray[np.float64], topology: TexelTopology) -> NDArray[np.int64]:
-        """Flat index of the texel in which each direction lies, [k]."""
-        return texels_at(coordinates, topology.shape[1])
+    def compiled(self, mesh: Mesh, topology: TexelTopology) -> SphereCharts:
+        """Mesh and sphere map."""
+        return SphereCharts(mesh.V, mesh.F, self.sphere, topology.shape[1])
 
     def linear_parts(self, mesh: Mesh) -> LinearParts:
         """The triangles, with the directions of their corners."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.kernel import Floats, Ints, kernel, variant
+from ripple_sim.solver.texels.nearest import nearest_place, texel_on
 
 from .convention import CHART_U, CHART_V
 
@@ -18,13 +21,37 @@ def sphere_directions(V: Floats, F: Ints, sphere: Floats, triangles: Ints, point
     return found
 
 
-@kernel
-def texels_at(directions: Floats, n: int) -> Ints:
-    """Flat index (chart N + row) N + column of the texel in which each direction lies; see `cube_chart_points`."""
-    found = np.empty(len(directions), np.int64)
-    for i in range(len(directions)):
-        found[i] = _texel_at(directions[i], n)
-    return found
+class SphereCharts(NamedTuple):
+    """A mesh and its sphere map on the six charts; see `CubeChartMap`."""
+
+    V: Floats
+    F: Ints
+    sphere: Floats
+    resolution: int
+
+
+class Ball(NamedTuple):
+    """A sphere round the origin [m], whose sphere map is itself."""
+
+    radius: float
+    resolution: int
+
+
+@variant(texel_on, SphereCharts)
+def _texel_on_sphere_map(charts: SphereCharts, triangle: int, x: float, y: float, z: float) -> int:
+    u, v, w = _direction(charts.V, charts.F, charts.sphere, triangle, (x, y, z))
+    return texel_at(u, v, w, charts.resolution)
+
+
+@variant(nearest_place, Ball)
+def _nearest_on_ball(surface: Ball, x: float, y: float, z: float) -> tuple[float, float, float, int]:
+    length = np.sqrt(x * x + y * y + z * z)
+    if length > 0:
+        x, y, z = x / length, y / length, z / length
+    else:
+        x, y, z = 0.0, 0.0, 1.0  # all are as near
+    texel = texel_at(x, y, z, surface.resolution)
+    return surface.radius * x, surface.radius * y, surface.radius * z, texel
 
 
 @kernel
@@ -51,9 +78,9 @@ def _mean(sphere: Floats, k: int, a: int, b: int, c: int, s: float, t: float) ->
 
 
 @kernel
-def _texel_at(direction: Floats, n: int) -> int:
-    """Flat index of the texel in which a direction [3] lies."""
-    axis = 0
+def texel_at(x: float, y: float, z: float, n: int) -> int:
+    """Flat index (chart N + row) N + column of the texel in which a direction lies; see `cube_chart_points`."""
+    direction, axis = (x, y, z), 0
     for k in range(1, 3):
         if abs(direction[k]) > abs(direction[axis]):
             axis = k

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.mesh.mesh import Mesh
 from ripple_sim.solver.texels.atlas import Atlas, check_points
+from ripple_sim.solver.texels.nearest import nearest_places
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
 from .convention import check_resolution, cube_topology, texel_directions
 from .cube_chart_map import CubeChartMap
+from .nearest import Ball
 
 
 class SphereAtlas(Atlas):
@@ -29,6 +33,16 @@ class SphereAtlas(Atlas):
         if not length.all():
             raise AtlasError("the sphere's centre has no nearest surface point; give a point off the centre")
         return self.radius * (points / length), points / length
+
+    def nearest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Closest points on the sphere [m], [k, 3], and the flat index of the texel in which each lies, [k]."""
+        closest, directions = self.project(points)
+        return closest, nearest_places(self.places, directions)[1]
+
+    @functools.cached_property
+    def places(self) -> Ball:
+        """The sphere itself."""
+        return Ball(self.radius, self.resolution)
 
 
 def sphere_atlas(radius: float = 1.0, resolution: int = 128) -> SphereAtlas:

@@ -107,8 +107,10 @@ def _distance2_to_box(boxes: Floats, node: int, x: float, y: float, z: float) ->
 
 @kernel
 def _closest_in_triangle(corners: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """The point of a triangle [3, 3] nearest to a point [m]: by the regions of C. Ericson, Real-Time Collision Detection
-    (2005), section 5.1.5."""
+    """The point of a triangle [3, 3] nearest to a point [m].
+
+    By the regions of C. Ericson, Real-Time Collision Detection (2005), section 5.1.5.
+    """
     ax, ay, az = corners[0, 0], corners[0, 1], corners[0, 2]
     ux, uy, uz = corners[1, 0] - ax, corners[1, 1] - ay, corners[1, 2] - az
     vx, vy, vz = corners[2, 0] - ax, corners[2, 1] - ay, corners[2, 2] - az

@@ -4,18 +4,29 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.kernel import Floats, Ints, kernel, variant
 from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.texels.barycentrics import barycentrics_in
+from ripple_sim.solver.texels.barycentrics import barycentrics_at, barycentrics_in
 from ripple_sim.solver.texels.chart_map import ChartPieces, LinearParts
+from ripple_sim.solver.texels.nearest import texel_on
 from ripple_sim.solver.texels.topology import TexelTopology
 
 from .pieces import Pieces
 from .quality import map_quality
+
+
+class PatchCharts(NamedTuple):
+    """Triangles in space [m], [m, 3, 3], the first piece of each, one behind the last, and the pieces."""
+
+    triangles: Floats
+    first: Ints
+    pieces: Pieces
+    resolution: int
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -54,12 +65,9 @@ class PatchChartMap:
         chart, column, row = coordinates.T
         return chart.astype(np.int64), row * resolution - 0.5, column * resolution - 0.5
 
-    def nearest_texels(self, coordinates: NDArray[np.float64], topology: TexelTopology) -> NDArray[np.int64]:
-        """Flat index of the texel in which each place lies, [k]."""
-        n = topology.shape[1]
-        chart, row, column = self.chart_points(coordinates, n)
-        place = np.clip(np.rint([row, column]).astype(np.int64), 0, n - 1)
-        return (chart * n + place[0]) * n + place[1]
+    def compiled(self, mesh: Mesh, topology: TexelTopology) -> PatchCharts:
+        """The triangles in space, and their pieces."""
+        return PatchCharts(mesh.V[mesh.F], self._first, self.pieces, topology.shape[1])
 
     def linear_parts(self, mesh: Mesh) -> LinearParts:
         """The pieces."""
@@ -88,20 +96,39 @@ class PatchChartMap:
 def _find(first: Ints, corners: Floats, triangles: Ints, weights: Floats, piece: Ints, inside: Floats) -> None:
     """For points at barycentrics [k, 3] in triangles [k], the piece in which each lies, and barycentrics in that."""
     for i in range(len(triangles)):
-        best = -np.inf
-        piece[i], inside[i] = min(first[triangles[i]], len(corners) - 1), 1 / 3
-        for p in range(first[triangles[i]], first[triangles[i] + 1]):
-            a, b, c = corners[p]
-            ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
-            dx, dy = weights[i, 0] - a[0], weights[i, 1] - a[1]
-            area = ux * vy - uy * vx
-            if not area > 0:
-                continue
-            s, t = (dx * vy - dy * vx) / area, (ux * dy - uy * dx) / area
-            least = min(s, t, 1 - s - t)
-            if least > best:
-                best, piece[i] = least, p
-                s, t = min(max(s, 0.0), 1.0), min(max(t, 0.0), 1.0)
-                excess = max(s + t, 1.0)
-                inside[i, 1], inside[i, 2] = s / excess, t / excess
-                inside[i, 0] = 1 - inside[i, 1] - inside[i, 2]
+        piece[i], s, t = _piece_at(first, corners, triangles[i], weights[i, 0], weights[i, 1])
+        inside[i, 0], inside[i, 1], inside[i, 2] = 1 - s - t, s, t
+
+
+@kernel
+def _piece_at(first: Ints, corners: Floats, triangle: int, x: float, y: float) -> tuple[int, float, float]:
+    """The piece of a triangle in which a point lies, and its second and third barycentric coordinate in that."""
+    best, piece, at_s, at_t = -np.inf, min(first[triangle], len(corners) - 1), 1 / 3, 1 / 3
+    for p in range(first[triangle], first[triangle + 1]):
+        a, b, c = corners[p]
+        ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
+        dx, dy = x - a[0], y - a[1]
+        area = ux * vy - uy * vx
+        if not area > 0:
+            continue
+        s, t = (dx * vy - dy * vx) / area, (ux * dy - uy * dx) / area
+        least = min(s, t, 1 - s - t)
+        if least > best:
+            best, piece = least, p
+            s, t = min(max(s, 0.0), 1.0), min(max(t, 0.0), 1.0)
+            excess = max(s + t, 1.0)
+            at_s, at_t = s / excess, t / excess
+    return piece, at_s, at_t
+
+
+@variant(texel_on, PatchCharts)
+def _texel_on_patches(charts: PatchCharts, triangle: int, x: float, y: float, z: float) -> int:
+    pieces, n = charts.pieces, charts.resolution
+    s, t = barycentrics_at(charts.triangles[triangle], x, y, z)
+    piece, s, t = _piece_at(charts.first, pieces.barycentrics, triangle, 1 - s - t, s)
+    texel = pieces.chart[piece]
+    for k in (1, 0):
+        place = (1 - s - t) * pieces.places[piece, 0, k]
+        place += s * pieces.places[piece, 1, k] + t * pieces.places[piece, 2, k]
+        texel = texel * n + min(max(int(np.rint(place * n - 0.5)), 0), n - 1)
+    return texel

@@ -16,6 +16,7 @@ from ripple_sim.solver.mesh.triangle_tree import TriangleTree, closest_points, t
 
 from .atlas_file import check_atlas_place, write_atlas_file
 from .chart_map import ChartMap, TextureCoordinates, texture_coordinates
+from .nearest import MeshPlaces, nearest_places
 from .quality import texel_quality
 from .sampling import sampling_matrix
 from .texel_mesh import TexelMesh
@@ -112,8 +113,7 @@ class Atlas:
 
     def nearest(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Closest surface points [m], [k, 3], and the flat index of the texel nearest to each in the atlas, [k]."""
-        closest, coordinates = self.project(points)
-        return closest, self.chart_map.nearest_texels(coordinates, self.texels.topology)
+        return nearest_places(self.places, check_points(points))
 
     def nearest_texel(self, points: ArrayLike) -> NDArray[np.int64]:
         """Flat index (chart N + row) N + column of the texel nearest in the atlas to each point, shape [k]."""
@@ -182,6 +182,11 @@ class Atlas:
     def __getstate__(self) -> dict[str, Any]:
         """What `copy` and `pickle` keep: the search tree is made again when it is needed."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
+    @functools.cached_property
+    def places(self) -> Any:
+        """What compiled code asks for the nearest places of the surface; see `nearest_places`."""
+        return MeshPlaces(self.tree, self.chart_map.compiled(self.mesh, self.texels.topology))
 
     @functools.cached_property
     def tree(self) -> TriangleTree:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,8 @@ class ChartMap(Protocol):
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Chart, row and column, each [k], of map coordinates; 0.0 is the centre of the first texel."""
 
-    def nearest_texels(self, coordinates: NDArray[np.float64], topology: TexelTopology) -> NDArray[np.int64]:
-        """Flat index of the texel in which map coordinates lie, [k]."""
+    def compiled(self, mesh: Mesh, topology: TexelTopology) -> Any:
+        """What compiled code asks for the texels of points, a NamedTuple of arrays; see `texel_on`."""
 
     def linear_parts(self, mesh: Mesh) -> LinearParts:
         """Parts of the mesh's triangles in which map coordinates are linear."""

@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver.kernel import Floats, Ints, variant
 from ripple_sim.solver.mesh.mesh import Mesh
 
-from .barycentrics import barycentrics_in
+from .barycentrics import barycentrics_at, barycentrics_in
 from .chart_map import ChartPieces, LinearParts
+from .nearest import texel_on
 from .topology import TexelTopology
+
+
+class LinearCharts(NamedTuple):
+    """Triangles in space [m], [m, 3, 3], and on the charts; see `LinearChartMap`."""
+
+    triangles: Floats
+    charts: Ints
+    corners: Floats
+    resolution: int
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -49,11 +61,9 @@ class LinearChartMap:
         """Chart, row and column, each [k]."""
         return coordinates[:, 0].astype(np.int64), coordinates[:, 1], coordinates[:, 2]
 
-    def nearest_texels(self, coordinates: NDArray[np.float64], topology: TexelTopology) -> NDArray[np.int64]:
-        """Flat index of the texel in which each place lies, [k]."""
-        n = topology.shape[1]
-        chart, row, column = np.rint(coordinates).astype(np.int64).T
-        return (chart * n + row.clip(0, n - 1)) * n + column.clip(0, n - 1)
+    def compiled(self, mesh: Mesh, topology: TexelTopology) -> LinearCharts:
+        """The triangles in space and on the charts."""
+        return LinearCharts(mesh.V[mesh.F], self.charts, self.corners, topology.shape[1])
 
     def linear_parts(self, mesh: Mesh) -> LinearParts:
         """The triangles, with chart, row and column of their corners."""
@@ -75,3 +85,14 @@ class LinearChartMap:
     def arrays(self) -> dict[str, NDArray]:
         """Charts and corners of the triangles."""
         return {"charts": self.charts, "corners": self.corners}
+
+
+@variant(texel_on, LinearCharts)
+def _texel_on_linear_charts(charts: LinearCharts, triangle: int, x: float, y: float, z: float) -> int:
+    s, t = barycentrics_at(charts.triangles[triangle], x, y, z)
+    texel, n = charts.charts[triangle], charts.resolution
+    for k in range(2):
+        place = (1 - s - t) * charts.corners[triangle, 0, k]
+        place += s * charts.corners[triangle, 1, k] + t * charts.corners[triangle, 2, k]
+        texel = texel * n + min(max(int(np.rint(place)), 0), n - 1)
+    return texel

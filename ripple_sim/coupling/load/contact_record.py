@@ -10,13 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.contacts.target_contacts import TargetContacts
-from ripple_sim.coupling.patches.contact_patches import LoadPoints, Patches
-from ripple_sim.coupling.patches.pose import Pose, in_world
+from ripple_sim.coupling.patches.pose import Pose, in_frame, in_world
 from ripple_sim.solver import Atlas, Load
-from ripple_sim.solver.kernel import Floats, Ints
-
-from .footprint_cache import FootprintCache
-from .texel_forces import texel_forces
+from ripple_sim.solver.kernel import Bools, Floats, Ints
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -69,29 +65,42 @@ class Touch:
     load: Load
 
 
-class ContactRecord(NamedTuple):
-    """The contacts on one target in a step, with their forces before the rest filter.
+class Touches(NamedTuple):
+    """What is told of the geoms that touch a target in a step, before the rest filter.
 
     Attributes
     ----------
-    contacts : TargetContacts
-    pose : Pose
-        Of the target.
-    patches : Patches
-    surface, texels : float64 [m, 3], int64 [m]
-        Surface points nearest to those of the patches [m], and flat indices of the texels nearest to them.
-    points : LoadPoints
-    cache : FootprintCache
-        With the footprints of the points first.
+    points : float64 [p, 3]
+        Surface points nearest to the middles of their contacts, in the world [m].
+    pushes : float64 [p]
+        Their normal forces [N].
+    texels : int64 [p]
+        Flat indices of the texels nearest to the points.
+    inner : bool [p]
+        Whether the inner side of an open surface is touched.
+    begins : int64 [p + 1]
+        The texels under geom i are those from begins[i] to begins[i + 1].
+    under : int64 [k]
+        Flat texel indices.
+    forces : float64 [k]
+        On them [N].
     """
+
+    points: Floats
+    pushes: Floats
+    texels: Ints
+    inner: Bools
+    begins: Ints
+    under: Ints
+    forces: Floats
+
+
+class ContactRecord(NamedTuple):
+    """The contacts on one target in a step, the target's pose, and its touches."""
 
     contacts: TargetContacts
     pose: Pose
-    patches: Patches
-    surface: Floats
-    texels: Ints
-    points: LoadPoints
-    cache: FootprintCache
+    told: Touches
 
     def impulses(self, names: Sequence[str], owners: Ints, atlas: Atlas, timestep: float) -> Iterator[Impulse]:
         """One record for each geom or flex that touches.
@@ -105,29 +114,28 @@ class ContactRecord(NamedTuple):
         timestep : float
             How long the forces were held [s].
         """
-        middles, forces = self.patches.begins[:-1], self.patches.forces
-        inner = self.points.forces[self.points.begins[:-1]] * forces < 0
-        places, texels, mine = self.surface[middles], self.texels[middles], owners[self.patches.geoms]
+        points, forces, texels, inner = self.told[:4]
+        n, geom, others = atlas.areas.shape[1], names[self.contacts.target], owners[self.contacts.others]
         # the last ids are those of a flex's vertices, which touch for themselves and are told of together
-        if mine[-1] != self.patches.geoms[-1]:
-            first = np.flatnonzero(np.diff(mine, prepend=-1))
-            weighted = np.add.reduceat(forces[:, None] * places, first)
-            forces, mine, inner = np.add.reduceat(forces, first), mine[first], inner[first]
+        if others[-1] != self.contacts.others[-1]:
+            first = np.flatnonzero(np.diff(others, prepend=-1))
+            weighted = np.add.reduceat(forces[:, None] * in_frame(points, self.pose), first)
+            forces, others, inner = np.add.reduceat(forces, first), others[first], inner[first]
             places, texels = atlas.nearest(weighted / forces[:, None])
-        points, n, geom = in_world(places, self.pose), atlas.areas.shape[1], names[self.contacts.target]
-        rows = zip(mine.tolist(), points, forces.tolist(), texels.tolist(), inner.tolist(), strict=True)
+            points = in_world(places, self.pose)
+        rows = zip(others.tolist(), points, forces.tolist(), texels.tolist(), inner.tolist(), strict=True)
         for other, point, force, texel, behind in rows:
             row = texel // n
             yield Impulse(geom, names[other], point, force * timestep, (row // n, row % n, texel % n), behind)
 
     def touches(self) -> Iterator[Touch]:
         """One record for each geom that touches."""
-        contacts, forces = self.contacts, texel_forces(self.patches, self.points, self.cache)
+        contacts, told = self.contacts, self.told
         for i, other in enumerate(contacts.others.tolist()):
             rows = slice(*contacts.begins[i : i + 2].tolist())
             of_contacts = np.abs(contacts.forces[rows])
             point = of_contacts @ contacts.points[rows] / of_contacts.sum()
             normal = of_contacts @ contacts.normals[rows]
-            at = slice(*forces.begins[i : i + 2].tolist())
-            load = Load(forces.texels[at], forces.forces[at])
+            at = slice(*told.begins[i : i + 2].tolist())
+            load = Load(told.under[at], told.forces[at])
             yield Touch(contacts.target, other, point, normal / np.linalg.norm(normal), load)

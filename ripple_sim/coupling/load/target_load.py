@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.contacts.target_contacts import TargetContacts
-from ripple_sim.coupling.patches.contact_patches import LoadPoints, Patches, find_load_points, find_patches
-from ripple_sim.coupling.patches.pose import Pose
+from ripple_sim.coupling.patches.contact_patches import find_load_points, find_patches
+from ripple_sim.coupling.patches.pose import Pose, in_world
 from ripple_sim.solver import Load, WaveSolver
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 from ripple_sim.solver.texels.distance import distance_scratch
+from ripple_sim.solver.texels.nearest import nearest_place, nearest_places
 from ripple_sim.solver.texels.texel_mesh import TexelGrid
 from ripple_sim.solver.waves.load import slot_scratch
 
-from .contact_record import ContactRecord
+from .contact_record import ContactRecord, Touches
 from .contact_state import CONTACT_STATE
 from .footprint_cache import EMPTY_CACHE, FootprintCache, rebuild, reusable
 from .rest_filter import rest_filter
@@ -32,13 +33,22 @@ class _State(NamedTuple):
     over: bool
 
 
-class _Texels(NamedTuple):
-    """A target's texels: grid, area that loads move [m^2], [C n n], and scratch buffers for distances and slots."""
+class _Target(NamedTuple):
+    """What stays the same from step to step: see `TargetLoad`, and `Atlas.places` for `surface`."""
 
+    surface: Any
     grid: TexelGrid
-    movable_area: Floats
-    distance_scratch: Floats
-    slot_scratch: Ints
+    movable_area: Floats  # area that loads move [m^2], [C n n]
+    radii: Floats
+    convex: Bools
+    is_open: bool
+
+
+class _Scratch(NamedTuple):
+    """Buffers that are left clean: see `distance_scratch` and `slot_scratch`."""
+
+    distances: Floats
+    slots: Ints
 
 
 class TargetLoad:
@@ -55,14 +65,15 @@ class TargetLoad:
     """
 
     def __init__(self, waves: WaveSolver, radii: NDArray[np.float64], convex: NDArray[np.bool_]) -> None:
-        self._atlas, self._grid, self._radii, self._convex = waves.atlas, waves.atlas.texels.grid, radii, convex
+        atlas, nowhere = waves.atlas, np.zeros(waves.atlas.areas.size)
+        self._target = _Target(atlas.places, atlas.texels.grid, nowhere, radii, convex, not atlas.mesh.closed)
         self._state = _State(EMPTY_CACHE, np.zeros(len(radii), CONTACT_STATE), NO_SHARES, True)
-        self._open = not waves.atlas.mesh.closed
         self.set_waves(waves)
 
     def set_waves(self, waves: WaveSolver) -> None:
         """Go on with new waves on the same atlas; deficits stay."""
-        self._movable_area = (waves.atlas.areas * waves.operator.movable).reshape(-1)
+        movable_area = (waves.atlas.areas * waves.operator.movable).reshape(-1)
+        self._target = self._target._replace(movable_area=movable_area)
         self._state = self._state._replace(cache=EMPTY_CACHE)
         # texels that carry no load any more are forgotten at the next touch
         self._state.geoms["memory"] = 0.0
@@ -80,53 +91,74 @@ class TargetLoad:
         timestep, elapsed : float
             How long the contacts' forces were held, and over which time their impulse is given [s].
         """
-        patches = find_patches(contacts, pose, self._radii, self._convex)
-        surface, texels = self._atlas.nearest(patches.points)
-        points, rows, lost = _load_points(self._state, patches, surface, texels, timestep / elapsed)
-        if len(lost):
-            points.places[lost], points.texels[lost] = self._atlas.nearest(points.points[lost])
-        if self._open:
-            points.forces[:] *= np.repeat(
-                _sides(contacts, pose, patches, self._grid.normals[texels]), np.diff(points.begins)
-            )
-        size = len(self._movable_area)
-        mine = _Texels(self._grid, self._movable_area, distance_scratch(size), slot_scratch(size))
-        self._state, given = _load(self._state, patches, points, rows, mine, elapsed)
-        record = ContactRecord(contacts, pose, patches, surface, texels, points, self._state.cache)
-        return Load(self._state.mean.texels, given), record
+        self._state, given, touches = _touched(
+            self._state, contacts, pose, self._target, self._scratch(), timestep, elapsed
+        )
+        return Load(self._state.mean.texels, given), ContactRecord(contacts, pose, touches)
 
     def untouched(self, elapsed: float) -> Load:
         """Load over a time [s] in which no geom touches."""
         if self._state.over:
             return Load.none()
-        state, scratch = self._state, slot_scratch(len(self._movable_area))
-        mean, given, over = rest_filter(state.geoms, state.mean, NO_FORCES, elapsed, scratch)
+        state = self._state
+        mean, given, over = rest_filter(state.geoms, state.mean, NO_FORCES, elapsed, self._scratch().slots)
         self._state = state._replace(mean=mean, over=over)
         return Load(mean.texels, given)
 
-
-def _sides(contacts: TargetContacts, pose: Pose, patches: Patches, normals: Floats) -> Floats:
-    """Side from which each geom touches, [p]: 1 outside, -1 inside; the surface's normals are those at its patches."""
-    towards = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, contacts.begins[:-1]) @ pose.rotation
-    return np.where((towards * normals[patches.begins[:-1]]).sum(axis=1) < 0, -1.0, 1.0)
+    def _scratch(self) -> _Scratch:
+        size = len(self._target.movable_area)
+        return _Scratch(distance_scratch(size), slot_scratch(size))
 
 
 @kernel
-def _load_points(
-    state: _State, patches: Patches, surface: Floats, texels: Ints, share: float
-) -> tuple[LoadPoints, Ints, Ints]:
-    """Load points, the footprints that serve them again, and load points whose places are still to be found."""
-    points = find_load_points(patches, surface, texels, share)
+def _touched(
+    state: _State,
+    contacts: TargetContacts,
+    pose: Pose,
+    target: _Target,
+    scratch: _Scratch,
+    timestep: float,
+    elapsed: float,
+) -> tuple[_State, Floats, Touches]:
+    """State after a step, forces given to its texels [N], and what is told of the touches.
+
+    One kernel from contacts to forces: a call from Python costs as much as all that one of its parts does.
+    """
+    patches = find_patches(contacts, pose, target.radii, target.convex)
+    places, texels = nearest_places(target.surface, patches.points)
+    points = find_load_points(patches, places, texels, timestep / elapsed)
     rows, lost = reusable(state.cache, points, state.geoms)
-    return points, rows, lost
+    for i in lost:
+        x, y, z = points.points[i]
+        x, y, z, points.texels[i] = nearest_place(target.surface, x, y, z)
+        points.places[i, 0], points.places[i, 1], points.places[i, 2] = x, y, z
+    middles = patches.begins[:-1]
+    inner = np.zeros(len(middles), np.bool_)
+    if target.is_open:
+        inner = _from_inside(contacts, pose, target.grid.normals[texels[middles]])
+        for i in np.flatnonzero(inner):
+            points.forces[points.begins[i] : points.begins[i + 1]] *= -1.0
+    cache = rebuild(state.cache, points, rows, target.grid, target.movable_area, scratch.distances)
+    forces = texel_forces(patches, points, cache)
+    mean, given, over = rest_filter(state.geoms, state.mean, forces, elapsed, scratch.slots)
+    touches = Touches(
+        in_world(places[middles], pose), patches.forces, texels[middles], inner,
+        forces.begins, forces.texels, forces.forces,
+    )  # fmt: skip
+    return _State(cache, state.geoms, mean, over), given, touches
 
 
 @kernel
-def _load(
-    state: _State, patches: Patches, points: LoadPoints, rows: Ints, texels: _Texels, dt: float
-) -> tuple[_State, Floats]:
-    """State after a step, and forces given to its texels [N]."""
-    cache = rebuild(state.cache, points, rows, texels.grid, texels.movable_area, texels.distance_scratch)
-    forces = texel_forces(patches, points, cache)
-    mean, given, over = rest_filter(state.geoms, state.mean, forces, dt, texels.slot_scratch)
-    return _State(cache, state.geoms, mean, over), given
+def _from_inside(contacts: TargetContacts, pose: Pose, normals: Floats) -> Bools:
+    """Whether each geom touches from inside, [p]; the surface's normals are those at the middles of its contacts."""
+    inside = np.zeros(len(contacts.others), np.bool_)
+    for i in range(len(inside)):
+        along = 0.0
+        for row in range(contacts.begins[i], contacts.begins[i + 1]):
+            for k in range(3):
+                normal = 0.0
+                for j in range(3):
+                    normal += contacts.normals[row, j] * pose.rotation[j, k]
+                along += abs(contacts.forces[row]) * normal * normals[i, k]
+        inside[i] = along < 0
+    return inside

@@ -5,7 +5,7 @@ import pytest
 
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.cube_map.convention import cube_chart_points, cube_rotations, texel_directions
-from ripple_sim.solver.cube_map.nearest import sphere_directions, texels_at
+from ripple_sim.solver.cube_map.nearest import sphere_directions, texel_at
 
 
 @pytest.mark.parametrize("n", [4, 7, 32])
@@ -18,8 +18,10 @@ def test_texels_are_those_of_the_rounded_coordinates(n: int) -> None:
     )
     chart, row, column = cube_chart_points(directions, n)
     row, column = (np.clip(np.rint(each).astype(int), 0, n - 1) for each in (row, column))
-    np.testing.assert_array_equal(texels_at(directions, n), (chart * n + row) * n + column)
-    np.testing.assert_array_equal(texels_at(texel_directions(n).reshape(-1, 3), n), np.arange(6 * n * n))
+    found = [texel_at(*direction, n) for direction in directions]
+    np.testing.assert_array_equal(found, (chart * n + row) * n + column)
+    found = [texel_at(*direction, n) for direction in texel_directions(n).reshape(-1, 3)]
+    np.testing.assert_array_equal(found, np.arange(6 * n * n))
 
 
 def test_directions_interpolate_the_sphere_map(animal: Atlas) -> None:

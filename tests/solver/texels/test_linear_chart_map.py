@@ -5,7 +5,9 @@ import pytest
 from hand_made import polygon, square, two_squares
 
 from ripple_sim.solver import Mesh, texel_atlas
+from ripple_sim.solver.mesh.triangle_tree import triangle_tree
 from ripple_sim.solver.texels.linear_chart_map import LinearChartMap
+from ripple_sim.solver.texels.nearest import MeshPlaces, nearest_places
 
 # two triangles far apart and skewed, each on a chart of its own
 V = np.array([[0.0, 0, 0], [2, 0, 1], [0, 3, 0], [5, 5, 5], [6, 5, 5], [5, 5, 9]])
@@ -41,9 +43,11 @@ def test_a_triangle_without_area_gives_the_middle_of_its_place(corners: list) ->
 
 
 def test_the_border_belongs_to_the_last_texels() -> None:
-    topology = two_squares(4).topology
-    coordinates = np.array([[1, -0.5, 3.5], [0, 3.5, -0.5], [1, 1.4, 1.6], [0, -0.50001, 3.50001]])
-    assert MAP.nearest_texels(coordinates, topology).tolist() == [16 + 3, 12, 16 + 6, 3]
+    # on the plane of the first triangle, whose corners are at the corners of chart 2; the second is on chart 0
+    charts = MAP.compiled(MESH, two_squares(4).topology)
+    points = [V[0], V[1], V[2], V[:3].mean(axis=0), 2 * V[2] - V[0]]
+    _, texels = nearest_places(MeshPlaces(triangle_tree(V, MESH.F), charts), np.array(points))
+    assert texels.tolist() == [2 * 16, 2 * 16 + 3, 2 * 16 + 15, 2 * 16 + 4 + 2, 2 * 16 + 15]
 
 
 @pytest.mark.parametrize("texels", [square(4), polygon(5, 4)])
