@@ -44,7 +44,7 @@ def _spacing(grid: TexelGrid, center: int) -> float:
     for down, right in ((0, 1), (1, 0), (1, 2), (2, 1)):
         t = halo[chart, row + down, column + right]
         if t >= 0:
-            greatest = max(greatest, np.sqrt(((positions[t] - positions[center]) ** 2).sum()))
+            greatest = max(greatest, _distance(positions[t], positions[center]))
     return greatest
 
 
@@ -61,7 +61,7 @@ def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, scratch:
     texels = np.empty(room, np.int64)
     count, done, flat = 1, 0, True
     texels[0] = center
-    scratch[center] = np.sqrt(((positions[center] - point) ** 2).sum())
+    scratch[center] = _distance(positions[center], point)
     while done < count and flat:
         t = texels[done]
         done += 1
@@ -81,8 +81,7 @@ def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, scratch:
             for j in range(3):
                 a = halo[chart, row + i, column + j]
                 if a >= 0 and scratch[a] == np.inf:
-                    x, y, z = positions[a, 0] - point[0], positions[a, 1] - point[1], positions[a, 2] - point[2]
-                    scratch[a] = np.sqrt(x * x + y * y + z * z)
+                    scratch[a] = _distance(positions[a], point)
                     texels[count] = a
                     count += 1
     texels = texels[:count]
@@ -96,9 +95,16 @@ def _blended(grid: TexelGrid, center: int, point: Floats, radius: float, scratch
     """Texels within a little more than the radius along the surface, and the distances that count."""
     texels, distance = march_from_point(grid.halo, grid.positions, center, point, 1.1 * radius, scratch)
     for i in range(len(texels)):
-        straight = np.sqrt(((grid.positions[texels[i]] - point) ** 2).sum())
+        straight = _distance(grid.positions[texels[i]], point)
         if straight > 0:
             bend = min(max((distance[i] / straight - _FLAT) / (_BENT - _FLAT), 0.0), 1.0)
             bend = bend * bend * (3 - 2 * bend)
             distance[i] = (1 - bend) * straight + bend * distance[i]
     return texels, distance
+
+
+@kernel
+def _distance(a: Floats, b: Floats) -> float:
+    """Straight distance of two points [m]."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return np.sqrt(x * x + y * y + z * z)

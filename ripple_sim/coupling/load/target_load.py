@@ -65,8 +65,8 @@ class TargetLoad:
     """
 
     def __init__(self, waves: WaveSolver, radii: NDArray[np.float64], convex: NDArray[np.bool_]) -> None:
-        atlas, nowhere = waves.atlas, np.zeros(waves.atlas.areas.size)
-        self._target = _Target(atlas.places, atlas.texels.grid, nowhere, radii, convex, not atlas.mesh.closed)
+        atlas, unmoved = waves.atlas, np.zeros(waves.atlas.areas.size)
+        self._target = _Target(atlas.places, atlas.texels.grid, unmoved, radii, convex, not atlas.mesh.closed)
         self._state = _State(EMPTY_CACHE, np.zeros(len(radii), CONTACT_STATE), NO_SHARES, True)
         self.set_waves(waves)
 
