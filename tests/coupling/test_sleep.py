@@ -110,3 +110,33 @@ def test_a_reset_forgets_sleeping_bodies() -> None:
     run.ripples.mj_step(run.data)
     assert not run.ripples.last_impulses
     assert not run.waves.height.any()
+
+
+@pytest.mark.parametrize("depth", [0.0, 5e-4])
+def test_bodies_that_start_asleep_press_from_the_beginning(depth: float) -> None:
+    box = '<freejoint/><geom type="box" size="0.04 0.05 0.04" mass="0.5"/>'
+    heights = 0.04 - depth, 0.12 - 2 * depth, 0.3  # the last one in mid-air
+    bodies = "".join(f'<body pos="0 0 {z}" sleep="init">{box}</body>' for z in heights)
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="0.002"><flag sleep="enable"/></option><worldbody>
+        <geom name="target" type="box" size="0.3 0.3 0.1" pos="0 0 -0.1"/>{bodies}</worldbody></mujoco>"""
+    )
+    run = Run(model)
+    run.until(0.002)
+    (impulse,) = run.ripples.last_impulses
+    assert impulse.impulse == pytest.approx(GRAVITY * 0.002, rel=1e-3)
+    np.testing.assert_allclose(impulse.point, [0, 0, 0], atol=1e-3)
+    run.until(2.0)
+    assert run.asleep
+    assert run.weight() == pytest.approx(GRAVITY, rel=1e-3)
+
+
+def test_ripples_that_begin_late_find_what_sleeps() -> None:
+    run = Run(model_of())
+    run.until(1.0)
+    assert run.asleep
+    run.ripples.reset()
+    run.until(1.1)
+    (impulse,) = run.ripples.last_impulses
+    assert impulse.other == "low"
+    assert impulse.impulse == pytest.approx(GRAVITY * 0.002, rel=1e-3)

@@ -7,6 +7,8 @@ import dataclasses
 import mujoco
 import numpy as np
 
+# A body that is so many times as heavy as another hardly feels it, and MuJoCo's solvers do not care.
+_HEAVY = 1e3
 FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 
 
@@ -19,14 +21,17 @@ class Balance:
     given : float
         What `Ripples` reports.
     reported : float
-        Normal forces of MuJoCo's contacts, times the time step.
+        Normal forces of MuJoCo's contacts, less the pull of suckers, times the time step.
     felt : float
         The same, by the change of momentum of the free body that takes part, where one does.
+    exchanged : float
+        Sum of the amounts of what is reported: pushes and pulls do not cancel.
     """
 
     given: float = 0.0
     reported: float = 0.0
     felt: float = 0.0
+    exchanged: float = 0.0
 
 
 class MomentumBalance:
@@ -77,22 +82,28 @@ class MomentumBalance:
                     # contacts with triangles push sideways in pairs: only the sum of their forces is meant
                     reported = float(np.linalg.norm(sum(vector for _, vector in forces))) * dt
                 pair.reported += reported
-                # the light one feels more
-                bodies = sorted(
-                    (self.model.geom_bodyid[x] for x in (b, a)), key=lambda body: self.model.body_mass[body]
-                )
-                share = next((shares[body] for body in bodies if body in shares), 1.0)
+                pair.exchanged += abs(reported)
+                share = self._share_of_pair(a, b, shares)
                 pair.felt += share * reported
         for impulse in impulses:
             self.pairs.setdefault((impulse.geom, impulse.other), Balance()).given += impulse.impulse
+
+    def _share_of_pair(self, a: int, b: int, shares: dict[int, float]) -> float:
+        """By the lighter body of two geoms, if that is free, or else by the heavier, if that feels it."""
+        moving = (body for body in self.model.geom_bodyid[[a, b]] if self.model.body_dofnum[body])
+        light, *heavy = sorted(moving, key=lambda body: self.model.body_mass[body])
+        known = [body for body in (light, *heavy) if self.model.body_mass[body] <= _HEAVY * self.model.body_mass[light]]
+        return next((shares[body] for body in known if body in shares), 1.0)
 
     def _contact_forces(self, data: mujoco.MjData) -> tuple[dict, dict]:
         """Normal forces with their vectors on the second geom, by pair, and the whole forces on each body."""
         normal: dict[tuple[int, int], list] = {}
         whole: dict[int, np.ndarray] = {}
-        wrench = np.zeros(6)
+        wrench, pulls = np.zeros(6), self._pulls(data)
         for i, contact in enumerate(data.contact):
             mujoco.mj_contactForce(self.model, data, i, wrench)
+            # which the solver's force contains, unlike the geoms' own
+            wrench[0] -= pulls[i]
             frame = contact.frame.reshape(3, 3)
             geoms = [
                 g if g >= 0 else self._flex_geom[f]
@@ -103,6 +114,15 @@ class MomentumBalance:
                 body = int(self.model.geom_bodyid[geom])
                 whole[body] = whole.get(body, np.zeros(3)) + sign * (frame.T @ wrench[:3])
         return normal, whole
+
+    def _pulls(self, data: mujoco.MjData) -> np.ndarray:
+        """Share of every contact of the forces of suckers on its bodies [N]."""
+        pulls, contacts = np.zeros(data.ncon), data.contact
+        for sucker in np.flatnonzero(self.model.actuator_trntype == mujoco.mjtTrn.mjTRN_BODY).tolist():
+            body = self.model.actuator_trnid[sucker, 0]
+            mine = (self.model.geom_bodyid[contacts.geom] == body).any(axis=1) & (contacts.exclude < 2)
+            pulls[mine] += data.actuator_force[sucker] / max(mine.sum(), 1)
+        return pulls
 
     def _share(self, data: mujoco.MjData, body: int, normal: dict, whole: dict, dt: float) -> float:
         """Change of a free body's momentum over that which its contacts' normal forces account for."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 
 import mujoco
 import numpy as np
@@ -32,20 +33,59 @@ class RandomHit:
         self.steps = int(min(250, 12 + 6 * random.stopping / random.timestep))
         mujoco.mj_fwdPosition(self.model, self.data)
         ways = [self._send(f"hitter {i}") for i in range(len(random.hitters))]
-        self._drift = -ways[0] * random.speed
+        self._drive(ways)
         if random.ground:
             self._lay_ground()
+        if random.restarted:
+            self._keep()
         mujoco.mj_forward(self.model, self.data)
 
     def step(self) -> None:
-        """Let motors push, mocap bodies move on, and MuJoCo take a step."""
-        data, model = self.data, self.model
-        towards = self._drift / np.linalg.norm(self._drift)
-        data.ctrl[:] = towards[np.arange(model.nu) % 3]
-        first = model.body("hitter 0").mocapid[0]
-        for mocap in range(model.nmocap):
-            data.mocap_pos[mocap] += self._drift * model.opt.timestep * (1.0 if mocap == first else -0.3)
-        mujoco.mj_step(model, data)
+        """Let mocap bodies move on, and MuJoCo take a step."""
+        self.data.mocap_pos += self._drift * self.model.opt.timestep
+        mujoco.mj_step(self.model, self.data)
+
+    @contextlib.contextmanager
+    def filtering(self) -> Iterator[None]:
+        """Refuse the contacts of the last hitter with the target, where the model says so."""
+        if not self._random.refused:
+            yield
+            return
+        pair = {self.model.geom(name).id for name in ("target", f"hitter {len(self._random.hitters) - 1}")}
+        mujoco.set_mjcb_contactfilter(lambda model, data, one, other: int({one, other} == pair))
+        try:
+            yield
+        finally:
+            mujoco.set_mjcb_contactfilter(None)
+
+    def restart(self) -> None:
+        """Go back to the beginning."""
+        mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
+        mujoco.mj_forward(self.model, self.data)
+
+    def _keep(self) -> None:
+        """Make a keyframe of the beginning."""
+        for name in ("qpos", "qvel", "ctrl"):
+            getattr(self.model, f"key_{name}")[0] = getattr(self.data, name)
+        self.model.key_mpos[0], self.model.key_mquat[0] = self.data.mocap_pos.ravel(), self.data.mocap_quat.ravel()
+
+    def _drive(self, ways: list[np.ndarray]) -> None:
+        """Switch motors and suckers on, towards the target, and choose velocities of mocap bodies [m/s]."""
+        model, self._drift = self.model, np.zeros((self.model.nmocap, 3))
+        self.data.ctrl[:] = 1.0
+        for i, way in enumerate(ways):
+            mocap = model.body(f"hitter {i}").mocapid[0]
+            if mocap >= 0:
+                self._drift[mocap] = -way * self._random.speed
+        if self._random.mount == "mocap":
+            self._drift[model.body("target").mocapid[0]] = 0.3 * ways[0] * self._random.speed
+        motors = np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT)
+        for motor in motors.tolist():
+            joint = model.joint(int(model.actuator_trnid[motor, 0]))
+            axis, hitter = joint.name.split()
+            parent = model.body_parentid[model.joint(f"x {hitter}").bodyid[0]]
+            along = self.data.xmat[parent].reshape(3, 3)[:, "xyz".index(axis)]
+            self.data.ctrl[motor] = -ways[int(hitter)] @ along
 
     def _send(self, name: str) -> np.ndarray:
         """Place a body near the target, and give it its speed; the direction that it comes from."""
@@ -85,18 +125,23 @@ class RandomHit:
         if body.mocapid[0] >= 0:
             data.mocap_pos[body.mocapid[0]] = place
             return
-        joint = body.jntadr[0]
-        where = data.qpos[model.jnt_qposadr[joint] :][:3]
-        where[:] = place if model.jnt_type[joint] == _FREE else place - body.pos
+        joint = int(body.jntadr[0])
+        if model.jnt_type[joint] == _FREE:
+            data.qpos[model.jnt_qposadr[joint] :][:3] = place
+            return
+        x = model.joint("x " + name.split()[1])
+        body, parent = int(x.bodyid[0]), int(model.body_parentid[x.bodyid[0]])
+        local = (place - data.xpos[parent]) @ data.xmat[parent].reshape(3, 3)
+        data.qpos[x.qposadr[0] :][:3] = local - model.body_pos[body]
 
     def _touch(self, name: str) -> bool:
         """Whether a geom touches the target, or the flex that collides for it."""
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_collision(self.model, self.data)
         geom, target = self.model.geom(name).id, self.model.geom("target").id
-        return any(
-            geom in contact.geom and (target in contact.geom or max(contact.flex) >= 0) for contact in self.data.contact
-        )
+        contacts = self.data.contact
+        met = (contacts.geom == target).any(axis=1) | (contacts.flex >= 0).any(axis=1)
+        return bool((met & (contacts.geom == geom).any(axis=1)).any())
 
 
 def _first_touch(touch: Callable[[float], bool], far: float) -> float:

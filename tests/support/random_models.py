@@ -21,7 +21,7 @@ SHAPES = {
     "egg": (),
 }
 # the convex hull, the signed distance field and the flex of a mesh that is not convex
-ANIMALS = {"hull": "mesh", "sdf": "sdf", "flex": "mesh"}
+ANIMALS = ("hull", "sdf", "flex")
 MOUNTS = {
     "static": "",
     "mocap": "",
@@ -33,7 +33,10 @@ MOUNTS = {
     "weld": "<freejoint/>",
     "connect": "<freejoint/>",
 }
-HITTERS = ("free", "free", "free", "driven", "mocap", "second target")
+# a link belongs to the target's own tree
+HITTERS = ("free", "free", "free", "driven", "mocap", "second target", "link")
+# a direct current motor without load is so many times as fast as geoms meet
+NO_LOAD = 3.0
 INTEGRATORS = {"Euler": 0.3, "implicit": 0.15, "implicitfast": 0.35, "RK4": 0.1, "discrete": 0.1}
 SCALES = (1e-3, 0.03, 1.0, 30.0, 1e3)
 
@@ -59,6 +62,8 @@ class RandomModel:
         Time step, and time constant of the contacts [s].
     speed : float
         At which geoms meet [m/s].
+    restarted, refused : bool
+        Whether a keyframe brings back the beginning, and whether a user's filter lets the last hitter through.
     rng : numpy.random.Generator
     xml : str
     """
@@ -81,6 +86,11 @@ class RandomModel:
             # which MuJoCo does not collide
             self.ground = "plane"
         self.condim = 1 if self.kind == "flex" else int(rng.choice([1, 3, 4, 6]))
+        self.sleeps, self.restarted, sticky = rng.random(3) < (0.15, 0.1, 0.15)
+        self.refused = len(self.hitters) > 1 and bool(rng.random() < 0.15)
+        # share of the usual force at a hit
+        self.stickiness = 10 ** rng.uniform(-2, 0) if sticky and self.kind != "flex" else 0.0
+        self._meshes: dict[str, str] = {}
         self.xml = self._xml()
 
     @property
@@ -96,61 +106,88 @@ class RandomModel:
         return spec.compile()
 
     def _xml(self) -> str:
-        bodies, actuators, equality = self._target(), "", ""
+        bodies, links, motors, suckers, equality = "", "", "", "", ""
+        for i, hitter in enumerate(self.hitters):
+            body, driven, sucking = self._hitter(i, hitter)
+            motors, suckers = motors + driven, suckers + sucking
+            bodies, links = (bodies, links + body) if hitter == "link" else (bodies + body, links)
+        bodies = self._target(links) + bodies
         if self.mount in ("weld", "connect"):
             partner = self.rng.choice(["partner", "world"])
             anchor = f'anchor="{self._vector(self.size)}"' if self.mount == "connect" else ""
             equality = f'<equality><{self.mount} body1="target" body2="{partner}" {anchor}/></equality>'
             bodies += f'<body name="partner" pos="0 0 {6 * self.size}"><freejoint/>{self._inertia()}</body>'
-        for i, hitter in enumerate(self.hitters):
-            body, motors = self._hitter(i, hitter)
-            bodies, actuators = bodies + body, actuators + motors
         if self.ground:
             shape = 'hfield="hills"' if self.ground == "hfield" else 'size="0 0 1"'
             bodies += f'<geom name="ground" type="{self.ground}" {shape} {self._contact()}/>'
+        key = "<keyframe><key/></keyframe>" if self.restarted else ""
         return f"""<mujoco><compiler boundinertia="1e-14" boundmass="1e-9"/>{self._option()}
             <asset>{self._assets()}</asset><worldbody>{bodies}</worldbody>{equality}
-            <actuator>{actuators}</actuator></mujoco>"""
+            <actuator>{motors}{suckers}</actuator>{key}</mujoco>"""
 
-    def _target(self) -> str:
+    def _target(self, links: str) -> str:
         shape = self._shape(self.kind, self.size, "egg")
-        geom = f'<geom name="target" {shape} mass="{self._mass()}" {self._contact()}/>'
+        geom = f'<geom name="target" {shape} {self._matter()}/>'
         joint = MOUNTS[self.mount].format(axis=self._vector(1.0), anchor=self._vector(self.size), mass=self._mass())
         mocap = 'mocap="true"' if self.mount == "mocap" else ""
-        body = f'<body name="target" quat="{vector(self.rng.standard_normal(4))}" {mocap}>{joint}{geom}</body>'
+        if self.sleeps and self.mount == "free" and not self.ground:
+            mocap = 'sleep="init"'
+        body = f'<body name="target" quat="{vector(self.rng.standard_normal(4))}" {mocap}>{joint}{geom}{links}</body>'
         if self.mount != "chain":
             return body
         return f'<body><joint type="slide" axis="{self._vector(1.0)}"/>{self._inertia()}{body}</body>'
 
-    def _hitter(self, i: int, hitter: str) -> tuple[str, str]:
-        """Body and actuators of what moves by itself, at a place of its own."""
+    def _hitter(self, i: int, hitter: str) -> tuple[str, str, str]:
+        """Body, motors and sucker of what moves by itself, at a place of its own."""
         name, place = f"hitter {i}", f'pos="{vector(3 * self.size * np.array([i, 1, 3]))}"'
-        shape = self._shape(str(self.rng.choice(list(SHAPES))), self.radii[i], f"egg {i}")
-        geom = f'<geom name="{name}" {shape} mass="{self._mass()}" {self._contact()}/>'
+        shape = self._shape(str(self.rng.choice([*SHAPES, "small sdf"])), self.radii[i], f"egg {i}")
+        geom, turned = f'<geom name="{name}" {shape} {self._matter()}/>', vector(self.rng.standard_normal(4))
+        x, y, z = (
+            f'<joint name="{axis} {i}" type="slide" axis="{direction}"/>'
+            for axis, direction in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), strict=True)
+        )
+        force = float(self._mass()) * self.speed / self.stopping
         if hitter == "driven":
-            axes = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
-            slides = "".join(f'<joint name="{x} {i}" type="slide" axis="{axis}"/>' for x, axis in axes.items())
-            force = float(self._mass()) * self.speed / self.stopping
-            motors = "".join(f'<motor joint="{x} {i}" gear="{force}"/>' for x in axes)
-            return f'<body name="{name}" {place}>{slides}{geom}</body>', motors
-        place += f' quat="{vector(self.rng.standard_normal(4))}"'
+            return f'<body name="{name}" {place}>{x}{y}{z}{geom}</body>', self._motors(i, force), ""
+        if hitter == "link":
+            inner = f'<body name="{name}">{z}{geom}</body>'
+            return f"<body>{x}{y}{self._inertia()}{inner}</body>", self._motors(i, force), ""
         if hitter == "mocap":
-            return f'<body name="{name}" {place} mocap="true">{geom}</body>', ""
-        return f'<body name="{name}" {place}><freejoint/>{geom}</body>', ""
+            return f'<body name="{name}" {place} quat="{turned}" mocap="true">{geom}</body>', "", ""
+        sucker = ""
+        if self.stickiness and self.rng.random() < 0.5:
+            sucker = f'<adhesion body="{name}" ctrlrange="0 1" gain="{self.stickiness * force:.4g}"/>'
+        return f'<body name="{name}" {place} quat="{turned}"><freejoint/>{geom}</body>', "", sucker
 
-    @staticmethod
-    def _shape(kind: str, radius: float, egg: str) -> str:
-        if kind in ANIMALS:
-            return f'type="{ANIMALS[kind]}" mesh="animal"'
-        if kind == "egg":
-            return f'type="mesh" mesh="{egg}"'
-        return f'type="{kind}" size="{vector(radius * np.array(SHAPES[kind]))}"'
+    def _motors(self, i: int, force: float) -> str:
+        """Motors of three joints that push with a force [N], or direct current motors that begin with it."""
+        if self.rng.random() < 0.7:
+            return "".join(f'<motor joint="{axis} {i}" gear="{force}"/>' for axis in "xyz")
+        constant = 1 / (NO_LOAD * self.speed)
+        motor = f'motorconst="{constant:.6g}" resistance="{constant / force:.6g}"'
+        return "".join(f'<dcmotor joint="{axis} {i}" {motor}/>' for axis in "xyz")
+
+    def _matter(self) -> str:
+        """Mass and contact parameters of a geom, which may be sticky."""
+        mass, sticky = self._mass(), ""
+        if self.stickiness and self.rng.random() < 0.5:
+            sticky = f'adhesion="{self.stickiness * float(mass) * self.speed / self.stopping:.4g}"'
+        return f'mass="{mass}" {self._contact()} {sticky}'
+
+    def _shape(self, kind: str, radius: float, egg: str) -> str:
+        """Type and size of a geom, whose mesh becomes an asset."""
+        if kind in SHAPES and kind != "egg":
+            return f'type="{kind}" size="{vector(radius * np.array(SHAPES[kind]))}"'
+        name, which = ("animal", 1) if kind in ANIMALS else (egg, 0)
+        self._meshes[name] = mesh_asset(
+            name, *_meshes()[which], f'scale="{vector(radius * np.ones(3))}" inertia="legacy"'
+        )
+        return f'type="{"sdf" if "sdf" in kind else "mesh"}" mesh="{name}"'
 
     def _assets(self) -> str:
-        scales = {"egg": self.size, **{f"egg {i}": radius for i, radius in enumerate(self.radii)}}
-        egg, animal = _meshes()
-        found = mesh_asset("animal", *animal, _scaled(self.size))
-        found += "".join(mesh_asset(name, *egg, _scaled(scale)) for name, scale in scales.items())
+        found = "".join(self._meshes.values())
+        if self.ground != "hfield":
+            return found
         hills = " ".join(map(str, np.random.default_rng(1).integers(0, 3, 49)))
         sizes = vector(self.size * np.array([9, 9, 1, 1]))
         return found + f'<hfield name="hills" nrow="7" ncol="7" size="{sizes}" elevation="{hills}"/>'
@@ -191,16 +228,13 @@ class RandomModel:
             integrator = "implicitfast"
         # share of the models with each of them
         shares = {"override": 0.1, "multiccd": 0.5, "nativeccd": 0.8, "warmstart": 0.8, "island": 0.8}
-        flags = {flag: rng.random() < share for flag, share in shares.items()}
+        flags = {flag: rng.random() < share for flag, share in shares.items()} | {"sleep": self.sleeps}
         text = " ".join(f'{flag}="{"enable" if on else "disable"}"' for flag, on in flags.items())
         overrides = f'o_solref="{self._solref()}" o_solimp="0.9 0.95 0.001 0.5 2"' if flags["override"] else ""
         gravity = vector(0.1 * self.speed / self.stopping * rng.standard_normal(3) * (rng.random() < 0.5))
         return f"""<option timestep="{self.timestep:.6g}" integrator="{integrator}" solver="{solver}" cone="{cone}"
-            gravity="{gravity}" impratio="{rng.choice([1, 1, 10])}" {overrides}><flag {text}/></option>"""
-
-
-def _scaled(scale: float) -> str:
-    return f'scale="{vector(scale * np.ones(3))}" inertia="legacy"'
+            gravity="{gravity}" sdf_initpoints="50" impratio="{rng.choice([1, 1, 10])}" {overrides}>
+            <flag {text}/></option>"""
 
 
 @functools.cache

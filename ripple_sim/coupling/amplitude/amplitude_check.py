@@ -59,8 +59,9 @@ class AmplitudeCheck:
         self._watched.pop(geom, None)
 
     def flush(self) -> None:
-        """Warn of what has been seen and is still being followed: the waves are about to end."""
+        """Look at the heights a last time, and warn of all that has been seen: the waves are about to end."""
         for geom, watch in list(self._watched.items()):
+            watch.look(self._waves[geom].height)
             if watch.excess > 1:
                 self._warn(geom)
 

@@ -6,8 +6,8 @@ import mujoco
 
 from ripple_sim.errors import SceneError
 
-from .convex_collider import add_convex_collider, remove_convex_collider
-from .flex_collider import add_flex_collider, remove_flex_collider
+from .convex_collider import add_convex_collider, convex_parts_of, remove_convex_collider
+from .flex_collider import add_flex_collider, flex_core, remove_flex_collider
 from .mesh_in_spec import is_closed
 from .tunnelling import SPECULATIVE
 
@@ -30,7 +30,7 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
     Parameters
     ----------
     spec : mujoco.MjSpec
-        Changed in place, before it is compiled. A route taken earlier is undone.
+        Changed in place, before it is compiled. A route taken earlier is undone, but not by one that fails.
     geom : str
         Name of a geom, or "body/index" of an unnamed one, which gets that name. One that collides with nothing gets a
         contype and a conaffinity of 1; other geoms of its body go on colliding.
@@ -65,25 +65,25 @@ def make_collidable(spec: mujoco.MjSpec, geom: str, route: str = "auto") -> mujo
     if route not in ROUTES:
         raise SceneError(f"collision route {route!r} is not known; valid are {', '.join(map(repr, ROUTES))}")
     found = _find(spec, geom)
+    if found.meshname and route == "auto":
+        route = "sdf" if is_closed(spec, found) else "flex"
+    # what can fail comes first: then nothing has been changed
+    core = flex_core(spec, found) if found.meshname and route == "flex" else None
+    parts = convex_parts_of(spec, found) if found.meshname and route == "convex" else None
     if not found.meshname or route in ("convex", "hull"):
         spec.option.enableflags |= SPECULATIVE
     if found.meshname:
         remove_flex_collider(spec, found)
         remove_convex_collider(spec, found)
+        found.type = _GEOM.mjGEOM_SDF if route == "sdf" else _GEOM.mjGEOM_MESH
     if not (found.contype or found.conaffinity):
         found.contype = found.conaffinity = 1
-    if not found.meshname:
-        return found
-    found.type = _GEOM.mjGEOM_MESH
-    if route == "auto":
-        route = "sdf" if is_closed(spec, found) else "flex"
-    if route == "sdf":
-        found.type = _GEOM.mjGEOM_SDF
+    if found.meshname and route == "sdf":
         spec.option.sdf_initpoints = _initpoints(spec, found)
-    elif route == "flex":
-        add_flex_collider(spec, found)
-    elif route == "convex":
-        add_convex_collider(spec, found)
+    if core is not None:
+        add_flex_collider(spec, found, core)
+    if parts is not None:
+        add_convex_collider(spec, found, parts)
     return found
 
 

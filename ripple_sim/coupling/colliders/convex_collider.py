@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.coupling.model.convex_colliders import part_name
 from ripple_sim.errors import SceneError
@@ -15,7 +18,7 @@ from .mesh_in_spec import LISTS, SETTINGS, mesh_on_body
 _HIDDEN = 3
 
 
-def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
+def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequence[NDArray[np.float64]]) -> None:
     """Let a mesh geom collide through geoms of its convex parts, on its body, and no longer by itself.
 
     They have its contact settings and no mass: mass and looks stay with the geom.
@@ -25,20 +28,10 @@ def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     spec : mujoco.MjSpec
     geom : mujoco.MjsGeom
         Of type mesh.
-
-    Raises
-    ------
-    SceneError
-        If the mesh is open, the package coacd is missing, or the specification does not compile or discards geoms that
-        do not collide.
+    parts : sequence of float64 [k, 3]
+        Vertices of each [m]; see `convex_parts_of`.
     """
-    mesh = mesh_on_body(spec, geom)
-    if not mesh.closed:
-        raise SceneError(
-            f"the mesh of geom {geom.name!r} is open and encloses no volume that has convex parts; valid routes for it "
-            "are 'flex' and 'hull'"
-        )
-    for i, V in enumerate(convex_parts(mesh)):
+    for i, V in enumerate(parts):
         name = part_name(geom.name, i)
         # a thin part may have too little volume for MuJoCo to take an inertia from it
         spec.add_mesh(name=name, uservert=V.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
@@ -53,6 +46,24 @@ def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
             **{each: np.array(getattr(geom, each)) for each in LISTS},
         )
     geom.contype = geom.conaffinity = 0
+
+
+def convex_parts_of(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> list[NDArray[np.float64]]:
+    """Vertices of the convex parts of a geom's mesh in the frame of its body [m].
+
+    Raises
+    ------
+    SceneError
+        If the mesh is open, the package coacd is missing, or the specification does not compile or discards geoms that
+        do not collide.
+    """
+    mesh = mesh_on_body(spec, geom)
+    if not mesh.closed:
+        raise SceneError(
+            f"the mesh of geom {geom.name!r} is open and encloses no volume that has convex parts; valid routes for it "
+            "are 'flex' and 'hull'"
+        )
+    return convex_parts(mesh)
 
 
 def remove_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:

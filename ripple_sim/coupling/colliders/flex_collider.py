@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import igl
 import mujoco
@@ -29,7 +29,15 @@ _ROUNDING = 1e-3
 _DEEPEST = 0.45
 
 
-def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
+class FlexCore(NamedTuple):
+    """Vertices of a flex inside a mesh [m], [n, 3], its triangles, and the margin that reaches to the surface [m]."""
+
+    V: NDArray[np.float64]
+    F: NDArray[np.int64]
+    thickness: float
+
+
+def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore) -> None:
     """Let a mesh geom collide through a rigid flex of its triangles, of the same name, and no longer by itself.
 
     MuJoCo's contacts with a triangle are right as long as nothing penetrates it: they push along the shortest line
@@ -46,26 +54,19 @@ def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     spec : mujoco.MjSpec
     geom : mujoco.MjsGeom
         Of type mesh.
-
-    Raises
-    ------
-    SceneError
-        If the specification does not compile as it is, or discards geoms that do not collide.
-    MeshError
-        If the mesh has no triangle with an area.
+    core : FlexCore
+        See `flex_core`.
     """
     body = geom.parent
     body.name = body.name or f"body of {geom.name}"
-    mesh = mesh_on_body(spec, geom)
-    core, thickness = _core(mesh)
     spec.add_flex(
         name=geom.name,
         dim=2,
         vertbody=[body.name],
-        vert=core.ravel(),
-        elem=mesh.F.ravel().astype(np.int32),
+        vert=core.V.ravel(),
+        elem=core.F.ravel().astype(np.int32),
         radius=0.0,
-        margin=geom.margin + thickness,
+        margin=geom.margin + core.thickness,
         # MuJoCo's own viewer does not show this group
         group=3,
         **{name: getattr(geom, name) for name in SETTINGS},
@@ -82,11 +83,20 @@ def remove_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
         spec.delete(flex)
 
 
-def _core(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
-    """Vertices of the flex inside a mesh [m], [n, 3], and the margin that reaches from them to its surface [m]."""
+def flex_core(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> FlexCore:
+    """What a geom's flex collider is made of.
+
+    Raises
+    ------
+    SceneError
+        If the specification does not compile as it is, or discards geoms that do not collide.
+    MeshError
+        If the mesh has no triangle with an area.
+    """
+    mesh = mesh_on_body(spec, geom)
     size = float(np.ptp(mesh.V, axis=0).max())
     if not mesh.closed:
-        return mesh.V, _SHEET * size
+        return FlexCore(mesh.V, mesh.F, _SHEET * size)
     points = np.concatenate([mesh.V, mesh.V[mesh.F].mean(axis=1)])
     for share in _THICKNESSES:
         thickness = share * size
@@ -94,7 +104,7 @@ def _core(mesh: Mesh) -> tuple[NDArray[np.float64], float]:
         squared, _, _ = igl.point_mesh_squared_distance(points, core, mesh.F)
         if np.abs(np.sqrt(squared) - thickness).max() <= GAP_TOLERANCE * size:
             break
-    return core, thickness
+    return FlexCore(core, mesh.F, thickness)
 
 
 def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:

@@ -43,8 +43,11 @@ def is_closed(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
 
 
 def _compiled(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjModel:
+    trial = spec.copy()
+    # whose signed distance would take long, and needs no rim
+    trial.geom(geom.name).type = mujoco.mjtGeom.mjGEOM_MESH
     try:
-        return spec.copy().compile()
+        return trial.compile()
     except ValueError as error:
         raise SceneError(
             f"the colliders of geom {geom.name!r} are made from its compiled mesh, but the specification does not "

@@ -39,6 +39,8 @@ class ContactReader:
         self._colliders = ColliderIds(coupled)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._is_read[[*meshes, *self._collision_contacts.geoms]] = True
+        self._has_flex = np.zeros(len(coupled.owners), dtype=np.bool_)
+        self._has_flex[list(coupled.flex_colliders)] = True
         self._adhesion = Adhesion(coupled.model)
         self._check_solver = SolverBalance(coupled)
         self._flexes = None
@@ -49,7 +51,7 @@ class ContactReader:
     def read(self, data: mujoco.MjData) -> dict[int, TargetContacts]:
         """Contacts of each target that is touched, by geom id."""
         model, extents, colliders = self._coupled.model, self._coupled.extents, self._colliders(data)
-        contacts = geom_contacts(model, data, colliders, self._is_read, extents, self._adhesion(data))
+        contacts = geom_contacts(model, data, colliders, self._is_read, extents, self._adhesion(data), self._has_flex)
         if self._flexes is not None:
             contacts |= self._flexes.contacts(data, colliders, extents)
         contacts = self._collision_contacts.hand_over(data, contacts)

@@ -34,6 +34,7 @@ def geom_contacts(
     is_target: NDArray[np.bool_],
     extents: NDArray[np.float64],
     pulls: NDArray[np.float64] | None = None,
+    has_flex: NDArray[np.bool_] | None = None,
 ) -> dict[int, TargetContacts]:
     """Contacts that load each target that is touched, by its geom id in ascending order.
 
@@ -51,18 +52,23 @@ def geom_contacts(
         Smallest half-extents [m].
     pulls : float64 [ncon], optional
         Of the contacts [N]; see `Adhesion`.
+    has_flex : bool [c], optional
+        By collider id, whether it collides through a flex. Its triangles push sideways in pairs: the contacts of such a
+        pair add up to the sum of their vectors, as for the flex; see `FlexContacts`.
     """
     if not data.ncon:
         return {}
     each = data.contact
     pulls = np.zeros(data.ncon) if pulls is None else pulls
     contacts = _MujocoContacts(each.efc_address, each.dim, each.frame, each.pos, each.dist, data.efc_force, pulls)
-    return _normal_contacts(colliders, contacts, is_target, extents, model.opt.cone == PYRAMIDAL).by_target()
+    has_flex = np.zeros(len(is_target), dtype=np.bool_) if has_flex is None else has_flex
+    pyramidal = model.opt.cone == PYRAMIDAL
+    return _normal_contacts(colliders, contacts, is_target, has_flex, extents, pyramidal).by_target()
 
 
 @kernel
 def _normal_contacts(
-    colliders: Ints, contacts: _MujocoContacts, is_target: Bools, extents: Floats, pyramidal: bool
+    colliders: Ints, contacts: _MujocoContacts, is_target: Bools, has_flex: Bools, extents: Floats, pyramidal: bool
 ) -> PairContacts:
     """Contacts that push or pull; pairs without one are left out."""
     # those within the gap pull without a row in the constraint solver
@@ -90,6 +96,8 @@ def _normal_contacts(
         if pull > 0:
             # the pair's own force, shared among its contacts by how much they bear
             found.forces[first:row] *= (whole - pull) / whole
+        if has_flex[pairs.others[pair]] and row > first and pull != whole:
+            found.forces[first:row] *= _unity(found.forces[first:row], found.normals[first:row])
         if row > first and pull != whole:
             found.targets[found_pairs], found.others[found_pairs] = pairs.targets[pair], pairs.others[pair]
             found.begins[found_pairs] = first
@@ -97,6 +105,15 @@ def _normal_contacts(
         else:
             row = first
     return trimmed(found, found_pairs, row)
+
+
+@kernel
+def _unity(forces: Floats, normals: Floats) -> float:
+    """Amount of the sum of forces along normals, over the sum of their amounts."""
+    square = 0.0
+    for k in range(3):
+        square += (forces * normals[:, k]).sum() ** 2
+    return np.sqrt(square) / abs(forces.sum())
 
 
 @kernel

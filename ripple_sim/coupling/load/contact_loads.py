@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import mujoco
 
+from ripple_sim.coupling.contacts.at_rest import at_rest
 from ripple_sim.coupling.contacts.contact_reader import ContactReader
 from ripple_sim.coupling.contacts.sleeping_contacts import SleepingContacts
 from ripple_sim.coupling.model.coupled_model import CoupledModel
@@ -33,7 +34,7 @@ class ContactLoads:
 
     def clear(self) -> None:
         """Forget all contacts."""
-        self._sleeping = SleepingContacts(self._coupled)
+        self._sleeping, self._begins = SleepingContacts(self._coupled), True
         self._targets = {
             geom: TargetLoad(waves, self._coupled.footprint_radii, self._coupled.convex)
             for geom, waves in self._waves.items()
@@ -58,6 +59,11 @@ class ContactLoads:
         loads = {}
         self._impulses, self._touching = None, []
         self._timestep = self._coupled.model.opt.timestep
+        if self._begins:
+            # bodies that sleep already never touched before our eyes
+            self._begins, resting = False, at_rest(self._coupled.model, data)
+            if resting is not None:
+                self._sleeping.add(data, self._contacts.read(resting))
         contacts = self._sleeping.add(data, self._contacts.read(data))
         for geom, target in self._targets.items():
             if geom in contacts:

@@ -94,6 +94,14 @@ def test_a_reset_reports_what_is_still_being_followed() -> None:
         ripples.reset()
 
 
+def test_a_reset_reports_what_was_never_looked_at() -> None:
+    model, data, ripples = still_ripples()
+    run(model, data, ripples, 1)
+    ripples["target"].height = 0.4
+    with pytest.warns(RippleWarning, match="0.4 m at .* radius is 0.5 m"):
+        ripples.reset()
+
+
 def test_a_target_may_have_any_height_if_that_is_wanted() -> None:
     model, data, ripples = still_ripples()
     ripples.allow_any_height("target")

@@ -75,6 +75,24 @@ def test_routes_agree_where_the_hull_is_the_surface(solref: list[float], restitu
     np.testing.assert_allclose(back, restitution, atol=0.1)
 
 
+@pytest.mark.parametrize("route", ["auto", "flex", "convex"])
+@pytest.mark.parametrize("earlier", ["flex", "hull"])
+def test_a_route_that_fails_leaves_the_earlier_one(earlier: str, route: str) -> None:
+    V, F = peanut(0.1)
+    spec = mesh_spec((V, F[:-40]), route=earlier)  # open: it has no convex parts
+    if route != "convex":
+        spec.worldbody.add_geom(name="broken", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="none")
+    geom = spec.geom("target")
+
+    def state() -> tuple[int, ...]:
+        return geom.type, geom.contype, geom.conaffinity, spec.option.enableflags, len(spec.flexes), len(spec.geoms)
+
+    before = state()
+    with pytest.raises(SceneError):
+        make_collidable(spec, "target", route)
+    assert state() == before
+
+
 def test_starting_points_are_lowered_but_never_raised() -> None:
     spec = spec_of(*peanut(0.05))
     make_collidable(spec, "target")

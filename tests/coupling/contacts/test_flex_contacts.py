@@ -127,6 +127,32 @@ def test_two_targets_with_flexes_ripple_with_one_momentum() -> None:
     assert given["upper"] == pytest.approx(lost, rel=0.03)
 
 
+@pytest.mark.parametrize("ripples_too", [True, False])
+def test_what_hits_a_flex_and_ripples_itself_gets_as_much_as_it_loses(ripples_too: bool) -> None:
+    spec = mesh_spec(limbed(0.04), condim=1)
+    spec.option.gravity = [0, 0, 0]
+    add_ball(spec, "body", [0, 0, 9], condim=1, **ROUND["cylinder"])
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    data.qpos[:3] = data.geom("target").xpos + np.array([0, 0, 0.6])
+    data.qpos[3:7] = np.random.default_rng(2).standard_normal(4)
+    data.qvel[2:6] = -2.0, 3.0, 2.0, 1.0
+    materials = {name: Material(density=50) for name in (["target"] if ripples_too else []) + ["body"]}
+    ripples, given = Ripples(model, materials, resolution=12, backend="cpu", conserve_volume=False), {}
+    lost, mass = 0.0, model.body("body").mass[0]
+    for _ in range(150):
+        before = data.qvel[:3].copy()
+        ripples.mj_step(data)
+        lost += mass * np.linalg.norm(data.qvel[:3] - before)
+        for hit in ripples.last_impulses:
+            given[hit.geom] = given.get(hit.geom, 0.0) + hit.impulse
+    assert lost > 0.2
+    assert given.keys() == materials.keys()
+    for impulse in given.values():
+        assert impulse == pytest.approx(lost, rel=1e-3)
+
+
 def test_flex_of_a_geom_that_does_not_ripple_goes_by_the_geoms_name() -> None:
     spec = mujoco.MjSpec()
     V, F = peanut(0.05)

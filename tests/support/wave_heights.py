@@ -1,0 +1,66 @@
+"""How high and how steep waves are, beside the object that carries them, by a way of its own."""
+
+from __future__ import annotations
+
+import functools
+
+import igl
+import numpy as np
+from scipy.ndimage import median_filter
+
+from ripple_sim.solver import Atlas, WaveSolver
+
+
+class WaveHeights:
+    """Heights of a target's waves beside the thickness of the object, step by step.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    """
+
+    def __init__(self, atlas: Atlas) -> None:
+        self._atlas = atlas
+        self._size = float(np.ptp(atlas.mesh.V, axis=0).max())
+
+    @functools.cached_property
+    def _radius(self) -> np.ndarray:
+        """Half the way to the object's other side [m], [C n n]; a half of its size at most, a hundredth at least."""
+        atlas, tree = self._atlas, igl.AABB()
+        V, F = atlas.mesh.V / self._size, atlas.mesh.F
+        tree.init(V, F)
+        corners = V[F[atlas.triangles.ravel()]]
+        across = np.cross(corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0])
+        ways = []
+        # a needle's own normal may point anywhere, and so may a texel's in a sharp crease
+        for inward in (-atlas.normals.reshape(-1, 3), across / np.linalg.norm(across, axis=1, keepdims=True)):
+            start = atlas.positions.reshape(-1, 3) / self._size + 1e-3 * inward
+            triangles, distance, _ = tree.intersect_ray_first(V, F, start, inward)
+            ways.append(np.where(triangles >= 0, np.clip(distance + 1e-3, 0.02, 1.0), 1.0))
+        radius = self._size / 2 * np.maximum(*ways).reshape(atlas.areas.shape)
+        return median_filter(radius, (1, 3, 3)).ravel()
+
+    @functools.cached_property
+    def _quads(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Sides of the charts' quads from their first corner, [C, n - 1, n - 1, 3, 2], their duals, and areas."""
+        P = self._atlas.positions
+        sides = np.stack([P[:, :-1, 1:] - P[:, :-1, :-1], P[:, 1:, :-1] - P[:, :-1, :-1]], axis=-1)
+        areas = np.linalg.norm(np.cross(sides[..., 0], sides[..., 1]), axis=-1)
+        return sides, np.linalg.pinv(np.swapaxes(sides, -1, -2)), areas
+
+    def high(self, waves: WaveSolver) -> float:
+        """The greatest height over the local thickness' half."""
+        height = np.abs(waves.height.reshape(-1).astype(np.float64))
+        if height.max() < 1e-3 * self._size:
+            return 0.0
+        return float((height / self._radius).max())
+
+    def steep(self, waves: WaveSolver, slope: float) -> float:
+        """Share of the surface that is steeper than a slope."""
+        h = waves.height.astype(np.float64)
+        if np.abs(h).max() < 1e-3 * self._size:
+            return 0.0
+        _, duals, areas = self._quads
+        rises = np.stack([h[:, :-1, 1:] - h[:, :-1, :-1], h[:, 1:, :-1] - h[:, :-1, :-1]], axis=-1)
+        gradient = np.linalg.norm(np.einsum("cijxk,cijk->cijx", duals, rises), axis=-1)
+        return float(areas[gradient > slope].sum() / areas.sum())
