@@ -21,6 +21,8 @@ from .rivals.naive_loop import NaiveLoop
 from .rivals.plain_shader import PlainShader
 from .rivals.sparse_leapfrog import SparseLeapfrog
 
+SUBSTEPS = 9  # of a frame: what backends and rivals are asked for at once
+
 _ROUNDS = 15
 _SECONDS_A_TURN = 0.04
 
@@ -67,20 +69,21 @@ class Race:
 
 
 def race(contestants: Mapping[str, Advances], texels: int, rounds: int = _ROUNDS) -> Race:
-    """Let contestants take turns, so that a busy machine slows all alike."""
+    """Let contestants take turns of whole frames, so that a busy machine slows all alike."""
     dt = 1e-6
-    counts = {}
+    frames = {}
     for name, contestant in contestants.items():
-        contestant.advance(2, dt)
+        contestant.advance(SUBSTEPS, dt)
         start = time.perf_counter()
-        contestant.advance(2, dt)
-        counts[name] = max(2, int(_SECONDS_A_TURN / (time.perf_counter() - start) * 2))
+        contestant.advance(SUBSTEPS, dt)
+        frames[name] = max(1, int(_SECONDS_A_TURN / (time.perf_counter() - start)))
     seconds: dict[str, list[float]] = {name: [] for name in contestants}
     for _ in range(rounds):
         for name, contestant in contestants.items():
             start = time.perf_counter()
-            contestant.advance(counts[name], dt)
-            seconds[name].append((time.perf_counter() - start) / counts[name])
+            for _ in range(frames[name]):
+                contestant.advance(SUBSTEPS, dt)
+            seconds[name].append((time.perf_counter() - start) / (frames[name] * SUBSTEPS))
     return Race(texels, seconds)
 
 

@@ -73,6 +73,14 @@ class Kick(NamedTuple):
     acceleration: Pressure
 
 
+class Drift(NamedTuple):
+    """v += shift as far as texels respond, then h += dt v."""
+
+    response: Coefficient
+    shift: Pressure
+    dt: np.float32
+
+
 class Balance(NamedTuple):
     """What keeps the volume, see `VolumeRate`: factors of texels that lie side by side in runs.
 

@@ -20,6 +20,20 @@ def _row_overload(x, chart, r):
     return lambda x, chart, r: x
 
 
+def cut(row, columns):
+    """Some columns of a row, a slice, or the number itself."""
+    raise NotImplementedError("for compiled code only")
+
+
+@overload(cut, inline="always")
+def _cut_overload(row, columns):
+    if isinstance(row, numba.types.Array):
+        return lambda row, columns: row[columns]
+    if isinstance(row, numba.types.BaseTuple):
+        return lambda row, columns: (row[0][columns], row[1])
+    return lambda row, columns: row
+
+
 def value_in(x, c):
     """x[c] of a row, or the number x itself."""
     raise NotImplementedError("for compiled code only")

@@ -15,8 +15,8 @@ from ripple_sim.solver.operator.step_coefficients import StepCoefficients, numbe
 from ripple_sim.solver.operator.volume_rate import volume_rate
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 
-from . import kernels, threads
-from .arguments import Amplitude, Balance, Bending, ByPart, Kick, Loads, Plasticity, Pressure, State
+from . import blocks, kernels, threads
+from .arguments import Amplitude, Balance, Bending, ByPart, Drift, Kick, Loads, Plasticity, Pressure, State
 from .cpu_fields import LARGE, LINE, PAGE, FieldLayout, aligned
 
 
@@ -53,9 +53,13 @@ class CPUBackend:
             self._plasticity = Plasticity(number_or_field(operator.yield_height), self._dent)
         drags = self._bending is not None or self._viscous is not None
         self._extra = fields.zeros() if drags else np.float32(0)
+        large = operator.mass.size >= 6 * LARGE**2
         if thread_count is None:
-            thread_count = threads.available() if fields.n >= LARGE else 1
-        self._threads = 1 if drags or self._plasticity is not None else thread_count
+            thread_count = threads.available() if large else 1
+        plain = not drags and self._plasticity is None and blocks.on_borders(self._stencil.irregular, self._h.shape)
+        self._threads = thread_count if plain else 1
+        self._in_blocks = plain and (large or thread_count > 1)
+        self._most = blocks.block_length(fields.n, self._h.shape[2])
         self._response = number_or_field(operator.response)
         self._chart_parts, self._parts = _parts_by_chart(operator)
         self._balance: Balance | None = None
@@ -118,17 +122,17 @@ class CPUBackend:
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
         k = self._prepare(dt)
-        self._drift(dt / 2)
         state = State(self._h, self._v, self._h_next)
         kick = Kick(self._stencil, k.gain, k.decay, k.spring, k.span, self._extra, self._pressure(self._acceleration))
-        step = (np.float32(dt), state, self._fields.halo, kick, self._loads)
-        if self._threads > 1 and self._balance is None:
-            kernels.fill(self._h, self._fields.halo)
-            threads.advance(self._threads, substeps, *step)
+        length, step = np.float32(dt), (state, self._fields.halo, kick, self._loads)
+        if self._in_blocks and self._balance is None:
+            plan = threads.Plan(substeps, self._most, length)
+            threads.advance(self._threads, plan, *step, self._start(dt / 2))
         else:
+            self._drift(dt / 2)
             if self._plasticity is not None:
                 kernels.flow(self._h, self._plasticity)
-            kernels.advance(substeps, *step, self._viscous, (self._bending, self._plasticity, self._balance))
+            kernels.advance(substeps, length, *step, self._viscous, (self._bending, self._plasticity, self._balance))
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
 
@@ -142,8 +146,13 @@ class CPUBackend:
 
     def _drift(self, dt: float) -> None:
         if dt or np.any(self._shift):
-            kernels.drift(self._h, self._v, self._response, self._pressure(self._shift), np.float32(dt))
+            kernels.drift(self._h, self._v, self._start(dt))
+
+    def _start(self, dt: float) -> Drift:
+        """The drift by which a step begins; the noted shift is in it."""
+        drift = Drift(self._response, self._pressure(self._shift), np.float32(dt))
         self._shift = 0.0
+        return drift
 
     def _pressure(self, amplitude: Amplitude) -> Pressure:
         """An amplitude as the loops take it."""
@@ -167,7 +176,9 @@ class CPUBackend:
         k = self._coefficients
         if new_length or self._load_is_new:
             kicks = k.gain.reshape(-1)[self._loaded] * self._forces.astype(np.float32)
-            self._loads = Loads(self._fields.addresses[self._loaded], kicks)
+            addresses = self._fields.addresses[self._loaded]
+            order = np.argsort(addresses, kind="stable")
+            self._loads = Loads(addresses[order], kicks[order])
             if self._balance is not None:
                 self._balance.loaded[:] = self._acceleration
             self._load_is_new = False

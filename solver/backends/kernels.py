@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
 
 from ripple_sim.solver.kernel import Floats32, kernel
@@ -11,17 +9,18 @@ from ripple_sim.solver.kernel import Floats32, kernel
 from .arguments import (
     Balance,
     Bending,
-    Coefficient,
+    Drift,
     Halo,
     Kick,
-    Links,
     Loads,
     Plasticity,
     Pressure,
     State,
     Weights,
 )
-from .coefficients import row_of, spread, value_at, value_in
+from .coefficients import row_of, spread, value_in
+from .kicks import kick_drift, kick_irregular, kick_texels
+from .stencil_loops import apply
 
 
 @kernel
@@ -32,26 +31,22 @@ def fill(h: Floats32, halo: Halo) -> None:
         flat[halo.ghosts[i]] = flat[halo.sources[i]]
 
 
-@kernel
-def kick_texels(h: Floats32, v: Floats32, loads: Loads, dt: np.float32) -> None:
-    """Kick some texels, and drift them by that."""
-    heights, velocities = h.reshape(-1), v.reshape(-1)
-    for i in range(len(loads.addresses)):
-        velocities[loads.addresses[i]] += loads.kicks[i]
-        heights[loads.addresses[i]] += dt * loads.kicks[i]
+@kernel(inline="always")
+def drift_row(h: Floats32, v: Floats32, drift: Drift, chart: int, r: int) -> None:
+    """Add the shift to v, as far as texels respond to it, then dt v to h, in one row."""
+    heights, velocities = h[chart, r], v[chart, r]
+    shift, response = row_of(drift.shift, chart, r - 1), row_of(drift.response, chart, r - 1)
+    for c in range(1, h.shape[1] - 1):
+        velocities[c] += value_in(shift, c - 1) * value_in(response, c - 1)
+        heights[c] += drift.dt * velocities[c]
 
 
 @kernel
-def drift(h: Floats32, v: Floats32, response: Coefficient, shift: Pressure, dt: np.float32) -> None:
-    """Add the shift to v, as far as texels respond to it, then dt v to h."""
+def drift(h: Floats32, v: Floats32, drift: Drift) -> None:
+    """`drift_row` of all rows."""
     n = h.shape[1] - 2
     for i in range(len(h) * n):
-        chart, r = i // n, i % n + 1
-        for c in range(1, n + 1):
-            v[chart, r, c] += value_in(row_of(shift, chart, r - 1), c - 1) * value_in(
-                row_of(response, chart, r - 1), c - 1
-            )
-            h[chart, r, c] += dt * v[chart, r, c]
+        drift_row(h, v, drift, i // n, i % n + 1)
 
 
 @kernel
@@ -66,109 +61,6 @@ def flow(h: Floats32, plasticity: Plasticity) -> None:
             kept = min(max(h[chart, r, c], -most), most)
             dent[chart, r, c] += h[chart, r, c] - kept
             h[chart, r, c] = kept
-
-
-# Rows are cut out of the fields before the loop over columns: the compiler then makes better vector code of that loop.
-# A product and a sum may be contracted to one rounding.
-_FAST = {"contract"}
-
-Rows: TypeAlias = tuple[Floats32, ...]
-
-
-@kernel(inline="always")
-def _force(rows: Rows, links: Rows, c: int) -> np.float32:
-    """Sum over the eight links of weight (h_j - h_i) at column c.
-
-    `rows` are those of the field below, at and above the texel; `links` those of this row's places, and of those below.
-    """
-    below, row, above = rows
-    east, north, south, rising, risen, falling, fallen = links
-    x = row[c]
-    return (
-        (east[c] * (row[c + 1] - x) + east[c - 1] * (row[c - 1] - x))
-        + (north[c] * (above[c] - x) + south[c] * (below[c] - x))
-        + (rising[c] * (above[c + 1] - x) + risen[c - 1] * (below[c - 1] - x))
-        + (falling[c - 1] * (above[c - 1] - x) + fallen[c] * (below[c + 1] - x))
-    )
-
-
-@kernel(inline="always")
-def _links(w: Floats32, chart: int, r: int) -> Rows:
-    """Rows of a stencil's links that meet in row r."""
-    return (
-        w[chart, 0, r],
-        w[chart, 1, r],
-        w[chart, 1, r - 1],
-        w[chart, 2, r],
-        w[chart, 2, r - 1],
-        w[chart, 3, r],
-        w[chart, 3, r - 1],
-    )
-
-
-@kernel
-def _irregular_force(links: Links, i: int, flat: Floats32) -> np.float32:
-    """Sum of weight (h_j - h_i) over the irregular links of texel i of the list."""
-    here, force = flat[links.addresses[i]], np.float32(0)
-    for k in range(links.begins[i], links.begins[i + 1]):
-        force += links.weights[k] * (flat[links.others[k]] - here)
-    return force
-
-
-@kernel(fastmath=_FAST)
-def apply(stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Floats32) -> None:
-    """The stencil on a field times a factor, written into `out` or added to it."""
-    n = h.shape[1] - 2
-    for i in range(len(h) * n):
-        chart, r = i // n, i % n + 1
-        rows, links = (h[chart, r - 1], h[chart, r], h[chart, r + 1]), _links(stencil.rows, chart, r)
-        result = out[chart, r]
-        for c in range(1, n + 1):
-            force = value_in(row_of(factor, chart, r - 1), c - 1) * _force(rows, links, c)
-            result[c] = result[c] + force if add else force
-    irregular, flat, sums = stencil.irregular, h.reshape(-1), out.reshape(-1)
-    for i in range(len(irregular.texels)):
-        sums[irregular.addresses[i]] += value_at(factor, irregular.texels[i]) * _irregular_force(irregular, i, flat)
-
-
-@kernel(fastmath=_FAST)
-def kick_drift(state: State, kick: Kick, dt: np.float32, first: int, last: int) -> None:
-    """One substep of some charts: v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v."""
-    h, v, h_next = state
-    n = h.shape[1] - 2
-    for chart in range(first, last):
-        for r in range(1, n + 1):
-            row = h[chart, r]
-            rows, links = (h[chart, r - 1], row, h[chart, r + 1]), _links(kick.stencil.rows, chart, r)
-            velocity, gains, result = v[chart, r], kick.gain[chart, r - 1], h_next[chart, r]
-            more, decays, springs, spans, accelerations = (
-                row_of(kick.extra, chart, r),
-                row_of(kick.decay, chart, r - 1),
-                row_of(kick.spring, chart, r - 1),
-                row_of(kick.span, chart, r - 1),
-                row_of(kick.acceleration, chart, r - 1),
-            )
-            for c in range(1, n + 1):
-                force = _force(rows, links, c)
-                kicked = (
-                    value_in(decays, c - 1) * velocity[c]
-                    + gains[c - 1] * (force + value_in(more, c))
-                    - value_in(springs, c - 1) * row[c]
-                    + value_in(spans, c - 1) * value_in(accelerations, c - 1)
-                )
-                velocity[c] = kicked
-                result[c] = row[c] + dt * kicked
-
-
-@kernel
-def kick_irregular(state: State, kick: Kick, dt: np.float32) -> None:
-    """The irregular links' part of a substep: the same kick, and the drift by it."""
-    links, gain = kick.stencil.irregular, kick.gain.reshape(-1)
-    heights, velocities, drifted = state.h.reshape(-1), state.v.reshape(-1), state.h_next.reshape(-1)
-    for i in range(len(links.texels)):
-        kicked = gain[links.texels[i]] * _irregular_force(links, i, heights)
-        velocities[links.addresses[i]] += kicked
-        drifted[links.addresses[i]] += dt * kicked
 
 
 @kernel
@@ -215,7 +107,7 @@ def _gather_extra(
         apply(bending.laplace, bending.moment, np.float32(-1), viscous is not None, kick.extra)
 
 
-@kernel(fastmath=_FAST | {"reassoc"})
+@kernel(fastmath={"contract", "reassoc"})
 def _weighed(factors: Floats32, field: Floats32) -> float:
     """Sum of factor times field over texels side by side."""
     total = 0.0

@@ -1,11 +1,11 @@
-"""Threads that share out the charts of each substep among them, without the interpreter."""
+"""Threads that share out the charts among them, without the interpreter; see `blocks`."""
 
 from __future__ import annotations
 
 import functools
 import os
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -13,10 +13,10 @@ from numba.extending import intrinsic
 
 from ripple_sim.solver.kernel import Ints, kernel
 
-from .arguments import Halo, Kick, Loads, State
-from .kernels import fill, kick_drift, kick_irregular, kick_texels
+from .arguments import Drift, Halo, Kick, Loads, State
+from .blocks import Pace, climb, close, passes
 
-# Counters, each in a cache line of its own: tickets drawn, charts done, substeps open.
+# Counters, each in a cache line of its own: tickets drawn, charts done, passes open.
 _DRAWN, _DONE, _OPEN, _COUNTERS = 0, 16, 32, 48
 
 _MOST = 6  # more threads than this wait for memory
@@ -28,13 +28,21 @@ def available() -> int:
     return min(cores, _MOST)
 
 
-def advance(threads: int, substeps: int, *fields: Any) -> None:
-    """`kernels.advance` of a plain material, in several threads; the height's halo is filled already.
+class Plan(NamedTuple):
+    """How many substeps to take, of which length [s], and how many a pass may take."""
+
+    substeps: int
+    most: int
+    dt: np.float32
+
+
+def advance(threads: int, plan: Plan, *fields: Any) -> None:
+    """Substeps of dt, from the first half drift to the last; the height ends in `h_next` where their number is odd.
 
     Nobody waits for a thread that has not yet taken a chart: a late one leaves its share to the others.
     Every texel is computed by the same code whatever the thread, so the numbers do not depend on how many there are.
     """
-    share = functools.partial(_advance, substeps, *fields, np.zeros(_COUNTERS, np.int64))
+    share = functools.partial(_advance, plan, *fields, np.zeros(_COUNTERS, np.int64))
     helpers = [_pool().submit(share) for _ in range(threads - 1)]
     share()
     for helper in helpers:
@@ -62,28 +70,36 @@ def _add(context, counters, which, amount):
 
 
 @kernel
-def _advance(substeps: int, dt: np.float32, state: State, halo: Halo, kick: Kick, loads: Loads, counters: Ints) -> None:
-    """Loop of every thread: draw a ticket for a chart of a substep, wait until that substep is open, and compute it.
+def _advance(
+    plan: Plan,
+    state: State,
+    halo: Halo,
+    kick: Kick,
+    loads: Loads,
+    start: Drift,
+    counters: Ints,
+) -> None:
+    """Loop of every thread: draw a ticket for a chart of a pass, wait until that pass is open, climb over the chart.
 
-    Whoever finishes the last chart of a substep opens the next one.
+    Whoever finishes the last chart of a pass closes it, and opens the next one.
     """
-    half = dt / np.float32(2)
+    substeps, most, dt = plan.substeps, plan.most, plan.dt
     h, v, h_next = state
-    charts = len(h)
+    charts, taken = len(h), passes(substeps, most)
+    still = Drift(start.response, start.shift, np.float32(0))
     while True:
         ticket = _add(counters, _DRAWN, 1)
-        if ticket >= charts * substeps:
+        if ticket >= charts * len(taken):
             break
-        step, chart = ticket // charts, ticket % charts
-        while _add(counters, _OPEN, 0) < step:
+        turn, chart = ticket // charts, ticket % charts
+        before, steps = taken[turn]
+        while _add(counters, _OPEN, 0) < turn:
             _yield_core()
-        here, there = (h, h_next) if step % 2 == 0 else (h_next, h)
-        drifted = dt if step < substeps - 1 else half
-        kick_drift(State(here, v, there), kick, drifted, chart, chart + 1)
-        if _add(counters, _DONE, 1) == charts * (step + 1) - 1:
-            kick_irregular(State(here, v, there), kick, drifted)
-            kick_texels(there, v, loads, drifted)
-            fill(there, halo)
+        here = state if before % 2 == 0 else State(h_next, v, h)
+        pace = Pace(steps, dt, dt if before + steps < substeps else dt / np.float32(2))
+        climb(pace, here, start if before == 0 else still, kick, loads, chart)
+        if _add(counters, _DONE, 1) == charts * (turn + 1) - 1:
+            close(pace, here, halo, kick, loads)
             _add(counters, _OPEN, 1)
-    while _add(counters, _OPEN, 0) < substeps:
+    while _add(counters, _OPEN, 0) < len(taken):
         _yield_core()

@@ -1,5 +1,6 @@
 #version 430
-// v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v.
+// v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v. The small terms are added up first:
+// one rounding at the size of v.
 layout(std430, binding = 0) readonly buffer Height { dvec4 x[]; };
 layout(std430, binding = 1) buffer Velocity { dvec4 v[]; };
 layout(std430, binding = 2) writeonly buffer HeightNext { dvec4 h_next[]; };
@@ -43,7 +44,7 @@ void emit(int eight, float here[8], float force[8]) {
 #ifdef PARTS
         float acceleration = accelerations[int(part[i])];
 #endif
-        velocity[i] = decay * velocity[i] + gain[i] * force[i] - spring * here[i] + span * acceleration;
+        velocity[i] = decay * velocity[i] + (gain[i] * force[i] + (span * acceleration - spring * here[i]));
         drifted[i] = here[i] + dt * velocity[i];
     }
     v[eight] = pack(velocity);

@@ -6,9 +6,11 @@ from dense_waves import matrix
 from hand_made import flat_torus, polygon, square
 
 from ripple_sim.solver import TexelMesh
-from ripple_sim.solver.backends.arguments import Loads, Plasticity
+from ripple_sim.solver.backends.arguments import Drift, Loads, Plasticity
 from ripple_sim.solver.backends.cpu_fields import FieldLayout
-from ripple_sim.solver.backends.kernels import apply, drift, fill, flow, kick_texels
+from ripple_sim.solver.backends.kernels import drift, fill, flow
+from ripple_sim.solver.backends.kicks import kick_texels
+from ripple_sim.solver.backends.stencil_loops import apply
 
 MESHES = [square(1), square(6), polygon(3, 5), polygon(5, 4), flat_torus(7)]
 
@@ -55,7 +57,7 @@ def test_a_drift_shifts_movable_texels_and_moves_all(texels: TexelMesh, everywhe
     layout, h, v = FieldLayout(texels.topology), noise(texels, 1), noise(texels, 2)
     movable = np.float32(1) if everywhere else (noise(texels, 3) > 0).astype(np.float32)
     height, velocity = laid_out(layout, h), laid_out(layout, v)
-    drift(height, velocity, movable, np.float32(0.5), np.float32(0.1))
+    drift(height, velocity, Drift(movable, np.float32(0.5), np.float32(0.1)))
     shifted = v + np.float32(0.5) * movable
     np.testing.assert_allclose(layout.texels(velocity), shifted, rtol=1e-6)
     np.testing.assert_allclose(layout.texels(height), h + np.float32(0.1) * shifted, rtol=1e-5, atol=1e-6)

@@ -1,0 +1,75 @@
+"""The nine-point stencil in compiled loops: the force on a texel, and a field that the stencil makes of another.
+
+Nothing is contracted or reordered: every loop over texels, whatever its shape, gives the same numbers, and the two ends
+of a link see the same force, so that momentum is kept. Rows are cut out of the fields before the loop over columns: the
+compiler then makes better vector code of that loop.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+
+from ripple_sim.solver.kernel import Floats32, kernel
+
+from .arguments import Coefficient, Links, Weights
+from .coefficients import row_of, value_at, value_in
+
+Rows: TypeAlias = tuple[Floats32, ...]
+
+
+@kernel(inline="always")
+def force_at(rows: Rows, links: Rows, c: int) -> np.float32:
+    """Sum over the eight links of weight (h_j - h_i) at column c.
+
+    `rows` are those of the field below, at and above the texel; `links` those of this row's places, and of those below.
+    """
+    below, row, above = rows
+    east, north, south, rising, risen, falling, fallen = links
+    x = row[c]
+    return (
+        (east[c] * (row[c + 1] - x) + east[c - 1] * (row[c - 1] - x))
+        + (north[c] * (above[c] - x) + south[c] * (below[c] - x))
+        + (rising[c] * (above[c + 1] - x) + risen[c - 1] * (below[c - 1] - x))
+        + (falling[c - 1] * (above[c - 1] - x) + fallen[c] * (below[c + 1] - x))
+    )
+
+
+@kernel(inline="always")
+def links_of(w: Floats32, chart: int, r: int) -> Rows:
+    """Rows of a stencil's links that meet in row r."""
+    return (
+        w[chart, 0, r],
+        w[chart, 1, r],
+        w[chart, 1, r - 1],
+        w[chart, 2, r],
+        w[chart, 2, r - 1],
+        w[chart, 3, r],
+        w[chart, 3, r - 1],
+    )
+
+
+@kernel
+def irregular_force(links: Links, i: int, flat: Floats32) -> np.float32:
+    """Sum of weight (h_j - h_i) over the irregular links of texel i of the list."""
+    here, force = flat[links.addresses[i]], np.float32(0)
+    for k in range(links.begins[i], links.begins[i + 1]):
+        force += links.weights[k] * (flat[links.others[k]] - here)
+    return force
+
+
+@kernel
+def apply(stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Floats32) -> None:
+    """The stencil on a field times a factor, written into `out` or added to it."""
+    n = h.shape[1] - 2
+    for i in range(len(h) * n):
+        chart, r = i // n, i % n + 1
+        rows, links = (h[chart, r - 1], h[chart, r], h[chart, r + 1]), links_of(stencil.rows, chart, r)
+        result = out[chart, r]
+        for c in range(1, n + 1):
+            force = value_in(row_of(factor, chart, r - 1), c - 1) * force_at(rows, links, c)
+            result[c] = result[c] + force if add else force
+    irregular, flat, sums = stencil.irregular, h.reshape(-1), out.reshape(-1)
+    for i in range(len(irregular.texels)):
+        sums[irregular.addresses[i]] += value_at(factor, irregular.texels[i]) * irregular_force(irregular, i, flat)
