@@ -12,13 +12,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
 from ripple_sim.solver.texels.chart_map import ChartPieces
 
 from .convention import CHART_NORMALS, CHART_U, CHART_V
 
 # Relative to a triangle: what hangs over an edge by less counts as within, and smaller pieces are left out.
 _ROUND_OFF = 1e-12
+_MOST = 8  # places for a polygon's corners
 # The four planes through the cube's centre that bound each chart's share of space; inwards is positive.
 _SIDES = np.stack(
     [CHART_NORMALS - CHART_U, CHART_NORMALS + CHART_U, CHART_NORMALS - CHART_V, CHART_NORMALS + CHART_V], axis=1
@@ -49,66 +49,53 @@ def _chart_of(directions: NDArray[np.float64]) -> NDArray[np.int64]:
     return 2 * axis + (np.take_along_axis(directions, axis[:, None], axis=1)[:, 0] < 0)
 
 
-@kernel
-def _cut(corners: Floats, sides: Floats) -> tuple[Ints, Ints, Floats]:
+def _cut(
+    corners: NDArray[np.float64], sides: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """Cut triangles [k, 3, 3] into their parts in each chart: owner, chart, and barycentrics [pieces, 3, 3]."""
-    # a triangle that is cut by four planes has seven corners at most, which make five pieces
-    owner = np.empty(30 * len(corners), np.int64)
-    chart = np.empty(30 * len(corners), np.int64)
-    pieces = np.empty((30 * len(corners), 3, 3))
-    polygon, clipped = np.empty((8, 3)), np.empty((8, 3))
-    count = 0
-    for t in range(len(corners)):
-        for f in range(6):
-            for i in range(3):
-                for j in range(3):
-                    polygon[i, j] = 1.0 if i == j else 0.0
-            size = 3
-            for s in range(4):
-                size = _clip(polygon, size, corners[t], sides[f, s], clipped)
-                polygon, clipped = clipped, polygon
-            for k in range(2, size):
-                a, b, c = polygon[0], polygon[k - 1], polygon[k]
-                area = (
-                    a[0] * (b[1] * c[2] - b[2] * c[1])
-                    + a[1] * (b[2] * c[0] - b[0] * c[2])
-                    + a[2] * (b[0] * c[1] - b[1] * c[0])
-                )
-                if area > _ROUND_OFF:
-                    owner[count] = t
-                    chart[count] = f
-                    for j in range(3):
-                        pieces[count, 0, j] = a[j]
-                        pieces[count, 1, j] = b[j]
-                        pieces[count, 2, j] = c[j]
-                    count += 1
-    return owner[:count], chart[:count], pieces[:count]
+    owner, chart = np.divmod(np.arange(6 * len(corners)), 6)
+    # a triangle that is cut by four planes has seven corners at most
+    polygons, sizes = np.zeros((len(owner), _MOST, 3)), np.full(len(owner), 3)
+    polygons[:, :3] = np.eye(3)
+    for s in range(4):
+        polygons, sizes = _clip(polygons, sizes, corners[owner], sides[chart, s])
+        left = sizes > 0
+        owner, chart, polygons, sizes = owner[left], chart[left], polygons[left], sizes[left]
+    fan, k = np.nonzero(np.arange(2, _MOST) < sizes[:, None])
+    pieces = np.stack([polygons[fan, 0], polygons[fan, k + 1], polygons[fan, k + 2]], axis=1)
+    a, b, c = pieces.transpose(1, 2, 0)
+    area = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    real = area > _ROUND_OFF
+    return owner[fan[real]], chart[fan[real]], pieces[real]
 
 
-@kernel
-def _clip(polygon: Floats, size: int, corners: Floats, plane: Floats, clipped: Floats) -> int:
-    """Keep the part of a convex polygon on the inner side of a plane (Sutherland and Hodgman 1974); return its size."""
-    count = 0
-    previous = polygon[size - 1]
-    p = _distance(previous, corners, plane)
-    for i in range(size):
-        q = _distance(polygon[i], corners, plane)
-        if (p >= 0) != (q >= 0):
-            for j in range(3):
-                # the same to the last bit from whichever side it is looked at
-                clipped[count, j] = (p * polygon[i, j] - q * previous[j]) / (p - q)
-            count += 1
-        if q >= 0:
-            for j in range(3):
-                clipped[count, j] = polygon[i, j]
-            count += 1
-        previous, p = polygon[i], q
-    return count
+def _clip(
+    polygons: NDArray[np.float64], sizes: NDArray[np.int64], corners: NDArray[np.float64], planes: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Keep the parts of convex polygons, [p, 8, 3], on the inner sides of planes (Sutherland and Hodgman 1974)."""
+    clipped, count, every = np.zeros_like(polygons), np.zeros_like(sizes), np.arange(len(sizes))
+    previous = polygons[every, sizes - 1]
+    p = _distance(previous, corners, planes)
+    for i in range(sizes.max(initial=0)):
+        here, there = polygons[:, i], i < sizes
+        q = _distance(here, corners, planes)
+        crossing = np.flatnonzero(there & ((p >= 0) != (q >= 0)))
+        before, after = p[crossing, None], q[crossing, None]
+        # the same to the last bit from whichever side it is looked at
+        cuts = (before * here[crossing] - after * previous[crossing]) / (before - after)
+        clipped[crossing, count[crossing]] = cuts
+        count[crossing] += 1
+        inside = np.flatnonzero(there & (q >= 0))
+        clipped[inside, count[inside]] = here[inside]
+        count[inside] += 1
+        previous, p = here, q
+    return clipped, count
 
 
-@kernel
-def _distance(weights: Floats, corners: Floats, plane: Floats) -> float:
-    total = 0.0
-    for i in range(3):
-        total += weights[i] * (corners[i, 0] * plane[0] + corners[i, 1] * plane[1] + corners[i, 2] * plane[2])
-    return total
+def _distance(
+    weights: NDArray[np.float64], corners: NDArray[np.float64], planes: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distance [p] of points in triangles, by barycentrics [p, 3] and corners [p, 3, 3], from planes [p, 3]."""
+    x, y, z = planes.T
+    a, b, c = (corners[:, i, 0] * x + corners[:, i, 1] * y + corners[:, i, 2] * z for i in range(3))
+    return weights[:, 0] * a + weights[:, 1] * b + weights[:, 2] * c

@@ -1,15 +1,34 @@
-"""The cells of a texel mesh, added up chart by chart: link weights and areas, compiled."""
+"""The cells of a texel mesh, added up: link weights and areas.
+
+Plain numpy, block by block: it runs a few times, and a compiled loop takes longer to compile than this takes on most
+meshes. Every place collects its cells row by row, so that the sums do not depend on the blocks.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-
-from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
+from numpy.typing import NDArray
 
 from .cells import quad, triangle
 from .topology import TRIANGLE
+
+Floats: TypeAlias = NDArray[np.float64]
+Ints: TypeAlias = NDArray[np.int64]
+Bools: TypeAlias = NDArray[np.bool_]
+Place: TypeAlias = tuple[Ints, Ints, Ints]  # chart, row, column of some cells of a block
+
+_BLOCK = 2**13  # cells; what is computed of them stays in the processor's cache
+
+# The four corners of a cell and its six links: what the cell at (r, c) adds to at (r + dr, c + dc). In this order a
+# place collects its cells row by row.
+_CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
+_COLLECTED = (3, 2, 1, 0)
+_NORTH, _SOUTH, _EAST, _WEST, _RISING, _FALLING = range(6)
+_LINKS = ((0, 1, 0), (0, 0, 0), (1, 0, 1), (1, 0, 0), (2, 0, 0), (3, 0, 0))  # link, dr, dc
+_BETWEEN = {(0, 1): _SOUTH, (2, 3): _NORTH, (0, 2): _WEST, (1, 3): _EAST, (0, 3): _RISING, (1, 2): _FALLING}
 
 
 class Cells(NamedTuple):
@@ -24,111 +43,133 @@ class Cells(NamedTuple):
     fixed_rim: bool
 
 
-@kernel
+class _Sums(NamedTuple):
+    """What the cells of a block, [k, b, n + 1], add to links and corners: quads everywhere, other cells in places."""
+
+    links: list[Floats]
+    corner: Floats
+    other_links: list[tuple[int, Place, Floats]]
+    other_corners: list[tuple[int, Place, Floats]]
+
+
 def assemble(cells: Cells, weights: Floats, areas: Floats) -> None:
-    """Add up the cells of each chart with halo: weights [C, 4, n + 1, n + 1], areas [C, n, n]."""
-    n = areas.shape[1]
-    # one place wider than the stencil: links inside the halo are collected too and left behind
-    link = np.zeros((4, n + 2, n + 2))
-    area = np.zeros((n + 2, n + 2))
-    for chart in range(len(areas)):
-        link[:] = 0
-        area[:] = 0
-        x, k, s = cells.positions[chart], cells.coefficient[chart], cells.softening[chart]
-        halo, rim = cells.halo[chart], cells.rim[chart]
-        for r in range(n + 1):
-            for c in range(n + 1):
-                if halo[r, c] >= 0 and halo[r, c + 1] >= 0 and halo[r + 1, c] >= 0 and halo[r + 1, c + 1] >= 0:
-                    if rim[r, c] or rim[r, c + 1] or rim[r + 1, c] or rim[r + 1, c + 1]:
-                        _add_strip(x, k, s, rim, halo, r, c, (link, area), cells.fixed_rim)
-                    else:
-                        _add_quad(x, k, s, r, c, link, area)
-                elif cells.valence[chart, _corner(r, c)] == TRIANGLE:
-                    _add_triangle(x, k, s, r, c, link, area)
-        weights[chart] = link[:, : n + 1, : n + 1]
-        areas[chart] = area[1 : n + 1, 1 : n + 1]
+    """Add up the cells of each chart with halo: weights [C, 4, n + 1, n + 1], areas [C, n, n], both 0 before."""
+    around = np.zeros(cells.halo.shape)
+    with np.errstate(divide="ignore", invalid="ignore"):  # beyond rims there may be no positions
+        for charts, rows in _blocks(len(areas), weights.shape[-1]):
+            sums = _add_up(cells, charts, rows)
+            for kind, (link, dr, dc) in enumerate(_LINKS):
+                target = weights[charts, link, rows.start + dr : rows.stop + dr, dc:]
+                _collect(target, sums.links[kind], [each for each in sums.other_links if each[0] == kind])
+            for corner in _COLLECTED:
+                dr, dc = _CORNERS[corner]
+                target = around[charts, rows.start + dr : rows.stop + dr, dc : dc + weights.shape[-1]]
+                _collect(target, sums.corner, [each for each in sums.other_corners if each[0] == corner])
+    areas[:] = around[:, 1:-1, 1:-1]
 
 
-@kernel(inline="always")
-def _corner(r: int, c: int) -> int:
-    """Number of the corner of a chart in which a cell lies."""
-    if r == 0:
-        return 0 if c == 0 else 1
-    return 3 if c == 0 else 2
+def _blocks(charts: int, size: int) -> Iterator[tuple[slice, slice]]:
+    """Charts, and rows of the cells in them, `size` x `size`."""
+    together, high = max(1, _BLOCK // size**2), max(1, _BLOCK // size)
+    for chart in range(0, charts, together):
+        for row in range(0, size, high):
+            yield slice(chart, min(chart + together, charts)), slice(row, min(row + high, size))
 
 
-@kernel
-def _conductance(k: Floats, s: Floats, r: int, c: int) -> float:
-    """Harmonic mean of the coefficients at the corners of a cell, softened by the least factor."""
-    a, b, d, e = k[r, c], k[r, c + 1], k[r + 1, c], k[r + 1, c + 1]
-    conductance = 4 / (1 / a + 1 / b + 1 / d + 1 / e) if a * b * d * e > 0 else 0.0
-    return conductance * min(s[r, c], s[r, c + 1], s[r + 1, c], s[r + 1, c + 1])
+def _collect(target: Floats, everywhere: Floats, others: list[tuple[int, Place, Floats]]) -> None:
+    """Add what cells hold for their places; links inside the halo, which have none, are left behind."""
+    _, height, width = target.shape
+    target += everywhere[:, :height, :width]
+    for _, (chart, r, c), value in others:
+        kept = (r < height) & (c < width)
+        target[chart[kept], r[kept], c[kept]] += value[kept]
 
 
-@kernel
-def _add_quad(x: Floats, k: Floats, s: Floats, r: int, c: int, link: Floats, area: Floats) -> None:
-    """The quad between the texels (r, c) and (r + 1, c + 1): link weights [4, n + 2, n + 2], areas [n + 2, n + 2]."""
-    south_north, west_east, rising, falling, whole = quad(x[r, c], x[r, c + 1], x[r + 1, c], x[r + 1, c + 1])
-    conductance = _conductance(k, s, r, c)
-    link[0, r, c] += conductance * south_north
-    link[0, r + 1, c] += conductance * south_north
-    link[1, r, c] += conductance * west_east
-    link[1, r, c + 1] += conductance * west_east
-    link[2, r, c] += conductance * rising
-    link[3, r, c] += conductance * falling
-    for i in range(2):
-        for j in range(2):
-            area[r + i, c + j] += whole / 4
+def _add_up(cells: Cells, charts: slice, rows: slice) -> _Sums:
+    """What the cells of a block add to links and corners."""
+    size = cells.halo.shape[-1] - 1
+
+    def corners(field: NDArray) -> list[NDArray]:
+        return [field[..., i : i + rows.stop - rows.start, j : j + size] for i, j in _CORNERS]
+
+    part = charts, slice(rows.start, rows.stop + 1)
+    x = corners(np.ascontiguousarray(np.moveaxis(cells.positions[part], -1, 0)))
+    k, s, halo, rim = (corners(field[part]) for field in (cells.coefficient, cells.softening, cells.halo, cells.rim))
+    exists = (np.minimum(np.minimum(halo[0], halo[1]), np.minimum(halo[2], halo[3]))) >= 0
+    at_rim = rim[0] | rim[1] | rim[2] | rim[3]
+    south_north, west_east, rising, falling, whole = quad(*x)
+    conductance = _conductance(k, s)
+    inner = exists & ~at_rim
+    links = [np.where(inner, conductance * weight, 0.0) for weight in (south_north, west_east, rising, falling)]
+    sums = _Sums([links[0], links[0], links[1], links[1], links[2], links[3]], np.where(inner, whole / 4, 0.0), [], [])
+    strips = np.nonzero(exists & at_rim & np.isfinite(whole))
+    if len(strips[0]):
+        halo, rim = (np.stack([field[strips] for field in corner], axis=1) for corner in (halo, rim))
+        of_links = [(conductance * weight)[strips] for weight in (south_north, west_east, rising, falling)]
+        _add_strips(sums, strips, (halo, rim), cells.fixed_rim, of_links, (whole / 4)[strips])
+    _add_triangles(sums, cells, charts, rows)
+    return sums
 
 
-@kernel
-def _add_triangle(x: Floats, k: Floats, s: Floats, r: int, c: int, link: Floats, area: Floats) -> None:
-    """The cell in a corner of three charts: the halo's corner does not exist; a triangle of the other three."""
-    # the chart's own texel is at r0, c0
-    r0, r1 = (1, 0) if r == 0 else (r, r + 1)
-    c0, c1 = (1, 0) if c == 0 else (c, c + 1)
-    _, vertical, horizontal, whole = triangle(x[r0, c0], x[r0, c1], x[r1, c0])
-    a, b, d = k[r0, c0], k[r0, c1], k[r1, c0]
-    conductance = 3 / (1 / a + 1 / b + 1 / d) if a * b * d > 0 else 0.0
-    conductance *= min(s[r0, c0], s[r0, c1], s[r1, c0])
-    area[r0, c0] += whole / 3
-    link[1, r, c0] += conductance * vertical
-    link[0, r0, c] += conductance * horizontal
+def _conductance(k: list[Floats], s: list[Floats]) -> Floats:
+    """Harmonic mean of the coefficients at the corners of cells, 0 where one is, softened by the least factor."""
+    product, resistance, softest = k[0], 1 / k[0], s[0]
+    for other, factor in zip(k[1:], s[1:], strict=True):
+        product, resistance, softest = product * other, resistance + 1 / other, np.minimum(softest, factor)
+    return np.where(product > 0, len(k) / resistance, 0.0) * softest
 
 
-@kernel
-def _add_strip(
-    x: Floats, k: Floats, s: Floats, rim: Bools, halo: Ints, r: int, c: int, sums: tuple[Floats, Floats], fixed: bool
+def _add_triangles(sums: _Sums, cells: Cells, charts: slice, rows: slice) -> None:
+    """The cells in corners of three charts: the halo's corner does not exist; triangles of the other three."""
+    n = cells.halo.shape[-1] - 2
+    for corner, (r, c) in enumerate(((0, 0), (0, n), (n, n), (n, 0))):
+        chart = np.flatnonzero(cells.valence[charts, corner] == TRIANGLE)
+        if not len(chart) or not rows.start <= r < rows.stop:
+            continue
+        # the chart's own texel is at r0, c0
+        r0, r1 = (1, 0) if r == 0 else (r, r + 1)
+        c0, c1 = (1, 0) if c == 0 else (c, c + 1)
+        places = [(charts.start + chart, row, column) for row, column in ((r0, c0), (r0, c1), (r1, c0))]
+        _, vertical, horizontal, whole = triangle(*(cells.positions[place].T for place in places))
+        conductance = _conductance([cells.coefficient[p] for p in places], [cells.softening[p] for p in places])
+        place = chart, np.full_like(chart, r - rows.start), np.full_like(chart, c)
+        sums.other_corners.append((_CORNERS.index((r0 - r, c0 - c)), place, whole / 3))
+        sums.other_links.append((_EAST if c == 0 else _WEST, place, conductance * vertical))
+        sums.other_links.append((_NORTH if r == 0 else _SOUTH, place, conductance * horizontal))
+
+
+def _add_strips(
+    sums: _Sums, strips: Place, around: tuple[Ints, Bools], fixed: bool, links: list[Floats], share: Floats
 ) -> None:
-    """A cell at a rim: each of its corners beyond the rim moves as the texel beside it, or is fixed.
+    """Cells at a rim: each of their corners beyond the rim moves as the texel beside it, or is fixed.
 
     Nothing is known of a strip where the rim has no positions.
+
+    Parameters
+    ----------
+    strips
+        The cells, [k].
+    around
+        Halo table and rim at their corners, [k, 4].
+    links
+        Weights times conductances: south and north, west and east, rising, falling, [k].
+    share
+        Quarter of their area [m^2], [k].
     """
-    link, area = sums
-    south_north, west_east, rising, falling, whole = quad(x[r, c], x[r, c + 1], x[r + 1, c], x[r + 1, c + 1])
-    if not np.isfinite(whole):
-        return
-    conductance = _conductance(k, s, r, c)
-    # corners are numbered 0 to 3 by row and column; `moves` is the texel of the cell with which each of them moves
-    moves = np.empty(4, np.int64)
+    halo, rim = around
+    # with which corner of the cell each of them moves
+    moves = np.tile(np.arange(4), (len(share), 1))
     for i in range(4):
-        moves[i] = i
         for j in range(4):
-            own = not rim[r + j // 2, c + j % 2]
-            if rim[r + i // 2, c + i % 2] and own and halo[r + j // 2, c + j % 2] == halo[r + i // 2, c + i % 2]:
-                moves[i] = j
-        area[r + moves[i] // 2, c + moves[i] % 2] += whole / 4
+            moves[rim[:, i] & ~rim[:, j] & (halo[:, i] == halo[:, j]), i] = j
+        for corner in range(4):
+            here = moves[:, i] == corner
+            sums.other_corners.append((corner, tuple(index[here] for index in strips), share[here]))
+    south_north, west_east, rising, falling = links
     for i, j, weight in (
         (0, 1, south_north), (2, 3, south_north), (0, 2, west_east), (1, 3, west_east), (0, 3, rising), (1, 2, falling)
     ):  # fmt: skip
-        a, b = (i, j) if fixed else (min(moves[i], moves[j]), max(moves[i], moves[j]))
-        if a == b:
-            continue
-        if b - a == 2:
-            link[1, r, c + a] += conductance * weight
-        elif b - a == 3:
-            link[2, r, c] += conductance * weight
-        elif a == 1:
-            link[3, r, c] += conductance * weight
-        else:
-            link[0, r + a // 2, c] += conductance * weight
+        a, b = (i, j) if fixed else (np.minimum(moves[:, i], moves[:, j]), np.maximum(moves[:, i], moves[:, j]))
+        for (first, second), kind in _BETWEEN.items():
+            here = np.broadcast_to((a == first) & (b == second), share.shape)
+            sums.other_links.append((kind, tuple(index[here] for index in strips), weight[here]))

@@ -9,12 +9,10 @@ N = 96.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-
-from ripple_sim.solver.kernel import kernel
 
 # Stiffness of a square against the hourglass. At 1 waves lag along its sides as much as they lead along its diagonals,
 # 1/2 makes the 5-point stencil, 1/3 an isotropic one, 1/4 allows the longest time step.
@@ -26,23 +24,21 @@ _SHARE = 0.75
 # A cell folded to a line would ask for an infinitely short time step: least area, in units of a square's as large.
 _LEAST_AREA = 0.02
 
-Point = Any  # a row of three floats, in compiled code
+Numbers: TypeAlias = Any  # a float, or an array of them
+Points: TypeAlias = Any  # coordinates [3] of a point, or [3, ...] of many
 
 
-@kernel
-def quad(sw: Point, se: Point, nw: Point, ne: Point) -> tuple[float, float, float, float, float]:
+def quad(sw: Points, se: Points, nw: Points, ne: Points) -> tuple[Numbers, Numbers, Numbers, Numbers, Numbers]:
     """Weights of a quad's links: south and north side, west and east side, diagonal sw-ne, diagonal se-nw; its area.
 
     With diagonals p, q and u_p, u_q the differences along them, area |gradient|^2 is
     (|q|^2 u_p^2 - 2 p.q u_p u_q + |p|^2 u_q^2) / 2 |p x q|, and 2 u_p u_q is the sum of squared differences along west
-    and east, less that along south and north.
+    and east, less that along south and north. A quad in one point has neither.
     """
     p, q = _between(sw, ne), _between(se, nw)
     pp, qq, pq, cross = _dot(p, p), _dot(q, q), _dot(p, q), _cross_length(p, q)
-    if pp + qq == 0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
-    twice = 2 * max(cross, _LEAST_AREA / 2 * (pp + qq))
-    hourglass = _hourglass(pp, qq, pq, twice / 4)
+    twice = _or_one(2 * np.maximum(cross, _LEAST_AREA / 2 * (pp + qq)))
+    hourglass = np.where(pp + qq == 0, 0.0, _hourglass(_or_one(pp), _or_one(qq), pq, twice / 4))
     return (
         pq / twice + hourglass,
         hourglass - pq / twice,
@@ -52,15 +48,12 @@ def quad(sw: Point, se: Point, nw: Point, ne: Point) -> tuple[float, float, floa
     )
 
 
-@kernel
-def triangle(a: Point, b: Point, c: Point) -> tuple[float, float, float, float]:
+def triangle(a: Points, b: Points, c: Points) -> tuple[Numbers, Numbers, Numbers, Numbers]:
     """Cotangent weights of the links bc, ca, ab, and the area of a triangle (Pinkall and Polthier 1993)."""
     ab, ac, bc = _between(a, b), _between(a, c), _between(b, c)
     double_area = _cross_length(ab, ac)
-    longest = max(_dot(ab, ab), _dot(ac, ac), _dot(bc, bc))
-    if longest == 0:
-        return 0.0, 0.0, 0.0, 0.0
-    twice = 2 * max(double_area, _LEAST_AREA * longest)
+    longest = np.maximum(np.maximum(_dot(ab, ab), _dot(ac, ac)), _dot(bc, bc))
+    twice = _or_one(2 * np.maximum(double_area, _LEAST_AREA * longest))
     return _dot(ab, ac) / twice, -_dot(ab, bc) / twice, _dot(ac, bc) / twice, double_area / 2
 
 
@@ -100,27 +93,28 @@ def _virtual_node(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     return weights / weights.sum()
 
 
-@kernel(inline="always")
-def _dot(a: Point, b: Point) -> float:
+def _or_one(x: Numbers) -> Numbers:
+    """1 in place of 0: what is divided by it is 0 as well."""
+    return np.where(x == 0, 1.0, x)
+
+
+def _dot(a: Points, b: Points) -> Numbers:
     """Inner product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel(inline="always")
-def _cross_length(a: Point, b: Point) -> float:
+def _cross_length(a: Points, b: Points) -> Numbers:
     """Length of the vector product."""
     x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     return np.sqrt(x * x + y * y + z * z)
 
 
-@kernel(inline="always")
-def _between(a: Point, b: Point) -> tuple[float, float, float]:
+def _between(a: Points, b: Points) -> Points:
     """Difference b - a."""
     return (b[0] - a[0], b[1] - a[1], b[2] - a[2])
 
 
-@kernel
-def _quad_area(sw: Point, se: Point, nw: Point, ne: Point) -> float:
+def _quad_area(sw: Points, se: Points, nw: Points, ne: Points) -> Numbers:
     """Area of a quad that need not be flat: that of its smaller triangulation.
 
     The flat area p x q / 2 misses what a fold holds, the other triangulation spans it twice.
@@ -128,11 +122,10 @@ def _quad_area(sw: Point, se: Point, nw: Point, ne: Point) -> float:
     south, west, north, east = _between(sw, se), _between(sw, nw), _between(ne, nw), _between(ne, se)
     rising = _cross_length(south, east) + _cross_length(north, west)
     falling = _cross_length(south, west) + _cross_length(north, east)
-    return min(rising, falling) / 2
+    return np.minimum(rising, falling) / 2
 
 
-@kernel
-def _hourglass(pp: float, qq: float, pq: float, area: float) -> float:
+def _hourglass(pp: Numbers, qq: Numbers, pq: Numbers, area: Numbers) -> Numbers:
     """Hourglass stiffness of a quad of given area whose diagonals p and q have the products pp, qq and pq.
 
     In a parallelogram with the squared sides a >= b, the product d of its sides and the area J, a wave of wave number k
@@ -141,7 +134,7 @@ def _hourglass(pp: float, qq: float, pq: float, area: float) -> float:
     H = (a^2 - d^2) / 4 a J.
     """
     both_sides = (pp + qq) / 2
-    a, d = (both_sides + abs(pq)) / 2, (pp - qq) / 4
+    a, d = (both_sides + np.abs(pq)) / 2, (pp - qq) / 4
     in_time = both_sides * area / (2 * (area * area + 3 * d * d))
     free = (a * a - d * d) / (4 * a * area)
-    return min(in_time, max(_SHARE * free, _HOURGLASS * 2 * area / both_sides))
+    return np.minimum(in_time, np.maximum(_SHARE * free, _HOURGLASS * 2 * area / both_sides))

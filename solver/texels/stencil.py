@@ -46,8 +46,10 @@ class Stencil:
 
     def absolute_sums(self) -> NDArray[np.float64]:
         """Sum of |w| over the links that meet in each texel, [C, n, n]."""
-        sums = np.empty(self.topology.shape)
-        _sum_absolute(self.weights, sums)
+        sums = np.zeros(self.topology.shape)
+        n, magnitudes = sums.shape[1], np.abs(self.weights)
+        for link, i, j, _, _ in _SIDES + _DIAGONALS:
+            sums += magnitudes[:, link, 1 + i : 1 + i + n, 1 + j : 1 + j + n]
         if self.irregular is not None:
             sums.reshape(-1)[self.irregular.texels] += np.add.reduceat(
                 np.abs(self.irregular.weights), self.irregular.begins[:-1]
@@ -71,18 +73,4 @@ def _gather(w: Floats, h: Floats, out: Floats) -> None:
                 for links in (_SIDES, _DIAGONALS):
                     for link, i, j, dr, dc in links:
                         total += w[chart, link, r + i, c + j] * (h[chart, r + dr, c + dc] - h[chart, r, c])
-                out[chart, r - 1, c - 1] = total
-
-
-@kernel
-def _sum_absolute(w: Floats, out: Floats) -> None:
-    """Sum of |weight| over the links of every texel, [C, n, n]."""
-    n = out.shape[1]
-    for chart in range(len(out)):
-        for r in range(1, n + 1):
-            for c in range(1, n + 1):
-                total = 0.0
-                for links in (_SIDES, _DIAGONALS):
-                    for link, i, j, _, _ in links:
-                        total += abs(w[chart, link, r + i, c + j])
                 out[chart, r - 1, c - 1] = total
