@@ -18,7 +18,7 @@ from .topology import TRIANGLE
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
 Bools: TypeAlias = NDArray[np.bool_]
-Place: TypeAlias = tuple[Ints, Ints, Ints]  # chart, row, column of some cells of a block
+Place: TypeAlias = tuple[NDArray[np.integer], ...]  # chart, row, column of some cells of a block
 
 _BLOCK = 2**13  # cells; what is computed of them stays in the processor's cache
 
@@ -104,9 +104,9 @@ def _add_up(cells: Cells, charts: slice, rows: slice) -> _Sums:
     sums = _Sums([links[0], links[0], links[1], links[1], links[2], links[3]], np.where(inner, whole / 4, 0.0), [], [])
     strips = np.nonzero(exists & at_rim & np.isfinite(whole))
     if len(strips[0]):
-        halo, rim = (np.stack([field[strips] for field in corner], axis=1) for corner in (halo, rim))
+        around = tuple(np.stack([field[strips] for field in corner], axis=1) for corner in (halo, rim))
         of_links = [(conductance * weight)[strips] for weight in (south_north, west_east, rising, falling)]
-        _add_strips(sums, strips, (halo, rim), cells.fixed_rim, of_links, (whole / 4)[strips])
+        _add_strips(sums, strips, around, cells.fixed_rim, of_links, (whole / 4)[strips])
     _add_triangles(sums, cells, charts, rows)
     return sums
 
@@ -139,7 +139,7 @@ def _add_triangles(sums: _Sums, cells: Cells, charts: slice, rows: slice) -> Non
 
 
 def _add_strips(
-    sums: _Sums, strips: Place, around: tuple[Ints, Bools], fixed: bool, links: list[Floats], share: Floats
+    sums: _Sums, strips: Place, around: tuple[NDArray, ...], fixed: bool, links: list[Floats], share: Floats
 ) -> None:
     """Cells at a rim: each of their corners beyond the rim moves as the texel beside it, or is fixed.
 
