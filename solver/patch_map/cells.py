@@ -26,7 +26,7 @@ class Cells:
     label : int64 [n]
         Number of the seed whose cell each vertex belongs to. A cell hangs together along edges.
     distance : float64 [n]
-        From that seed [m].
+        From that seed, in the units of the graph of distances.
     """
 
     seeds: NDArray[np.int64]
@@ -34,11 +34,14 @@ class Cells:
     distance: NDArray[np.float64]
 
 
-def spread_seeds(graph: csr_array, count: int) -> NDArray[np.int64]:
-    """Vertices far from one another, each the farthest from those before, on one connected component."""
+def spread_seeds(graph: csr_array, reach: float) -> NDArray[np.int64]:
+    """Vertices of which one lies within reach of every vertex, on one connected component.
+
+    Each is the farthest from those before.
+    """
     seeds = [int(np.argmax(dijkstra(graph, indices=0)))]
     distance = dijkstra(graph, indices=seeds[0])
-    while len(seeds) < count and distance.max() > 0:
+    while distance.max() > reach:
         seeds.append(int(np.argmax(distance)))
         distance = np.minimum(distance, dijkstra(graph, indices=seeds[-1], limit=distance.max()))
     return np.array(seeds)
@@ -53,9 +56,11 @@ def voronoi_cells(surface: Surface, graph: csr_array, seeds: NDArray[np.int64]) 
     return Cells(seeds, label, distance)
 
 
-def centred_cells(surface: Surface, graph: csr_array, seeds: NDArray[np.int64]) -> Cells:
-    """Cells whose seeds moved to their middles a few times (Lloyd 1982)."""
-    mass = np.bincount(surface.F.ravel(), np.repeat(surface.areas, 3), len(surface.V)) + np.finfo(np.float64).tiny
+def centred_cells(
+    surface: Surface, graph: csr_array, seeds: NDArray[np.int64], sizes: NDArray[np.float64]
+) -> Cells:
+    """Cells whose seeds moved to their middles a few times (Lloyd 1982), in the metric scaled by their sizes [n]."""
+    mass = lumped_areas(surface) / sizes**2
     for _ in range(_LLOYD_STEPS):
         cells = voronoi_cells(surface, graph, seeds)
         total = np.bincount(cells.label, mass)
@@ -67,6 +72,11 @@ def centred_cells(surface: Surface, graph: csr_array, seeds: NDArray[np.int64]) 
             break
         seeds = moved
     return voronoi_cells(surface, graph, seeds)
+
+
+def lumped_areas(surface: Surface) -> NDArray[np.float64]:
+    """Area that belongs to each vertex [m^2], [n]."""
+    return np.bincount(surface.F.ravel(), np.repeat(surface.areas / 3, 3), len(surface.V)) + np.finfo(np.float64).tiny
 
 
 def _gathered(surface: Surface, label: NDArray[np.int64], seeds: NDArray[np.int64]) -> NDArray[np.int64]:

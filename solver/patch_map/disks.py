@@ -18,11 +18,11 @@ _MOST_ROUNDS = 200
 _FEWEST = 4  # cells of a closed surface
 
 
-def disk_cells(surface: Surface, graph: csr_array, cells: Cells) -> BorderedCells:
+def disk_cells(surface: Surface, graph: csr_array, cells: Cells, sizes: NDArray[np.float64]) -> BorderedCells:
     """Cells of one connected component, cut apart, each a disk with at least three corners.
 
     A cell that is no disk gets a seed half-way round its shortest loop that does not shrink to a point; one with fewer
-    corners loses its seed or, if that was tried before, gets a neighbour.
+    corners gets a further neighbour on its border or, if that was tried before, loses its seed.
 
     Raises
     ------
@@ -41,19 +41,18 @@ def disk_cells(surface: Surface, graph: csr_array, cells: Cells) -> BorderedCell
         if len(cells.seeds) < _FEWEST and not surface.edges.rim.any():
             cells = _with(surface, graph, cells, int(np.argmax(cells.distance)))
             continue
-        bordered = cut_borders(surface, cells)
+        bordered = cut_borders(surface, cells, sizes)
         few = bordered.short_of_corners()
         if not len(few):
             return bordered
         cell = int(few[0])
         seed = int(cells.seeds[cell])
-        if seed not in tried and len(cells.seeds) > _FEWEST:
+        if seed not in tried or len(cells.seeds) <= _FEWEST:
             tried.add(seed)
-            cells = voronoi_cells(surface, graph, np.delete(cells.seeds, cell))
-        else:
-            around = _neighbours(surface, cells, cell)
-            farthest = np.where(np.isin(cells.label, around), cells.distance, -1.0)
+            farthest = np.where(_beside(surface, cells, cell), cells.distance, -1.0)
             cells = _with(surface, graph, cells, int(np.argmax(farthest)))
+        else:
+            cells = voronoi_cells(surface, graph, np.delete(cells.seeds, cell))
     raise AtlasError("no cells found that are disks with three corners")
 
 
@@ -61,10 +60,12 @@ def _with(surface: Surface, graph: csr_array, cells: Cells, seed: int) -> Cells:
     return voronoi_cells(surface, graph, np.unique(np.append(cells.seeds, seed)))
 
 
-def _neighbours(surface: Surface, cells: Cells, cell: int) -> NDArray[np.int64]:
-    sides = cells.label[surface.edges.ends]
-    beside = sides[(sides == cell).any(axis=1)]
-    return np.setdiff1d(beside, [cell])
+def _beside(surface: Surface, cells: Cells, cell: int) -> NDArray[np.bool_]:
+    """Vertices of other cells that have a neighbour in this one, [n]."""
+    ends = surface.edges.ends[(cells.label[surface.edges.ends] == cell).any(axis=1)]
+    beside = np.zeros(len(surface.V), bool)
+    beside[ends] = True
+    return beside & (cells.label != cell)
 
 
 def _euler(surface: Surface, cells: Cells) -> NDArray[np.int64]:

@@ -43,3 +43,9 @@ def _along_and_across(
     x = np.einsum("ij,ij->i", offset, along)
     square = np.einsum("ij,ij->i", offset, offset)
     return x, np.sqrt(np.maximum(square - x * x, 0.0))
+
+
+def scaled(graph: csr_array, sizes: NDArray[np.float64]) -> csr_array:
+    """A graph of distances in units of what is given at its vertices [n]: the mean of both ends of each link."""
+    row = np.repeat(np.arange(len(sizes)), np.diff(graph.indptr))
+    return csr_array((2 * graph.data / (sizes[row] + sizes[graph.indices]), graph.indices, graph.indptr), graph.shape)

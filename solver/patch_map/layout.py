@@ -11,17 +11,19 @@ from scipy.sparse.csgraph import connected_components
 
 from .cells import centred_cells, spread_seeds
 from .disks import disk_cells
-from .distances import distance_graph
+from .distances import distance_graph, scaled
 from .quads import Quads, cut_into_quads
 from .refine import refined
 from .relax import relaxed
 from .seamless import SeamlessMap
+from .sizes import cell_sizes
 from .surface import Surface
 
 CELLS = 24
 _MOST_CELLS = 96  # of a mesh in parts of uneven sizes
 _FEWEST = 0.5  # cells that the smallest part should have by its area; in truth it has four
 _NEGLIGIBLE = 2e-3  # share of the area of a part for which no others are cut smaller
+_RADIUS, _REACH, _SMALLEST = 0.75, 0.4, 0.35
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 
@@ -70,8 +72,11 @@ def _component_quads(V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArra
     longest = np.sqrt(whole.areas.sum() / (_TRIANGLES / CELLS * count))
     surface = refined(dataclasses.replace(whole, parent=faces), longest)
     graph = distance_graph(surface)
-    cells = centred_cells(surface, graph, spread_seeds(graph, count))
-    return cut_into_quads(disk_cells(surface, graph, cells))
+    largest = _RADIUS * np.sqrt(whole.areas.sum() / count)
+    sizes = cell_sizes(surface, graph, largest, _REACH, _SMALLEST * largest)
+    graph = scaled(graph, sizes)
+    cells = centred_cells(surface, graph, spread_seeds(graph, 1.0), sizes)
+    return cut_into_quads(disk_cells(surface, graph, cells, sizes))
 
 
 def _joined(parts: list[Quads]) -> Quads:
