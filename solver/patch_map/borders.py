@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Cells
+from .distances import Metric
 from .surface import AB, BC, CA, MIDDLE, A, B, C, Surface, Triangle
 
 # Triangles between two cells, the one vertex on its side of the border; and between three.
@@ -43,17 +44,17 @@ class BorderedCells:
         return np.flatnonzero([len(each) < 3 for each in self.arcs])
 
 
-def cut_borders(surface: Surface, cells: Cells, sizes: NDArray[np.float64]) -> BorderedCells:
+def cut_borders(metric: Metric, cells: Cells) -> BorderedCells:
     """Cut the triangles between cells that are disks, and find the cells' corners.
 
     In an inner corner three cells meet, in one at the rim two; at the rim a cell has corners of its own where that is
     sharp, and as many more as it lacks to three.
     """
+    surface = metric.surface
     ends = surface.edges.ends
     label, distance = cells.label[ends], cells.distance[ends]
     between = label[:, 0] != label[:, 1]
-    length = np.maximum(surface.edge_lengths / sizes[ends].mean(axis=1), np.finfo(np.float64).tiny)
-    place = np.clip(0.5 + (distance[:, 1] - distance[:, 0]) / (2 * length), _LEAST_SHARE, 1 - _LEAST_SHARE)
+    place = np.clip(0.5 + (distance[:, 1] - distance[:, 0]) / (2 * metric.edge_lengths), _LEAST_SHARE, 1 - _LEAST_SHARE)
     cut = surface.subdivided(np.where(between, place, np.nan), _CUTS).surface
     # each triangle has a vertex of the surface before, and all of those are of its cell
     of_vertex = np.concatenate([cells.label, np.full(len(cut.V) - len(cells.label), -1)])

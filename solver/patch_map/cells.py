@@ -6,9 +6,10 @@ import dataclasses
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from .distances import Metric
 from .surface import Surface
 
 _LLOYD_STEPS = 8
@@ -26,7 +27,7 @@ class Cells:
     label : int64 [n]
         Number of the seed whose cell each vertex belongs to. A cell hangs together along edges.
     distance : float64 [n]
-        From that seed, in the units of the graph of distances.
+        From that seed, in the units of the metric.
     """
 
     seeds: NDArray[np.int64]
@@ -34,11 +35,12 @@ class Cells:
     distance: NDArray[np.float64]
 
 
-def spread_seeds(graph: csr_array, reach: float) -> NDArray[np.int64]:
+def spread_seeds(metric: Metric, reach: float) -> NDArray[np.int64]:
     """Vertices of which one lies within reach of every vertex, on one connected component.
 
     Each is the farthest from those before.
     """
+    graph = metric.graph
     seeds = [int(np.argmax(dijkstra(graph, indices=0)))]
     distance = dijkstra(graph, indices=seeds[0])
     while distance.max() > reach:
@@ -47,36 +49,29 @@ def spread_seeds(graph: csr_array, reach: float) -> NDArray[np.int64]:
     return np.array(seeds)
 
 
-def voronoi_cells(surface: Surface, graph: csr_array, seeds: NDArray[np.int64]) -> Cells:
+def voronoi_cells(metric: Metric, seeds: NDArray[np.int64]) -> Cells:
     """The vertices nearest to each seed."""
-    distance, _, source = dijkstra(graph, indices=seeds, min_only=True, return_predecessors=True)
-    number = np.full(len(surface.V), -1)
+    distance, _, source = dijkstra(metric.graph, indices=seeds, min_only=True, return_predecessors=True)
+    number = np.full(len(metric.unit), -1)
     number[seeds] = np.arange(len(seeds))
-    label = _gathered(surface, number[source], seeds)
+    label = _gathered(metric.surface, number[source], seeds)
     return Cells(seeds, label, distance)
 
 
-def centred_cells(
-    surface: Surface, graph: csr_array, seeds: NDArray[np.int64], sizes: NDArray[np.float64]
-) -> Cells:
-    """Cells whose seeds moved to their middles a few times (Lloyd 1982), in the metric scaled by their sizes [n]."""
-    mass = lumped_areas(surface) / sizes**2
+def centred_cells(metric: Metric, seeds: NDArray[np.int64]) -> Cells:
+    """Cells whose seeds moved to their middles a few times (Lloyd 1982)."""
+    V, mass = metric.surface.V, metric.masses
     for _ in range(_LLOYD_STEPS):
-        cells = voronoi_cells(surface, graph, seeds)
+        cells = voronoi_cells(metric, seeds)
         total = np.bincount(cells.label, mass)
-        middle = np.stack([np.bincount(cells.label, mass * surface.V[:, k]) / total for k in range(3)], axis=1)
-        square = ((surface.V - middle[cells.label]) ** 2).sum(axis=1)
+        middle = np.stack([np.bincount(cells.label, mass * V[:, k]) / total for k in range(3)], axis=1)
+        square = ((V - middle[cells.label]) ** 2).sum(axis=1)
         order = np.lexsort((square, cells.label))
         moved = order[np.searchsorted(cells.label[order], np.arange(len(seeds)))]
         if (moved == seeds).all():
             break
         seeds = moved
-    return voronoi_cells(surface, graph, seeds)
-
-
-def lumped_areas(surface: Surface) -> NDArray[np.float64]:
-    """Area that belongs to each vertex [m^2], [n]."""
-    return np.bincount(surface.F.ravel(), np.repeat(surface.areas / 3, 3), len(surface.V)) + np.finfo(np.float64).tiny
+    return voronoi_cells(metric, seeds)
 
 
 def _gathered(surface: Surface, label: NDArray[np.int64], seeds: NDArray[np.int64]) -> NDArray[np.int64]:

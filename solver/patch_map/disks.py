@@ -11,53 +11,63 @@ from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.kernel import Bools, Ints, kernel
 
 from .borders import BorderedCells, cut_borders
-from .cells import Cells, voronoi_cells
+from .cells import Cells, centred_cells, voronoi_cells
+from .distances import Metric
 from .surface import Surface
 
 _MOST_ROUNDS = 200
 _FEWEST = 4  # cells of a closed surface
 
 
-def disk_cells(surface: Surface, graph: csr_array, cells: Cells, sizes: NDArray[np.float64]) -> BorderedCells:
+def disk_cells(metric: Metric, cells: Cells) -> BorderedCells:
     """Cells of one connected component, cut apart, each a disk with at least three corners.
 
     A cell that is no disk gets a seed half-way round its shortest loop that does not shrink to a point; one with fewer
-    corners gets a further neighbour on its border or, if that was tried before, loses its seed.
+    corners gets a further neighbour on its border or, if that was tried before, loses its seed. Cells with new
+    neighbours are centred anew, and mended once more.
 
     Raises
     ------
     AtlasError
         If none are found.
     """
-    tried: set[int] = set()
+    count = len(cells.seeds)
+    cells, bordered = _mended(metric, cells)
+    if len(cells.seeds) > count:
+        _, bordered = _mended(metric, centred_cells(metric, cells.seeds))
+    return bordered
+
+
+def _mended(metric: Metric, cells: Cells) -> tuple[Cells, BorderedCells]:
+    surface, tried = metric.surface, set[int]()
     for _ in range(_MOST_ROUNDS):
         bad = np.flatnonzero(_euler(surface, cells) != 1)
         if len(bad):
             new = np.setdiff1d([_far_side(surface, cells, int(cell)) for cell in bad], cells.seeds)
             if not len(new):
                 break
-            cells = voronoi_cells(surface, graph, np.concatenate([cells.seeds, new]))
+            cells = voronoi_cells(metric, np.concatenate([cells.seeds, new]))
             continue
         if len(cells.seeds) < _FEWEST and not surface.edges.rim.any():
-            cells = _with(surface, graph, cells, int(np.argmax(cells.distance)))
+            cells = _with(metric, cells, int(np.argmax(cells.distance)))
             continue
-        bordered = cut_borders(surface, cells, sizes)
+        bordered = cut_borders(metric, cells)
         few = bordered.short_of_corners()
         if not len(few):
-            return bordered
+            return cells, bordered
         cell = int(few[0])
         seed = int(cells.seeds[cell])
         if seed not in tried or len(cells.seeds) <= _FEWEST:
             tried.add(seed)
             farthest = np.where(_beside(surface, cells, cell), cells.distance, -1.0)
-            cells = _with(surface, graph, cells, int(np.argmax(farthest)))
+            cells = _with(metric, cells, int(np.argmax(farthest)))
         else:
-            cells = voronoi_cells(surface, graph, np.delete(cells.seeds, cell))
+            cells = voronoi_cells(metric, np.delete(cells.seeds, cell))
     raise AtlasError("no cells found that are disks with three corners")
 
 
-def _with(surface: Surface, graph: csr_array, cells: Cells, seed: int) -> Cells:
-    return voronoi_cells(surface, graph, np.unique(np.append(cells.seeds, seed)))
+def _with(metric: Metric, cells: Cells, seed: int) -> Cells:
+    return voronoi_cells(metric, np.unique(np.append(cells.seeds, seed)))
 
 
 def _beside(surface: Surface, cells: Cells, cell: int) -> NDArray[np.bool_]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
@@ -9,6 +12,49 @@ from scipy.sparse import coo_array, csr_array
 from .surface import Surface
 
 _LEAST = 1e-12  # of the longest link: graphs know no links of length 0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Metric:
+    """Distances along a surface, in units of a length that differs from place to place.
+
+    Attributes
+    ----------
+    surface : Surface
+    graph : csr_array [n, n]
+        Links between near vertices with their lengths in these units.
+    unit : float64 [n]
+        At each vertex [m].
+    """
+
+    surface: Surface
+    graph: csr_array
+    unit: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, surface: Surface) -> Metric:
+        """Distances in metres."""
+        return cls(surface, distance_graph(surface), np.ones(len(surface.V)))
+
+    def in_units(self, unit: NDArray[np.float64]) -> Metric:
+        """The same distances in other units [n] [m]; a link takes the mean of both ends."""
+        row = np.repeat(np.arange(len(unit)), np.diff(self.graph.indptr))
+        column = self.graph.indices
+        lengths = self.graph.data * (self.unit[row] + self.unit[column]) / (unit[row] + unit[column])
+        return Metric(self.surface, csr_array((lengths, column, self.graph.indptr), self.graph.shape), unit)
+
+    @functools.cached_property
+    def edge_lengths(self) -> NDArray[np.float64]:
+        """Lengths of the surface's edges, none of them 0, [e]."""
+        lengths = self.surface.edge_lengths / self.unit[self.surface.edges.ends].mean(axis=1)
+        return np.maximum(lengths, np.finfo(np.float64).tiny)
+
+    @functools.cached_property
+    def masses(self) -> NDArray[np.float64]:
+        """Area that belongs to each vertex, [n]."""
+        surface = self.surface
+        lumped = np.bincount(surface.F.ravel(), np.repeat(surface.areas / 3, 3), len(surface.V))
+        return lumped / self.unit**2 + np.finfo(np.float64).tiny
 
 
 def distance_graph(surface: Surface) -> csr_array:
@@ -43,9 +89,3 @@ def _along_and_across(
     x = np.einsum("ij,ij->i", offset, along)
     square = np.einsum("ij,ij->i", offset, offset)
     return x, np.sqrt(np.maximum(square - x * x, 0.0))
-
-
-def scaled(graph: csr_array, sizes: NDArray[np.float64]) -> csr_array:
-    """A graph of distances in units of what is given at its vertices [n]: the mean of both ends of each link."""
-    row = np.repeat(np.arange(len(sizes)), np.diff(graph.indptr))
-    return csr_array((2 * graph.data / (sizes[row] + sizes[graph.indices]), graph.indices, graph.indptr), graph.shape)

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from .cells import centred_cells, spread_seeds
 from .disks import disk_cells
-from .distances import distance_graph, scaled
+from .distances import Metric
 from .quads import Quads, cut_into_quads
 from .refine import refined
 from .relax import relaxed
@@ -19,11 +19,13 @@ from .seamless import SeamlessMap
 from .sizes import cell_sizes
 from .surface import Surface
 
-CELLS = 24
+CELLS = 48
 _MOST_CELLS = 96  # of a mesh in parts of uneven sizes
 _FEWEST = 0.5  # cells that the smallest part should have by its area; in truth it has four
 _NEGLIGIBLE = 2e-3  # share of the area of a part for which no others are cut smaller
-_RADIUS, _REACH, _SMALLEST = 0.75, 0.4, 0.35
+_RADIUS = 0.75  # of a cell, over the root of its share of the area
+_REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
+_SMALLEST = 0.6  # of the radius of cells elsewhere
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 
@@ -71,12 +73,11 @@ def _component_quads(V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArra
     whole = Surface.of(V[used], corners.reshape(-1, 3))
     longest = np.sqrt(whole.areas.sum() / (_TRIANGLES / CELLS * count))
     surface = refined(dataclasses.replace(whole, parent=faces), longest)
-    graph = distance_graph(surface)
-    largest = _RADIUS * np.sqrt(whole.areas.sum() / count)
-    sizes = cell_sizes(surface, graph, largest, _REACH, _SMALLEST * largest)
-    graph = scaled(graph, sizes)
-    cells = centred_cells(surface, graph, spread_seeds(graph, 1.0), sizes)
-    return cut_into_quads(disk_cells(surface, graph, cells, sizes))
+    metric, reach = Metric.of(surface), np.inf
+    if count > 1:
+        largest = _RADIUS * np.sqrt(whole.areas.sum() / count)
+        metric, reach = metric.in_units(cell_sizes(metric, _REACH, (_SMALLEST * largest, largest))), 1.0
+    return cut_into_quads(disk_cells(metric, centred_cells(metric, spread_seeds(metric, reach))))
 
 
 def _joined(parts: list[Quads]) -> Quads:

@@ -17,6 +17,7 @@ from .topology import TexelTopology
 
 # Least and most area in units of what the texel mesh spans. A limb that falls between the texels is not theirs.
 _LEAST, _MOST = 0.5, 1.2
+_POSITIVE = 0.05  # of what the map says, on average round a texel; a folded one may span less than nothing
 
 
 def levelled_areas(
@@ -32,5 +33,6 @@ def levelled_areas(
     sampled : float64 [C, n, n]
         What the map onto the charts says of each texel [m^2].
     """
-    level = smoothed(topology, sampled) / np.maximum(smoothed(topology, spanned), 1e-300)
-    return spanned * np.clip(level, _LEAST, _MOST)
+    around = smoothed(topology, sampled)
+    level = around / np.maximum(smoothed(topology, spanned), 1e-300)
+    return np.maximum(spanned * np.clip(level, _LEAST, _MOST), _POSITIVE * around)

@@ -7,7 +7,7 @@ from surfaces import disk, sphere, torus
 from ripple_sim.solver import glue
 from ripple_sim.solver.patch_map.cells import centred_cells, spread_seeds
 from ripple_sim.solver.patch_map.disks import disk_cells
-from ripple_sim.solver.patch_map.distances import distance_graph
+from ripple_sim.solver.patch_map.distances import Metric
 from ripple_sim.solver.patch_map.flatten import signed_areas
 from ripple_sim.solver.patch_map.quads import Quads, cut_into_quads
 from ripple_sim.solver.patch_map.surface import Surface
@@ -19,8 +19,9 @@ EULER = {"sphere": 2, "torus": 0, "disk": 1}
 def quads_of(name: str, cells: int) -> Quads:
     mesh = MESHES[name]()
     surface = Surface.of(mesh.V, mesh.F)
-    graph = distance_graph(surface)
-    return cut_into_quads(disk_cells(surface, graph, centred_cells(surface, graph, spread_seeds(graph, cells))))
+    metric = Metric.of(surface)
+    reach = 0.75 * np.sqrt(surface.areas.sum() / cells) if cells > 1 else np.inf
+    return cut_into_quads(disk_cells(metric, centred_cells(metric, spread_seeds(metric, reach))))
 
 
 @pytest.mark.parametrize("name", MESHES)

@@ -6,7 +6,7 @@ from surfaces import disk, torus
 
 from ripple_sim.solver.patch_map.cells import centred_cells, spread_seeds
 from ripple_sim.solver.patch_map.disks import disk_cells
-from ripple_sim.solver.patch_map.distances import distance_graph
+from ripple_sim.solver.patch_map.distances import Metric
 from ripple_sim.solver.patch_map.energy import reference_of, total_energy
 from ripple_sim.solver.patch_map.flatten import signed_areas
 from ripple_sim.solver.patch_map.quads import cut_into_quads
@@ -19,8 +19,9 @@ from ripple_sim.solver.patches.located import locate_texels
 @pytest.mark.parametrize("mesh", [torus(20), disk(14)], ids=["torus", "disk"])
 def test_a_relaxed_map_covers_the_charts_once_with_less_energy(mesh) -> None:
     surface = Surface.of(mesh.V, mesh.F)
-    graph = distance_graph(surface)
-    quads = cut_into_quads(disk_cells(surface, graph, centred_cells(surface, graph, spread_seeds(graph, 8))))
+    metric = Metric.of(surface)
+    reach = 0.75 * np.sqrt(surface.areas.sum() / 8)
+    quads = cut_into_quads(disk_cells(metric, centred_cells(metric, spread_seeds(metric, reach))))
     seamless = relaxed(quads)
     areas = signed_areas(corner_places(seamless))
     assert areas.min() > 0
