@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import time
 from collections.abc import Callable
 
 import mujoco
@@ -14,6 +13,7 @@ from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.coupling.stepping.divergence import divergence
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
+from ripple_sim.solver.compilation import work_clock
 
 from .errors import SceneError, SimulationError
 from .solver import texture_map
@@ -121,17 +121,17 @@ class Simulation:
         if self._steps == 0:
             self.impulses = []
         self._steps += 1
-        start = time.perf_counter()
+        start = work_clock()
         if self._on_step is not None:
             self._on_step(self)
         self._script.apply(self.data, self.ripples)
         mujoco.mj_step(self.model, self.data)
-        stepped = time.perf_counter()
+        stepped = work_clock()
         self._check_state()
         self.ripples.step(self.data)
         self.impulses += self.ripples.last_impulses
         self.physics_seconds += stepped - start
-        self.wave_seconds += time.perf_counter() - stepped
+        self.wave_seconds += work_clock() - stepped
 
     def reset(self) -> None:
         """Return to the beginning: bodies, waves, materials and script."""

@@ -18,6 +18,8 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from . import compilation  # noqa: F401 - watches from the first kernel on
+
 Floats: TypeAlias = NDArray[np.float64]
 Floats32: TypeAlias = NDArray[np.float32]
 Ints: TypeAlias = NDArray[np.int64]

@@ -126,6 +126,7 @@ def _one_word(
 Size = Annotated[tuple[int, int], _one_word(parse_size, "WIDTHxHEIGHT", lambda size: f"{size[0]}x{size[1]}")]
 Count = Annotated[int, _one_word(parse_count, "N")]
 Seed = Annotated[int, _one_word(parse_seed, "N")]
+SceneSeed = Annotated[int | None, _one_word(parse_seed, "N"), arg(help_behavior_hint="(default: the scene's)")]
 FrameRate = Annotated[int | None, _one_word(parse_count, "FPS"), arg(help_behavior_hint="(default: 60, for a GIF 25)")]
 Duration = Annotated[float | None, _one_word(parse_seconds, "S"), arg(help_behavior_hint="(default: the scene's)")]
 Resolution = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's)")]

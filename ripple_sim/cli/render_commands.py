@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
-from .arguments import Count, Device, Seed, UpAxis
+from .arguments import Count, Device, SceneSeed, Seed, UpAxis
 from .video_arguments import VideoArguments
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class _VideoCommand(VideoArguments):
         from ripple_sim.scene.camera_override import through_camera
         from ripple_sim.solver.gl import select_device, shared_context
         from ripple_sim.video.render_video import render_video
-        from ripple_sim.video.settings import settled
+        from ripple_sim.video.settings import frame_count, settled
 
         from .progress import frame_progress
 
@@ -47,7 +47,8 @@ class _VideoCommand(VideoArguments):
         if self.camera is not None:
             scene = through_camera(scene, self.camera)
         options = settled(self.options(), scene, self.output)
-        with frame_progress(f"renderer {shared_context().renderer}, waves {options.backend}") as progress:
+        title = f"renderer {shared_context().renderer}, waves {options.backend}"
+        with frame_progress(title, frame_count(options)) as progress:
             summary = render_video(scene, self.output, options, progress=progress)
         print(_summary_text(summary))
 
@@ -58,12 +59,14 @@ class Render(_VideoCommand):
 
     scene: Annotated[Positional[str], arg(metavar="SCENE")]
     """Name of a shipped scene, such as duck, or path of a scene file (TOML)."""
+    seed: SceneSeed = None
+    """Seed of the scene's random variation, in place of the one in its [random]."""
 
     def load(self) -> Scene:
         """Load the scene."""
         from ripple_sim.scene.load_scene import load_scene
 
-        return load_scene(self.scene)
+        return load_scene(self.scene, seed=self.seed)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -105,11 +108,12 @@ class Drop(_VideoCommand):
 
 def _summary_text(summary: Summary) -> str:
     resumed = f", the first {summary.resumed_at} of them rendered before" if summary.resumed_at else ""
+    compiling = f"compiling (once) {summary.compile_seconds:.1f} s, " if summary.compile_seconds >= 0.05 else ""
     return (
         f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s{resumed}\n"
         f"renderer  {summary.renderer}\n"
         f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps per frame\n"
-        f"stages    set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
+        f"stages    {compiling}set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
         f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
         f"encoding {summary.encode_seconds:.1f} s"
     )

@@ -33,7 +33,7 @@ def shipped_scenes() -> list[str]:
     return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
 
 
-def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
+def load_scene(name_or_path: str | Path, edit: Edit | None = None, seed: int | None = None) -> Scene:
     """Load a shipped scene by its name, or any scene by the path of its TOML file.
 
     Parameters
@@ -41,6 +41,8 @@ def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
     name_or_path : str or path
     edit : callable, optional
         Called with the model's specification (`mujoco.MjSpec`) before it is compiled, to change it in place.
+    seed : int, optional
+        In place of the one of the file's `[random]`.
 
     Raises
     ------
@@ -50,7 +52,8 @@ def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
     """
     path = _scene_path(str(name_or_path))
     content = _read(path)
-    model, shifts = load_model(path.parent / content.model, content.random, edit)
+    random = content.random if seed is None else _seeded(path, content.random, seed)
+    model, shifts = load_model(path.parent / content.model, random, edit)
     scene = Scene(
         name=path.stem,
         model=model,
@@ -71,6 +74,16 @@ def load_scene(name_or_path: str | Path, edit: Edit | None = None) -> Scene:
     )
     check_scene(scene)
     return scene
+
+
+def _seeded(path: Path, random: RandomEntry | None, seed: int) -> RandomEntry:
+    """The scene's random variation with another seed."""
+    if random is None:
+        raise SceneError(
+            f"scene file {str(path)!r} has no [random], so nothing follows the seed {seed}; leave the seed out, or "
+            "write what is to vary under [random]"
+        )
+    return msgspec.structs.replace(random, seed=seed)
 
 
 def _target(model: mujoco.MjModel, entry: RippleEntry) -> RippleEntry:

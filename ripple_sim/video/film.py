@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -23,6 +22,7 @@ from ripple_sim.overlay.projection import Projection
 from ripple_sim.render import Surface
 from ripple_sim.scene.overlays import parse_request
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver.compilation import work_clock
 
 from .options import VideoOptions
 from .shot import Shot
@@ -112,7 +112,7 @@ class Film:
         The shot must stay as it is until then.
         """
         self.prepare()
-        start = time.perf_counter()
+        start = work_clock()
         for number, (source, snapshot) in enumerate(zip(self._sources, shot.snapshots, strict=True)):
             if self._request.heatmap and shot.exposure == 0:
                 geoms = self.simulations[number].ripples.geom_ids
@@ -120,17 +120,17 @@ class Film:
                     source.renderer.set_heatmap(geoms[name], heatmap, shot.notes.heatmap_scale.value)
             source.submit(snapshot)
         self._submitted.append(shot)
-        self.seconds += time.perf_counter() - start
+        self.seconds += work_clock() - start
 
     def fetch(self) -> NDArray | None:
         """Wait for the earliest exposure submitted, and return what `render` does."""
-        start = time.perf_counter()
+        start = work_clock()
         shot = self._submitted.popleft()
         if shot.exposure == 0:
             self._marks = [self._placed_marks(run, shot) for run in range(len(self._sources))]
         halves = [half for source in self._sources if (half := source.fetch()) is not None]
         frame = self._composed(halves, shot) if halves else None
-        self.seconds += time.perf_counter() - start
+        self.seconds += work_clock() - start
         return frame
 
     def _composed(self, halves: list[NDArray], shot: Shot) -> NDArray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from .options import VideoOptions
 from .prefetch import Prefetch
 from .settings import EXPOSURE, check_options, frame_count, render_settings, settled
 from .shot import Shot
-from .summary import Summary
+from .summary import Summary, Times
 
 # Shots that wait to be rendered. One would do if all frames took the same time.
 _WAITING = 2
@@ -63,7 +62,7 @@ def render_video(
         Before anything is simulated if the output, an option, the scene or the render to resume is invalid; later if
         the physics becomes unstable or the video cannot be written.
     """
-    start = time.perf_counter()
+    times = Times.now()
     # MuJoCo would write its warnings to a file in the current folder; `Simulation` reports those that matter
     mujoco.set_mju_user_warning(lambda message: None)
     output = Path(output)
@@ -85,7 +84,7 @@ def render_video(
         resumed_at = writer.frames
         film = Film(_simulations(scene, options, on_step), options, frames)
         ready = _write_frames(film, writer, frames, gl, progress)
-    return Summary.of(film, writer, gl, resumed_at=resumed_at, started=start, ready=ready)
+    return Summary.of(film, writer, gl, resumed_at=resumed_at, started=times, ready=ready)
 
 
 def _simulations(scene: Scene, options: VideoOptions, on_step: Callable[[Simulation], None] | None) -> list[Simulation]:
@@ -104,8 +103,8 @@ def _simulations(scene: Scene, options: VideoOptions, on_step: Callable[[Simulat
     ]
 
 
-def _write_frames(film: Film, writer: FrameWriter, frames: int, gl: GLContext, progress: Progress | None) -> float:
-    """Render and write the frames that the video still lacks; return when the first could begin, a `perf_counter`."""
+def _write_frames(film: Film, writer: FrameWriter, frames: int, gl: GLContext, progress: Progress | None) -> Times:
+    """Render and write the frames that the video still lacks; return when the first could begin."""
     # a software driver renders on the processor, which is busy enough with one frame
     ahead = 0 if gl.software else 1
     shots = film.shots(alive=_WAITING + ahead + 2)
@@ -113,7 +112,7 @@ def _write_frames(film: Film, writer: FrameWriter, frames: int, gl: GLContext, p
     on_cpu = film.simulations[0].backend == "cpu"
     with Prefetch(shots, _WAITING) if on_cpu else contextlib.nullcontext(shots) as shots:
         film.prepare()
-        ready = time.perf_counter()
+        ready = Times.now()
         for frame in film.render_all(_missing(shots, writer, progress, frames), ahead):
             writer.write(frame)
             if progress is not None:

@@ -5,11 +5,26 @@ from __future__ import annotations
 import dataclasses
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 from ripple_sim.encode import FrameWriter
+from ripple_sim.solver.compilation import compile_times, work_clock
 from ripple_sim.solver.gl import GLContext
 
 from .film import Film
+
+
+class Times(NamedTuple):
+    """A moment [s]: on the wall's clock, on this thread's `work_clock`, and the time of compilation so far."""
+
+    wall: float
+    work: float
+    compiled: float
+
+    @classmethod
+    def now(cls) -> Times:
+        """Take the time."""
+        return cls(time.perf_counter(), work_clock(), sum(compile_times().values()))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -17,7 +32,8 @@ class Summary:
     """What a rendered video took.
 
     Of its `frames`, those before `resumed_at` were there already. `renderer` is the driver's GL_RENDERER, `backend` the
-    wave solver's. Times in seconds; the stages overlap, so they add up to more than `wall_seconds`.
+    wave solver's. Times in seconds; the stages overlap, so they add up to more than `wall_seconds`. What was spent on
+    compiling kernels, at their first use on a machine, is told apart from the work of the stages.
     """
 
     output: Path
@@ -26,6 +42,7 @@ class Summary:
     renderer: str
     backend: str
     substeps_per_frame: float
+    compile_seconds: float
     setup_seconds: float
     physics_seconds: float
     wave_seconds: float
@@ -35,10 +52,10 @@ class Summary:
 
     @classmethod
     def of(
-        cls, film: Film, writer: FrameWriter, gl: GLContext, *, resumed_at: int, started: float, ready: float
+        cls, film: Film, writer: FrameWriter, gl: GLContext, *, resumed_at: int, started: Times, ready: Times
     ) -> Summary:
-        """Summary of a film that has been written; the times are those of `time.perf_counter`."""
-        simulations = film.simulations
+        """Summary of a film that has been written; it was started, and its first frame could begin, at these times."""
+        simulations, ended = film.simulations, Times.now()
         return cls(
             output=writer.path,
             frames=writer.frames,
@@ -46,10 +63,11 @@ class Summary:
             renderer=gl.renderer,
             backend=simulations[0].backend,
             substeps_per_frame=sum(each.substeps_taken for each in simulations) / max(writer.frames - 1, 1),
-            setup_seconds=ready - started,
+            compile_seconds=ended.compiled - started.compiled,
+            setup_seconds=ready.work - started.work,
             physics_seconds=sum(each.physics_seconds for each in simulations),
             wave_seconds=sum(each.wave_seconds for each in simulations),
             render_seconds=film.seconds,
             encode_seconds=writer.encode_seconds,
-            wall_seconds=time.perf_counter() - started,
+            wall_seconds=ended.wall - started.wall,
         )

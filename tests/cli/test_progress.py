@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from ripple_sim.cli import progress
 from ripple_sim.cli.progress import frame_progress
 
 
@@ -35,6 +36,33 @@ def test_a_terminal_shows_title_and_frames_done(
     assert "llvmpipe [red] (LLVM 15), waves cpu" in text
     assert "60/120" in text
     assert capsys.readouterr().out == ""
+
+
+def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    kernels = "ripple_sim.solver.backends.kernels"
+    monkeypatch.setattr(progress, "compiling", lambda: kernels)
+    monkeypatch.setattr(progress, "compile_times", lambda: {kernels: 11.6, "ripple_sim.solver.texels.stencil": 3.0})
+    with frame_progress("renderer", 120):
+        pass
+    text = sys.stderr.getvalue()
+    assert "compiling the wave step (once): 12 s" in text
+    assert "0/120" in text
+
+
+@pytest.mark.parametrize(
+    ("module", "stage"),
+    [
+        ("ripple_sim.solver.waves.load", "loads and height maps"),
+        ("ripple_sim.solver.texels.stencil", "the atlas"),
+        ("ripple_sim.coupling.load.texel_forces", "the contacts"),
+        ("my_kernels", "my_kernels"),
+    ],
+)
+def test_kernels_are_told_by_what_they_do(module: str, stage: str) -> None:
+    assert progress._stage(module) == stage
 
 
 def test_an_error_goes_on_through_the_progress(monkeypatch: pytest.MonkeyPatch) -> None:

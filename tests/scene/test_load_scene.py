@@ -63,6 +63,16 @@ def test_drops_and_throws_are_shifted_with_their_bodies_and_places_stay(tmp_path
     assert scene.events.place[0].position == (7, 8, 9)
 
 
+def test_a_seed_takes_the_place_of_the_files_and_needs_something_that_varies(tmp_path) -> None:
+    path = written(tmp_path, TOML + "[random]\nposition = 0.3\nseed = 5\n")
+    own, same, other = (load_scene(path, seed=seed).model.body_pos for seed in (None, 5, 6))
+    np.testing.assert_array_equal(own, same)
+    assert not np.array_equal(own, other)
+    path.write_text(TOML)
+    with pytest.raises(SceneError, match=r"has no \[random\], so nothing follows the seed 6"):
+        load_scene(path, seed=6)
+
+
 def test_an_edit_comes_after_chance_and_before_the_model_is_compiled(tmp_path) -> None:
     seen = []
 

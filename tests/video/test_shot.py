@@ -1,5 +1,6 @@
 """Shots of several runs, and the summary of a video."""
 
+import dataclasses
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,7 +11,7 @@ import pytest
 from ripple_sim.capture.snapshot import Snapshot
 from ripple_sim.cli.render_commands import _summary_text
 from ripple_sim.video.shot import Shot
-from ripple_sim.video.summary import Summary
+from ripple_sim.video.summary import Summary, Times
 
 MODEL = mujoco.MjModel.from_xml_string(
     '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>'
@@ -47,10 +48,14 @@ def test_a_summary_adds_up_the_runs(frames: int, resumed_at: int) -> None:
     writer = SimpleNamespace(path=Path("clip.mp4"), frames=frames, encode_seconds=0.5)
     gl = SimpleNamespace(renderer="llvmpipe")
     film = SimpleNamespace(simulations=runs, seconds=4.0)
-    summary = Summary.of(film, writer, gl, resumed_at=resumed_at, started=10.0, ready=13.0)
+    summary = Summary.of(
+        film, writer, gl, resumed_at=resumed_at, started=Times(0.0, 10.0, 1.0), ready=Times(5.0, 13.0, 2.0)
+    )
     assert summary.substeps_per_frame == (400 if frames == 1 else 40)
     assert (summary.setup_seconds, summary.physics_seconds, summary.wave_seconds) == (3.0, 2.0, 4.0)
-    text = _summary_text(summary)
+    assert "compiling" not in _summary_text(dataclasses.replace(summary, compile_seconds=0.0))
+    text = _summary_text(dataclasses.replace(summary, compile_seconds=7.0))
+    assert "compiling (once) 7.0 s, set-up 3.0 s" in text
     assert text.startswith(f"clip.mp4: {frames} frames in ")
     assert ("the first 5 of them rendered before" in text) == (resumed_at > 0)
     assert "physics 2.0 s, waves 4.0 s, rendering 4.0 s, encoding 0.5 s" in text
