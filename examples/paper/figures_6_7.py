@@ -35,7 +35,7 @@ def make(folder: Path) -> Part:
     for baseline, name in BASELINES.items():
         file = strip(scene, TIMES, folder / f"{name}.png", SIZE, compare=baseline, overlay=["height"], columns=1)
         pictures.append((file, f"Ours and {baseline}, {' and '.join(f'{t:g} s' for t in TIMES)} after a poke."))
-    errors = arrivals([], sources=2)["limbed"]
+    errors = arrivals({}, sources=2)["limbed"]
     rows = [["operator", "arrival of the front: median error", "90 %", "under 3 %", "set-up"]]
     atlas = build_atlas(load_mesh(LIMBED_FILE), 96)
     for operator in ("fem", *BASELINES):

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver import Atlas, Mesh, RippleError, build_atlas, load_mesh
+from ripple_sim.solver import Atlas, Mesh, RippleError, build_atlas
 from ripple_sim.solver.operator.assembly import OPERATORS
 
 from .arrival import Arrival, arrival
@@ -28,9 +27,9 @@ CONFORMAL = "paper, conformal map"
 Row = dict[str, float] | None
 
 
-def arrivals(meshes: list[Path], resolution: int = 96, sources: int = 3) -> dict[str, dict[str, Row]]:
+def arrivals(meshes: dict[str, Mesh], resolution: int = 96, sources: int = 3) -> dict[str, dict[str, Row]]:
     """Errors of arrival on the project's own test body and on given meshes, mean over the sources."""
-    bodies = {"limbed": Mesh.from_arrays(*limbed())} | {path.stem: load_mesh(path) for path in meshes}
+    bodies = {"limbed": Mesh.from_arrays(*limbed())} | meshes
     return {name: _rows(mesh, resolution, sources) for name, mesh in bodies.items()}
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ripple_sim.diagnostics.info import Info, collect
+from ripple_sim.solver import load_mesh
 
 from .accuracy import energy_drift, sphere_modes
 from .arrival_table import arrivals
@@ -21,7 +22,14 @@ Report = dict[str, Any]
 
 
 def measure(meshes: list[Path], say: Callable[[str], object] = lambda stage: None) -> Report:
-    """Measure everything; `say` is called with the name of each stage as it begins."""
+    """Measure everything; `say` is called with the name of each stage as it begins.
+
+    Raises
+    ------
+    MeshError
+        Before anything is measured, if a mesh cannot be read.
+    """
+    loaded = {path.stem: load_mesh(path) for path in meshes}
     report: Report = {"machine": _machine(collect())}
     stages: dict[str, Callable[[], Any]] = {
         "cpu": lambda: {str(n): cpu_speed(n) for n in (256, 512)},
@@ -30,7 +38,7 @@ def measure(meshes: list[Path], say: Callable[[str], object] = lambda stage: Non
         "coupling": coupling_cost,
         "sphere": sphere_modes,
         "energy": energy_drift,
-        "arrival": lambda: arrivals(meshes),
+        "arrival": lambda: arrivals(loaded),
     }
     for name, run in stages.items():
         say(name)

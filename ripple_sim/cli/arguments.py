@@ -13,13 +13,14 @@ from tyro.constructors import PrimitiveConstructorSpec
 from ripple_sim.overlay.comparison import BASELINES
 from ripple_sim.scene.up_axis import UP_AXES
 from ripple_sim.solver.atlas.layouts import LAYOUTS
+from ripple_sim.solver.checked import shown
 
 
 def parse_size(word: str) -> tuple[int, int]:
     """Read width and height [pixels] from a word such as "1280x720"."""
     match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", word)
     if match is None:
-        raise ValueError(f"{word!r} is not a frame size; valid is WIDTHxHEIGHT in pixels, such as 1280x720")
+        raise ValueError(f"{shown(word)} is not a frame size; valid is WIDTHxHEIGHT in pixels, such as 1280x720")
     return int(match[1]), int(match[2])
 
 
@@ -35,7 +36,7 @@ def parse_seed(word: str) -> int:
 
 def _whole(word: str, least: int) -> int:
     if not re.fullmatch(r"[0-9]{1,9}", word) or int(word) < least:
-        raise ValueError(f"{word!r} is not valid; it must be a whole number, {least} or more")
+        raise ValueError(f"{shown(word)} is not valid; it must be a whole number, {least} or more")
     return int(word)
 
 
@@ -53,7 +54,7 @@ def parse_angle(word: str) -> float:
     """Read a shutter angle [degrees]."""
     number = _number(word)
     if not 0 <= number <= 360:
-        raise ValueError(f"{word!r} is not valid; it must be an angle from 0 to 360 degrees, such as 180")
+        raise ValueError(f"{shown(word)} is not valid; it must be an angle from 0 to 360 degrees, such as 180")
     return number
 
 
@@ -61,7 +62,7 @@ def parse_diameter(word: str) -> float:
     """Read the diameter of a lens [m]."""
     number = _number(word)
     if not 0 <= number < math.inf:
-        raise ValueError(f"{word!r} is not valid; it must be a number of metres, 0 or more, such as 0.02")
+        raise ValueError(f"{shown(word)} is not valid; it must be a number of metres, 0 or more, such as 0.02")
     return number
 
 
@@ -74,7 +75,7 @@ def parse_focus(word: str) -> float | str:
 def _positive(word: str, valid: str) -> float:
     number = _number(word)
     if not 0 < number < math.inf:
-        raise ValueError(f"{word!r} is not valid; it must be {valid}")
+        raise ValueError(f"{shown(word)} is not valid; it must be {valid}")
     return number
 
 
@@ -88,21 +89,21 @@ def _number(word: str) -> float:
 def parse_supersample(word: str) -> int:
     """Read a supersampling factor."""
     if not re.fullmatch(r"[1-4]", word):
-        raise ValueError(f"{word!r} is not valid; it must be 1, 2, 3 or 4")
+        raise ValueError(f"{shown(word)} is not valid; it must be 1, 2, 3 or 4")
     return int(word)
 
 
 def parse_axis(word: str) -> str:
     """Read the axis that points up."""
     if word not in UP_AXES:
-        raise ValueError(f"{word!r} is not valid; it must be {' or '.join(UP_AXES)}")
+        raise ValueError(f"{shown(word)} is not valid; it must be {' or '.join(UP_AXES)}")
     return word
 
 
 def parse_layout(word: str) -> str:
     """Read the name of a layout."""
     if word not in LAYOUTS:
-        raise ValueError(f"{word!r} is not valid; it must be {', '.join(LAYOUTS[:-1])} or {LAYOUTS[-1]}")
+        raise ValueError(f"{shown(word)} is not valid; it must be {', '.join(LAYOUTS[:-1])} or {LAYOUTS[-1]}")
     return word
 
 

@@ -5,7 +5,9 @@ Exit status: 0 done, 1 something failed, 2 bad input, 130 interrupted, 143 termi
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +16,11 @@ from typing import Any
 from .signals import INTERRUPTED, TERMINATED, end_at_once, end_in_good_order
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
+
+# Errors of the system that another name would have avoided.
+_OF_THE_NAME = (errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EINVAL, errno.ELOOP)
+
+_LONGEST = 800  # of a message [characters]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -25,6 +32,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.environ.setdefault("MUJOCO_GL", "disable")  # MuJoCo's own renderer would take the OpenGL context away
 
     from ripple_sim.errors import DisplayError, EncodingError
+    from ripple_sim.solver.checked import shown
     from ripple_sim.solver.errors import GLError, RippleError
 
     end_in_good_order()
@@ -32,6 +40,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         command.run()
         sys.stdout.flush()
     except OSError as error:
+        if error.filename is not None:  # not standard output, which has no name
+            status = BAD_INPUT if error.errno in _OF_THE_NAME else FAILED
+            return _fail(f"{shown(os.fspath(error.filename))}: {error.strerror}", status)
         # standard output has failed (full disk, closed pipe): nothing more goes there, not even at exit
         sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115
         return FAILED if isinstance(error, BrokenPipeError) else _fail(error.strerror or error, FAILED)
@@ -39,6 +50,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(error, FAILED)
     except RippleError as error:
         return _fail(error, BAD_INPUT)
+    except MemoryError as error:
+        return _fail(
+            f"not enough memory{f': {error}' if str(error) else ''}; ask for a lower resolution or size", FAILED
+        )
     except KeyboardInterrupt as ending:
         return _fail("interrupted", INTERRUPTED, ending)
     except SystemExit as ending:
@@ -51,8 +66,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _fail(message: object, status: int, ending: BaseException | None = None) -> int:
     """Print a message, with the notes of the exception that ended the command, in one line; return the status."""
     notes = getattr(message if ending is None else ending, "__notes__", [])
-    print(f"ripple-sim: {' '.join('; '.join([str(message), *notes]).split())}", file=sys.stderr)
+    print(f"ripple-sim: {_one_line('; '.join([str(message), *notes]))}", file=sys.stderr)
     return status
+
+
+def _one_line(message: str) -> str:
+    """A message without line ends and long words, such as a name of thousands of letters."""
+    text = " ".join(re.sub(r"(\S{120})\S{80,}", r"\1...", message).split())
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
 def _parse(argv: list[str]) -> Any:
@@ -60,6 +81,8 @@ def _parse(argv: list[str]) -> Any:
     # here, where the signals are handled: importing it takes a third of a second
     from .parser import UsageError, parse
 
+    if any("\0" in word for word in argv):
+        return _fail("a word of the command line holds a NUL; no name can", BAD_INPUT)
     try:
         command = parse(argv)
     except UsageError as error:

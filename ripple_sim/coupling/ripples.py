@@ -18,8 +18,9 @@ from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
 from ripple_sim.coupling.model.coupled_model import CoupledModel
 from ripple_sim.coupling.model.geoms import ByGeom, GeomKey
 from ripple_sim.coupling.two_way.push_back import PushBack
-from ripple_sim.errors import RippleWarning
+from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Load, Material
+from ripple_sim.solver.checked import checked, whole
 
 from .arguments import integrator_warning, own_data, own_model
 from .stepping.clock import StepClock, missed_warning
@@ -135,6 +136,7 @@ class Ripples(Targets):
         self._loads.skip()
         self._follow(own_data(self.model, data))
 
+    @checked(SceneError, nstep=whole(0))
     def mj_step(self, data: mujoco.MjData, nstep: int = 1) -> None:
         """Take physics steps as `mujoco.mj_step` does, and `step` after each of them.
 

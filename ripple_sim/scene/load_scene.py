@@ -15,6 +15,7 @@ import numpy as np
 
 from ripple_sim.coupling.model.geoms import find_target, geom_name
 from ripple_sim.errors import SceneError
+from ripple_sim.solver.checked import PATH, checked, shown
 
 from .check_scene import check_scene
 from .events import Events
@@ -33,6 +34,7 @@ def shipped_scenes() -> list[str]:
     return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
 
 
+@checked(SceneError, name_or_path=PATH)
 def load_scene(name_or_path: str | Path, edit: Edit | None = None, seed: int | None = None) -> Scene:
     """Load a shipped scene by its name, or any scene by the path of its TOML file.
 
@@ -96,6 +98,8 @@ def _read(path: Path) -> SceneFile:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(f"scene file {str(path)!r} cannot be read: {error}") from error
+    except RecursionError as error:
+        raise SceneError(f"scene file {str(path)!r} is nested too deeply; a scene has three levels") from error
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from error
     return parse_scene(table, str(path))
@@ -106,10 +110,12 @@ def _scene_path(name_or_path: str) -> Path:
     if name_or_path in shipped:
         return Path(str(importlib.resources.files("ripple_sim.scenes") / f"{name_or_path}.toml"))
     path = Path(name_or_path)
-    if path.is_file():
-        return path
+    with contextlib.suppress(OSError):  # a name longer than the system's
+        if path.is_file():
+            return path
     raise SceneError(
-        f"there is no scene {name_or_path!r}; shipped scenes are {', '.join(shipped)}, or give the path of a TOML file"
+        f"there is no scene {shown(name_or_path)}; shipped scenes are {', '.join(shipped)}, or give the path of a TOML "
+        "file"
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from ripple_sim.errors import SceneError
+from ripple_sim.solver.checked import shown
 
 from .camera import CameraEntry
 from .events import ChangeEntry, ControlEntry, PokeEntry
@@ -89,7 +90,7 @@ def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
         Naming the place, the value and what is valid.
     """
     _check_keys(table, SceneFile, "", origin)
-    _check_numbers(table, "", origin)
+    _check_values(table, "", origin)
     try:
         return msgspec.convert(table, SceneFile)
     except msgspec.ValidationError as error:
@@ -100,16 +101,18 @@ def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:
 _LARGEST = 1e12
 
 
-def _check_numbers(value: Any, place: str, origin: str) -> None:
-    """Refuse NaN, infinity and absurdly large numbers anywhere."""
+def _check_values(value: Any, place: str, origin: str) -> None:
+    """Refuse NaN, infinity, absurdly large numbers and texts with a NUL anywhere."""
     if isinstance(value, dict):
         for key, inner in value.items():
-            _check_numbers(inner, f"{place}.{key}" if place else key, origin)
+            _check_values(inner, f"{place}.{key}" if place else key, origin)
     elif isinstance(value, list):
         for inner in value:
-            _check_numbers(inner, place, origin)
+            _check_values(inner, place, origin)
+    elif isinstance(value, str) and "\0" in value:
+        raise SceneError(f"scene file {origin!r}: {place} is {shown(value)}; valid are names without a NUL")
     elif isinstance(value, (int, float)) and not abs(value) <= _LARGEST:
-        raise SceneError(f"scene file {origin!r}: {place} is {value}; valid are numbers up to {_LARGEST:g}")
+        raise SceneError(f"scene file {origin!r}: {place} is {shown(value)}; valid are numbers up to {_LARGEST:g}")
 
 
 _TABLES: dict[str, type[msgspec.Struct]] = {

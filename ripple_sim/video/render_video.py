@@ -9,10 +9,12 @@ from pathlib import Path
 import mujoco
 
 from ripple_sim.encode import FrameWriter, open_writer
+from ripple_sim.errors import VideoError
 from ripple_sim.overlay.comparison import compared_operators
 from ripple_sim.scene.camera_override import with_exposure
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver.checked import PATH, checked, instance
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .film import Film
@@ -31,6 +33,12 @@ _CHECKED = 16
 Progress = Callable[[int, int], None]
 
 
+@checked(
+    VideoError,
+    scene=instance(Scene, ", from load_scene or drop_scene"),
+    output=PATH,
+    options=instance(VideoOptions, ", for instance VideoOptions(fps=30)"),
+)
 def render_video(
     scene: Scene,
     output: str | Path,

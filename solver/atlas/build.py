@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.cache import cache_path, make_room, mark_used
+from ripple_sim.solver.checked import checked, instance
 from ripple_sim.solver.cube_map.convention import check_resolution
 from ripple_sim.solver.cube_map.cube_atlas import atlas_from_sphere_map
 from ripple_sim.solver.errors import AtlasError, MeshError, SphereMapError
@@ -31,6 +32,7 @@ SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {
 }
 
 
+@checked(AtlasError, mesh=instance(Mesh, ", from load_mesh or Mesh.from_arrays"))
 def build_atlas(
     mesh: Mesh,
     resolution: int = 128,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from numpy.typing import NDArray
 
+from ripple_sim.solver.checked import PATH, checked
 from ripple_sim.solver.cube_map.cube_chart_map import CubeChartMap
 from ripple_sim.solver.cube_map.sphere_atlas import SphereAtlas
 from ripple_sim.solver.errors import AtlasError
@@ -29,6 +30,7 @@ _CHART_MAPS: dict[str, Callable[[Arrays], ChartMap]] = {
 }
 
 
+@checked(AtlasError, path=PATH)
 def load_atlas(path: str | Path) -> Atlas:
     """Read an atlas written by `Atlas.save`.
 

@@ -7,6 +7,7 @@ import functools
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.solver.checked import POSITIVE, checked
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.mesh.mesh import Mesh
 from ripple_sim.solver.texels.atlas import Atlas, check_points
@@ -45,6 +46,7 @@ class SphereAtlas(Atlas):
         return Ball(self.radius, self.resolution)
 
 
+@checked(AtlasError, radius=POSITIVE)
 def sphere_atlas(radius: float = 1.0, resolution: int = 128) -> SphereAtlas:
     """Atlas of the sphere of a given radius [m] round the origin, texel positions exact to round-off.
 
@@ -56,8 +58,6 @@ def sphere_atlas(radius: float = 1.0, resolution: int = 128) -> SphereAtlas:
         If the radius is not positive and finite, or the resolution is invalid.
     """
     resolution = check_resolution(resolution)
-    if not (np.isfinite(radius) and radius > 0):
-        raise AtlasError(f"sphere radius is {radius!r} m; valid is a positive finite number")
     directions, topology = texel_directions(resolution), cube_topology(resolution)
     F, triangles, barycentrics = _texel_triangulation(topology.halo, resolution)
     return SphereAtlas(

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from ripple_sim.solver.checked import PATH, checked
 from ripple_sim.solver.errors import MeshError
 
 from .counting import counted
@@ -27,6 +28,7 @@ logging.getLogger("trimesh").addHandler(logging.NullHandler())
 _READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
 
 
+@checked(MeshError, path=PATH)
 def load_mesh(path: str | Path, repair: bool = False, wrap: bool = False) -> Mesh:
     """Read a mesh file: OBJ, OFF, PLY, STL, GLB, or any other format that trimesh reads.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.solver.checked import POSITIVE, shown
 from ripple_sim.solver.errors import SolverError
 
 # name: unit, least value, whether the least value itself is excluded, whether infinity is allowed
@@ -49,8 +50,8 @@ def check_mask(name: str, value: ArrayLike) -> None:
 def _numbers(name: str, value: object) -> NDArray[np.float64]:
     try:
         return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise SolverError(f"material {name} is {value!r}; valid is a number or an array of numbers") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SolverError(f"material {name} is {shown(value)}; valid is a number or an array of numbers") from error
 
 
 def _check_shape(name: str, value: NDArray) -> None:
@@ -62,5 +63,5 @@ def _check_shape(name: str, value: NDArray) -> None:
 def require_positive(**values: tuple[float, str]) -> None:
     """Raise `SolverError` unless every value, given with its unit, is a finite number greater than 0."""
     for name, (value, unit) in values.items():
-        if not 0 < value < np.inf:
-            raise SolverError(f"{name} is {value!r} {unit}; valid is a finite number greater than 0")
+        if not POSITIVE.holds(value):
+            raise SolverError(f"{name} is {shown(value)} {unit}; valid is {POSITIVE.words}")

@@ -29,6 +29,7 @@ def suited_coefficients(
     decay: float,
 ) -> dict[str, float]:
     """Coefficients by their names; see `Material.suited`."""
+    require_positive(size=(size, "m"))
     radius = _RADIUS * size if radius is None else radius
     impulse, mass = _impulse(hit)
     require_positive(

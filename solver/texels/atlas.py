@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.solver.checked import PATH, checked
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.mesh.mesh import Mesh
 from ripple_sim.solver.mesh.triangle_tree import TriangleTree, closest_points, triangle_tree
@@ -152,6 +153,7 @@ class Atlas:
         """
         return {**self.chart_map.quality(self.mesh), **texel_quality(self.texels, self.mesh)}
 
+    @checked(AtlasError, path=PATH)
     def save(self, path: str | Path, overwrite: bool = False) -> None:
         """Write the atlas to one file, which `load_atlas` reads. The file appears whole or not at all.
 

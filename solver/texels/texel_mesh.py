@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
+from ripple_sim.solver.checked import shown
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.kernel import Floats, Ints
 
@@ -127,7 +128,13 @@ class TexelMesh:
         Symmetric and positive semidefinite; with the areas as lumped mass M, waves on a free surface of density 1 have
         M h_tt = -K h.
         """
-        return stiffness_matrix(self.stencil(np.broadcast_to(np.asarray(speed, dtype=np.float64) ** 2, self.shape)))
+        try:
+            squared = np.broadcast_to(np.asarray(speed, dtype=np.float64) ** 2, self.shape)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise AtlasError(
+                f"speed is {shown(speed)}; valid is a number, or an array of shape {self.shape}, in m/s"
+            ) from error
+        return stiffness_matrix(self.stencil(squared))
 
 
 class TexelGrid(NamedTuple):

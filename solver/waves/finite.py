@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numbers
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.solver.checked import is_finite, shown
 from ripple_sim.solver.errors import SolverError
 from ripple_sim.solver.texels.atlas import Atlas
 
@@ -33,7 +32,10 @@ def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.
     SolverError
         If the shape is another one, or a value is not finite.
     """
-    array = np.asarray(value, dtype=np.float32)
+    try:
+        array = np.asarray(value, dtype=np.float32)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SolverError(f"{name} is {shown(value)}; valid is a number, or an array of shape {shape}") from error
     if array.shape not in ((), shape):
         raise SolverError(f"{name} has shape {array.shape}; valid is {shape}, or one number")
     array = np.broadcast_to(array, shape)
@@ -44,6 +46,6 @@ def as_field(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.
 
 def require_finite(name: str, value: float, unit: str, least: float = -np.inf) -> None:
     """Raise `SolverError` unless a value is a finite number, of at least `least`."""
-    if not (isinstance(value, numbers.Real) and np.isfinite(value) and value >= least):
+    if not (is_finite(value) and value >= least):
         bound = "" if least == -np.inf else f", {least:g} or greater"
-        raise SolverError(f"{name} is {value!r} {unit}; valid is a finite number{bound}")
+        raise SolverError(f"{name} is {shown(value)} {unit}; valid is a finite number{bound}")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import numbers
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.solver.checked import is_finite, shown
 from ripple_sim.solver.errors import SolverError
 from ripple_sim.solver.texels.atlas import Atlas, check_points
 from ripple_sim.solver.texels.distance import distance_scratch
@@ -61,8 +61,8 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
     AtlasError
         If the point is not finite.
     """
-    if not (isinstance(radius, numbers.Real) and np.isfinite(radius) and radius >= 0):
-        raise SolverError(f"impulse radius is {radius!r} m; valid is a finite number, 0 or greater")
+    if not (is_finite(radius) and radius >= 0):
+        raise SolverError(f"impulse radius is {shown(radius)} m; valid is a finite number, 0 or greater")
     points = check_points(point)
     if len(points) != 1:
         raise SolverError(f"a source has {len(points)} points; valid is one, [3]: call this once for each of them")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver.backends.backend import make_backend
+from ripple_sim.solver.checked import checked, instance
 from ripple_sim.solver.errors import SolverError
 from ripple_sim.solver.operator.assembly import build_operator
 from ripple_sim.solver.operator.material import Material
@@ -56,6 +57,11 @@ class WaveSolver(WaveField):
         If "gl" is asked for and no context can be made.
     """
 
+    @checked(
+        SolverError,
+        atlas=instance(Atlas, ", from build_atlas or sphere_atlas"),
+        material=instance(Material, ", for instance Material(speed=1.0)", optional=True),
+    )
     def __init__(
         self,
         atlas: Atlas,
@@ -66,8 +72,6 @@ class WaveSolver(WaveField):
         rim: str = "free",
         conserve_volume: bool = True,
     ) -> None:
-        if not (material is None or isinstance(material, Material)):
-            raise SolverError(f"material is {material!r}; valid is a Material, for instance Material(speed=1.0)")
         self.material = material if material is not None else Material()
         self._begin(atlas, build_operator(atlas, self.material, operator, rim), backend, conserve_volume)
 

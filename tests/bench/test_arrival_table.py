@@ -11,7 +11,7 @@ from ripple_sim.bench.arrival import Arrival, arrival
 from ripple_sim.bench.arrival_table import CALIBRATED, CONFORMAL, arrivals, mean_error, speed_factor
 from ripple_sim.bench.sources import spread_sources
 from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver import Atlas, Mesh, build_atlas
+from ripple_sim.solver import Atlas, Mesh, build_atlas, load_mesh
 
 N = 32
 
@@ -50,7 +50,7 @@ def test_a_constant_delay_is_calibrated_away_and_no_crest_is_not() -> None:
 
 
 def test_table_has_our_operator_and_its_rivals() -> None:
-    rows = arrivals([], resolution=N, sources=1)["limbed"]
+    rows = arrivals({}, resolution=N, sources=1)["limbed"]
     paint, calibrated, conformal = rows["dynamic-paint"], rows[CALIBRATED], rows[CONFORMAL]
     # on a grid of squares the sum over 8 neighbours is twice the Laplacian
     assert calibrated["speed factor"] == pytest.approx(np.sqrt(1 / 2), rel=0.1)
@@ -63,7 +63,7 @@ def test_table_has_our_operator_and_its_rivals() -> None:
 def test_a_mesh_with_a_handle_has_no_sphere_map_and_all_else(tmp_path: Path) -> None:
     ring = torus(16)
     trimesh.Trimesh(ring.V, ring.F, process=False).export(tmp_path / "ring.obj")
-    rows = arrivals([tmp_path / "ring.obj"], resolution=24, sources=1)["ring"]
+    rows = arrivals({"ring": load_mesh(tmp_path / "ring.obj")}, resolution=24, sources=1)["ring"]
     assert rows.pop(CONFORMAL) is None
     assert len(rows) == 5
     for name, row in rows.items():
