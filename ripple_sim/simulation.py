@@ -11,6 +11,7 @@ import mujoco
 from ripple_sim.coupling.model.geoms import find_geom, geom_name
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.coupling.stepping.divergence import divergence
+from ripple_sim.coupling.stepping.physics_messages import physics_errors
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
 from ripple_sim.solver.compilation import work_clock
@@ -125,7 +126,8 @@ class Simulation:
         if self._on_step is not None:
             self._on_step(self)
         self._script.apply(self.data, self.ripples)
-        mujoco.mj_step(self.model, self.data)
+        with physics_errors():
+            mujoco.mj_step(self.model, self.data)
         stepped = work_clock()
         self._check_state()
         self.ripples.step(self.data)
@@ -172,7 +174,8 @@ class Simulation:
             mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
         else:
             mujoco.mj_resetData(self.model, self.data)
-        mujoco.mj_forward(self.model, self.data)
+        with physics_errors():
+            mujoco.mj_forward(self.model, self.data)
 
     def _check_state(self) -> None:
         broken = divergence(self.data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -26,6 +27,11 @@ def own_model(model: Any) -> mujoco.MjModel:
     found = getattr(model, "ptr", model)
     if not isinstance(found, mujoco.MjModel):
         raise SceneError(f"model is {type(model).__name__}; valid is a compiled mujoco.MjModel, or dm_control's")
+    if not 0 < found.opt.timestep < math.inf:
+        raise SceneError(
+            f"the model's timestep is {found.opt.timestep:g} s; valid is a finite number greater than 0, such as 0.002 "
+            "(<option timestep=...>)"
+        )
     return found
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import mujoco
 
+from ripple_sim.coupling.arguments import own_model
 from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
 from ripple_sim.coupling.model.geoms import find_target
 from ripple_sim.errors import SceneError
@@ -29,6 +30,7 @@ def check_scene(scene: Scene) -> None:
     """
     from ripple_sim.render import LIGHTING  # brings OpenGL, which reading a scene file can do without until here
 
+    own_model(scene.model)
     if not scene.targets:
         raise SceneError(f"scene {scene.name!r} has no [[ripple]] entry; name at least one geom")
     if not 0 < scene.duration < MAX_DURATION:

@@ -14,11 +14,13 @@ import mujoco
 import numpy as np
 
 from ripple_sim.coupling.model.geoms import find_target, geom_name
+from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.checked import PATH, checked, shown
 
 from .check_scene import check_scene
 from .events import Events
+from .model_files import check_files
 from .motion import DropEntry, ThrowEntry
 from .randomize import RandomEntry, randomize
 from .scene import Scene
@@ -142,14 +144,22 @@ def load_model(
     if not path.is_file():
         problem = "is not a file" if path.exists() else "does not exist"
         raise SceneError(f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file")
+    check_files(path)
+    adopt_warnings()
     with refusal_of(repr(str(path))):
-        if random is None and edit is None:
-            return mujoco.MjModel.from_xml_path(str(path)), {}
         spec = mujoco.MjSpec.from_file(str(path))
+        keys = [(key.name, len(key.qpos)) for key in spec.keys]  # the compiler fills up what is missing
         shifts = {} if random is None else randomize(spec, random)
         if edit is not None:
             edit(spec)
-        return spec.compile(), shifts
+        model = spec.compile()
+    for name, given in keys:
+        if edit is None and given not in (0, model.nq):
+            raise SceneError(
+                f"keyframe {name!r} of {str(path)!r} has {given} positions (qpos); valid are {model.nq}, as the model "
+                "has"
+            )
+    return model, shifts
 
 
 @contextlib.contextmanager

@@ -6,8 +6,7 @@ import contextlib
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-import mujoco
-
+from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
 from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.errors import VideoError
 from ripple_sim.overlay.comparison import compared_operators
@@ -71,8 +70,7 @@ def render_video(
         the physics becomes unstable or the video cannot be written.
     """
     times = Times.now()
-    # MuJoCo would write its warnings to a file in the current folder; `Simulation` reports those that matter
-    mujoco.set_mju_user_warning(lambda message: None)
+    adopt_warnings()
     output = Path(output)
     options = settled(options, scene, output)
     check_options(options, output)

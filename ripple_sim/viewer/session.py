@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError
@@ -55,8 +55,7 @@ class Session:
     """
 
     def __init__(self, scene: Scene, *, fps: int = 30, resolution: int | None = None) -> None:
-        # MuJoCo would write its warnings to a file in the current folder; `Simulation` reports those that matter
-        mujoco.set_mju_user_warning(lambda message: None)
+        adopt_warnings()
         self.fps = fps
         self.simulation = Simulation(scene, fps=fps, resolution=resolution, backend="cpu", on_step=self._before_step)
         self._balls = Balls(self.simulation.model)

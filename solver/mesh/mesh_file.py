@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import logging
 import warnings
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import trimesh
@@ -79,6 +81,8 @@ def _read(path: Path) -> Soup:
             return _READERS[path.suffix.lower()](path.read_bytes())
         if kind.lower() not in trimesh.available_formats():
             raise MeshError(f"mesh file {str(path)!r} has an unknown ending; valid are .obj, .off, .ply, .stl and .glb")
+        if path.suffix.lower() == ".gltf":
+            _check_buffers(path)
         with path.open("rb"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return _parts(trimesh.load_scene(path, process=False))
@@ -93,6 +97,15 @@ def _read(path: Path) -> Soup:
         raise MeshError(
             f"mesh file {str(path)!r} cannot be read: it is damaged or not a {kind} file ({reason})"
         ) from error
+
+
+def _check_buffers(path: Path) -> None:
+    """Make sure that what a glTF file names are regular files: reading a FIFO would wait for ever."""
+    content = json.loads(path.read_bytes())
+    for each in (*content.get("buffers", ()), *content.get("images", ())):
+        uri = each.get("uri", "data:")
+        if not uri.startswith("data:") and not (path.parent / unquote(uri)).is_file():
+            raise MeshError(f"it names {uri[:80]!r}, which does not exist or is not a regular file")
 
 
 def _parts(scene: trimesh.Scene) -> Soup:

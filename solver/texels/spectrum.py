@@ -30,6 +30,8 @@ def largest_eigenvalue(
     bound : float
         One that is always safe, such as Gershgorin's, caps the estimate.
     """
+    if not free.any():
+        return 0.0
     if bound == 0 or mass.shape[1] < _LANCZOS_FROM:
         return bound
     weight = free / np.sqrt(mass)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from ripple_sim.errors import RippleWarning
 from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.gpu.textures import srgb_cube, srgb_texture
+from ripple_sim.render.gpu.textures import fitted, srgb_cube, srgb_texture
 
 SAMPLE = """#version 430
 layout(local_size_x = 1) in;
@@ -68,3 +69,24 @@ def test_faces_of_a_cube_lie_below_one_another(resources):
     ways = np.concatenate([np.stack([axis, -axis]) for axis in np.eye(3)])
     got = sampled(resources, srgb_cube(resources, pixels), np.column_stack([ways, np.zeros(6)]), "Cube")
     np.testing.assert_allclose(got, srgb_to_linear(faces / 255), atol=0.01)
+
+
+def test_a_texture_larger_than_the_drivers_largest_is_scaled_down_and_that_is_said(resources) -> None:
+    with resources.gl as ctx:
+        largest = ctx.info["GL_MAX_TEXTURE_SIZE"]
+    pixels = np.zeros((2, largest + 100, 3), np.uint8)
+    pixels[:, : largest // 2] = 200
+    with pytest.warns(RippleWarning, match=rf"a texture of {largest + 100}x2 pixels is larger than the {largest}"):
+        texture = srgb_texture(resources, pixels)
+    assert texture.size == (largest, 2)
+
+
+def test_scaling_keeps_colours_and_shape() -> None:
+    pixels = np.zeros((40, 80, 3), np.uint8)
+    pixels[:, :40] = (10, 100, 200)
+    with pytest.warns(RippleWarning, match="scaled down to 20x10"):
+        small = fitted(pixels, 20)
+    assert small.shape == (10, 20, 3)
+    assert (small[:, :10] == (10, 100, 200)).all()
+    assert not small[:, 10:].any()
+    assert fitted(pixels, 80) is pixels

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import struct
@@ -156,3 +157,14 @@ def test_nothing_but_the_error_is_said(tmp_path: Path) -> None:
 )
 def test_a_file_that_promises_too_much_is_refused_at_once(tmp_path: Path, name: str, content: bytes) -> None:
     refusal(written(tmp_path, name, content))
+
+
+@pytest.mark.parametrize("kind", ["buffers", "images"])
+def test_a_gltf_whose_buffer_is_a_fifo_does_not_wait_for_it(tmp_path: Path, kind: str) -> None:
+    os.mkfifo(tmp_path / "a pipe")
+    content = {"asset": {"version": "2.0"}, kind: [{"uri": "a%20pipe", "byteLength": 12}]}
+    (tmp_path / "mesh.gltf").write_text(json.dumps(content))
+    with pytest.raises(
+        MeshError, match=r"mesh\.gltf' cannot be read: it names 'a%20pipe', which .* not a regular file"
+    ):
+        load_mesh(tmp_path / "mesh.gltf")

@@ -137,3 +137,13 @@ def test_held_region_costs_little_of_the_time_step_and_is_moved_by_nothing(anima
         hold(animal, Material(), 2.0 * region)
     with pytest.raises(SolverError, match="shape"):
         hold(animal, Material(), region[:, :5])
+
+
+@pytest.mark.parametrize("backend", ["cpu", "gl"])
+def test_a_surface_that_is_wholly_held_is_legal_and_does_not_move(backend: str, opengl: None) -> None:
+    atlas = sphere_atlas(1.0, 8)
+    waves = WaveSolver(atlas, Material(fixed=np.ones(atlas.areas.shape, bool)), backend=backend)
+    waves.add_impulse([1.0, 0.0, 0.0], 1.0, 0.3)
+    waves.step(0.01)
+    assert not waves.height.any()
+    assert not waves.velocity.any()
