@@ -35,13 +35,12 @@ def main() -> None:
     speed = vertex_map(atlas, SLOW + (FAST - SLOW) * stripes)  # one value a texel
     ripples.change_material("egg", speed=speed)
 
-    egg = ripples["egg"]
-    egg.add_impulse((0.02, -0.05, 0.3), 0.6, radius=0.05)
+    ripples.poke("egg", (0.02, -0.05, 0.6), 0.6, radius=0.05)  # in the frame of its body, the world
     renderer = RippleRenderer(model, ripples, width=480, height=400, looks={"egg": "clay"})
     camera = Camera(lookat=(0.0, 0.0, 0.3), distance=1.7, azimuth=90.0, elevation=-50.0)
     frames = []
     for _ in range(3):
-        egg.step(0.2)
+        ripples["egg"].step(0.2)
         frames.append(renderer.render(data, camera))
 
     path = Path("out/painted_speed.png")

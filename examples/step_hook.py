@@ -13,14 +13,15 @@ from ripple_sim.video.render_video import render_video
 
 FORCE = 12.0  # N
 TURNS = 0.4  # 1/s
+MIDDLE = (0.0, 0.0, 0.5)  # of the sphere [m]
 
 
 def stir(simulation: Simulation) -> None:
-    """Press on a point that goes round the top, in the frame of the geom."""
+    """Press on a point that goes round the top."""
     time, timestep = simulation.data.time, simulation.model.opt.timestep
     angle = 2 * np.pi * TURNS * time
-    point = 0.5 * np.array([0.6 * np.cos(angle), 0.6 * np.sin(angle), 0.8])
-    simulation.ripples["sphere"].add_impulse(point, FORCE * timestep, radius=0.04)
+    point = MIDDLE + 0.5 * np.array([0.6 * np.cos(angle), 0.6 * np.sin(angle), 0.8])  # in the frame of the body
+    simulation.ripples.poke("sphere", point, FORCE * timestep, radius=0.04)
 
 
 if __name__ == "__main__":

@@ -160,7 +160,7 @@ class Simulation:
             if entry.still_map is not None:
                 self.ripples.hold(entry.geom, 1.0 - texture_map(atlas, entry.still_map, 0.0, 1.0))
             for disc in entry.still:
-                self.ripples.make_rigid(entry.geom, self.ripples.to_geom(entry.geom, disc.point), disc.radius)
+                self.ripples.make_rigid(entry.geom, disc.point, disc.radius)
 
     def _apply_limits(self) -> None:
         self.limited = {}

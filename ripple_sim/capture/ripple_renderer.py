@@ -10,10 +10,7 @@ from ripple_sim.coupling.arguments import own_data, own_model
 from ripple_sim.coupling.model.geoms import ByGeom, by_name
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
-from ripple_sim.render.gpu.contract import MappingKind
 from ripple_sim.render.surfaces.charts import Charts
-from ripple_sim.render.visuals.texture_mapping import mapping_of
-from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.scene.camera import CameraEntry
 from ripple_sim.solver import HeightMap, WaveSolver
 from ripple_sim.solver.gl import GLContext, shared_context
@@ -33,8 +30,8 @@ class RippleRenderer:
     width, height : int
         [pixels].
     looks : mapping
-        Geom, by its name or id, to the look of its surface: rubber (the default), jelly, clay and so on. Its colour is
-        the geom's, where the model gives it a texture or a colour.
+        Geom, by its name or id, to the look of its surface, one of `LOOKS`: rubber (the default), jelly, clay and so
+        on. Its colour is the geom's, where the model gives it a texture or a colour, as in a scene file.
     gl : GLContext, optional
         By default the process's shared one.
     limit : bool
@@ -62,8 +59,7 @@ class RippleRenderer:
         self._height_maps = {name: HeightMap.drawn(ripples[name].atlas, limit) for name in ripples}
         named = by_name(self._model, looks or {}, "looks")
         surfaces = {
-            geom: surface_of(ripples[name], named.get(name, "rubber"), _color(self._model, geom))
-            for name, geom in ripples.geom_ids.items()
+            geom: surface_of(ripples[name], named.get(name, "rubber")) for name, geom in ripples.geom_ids.items()
         }
         self._renderer = Renderer(gl or shared_context(), self._model, surfaces, size=(width, height))
 
@@ -101,11 +97,3 @@ def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] |
         color=color,
         uv=mesh.uv if mesh.corner_uv is None else mesh.corner_uv,
     )
-
-
-def _color(model: mujoco.MjModel, geom: int) -> tuple[float, float, float] | None:
-    """Colour of a geom, unless it is MuJoCo's grey or a texture."""
-    visual = geom_visual(model, geom)
-    red, green, blue = (float(x) for x in visual.rgba[:3])
-    plain = mapping_of(model, visual).kind == MappingKind.NO_IMAGE
-    return (red, green, blue) if plain and not red == green == blue == 0.5 else None

@@ -64,9 +64,9 @@ class Target:
         self._rebuild(self._material, self._held, {**self._options, "operator": operator})
 
     def make_rigid(self, point: ArrayLike, radius: float) -> None:
-        """Hold a disc still, of a radius [m] round a point [m] in the frame of the geom; waves bounce off its rim."""
+        """Hold a disc still, of a radius [m] round a point [m] in the body's frame; waves bounce off its rim."""
         disc = np.zeros(self.waves.atlas.areas.shape)
-        disc.reshape(-1)[footprint(self.waves.atlas, point, radius).texels] = 1.0
+        disc.reshape(-1)[footprint(self.waves.atlas, self.to_geom(point), radius).texels] = 1.0
         self.hold(disc)
 
     def hold(self, region: ArrayLike) -> None:

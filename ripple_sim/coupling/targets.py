@@ -14,6 +14,7 @@ from ripple_sim.coupling.model.suited_target import suited_targets
 from ripple_sim.coupling.model.target_mesh import target_atlas
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, WaveSolver
+from ripple_sim.solver.waves.footprint import Footprint
 
 from .arguments import checked_materials, for_each
 from .target import Target
@@ -90,6 +91,35 @@ class Targets:
         self._target(name).change_material(**coefficients)
         self._waves_changed(name)
 
+    def poke(self, name: GeomKey, point: ArrayLike, impulse: float, radius: float = 0.0) -> Footprint:
+        """Give a geom's surface an impulse at once, as `[[poke]]` in a scene file does.
+
+        Parameters
+        ----------
+        name : str or int
+            Geom.
+        point : [3]
+            In the frame of the geom's body, as places in an MJCF are [m]; the nearest surface point is taken.
+        impulse : float
+            [N s]; positive presses inwards.
+        radius : float
+            Of the footprint, along the surface [m]; at least two texels are used.
+
+        Returns
+        -------
+        Footprint
+            The texels that were hit.
+
+        Raises
+        ------
+        SceneError
+            For an unknown geom.
+        SolverError
+            If the impulse, the point or the radius is not finite, or the radius negative.
+        """
+        target = self._target(name)
+        return target.waves.add_impulse(target.to_geom(point), impulse, radius)
+
     def make_rigid(self, name: GeomKey, point: ArrayLike, radius: float) -> None:
         """Hold a disc of a geom's surface still: waves go round it, and contacts there move nothing.
 
@@ -98,7 +128,7 @@ class Targets:
         name : str or int
             Geom.
         point : [3]
-            In the frame of the geom [m]; the nearest surface point is taken.
+            In the frame of the geom's body [m]; the nearest surface point is taken.
         radius : float
             Along the surface [m].
         """
@@ -136,7 +166,11 @@ class Targets:
             self._waves_changed(name)
 
     def to_geom(self, name: GeomKey, point: ArrayLike) -> NDArray[np.float64]:
-        """Carry a point [m] from the frame of a geom's body to that of the geom, which MuJoCo chooses for meshes."""
+        """Carry a point [m] from the frame of a geom's body to that of the geom, which MuJoCo chooses for meshes.
+
+        The points of `poke` and `make_rigid` are in the body's frame; those of an atlas, and of the waves of one geom,
+        `ripples[name]`, in the geom's.
+        """
         return self._target(name).to_geom(point)
 
     def _target(self, name: GeomKey) -> Target:

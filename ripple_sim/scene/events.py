@@ -92,8 +92,7 @@ class Script:
         while self._surface_events and self._surface_events[0].time <= data.time + 1e-9:
             event = self._surface_events.pop(0)
             if isinstance(event, PokeEntry):
-                point = ripples.to_geom(event.geom, event.point)
-                ripples[event.geom].add_impulse(point, event.impulse, event.radius)
+                ripples.poke(event.geom, event.point, event.impulse, event.radius)
             else:
                 ripples.change_material(event.geom, **given_fields(event.material))
 

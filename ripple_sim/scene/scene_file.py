@@ -31,9 +31,9 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
 
     `resolution` is chosen by the model where it is left out, see `suited_resolution`. `layout` is that of the atlas,
     see `build_atlas`; the `rim` of an open surface is "free" or "fixed".
-    `color` (sRGB, 0 to 1) replaces the look's own colour, or the texture of the geom's material. `still_map` is the
-    path of an image in the mesh's own texture coordinates: there are no waves where it is black. `contacts` names the
-    geoms that collide for a geom that is only visible; by default those of its body.
+    `color` (sRGB, 0 to 1) replaces the texture or colour that the MJCF gives the geom; without either it is the look's.
+    `still_map` is the path of an image in the mesh's own texture coordinates: there are no waves where it is black.
+    `contacts` names the geoms that collide for a geom that is only visible; by default those of its body.
     `limit` bends heights that are too large for the object where they are drawn, see `DisplacementLimit`, and warns of
     them; False: neither. `warn` = False: limited without a warning.
     """

@@ -84,7 +84,7 @@ class SkinActor:
         sRGB, 0 to 1.
     """
 
-    def __init__(self, plotter: pv.Plotter, skin: Skin, color: tuple[float, float, float]) -> None:
+    def __init__(self, plotter: pv.Plotter, skin: Skin, color: NDArray[np.float64]) -> None:
         mesh = pv.PolyData.from_regular_faces(skin.points, skin.F)
         mesh.point_data.active_normals = skin.normals
         mesh.point_data.set_array(_PER_METRE * skin.height, HEIGHT)
@@ -95,7 +95,7 @@ class SkinActor:
             scalars=HEIGHT,
             cmap=_COLORMAP,
             clim=(-1.0, 1.0),
-            color=color,
+            color=color.tolist(),
             show_scalar_bar=False,
             copy_mesh=False,
             interpolation="Phong",

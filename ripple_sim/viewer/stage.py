@@ -7,7 +7,7 @@ import math
 import pyvista as pv
 
 from ripple_sim.capture.viewpoint import viewpoint
-from ripple_sim.render.visuals.looks import find_look
+from ripple_sim.render.surfaces.surface import target_color
 
 from .actors import HEIGHT, BodyActors, SkinActor
 from .floor import BACKGROUND, find_floor
@@ -46,7 +46,11 @@ class Stage:
         simulation = session.simulation
         pose = viewpoint(simulation.model, simulation.data, simulation.scene.camera, 0.0).pose()
         self.skins = {
-            entry.geom: SkinActor(plotter, session.skins[entry.geom], entry.color or find_look(entry.look).color)
+            entry.geom: SkinActor(
+                plotter,
+                session.skins[entry.geom],
+                target_color(simulation.model, simulation.ripples.geom_ids[entry.geom], entry.look, entry.color),
+            )
             for entry in simulation.scene.targets
         }
         self._bodies = BodyActors(plotter, session, pose.focus, _REACH * pose.distance)

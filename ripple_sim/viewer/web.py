@@ -81,7 +81,8 @@ def serve(window: Window, port: int, host: str) -> None:
         serving = asyncio.ensure_future(
             server.start(exec_mode="coroutine", open_browser=False, show_connection_info=False)
         )
-        print(f"{address(host, port, secret)} shows {window.plotter.title}; press Ctrl+C to stop", flush=True)
+        shown = f"shows {window.plotter.title}, which starts when the page is opened; press Ctrl+C to stop"
+        print(f"{address(host, port, secret)} {shown}", flush=True)
         await page.animate()
         await server.stop()
         with contextlib.suppress(asyncio.CancelledError):
@@ -113,7 +114,9 @@ class _Page:
         # numbers of the latest frames sent, and acknowledged by the browser
         self._sent = self._received = 0
         self._heard = 0.0
-        server.state.update({"status": "", "sent": 0})
+        server.state.update({"status": "", "sent": 0, "trame__title": f"{window.plotter.title} - ripple-sim"})
+        self._opened = asyncio.Event()
+        server.controller.on_client_connected.add(self._opened.set)
         width, height = window.plotter.window_size
         with DivLayout(server) as layout:
             layout.root.style = ""
@@ -137,12 +140,13 @@ class _Page:
         window.render = self._view.update
 
     async def animate(self) -> None:
-        """Run the session frame by frame until the window is closed.
+        """Run the session frame by frame, from when the page is first opened until the window is closed.
 
         Trame's own animation draws and sends the frames: without one it would draw at every movement of the pointer.
         The next frame is drawn once the browser has the last one, or they would queue up, and clicks with them.
         """
         await self._server.ready
+        await self._opened.wait()
         window = self._window
         self._view.start_animation(fps=window.session.fps, quality=_QUALITY)
         frame = 1 / window.session.fps

@@ -1,5 +1,6 @@
 """Arguments of `Ripples` that cannot be right."""
 
+import numpy as np
 import pytest
 from mujoco_models import BALL, model_of
 
@@ -32,6 +33,7 @@ def test_arguments_of_a_wrong_kind_are_named(materials, options: dict, message: 
     ("call", "message"),
     [
         (lambda ripples: ripples.make_rigid("target", "top", 0.1), "points are 'top'"),
+        (lambda ripples: ripples.poke("target", [0.0, np.nan, 0.0], 0.1), "points"),
         (lambda ripples: ripples.to_geom("target", [1.0, 2.0]), "points have shape"),
         (lambda ripples: ripples.hold("target", "all"), "region is 'all'"),
     ],

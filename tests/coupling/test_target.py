@@ -32,6 +32,30 @@ def test_material_may_change_under_a_body_at_rest() -> None:
         ripples.change_material("target", sped=1.0)
 
 
+@pytest.mark.parametrize("place", ["poke", "rigid"])
+def test_places_are_in_the_frame_of_the_body_as_in_the_model(place: str) -> None:
+    """MuJoCo puts a mesh's frame at its middle, along its axes of inertia: nobody knows it."""
+    model = model_of(
+        '<body pos="3 0 0" euler="0 0 90"><geom name="target" type="ellipsoid" size="0.3 0.2 0.2" pos="1 0 0" '
+        'euler="0 90 0"/><site name="end" pos="1 0 -0.3"/></body>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=16, backend="cpu")
+    geom, end = data.geom("target"), model.site("end").pos
+    if place == "poke":
+        ripples.poke("target", end, 0.01, 0.1)
+        ripples["target"].step(1e-3)
+        chosen = ripples["target"].height < 0.5 * ripples["target"].height.min()
+    else:
+        ripples.make_rigid("target", end, 0.1)
+        chosen = ~ripples["target"].operator.movable
+    atlas = ripples["target"].atlas
+    world = atlas.positions[chosen] @ geom.xmat.reshape(3, 3).T + geom.xpos
+    assert 2 < len(world) < 60
+    assert np.linalg.norm(world - data.site("end").xpos, axis=1).max() < 0.12
+
+
 def ball_on_sphere(material: Material) -> tuple[mujoco.MjModel, mujoco.MjData, Ripples]:
     model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 0.6"))
     ripples = Ripples(model, {"target": material}, resolution=16, backend="cpu", conserve_volume=False)

@@ -109,6 +109,18 @@ def click_surface(page: Page) -> None:
     page.mouse.click(box["x"] + MIDDLE[0], box["y"] + MIDDLE[1])
 
 
+def test_the_run_waits_for_the_first_browser_and_the_page_has_the_scenes_name(browser: Any, address: str) -> None:
+    """The first balls had fallen before anybody saw them. This test comes first: later pages join a run."""
+    time.sleep(1.0)
+    opened = time.monotonic()
+    page = browser.new_page()
+    page.goto(address)
+    wait_for(lambda: seconds(page) >= 0)
+    assert seconds(page) < time.monotonic() - opened + 0.1
+    assert page.title() == "sphere - ripple-sim"
+    page.close()
+
+
 def test_the_page_shows_the_scene_and_time_goes_on(page: Page) -> None:
     first = seconds(page)
     wait_for(lambda: seconds(page) > first + 0.3)

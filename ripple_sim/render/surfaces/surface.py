@@ -40,7 +40,7 @@ class Surface:
     look : str
         Name of one of `LOOKS`; "model" takes colour, texture and gloss from the geom's MuJoCo material.
     color : tuple, optional
-        sRGB, 0 to 1. By default the texture of the geom's MuJoCo material, if it has one, or else the look's own.
+        sRGB, 0 to 1. By default the texture or colour that the model gives the geom, or else the look's own.
     uv, image : optional
         Texture coordinates, shape [n, 2] or per corner [m, 3, 2], and the file of the texture.
     heatmap_colors : array of uint8, shape [k, 3], optional
@@ -82,7 +82,16 @@ def appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[n
         return look, np.ones(3), Mapping(MappingKind.FLAT_IMAGE, own=True)
     if surface.color is None and mapping.kind != MappingKind.NO_IMAGE:
         return look, visual.color, mapping
-    return look, srgb_to_linear(surface.color or look.color), plain
+    return look, srgb_to_linear(target_color(model, geom, surface.look, surface.color)), plain
+
+
+def target_color(model: Any, geom: int, look: str, given: tuple[float, float, float] | None) -> NDArray[np.float64]:
+    """Colour of a target without its texture, sRGB [3]: the given one, or else the model's own, or else the look's."""
+    visual = geom_visual(model, geom)
+    if given is not None:
+        return np.array(given)
+    plain = mapping_of(model, visual).kind == MappingKind.NO_IMAGE
+    return visual.rgba[:3] if visual.colored and plain else np.array(find_look(look).color)
 
 
 def load_image(resources: Resources, surface: Surface) -> moderngl.Texture:

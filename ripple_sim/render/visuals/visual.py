@@ -59,6 +59,11 @@ class Visual:
         return srgb_to_linear(self.rgba[:3])
 
     @property
+    def colored(self) -> bool:
+        """Whether the model gives it a colour of its own; a material does."""
+        return self.material >= 0 or not np.array_equal(self.rgba[:3], _UNSET[:3])
+
+    @property
     def opacity(self) -> float:
         """0 to 1."""
         return float(self.rgba[3])

@@ -74,5 +74,5 @@ def test_targets_go_by_name_or_id_or_place() -> None:
     ripples.step(data)
     assert [(each.geom, each.other) for each in ripples.last_impulses] == [("world/0", "b/0"), ("b/0", "world/0")]
     ripples.change_material(0, speed=0.5)
-    ripples.make_rigid(1, ripples.to_geom(1, [0, 0, 0.05]), 0.02)
+    ripples.make_rigid(1, [0, 0, 0.05], 0.02)
     assert ripples[0].material.speed == 0.5
