@@ -1,6 +1,6 @@
 """The `ripple-sim` program: reads the command line, runs a command, turns errors into one line and an exit status.
 
-Exit status: 0 done, 1 something failed, 2 bad input, 130 interrupted, 143 terminated.
+Exit status: 0 done, 1 something failed, 2 bad input, 128 + a signal's number after one.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .signals import INTERRUPTED, TERMINATED, end_at_once, end_in_good_order
+from .signals import INTERRUPTED, end_at_once, end_in_good_order, word_of
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -57,9 +57,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as ending:
         return _fail("interrupted", INTERRUPTED, ending)
     except SystemExit as ending:
-        if ending.code != TERMINATED:
+        if not (isinstance(ending.code, int) and (word := word_of(ending.code))):
             raise
-        return _fail("terminated", TERMINATED, ending)
+        return _fail(word, ending.code, ending)
+    finally:
+        end_at_once()
     return DONE
 
 

@@ -1,54 +1,93 @@
-"""Ctrl-C and SIGTERM as exceptions, so that unfinished work is cleaned up.
+"""Ctrl-C, SIGTERM and SIGHUP: one line, status 128 + the signal's number, and what is unfinished is cleaned up.
 
 Before a command begins, and during imports, where an exception could be taken for an import error, there is nothing to
-clean up, and the process ends at once.
+clean up, and the process ends at once. Later the signal becomes an exception, but never within a call of moderngl's,
+which would end in a segmentation fault, nor while a video is being opened: then a timer tries again until it is over.
+A second signal ends the process at once; what is left is then as whole as after a kill.
 """
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import FrameType
+from typing import Any
 
-INTERRUPTED, TERMINATED = 130, 143
-_STATUS = {signal.SIGINT: (INTERRUPTED, "interrupted"), signal.SIGTERM: (TERMINATED, "terminated")}
+_WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
+INTERRUPTED, TERMINATED, HUNG_UP = (128 + number for number in _WORDS)
+
+# Files within whose calls no exception is raised, by the ends of their paths.
+_NEVER_IN = ("moderngl/__init__.py", "encode/open_writer.py")
+# Where an import may be under way and there is something to clean up.
+_AT_STAKE = "video/render_video.py"
+
+_RETRY = 0.02  # [s]
+
+
+def word_of(status: int) -> str | None:
+    """The word for an exit status of a signal, or None for any other."""
+    return {128 + number: word for number, word in _WORDS.items()}.get(status)
 
 
 def end_at_once() -> None:
-    """Let both signals end the process, with one line; a signal ignored by the parent stays ignored."""
+    """Let the signals end the process, with one line; a signal ignored by the parent stays ignored."""
+    signal.setitimer(signal.ITIMER_REAL, 0)
     _handle(_end)
 
 
 def end_in_good_order() -> None:
-    """Let both signals raise `KeyboardInterrupt` or `SystemExit`; a signal ignored by the parent stays ignored."""
+    """Let the signals raise `KeyboardInterrupt` or `SystemExit`; a signal ignored by the parent stays ignored."""
+    if not isinstance(sys.unraisablehook, functools.partial):
+        sys.unraisablehook = functools.partial(_retry_what_got_lost, sys.unraisablehook)
     _handle(_raise)
 
 
 def _handle(handler: Callable[[int, FrameType | None], None]) -> None:
-    for number in _STATUS:
+    for number in _WORDS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    status, word = _STATUS[signal.Signals(number)]
-    os.write(2, f"ripple-sim: {word}\n".encode())
-    os._exit(status)
+    os.write(2, f"ripple-sim: {_WORDS[signal.Signals(number)]}\n".encode())
+    os._exit(128 + number)
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
-    if _importing(frame):
+    files = list(_files(frame))
+    importing = any(file.startswith("<frozen importlib") for file in files)
+    if importing and not any(file.endswith(_AT_STAKE) for file in files):
         _end(number, frame)
+    if importing or any(file.endswith(_NEVER_IN) for file in files):
+        _retry(number)
+        return
+    end_at_once()
     if number == signal.SIGINT:
         raise KeyboardInterrupt
-    sys.exit(TERMINATED)
+    sys.exit(128 + number)
 
 
-def _importing(frame: FrameType | None) -> bool:
+def _retry(number: int) -> None:
+    signal.signal(signal.SIGALRM, lambda _, frame: _raise(number, frame))
+    signal.setitimer(signal.ITIMER_REAL, _RETRY)
+
+
+def _retry_what_got_lost(before: Callable[[Any], object], unraisable: Any) -> None:
+    """An exception in a finalizer goes no further: raise it again outside."""
+    error = unraisable.exc_value
+    if isinstance(error, KeyboardInterrupt):
+        _retry(signal.SIGINT)
+    elif isinstance(error, SystemExit) and isinstance(error.code, int) and word_of(error.code):
+        _retry(error.code - 128)
+    else:
+        before(unraisable)
+
+
+def _files(frame: FrameType | None) -> Iterator[str]:
+    """Files of the functions that are running, from the innermost."""
     while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib"):
-            return True
+        yield frame.f_code.co_filename
         frame = frame.f_back
-    return False

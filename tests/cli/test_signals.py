@@ -4,22 +4,28 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 
 import pytest
 
 from ripple_sim.cli import signals
+from ripple_sim.encode import open_writer
 
 BOTH = [signal.SIGINT, signal.SIGTERM]
+ALL = [*BOTH, signal.SIGHUP]
 
 
 @pytest.fixture(autouse=True)
 def _left_as_found() -> Iterator[None]:
-    handlers = {number: signal.getsignal(number) for number in BOTH}
+    handlers = {number: signal.getsignal(number) for number in (*ALL, signal.SIGALRM)}
+    hook = sys.unraisablehook
     # a shell in the background starts us with Ctrl-C ignored, which children would inherit
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     yield
+    sys.unraisablehook = hook
+    signal.setitimer(signal.ITIMER_REAL, 0)
     for number, handler in handlers.items():
         signal.signal(number, handler)
 
@@ -28,9 +34,14 @@ def test_ctrl_c_and_termination_are_exceptions() -> None:
     signals.end_in_good_order()
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGINT)
+    signals.end_in_good_order()
     with pytest.raises(SystemExit) as ending:
         signal.raise_signal(signal.SIGTERM)
     assert ending.value.code == signals.TERMINATED == 128 + signal.SIGTERM
+    signals.end_in_good_order()
+    with pytest.raises(SystemExit) as ending:
+        signal.raise_signal(signal.SIGHUP)
+    assert (ending.value.code, signals.word_of(129)) == (129, "hung up")
     assert signals.INTERRUPTED == 128 + signal.SIGINT
 
 
@@ -58,3 +69,50 @@ def test_before_a_command_and_during_imports_the_process_ends_with_one_line(
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert result.returncode == 128 + number
     assert (result.stdout, result.stderr) == ("", f"ripple-sim: {line}\n")
+
+
+def within(file: str, number: int) -> list[str]:
+    """Send a signal while a function of a file is running; return what had happened when the exception came."""
+    happened: list[str] = []
+    code = "def call():\n    os.kill(os.getpid(), number)\n    time.sleep(0.1)\n    happened.append('call ended')\n"
+    names = {"os": os, "time": time, "number": number, "happened": happened}
+    exec(compile(code, file, "exec"), names)
+    signals.end_in_good_order()
+    with pytest.raises((KeyboardInterrupt, SystemExit)):
+        names["call"]()
+        for _ in range(500):
+            time.sleep(0.01)
+        happened.append("no exception")
+    return happened
+
+
+@pytest.mark.parametrize("number", ALL)
+def test_no_exception_is_raised_within_a_call_of_moderngls_but_soon_after(number: int) -> None:
+    import moderngl
+
+    assert within(moderngl.__file__, number) == ["call ended"]
+    assert within(open_writer.__code__.co_filename, number) == ["call ended"]
+    assert within("elsewhere.py", number) == []
+
+
+def test_what_a_finalizer_swallows_comes_again() -> None:
+    class Dying:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGTERM)
+
+    signals.end_in_good_order()
+    with pytest.raises(SystemExit):
+        Dying()
+        for _ in range(500):
+            time.sleep(0.01)
+
+
+def test_a_second_signal_ends_the_process_while_the_first_is_cleaned_up() -> None:
+    program = (
+        "import signal, time\nfrom ripple_sim.cli import signals\nsignals.end_in_good_order()\n"
+        "try:\n    signal.raise_signal(signal.SIGTERM)\nfinally:\n    signal.raise_signal(signal.SIGINT)\n"
+        "    print('cleaned up')\n"
+    )
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    # a job in the background has Ctrl-C ignored, and then cleans up
+    assert (result.returncode, result.stderr) in ((130, "ripple-sim: interrupted\n"), (143, ""))
