@@ -40,7 +40,7 @@ def end_at_once() -> None:
 
 def end_in_good_order() -> None:
     """Let the signals raise `KeyboardInterrupt` or `SystemExit`; a signal ignored by the parent stays ignored."""
-    if not isinstance(sys.unraisablehook, functools.partial):
+    if getattr(sys.unraisablehook, "func", None) is not _retry_what_got_lost:
         sys.unraisablehook = functools.partial(_retry_what_got_lost, sys.unraisablehook)
     _handle(_raise)
 

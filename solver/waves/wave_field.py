@@ -63,8 +63,13 @@ class WaveField:
 
     @property
     def velocity(self) -> NDArray[np.float32]:
-        """Rate of the height [m/s], float32 [C, n, n]: a copy; assign to change it, as with `height`."""
-        return self._backend.velocity()
+        """Rate of the height [m/s], float32 [C, n, n]: a copy; assign to change it, as with `height`.
+
+        Reading raises `SolverError` if it is no longer finite, which it may be before the height is.
+        """
+        velocity = self._backend.velocity()
+        self._check_finite(velocity, "velocity")
+        return velocity
 
     @velocity.setter
     def velocity(self, value: ArrayLike) -> None:
@@ -95,14 +100,14 @@ class WaveField:
     def _elastic_energy(self, field: NDArray[np.float64]) -> float:
         return -float((field * self.operator.elastic_force(field)).sum()) / 2
 
-    def _check_finite(self, height: NDArray[np.float32]) -> None:
-        """Report once, with place and time, that the height is no longer finite."""
+    def _check_finite(self, field: NDArray[np.float32], name: str = "height") -> None:
+        """Report once, with place and time, that a field is no longer finite."""
         if self._reported:
             return
-        where = where_not_finite(self.atlas, height)
+        where = where_not_finite(self.atlas, field)
         if where is not None:
             self._reported = True
             raise SolverError(
-                f"height is no longer finite {where}, at time {self.time:.6g} s; a source was too large for float32: "
+                f"{name} is no longer finite {where}, at time {self.time:.6g} s; a source was too large for float32: "
                 "make it smaller and `reset()` the waves"
             )

@@ -94,3 +94,13 @@ def test_what_float32_cannot_hold_is_one_error_and_no_warning() -> None:
         with pytest.raises(SolverError, match="no longer finite"):
             waves.step(0.1)
         assert np.isnan(waves.energy())
+
+
+def test_a_velocity_that_is_not_finite_before_the_height_is_no_secret(backend: str) -> None:
+    waves = WaveSolver(sphere_atlas(1.0, 8), backend=backend)
+    velocity = np.zeros((6, 8, 8), np.float32)
+    velocity[1, 2, 3] = np.inf
+    waves._backend.set_velocity(velocity)
+    with pytest.raises(SolverError, match="velocity is no longer finite at chart 1, row 2, column 3"):
+        _ = waves.velocity
+    assert not waves.height.any()
