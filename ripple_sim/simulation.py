@@ -37,8 +37,10 @@ class Simulation:
         Overrides the scene's atlas resolutions.
     layout : str, optional
         Overrides the scene's layouts.
-    backend, operator : str
+    backend : str
         As for `WaveSolver`.
+    operator : str
+        Likewise.
     on_step : callable, optional
         Called with the simulation before each physics step: to steer actuators, move mocap bodies, press on surfaces.
 

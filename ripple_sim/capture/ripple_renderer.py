@@ -27,7 +27,9 @@ class RippleRenderer:
         Or dm_control's wrapper of one; likewise the data of each frame.
     ripples : Ripples
         Whose targets are drawn with their ripples.
-    width, height : int
+    width : int
+        [pixels].
+    height : int
         [pixels].
     looks : mapping
         Geom, by its name or id, to the look of its surface, one of `LOOKS`: rubber (the default), jelly, clay and so

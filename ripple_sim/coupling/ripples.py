@@ -74,7 +74,7 @@ class Ripples(Targets):
         that collide and do not ripple. A contact loads the surface where this is nearest and faces it; of several
         targets that share a geom, the nearest.
     **wave_options
-        `backend`, `operator` and `conserve_volume`, as for `WaveSolver`.
+        As for `WaveSolver`: `backend` (str, "auto"), `operator` (str, "fem") and `conserve_volume` (bool, True).
 
     Raises
     ------

@@ -14,30 +14,36 @@ MAX_EXPOSURES = 1024
 
 
 class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[camera]`: a camera of the MJCF by name, or MuJoCo's free camera (metres, degrees).
-
-    With `orbit` it circles by that many degrees a second. With `track` it follows a body: the free camera moves along
-    with the body's centre of mass, from which `lookat` then counts; a named camera turns towards it.
-
-    A frame is the mean of `exposures` images where `shutter` or `aperture` is not 0. `shutter` is the shutter angle
-    [degrees]: 360 leaves the shutter open from one frame to the next, 180, usual in film, half of that time. `aperture`
-    is the diameter of the lens [m]; an f-number would need a focal length, which MuJoCo's cameras do not have. `focus`
-    is a distance along the camera's axis [m], the name of a body or a geom, which then stays sharp, or a point in the
-    world [m]; by default it is the point that the camera looks at.
-    """
+    """`[camera]`: where the video is seen from."""
 
     name: str | None = None
+    """A camera of the MJCF; by default MuJoCo's free camera."""
     track: str | None = None
+    """A body to follow: the free camera moves along with its centre of mass, from which `lookat` then counts; a named
+    camera turns towards it."""
     lookat: Vector | None = None
+    """Point that the free camera looks at [m]; by default the model's middle."""
     distance: float | None = None
+    """From there [m]; by default by the model's extent."""
     azimuth: float = 90.0
+    """As in MuJoCo's viewer [degrees]."""
     elevation: float = -20.0
+    """Likewise; negative looks down."""
     fovy: float = 45.0
+    """Vertical field of view [degrees]."""
     orbit: float = 0.0
+    """Degrees per second by which the camera circles."""
     shutter: float = 0.0
+    """Shutter angle [degrees]: 360 leaves the shutter open from one frame to the next, 180, usual in film, half of that
+    time."""
     aperture: float = 0.0
+    """Diameter of the lens [m]; 0: all is sharp. An f-number would need a focal length, which MuJoCo's cameras do not
+    have."""
     focus: float | str | Vector | None = None
+    """What stays sharp: a distance along the camera's axis [m], the name of a body or a geom, or a point in the world
+    [m]; by default the point that the camera looks at."""
     exposures: int = 32
+    """Images of which a frame is the mean where `shutter` or `aperture` is not 0; at most 1024."""
 
 
 def check_camera(model: mujoco.MjModel, entry: CameraEntry) -> None:

@@ -18,33 +18,41 @@ from .motion import DropEntry, Motions, PlaceEntry, ThrowEntry, Vector, check_ti
 
 
 class PokeEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[poke]]`: an instantaneous push on a rippling geom.
-
-    At a point [m] in the frame of the geom's body (the world, for a fixed target), with an impulse [N s], positive
-    inwards, spread over a radius [m], at a time [s].
-    """
+    """`[[poke]]`: an instantaneous push on the surface; in Python `Ripples.poke`."""
 
     geom: str
+    """One that ripples."""
     time: float
+    """[s]"""
     point: Vector
+    """In the frame of the geom's body, which is the world's for a fixed target [m]; the nearest point of the surface is
+    taken."""
     impulse: float
+    """[N s]; positive presses inwards."""
     radius: float = 0.0
+    """Of the footprint, along the surface [m]; at least two texels are used."""
 
 
 class ChangeEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[change]]`: change the material of a rippling geom at a time [s]."""
+    """`[[change]]`: change the material of a geom at a time."""
 
     geom: str
+    """One that ripples."""
     time: float
+    """[s]"""
     material: MaterialChange
+    """The coefficients that change, see below."""
 
 
 class ControlEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[control]]`: set an actuator's control at a time [s], in the actuator's own unit."""
+    """`[[control]]`: set an actuator's control at a time."""
 
     actuator: str
+    """Its name."""
     time: float
+    """[s]"""
     value: float
+    """In the actuator's own unit."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -23,15 +23,16 @@ COEFFICIENTS = tuple(field.name for field in dataclasses.fields(Material) if isi
 
 
 class MapEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """A coefficient from an image in the mesh's own texture coordinates, see `texture_map`.
-
-    `map` is the image's path, relative to the scene file; black stands for `low`, white for `high`.
-    """
+    """A coefficient from an image in the mesh's own texture coordinates, see `texture_map`."""
 
     map: str
+    """Path of the image, relative to the scene file."""
     low: float = 0.0
+    """Value where it is black, in the coefficient's unit."""
     high: float = 1.0
+    """Value where it is white."""
     channel: str = "luminance"
+    """Part of the image that counts."""
 
 
 Coefficient = float | str | MapEntry
@@ -82,11 +83,12 @@ class PresetEntry(_OfPresets):
 class MaterialEntry(_OfMaterial):
     """`[ripple.material]`: the wave equation's coefficients, by their names and in their units in `Material`.
 
-    Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}. A preset, by its name or as a
-    table {name = ..., its parameters}, gives those that are left out; without one they are those of `Material()`.
+    Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}. Without a preset, those that
+    are left out are those of `Material()`.
     """
 
     preset: str | PresetEntry | None = None
+    """Gives the coefficients that are left out; by its name, or as a table with its parameters."""
 
     def material(self) -> Material:
         """The solver's material; where a coefficient is a map, with its value for white.

@@ -16,38 +16,50 @@ Quaternion = tuple[float, float, float, float]
 
 
 class DropEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[drop]]`: hold a free body in place until a time [s], then release it.
-
-    From a position [m] and an orientation (quaternion w x y z; default: unchanged), with a velocity [m/s] and an
-    angular velocity [rad/s], all in the world.
-    """
+    """`[[drop]]`: hold a free body in place until a time, then release it."""
 
     body: str
+    """With a free joint."""
     time: float
+    """Of the release [s]."""
     position: Vector | None = None
+    """In the world [m]; by default where it is."""
     orientation: Quaternion | None = None
+    """Quaternion w x y z; by default unchanged."""
     velocity: Vector = (0.0, 0.0, 0.0)
+    """In the world [m/s]."""
     angular_velocity: Vector = (0.0, 0.0, 0.0)
+    """In the world [rad/s]."""
 
 
 class ThrowEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[throw]]`: give a free body a velocity at a time, from its place or a given one. Units as above."""
+    """`[[throw]]`: give a free body a velocity at a time, from its place or a given one."""
 
     body: str
+    """With a free joint."""
     time: float
+    """[s]"""
     velocity: Vector
+    """In the world [m/s]."""
     angular_velocity: Vector = (0.0, 0.0, 0.0)
+    """In the world [rad/s]."""
     position: Vector | None = None
+    """In the world [m]; by default where it is."""
     orientation: Quaternion | None = None
+    """Quaternion w x y z; by default unchanged."""
 
 
 class PlaceEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[place]]`: move a free body to a place at a time, at rest. Units as above."""
+    """`[[place]]`: move a free body to a place at a time, at rest."""
 
     body: str
+    """With a free joint."""
     time: float
+    """[s]"""
     position: Vector
+    """In the world [m]."""
     orientation: Quaternion | None = None
+    """Quaternion w x y z; by default unchanged."""
 
 
 class Motions:

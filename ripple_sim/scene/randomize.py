@@ -12,20 +12,22 @@ from .body_shapes import BODY_SHAPES
 
 
 class RandomEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[random]`: random variation of every free body, by a seed.
-
-    `position` [m] is the largest shift along each axis, of the body's place and of the place it is dropped or thrown
-    from; `size` and `mass` are ranges of factors; `shapes` are those to choose from (none: unchanged); `orientation`
-    turns the body at random.
-    """
+    """`[random]`: random variation of free bodies, by a seed."""
 
     seed: int = 0
+    """Another seed, another variation; `render --seed` overrides it."""
     position: float = 0.0
+    """Largest shift along each axis, of a body's place and of the place it is dropped or thrown from [m]."""
     orientation: bool = False
+    """Whether to turn the bodies at random."""
     size: tuple[float, float] = (1.0, 1.0)
+    """Range of factors."""
     mass: tuple[float, float] = (1.0, 1.0)
+    """Range of factors."""
     shapes: list[str] = []
+    """To choose from; none: unchanged."""
     bodies: list[str] | None = None
+    """Names; by default all free ones."""
 
 
 def randomize(spec: mujoco.MjSpec, entry: RandomEntry) -> dict[str, np.ndarray]:

@@ -20,36 +20,41 @@ Color = tuple[float, float, float]
 
 
 class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[ripple.still]]`: a disc of the surface without waves, around a point [m] in the frame of the geom's body."""
+    """`[[ripple.still]]`: a disc of the surface without waves."""
 
     point: Vector
+    """In the frame of the geom's body [m]; the nearest point of the surface is taken."""
     radius: float
+    """Along the surface [m]."""
 
 
 class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """`[[ripple]]`: one target, its material and its look.
-
-    `resolution` is chosen by the model where it is left out, see `suited_resolution`. `layout` is that of the atlas,
-    see `build_atlas`; the `rim` of an open surface is "free" or "fixed".
-    `color` (sRGB, 0 to 1) replaces the texture or colour that the MJCF gives the geom; without either it is the look's.
-    `still_map` is the path of an image in the mesh's own texture coordinates: there are no waves where it is black.
-    `contacts` names the geoms that collide for a geom that is only visible; by default those of its body.
-    `limit` bends heights that are too large for the object where they are drawn, see `DisplacementLimit`, and warns of
-    them; False: neither. `warn` = False: limited without a warning.
-    """
+    """`[[ripple]]`: one target, its material and its look."""
 
     geom: str
+    """Name of the geom, or of its body and its index there: "torso/0"."""
     resolution: int | None = None
+    """Texels along the edge of a chart; by default chosen by the model, see `suited_resolution`."""
     layout: str = "auto"
+    """How the surface gets its charts, see `build_atlas`."""
     rim: str = "free"
+    """Rims of an open surface: waves come back upright from a free one, inverted from a fixed one."""
     look: str = "rubber"
+    """What the surface looks made of; `model` as the MJCF's material says."""
     color: Color | None = None
+    """sRGB, 0 to 1; by default the texture or colour that the MJCF gives the geom, or else the look's."""
     material: MaterialEntry = msgspec.field(default_factory=MaterialEntry)
+    """The wave equation's coefficients, see below."""
     still: list[StillEntry] = []
+    """Discs without waves, see below."""
     still_map: str | None = None
+    """Path of an image in the mesh's own texture coordinates: no waves where it is black."""
     contacts: list[str] | None = None
+    """Geoms that collide for a geom that is only visible; by default those of its body."""
     limit: bool = True
+    """Bend heights that are too large for the object where they are drawn, and warn of them."""
     warn: bool = True
+    """Whether to warn of them."""
 
     def located(self, folder: Path) -> RippleEntry:
         """The same with the images' paths made relative to a folder."""
@@ -58,27 +63,37 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
-    """The whole TOML file.
-
-    `overlay` names the overlays: "height" or "velocity" as a heatmap (with a fixed end of the colours in m or m/s as in
-    "height=0.02"), "contacts", "grid", "time", "energy". `lighting` is "model" for the MJCF's lamps and skybox,
-    "studio" for a photo studio instead, or "auto": the studio if the MJCF has no lamp.
-    """
+    """The whole TOML file."""
 
     model: str
+    """Path of the MJCF."""
     ripple: list[RippleEntry]
+    """The targets, see below; at least one."""
     duration: float = 5.0
+    """Length of the video [s]."""
     two_way: bool = False
+    """Let surfaces push back on bodies."""
     lighting: str = "auto"
+    """`model`: the MJCF's lamps and skybox; `studio`: a photo studio instead; `auto`: the studio if the MJCF has no
+    lamp."""
     overlay: list[str] = []
+    """Drawn on the video; a heatmap may have an end of its colours [m, m/s]: `"height=0.02"`."""
     camera: CameraEntry = msgspec.field(default_factory=CameraEntry)
+    """Where the video is seen from, see below."""
     drop: list[DropEntry] = []
+    """Bodies held until a time, see below."""
     throw: list[ThrowEntry] = []
+    """Bodies thrown at a time, see below."""
     place: list[PlaceEntry] = []
+    """Bodies moved at a time, see below."""
     poke: list[PokeEntry] = []
+    """Pushes on surfaces, see below."""
     change: list[ChangeEntry] = []
+    """Changes of materials, see below."""
     control: list[ControlEntry] = []
+    """Controls of actuators, see below."""
     random: RandomEntry | None = None
+    """Variation by a seed, see below."""
 
 
 def parse_scene(table: dict[str, Any], origin: str) -> SceneFile:

@@ -13,6 +13,7 @@ from ripple_sim.solver.errors import SolverError
 from .atlas import Atlas
 
 _CHANNELS = {"red": 0, "green": 1, "blue": 2, "alpha": 3}
+CHANNELS = ("luminance", *_CHANNELS)
 
 
 def vertex_map(atlas: Atlas, values: ArrayLike) -> NDArray[np.float64]:
@@ -54,10 +55,12 @@ def texture_map(
     image : path, or array [height, width] or [height, width, channels]
         Path of a PNG or any image that Pillow reads, 8 or 16 bits; its values are taken as they are, without gamma.
         Or an array of values from 0 to 1. It repeats beyond its borders; v = 0 is its lower edge.
-    low, high : float
-        What black and white stand for; in between is linear.
+    low : float
+        What black stands for; in between is linear.
+    high : float
+        What white stands for.
     channel : str
-        "luminance" (mean of red, green and blue), "red", "green", "blue" or "alpha".
+        One of `CHANNELS`: "luminance" (mean of red, green and blue), "red", "green", "blue" or "alpha".
 
     Returns
     -------
@@ -106,7 +109,7 @@ def _channel(pixels: NDArray[np.float64], channel: str) -> NDArray[np.float64]:
     if channel == "luminance":
         return pixels[..., : 3 if channels >= 3 else 1].mean(axis=2)
     if channel not in _CHANNELS:
-        raise SolverError(f"channel {channel!r} does not exist; valid are 'luminance', {str(list(_CHANNELS))[1:-1]}")
+        raise SolverError(f"channel {channel!r} does not exist; valid are {', '.join(map(repr, CHANNELS))}")
     place = channels - 1 if channel == "alpha" and channels in (2, 4) else _CHANNELS[channel]
     if place >= channels:
         raise SolverError(f"the image has no channel {channel!r}, only {channels}; use 'luminance'")

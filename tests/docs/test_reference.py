@@ -1,0 +1,92 @@
+"""The pages on scene files and on Python say what the code does."""
+
+import importlib
+import importlib.util
+import inspect
+import re
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import msgspec
+import pytest
+
+from ripple_sim.render import LOOKS
+from ripple_sim.scene import scene_file
+
+DOCS = Path(__file__).parents[2] / "docs"
+TABLES = [scene_file.SceneFile, *scene_file._TABLES.values()]
+
+
+def hook(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, DOCS / "hooks" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def objects() -> list[str]:
+    """What the page on Python shows, with all that its modules of errors define."""
+    found = []
+    for path in re.findall(r"^::: (\S+)$", (DOCS / "python.md").read_text(encoding="utf-8"), re.MULTILINE):
+        if path.startswith(("ripple_sim.gymnasium", "ripple_sim.dm_control")):
+            continue  # extras, which may be missing; their own tests import them
+        if path.endswith(".errors"):
+            module = importlib.import_module(path)
+            found += [f"{path}.{name}" for name, value in vars(module).items() if inspect.isclass(value)]
+        else:
+            found.append(path)
+    return found
+
+
+def named(path: str) -> Any:
+    home, name = path.rsplit(".", 1)
+    return getattr(importlib.import_module(home), name)
+
+
+@pytest.mark.parametrize("path", objects())
+def test_the_import_line_of_a_name_imports_it(path: str) -> None:
+    space: dict[str, Any] = {}
+    exec(hook("import_lines").import_line(path), space)
+    assert space[path.rsplit(".", 1)[1]] is named(path)
+
+
+def test_the_page_has_the_errors_and_warnings_that_users_catch() -> None:
+    assert {"SceneError", "RippleWarning", "RippleError", "SolverError"} <= {
+        path.rsplit(".", 1)[1] for path in objects()
+    }
+
+
+@pytest.mark.parametrize("path", objects())
+def test_parameters_that_share_a_line_share_a_default(path: str) -> None:
+    """The page gives all names on a line the first one's default: an operator once was \"auto\", a height 1280."""
+    thing = named(path)
+    own = (
+        [thing]
+        if not inspect.isclass(thing)
+        else [thing, *(m for _, m in inspect.getmembers(thing, inspect.isroutine))]
+    )
+    for each in own:
+        try:
+            parameters = inspect.signature(each).parameters
+        except (TypeError, ValueError):
+            continue
+        for line in re.findall(r"^(\w+(?:, \w+)+) : ", inspect.getdoc(each) or "", re.MULTILINE):
+            defaults = {str(parameters[name].default) for name in line.split(", ") if name in parameters}
+            assert len(defaults) <= 1, f"{path}: {line} have the defaults {', '.join(sorted(defaults))}"
+
+
+@pytest.mark.parametrize("entry", TABLES, ids=lambda entry: entry.__name__)
+def test_every_key_of_a_scene_file_has_a_text(entry: type[msgspec.Struct]) -> None:
+    texts = hook("scene_tables").key_texts(entry)
+    assert not [field.name for field in msgspec.structs.fields(entry) if not texts.get(field.name)]
+
+
+def test_the_page_on_scene_files_has_every_table_and_the_words_of_a_look() -> None:
+    text = hook("scene_tables").scene_tables()
+    for name in scene_file._TABLES:
+        if not name.startswith("ripple.material."):
+            assert f"`[{name}]`" in text
+    assert ", ".join(f"`{look}`" for look in LOOKS) in text
