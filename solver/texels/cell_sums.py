@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import quad, triangle
+from .cells import quad, strip, triangle
 from .topology import TRIANGLE
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -28,7 +28,7 @@ _CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
 _COLLECTED = (3, 2, 1, 0)
 _NORTH, _SOUTH, _EAST, _WEST, _RISING, _FALLING = range(6)
 _LINKS = ((0, 1, 0), (0, 0, 0), (1, 0, 1), (1, 0, 0), (2, 0, 0), (3, 0, 0))  # link, dr, dc
-_BETWEEN = {(0, 1): _SOUTH, (2, 3): _NORTH, (0, 2): _WEST, (1, 3): _EAST, (0, 3): _RISING, (1, 2): _FALLING}
+_BETWEEN = {(0, 1): _SOUTH, (2, 3): _NORTH, (0, 2): _WEST, (1, 3): _EAST}
 
 
 class Cells(NamedTuple):
@@ -97,16 +97,20 @@ def _add_up(cells: Cells, charts: slice, rows: slice) -> _Sums:
     k, s, halo, rim = (corners(field[part]) for field in (cells.coefficient, cells.softening, cells.halo, cells.rim))
     exists = (np.minimum(np.minimum(halo[0], halo[1]), np.minimum(halo[2], halo[3]))) >= 0
     at_rim = rim[0] | rim[1] | rim[2] | rim[3]
-    south_north, west_east, rising, falling, whole = quad(*x)
+    *sides, rising, falling, whole = quad(*x)
     conductance = _conductance(k, s)
     inner = exists & ~at_rim
-    links = [np.where(inner, conductance * weight, 0.0) for weight in (south_north, west_east, rising, falling)]
-    sums = _Sums([links[0], links[0], links[1], links[1], links[2], links[3]], np.where(inner, whole / 4, 0.0), [], [])
+    south, north, west, east = sides
+    weights = [conductance * weight for weight in (north, south, east, west, rising, falling)]
+    sums = _Sums([np.where(inner, weight, 0.0) for weight in weights], np.where(inner, whole / 4, 0.0), [], [])
     strips = np.nonzero(exists & at_rim & np.isfinite(whole))
     if len(strips[0]):
         around = tuple(np.stack([field[strips] for field in corner], axis=1) for corner in (halo, rim))
-        of_links = [(conductance * weight)[strips] for weight in (south_north, west_east, rising, falling)]
-        _add_strips(sums, strips, around, cells.fixed_rim, of_links, (whole / 4)[strips])
+        _share_strips(sums, strips, around, (whole / 4)[strips])
+        if cells.fixed_rim:
+            sums.other_links.extend((kind, strips, weight[strips]) for kind, weight in enumerate(weights))
+        else:
+            _link_strips(sums, strips, around[1], [corner[:, *strips] for corner in x], conductance[strips])
     _add_triangles(sums, cells, charts, rows)
     return sums
 
@@ -138,10 +142,8 @@ def _add_triangles(sums: _Sums, cells: Cells, charts: slice, rows: slice) -> Non
         sums.other_links.append((_NORTH if r == 0 else _SOUTH, place, conductance * horizontal))
 
 
-def _add_strips(
-    sums: _Sums, strips: Place, around: tuple[NDArray, ...], fixed: bool, links: list[Floats], share: Floats
-) -> None:
-    """Cells at a rim: each of their corners beyond the rim moves as the texel beside it, or is fixed.
+def _share_strips(sums: _Sums, strips: Place, around: tuple[NDArray, ...], share: Floats) -> None:
+    """The areas of cells at a rim: each of their corners beyond the rim has its own go to the texel beside it.
 
     Nothing is known of a strip where the rim has no positions.
 
@@ -151,25 +153,23 @@ def _add_strips(
         The cells, [k].
     around
         Halo table and rim at their corners, [k, 4].
-    links
-        Weights times conductances: south and north, west and east, rising, falling, [k].
     share
         Quarter of their area [m^2], [k].
     """
     halo, rim = around
-    # with which corner of the cell each of them moves
-    moves = np.tile(np.arange(4), (len(share), 1))
     for i in range(4):
+        belongs = np.full(len(share), i)
         for j in range(4):
-            moves[rim[:, i] & ~rim[:, j] & (halo[:, i] == halo[:, j]), i] = j
+            belongs[rim[:, i] & ~rim[:, j] & (halo[:, i] == halo[:, j])] = j
         for corner in range(4):
-            here = moves[:, i] == corner
+            here = belongs == corner
             sums.other_corners.append((corner, tuple(index[here] for index in strips), share[here]))
-    south_north, west_east, rising, falling = links
-    for i, j, weight in (
-        (0, 1, south_north), (2, 3, south_north), (0, 2, west_east), (1, 3, west_east), (0, 3, rising), (1, 2, falling)
-    ):  # fmt: skip
-        a, b = (i, j) if fixed else (np.minimum(moves[:, i], moves[:, j]), np.maximum(moves[:, i], moves[:, j]))
-        for (first, second), kind in _BETWEEN.items():
-            here = np.broadcast_to((a == first) & (b == second), share.shape)
-            sums.other_links.append((kind, tuple(index[here] for index in strips), weight[here]))
+
+
+def _link_strips(sums: _Sums, strips: Place, rim: Bools, x: list[Floats], conductance: Floats) -> None:
+    """The links between two texels beside a free rim, for the cells from them to that; rim [k, 4], corners [3, k]."""
+    for (i, j), kind in _BETWEEN.items():
+        p, q = 3 - j, 3 - i  # opposite
+        here = ~rim[:, i] & ~rim[:, j] & rim[:, p] & rim[:, q]
+        weight = strip(*(x[corner][:, here] for corner in (i, j, p, q)))
+        sums.other_links.append((kind, tuple(index[here] for index in strips), conductance[here] * weight))

@@ -2,7 +2,7 @@
 
 Vertices are the texel centres. Cells are the quads between four texels, also across glued sides, a triangle in each
 corner of three charts, and a polygon in corners of five and more. Only real-space coordinates enter. Between the last
-texels and a rim lies a strip of half a texel: its heights are those of the texels beside it, the natural boundary.
+texels and a rim lies a strip of half a texel: where the rim is free, heights in it change along the rim only.
 """
 
 from __future__ import annotations

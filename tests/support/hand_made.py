@@ -53,6 +53,15 @@ def square(n: int) -> TexelMesh:
     return flat_charts([[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]], [[RIM] * 4], n)
 
 
+def aslant(n: int, slope: float) -> TexelMesh:
+    """Unit square with free edges whose grid lines are bent, and end at the edges at an angle."""
+    place = ((np.arange(n + 2) - 0.5) / n).clip(0, 1)
+    u, v = np.meshgrid(place, place)
+    x, y = u + slope * np.sin(np.pi * u) * (v - 0.5), v + 0.7 * slope * np.sin(np.pi * v) * (u - 0.5)
+    places = np.stack([x, y, 0 * x], axis=-1)[None]
+    return TexelMesh.of(glue(np.array([[RIM] * 4]), n), places[:, 1:-1, 1:-1], beyond=places)
+
+
 def polygon(sides: int, n: int) -> TexelMesh:
     """Regular polygon with free edges, cut into charts from its centre: that many meet there."""
     angle = 2 * np.pi * np.arange(sides) / sides

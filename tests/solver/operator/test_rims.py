@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hand_made import disk, eigenvalues, polygon, square
+from hand_made import aslant, disk, eigenvalues, polygon, square
 from scipy.special import jn_zeros, jnp_zeros
 
 from ripple_sim.solver import Material, SolverError, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
@@ -22,7 +22,11 @@ def disk_modes(rim: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("rim", ["free", "fixed"])
-@pytest.mark.parametrize(("shape", "modes"), [(square, square_modes), (disk, disk_modes)], ids=["square", "disk"])
+@pytest.mark.parametrize(
+    ("shape", "modes"),
+    [(square, square_modes), (lambda n: aslant(n, 0.5), square_modes), (disk, disk_modes)],
+    ids=["square", "aslant", "disk"],
+)
 def test_eigenvalues_converge_at_second_order(shape, modes, rim: str) -> None:
     exact, errors = modes(rim)[1 : MODES + 1], []
     for n in (12, 24, 48):

@@ -31,8 +31,8 @@ def cell_by_cell(texels: TexelMesh, k: np.ndarray, s: np.ndarray) -> tuple[np.nd
         seen.add(frozenset(indices))
         conductance = len(indices) / (1 / k[indices]).sum() * s[indices].min()
         if len(indices) == 4:
-            sn, we, rising, falling, area = quad(*points)
-            ends, weights = [(0, 1), (2, 3), (0, 2), (1, 3), (0, 3), (1, 2)], [sn, sn, we, we, rising, falling]
+            *weights, area = quad(*points)
+            ends = [(0, 1), (2, 3), (0, 2), (1, 3), (0, 3), (1, 2)]
         else:
             *weights, area = triangle(*points)
             ends = [(1, 2), (2, 0), (0, 1)]

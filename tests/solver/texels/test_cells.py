@@ -11,7 +11,7 @@ from ripple_sim.solver.texels.cells import quad
 def test_waves_over_sheared_quads_are_in_time_in_the_mean_over_their_directions(long: float, angle: float) -> None:
     east = np.array([long, 0.0, 0.0])
     north = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
-    sides_ew, sides_ns, rising, falling, area = quad(0 * east, east, north, east + north)
+    south, north_side, west, east_side, rising, falling, area = quad(0 * east, east, north, east + north)
     direction = np.linspace(0, np.pi, 180, endpoint=False)
     errors = []
     for k in (0.2, 0.1):
@@ -19,14 +19,37 @@ def test_waves_over_sheared_quads_are_in_time_in_the_mean_over_their_directions(
         theta, phi = wave @ east, wave @ north
         # every side belongs to two quads
         squared = (
-            2 * sides_ew * (2 - 2 * np.cos(theta))
-            + 2 * sides_ns * (2 - 2 * np.cos(phi))
+            (south + north_side) * (2 - 2 * np.cos(theta))
+            + (west + east_side) * (2 - 2 * np.cos(phi))
             + rising * (2 - 2 * np.cos(theta + phi))
             + falling * (2 - 2 * np.cos(theta - phi))
         ) / area
         errors.append(abs(np.mean(squared / k**2) - 1))
     # the error in k^2 is gone, that in k^4 is left
     assert errors[1] < errors[0] / 14
+
+
+def test_a_quad_of_any_convex_shape_is_next_to_exact_for_linear_functions() -> None:
+    rng = np.random.default_rng(5)
+    ends = np.array([(0, 1), (2, 3), (0, 2), (1, 3), (0, 3), (1, 2)])
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    for _ in range(50):
+        angle = np.sort(rng.uniform(0, 2 * np.pi, 4))[[0, 1, 3, 2]]
+        corners = np.stack([np.cos(angle), 0.5 * np.sin(angle), 0 * angle], axis=1) @ turn
+        slope = turn.T @ np.array([*rng.standard_normal(2), 0.0])
+        *weights, area = quad(*corners)
+        if area < 0.1:
+            continue
+        matrix = np.zeros((4, 4))
+        for (i, j), weight in zip(ends, weights, strict=True):
+            matrix[[i, j], [j, i]] -= weight
+            matrix[[i, j], [i, j]] += weight
+        assert np.einsum("i,ij,j", corners @ slope, matrix, corners @ slope) == pytest.approx(
+            area * slope @ slope, rel=2e-3
+        )
+        # three motions have energy, a constant has none, and none has less than none
+        values = np.linalg.eigvalsh(matrix)
+        assert values[0] == pytest.approx(0, abs=1e-12 * values[-1]) and values[1] > 1e-3 * values[-1]
 
 
 @pytest.mark.parametrize("corners", [3, 4, 5, 8])

@@ -21,6 +21,10 @@ def element(corners: np.ndarray) -> tuple[np.ndarray, float]:
     stiffness = area * gradient.T @ gradient
     if len(corners) == 4:
         hourglass = np.array([1.0, -1, 1, -1])
+        # where the quad is uneven, linear functions have next to nothing of the pattern
+        unevenness = np.linalg.lstsq(frame.T, hourglass @ corners, rcond=None)[0]
+        share = unevenness @ unevenness / (unevenness @ unevenness + 1e-3)
+        hourglass -= share * (hourglass @ corners @ gradient)
         stiffness += hourglass_stiffness(frame, area) * np.outer(hourglass, hourglass)
         triangles = corners[[[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]]
         edges = triangles[:, 1:] - triangles[:, :1]
