@@ -38,8 +38,8 @@ def texel_meshes(mesh: Mesh, project: Callable[[np.ndarray], np.ndarray]) -> lis
     """At two resolutions, with the texels on the true surface."""
     patches = patch_map(mesh.V, mesh.F)
     meshes = []
-    for resolution in (16, 32):
-        texels = atlas_from_patch_map(mesh, patches, resolution).texels
+    for n in (5, 10):
+        texels = atlas_from_patch_map(mesh, patches, round(n * np.sqrt(len(patches.seamless.glued) / 6))).texels
         beyond = None if texels.beyond is None else project(texels.beyond)
         meshes.append(TexelMesh.of(texels.topology, project(texels.positions), normals=texels.normals, beyond=beyond))
     return meshes
