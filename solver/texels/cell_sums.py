@@ -110,7 +110,13 @@ def _add_up(cells: Cells, charts: slice, rows: slice) -> _Sums:
         if cells.fixed_rim:
             sums.other_links.extend((kind, strips, weight[strips]) for kind, weight in enumerate(weights))
         else:
-            _link_strips(sums, strips, around[1], [corner[:, *strips] for corner in x], conductance[strips])
+            _link_strips(
+                sums,
+                strips,
+                around[1],
+                [np.stack([axis[strips] for axis in corner]) for corner in x],
+                conductance[strips],
+            )
     _add_triangles(sums, cells, charts, rows)
     return sums
 
