@@ -1,5 +1,6 @@
 # make demo   sets up what running needs, then renders out/demo.mp4
 # make test   sets everything up, then runs the tests
+# make fuzz   10,000 strange inputs for each of the tests in tests/fuzz
 # make lint   ruff, mypy and the layers of packages
 # make docs   the documentation, into build/docs
 # make sphere-maps  writes the sphere maps of the shipped scenes again, after a change of a mesh or of the mapping
@@ -12,7 +13,7 @@ ALL := .venv/.installed
 KERNELS := solver/__pycache__/.kernels
 TYPES := build/types
 
-.PHONY: setup demo test lint docs package sphere-maps types clean
+.PHONY: setup demo test fuzz lint docs package sphere-maps types clean
 
 # what running needs; the targets for which that is too little set up the rest
 setup: $(RUNNING)
@@ -36,6 +37,10 @@ demo: setup $(KERNELS)
 # two processes, each with OpenGL and kernels of its own: as many as the smallest machine has cores
 test: $(ALL) $(KERNELS)
 	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+# much more of tests/fuzz, by chance; what it finds is kept in .hypothesis, and tried first the next time
+fuzz: $(ALL) $(KERNELS)
+	RIPPLE_SIM_FUZZ=10000 $(BIN)/python -m pytest tests/fuzz -n 2
 
 # mypy and the documentation know nothing of setuptools' package-dir, so they are shown the package as it is installed,
 # made of links.

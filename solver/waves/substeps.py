@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ripple_sim.solver.checked import shown, whole
 from ripple_sim.solver.errors import SolverError
 
 # A step that needs more is a mistake in a unit, and would run for ever.
 _MOST = 1_000_000
+_ONE_OR_MORE = whole(1)
 
 
 def count_substeps(dt: float, stable: float, asked: int | None) -> int:
@@ -34,6 +36,8 @@ def count_substeps(dt: float, stable: float, asked: int | None) -> int:
     needed = max(1, int(np.ceil(ratio)))
     if asked is None:
         return needed
+    if not _ONE_OR_MORE.holds(asked):
+        raise SolverError(f"substeps is {shown(asked)}; valid is {_ONE_OR_MORE.words}, or None for the fewest")
     if asked < needed:
         raise SolverError(
             f"{asked} substeps of {dt / max(asked, 1):.4g} s are longer than the stable {stable:.4g} s; "

@@ -201,7 +201,7 @@ class WaveSolver(WaveField):
     def add_pressure(self, pressure: ArrayLike) -> None:
         """Add a pressure field [Pa], a number or [C, n, n], positive inwards, that is held from now on."""
         shape = self.operator.mass.shape
-        field = as_field(np.broadcast_to(pressure, shape), "pressure", shape)
+        field = as_field(pressure, "pressure", shape)
         force = (field * self.atlas.areas).reshape(-1)
         texels = np.flatnonzero(force)
         self._held.add(Load(texels, force[texels]))

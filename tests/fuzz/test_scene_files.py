@@ -1,0 +1,97 @@
+"""Scene files and models of any content load, or raise our error."""
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fuzzing import NUMBERS, VALUES, fuzzed, outcome
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ripple_sim.errors import SceneError
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene import Scene
+from ripple_sim.scene.scene_file import SceneFile, parse_scene
+from ripple_sim.solver import RippleError
+
+TABLE: dict[str, Any] = {
+    "model": "model.xml",
+    "duration": 1.0,
+    "camera": {"lookat": [0.0, 0.0, 0.0], "distance": 2.0},
+    "ripple": [{"geom": "g", "material": {"speed": 1.0}, "still": [{"point": [0, 0, 1], "radius": 0.1}]}],
+    "drop": [{"body": "b", "time": 0.1}],
+    "poke": [{"geom": "g", "time": 0.2, "point": [0, 0, 1], "impulse": 1.0, "radius": 0.1}],
+}
+TEXT = """model = "model.xml"
+duration = 1.0
+[camera]
+lookat = [0.0, 0.0, 0.0]
+[[ripple]]
+geom = "g"
+look = "rubber"
+[ripple.material]
+speed = 0.6
+"""
+MODEL = '<mujoco><option {}/><worldbody><body name="b"><freejoint/><geom name="g" {}/></body></worldbody>{}</mujoco>'
+
+
+def places(value: Any, path: tuple = ()) -> list[tuple]:
+    """Paths to all values in a table."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [path, *(place for key, each in inner for place in places(each, (*path, key)))]
+
+
+@fuzzed
+@given(st.sampled_from(places(TABLE)[1:]), VALUES)
+def test_a_table_with_any_value_anywhere(place: tuple, value: Any) -> None:
+    table = copy.deepcopy(TABLE)
+    at = table
+    for key in place[:-1]:
+        at = at[key]
+    at[place[-1]] = value
+    assert isinstance(outcome(lambda: parse_scene(table, "scene.toml")), SceneFile | SceneError)
+
+
+@fuzzed
+@given(st.lists(st.tuples(st.integers(0, len(TEXT) - 1), st.binary(max_size=4)), min_size=1, max_size=4))
+def test_a_file_with_any_bytes_anywhere(tmp_path_factory: pytest.TempPathFactory, changes: list) -> None:
+    folder = tmp_path_factory.getbasetemp() / "changed"
+    folder.mkdir(exist_ok=True)
+    (folder / "model.xml").write_text(MODEL.format("", 'type="sphere" size="1"', ""))
+    content = TEXT.encode()
+    for place, new in changes:
+        content = content[:place] + new + content[place + len(new) :]
+    (folder / "scene.toml").write_bytes(content)
+    assert isinstance(outcome(lambda: load_scene(folder / "scene.toml")), Scene | RippleError)
+
+
+ATTRIBUTES = st.dictionaries(
+    st.sampled_from(["timestep", "gravity", "integrator", "cone", "iterations", "impratio"]),
+    NUMBERS.map(str) | st.sampled_from(["RK4", "elliptic", "0 0 nan", "a"]),
+    max_size=3,
+)
+GEOMS = st.dictionaries(
+    st.sampled_from(["type", "size", "mass", "density", "pos", "quat", "solref", "friction", "condim", "rgba"]),
+    NUMBERS.map(str) | st.sampled_from(["sphere", "box", "mesh", "0 0 0 0", "1 1 1", "nan 0 0", "plane", "sdf"]),
+    max_size=4,
+)
+KEYS = st.lists(NUMBERS, max_size=9).map(lambda row: f'<keyframe><key qpos="{" ".join(map(str, row))}"/></keyframe>')
+
+
+def written(attributes: dict[str, str]) -> str:
+    return " ".join(f'{name}="{value}"' for name, value in attributes.items())
+
+
+@fuzzed
+@given(ATTRIBUTES, GEOMS, KEYS | st.just(""))
+def test_a_model_with_any_numbers(tmp_path_factory: pytest.TempPathFactory, option: dict, geom: dict, key: str) -> None:
+    folder: Path = tmp_path_factory.getbasetemp() / "model"
+    folder.mkdir(exist_ok=True)
+    (folder / "scene.toml").write_text('model = "model.xml"\n[[ripple]]\ngeom = "g"\n')
+    (folder / "model.xml").write_text(MODEL.format(written(option), written({"size": "1", **geom}), key))
+    found = outcome(lambda: load_scene(folder / "scene.toml"))
+    assert isinstance(found, Scene | RippleError)
+    if isinstance(found, Scene):
+        assert 0 < found.model.opt.timestep < float("inf")
+    assert sorted(each.name for each in folder.iterdir()) == ["model.xml", "scene.toml"]
