@@ -13,6 +13,7 @@ from .mark import MARK, made_here
 
 MIN_SIZE, MAX_SIZE = 16, 8192
 MAX_FPS = 240
+_H264_BLOCKS = 139_264
 # Browsers slow a GIF down to 10 frames per second if a frame lasts less than 0.02 s.
 MAX_GIF_FPS = 50
 
@@ -104,6 +105,11 @@ def check_size(width: int, height: int) -> None:
 
 def _check_size(form: str, width: int, height: int) -> None:
     check_size(width, height)
+    if form == ".mp4" and -(-width // 16) * -(-height // 16) > _H264_BLOCKS:
+        raise VideoError(
+            f"frame size is {width}x{height}; .mp4 is H.264, whose highest level (6.2) ends at {_H264_BLOCKS} blocks "
+            "of 16x16, such as 8192x4352: make it smaller, or write .webm, .gif, .webp or a folder of frames"
+        )
     if form in _SUBSAMPLED and (width % 2 or height % 2):
         raise VideoError(
             f"frame size is {width}x{height}; {form} needs an even width and height, "

@@ -113,3 +113,21 @@ def test_a_file_that_appears_among_the_older_frames_meanwhile_is_not_deleted(tmp
 def test_default_rates_are_valid_for_their_formats(tmp_path: Path) -> None:
     for name in ("clip.mp4", "clip.webm", "clip.GIF", "clip.webp", "frames"):
         check_output(tmp_path / name, 64, 48, default_fps(tmp_path / name))
+
+
+def test_frames_beyond_the_highest_level_of_h264_are_refused_where_others_hold_them(tmp_path: Path) -> None:
+    check_output(tmp_path / "clip.mp4", 8192, 4352, 25)
+    with pytest.raises(VideoError, match=r"8192x8192; \.mp4 is H\.264.*or write \.webm, \.gif, \.webp or a folder"):
+        check_output(tmp_path / "clip.mp4", 8192, 8192, 25)
+    for name in ("clip.webm", "clip.gif", "clip.webp", "frames"):
+        check_output(tmp_path / name, 8192, 8192, 25)
+
+
+@pytest.mark.parametrize(
+    "name", ["a:b.mp4", "pipe:1.mp4", "concat:x.mp4", "file:z.gif", "%d.webm", "http:x.webp", "-.mp4"]
+)
+def test_no_name_is_taken_for_a_protocol(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    with open_writer(name, width=16, height=16, fps=25) as writer:
+        writer.write(np.zeros((16, 16, 3), np.uint8))
+    assert [each.name for each in tmp_path.iterdir()] == [name]
