@@ -5,6 +5,7 @@ Exit status: 0 done, 1 something failed, 2 bad input, 128 + a signal's number af
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import re
@@ -26,6 +27,7 @@ _LONGEST = 800  # of a message [characters]
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program with the arguments `argv` (by default the process's own) and return its exit status."""
     end_at_once()
+    _open_standard_streams()
     command = _parse(list(sys.argv[1:] if argv is None else argv))
     if isinstance(command, int):
         return command
@@ -68,8 +70,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _fail(message: object, status: int, ending: BaseException | None = None) -> int:
     """Print a message, with the notes of the exception that ended the command, in one line; return the status."""
     notes = getattr(message if ending is None else ending, "__notes__", [])
-    print(f"ripple-sim: {_one_line('; '.join([str(message), *notes]))}", file=sys.stderr)
+    with contextlib.suppress(OSError):  # standard error may be full, or a closed pipe
+        print(f"ripple-sim: {_one_line('; '.join([str(message), *notes]))}", file=sys.stderr, flush=True)
     return status
+
+
+def _open_standard_streams() -> None:
+    """Where the caller has closed one of them, open the null device: an output file would take its number."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free, this one
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open("w" if number else "r"))  # noqa: SIM115
 
 
 def _one_line(message: str) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.checked import PATH, checked
+from ripple_sim.solver.checked import PATH, checked, shown
 from ripple_sim.solver.errors import AtlasError
 from ripple_sim.solver.mesh.mesh import Mesh
 from ripple_sim.solver.mesh.triangle_tree import TriangleTree, closest_points, triangle_tree
@@ -200,8 +200,8 @@ def check_points(points: ArrayLike) -> NDArray[np.float64]:
     """Points as float64 [k, 3], or `AtlasError`."""
     try:
         array = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise AtlasError(f"points are {points!r}; valid are numbers of shape [3] or [k, 3], in metres") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise AtlasError(f"points are {shown(points)}; valid are numbers of shape [3] or [k, 3], in metres") from error
     if array.ndim == 0 or array.shape[-1] != 3 or array.ndim > 2:
         raise AtlasError(f"points have shape {array.shape}; valid is [3] or [k, 3], in metres")
     if not (np.abs(array) < _FARTHEST).all():

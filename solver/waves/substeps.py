@@ -36,8 +36,10 @@ def count_substeps(dt: float, stable: float, asked: int | None) -> int:
     needed = max(1, int(np.ceil(ratio)))
     if asked is None:
         return needed
-    if not _ONE_OR_MORE.holds(asked):
-        raise SolverError(f"substeps is {shown(asked)}; valid is {_ONE_OR_MORE.words}, or None for the fewest")
+    if not (_ONE_OR_MORE.holds(asked) and asked <= _MOST):
+        raise SolverError(
+            f"substeps is {shown(asked)}; valid is {_ONE_OR_MORE.words}, up to {_MOST}, or None for the fewest"
+        )
     if asked < needed:
         raise SolverError(
             f"{asked} substeps of {dt / max(asked, 1):.4g} s are longer than the stable {stable:.4g} s; "
