@@ -140,36 +140,30 @@ def _closest_in_triangle(corners: Floats, x: float, y: float, z: float) -> tuple
     return ax + s * ux + t * vx, ay + s * uy + t * vy, az + s * uz + t * vz
 
 
-@kernel
-def _in_halves(middles: Floats, leaves: int) -> Ints:
+# Built once, so in plain numpy, a level at a time: to compile that would take longer.
+def _in_halves(middles: NDArray[np.float64], leaves: int) -> NDArray[np.int64]:
     """Triangles in the order of the leaves: each node's are halved across its longest side, by their middles [m, 3]."""
-    order, count, level = np.arange(len(middles)), len(middles), 1
+    order, level = np.arange(len(middles)), 1
     while level < leaves:
-        for node in range(level):
-            mine = order[count * node // level : count * (node + 1) // level]
-            axis, widest = 0, -1.0
-            for k in range(3):
-                along = middles[mine, k]
-                if along.max() - along.min() > widest:
-                    axis, widest = k, along.max() - along.min()
-            mine[:] = mine[np.argsort(middles[mine, axis])]
+        starts = len(middles) * np.arange(level) // level
+        placed = middles[order]
+        sides = np.maximum.reduceat(placed, starts) - np.minimum.reduceat(placed, starts)
+        node = np.repeat(np.arange(level), np.diff(starts, append=len(middles)))
+        along = placed[np.arange(len(order)), sides.argmax(axis=1)[node]]
+        order = order[np.lexsort((along, node))]
         level *= 2
     return order
 
 
-@kernel
-def _boxes(corners: Floats, leaves: int) -> Floats:
+def _boxes(corners: NDArray[np.float64], leaves: int) -> NDArray[np.float64]:
     """Boxes of the tree's nodes, from the leaves up."""
-    boxes, count = np.empty((2 * leaves, 6)), len(corners)
-    boxes[:, :3], boxes[:, 3:] = np.inf, -np.inf
-    for leaf in range(leaves):
-        box = boxes[leaves + leaf]
-        for i in range(count * leaf // leaves, count * (leaf + 1) // leaves):
-            for j in range(3):
-                for k in range(3):
-                    box[k], box[3 + k] = min(box[k], corners[i, j, k]), max(box[3 + k], corners[i, j, k])
-    for node in range(leaves - 1, 0, -1):
-        for k in range(3):
-            boxes[node, k] = min(boxes[2 * node, k], boxes[2 * node + 1, k])
-            boxes[node, 3 + k] = max(boxes[2 * node, 3 + k], boxes[2 * node + 1, 3 + k])
+    boxes, starts = np.empty((2 * leaves, 6)), len(corners) * np.arange(leaves) // leaves
+    boxes[0] = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf  # no node
+    boxes[leaves:, :3] = np.minimum.reduceat(corners.min(axis=1), starts)
+    boxes[leaves:, 3:] = np.maximum.reduceat(corners.max(axis=1), starts)
+    while leaves > 1:
+        children = boxes[leaves : 2 * leaves].reshape(-1, 2, 6)
+        leaves //= 2
+        boxes[leaves : 2 * leaves, :3] = children[:, :, :3].min(axis=1)
+        boxes[leaves : 2 * leaves, 3:] = children[:, :, 3:].max(axis=1)
     return boxes

@@ -74,7 +74,8 @@ def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, scratch:
         if count + 8 > room:
             room *= 2
             longer = np.empty(room, np.int64)
-            longer[:count] = texels[:count]
+            for i in range(count):
+                longer[i] = texels[i]
             texels = longer
         chart, row, column = t // (n * n), t // n % n, t % n
         for i in range(3):

@@ -60,7 +60,10 @@ def geom_contacts(
         return {}
     each = data.contact
     pulls = np.zeros(data.ncon) if pulls is None else pulls
-    contacts = _MujocoContacts(each.efc_address, each.dim, each.frame, each.pos, each.dist, data.efc_force, pulls)
+    # one contact alone is an array of another layout than several: kernels would be compiled for each
+    fields = (each.efc_address, each.dim, each.frame, each.pos, each.dist)
+    address, dim, frame, pos, dist = map(np.ascontiguousarray, fields)
+    contacts = _MujocoContacts(address, dim, frame, pos, dist, data.efc_force, pulls)
     has_flex = np.zeros(len(is_target), dtype=np.bool_) if has_flex is None else has_flex
     pyramidal = model.opt.cone == PYRAMIDAL
     return _normal_contacts(colliders, contacts, is_target, has_flex, extents, pyramidal).by_target()
@@ -95,9 +98,9 @@ def _normal_contacts(
             row += 1
         if pull > 0:
             # the pair's own force, shared among its contacts by how much they bear
-            found.forces[first:row] *= (whole - pull) / whole
+            _multiply(found.forces, first, row, (whole - pull) / whole)
         if has_flex[pairs.others[pair]] and row > first and pull != whole:
-            found.forces[first:row] *= _unity(found.forces[first:row], found.normals[first:row])
+            _multiply(found.forces, first, row, _unity(found.forces[first:row], found.normals[first:row]))
         if row > first and pull != whole:
             found.targets[found_pairs], found.others[found_pairs] = pairs.targets[pair], pairs.others[pair]
             found.begins[found_pairs] = first
@@ -105,6 +108,13 @@ def _normal_contacts(
         else:
             row = first
     return trimmed(found, found_pairs, row)
+
+
+@kernel
+def _multiply(forces: Floats, first: int, last: int, factor: float) -> None:
+    """Multiply the forces from `first` to `last`."""
+    for i in range(first, last):
+        forces[i] *= factor
 
 
 @kernel

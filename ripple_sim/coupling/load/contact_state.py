@@ -86,7 +86,9 @@ def touch(state: Any, force: float, middle: Floats, place_radius: float, dt: flo
     if not state.active or has_left(state, dt):
         state.age, state.unbroken, state.level, state.mean = 0.0, 0.0, force, force
         state.chatters, state.springy = False, False
-        state.place[:], state.mean_place[:], state.jitter = middle, middle, place_radius
+        state.jitter = place_radius
+        for k in range(3):
+            state.place[k] = state.mean_place[k] = middle[k]
     elif state.absent > 0:
         if state.age > _ONSET and state.unbroken < max(_CHATTER_PERIOD, _CHATTER_STEPS * dt):
             state.springy = True

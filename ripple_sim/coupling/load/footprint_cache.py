@@ -152,5 +152,6 @@ def _first_row(cache: FootprintCache, geom: int) -> int:
 def _doubled(array: np.ndarray) -> np.ndarray:
     """An array with room for twice as many entries."""
     longer = np.empty(2 * len(array), array.dtype)
-    longer[: len(array)] = array
+    for i in range(len(array)):
+        longer[i] = array[i]
     return longer

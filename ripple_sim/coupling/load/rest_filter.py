@@ -96,8 +96,11 @@ def _mean_shares(
         if before.shares[i] > _LEAST_SHARE:
             at[count], values[0, count] = before.texels[i], before.shares[i]
             count += 1
-    values[0, :count] *= (1 - pace) / values[0, :count].sum()
-    new = slice(count, count + len(texels))
-    at[new], values[0, new], values[1, new] = texels, pace * shares, shares
-    at, sums = add_up_by(scratch, at[: new.stop], values[:, : new.stop])
+    fading = (1 - pace) / values[0, :count].sum()
+    for i in range(count):
+        values[0, i] *= fading
+    for i in range(len(texels)):
+        at[count + i], values[0, count + i], values[1, count + i] = texels[i], pace * shares[i], shares[i]
+    count += len(texels)
+    at, sums = add_up_by(scratch, at[:count], values[:, :count])
     return MeanShares(at, sums[0]), sums[1]

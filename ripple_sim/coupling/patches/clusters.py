@@ -46,10 +46,8 @@ def cluster(points: Floats, forces: Floats, radius: float) -> tuple[Floats, Floa
             for j in range(1, count):
                 if squared_distance(points, i, points, seeds[j]) < squared_distance(points, i, points, seeds[owner[i]]):
                     owner[i] = j
-        totals[owner[i]] += forces[i]
-        means[owner[i]] += forces[i] * points[i]
-    for j in range(count):
-        means[j] /= totals[j]
+        _add(means, totals, owner[i], points, forces, i)
+    _divide(means, totals, count)
     return means, totals
 
 
@@ -65,9 +63,26 @@ def merge_near(points: Floats, forces: Floats, near: float) -> tuple[Floats, Flo
         if owner == count:
             first[count] = i
             count += 1
-        totals[owner] += forces[i]
-        means[owner] += forces[i] * points[i]
-    return means[:count] / totals[:count].copy().reshape(-1, 1), totals[:count]
+        _add(means, totals, owner, points, forces, i)
+    _divide(means, totals, count)
+    return means[:count], totals[:count]
+
+
+# Number by number: expressions of arrays and assignments to slices take many times longer to compile.
+@kernel
+def _add(means: Floats, totals: Floats, owner: int, points: Floats, forces: Floats, i: int) -> None:
+    """Add point and force i to the sums of its owner."""
+    totals[owner] += forces[i]
+    for k in range(3):
+        means[owner, k] += forces[i] * points[i, k]
+
+
+@kernel
+def _divide(means: Floats, totals: Floats, count: int) -> None:
+    """Divide the first sums of points by those of forces."""
+    for j in range(count):
+        for k in range(3):
+            means[j, k] /= totals[j]
 
 
 @kernel

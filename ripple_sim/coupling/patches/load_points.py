@@ -43,11 +43,14 @@ def find_probes(points: Floats, forces: Floats, radius: float, convex: bool) -> 
     if count == 1 or not convex:
         return corner_forces, corners
     probes = np.empty((count * (count + 1) // 2, 3))
-    probes[:count] = corners
+    for i in range(count):
+        for k in range(3):
+            probes[i, k] = corners[i, k]
     row = count
     for i in range(count):
         for j in range(i + 1, count):
-            probes[row] = (corners[i] + corners[j]) / 2
+            for k in range(3):
+                probes[row, k] = (corners[i, k] + corners[j, k]) / 2
             row += 1
     return corner_forces, probes
 
@@ -85,8 +88,13 @@ def spread(corner_forces: Floats, probes: Floats, surface: Floats, radius: float
         return probes[touching], forces[touching], radius, touching
     total, middle = corner_forces.sum(), np.zeros(3)
     for i in range(count):
-        middle += corner_forces[i] / total * probes[i]
-    points, forces = merge_near(middle + _INSET * (probes - middle), forces, size / 8)
+        for k in range(3):
+            middle[k] += corner_forces[i] / total * probes[i, k]
+    inset = np.empty_like(probes)
+    for i in range(len(probes)):
+        for k in range(3):
+            inset[i, k] = middle[k] + _INSET * (probes[i, k] - middle[k])
+    points, forces = merge_near(inset, forces, size / 8)
     return points, forces, max(radius, _OVERLAP * size), np.full(len(forces), -1)
 
 
@@ -98,7 +106,8 @@ def _probe_forces(corner_forces: Floats, probes: Floats, surface: Floats, radius
     # contact points lie a little outside the surface, by up to their depth: so may the midpoints
     limit = away[:count].max() + radius / 10
     forces = np.zeros(len(probes))
-    forces[:count] = corner_forces**2 / total
+    for i in range(count):
+        forces[i] = corner_forces[i] ** 2 / total
     size, row = 0.0, count
     for i in range(count):
         for j in range(i + 1, count):
