@@ -1,6 +1,10 @@
 """Errors of the application. Like the solver's, each is a `RippleError`."""
 
-from ripple_sim.solver.errors import RippleError
+from ripple_sim.solver.errors import RippleError, RippleWarning
+
+__all__ = [
+    "DisplayError", "EncodingError", "RippleError", "RippleWarning", "SceneError", "SimulationError", "VideoError",
+]  # fmt: skip
 
 
 class VideoError(RippleError):
@@ -21,7 +25,3 @@ class SimulationError(RippleError):
 
 class DisplayError(RippleError):
     """There is no display for a window, or the web page cannot be served."""
-
-
-class RippleWarning(UserWarning):
-    """Something runs, but not as expected: a hull off its surface, a body too fast for the time step."""

@@ -26,3 +26,7 @@ class SolverError(RippleError):
 
 class GLError(RippleError):
     """No usable OpenGL context, or the driver reported an error."""
+
+
+class RippleWarning(UserWarning):
+    """Something runs, but not as expected: a hull off its surface, a body too fast for the time step."""

@@ -16,11 +16,12 @@ import msgspec
 from ripple_sim.render import LIGHTING, LOOKS
 from ripple_sim.scene import scene_file
 from ripple_sim.scene.body_shapes import BODY_SHAPES
-from ripple_sim.scene.material_entry import PRESETS
+from ripple_sim.scene.material_entry import LAWS
 from ripple_sim.scene.overlays import NAMES as OVERLAYS
 from ripple_sim.solver import Material
 from ripple_sim.solver.atlas.layouts import LAYOUTS
 from ripple_sim.solver.operator.assembly import RIMS
+from ripple_sim.solver.operator.presets import PRESETS
 from ripple_sim.solver.texels.maps import CHANNELS
 
 _TYPES = {
@@ -43,8 +44,8 @@ _WORDS: dict[str, Iterable[str]] = {
     "rim": RIMS,
     "lighting": LIGHTING,
     "overlay": OVERLAYS,
-    "preset": PRESETS,
-    "name": PRESETS,
+    "preset": (*LAWS, *PRESETS),
+    "name": (*LAWS, *PRESETS),
     "shapes": BODY_SHAPES,
     "channel": CHANNELS,
 }
@@ -91,7 +92,7 @@ def key_texts(entry: type[msgspec.Struct]) -> dict[str, str]:
     sources = {
         scene_file.MaterialEntry: {"": Material},
         scene_file.MaterialChange: {"": Material},
-        scene_file.PresetEntry: {f"`{preset}`: ": getattr(Material, preset) for preset in PRESETS},
+        scene_file.PresetEntry: {f"`{preset}`: ": getattr(Material, preset) for preset in LAWS},
     }
     texts: dict[str, list[str]] = {"name": ["The preset."]} if entry is scene_file.PresetEntry else {}
     for where, source in sources.get(entry, {}).items():

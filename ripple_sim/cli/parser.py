@@ -20,6 +20,7 @@ from .bench_command import Bench
 from .cache_command import Cache
 from .completion_command import Completion
 from .info_command import Info
+from .materials_command import Materials
 from .render_commands import Drop, Render
 from .view_command import View
 
@@ -30,6 +31,7 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "info": Info,
     "bench": Bench,
     "view": View,
+    "materials": Materials,
     "cache": Cache,
     "completion": Completion,
 }

@@ -15,8 +15,10 @@ import msgspec
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
+from ripple_sim.solver.operator.presets import PRESETS
 
-PRESETS = ("membrane", "jelly", "plate", "dent")
+# Constructors of `Material`; the presets of a scene file are these and the real materials by name.
+LAWS = ("membrane", "layer", "jelly", "plate", "dent")
 
 # The numbers among `Material`'s fields; the others are flags.
 COEFFICIENTS = tuple(field.name for field in dataclasses.fields(Material) if isinstance(field.default, float))
@@ -44,17 +46,20 @@ def _struct(fields: Iterable[str], kind: Any, *required: tuple[str, type]) -> An
     return msgspec.defstruct("_Fields", [*required, *optional], forbid_unknown_fields=True)
 
 
-def _parameters(preset: str) -> dict[str, inspect.Parameter]:
-    return dict(inspect.signature(getattr(Material, preset)).parameters)
+def _parameters(law: str) -> dict[str, inspect.Parameter]:
+    return dict(inspect.signature(getattr(Material, law)).parameters)
 
 
-_OfPresets: Any = _struct({name: None for preset in PRESETS for name in _parameters(preset)}, float, ("name", str))
+_OfPresets: Any = _struct({name: None for law in LAWS for name in _parameters(law)}, float, ("name", str))
 _OfMaterial: Any = _struct(COEFFICIENTS, Coefficient)
 _Numbers: Any = _struct(COEFFICIENTS, float)
 
 
 class PresetEntry(_OfPresets):
-    """A preset by name, with the parameters of `Material.membrane`, `jelly`, `plate` or `dent`, in their units."""
+    """A preset by name, with its parameters in their units.
+
+    The name is a constructor of `Material`, membrane, layer, jelly, plate or dent, or a real material, see `PRESETS`.
+    """
 
     def material(self) -> Material:
         """The preset's material.
@@ -64,14 +69,19 @@ class PresetEntry(_OfPresets):
         SceneError
             For an unknown preset, a parameter that it does not take, or a missing one.
         """
-        if self.name not in PRESETS:
-            raise SceneError(f"ripple.material.preset {self.name!r} does not exist; valid are {', '.join(PRESETS)}")
-        parameters, given = _parameters(self.name), given_fields(self, without="name")
+        if self.name not in (*LAWS, *PRESETS):
+            raise SceneError(
+                f"ripple.material.preset {self.name!r} does not exist; valid are {', '.join((*LAWS, *PRESETS))}"
+            )
+        given, real = given_fields(self, without="name"), self.name in PRESETS
+        parameters = _parameters(PRESETS[self.name].law if real else self.name)
         for key in given:
             if key not in parameters:
                 raise SceneError(
                     f"the preset {self.name!r} has no parameter {key!r}; valid are {', '.join(parameters)}"
                 )
+        if real:
+            return Material.preset(self.name, **given)
         for key, parameter in parameters.items():
             if parameter.default is inspect.Parameter.empty and key not in given:
                 raise SceneError(

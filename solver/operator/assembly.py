@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 
 import numpy as np
@@ -15,6 +14,7 @@ from ripple_sim.solver.texels.softening import softening
 from ripple_sim.solver.texels.stencil import Stencil
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
+from .coefficients import LIMITS
 from .material import Material
 from .wave_operator import WaveOperator
 
@@ -50,7 +50,7 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: str = "free
         raise SolverError(f"rim {rim!r} does not exist; valid are {', '.join(map(repr, RIMS))}")
     if kind not in OPERATORS:
         raise SolverError(f"operator {kind!r} does not exist; valid are {', '.join(map(repr, OPERATORS))}")
-    field = {each.name: material.texels(each.name, atlas.areas.shape) for each in dataclasses.fields(material)}
+    field = {name: material.texels(name, atlas.areas.shape) for name in (*LIMITS, "fixed")}
     density, area, texels = field["density"], atlas.areas, atlas.texels
     if rim == "fixed":
         texels = texels.with_fixed_rim()

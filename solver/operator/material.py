@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from ripple_sim.solver.errors import SolverError
 
 from .coefficients import LIMITS, check_mask, check_numbers, require_positive
+from .layer import layer_coefficients, layer_wavelengths
+from .presets import preset_named
 from .suited import suited_coefficients
 from .unset import Unset
 
@@ -45,6 +47,9 @@ class Material:
         Deformation beyond it is permanent (see `dent`). Infinite: fully elastic.
     fixed : bool
         Where True, the surface is clamped: its height stays 0 and waves come back inverted.
+    wavelengths : (float, float)
+        Shortest and longest wave for which the coefficients stand for the real material [m]. `WaveSolver` warns where
+        an atlas has room for none of them.
 
     A density that is not given is 1 to `WaveSolver`, which knows nothing of a scale. `Ripples` takes it from the model,
     and with it those of speed, damping and stiffness that are not given; see `suited_material`.
@@ -58,6 +63,7 @@ class Material:
     bending: float | ArrayLike = 0.0
     yield_height: float | ArrayLike = np.inf
     fixed: bool | ArrayLike = False
+    wavelengths: tuple[float, float] = (0.0, np.inf)
 
     @classmethod
     def suited(
@@ -119,15 +125,40 @@ class Material:
         return cls(speed=(tension / density) ** 0.5, density=density, damping=damping)
 
     @classmethod
+    def layer(
+        cls, modulus: float, viscosity: float = 0.0, density: float = 1000.0, thickness: float | ArrayLike = 0.05
+    ) -> Material:
+        """Soft layer bonded to a rigid core: where it is thin it is stiff and soon still, where thick soft and slow.
+
+        The waves that normal impacts drive: the lowest normal mode of an incompressible Kelvin-Voigt layer on a rigid
+        base, whose modulus is G + eta d/dt. With c_T^2 = G / rho its frequency is, within 3.0 % for 1.3 <= q d <= 8,
+        omega^2 = 6.527 (c_T / d)^2 + 0.7668 c_T^2 q^2, a fit to the zeros of the mode's determinant (Achenbach 1973,
+        chapter 6, for the waves in a layer); waves shorter than 0.8 d or longer than 4.8 d are outside of it.
+        All forces in the layer go with the modulus, so that eta gives damping and viscosity in the same two terms.
+        The density is the mode's share of the layer's mass, 0.665 rho d, within a quarter for 1.6 <= q d <= 8.
+
+        Parameters
+        ----------
+        modulus : G [Pa]
+            Shear modulus.
+        viscosity : eta [Pa s]
+        density : rho [kg/m^3]
+        thickness : d [m]
+            A number, or one at every texel, [C, n, n].
+
+        Raises
+        ------
+        SolverError
+            If a number is not finite and greater than 0; the viscosity may be 0.
+        """
+        coefficients = layer_coefficients(modulus, viscosity, density, thickness)
+        return cls(**coefficients, wavelengths=layer_wavelengths(thickness))  # type: ignore[arg-type]
+
+    @classmethod
     def jelly(
         cls, modulus: float = 500.0, viscosity: float = 2.0, thickness: float = 0.1, density: float = 1000.0
     ) -> Material:
-        """Soft layer on a rigid core: it wobbles at its own frequency and settles.
-
-        The first thickness mode h sin(pi z / 2 d) of a Kelvin-Voigt layer of thickness d, held at its base and free at
-        its surface, carries waves along the layer with c^2 = G / rho, k = c^2 (pi / 2 d)^2, nu = eta / rho,
-        zeta = nu (pi / 2 d)^2 and half of the layer's mass, sigma = rho d / 2 (Achenbach 1973, chapter 6, for layers;
-        the modulus becomes G + eta d/dt).
+        """Soft jelly on a rigid core: a `layer` that wobbles at its own frequency and settles.
 
         Parameters
         ----------
@@ -137,15 +168,23 @@ class Material:
         thickness : d [m]
         density : rho [kg/m^3]
         """
-        require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))
-        across = (np.pi / 2 / thickness) ** 2
-        return cls(
-            speed=(modulus / density) ** 0.5,
-            stiffness=modulus / density * across,
-            viscosity=viscosity / density,
-            damping=viscosity / density * across,
-            density=density * thickness / 2,
-        )
+        return cls.layer(modulus, viscosity, density, thickness)
+
+    @classmethod
+    def preset(cls, name: str, **parameters: float) -> Material:
+        """Real material by its name in `PRESETS`, with some parameters of its constructor changed.
+
+        Raises
+        ------
+        SolverError
+            For an unknown name or parameter.
+        """
+        chosen = preset_named(name)
+        unknown = [key for key in parameters if key not in chosen.parameters]
+        if unknown:
+            valid = ", ".join(chosen.parameters)
+            raise SolverError(f"the preset {name!r} has no parameter {unknown[0]!r}; valid are {valid}")
+        return getattr(cls, chosen.law)(**{**chosen.parameters, **parameters})
 
     @classmethod
     def plate(

@@ -13,6 +13,7 @@ from ripple_sim.solver.errors import SolverError
 from ripple_sim.solver.operator.assembly import build_operator
 from ripple_sim.solver.operator.material import Material
 from ripple_sim.solver.operator.wave_operator import WaveOperator
+from ripple_sim.solver.operator.wavelengths import warn_of_wavelengths
 from ripple_sim.solver.texels.atlas import Atlas
 
 from .finite import as_field, require_finite
@@ -73,6 +74,7 @@ class WaveSolver(WaveField):
         conserve_volume: bool = True,
     ) -> None:
         self.material = material if material is not None else Material()
+        warn_of_wavelengths(atlas, self.material)
         self._begin(atlas, build_operator(atlas, self.material, operator, rim), backend, conserve_volume)
 
     def _begin(self, atlas: Atlas, operator: WaveOperator, backend: str, conserve_volume: bool) -> None:

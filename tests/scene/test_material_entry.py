@@ -19,6 +19,9 @@ def material_of(table: dict) -> Material:
         ({}, Material()),
         ({"speed": 2, "density": 5.0}, Material(speed=2.0, density=5.0)),
         ({"preset": "jelly"}, Material.jelly()),
+        ({"preset": {"name": "layer", "modulus": 2e3, "thickness": 0.02}}, Material.layer(2e3, thickness=0.02)),
+        ({"preset": "gelatine-7"}, Material.preset("gelatine-7")),
+        ({"preset": {"name": "drum-skin", "tension": 4500.0}}, Material.preset("drum-skin", tension=4500.0)),
         ({"preset": "plate"}, Material.plate()),
         ({"preset": {"name": "membrane", "tension": 8.0, "density": 2.0}}, Material.membrane(8.0, 2.0)),
         ({"preset": {"name": "dent", "yield_height": 0.01}}, Material.dent(0.01)),
@@ -40,7 +43,7 @@ def test_preset_gives_what_is_left_out(table: dict, expected: Material) -> None:
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"preset": "foam"}, "'foam' does not exist; valid are membrane, jelly, plate, dent"),
+        ({"preset": "foam"}, "'foam' does not exist; valid are membrane, layer, jelly, plate, dent, gelatine-3"),
         (
             {"preset": {"name": "membrane", "modulus": 1.0}},
             "no parameter 'modulus'; valid are tension, density, damping",
