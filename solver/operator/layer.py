@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.solver.checked import POSITIVE, is_finite, shown
 from ripple_sim.solver.errors import SolverError
@@ -44,10 +46,10 @@ def layer_wavelengths(thickness: ArrayLike) -> tuple[float, float]:
     return SHORTEST * float(np.max(depth)), LONGEST * float(np.min(depth))
 
 
-def _thickness(value: ArrayLike) -> ArrayLike:
+def _thickness(value: Any) -> float | NDArray[np.float64]:
     if np.ndim(value) == 0:  # a word, too
         require_positive(thickness=(value, "m"))
-        return float(value)  # type: ignore[arg-type]
+        return float(value)
     depth = np.asarray(value)
     wrong = ~(np.isfinite(depth) & (depth > 0)) if np.issubdtype(depth.dtype, np.number) else np.ones(1, np.bool_)
     if wrong.any():

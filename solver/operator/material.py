@@ -63,7 +63,7 @@ class Material:
     bending: float | ArrayLike = 0.0
     yield_height: float | ArrayLike = np.inf
     fixed: bool | ArrayLike = False
-    wavelengths: tuple[float, float] = (0.0, np.inf)
+    wavelengths: ArrayLike = (0.0, np.inf)
 
     @classmethod
     def suited(
@@ -152,7 +152,7 @@ class Material:
             If a number is not finite and greater than 0; the viscosity may be 0.
         """
         coefficients = layer_coefficients(modulus, viscosity, density, thickness)
-        return cls(**coefficients, wavelengths=layer_wavelengths(thickness))  # type: ignore[arg-type]
+        return cls(**coefficients, wavelengths=layer_wavelengths(thickness))
 
     @classmethod
     def jelly(

@@ -17,7 +17,7 @@ _TEXELS = 6.0
 
 def warn_of_wavelengths(atlas: Atlas, material: Material) -> None:
     """Warn where no wave that fits on an atlas is one that the material's coefficients hold for."""
-    shortest, longest = material.wavelengths
+    shortest, longest = np.asarray(material.wavelengths, dtype=np.float64)
     areas = atlas.areas
     finest, whole = _TEXELS * float(np.sqrt(np.mean(areas))), float(np.sqrt(np.pi * areas.sum()))
     if longest < finest:
