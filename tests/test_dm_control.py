@@ -1,13 +1,13 @@
 """dm_control's `Physics` ripples, though it ends its steps with the beginning of the next one."""
 
 import importlib.util
-import types
 import warnings
 from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
+from stand_in_physics import StandIn
 
 from ripple_sim import Material, RippleRenderer, Ripples, RippleWarning
 from ripple_sim.dm_control import couple
@@ -21,30 +21,6 @@ MATERIALS = {"block": Material(speed=1.0, density=100.0)}
 OPTIONS: dict[str, Any] = {"resolution": 16, "backend": "cpu"}
 
 
-class StandIn:
-    """Steps and wraps as dm_control's `Physics` does, where that is not installed."""
-
-    legacy_step = True
-
-    def __init__(self) -> None:
-        model = mujoco.MjModel.from_xml_string(MODEL)
-        self.model, self.data = types.SimpleNamespace(ptr=model), types.SimpleNamespace(ptr=mujoco.MjData(model))
-        self.reset()
-
-    def reset(self) -> None:
-        mujoco.mj_resetData(self.model.ptr, self.data.ptr)
-        mujoco.mj_forward(self.model.ptr, self.data.ptr)
-
-    def step(self, nstep: int = 1) -> None:
-        if not self.legacy_step:
-            mujoco.mj_step(self.model.ptr, self.data.ptr, nstep)
-            return
-        mujoco.mj_step2(self.model.ptr, self.data.ptr)
-        if nstep > 1:
-            mujoco.mj_step(self.model.ptr, self.data.ptr, nstep - 1)
-        mujoco.mj_step1(self.model.ptr, self.data.ptr)
-
-
 def dm_control_physics() -> Any:
     from dm_control.mujoco import Physics
 
@@ -52,7 +28,11 @@ def dm_control_physics() -> Any:
 
 
 # the stand-in everywhere, and the package itself where it is installed
-KINDS = [StandIn, *([dm_control_physics] if importlib.util.find_spec("dm_control") else [])]
+def stand_in() -> StandIn:
+    return StandIn(MODEL)
+
+
+KINDS = [stand_in, *([dm_control_physics] if importlib.util.find_spec("dm_control") else [])]
 
 
 @pytest.mark.parametrize("make", KINDS)
@@ -83,7 +63,7 @@ def test_each_physics_step_counts(make: Any, legacy: bool, monkeypatch: pytest.M
 
 
 def test_its_wrappers_are_drawn_as_they_are() -> None:
-    physics = StandIn()
+    physics = StandIn(MODEL)
     ripples = couple(physics, MATERIALS, **OPTIONS)
     frame = RippleRenderer(physics.model, ripples, width=32, height=24).render(physics.data)
     assert frame.shape == (24, 32, 3)
