@@ -25,15 +25,15 @@ def insert(seamless: SeamlessMap, reference: Reference, across: Transitions, mer
     star = np.empty((largest, TERMS))
     for u in range(first, len(seamless.x)):
         degree = gather(seamless, reference, u, star)
-        _place(seamless, reference, u, merged[u], star, degree)
-        _settle(seamless, across, u)
+        place(seamless, reference, u, merged[u], star, degree)
+        settle(seamless, across, u)
         x, y = seamless.x[u, 0], seamless.x[u, 1]
         relax_vertex(seamless, reference, u, star)
         rehome_vertex(seamless, across, u, x, y)
 
 
 @kernel
-def _place(seamless: SeamlessMap, reference: Reference, u: int, v: int, star: Floats, degree: int) -> None:
+def place(seamless: SeamlessMap, reference: Reference, u: int, v: int, star: Floats, degree: int) -> None:
     """Put u, in the frame that it begins with, on a way from v, where its star's energy is least."""
     start = seamless.star_start[u]
     x = y = left_x = left_y = right_x = right_y = middle_x = middle_y = 0.0
@@ -104,7 +104,7 @@ def _other_end(seamless: SeamlessMap, u: int, v: int, star: Floats, degree: int)
 
 
 @kernel
-def _settle(seamless: SeamlessMap, across: Transitions, u: int) -> None:
+def settle(seamless: SeamlessMap, across: Transitions, u: int) -> None:
     """Find the chart in which u lies, on a straight way from a neighbour, and take its frame."""
     first, last = seamless.star_start[u], seamless.star_start[u + 1]
     f, k, j = 0, 0, -1

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Floats, Ints, kernel
 
+from .cones import move_tips
 from .energy import Reference, reference_of, total_energy
 from .frames import after, inverse
 from .insertion import insert
@@ -27,6 +28,7 @@ _POWER = 2
 _GROWTH = 1.8  # of the vertices from one relaxation to the next
 _SWEEPS = 2
 _MOST_STEPS, _TIRED = 20, 5e-3  # stop when a step lowers the energy by less than this share
+_MOST_MOVES = 8  # of a tip, by an edge each
 _LEAST_CG_STEPS, _MOST_CG_STEPS, _SHORT_STEP = 10, 80, 0.3
 
 
@@ -49,6 +51,7 @@ def relaxed(quads: Quads) -> SeamlessMap:
         if count > _GROWTH * done or each is rounds[0]:
             _relax(level, reference, across)
             done = count
+    _place_tips(level, reference, across)
     result = seamless_map(quads)
     for name in ("x", "chart", "freedom", "moved"):
         getattr(result, name)[order] = getattr(level, name)
@@ -99,6 +102,15 @@ def _gathered(
         current = kept
         result.append(current)
     return result
+
+
+def _place_tips(level: SeamlessMap, reference: Reference, across: Transitions) -> None:
+    """Move the tips of cones to better places, and the map after them."""
+    for i in range(_MOST_MOVES):
+        if not move_tips(level, reference, across):
+            return
+        _sweep(level, reference, across, i % 2 == 0)
+    _relax(level, reference, across)
 
 
 def _relax(level: SeamlessMap, reference: Reference, across: Transitions) -> None:
