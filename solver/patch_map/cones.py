@@ -34,15 +34,16 @@ class _Round(NamedTuple):
 
 
 @kernel
-def move_tips(seamless: SeamlessMap, reference: Reference, across: Transitions) -> int:
-    """Move each tip to the first neighbour where the energy is lower; return how many have moved."""
+def move_tips(seamless: SeamlessMap, reference: Reference, across: Transitions, tips: Ints) -> Ints:
+    """Move each of these tips to the first neighbour where the energy is lower; return where those are that moved."""
     largest = 0
     for v in range(len(seamless.x)):
         largest = max(largest, seamless.star_start[v + 1] - seamless.star_start[v])
     star, fan = np.empty((largest, TERMS)), np.empty((2, largest), np.int64)
     mark = np.zeros(len(seamless.x) + len(seamless.F), np.int64)
-    moves = stamp = 0
-    for v in np.flatnonzero(seamless.freedom == FIXED):
+    count = stamp = 0
+    moved = np.empty(len(tips), np.int64)
+    for v in tips:
         for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
             h = seamless.star[i]
             u = seamless.F[h // 3, (h % 3 + 1) % 3]
@@ -52,9 +53,10 @@ def move_tips(seamless: SeamlessMap, reference: Reference, across: Transitions) 
             stamp += 1
             beside = _beside(seamless, v, u, mark, stamp)
             if len(beside.vertices) and _moved(seamless, reference, across, beside, fan, star):
-                moves += 1
+                moved[count] = u
+                count += 1
                 break
-    return moves
+    return moved[:count]
 
 
 @kernel

@@ -19,13 +19,13 @@ from .seamless import SeamlessMap
 from .sizes import cell_sizes
 from .surface import Surface
 
-CELLS = 48
-_MOST_CELLS = 96  # of a mesh in parts of uneven sizes
+CELLS = 96
+_MOST_CELLS = 128  # of a mesh in parts of uneven sizes
 _FEWEST = 0.5  # cells that the smallest part should have by its area; in truth it has four
 _NEGLIGIBLE = 2e-3  # share of the area of a part for which no others are cut smaller
 _RADIUS = 0.75  # of a cell, over the root of its share of the area
 _REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
-_SMALLEST = 0.6  # of the radius of cells elsewhere
+_SMALLEST = 0.85  # of the radius of cells elsewhere
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 

@@ -18,7 +18,7 @@ from .frames import after, inverse
 from .insertion import insert
 from .newton import newton_step
 from .quads import Quads
-from .seamless import SeamlessMap, Transitions, frame_of, seamless_map, stars, transitions
+from .seamless import FIXED, SeamlessMap, Transitions, frame_of, seamless_map, stars, transitions
 from .surface import edges_of
 from .sweep import sweep
 from .thinning import Round, thinned
@@ -28,7 +28,7 @@ _POWER = 2
 _GROWTH = 1.8  # of the vertices from one relaxation to the next
 _SWEEPS = 2
 _MOST_STEPS, _TIRED = 20, 5e-3  # stop when a step lowers the energy by less than this share
-_MOST_MOVES = 8  # of a tip, by an edge each
+_MOST_MOVES = 5  # of a tip, by an edge each
 _LEAST_CG_STEPS, _MOST_CG_STEPS, _SHORT_STEP = 10, 80, 0.3
 
 
@@ -53,6 +53,8 @@ def relaxed(quads: Quads) -> SeamlessMap:
             done = count
     _place_tips(level, reference, across)
     result = seamless_map(quads)
+    if not total_energy(level, reference) < np.inf:
+        return result  # a vertex found no place: the map of the quads has no fold
     for name in ("x", "chart", "freedom", "moved"):
         getattr(result, name)[order] = getattr(level, name)
     return result._replace(turn=level.turn, shift=level.shift)
@@ -106,9 +108,11 @@ def _gathered(
 
 def _place_tips(level: SeamlessMap, reference: Reference, across: Transitions) -> None:
     """Move the tips of cones to better places, and the map after them."""
+    tips = np.flatnonzero(level.freedom == FIXED)
     for i in range(_MOST_MOVES):
-        if not move_tips(level, reference, across):
-            return
+        tips = move_tips(level, reference, across, tips)
+        if not len(tips):
+            break
         _sweep(level, reference, across, i % 2 == 0)
     _relax(level, reference, across)
 
