@@ -21,7 +21,7 @@ from .seamless import FIXED, FREE, SeamlessMap, Transitions, frame_of
 from .sweep import TERMS, gather, relax_vertex
 from .wander import rehome_vertex
 
-_RINGS = 3  # of vertices that a tip's move may move
+_LAYERS = 3  # of vertices that a tip's move may move
 _SWEEPS = 3  # over the vertices round a tip, before it is judged
 _WORTH = 1e-3  # share of the energy round a tip that a move must save
 
@@ -83,12 +83,12 @@ def _beside(seamless: SeamlessMap, v: int, u: int, mark: Ints, stamp: int) -> _R
     vertices, triangles = [v, u], [np.int64(0) for _ in range(0)]
     mark[v] = mark[u] = stamp
     first, last = 0, 2
-    for ring in range(_RINGS):
+    for layer in range(_LAYERS):
         for at in range(first, last):
             for i in range(seamless.star_start[vertices[at]], seamless.star_start[vertices[at] + 1]):
                 h = seamless.star[i]
                 w = seamless.F[h // 3, (h % 3 + 1) % 3]
-                if ring == 0 and seamless.freedom[w] == FIXED and w != v:
+                if layer == 0 and seamless.freedom[w] == FIXED and w != v:
                     return _Round(np.empty(0, np.int64), np.empty(0, np.int64))
                 if mark[w] != stamp:
                     mark[w] = stamp
