@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .errors import AtlasError, GLError, MeshError, RippleError, SolverError, SphereMapError
     from .mesh.mesh import Mesh
     from .mesh.mesh_file import load_mesh
+    from .mesh.volume import Volume
     from .mesh.wrap import Wrap, wrap
     from .operator.absorbing import absorbing_damping
     from .operator.material import Material
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from .texels.maps import texture_map, vertex_map
     from .texels.texel_atlas import texel_atlas
     from .texels.texel_mesh import TexelMesh
+    from .texels.thickness_map import thickness_map
     from .texels.topology import TexelTopology
     from .waves.footprint import Footprint
     from .waves.height_map import HeightMap
@@ -45,6 +47,7 @@ _HOME = {
     "SphereMapError": "errors",
     "TexelMesh": "texels.texel_mesh",
     "TexelTopology": "texels.topology",
+    "Volume": "mesh.volume",
     "WaveSolver": "waves.wave_solver",
     "Wrap": "mesh.wrap",
     "absorbing_damping": "operator.absorbing",
@@ -55,6 +58,7 @@ _HOME = {
     "sphere_atlas": "cube_map.sphere_atlas",
     "texel_atlas": "texels.texel_atlas",
     "texture_map": "texels.maps",
+    "thickness_map": "texels.thickness_map",
     "vertex_map": "texels.maps",
     "wrap": "mesh.wrap",
 }
@@ -75,6 +79,7 @@ __all__ = [
     "SphereMapError",
     "TexelMesh",
     "TexelTopology",
+    "Volume",
     "WaveSolver",
     "Wrap",
     "absorbing_damping",
@@ -85,6 +90,7 @@ __all__ = [
     "sphere_atlas",
     "texel_atlas",
     "texture_map",
+    "thickness_map",
     "vertex_map",
     "wrap",
 ]

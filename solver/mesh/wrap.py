@@ -16,14 +16,13 @@ from ripple_sim.solver.errors import MeshError
 
 from .counting import counted
 from .distance_grid import distance_grid, filled
+from .isosurface import zero_surface
 from .mesh import Mesh
 
 # Below, the grid has more than some 20 million nodes; above, little of the object's shape is left.
 _SMALLEST, _LARGEST = 0.004, 0.2
 # Nodes nearer to the surface than this share of the spacing are moved off it: they would make slivers.
 _CLEAR = 0.05
-# Corners of a grid cell as `igl.marching_cubes` counts them: along x, y, z.
-_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -80,7 +79,7 @@ def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:
     values, origin = distance_grid(mesh.V, mesh.F, distance)
     values = filled(values - distance)
     values = np.where(values < 0, np.minimum(values, -_CLEAR * distance), np.maximum(values, _CLEAR * distance))
-    V, F = _surface(values, origin, distance)
+    V, F = zero_surface(values, origin, distance)
     found = Mesh.from_arrays(V, F, name=mesh.name)
     note = (
         f"wrapped, {distance:.3g} m off: {counted(mesh.component_count, 'part')} in "
@@ -89,24 +88,6 @@ def wrap(mesh: Mesh, offset: float = 0.015) -> Wrap:
     )
     surface = dataclasses.replace(found, notes=(*mesh.notes, note))
     return Wrap(surface, mesh, *_nearest(surface, mesh.V), distance)
-
-
-def _surface(
-    values: NDArray[np.float64], origin: NDArray[np.float64], spacing: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Triangles where values on a grid [x, y, z] change their sign, from those cells alone in which they do."""
-    inside = values < 0
-    corners = [inside[tuple(slice(d, n - 1 + d) for d, n in zip(c, values.shape, strict=True))] for c in _CORNERS]
-    count = np.sum(corners, axis=0)
-    cells = np.argwhere((count > 0) & (count < 8))
-    nodes = (cells[:, None] + _CORNERS).reshape(-1, 3)
-    number = np.ravel_multi_index(tuple(nodes.T), values.shape)
-    used, index = np.unique(number, return_inverse=True)
-    places = np.stack(np.unravel_index(used, values.shape), axis=1)
-    V, F, _ = igl.marching_cubes(
-        values.ravel()[used], origin + spacing * places, index.reshape(-1, 8).astype(np.int64), 0.0
-    )
-    return V, F
 
 
 def _nearest(mesh: Mesh, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
