@@ -19,10 +19,11 @@ from .seamless import SeamlessMap
 from .sizes import cell_sizes
 from .surface import Surface
 
-CELLS = 96
-_MOST_CELLS = 128  # of a mesh in parts of uneven sizes
+CELLS = 96  # of a mesh, where there are texels enough for them
+_MOST = 4 / 3  # times as many has a mesh in parts of uneven sizes
 _FEWEST = 0.5  # cells that the smallest part should have by its area; in truth it has four
 _NEGLIGIBLE = 2e-3  # share of the area of a part for which no others are cut smaller
+_MISJUDGED, _TRIES = 0.1, 3  # by so much more or less than its share of charts a part is cut again, so often
 _RADIUS = 0.75  # of a cell, over the root of its share of the area
 _REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
 _SMALLEST = 0.85  # of the radius of cells elsewhere
@@ -43,20 +44,45 @@ class PatchMap:
     seamless: SeamlessMap
 
 
-def patch_map(V: NDArray[np.float64], F: NDArray[np.int64]) -> PatchMap:
-    """Lay a manifold, oriented mesh out on charts, without a fold.
+def patch_map(V: NDArray[np.float64], F: NDArray[np.int64], cells: int = CELLS) -> PatchMap:
+    """Lay a manifold, oriented mesh out on charts, without a fold; on about so many cells of four to six charts.
 
     Raises
     ------
     AtlasError
         If its triangles are too thin, or no cells are found.
     """
-    quads = _joined([_component_quads(V, F, faces, count) for faces, count in _components(V, F)])
-    return PatchMap(quads.surface, relaxed(quads))
+    parts, counts, shares = _components(V, F, cells)
+    quads = [_component_quads(V, F, faces, count) for faces, count in zip(parts, counts, strict=True)]
+    wanted = shares * sum(len(each.glued) for each in quads)
+    for i in np.flatnonzero(shares > _NEGLIGIBLE) if len(parts) > 1 else ():
+        quads[i] = _recut(V, F, parts[i], quads[i], counts[i], wanted[i])
+    whole = _joined(quads)
+    return PatchMap(whole.surface, relaxed(whole))
 
 
-def _components(V: NDArray[np.float64], F: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], int]]:
-    """Triangles of each connected component, and how many cells it gets."""
+def _recut(
+    V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArray[np.int64], quads: Quads, count: int, wanted: float
+) -> Quads:
+    """Cut a part again that has come to more or less than the charts that its area should have; the best of the tries.
+
+    Cells are mended until they are disks with corners enough, which changes their number.
+    """
+    best = quads
+    for _ in range(_TRIES):
+        charts = len(quads.glued)
+        count, before = max(1, round(count * np.sqrt(wanted / charts))), count
+        if abs(charts / wanted - 1) < _MISJUDGED or count == before:
+            break
+        quads = _component_quads(V, F, faces, count)
+        best = min(best, quads, key=lambda each: abs(np.log(len(each.glued) / wanted)))
+    return best
+
+
+def _components(
+    V: NDArray[np.float64], F: NDArray[np.int64], cells: int
+) -> tuple[list[NDArray[np.int64]], list[int], NDArray[np.float64]]:
+    """Triangles of each connected component, how many cells it gets, and its share of the area."""
     links = coo_array((np.ones(F.size), (F.ravel(), np.roll(F, -1, axis=1).ravel())), shape=(len(V), len(V)))
     _, part = connected_components(links, directed=False)
     number, of = np.unique(part[F[:, 0]], return_inverse=True)
@@ -64,8 +90,8 @@ def _components(V: NDArray[np.float64], F: NDArray[np.int64]) -> list[tuple[NDAr
     share = np.bincount(of, areas / areas.sum())
     # a small part has a few cells at least; where others have more, its texels are less tiny beside theirs
     small = share[share > _NEGLIGIBLE].min()
-    count = np.maximum(1, np.rint(np.clip(_FEWEST / small, CELLS, _MOST_CELLS) * share)).astype(int)
-    return [(np.flatnonzero(of == each), int(count[each])) for each in range(len(number))]
+    count = np.maximum(1, np.rint(np.clip(_FEWEST / small, cells, _MOST * cells) * share)).astype(int)
+    return [np.flatnonzero(of == each) for each in range(len(number))], count.tolist(), share
 
 
 def _component_quads(V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArray[np.int64], count: int) -> Quads:

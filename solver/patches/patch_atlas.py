@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.patch_map.layout import PatchMap, patch_map
+from ripple_sim.solver.patch_map.layout import CELLS, PatchMap, patch_map
 from ripple_sim.solver.patch_map.seamless import corner_places
 from ripple_sim.solver.texels.areas import levelled_areas
 from ripple_sim.solver.texels.atlas import Atlas
@@ -20,6 +20,9 @@ from .rims import positions_beyond
 
 _LEAST_TEXELS = 4  # along a chart's side
 
+# Texels of a cell that is worth having: five charts of 7 x 7. A coarse atlas has fewer cells, but not below the least.
+_TEXELS_OF_CELL, _LEAST_CELLS = 245, 24
+
 
 def patch_atlas(mesh: Mesh, resolution: int) -> Atlas:
     """Atlas of about 6 N^2 texels, for a resolution N.
@@ -29,7 +32,8 @@ def patch_atlas(mesh: Mesh, resolution: int) -> Atlas:
     AtlasError
         If the mesh cannot be laid out.
     """
-    return atlas_from_patch_map(mesh, patch_map(mesh.V, mesh.F), resolution)
+    cells = int(np.clip(6 * resolution**2 / _TEXELS_OF_CELL, _LEAST_CELLS, CELLS))
+    return atlas_from_patch_map(mesh, patch_map(mesh.V, mesh.F, cells), resolution)
 
 
 def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atlas:

@@ -107,7 +107,9 @@ def test_a_name_that_another_site_points_at_this_machine_is_refused() -> None:
     asyncio.run(check())
 
 
-@pytest.mark.parametrize("secret", ["wslink-secret", "", access.new_secret()])
+@pytest.mark.parametrize(
+    "secret", ["wslink-secret", "", access.new_secret()], ids=["default", "none", "of another run"]
+)
 def test_without_this_runs_secret_no_call_is_answered(secret: str) -> None:
     async def check() -> None:
         async with served(f"secret {secret}") as (port, client, calls):
