@@ -71,7 +71,7 @@ def _recut(
     best = quads
     for _ in range(_TRIES):
         charts = len(quads.glued)
-        count, before = max(1, round(count * np.sqrt(wanted / charts))), count
+        count, before = max(1, round(count * float(np.sqrt(wanted / charts)))), count
         if abs(charts / wanted - 1) < _MISJUDGED or count == before:
             break
         quads = _component_quads(V, F, faces, count)
@@ -87,7 +87,7 @@ def _components(
     _, part = connected_components(links, directed=False)
     number, of = np.unique(part[F[:, 0]], return_inverse=True)
     areas = Surface.of(V, F).areas
-    share = np.bincount(of, areas / areas.sum())
+    share = np.bincount(of, areas / areas.sum()).astype(np.float64)
     # a small part has a few cells at least; where others have more, its texels are less tiny beside theirs
     small = share[share > _NEGLIGIBLE].min()
     count = np.maximum(1, np.rint(np.clip(_FEWEST / small, cells, _MOST * cells) * share)).astype(int)
