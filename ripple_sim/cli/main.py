@@ -5,7 +5,6 @@ Exit status: 0 done, 1 something failed, 2 bad input, 128 + a signal's number af
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import os
 import re
@@ -70,8 +69,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _fail(message: object, status: int, ending: BaseException | None = None) -> int:
     """Print a message, with the notes of the exception that ended the command, in one line; return the status."""
     notes = getattr(message if ending is None else ending, "__notes__", [])
-    with contextlib.suppress(OSError):  # standard error may be full, or a closed pipe
+    try:
         print(f"ripple-sim: {_one_line('; '.join([str(message), *notes]))}", file=sys.stderr, flush=True)
+    except OSError:  # standard error is full, or a closed pipe: nothing more goes there, not even at exit
+        sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115
     return status
 
 

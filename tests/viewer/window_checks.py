@@ -226,7 +226,7 @@ def test_a_recording_ends_with_the_window(closed: Window, tmp_path: Path) -> Non
 
 
 def test_an_unwritable_folder_is_told_and_the_window_goes_on(window: Window) -> None:
-    window.recorder._folder = Path("/proc/nowhere")
+    window.recorder.folder = Path("/proc/nowhere")
     press(window, "s")
     assert "cannot write /proc/nowhere/sphere-1.png" in window.message
     press(window, "v")
