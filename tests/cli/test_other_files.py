@@ -1,7 +1,5 @@
 """Nothing that was not made here is replaced or deleted without `--overwrite`, and links are written through."""
 
-import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,14 +17,6 @@ SIZE = {"width": 32, "height": 16, "fps": 25}
 FRAME = np.full((16, 32, 3), 90, np.uint8)
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
-
-
-@pytest.fixture(autouse=True)
-def _handlers() -> Iterator[None]:
-    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in kept.items():
-        signal.signal(number, handler)
 
 
 def write(path: Path, overwrite: bool = False, count: int = 2, **settings: str) -> FrameWriter:

@@ -1,7 +1,5 @@
 """Strange words on the command line: one line that is no longer than a line should be, and status 2, at once."""
 
-import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,14 +9,6 @@ from ripple_sim.cli import main as cli
 
 LONG = "a" * 5000
 MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
-
-
-@pytest.fixture(autouse=True)
-def _handlers() -> Iterator[None]:
-    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in kept.items():
-        signal.signal(number, handler)
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
