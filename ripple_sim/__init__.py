@@ -6,10 +6,14 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .batch.load_batch import load_batch
     from .capture.ripple_renderer import RippleRenderer
     from .coupling.colliders.collidable import make_collidable
     from .coupling.ripples import Impulse, Ripples
     from .errors import RippleWarning
+    from .export.export_scene import export_scene
+    from .export.exporter import Exporter
+    from .export.options import ExportOptions
     from .render import Camera
     from .scene.load_scene import load_scene
     from .simulation import Simulation
@@ -20,6 +24,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 __all__ = [
     "Camera",
+    "ExportOptions",
+    "Exporter",
     "Impulse",
     "Material",
     "RippleError",
@@ -28,6 +34,8 @@ __all__ = [
     "Ripples",
     "Simulation",
     "VideoOptions",
+    "export_scene",
+    "load_batch",
     "load_scene",
     "make_collidable",
     "render_video",
@@ -35,6 +43,8 @@ __all__ = [
 
 _HOMES = {
     "Camera": ".render",
+    "ExportOptions": ".export.options",
+    "Exporter": ".export.exporter",
     "Impulse": ".coupling.ripples",
     "Material": ".solver",
     "RippleError": ".solver",
@@ -43,6 +53,8 @@ _HOMES = {
     "Ripples": ".coupling.ripples",
     "Simulation": ".simulation",
     "VideoOptions": ".video.options",
+    "export_scene": ".export.export_scene",
+    "load_batch": ".batch.load_batch",
     "load_scene": ".scene.load_scene",
     "make_collidable": ".coupling.colliders.collidable",
     "render_video": ".video.render_video",

@@ -2,6 +2,6 @@
 
 import sys
 
-from ripple_sim.cli.main import main
+from ripple_sim.cli.start import main
 
 sys.exit(main())

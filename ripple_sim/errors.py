@@ -3,16 +3,25 @@
 from ripple_sim.solver.errors import RippleError, RippleWarning
 
 __all__ = [
-    "DisplayError", "EncodingError", "RippleError", "RippleWarning", "SceneError", "SimulationError", "VideoError",
+    "BatchError", "DisplayError", "EncodingError", "ExportError", "RippleError", "RippleWarning", "SceneError",
+    "SimulationError", "VideoError",
 ]  # fmt: skip
+
+
+class BatchError(RippleError):
+    """A batch cannot go on in its folder: the plan has changed, or the disk is full."""
 
 
 class VideoError(RippleError):
     """The ending, place, size or frame rate of a video is invalid."""
 
 
+class ExportError(RippleError):
+    """The ending or the place of an export is invalid, or it needs what is not installed."""
+
+
 class EncodingError(RippleError):
-    """Encoding or writing a video failed, for instance on a full disk."""
+    """Encoding or writing a file failed, for instance on a full disk."""
 
 
 class SceneError(RippleError):

@@ -8,16 +8,16 @@ from collections.abc import Callable
 
 import mujoco
 
-from ripple_sim.coupling.model.geoms import find_geom, geom_name
+from ripple_sim.coupling.model.geoms import find_target, target_name
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.coupling.stepping.divergence import divergence
 from ripple_sim.coupling.stepping.physics_messages import physics_errors
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
+from ripple_sim.scene.target_maps import apply_maps, uniform_material
 from ripple_sim.solver.compilation import work_clock
 
 from .errors import SceneError, SimulationError
-from .solver import texture_map
 
 # More is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000
@@ -37,6 +37,8 @@ class Simulation:
         Overrides the scene's atlas resolutions.
     layout : str, optional
         Overrides the scene's layouts.
+    rim : str, optional
+        Overrides what the scene's rims do, "free" or "fixed".
     backend : str
         As for `WaveSolver`.
     operator : str
@@ -61,6 +63,7 @@ class Simulation:
         fps: float = 60,
         resolution: int | None = None,
         layout: str | None = None,
+        rim: str | None = None,
         backend: str = "auto",
         operator: str = "fem",
         on_step: Callable[[Simulation], None] | None = None,
@@ -74,17 +77,25 @@ class Simulation:
         self._reset_bodies()
         self.ripples = Ripples(
             self.model,
-            {entry.geom: entry.material.material() for entry in scene.targets},
+            {entry.geom: uniform_material(entry) for entry in scene.targets},
             resolution={entry.geom: resolution or entry.resolution for entry in scene.targets},
             layout={entry.geom: layout or entry.layout for entry in scene.targets},
-            rim={entry.geom: entry.rim for entry in scene.targets},
+            rim={entry.geom: rim or entry.rim for entry in scene.targets},
             backend=backend,
             operator=operator,
             two_way=scene.two_way,
             contacts=scene.contacts,
+            high_pass={entry.geom: entry.high_pass for entry in scene.targets},
         )
-        self._apply_maps()
+        for entry in scene.targets:
+            apply_maps(self.ripples, entry)
         self._apply_limits()
+        self._heights = {
+            entry.geom: entry.height.heights(self.ripples, entry.geom)
+            for entry in scene.targets
+            if entry.height is not None
+        }
+        self._raise_surfaces()
         self._materials = {name: self.ripples[name].material for name in self.ripples}
         self._script = Script(self.model, scene.events, list(self.ripples))
         self.physics_seconds = self.wave_seconds = 0.0
@@ -145,29 +156,19 @@ class Simulation:
             if self.ripples[name].material is not material:
                 self.ripples.change_material(name, **vars(material))
                 self._materials[name] = self.ripples[name].material
+        self._raise_surfaces()
         self._script = Script(self.model, self.scene.events, list(self.ripples))
         self.impulses = []
         self._steps = 0
 
-    def _apply_maps(self) -> None:
-        """Give the targets their materials' maps and their parts without waves."""
-        for entry in self.scene.targets:
-            atlas = self.ripples[entry.geom].atlas
-            maps = {
-                name: texture_map(atlas, each.map, each.low, each.high, each.channel)
-                for name, each in entry.material.maps().items()
-            }
-            if maps:
-                self.ripples.change_material(entry.geom, **maps)
-            if entry.still_map is not None:
-                self.ripples.hold(entry.geom, 1.0 - texture_map(atlas, entry.still_map, 0.0, 1.0))
-            for disc in entry.still:
-                self.ripples.make_rigid(entry.geom, disc.point, disc.radius)
+    def _raise_surfaces(self) -> None:
+        for geom, height in self._heights.items():
+            self.ripples[geom].add_height(height)
 
     def _apply_limits(self) -> None:
         self.limited = {}
         for entry in self.scene.targets:
-            self.limited[geom_name(self.model, find_geom(self.model, entry.geom))] = entry.limit
+            self.limited[target_name(self.model, find_target(self.model, entry.geom))] = entry.limit
             if not (entry.limit and entry.warn):
                 self.ripples.allow_any_height(entry.geom)
 

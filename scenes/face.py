@@ -40,7 +40,7 @@ _IRIS, _PUPIL, _GLINT = 0.048, 0.026, 0.011  # radii [m]
 _SKIN, _CHEEK, _LIP = (236, 190, 150), (232, 150, 124), (196, 92, 84)
 _WHITE, _BLUE, _BLACK = (250, 250, 246), (58, 128, 150), (24, 24, 30)
 
-_FOOT = 0.13  # height at which the neck is cut off [m]
+FOOT = 0.13  # height at which the neck is cut off [m]
 # ears stand off the head towards the back
 _FLARED = np.array([[np.cos(0.45), np.sin(0.45), 0.0], [-np.sin(0.45), np.cos(0.45), 0.0], [0.0, 0.0, 1.0]])
 
@@ -53,11 +53,12 @@ _LIPS = smooth_union(
 
 def head(cell: float = 0.017) -> tuple[Array, NDArray[np.int64]]:
     """Model a head 0.75 m high that faces +x and stands on z = 0, vertices and triangles as `polygonise` gives them."""
-    V, F = polygonise(_head_solid(), ((-0.4, -0.4, 0.1), (0.45, 0.4, 0.95)), cell)
-    return V - [0.0, 0.0, _FOOT], F
+    V, F = polygonise(head_solid(), ((-0.4, -0.4, 0.1), (0.45, 0.4, 0.95)), cell)
+    return V - [0.0, 0.0, FOOT], F
 
 
-def _head_solid() -> Sdf:
+def head_solid() -> Sdf:
+    """Solid of the head, before its foot is put on the ground: negative distances inside [m]."""
     skull = ellipsoid((-0.03, 0.0, 0.60), (0.29, 0.26, 0.28))
     jaw = ellipsoid((0.05, 0.0, 0.40), (0.215, 0.205, 0.20))
     cheek = sphere((0.13, 0.115, 0.425), 0.10)
@@ -72,13 +73,13 @@ def _head_solid() -> Sdf:
     solid = smooth_union(0.04, solid, mirrored(ear))
     solid = smooth_union(0.03, solid, mirrored(sphere(_EYE, _EYE_RADIUS)))
     solid = smooth_union(0.02, solid, _LIPS)
-    return smooth_intersection(0.03, solid, half_space((0.0, 0.0, -1.0), -_FOOT))
+    return smooth_intersection(0.03, solid, half_space((0.0, 0.0, -1.0), -FOOT))
 
 
 def write_mesh(path: Path) -> None:
     """Write the head as OBJ, with texture coordinates that end at the back."""
     V, F = head()
-    uv = _coordinates(V + np.array([0.0, 0.0, _FOOT]))[F]
+    uv = _coordinates(V + np.array([0.0, 0.0, FOOT]))[F]
     # triangles across the end of the image go on into its next repetition
     uv[..., 0] += uv[..., 0] < uv[..., 0].max(axis=1, keepdims=True) - 0.5
     unique, index = np.unique(np.round(uv.reshape(-1, 2), 5), axis=0, return_inverse=True)
@@ -113,7 +114,7 @@ def _painted_points() -> Array:
     longitude = 2 * np.pi * ((np.arange(width) + 0.5) / width - 0.5)
     x, y, z = np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)
     ways = np.stack([x, y, np.broadcast_to(z, x.shape)], axis=-1)
-    solid, away = _head_solid(), np.full((height, width), 0.5)
+    solid, away = head_solid(), np.full((height, width), 0.5)
     front = x > 0.5  # what is painted lies here
     for _ in range(30):  # from outside inwards; the distances are approximate, so in shorter steps
         away[front] -= 0.8 * solid(_MIDDLE + away[front][:, None] * ways[front])

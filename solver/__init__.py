@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .mesh.mesh import Mesh
     from .mesh.mesh_file import load_mesh
     from .mesh.volume import Volume
+    from .mesh.volume_file import load_volume
     from .mesh.wrap import Wrap, wrap
     from .operator.absorbing import absorbing_damping
     from .operator.material import Material
@@ -55,6 +56,7 @@ _HOME = {
     "glue": "texels.glue",
     "load_atlas": "atlas.load",
     "load_mesh": "mesh.mesh_file",
+    "load_volume": "mesh.volume_file",
     "sphere_atlas": "cube_map.sphere_atlas",
     "texel_atlas": "texels.texel_atlas",
     "texture_map": "texels.maps",
@@ -87,6 +89,7 @@ __all__ = [
     "glue",
     "load_atlas",
     "load_mesh",
+    "load_volume",
     "sphere_atlas",
     "texel_atlas",
     "texture_map",

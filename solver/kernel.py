@@ -10,7 +10,7 @@ others call.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numba
@@ -31,7 +31,19 @@ def kernel(function: Callable | None = None, **options: Any) -> Any:
     """Compile a function at its first call: `@kernel`, or `@kernel(inline="always")` with options of `numba.njit`."""
     # nobody calls kernels through pointers: without the wrappers for that a tenth less is compiled
     compiler = numba.njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)
-    return compiler if function is None else compiler(function)
+
+    def compiled(function: Callable) -> Any:
+        dispatcher = compiler(function)
+        dispatcher.get_call_template = functools.partial(_call_template, dispatcher)
+        return dispatcher
+
+    return compiled if function is None else compiled(function)
+
+
+def _call_template(dispatcher: Any, args: Sequence[Any], kws: Mapping[str, Any]) -> Any:
+    """What numba asks of a kernel that others call: one version for all numbers, not one more for each literal."""
+    of_any = {name: numba.types.unliteral(each) for name, each in kws.items()}
+    return type(dispatcher).get_call_template(dispatcher, [*map(numba.types.unliteral, args)], of_any)
 
 
 def variant(declared: Callable, first: type) -> Callable[[Callable], Callable]:

@@ -1,4 +1,4 @@
-"""The tables and keys of scene files, with their words, units, defaults and texts, taken from the code."""
+"""The tables and keys of scene files and plans, with their words, units, defaults and texts, taken from the code."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from typing import Any
 
 import msgspec
 
+from ripple_sim.batch.distributions import Distribution
+from ripple_sim.batch.plan import MeshesEntry, PlanFile
+from ripple_sim.batch.store_entry import StoreEntry
 from ripple_sim.render import LIGHTING, LOOKS
 from ripple_sim.scene import scene_file
 from ripple_sim.scene.body_shapes import BODY_SHAPES
@@ -53,7 +56,23 @@ _WORDS: dict[str, Iterable[str]] = {
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Fill in the tables of a page that asks for them."""
-    return markdown.replace("<!-- scene file -->", scene_tables()) if "<!-- scene file -->" in markdown else markdown
+    for mark, tables in (("<!-- scene file -->", scene_tables), ("<!-- plan file -->", plan_tables)):
+        if mark in markdown:
+            markdown = markdown.replace(mark, tables())
+    return markdown
+
+
+def plan_tables() -> str:
+    """All tables of a batch's plan."""
+    return "\n\n".join(
+        _table(name, entry)
+        for name, entry in (
+            ("", PlanFile),
+            ("meshes", MeshesEntry),
+            ("store", StoreEntry),
+            ("a value that is drawn", Distribution),
+        )
+    )
 
 
 def scene_tables() -> str:

@@ -1,12 +1,12 @@
 """How exact are the eigenvalues of the patch layout's operator, where theory knows them?
 
-    python examples/benchmarks/eigenvalues.py [--resolutions 32 64 128] [--softened]
+    python examples/benchmarks/eigenvalues.py [--resolutions 32 64 128]
 
 Mean relative error of the eigenvalues 2 to 20 (1 to 20 with a fixed rim, where none is zero) of five surfaces, at three
 resolutions, and its order by regression over the texels along a side. The meshes' vertices lie on the true surfaces,
-and the texels are put there too, so that no facet counts as an error. With --softened the operator is that of
-`WaveSolver`, which slows the few stiffest texels down for the sake of the time step. After the sphere comes the cube
-layout of the same sphere, and how the patches' errors stand to it at equal texels.
+and the texels are put there too, so that no facet counts as an error. The operator is that of `WaveSolver`, which slows
+the few stiffest texels down for the sake of the time step. After the sphere comes the cube layout of the same sphere,
+and how the patches' errors stand to it at equal texels.
 """
 
 import argparse
@@ -175,15 +175,10 @@ def placed(atlas: Atlas, project: Callable[[Points], Points]) -> Atlas:
     )
 
 
-def mean_error(atlas: Atlas, case: Case, softened: bool) -> float:
+def mean_error(atlas: Atlas, case: Case) -> float:
     """Mean relative error of the eigenvalues up to the twentieth but for that of the constant mode."""
     placed_atlas = placed(atlas, case.project)
-    if softened:
-        stencil = build_operator(placed_atlas, Material(), "fem", case.rim).stencil
-    else:
-        texels = placed_atlas.texels.with_fixed_rim() if case.rim == "fixed" else placed_atlas.texels
-        stencil = texels.stencil(np.ones(texels.shape))
-    stiffness = stiffness_matrix(stencil)
+    stiffness = stiffness_matrix(build_operator(placed_atlas, Material(), "fem", case.rim).stencil)
     mass = diags_array(placed_atlas.areas.ravel())
     values = np.sort(eigsh(stiffness.tocsc(), COUNT, mass.tocsc(), sigma=-0.5, which="LM", return_eigenvectors=False))
     exact = np.sort(case.exact)[:COUNT]
@@ -200,7 +195,6 @@ def line(name: str, texels: list[int], errors: list[float]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description="Eigenvalues of the patch layout against exact ones.")
     parser.add_argument("--resolutions", type=int, nargs="+", default=[32, 64, 128])
-    parser.add_argument("--softened", action="store_true")
     options = parser.parse_args()
     resolutions = options.resolutions
     print(f"{'surface':<20}{'  texels    error' * len(resolutions)}  order")
@@ -208,13 +202,13 @@ def main() -> None:
     for name, case in cases().items():
         mesh = case.mesh()
         atlases = [build_atlas(mesh, n, layout="patches") for n in resolutions]
-        errors = [mean_error(atlas, case, options.softened) for atlas in atlases]
+        errors = [mean_error(atlas, case) for atlas in atlases]
         texels = [atlas.areas.size for atlas in atlases]
         print(line(name, texels, errors), flush=True)
         if name == "sphere":
             patches = np.multiply(texels, errors)
             cube = [build_atlas(mesh, n, layout="cube") for n in resolutions]
-            reference = [mean_error(atlas, case, options.softened) for atlas in cube]
+            reference = [mean_error(atlas, case) for atlas in cube]
             sizes = [atlas.areas.size for atlas in cube]
             print(line("sphere, cube layout", sizes, reference))
             # errors go with the area of a texel, by which the few texels more or less are made up for

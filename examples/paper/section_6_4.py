@@ -2,7 +2,7 @@
 
 python examples/paper/section_6_4.py [MESH]
 
-On a torus and on the project's pretzel, or on another mesh instead of the pretzel, such as the rocker arm.
+On a torus, a rocker arm that is modelled here, and the project's pretzel, or another mesh instead of the pretzel.
 """
 
 import dataclasses
@@ -11,6 +11,7 @@ import tempfile
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import trimesh
 from page import Part
 from stills import strip
@@ -20,6 +21,7 @@ from ripple_sim.bench.arrival_table import mean_error
 from ripple_sim.bench.sources import spread_sources
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.events import Events, PokeEntry
+from ripple_sim.scenes.implicit import pebble, polygonise, rounded_cone, smooth_intersection, smooth_union
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
 
 PRETZEL = Path(__file__).parents[2] / "scenes" / "meshes" / "pretzel.obj"
@@ -33,9 +35,21 @@ def torus(folder: Path) -> Path:
     return path
 
 
+def rocker_arm(folder: Path) -> Path:
+    """Write the model of a rocker arm that lies flat, z up: a hub with a bore, and a lever with a knob at its end."""
+    hub, bore = pebble((0.0, 0.0, 0.0), 0.14, 0.1), lambda p: 0.11 - np.hypot(p[:, 0], p[:, 1])
+    lever = rounded_cone((0.1, 0.0, 0.0), (0.52, 0.1, 0.02), 0.1, 0.06)
+    other = rounded_cone((-0.1, 0.0, 0.0), (-0.36, 0.12, 0.0), 0.09, 0.075)
+    solid = smooth_union(0.1, hub, lever, other, pebble((0.56, 0.11, 0.02), 0.04, 0.08))
+    V, F = polygonise(smooth_intersection(0.05, solid, bore), ((-0.5, -0.3, -0.15), (0.75, 0.3, 0.15)), 0.016)
+    path = folder / "rocker arm.ply"
+    trimesh.Trimesh(V, F, process=False).export(path)
+    return path
+
+
 def stills(mesh: Path, file: Path) -> Path:
     """Waves after a poke from above, at the end of the mesh."""
-    lies = mesh.stem == "torus"
+    lies = mesh.stem in ("torus", "rocker arm")
     scene = drop_scene(mesh, bodies=0, up="z" if lies else None)
     material = msgspec.structs.replace(scene.targets[0].material, stiffness=300.0, damping=0.5, density=150.0)
     target = msgspec.structs.replace(scene.targets[0], material=material)
@@ -59,8 +73,8 @@ def make(folder: Path, mesh: Path = PRETZEL) -> Part:
     pictures, rows = [], [["surface", "handles", "texels", "arrival of the front: median error", "90 %", "under 3 %"]]
     times = ", ".join(f"{t:g}" for t in TIMES)
     with tempfile.TemporaryDirectory() as own:
-        for path in (torus(Path(own)), mesh):
-            file = stills(path, folder / f"section_6_4_{path.stem}.png")
+        for path in (torus(Path(own)), rocker_arm(Path(own)), mesh):
+            file = stills(path, folder / f"section_6_4_{path.stem.replace(' ', '_')}.png")
             pictures.append((file, f"{path.stem.capitalize()}: waves {times} s after the start, poked at 0.02 s."))
             rows.append(row(path.stem, build_atlas(load_mesh(path), RESOLUTION)))
     return Part(

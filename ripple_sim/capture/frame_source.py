@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
@@ -12,6 +13,7 @@ from ripple_sim.simulation import Simulation
 from ripple_sim.solver.gl import shared_context
 
 from .exposure import Exposures
+from .passes import Sighting
 from .ripple_renderer import surface_of
 from .sensor import Sensor
 from .snapshot import Snapshot
@@ -86,6 +88,14 @@ class FrameSource:
     def fetch(self) -> NDArray | None:
         """Wait for the earliest snapshot submitted, and return what `render` does."""
         return self._sensor.expose(self.renderer.fetch())
+
+    def sighting(self, snapshot: Snapshot) -> Sighting:
+        """What the camera sees at a snapshot, through the middle of its lens."""
+        height_maps = {self._geoms[name]: height_map for name, height_map in snapshot.height_maps.items()}
+        camera = self.camera(snapshot)
+        image = self.renderer.surfaces(snapshot.data, height_maps, camera, (self.width, self.height))
+        read = {geom: np.asarray(height_map) for geom, height_map in height_maps.items()}
+        return Sighting.of(image, camera.pose(), snapshot.data, read)
 
     def camera(self, snapshot: Snapshot) -> Camera | FixedCamera:
         """Camera of a snapshot, through the middle of its lens."""

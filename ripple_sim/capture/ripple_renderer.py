@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from ripple_sim.coupling.arguments import own_data, own_model
 from ripple_sim.coupling.model.geoms import ByGeom, by_name
@@ -12,9 +15,10 @@ from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
 from ripple_sim.render.surfaces.charts import Charts
 from ripple_sim.scene.camera import CameraEntry
-from ripple_sim.solver import HeightMap, WaveSolver
+from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.gl import GLContext, shared_context
 
+from .drawn_heights import DrawnHeights
 from .viewpoint import viewpoint
 
 
@@ -58,11 +62,12 @@ class RippleRenderer:
         limit: bool = True,
     ) -> None:
         self._model, self._ripples = own_model(model), ripples
-        self._height_maps = {name: HeightMap.drawn(ripples[name].atlas, limit) for name in ripples}
+        self._height_maps = {name: DrawnHeights(ripples, name, limit) for name in ripples}
         named = by_name(self._model, looks or {}, "looks")
         surfaces = {
             geom: surface_of(ripples[name], named.get(name, "rubber")) for name, geom in ripples.geom_ids.items()
         }
+        self._shown: NDArray[np.uint8] | None = None
         self._renderer = Renderer(gl or shared_context(), self._model, surfaces, size=(width, height))
 
     def render(self, data: mujoco.MjData, camera: Camera | FixedCamera | str | None = None) -> NDArray[np.uint8]:
@@ -81,15 +86,24 @@ class RippleRenderer:
             entry = CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)
             camera = viewpoint(self._model, data, entry, data.time)
         height_maps = {
-            self._ripples.geom_ids[name]: height_map(self._ripples[name].height)
+            self._ripples.geom_ids[name]: height_map(self._ripples[name].snapshot(), data)
             for name, height_map in self._height_maps.items()
         }
-        return self._renderer.render(data, height_maps, camera)
+        self._shown = self._renderer.render(data, height_maps, camera)
+        return self._shown
+
+    def _repr_png_(self) -> bytes | None:
+        """In a notebook: what was rendered last."""
+        if self._shown is None:
+            return None
+        file = io.BytesIO()
+        Image.fromarray(self._shown).save(file, "PNG")
+        return file.getvalue()
 
 
 def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] | None = None) -> Surface:
     """Surface to be drawn of a target."""
-    atlas = waves.atlas
+    atlas = waves.rest
     mesh = atlas.mesh
     return Surface(
         V=mesh.V,

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TypeAlias
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver.backends.device_field import DeviceField
 
-Heights = dict[str, NDArray[np.float32]]
+Field: TypeAlias = NDArray[np.float32] | DeviceField
+Heights = dict[str, Field]
 
 _ROUNDING = 9  # decimals of a physics step: what is a whole step but for round-off is one
 
@@ -43,7 +46,8 @@ class ShutterTimes:
         data : mujoco.MjData
             State of the bodies, until the next iteration.
         heights : dict
-            By the geom's name [m], float32 [C, n, n]. The same object as before where no time has passed.
+            By the geom's name [m], float32 [C, n, n], or on the GPU, see `WaveSolver.snapshot`. The same object as
+            before where no time has passed.
         """
         simulation = self._simulation
         done = 0
@@ -62,7 +66,7 @@ class ShutterTimes:
                 yield self._between, {name: _blend(now[name], before[name], rest) for name in now}
 
     def _heights(self) -> Heights:
-        return {name: self._simulation.ripples[name].height for name in self._simulation.ripples}
+        return {name: self._simulation.ripples[name].snapshot() for name in self._simulation.ripples}
 
     def _go_back(self, duration: float) -> None:
         """Set the bodies to where they were a duration [s] ago, within the last step.
@@ -76,8 +80,11 @@ class ShutterTimes:
         mujoco.mj_integratePos(model, data.qpos, data.qvel, -duration)
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
+        mujoco.mj_flex(model, data)
         mujoco.mj_camlight(model, data)
 
 
-def _blend(first: NDArray[np.float32], second: NDArray[np.float32], share: float) -> NDArray[np.float32]:
+def _blend(first: Field, second: Field, share: float) -> Field:
+    if isinstance(first, DeviceField):
+        return first.blend(second, share) if isinstance(second, DeviceField) else first
     return first + np.float32(share) * (second - first)

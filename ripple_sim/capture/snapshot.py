@@ -9,14 +9,14 @@ from collections.abc import Iterator
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from ripple_sim.coupling.ripples import Impulse
+from ripple_sim.render.surfaces.height_maps import AnyHeightMap
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver import HeightMap
 
+from .drawn_heights import DrawnHeights
 from .exposure import Exposures
-from .shutter import ShutterTimes
+from .shutter import Heights, ShutterTimes
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -32,7 +32,8 @@ class Snapshot:
     data : mujoco.MjData
         Copy of MuJoCo's state.
     heights, height_maps : dict
-        By the geom's name: height [m], float32 [C, n, n], and its height map (see `HeightMap`).
+        By the geom's name: height [m], float32 [C, n, n], and its height map (see `HeightMap`). Where the waves run on
+        a GPU both stay there, and `numpy.asarray` reads them back.
     impulses : list of Impulse
         Since the frame before, up to the frame's own time.
     """
@@ -40,14 +41,14 @@ class Snapshot:
     number: int
     exposure: int
     data: mujoco.MjData
-    heights: dict[str, NDArray[np.float32]]
-    height_maps: dict[str, NDArray[np.float32]]
+    heights: Heights
+    height_maps: dict[str, AnyHeightMap]
     impulses: list[Impulse]
 
     def digest(self) -> str:
         """Fingerprint of the state of bodies and waves: the same if and only if every bit is."""
         hasher = hashlib.blake2b(digest_size=16)
-        for array in (self.data.qpos, self.data.qvel, self.data.act, *self.heights.values()):
+        for array in (self.data.qpos, self.data.qvel, self.data.act, *map(np.asarray, self.heights.values())):
             hasher.update(array.tobytes())
         return hasher.hexdigest()
 
@@ -66,7 +67,7 @@ def snapshots(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterato
     """
     states = itertools.cycle([mujoco.MjData(simulation.model) for _ in range(alive)])
     ripples = simulation.ripples
-    height_map_of = {name: HeightMap.drawn(ripples[name].atlas, simulation.limited[name]) for name in ripples}
+    drawn = {name: DrawnHeights(ripples, name, simulation.limited[name]) for name in ripples}
     shutter_times = ShutterTimes(simulation, Exposures.of(simulation.scene.camera).times)
     for number in range(frames):
         if number:
@@ -76,5 +77,5 @@ def snapshots(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterato
             if heights is not shown:
                 data, shown = next(states), heights
                 mujoco.mj_copyData(data, simulation.model, state)
-                height_maps = {name: height_map_of[name](height) for name, height in heights.items()}
+                height_maps = {name: drawn[name](height, data) for name, height in heights.items()}
             yield Snapshot(number, exposure, data, heights, height_maps, impulses)

@@ -14,6 +14,7 @@ from ripple_sim.overlay.comparison import BASELINES
 from ripple_sim.scene.up_axis import UP_AXES
 from ripple_sim.solver.atlas.layouts import LAYOUTS
 from ripple_sim.solver.checked import shown
+from ripple_sim.solver.operator.rims import RIMS
 
 
 def parse_size(word: str) -> tuple[int, int]:
@@ -93,6 +94,14 @@ def parse_supersample(word: str) -> int:
     return int(word)
 
 
+def parse_shard(word: str) -> tuple[int, int]:
+    """Read which part of how many, such as "1/4"."""
+    match = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", word)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        raise ValueError(f"{shown(word)} is not valid; it must be a part of how many, such as 1/4, 2/4, 3/4 or 4/4")
+    return int(match[1]), int(match[2])
+
+
 def parse_axis(word: str) -> str:
     """Read the axis that points up."""
     if word not in UP_AXES:
@@ -107,8 +116,15 @@ def parse_layout(word: str) -> str:
     return word
 
 
+def parse_rim(word: str) -> str:
+    """Read what rims do."""
+    if word not in RIMS:
+        raise ValueError(f"{shown(word)} is not valid; it must be {' or '.join(RIMS)}")
+    return word
+
+
 def parse_overlay(word: str) -> tuple[str, ...]:
-    """Read a list of overlays, separated by commas; the names are checked later."""
+    """Read a list of overlays or passes, separated by commas; the names are checked later."""
     return tuple(part.strip() for part in word.split(",")) if word.strip() else ()
 
 
@@ -136,6 +152,11 @@ Overlay = Annotated[
     _one_word(parse_overlay, "NAME[,NAME ...]", lambda words: ",".join(words or ())),
     arg(help_behavior_hint="(default: the scene's, or none)"),
 ]
+Passes = Annotated[
+    tuple[str, ...],
+    _one_word(parse_overlay, "NAME[,NAME ...]", lambda words: ",".join(words or ())),
+    arg(help_behavior_hint="(optional)"),
+]
 Baseline = Annotated[
     str | None,
     _one_word(str, "{" + ",".join(BASELINES) + "}", lambda name: name or ""),
@@ -151,9 +172,13 @@ Focus = Annotated[
     arg(help_behavior_hint="(default: the camera's aim)"),
 ]
 Exposures = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's, or 32)")]
+Shard = Annotated[tuple[int, int] | None, _one_word(parse_shard, "I/N"), arg(help_behavior_hint="(default: all)")]
+Gigabytes = Annotated[float, _one_word(parse_factor, "GB")]
+Limit = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(optional)")]
 Device = Annotated[int | None, _one_word(parse_seed, "N"), arg(help_behavior_hint="(default: the first that works)")]
 UpAxis = Annotated[str | None, _one_word(parse_axis, "{y,z}"), arg(help_behavior_hint="(default: z for STL, else y)")]
 LayoutName = Annotated[str, _one_word(parse_layout, "{auto,cube,patches}")]
 SceneLayout = Annotated[
     str | None, _one_word(parse_layout, "{auto,cube,patches}"), arg(help_behavior_hint="(default: the scene's)")
 ]
+Rim = Annotated[str | None, _one_word(parse_rim, "{free,fixed}"), arg(help_behavior_hint="(default: the scene's)")]

@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
 
 
-def atlas_report(path: Path, atlas: Atlas, method: str, seconds: dict[str, float]) -> dict[str, Any]:
+def atlas_report(
+    path: Path, atlas: Atlas, method: str, seconds: dict[str, float], thickness: NDArray[np.float64] | None = None
+) -> dict[str, Any]:
     """Figures of an atlas, as JSON can hold them.
 
     Parameters
@@ -23,15 +26,18 @@ def atlas_report(path: Path, atlas: Atlas, method: str, seconds: dict[str, float
         Its sphere map; counts for the cube layout only.
     seconds : dict
         Wall time of each stage [s].
+    thickness : [C, n, n], optional
+        Of the layer over what is inside [m].
 
     Returns
     -------
     dict
         `mesh`, `vertices`, `triangles`, `size` of the bounding box [m], `area` [m^2], `volume` [m^3], `notes` (what was
         done to it, one line each), `layout`, `method`, `charts` (C, n, n), `resolution` n, `quality` (see
-        `Atlas.quality`) and `seconds`.
+        `Atlas.quality`), `thickness` if it is given (quantiles by texels [m]) and `seconds`.
     """
     mesh = atlas.mesh
+    known = {} if thickness is None else {"thickness": _quantiles(thickness)}
     return {
         "mesh": str(path),
         "vertices": len(mesh.V),
@@ -45,8 +51,14 @@ def atlas_report(path: Path, atlas: Atlas, method: str, seconds: dict[str, float
         "method": method if atlas.layout == "cube" else None,
         "charts": list(atlas.texels.shape),
         "quality": atlas.quality(),
+        **known,
         "seconds": seconds,
     }
+
+
+def _quantiles(thickness: NDArray[np.float64]) -> dict[str, float]:
+    names, shares = ("least", "q01", "median", "q99", "greatest"), (0, 0.01, 0.5, 0.99, 1)
+    return dict(zip(names, np.quantile(thickness, shares).tolist(), strict=True))
 
 
 def charts_text(shape: Sequence[int], method: str | None) -> str:
@@ -64,6 +76,7 @@ def report_text(report: dict[str, Any]) -> str:
         *(("note", note) for note in report["notes"]),
         ("atlas", charts_text(report["charts"], report["method"])),
         *((name, f"{value:.6g}") for name, value in report["quality"].items()),
+        *((f"thickness, {name}", f"{metres:.6g} m") for name, metres in report.get("thickness", {}).items()),
         *((f"{stage.replace('_', ' ')} time", f"{seconds:.3f} s") for stage, seconds in report["seconds"].items()),
     ]
     width = max(len(name) for name, _ in rows)

@@ -5,10 +5,10 @@ Exit status: 0 done, 1 something failed, 2 bad input, 128 + a signal's number af
 
 from __future__ import annotations
 
-import errno
 import os
 import re
 import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,6 @@ from typing import Any
 from .signals import INTERRUPTED, end_at_once, end_in_good_order, word_of
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-
-# Errors of the system that another name would have avoided.
-_OF_THE_NAME = (errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EINVAL, errno.ELOOP)
 
 _LONGEST = 800  # of a message [characters]
 
@@ -30,9 +27,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     command = _parse(list(sys.argv[1:] if argv is None else argv))
     if isinstance(command, int):
         return command
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        return _run(command)
+
+
+def _run(command: Any) -> int:
+    """Run a command and return the exit status."""
     os.environ.setdefault("MUJOCO_GL", "disable")  # MuJoCo's own renderer would take the OpenGL context away
 
     from ripple_sim.errors import DisplayError, EncodingError
+    from ripple_sim.solver.atomic_file import OF_THE_DISK, OF_THE_NAME
     from ripple_sim.solver.checked import shown
     from ripple_sim.solver.errors import GLError, RippleError
 
@@ -42,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except OSError as error:
         if error.filename is not None:  # not standard output, which has no name
-            status = BAD_INPUT if error.errno in _OF_THE_NAME else FAILED
+            status = BAD_INPUT if error.errno in OF_THE_NAME else FAILED
             return _fail(f"{shown(os.fspath(error.filename))}: {error.strerror}", status)
         # standard output has failed (full disk, closed pipe): nothing more goes there, not even at exit
         sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115
@@ -50,7 +55,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (GLError, DisplayError, EncodingError) as error:  # other input would not help
         return _fail(error, FAILED)
     except RippleError as error:
-        return _fail(error, BAD_INPUT)
+        cause = error.__cause__
+        full = isinstance(cause, OSError) and cause.errno in OF_THE_DISK
+        return _fail(error, FAILED if full else BAD_INPUT)
     except MemoryError as error:
         return _fail(
             f"not enough memory{f': {error}' if str(error) else ''}; ask for a lower resolution or size", FAILED
@@ -69,11 +76,21 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _fail(message: object, status: int, ending: BaseException | None = None) -> int:
     """Print a message, with the notes of the exception that ended the command, in one line; return the status."""
     notes = getattr(message if ending is None else ending, "__notes__", [])
+    _say("; ".join([str(message), *notes]))
+    return status
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Print a warning in one line, without the place in the code: takes the place of `warnings.showwarning`."""
+    _say(f"warning: {message}")
+
+
+def _say(message: str) -> None:
+    """Print a line on standard error."""
     try:
-        print(f"ripple-sim: {_one_line('; '.join([str(message), *notes]))}", file=sys.stderr, flush=True)
+        print(f"ripple-sim: {_one_line(message)}", file=sys.stderr, flush=True)
     except OSError:  # standard error is full, or a closed pipe: nothing more goes there, not even at exit
         sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115
-    return status
 
 
 def _open_standard_streams() -> None:

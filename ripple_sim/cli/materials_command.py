@@ -31,8 +31,8 @@ class Materials:
             print(f"{name:{width}}  {row['speed [m/s]']:.3g} m/s, falls to 1/e in {row['decay [s]']:.3g} s")
             parameters = ", ".join(f"{key} {value:g}" for key, value in row["parameters"].items())
             print(f"{'':{width}}  {row['law']}: {parameters}")
-            print(f"{'':{width}}  holds for {row['valid']}")
-            print(f"{'':{width}}  source: {row['source']}")
+            print(f"{'':{width}}  holds: {row['valid']}")
+            print(f"{'':{width}}  source{'' if row['checked'] else ', not checked'}: {row['source']}")
 
 
 def _told(name: str) -> dict[str, Any]:

@@ -16,9 +16,11 @@ import tyro.conf
 import tyro.extras
 
 from .atlas_command import Atlas
+from .batch_command import Batch
 from .bench_command import Bench
 from .cache_command import Cache
 from .completion_command import Completion
+from .export_command import Export
 from .info_command import Info
 from .materials_command import Materials
 from .render_commands import Drop, Render
@@ -27,6 +29,8 @@ from .view_command import View
 COMMANDS: dict[str, Callable[..., Any]] = {
     "render": Render,
     "drop": Drop,
+    "export": Export,
+    "batch": Batch,
     "atlas": Atlas,
     "info": Info,
     "bench": Bench,

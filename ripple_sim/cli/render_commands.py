@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
@@ -23,6 +23,10 @@ class _VideoCommand(VideoArguments):
     """Camera of the MJCF to render from."""
     device: Device = None
     """EGL device to render on, by number, where there are several."""
+    renderer: Literal["gl", "cycles"] = "gl"
+    """Ours, with OpenGL, or Cycles, Blender's path tracer (needs bpy), which takes seconds to minutes a frame."""
+    samples: Count = 64
+    """Paths a pixel that Cycles takes."""
 
     def load(self) -> Scene:
         """Make the scene that is rendered."""
@@ -30,11 +34,16 @@ class _VideoCommand(VideoArguments):
 
     def run(self) -> None:
         """Render the scene and print a summary."""
+        if self.renderer == "cycles":
+            self._run_cycles()
+        else:
+            self._run_gl()
+
+    def _run_gl(self) -> None:
         from ripple_sim.video.settings import check_options
 
         check_options(self.options(), self.output)  # before anything that takes time
 
-        from ripple_sim.scene.camera_override import through_camera
         from ripple_sim.solver.gl import select_device, shared_context
         from ripple_sim.video.render_video import render_video
         from ripple_sim.video.settings import frame_count, settled
@@ -43,14 +52,35 @@ class _VideoCommand(VideoArguments):
 
         if self.device is not None:
             select_device(self.device)
-        scene = self.load()
-        if self.camera is not None:
-            scene = through_camera(scene, self.camera)
+        scene = self._seen()
         options = settled(self.options(), scene, self.output)
         title = f"renderer {shared_context().renderer}, waves {options.backend}"
         with frame_progress(title, frame_count(options)) as progress:
             summary = render_video(scene, self.output, options, progress=progress)
         print(_summary_text(summary))
+
+    def _run_cycles(self) -> None:
+        from ripple_sim.cycles.render_cycles import check_cycles, render_cycles
+
+        check_cycles(self.options(), self.output, self.samples)  # before anything that takes time
+
+        from ripple_sim.video.settings import frame_count, settled
+
+        from .progress import frame_progress
+
+        scene = self._seen()
+        frames = frame_count(settled(self.options(), scene, self.output))
+        with frame_progress(f"renderer Cycles, {self.samples} samples", frames) as progress:
+            summary = render_cycles(scene, self.output, self.options(), samples=self.samples, progress=progress)
+        print(f"{summary.output}: {summary.frames} frames")
+        print(f"stages    simulation and export {summary.export_seconds:.1f} s, Cycles {summary.render_seconds:.1f} s")
+
+    def _seen(self) -> Scene:
+        """The scene through the camera that is asked for."""
+        from ripple_sim.scene.camera_override import through_camera
+
+        scene = self.load()
+        return scene if self.camera is None else through_camera(scene, self.camera)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

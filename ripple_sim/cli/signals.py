@@ -2,7 +2,8 @@
 
 Before a command begins, and during imports, where an exception could be taken for an import error, there is nothing to
 clean up, and the process ends at once. Later the signal becomes an exception, but never within a call of moderngl's,
-which would end in a segmentation fault, nor while a video is being opened: then a timer tries again until it is over.
+which would end in a segmentation fault, nor within VTK's, which swallows exceptions of what it calls back or exits by
+itself, nor while a video is being opened: then a timer tries again until it is over.
 A second signal ends the process at once; what is left is then as whole as after a kill.
 """
 
@@ -19,8 +20,8 @@ from typing import Any
 _WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
 INTERRUPTED, TERMINATED, HUNG_UP = (128 + number for number in _WORDS)
 
-# Files within whose calls no exception is raised, by the ends of their paths.
-_NEVER_IN = ("moderngl/__init__.py", "encode/open_writer.py")
+# Files within whose calls no exception is raised, by parts of their paths.
+_NEVER_IN = ("moderngl/__init__.py", "/pyvista/plotting/", "encode/open_writer.py")
 # Where an import may be under way and there is something to clean up.
 _AT_STAKE = "video/render_video.py"
 
@@ -61,7 +62,7 @@ def _raise(number: int, frame: FrameType | None) -> None:
     importing = any(file.startswith("<frozen importlib") for file in files)
     if importing and not any(file.endswith(_AT_STAKE) for file in files):
         _end(number, frame)
-    if importing or any(file.endswith(_NEVER_IN) for file in files):
+    if importing or any(part in file for file in files for part in _NEVER_IN):
         _retry(number)
         return
     end_at_once()

@@ -19,7 +19,9 @@ from .arguments import (
     Focus,
     FrameRate,
     Overlay,
+    Passes,
     Resolution,
+    Rim,
     SceneLayout,
     Shutter,
     Size,
@@ -38,9 +40,11 @@ _WORDS: dict[str, Any] = {
     "focus": Focus,
     "exposures": Exposures,
     "overlay": Overlay,
+    "passes": Passes,
     "compare": Baseline,
     "resolution": Resolution,
     "layout": SceneLayout,
+    "rim": Rim,
 }
 
 if TYPE_CHECKING:

@@ -8,21 +8,24 @@ from collections.abc import Iterator, Sequence
 from typing import TypedDict, Unpack
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.coupling.amplitude.amplitude_check import AmplitudeCheck
 from ripple_sim.coupling.colliders.collision_warnings import collision_warnings
 from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
 from ripple_sim.coupling.load.contact_loads import ContactLoads
 from ripple_sim.coupling.load.contact_record import Impulse
+from ripple_sim.coupling.load.high_pass import HighPass
 from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
 from ripple_sim.coupling.model.coupled_model import CoupledModel
-from ripple_sim.coupling.model.geoms import ByGeom, GeomKey
+from ripple_sim.coupling.model.geoms import ByGeom, GeomKey, target_name
 from ripple_sim.coupling.two_way.push_back import PushBack
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Load, Material
 from ripple_sim.solver.checked import checked, whole
 
-from .arguments import integrator_warning, own_data, own_model
+from .arguments import for_each, integrator_warning, own_data, own_model
 from .stepping.clock import StepClock, missed_warning
 from .stepping.divergence import divergence_warning, goes_on_broken
 from .stepping.followed import followed
@@ -73,6 +76,10 @@ class Ripples(Targets):
         to it, collide. A target that neither collides nor is named here takes the contacts of all geoms of its body
         that collide and do not ripple. A contact loads the surface where this is nearest and faces it; of several
         targets that share a geom, the nearest.
+    high_pass : bool or mapping
+        Whether a flex keeps to itself the coarse motion that contacts give it, for all targets or by name: its waves
+        then get what it cannot follow, see `HighPass`. Otherwise the momentum of a contact counts twice, in the flex
+        and in its waves, which take theirs from nothing.
     **wave_options
         As for `WaveSolver`: `backend` (str, "auto"), `operator` (str, "fem") and `conserve_volume` (bool, True).
 
@@ -94,17 +101,30 @@ class Ripples(Targets):
         rim: str | ByGeom[str] = "free",
         two_way: bool = False,
         contacts: ByGeom[Sequence[GeomKey]] | None = None,
+        high_pass: bool | ByGeom[bool] = False,
         **wave_options: Unpack[WaveOptions],
     ) -> None:
         super().__init__(own_model(model), materials, resolution, layout, rim, wave_options)
         coupled = CoupledModel(self.model, self._waves, named_collision_geoms(self.model, self, contacts or {}))
-        for geom, waves in self._waves.items():
+        rigid = {geom: waves for geom, waves in self._waves.items() if geom not in coupled.soft}
+        for geom, waves in rigid.items():
             for message in collision_warnings(coupled, geom, waves.atlas):
                 _warn(message)
+        if two_way and coupled.soft:
+            raise SceneError("flexes and skins cannot push back yet; take two_way=False, or geoms as targets alone")
+        self._soft = coupled.soft
+        fine = for_each(self.model, self, "high_pass", high_pass)
+        self._high_pass = {
+            target: HighPass(self._waves[target], surface)
+            for target, surface in coupled.soft.items()
+            if surface.flex >= 0 and fine[target_name(self.model, target)]
+        }
         _warn(integrator_warning(self.model))
         self._loads = ContactLoads(coupled, self._waves)
-        self._check_tunnelling = TunnellingCheck(coupled, list(self._waves))
+        self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
         self._check_amplitude = AmplitudeCheck(self._waves, coupled.names)
+        for target in coupled.soft:
+            self._check_amplitude.ignore(target)
         self._push_back = PushBack(coupled, self._waves) if two_way else None
         self._clock, self._solved = StepClock(), SolvedForces(self.model)
         self._warned: set[str] = set()
@@ -175,6 +195,15 @@ class Ripples(Targets):
             yield
         self._follow(data)  # what was stepped in other ways is warned of
 
+    def vertices(self, name: GeomKey, data: mujoco.MjData) -> NDArray[np.float64] | None:
+        """Where the vertices of a target's mesh are [m], [n, 3]: of a flex or a skin by `data`, in the world.
+
+        Of a geom that was moved by `ripples[name].move` in its own frame; None where nothing has moved them.
+        """
+        target = self._target(name)
+        soft = self._soft.get(target.geom)
+        return target.waves.vertices if soft is None else soft.vertices(data)
+
     def reset(self) -> None:
         """Flatten all surfaces, and let time begin anew."""
         self._clock.restart()
@@ -196,7 +225,11 @@ class Ripples(Targets):
         solved, solved_here = self._solved.of(data)
         self._warn_once("unsolved", UNSOLVED_WARNING if solved_here else None)
         self._check_tunnelling(solved)
+        for target, surface in self._soft.items():
+            self._waves[target].move(surface.vertices(solved))
         loads = self._loads.loads(solved, passed.elapsed)
+        for target, filtered in self._high_pass.items():
+            loads[target] = filtered(loads[target])
         if self._push_back is not None:
             for geom, load in self._push_back.exchange(data, self._loads.touches, self._waves, passed.elapsed):
                 loads[geom] = Load.together([loads[geom], load])
@@ -206,7 +239,10 @@ class Ripples(Targets):
 
     def _waves_changed(self, name: GeomKey) -> None:
         super()._waves_changed(name)
-        self._loads.waves_changed(self._target(name).geom)
+        target = self._target(name)
+        self._loads.waves_changed(target.geom)
+        if target.geom in self._high_pass:
+            self._high_pass[target.geom] = HighPass(target.waves, self._soft[target.geom])
 
     def _flatten(self) -> None:
         self._check_amplitude.flush()

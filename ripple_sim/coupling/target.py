@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.coupling.model.soft_ids import is_soft
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver
 from ripple_sim.solver.operator.holding import hold
 from ripple_sim.solver.texels.atlas import check_points
@@ -80,7 +81,9 @@ class Target:
         self._rebuild(self._material, held, self._options)
 
     def to_geom(self, point: ArrayLike) -> NDArray[np.float64]:
-        """Carry a point [m] from the frame of the geom's body to that of the geom."""
+        """Carry a point [m] from the frame of the geom's body to that of the geom; what is soft is in the world."""
+        if is_soft(self._model, self.geom):
+            return np.array(point, dtype=np.float64)
         rotation = np.zeros(9)
         mujoco.mju_quat2Mat(rotation, self._model.geom_quat[self.geom])
         places = check_points(point) - self._model.geom_pos[self.geom]
@@ -90,7 +93,9 @@ class Target:
         """Make a new solver in the old one's state; if that fails, nothing has changed."""
         old, held_material = self.waves, material
         if held is not None:
-            held_material = hold(old.atlas, material, held)
-        new = WaveSolver(old.atlas, held_material, **options)
+            held_material = hold(old.rest, material, held)
+        new = WaveSolver(old.rest, held_material, **options)
+        if old.vertices is not None:
+            new.move(old.vertices)
         new.state = old.state
         self.waves, self._material, self._held, self._options = new, material, held, options

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.coupling.model.geoms import ByGeom, GeomKey, find_geom, geom_name
+from ripple_sim.coupling.model.geoms import ByGeom, GeomKey, find_any, find_target, target_name
 from ripple_sim.coupling.model.suited_target import suited_targets
 from ripple_sim.coupling.model.target_mesh import target_atlas
 from ripple_sim.errors import SceneError
@@ -53,7 +53,7 @@ class Targets:
         self._targets = {
             name: Target(
                 model,
-                (geom := find_geom(model, name)),
+                (geom := find_target(model, name)),
                 target_atlas(model, geom, texels[name], layouts[name]),
                 material,
                 {**options, "rim": rims[name]},
@@ -75,7 +75,7 @@ class Targets:
 
     @property
     def geom_ids(self) -> dict[str, int]:
-        """Geom id of every target, by name."""
+        """Geom id of every target, by name; a flex or a skin has one after all geoms."""
         return {name: target.geom for name, target in self._targets.items()}
 
     def change_material(self, name: GeomKey, **coefficients: Any) -> None:
@@ -176,7 +176,7 @@ class Targets:
     def _target(self, name: GeomKey) -> Target:
         target = self._targets.get(name) if isinstance(name, str) else None
         if target is None:
-            target = self._targets.get(geom_name(self.model, find_geom(self.model, name)))
+            target = self._targets.get(target_name(self.model, find_any(self.model, name)))
         if target is None:
             raise SceneError(
                 f"geom {name!r} does not ripple; the rippling geoms are {', '.join(map(repr, self._targets))}"

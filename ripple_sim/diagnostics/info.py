@@ -8,6 +8,7 @@ import os
 import platform
 
 from ripple_sim.solver.backends.backend import auto_backend
+from ripple_sim.solver.backends.measured import measured
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import shared_context
 
@@ -53,6 +54,8 @@ class Info:
         None if there is no usable context; `advice` then says what to install.
     backend : str
         The wave solver of "auto": "gl" or "cpu".
+    measured : str
+        What was measured to choose it, once on this machine; "" where nothing was.
     advice : str
         Problems that prevent or slow down rendering, with their fixes, one per line; "" if there is none.
     """
@@ -62,6 +65,7 @@ class Info:
     processors: int
     opengl: OpenGL | None
     backend: str
+    measured: str
     advice: str
 
 
@@ -81,6 +85,7 @@ def collect() -> Info:
         processors=os.cpu_count() or 1,
         opengl=opengl,
         backend=auto_backend(),
+        measured=str(measured(context)) if opengl and not opengl.software else "",
         advice="\n".join(map(str, findings)) or failure,
     )
 
@@ -97,6 +102,7 @@ def as_text(info: Info) -> str:
         if gl
         else "none: rendering is impossible",
         "waves": f"{info.backend} (auto: {where})",
+        **({"measured": f"nine substeps: {info.measured}"} if info.measured else {}),
     }
     width = max(map(len, rows))
     lines = [f"{name:<{width}}  {value}" for name, value in rows.items()]

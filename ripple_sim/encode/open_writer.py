@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ripple_sim.errors import EncodingError
+from ripple_sim.solver.atomic_file import final_path
 
 from .clip import Stream
 from .formats import FORMATS
@@ -66,7 +67,7 @@ def open_writer(
     video = FORMATS[video_format(path, frame_format)]
     try:
         part = Part(
-            path.resolve(),
+            final_path(path),
             suffix=video.suffix,
             length=video.length,
             settings=settings or {},

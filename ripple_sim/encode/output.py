@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 from ripple_sim.errors import EncodingError, VideoError
+from ripple_sim.solver.atomic_file import NO_NAME, final_path
 
 from .exr import check_exr
 from .mark import MARK, made_here
@@ -68,8 +69,9 @@ def check_output(
     ------
     VideoError
         If the ending is unknown, the size or rate is out of range, the size is odd in a format of halved colour
-        resolution, the format supports no transparency or no overlays, EXR frames are not for a folder, or something
-        that was not made here stands in the output's place. With `overwrite` such a file or frames are no obstacle.
+        resolution, the format supports no transparency or no overlays, EXR frames are not for a folder, there can be
+        no such name, or something that was not made here stands in the output's place. With `overwrite` such a file
+        or frames are no obstacle.
     EncodingError
         If the output cannot be written.
     """
@@ -86,9 +88,8 @@ def check_output(
         _check_fps(form, fps)
         _check_place(path, form, overwrite)
     except OSError as error:
-        raise EncodingError(
-            f"cannot write {path}: {error.strerror}; name a file in a folder you can write to"
-        ) from error
+        kind = VideoError if error.errno in NO_NAME else EncodingError
+        raise kind(f"cannot write {path}: {error.strerror}; name a file in a folder you can write to") from error
 
 
 def check_size(width: int, height: int) -> None:
@@ -167,13 +168,13 @@ def _check_place(path: Path, form: str, overwrite: bool) -> None:
         if is_file:
             raise VideoError(f"cannot write {path}: it is a folder; name a file")
         if path.is_symlink():  # which no finished folder can replace
-            raise VideoError(f"cannot write frames to {path}: it is a link; name the folder {path.resolve()}")
+            raise VideoError(f"cannot write frames to {path}: it is a link; name the folder {final_path(path)}")
         check_replaceable(path, overwrite)
     elif path.exists():
         if not (is_file and path.is_file()):
             raise VideoError(f"cannot write {path}: it exists and is not a {'file' if is_file else 'folder'}")
-        check_replaceable(path.resolve(), overwrite)
-    path = path.resolve()  # a link is written through
+        check_replaceable(final_path(path), overwrite)
+    path = final_path(path)  # a link is written through
     folder = path.absolute().parent
     while not folder.exists():
         folder = folder.parent

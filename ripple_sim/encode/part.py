@@ -73,6 +73,8 @@ class Part:
         self._record = Record(video, self.folder)
         if self.folder.is_symlink():
             raise VideoError(f"cannot write {video}: its folder {self.folder.name} is a link; move it away")
+        if self.folder.exists() and not self.folder.is_dir():
+            raise VideoError(f"cannot write {video}: {self.folder.name} beside it is no folder; move it away")
         self.folder.mkdir(parents=True, exist_ok=True)
         self._lock = os.open(self.folder, os.O_RDONLY | os.O_NOFOLLOW)
         try:

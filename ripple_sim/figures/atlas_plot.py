@@ -3,38 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure  # without pyplot, which would look for a display
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ripple_sim.encode.mark import MARK, made_here
-from ripple_sim.solver import Atlas, AtlasError
+from ripple_sim.solver import Atlas
 
 from .atlas_painter import AtlasPainter
 from .chart_images import cross, sphere_image, squares
+from .plot_page import FAINT, TEXT, check_plot_path, dressed, save_plot, show
 from .texel_colors import STRETCH_COLORS, STRETCH_RANGE, chart_colors, stretch_colors, stretch_shade, texel_stretch
 from .view import View
-
-_ENDINGS = (".png", ".jpg", ".pdf", ".svg")
-_TEXT, _FAINT = "#1b2432", "#6b7685"
-_DPI = 120
-
-
-def check_plot_path(path: str | Path, overwrite: bool = True) -> None:
-    """Raise `AtlasError` if the ending is unknown, the folder missing, or the file another's that must not go."""
-    path = Path(path)
-    if path.suffix.lower() not in _ENDINGS:
-        raise AtlasError(f"plot file {str(path)!r} has an unknown ending; valid are {', '.join(_ENDINGS)}")
-    if not path.absolute().parent.is_dir() or path.is_dir():
-        raise AtlasError(f"plot file {str(path)!r} cannot be written: name a file in a folder that exists")
-    if path.exists() and not (overwrite or made_here(path.resolve())):
-        raise AtlasError(
-            f"plot file {str(path)!r} cannot be written: it exists and was not {MARK}; name another file, or add "
-            "--overwrite"
-        )
 
 
 def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = "", up: str = "y") -> None:
@@ -56,47 +37,26 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
     """
     check_plot_path(path)
     stretch = texel_stretch(atlas)
-    figure = Figure(figsize=(16, 9), dpi=_DPI, facecolor="white")
-    figure.text(0.03, 0.945, title, fontsize=25, fontweight="bold", color=_TEXT, va="center")
-    figure.text(0.03, 0.903, subtitle, fontsize=12.5, color=_FAINT, va="center")
+    figure = dressed(title, subtitle)
     painter = AtlasPainter(atlas, stretch_colors(stretch))
     front, back = View(up=up), View(azimuth=View.azimuth + 180, up=up)
     if atlas.layout == "cube":
-        _show(figure, (0.025, 0.05, 0.37, 0.82), painter.mesh(front, 800))
-        _show(figure, (0.42, 0.50, 0.20, 0.38), painter.mesh(back, 400), "the other side")
+        show(figure, (0.025, 0.05, 0.37, 0.82), painter.mesh(front, 800))
+        show(figure, (0.42, 0.50, 0.20, 0.38), painter.mesh(back, 400), "the other side")
         sphere = sphere_image(painter, atlas.resolution, front, 380)
-        _show(figure, (0.42, 0.07, 0.20, 0.355), sphere, "on the sphere")
-        _show(figure, (0.635, 0.455, 0.35, 0.47), cross(painter, atlas.resolution, 160), "the six charts, unfolded")
+        show(figure, (0.42, 0.07, 0.20, 0.355), sphere, "on the sphere")
+        show(figure, (0.635, 0.455, 0.35, 0.47), cross(painter, atlas.resolution, 160), "the six charts, unfolded")
     else:
         colors = np.broadcast_to(chart_colors(atlas.texels.topology)[:, None, None], (*atlas.texels.shape, 3))
         charts = AtlasPainter(atlas, colors)
-        _show(figure, (0.025, 0.05, 0.37, 0.82), charts.mesh(front, 800))
-        _show(figure, (0.42, 0.50, 0.20, 0.38), charts.mesh(back, 400), "the other side")
-        _show(figure, (0.42, 0.07, 0.20, 0.355), painter.mesh(front, 380), "stretch")
+        show(figure, (0.025, 0.05, 0.37, 0.82), charts.mesh(front, 800))
+        show(figure, (0.42, 0.50, 0.20, 0.38), charts.mesh(back, 400), "the other side")
+        show(figure, (0.42, 0.07, 0.20, 0.355), painter.mesh(front, 380), "stretch")
         page = squares(painter, atlas.texels.shape, 672, 508)
-        _show(figure, (0.635, 0.455, 0.35, 0.47), page, f"the {atlas.texels.shape[0]} charts, side by side")
+        show(figure, (0.635, 0.455, 0.35, 0.47), page, f"the {atlas.texels.shape[0]} charts, side by side")
     _histogram(figure.add_axes((0.655, 0.300, 0.31, 0.105)), stretch, atlas.areas)
     _figures(figure, atlas)
-    try:
-        figure.savefig(path, dpi=_DPI, **_marked(Path(path).suffix.lower()))
-    except OSError as error:
-        raise AtlasError(f"plot file {str(path)!r} cannot be written: {error.strerror or error}") from error
-
-
-def _marked(ending: str) -> dict[str, Any]:
-    """How each format is told to hold the mark of files that were made here."""
-    if ending == ".jpg":
-        return {"pil_kwargs": {"comment": MARK.encode()}}
-    name = "Software" if ending == ".png" else "Creator"
-    return {"metadata": {name: MARK, **({"Date": None} if ending == ".svg" else {})}}
-
-
-def _show(figure: Figure, place: tuple[float, float, float, float], image: NDArray, caption: str = "") -> None:
-    axes = figure.add_axes(place)
-    axes.imshow(image, interpolation="antialiased")
-    axes.set_axis_off()
-    if caption:
-        axes.text(0.5, -0.03, caption, transform=axes.transAxes, ha="center", va="top", fontsize=11.5, color=_FAINT)
+    save_plot(figure, path)
 
 
 def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float64]) -> None:
@@ -106,17 +66,17 @@ def _histogram(axes: Axes, stretch: NDArray[np.float64], areas: NDArray[np.float
     middles = np.sqrt(bins[1:] * bins[:-1])
     colors = STRETCH_COLORS(stretch_shade(middles))
     axes.bar(bins[:-1], share / share.max(), np.diff(bins), align="edge", color=colors, edgecolor="none")
-    axes.stairs(share / share.max(), bins, color=_FAINT, linewidth=0.7)  # pale bars need an outline
+    axes.stairs(share / share.max(), bins, color=FAINT, linewidth=0.7)  # pale bars need an outline
     axes.bar(bins[:-1], -0.14, np.diff(bins), bottom=-0.03, align="edge", color=colors, edgecolor="none")
     axes.set_xscale("log")
     axes.set_xlim(bins[0], bins[-1])
     axes.set_ylim(-0.17, 1.02)
     ticks = [0.5, 0.6, 0.7, 0.8, 1.0, 1.25, 1.5, 2.0]
-    axes.set_xticks(ticks, ["≤ ½", *(f"{t:g}" for t in ticks[1:-1]), "≥ 2"], fontsize=10, color=_TEXT)
+    axes.set_xticks(ticks, ["≤ ½", *(f"{t:g}" for t in ticks[1:-1]), "≥ 2"], fontsize=10, color=TEXT)
     axes.set_xticks([], minor=True)
     axes.set_yticks([])
     axes.tick_params(length=0, pad=3)
-    axes.set_xlabel("stretch: texel width relative to an even spread", fontsize=11.5, color=_FAINT)
+    axes.set_xlabel("stretch: texel width relative to an even spread", fontsize=11.5, color=FAINT)
     for spine in axes.spines.values():
         spine.set_visible(False)
 
@@ -139,5 +99,5 @@ def _figures(figure: Figure, atlas: Atlas) -> None:
             text = form.format(**values)
         except KeyError:  # the layout does not know it
             text = "-"
-        figure.text(left, 0.196 - 0.062 * k, text, fontsize=16, fontweight="bold", color=_TEXT, va="center")
-        figure.text(left, 0.170 - 0.062 * k, name, fontsize=11, color=_FAINT, va="center")
+        figure.text(left, 0.196 - 0.062 * k, text, fontsize=16, fontweight="bold", color=TEXT, va="center")
+        figure.text(left, 0.170 - 0.062 * k, name, fontsize=11, color=FAINT, va="center")

@@ -8,6 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.model.soft_ids import target_pose
 from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.simulation import Simulation
 
@@ -96,15 +97,16 @@ class ContactMarks:
 
     def _mark(self, contact: _Contact, height: float) -> Mark:
         position, rotation = self._pose(contact.geom)
-        normal = self._simulation.ripples[contact.geom].atlas.normals[contact.texel]
+        waves = self._simulation.ripples[contact.geom]
+        normal = waves.atlas.normals[contact.texel]
+        place = contact.place if waves.vertices is None else waves.atlas.positions[contact.texel]
         opacity = (contact.impulse / contact.largest - _FADED) / (_FADING - _FADED)
         return Mark(
-            point=position + rotation @ (contact.place + height * normal),
+            point=position + rotation @ (place + height * normal),
             axis=rotation @ normal,
             impulse=contact.impulse,
             opacity=min(opacity, 1.0),
         )
 
     def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        geom, data = self._simulation.ripples.geom_ids[name], self._simulation.data
-        return data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
+        return target_pose(self._simulation.data, self._simulation.ripples.geom_ids[name])

@@ -9,12 +9,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.model.soft_ids import target_pose
 from ripple_sim.solver.errors import RippleError
 
 from .bounds import Balls, join
 from .camera import Pose
 from .surfaces.displacement import Place
-from .surfaces.height_maps import HeightMapTextures
+from .surfaces.height_maps import AnyHeightMap, HeightMapTextures
 from .surfaces.surface import Surface
 from .surfaces.surface_mesh import SurfaceMesh
 from .visuals.assets import Assets
@@ -63,15 +64,14 @@ class DrawnScene:
         geoms = ", ".join(str(target.geom) for target in self._targets) or "none"
         raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
 
-    def update(
-        self, ctx: moderngl.Context, data: Any, height_maps: Mapping[int, NDArray[np.float32]], pose: Pose
-    ) -> int:
+    def update(self, ctx: moderngl.Context, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose) -> int:
         """Bring everything on the GPU up to date; return the number of occluders."""
+        for target in self._targets:
+            target.ripple(ctx, height_maps.get(target.geom))
         occluders = self._geoms.occluders.bind(data, pose.focus)
         for target in self._targets:
-            rotation = np.array(data.geom_xmat[target.geom].reshape(3, 3))
-            place = Place(rotation, np.array(data.geom_xpos[target.geom]), occluders)
-            target.update(ctx, place, height_maps.get(target.geom))
+            origin, rotation = target_pose(data, target.geom)
+            target.update(ctx, Place(rotation, origin, occluders))
         pixels = self._height / (2 * np.tan(np.radians(pose.fovy) / 2))
         self._geoms.update(data, pose.position, pixels)
         self._assets.objects.bind()
@@ -100,7 +100,7 @@ class DrawnScene:
         """Draw the depth of everything that casts a shadow, under a matrix of 16 numbers, column by column."""
         for target in self._targets:
             if target.casts_shadow:
-                target.draw_shadow(view_projection)
+                target.draw_depth(view_projection)
         self._geoms.draw_depth(view_projection, sites=True)
 
     def draw_occluders(self, view_projection: tuple[float, ...]) -> None:

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import moderngl
-import numpy as np
-from numpy.typing import NDArray
 
 from .bounds import enclosing, within
 from .camera import Pose
@@ -21,7 +19,9 @@ from .passes.floor_occlusion import FloorOcclusion
 from .passes.mirror import Mirror
 from .passes.screen_bounds import boxes_of
 from .passes.shadow import ShadowMaps
+from .passes.surface_buffers import SurfaceBuffers, SurfaceImage
 from .scene_light import SceneLight
+from .surfaces.height_maps import AnyHeightMap
 
 _SHADOW_REACH = 2.5  # casters further than that from the focus, in camera distances, cast no shadow
 
@@ -46,18 +46,19 @@ class FramePasses:
         floor: Floor | None,
         light: SceneLight,
     ) -> None:
-        self._gl, self._format = resources.gl, frame_format
+        self._resources, self._gl, self._format = resources, resources.gl, frame_format
         self._scene, self._floor, self._light = scene, floor, light
         self._frame = FrameUniforms(resources)
-        self._shadows = ShadowMaps(resources, light.shadows)
+        self._shadows = ShadowMaps(resources, light.shadows, frame_format.size[1])
         self._occlusion = FloorOcclusion(resources, light.shadows, floor)
         self._shading = DeferredShading(resources, frame_format, floor, light.options)
+        self._buffers: SurfaceBuffers | None = None
         self._mirror = None
         if floor is not None and floor.reflects and not frame_format.alpha:
             self._mirror = Mirror(resources, frame_format, floor, light.options)
 
     def draw(
-        self, data: Any, height_maps: Mapping[int, NDArray[np.float32]], pose: Pose, exposure: int
+        self, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose, exposure: int
     ) -> moderngl.Framebuffer:
         """Draw a frame and leave it on the GPU; see `Renderer.draw`."""
         scene, shading = self._scene, self._shading
@@ -77,11 +78,30 @@ class FramePasses:
                 shading.layers.add(ctx, layer.number, layer.draw, boxes_of(layer.balls, pose, self._format.size))
         return shading.frame
 
+    def surfaces(
+        self, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose, size: tuple[int, int]
+    ) -> SurfaceImage:
+        """Draw what each pixel shows, without light; see `Renderer.surfaces`."""
+        scene = self._scene
+        with self._gl as ctx:
+            if self._buffers is None or self._buffers.size != size:
+                floor_geom = -1 if self._floor is None else self._floor.geom
+                self._buffers = SurfaceBuffers(self._resources, size, floor_geom)
+            self._update(ctx, data, height_maps, pose, 0)
+            scene.bind()
+
+            def draw() -> None:
+                scene.draw()
+                for layer in scene.layers(data, pose):
+                    layer.draw()
+
+            return self._buffers.draw(ctx, draw)
+
     def _update(
         self,
         ctx: moderngl.Context,
         data: Any,
-        height_maps: Mapping[int, NDArray[np.float32]],
+        height_maps: Mapping[int, AnyHeightMap],
         pose: Pose,
         exposure: int,
     ) -> None:

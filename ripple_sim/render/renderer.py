@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.gl import GLContext
+from ripple_sim.solver.memory import require_memory
 
 from .camera import Viewpoint
 from .drawn_scene import DrawnScene
@@ -20,11 +21,16 @@ from .frame_passes import FramePasses
 from .gpu.readback import Readback
 from .gpu.resources import Resources
 from .passes.floor import Floor, find_floor
+from .passes.surface_buffers import SurfaceImage
 from .scene_light import SceneLight
+from .surfaces.height_maps import AnyHeightMap
 from .surfaces.surface import Surface
 from .visuals.assets import Assets
 from .visuals.unsupported import warn_of_unsupported
 from .visuals.visual import visible_geoms
+
+# Memory for a pixel and for each of its samples, at least [bytes].
+_PIXEL, _SAMPLE = 8, 20
 
 
 class Renderer:
@@ -51,8 +57,8 @@ class Renderer:
     Raises
     ------
     RippleError
-        If the driver cannot make frames of this size, a look or the lighting is unknown, or linear frames are to show a
-        heatmap or a grid, whose colours are the screen's.
+        If the driver cannot make frames of this size, or memory holds none, a look or the lighting is unknown, or
+        linear frames are to show a heatmap or a grid, whose colours are the screen's.
     """
 
     def __init__(
@@ -71,10 +77,11 @@ class Renderer:
             raise RippleError(
                 "heatmaps and grids have the screen's colours, which linear light lacks: take linear=False"
             )
-        warn_of_unsupported(model)
-        self._gl = gl
+        warn_of_unsupported(model, targets)
+        self._gl, self._size = gl, size
         self._resources = resources = Resources(gl, self)
         frame_format = FrameFormat(size, samples, alpha, linear)
+        _check_memory(gl, frame_format)
         with gl:
             assets = Assets.of(model, resources)
             light = SceneLight(assets, lighting)
@@ -118,7 +125,7 @@ class Renderer:
             self._scene.set_heatmap(geom, values, limit)
 
     def render(
-        self, data: Any, height_maps: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
+        self, data: Any, height_maps: Mapping[int, AnyHeightMap], camera: Viewpoint, exposure: int = 0
     ) -> NDArray:
         """Draw one frame and return its pixels.
 
@@ -128,7 +135,8 @@ class Renderer:
             Poses of the geoms, after `mj_forward` or `mj_step`.
         height_maps : mapping
             Geom id to height map, shape [C, n + 2, n + 2, 4]: gradient of the height (xyz, in the geom's frame) and
-            height [m] (w), each face with a halo of one texel. A target without one is flat.
+            height [m] (w), each face with a halo of one texel. A target without one is flat. One that `HeightMap` made
+            of a field on the GPU is written there.
         camera : Camera, FixedCamera or ThroughLens
         exposure : int
             Number of this exposure among those whose mean is a frame: each has another noise in its shadows.
@@ -142,9 +150,7 @@ class Renderer:
         self.submit(data, height_maps, camera, exposure)
         return self.fetch()
 
-    def submit(
-        self, data: Any, height_maps: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
-    ) -> None:
+    def submit(self, data: Any, height_maps: Mapping[int, AnyHeightMap], camera: Viewpoint, exposure: int = 0) -> None:
         """Draw one frame as `render` does without waiting for it; `fetch` returns frames in the order of submission."""
         with self._gl:
             self._readback.submit(self.draw(data, height_maps, camera, exposure))
@@ -153,8 +159,22 @@ class Renderer:
         """Wait for the earliest submitted frame, and return it as `render` does."""
         return self._readback.fetch()
 
+    def surfaces(
+        self,
+        data: Any,
+        height_maps: Mapping[int, AnyHeightMap],
+        camera: Viewpoint,
+        size: tuple[int, int] | None = None,
+    ) -> SurfaceImage:
+        """Draw what is seen at the middle of each pixel, without light: distances, normals, geoms.
+
+        Transparent objects count as solid. Arguments are as for `render`; `size` (width, height) may be another than
+        that of the frames, of the same shape.
+        """
+        return self._passes.surfaces(data, height_maps, camera.pose(), size or self._size)
+
     def draw(
-        self, data: Any, height_maps: Mapping[int, NDArray[np.float32]], camera: Viewpoint, exposure: int = 0
+        self, data: Any, height_maps: Mapping[int, AnyHeightMap], camera: Viewpoint, exposure: int = 0
     ) -> moderngl.Framebuffer:
         """Draw one frame and leave it on the GPU.
 
@@ -165,3 +185,11 @@ class Renderer:
             over it.
         """
         return self._passes.draw(data, height_maps, camera.pose(), exposure)
+
+
+def _check_memory(gl: GLContext, frame: FrameFormat) -> None:
+    """A software driver takes the machine's memory; a GPU says itself that it has too little."""
+    if gl.software:
+        width, height = frame.size
+        need = width * height * (_PIXEL + _SAMPLE * max(frame.samples, 1))
+        require_memory(RippleError, need, f"drawing frames of {width}x{height} pixels", "take smaller frames")

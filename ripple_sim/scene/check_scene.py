@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 from ripple_sim.coupling.arguments import own_model
 from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
@@ -51,7 +52,7 @@ def check_scene(scene: Scene) -> None:
 
 def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
     from ripple_sim.render import LOOKS
-    from ripple_sim.solver.operator.assembly import RIMS
+    from ripple_sim.solver.operator.rims import RIMS
 
     find_target(model, entry.geom)
     for what, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS), ("rim", entry.rim, RIMS)):
@@ -59,7 +60,17 @@ def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
             raise SceneError(f"{what} {name!r} does not exist; valid are {', '.join(valid)}")
     if entry.color is not None and not all(0 <= part <= 1 for part in entry.color):
         raise SceneError(f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 (sRGB)")
-    entry.material.material()
+    entry.material.material(np.ones((1, 1, 1)) if entry.inside else None)
+    for body in entry.inside:
+        body.check()
+    if entry.height is not None:
+        entry.height.check()
+    least, greatest = entry.thickness_limits
+    if not 0 <= least <= greatest:
+        raise SceneError(
+            f"thickness_limits of geom {entry.geom!r} are {entry.thickness_limits} m; valid are two numbers from 0 on, "
+            "the least first"
+        )
     for coefficient, each in entry.material.maps().items():
         _check_image(
             f"ripple.material.{coefficient}", each.map, "a number, or the path of an image relative to the scene file"

@@ -76,8 +76,8 @@ def drop_scene(
         raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
     mesh = load_mesh(mesh_path, **reading)
     V = _standing(mesh, up)
-    # MuJoCo may throw boxes aside from a sheet
-    shapes = [shape for shape in BODY_SHAPES if mesh.closed or shape != "box"]
+    # MuJoCo may throw boxes and cylinders aside from a sheet
+    shapes = [shape for shape in BODY_SHAPES if mesh.closed or shape not in ("box", "cylinder")]
     spec, drops = drop_model(V, mesh.F, [shapes[i % len(shapes)] for i in range(bodies)], np.random.default_rng(seed))
     if not mesh.closed:
         make_collidable(spec, "target", "flex")

@@ -48,7 +48,10 @@ def drop_model(
     # springy contacts (restitution about 0.5): a spring of 0.01 s at a damping ratio of 0.2
     spec.default.geom.solref = [0.01, 0.2]
     spec.default.geom.friction = [0.4, 0.005, 0.0001]
-    spec.add_mesh(name="target", uservert=V.ravel(), userface=F.ravel())
+    # sheets may have no volume
+    spec.add_mesh(
+        name="target", uservert=V.ravel(), userface=F.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+    )
     spec.worldbody.add_geom(name="target", type=_GEOM.mjGEOM_SDF, meshname="target")
     spec.worldbody.add_geom(
         name="floor",

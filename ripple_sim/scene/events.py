@@ -9,7 +9,7 @@ import msgspec
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.model.geoms import find_geom, geom_name
+from ripple_sim.coupling.model.geoms import find_any, target_name
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
 
@@ -107,7 +107,7 @@ class Script:
 
 def _check_target(model: mujoco.MjModel, verb: str, entry: PokeEntry | ChangeEntry, targets: Sequence[str]) -> None:
     check_time(verb, entry.geom, entry.time)
-    if geom_name(model, find_geom(model, entry.geom)) not in targets:
+    if target_name(model, find_any(model, entry.geom)) not in targets:
         raise SceneError(
             f"[[{verb}]] names the geom {entry.geom!r}, which does not ripple; the rippling geoms are "
             f"{', '.join(map(repr, targets))}"

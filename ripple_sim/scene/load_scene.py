@@ -7,13 +7,13 @@ import importlib.resources
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.model.geoms import find_target, geom_name
+from ripple_sim.coupling.model.geoms import find_target, target_name
 from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.checked import PATH, checked, shown
@@ -28,6 +28,7 @@ from .scene_file import RippleEntry, SceneFile, parse_scene
 
 Moved = TypeVar("Moved", DropEntry, ThrowEntry)
 Edit = Callable[[mujoco.MjSpec], None]
+Change = Callable[[dict[str, Any]], None]
 
 
 def shipped_scenes() -> list[str]:
@@ -37,7 +38,9 @@ def shipped_scenes() -> list[str]:
 
 
 @checked(SceneError, name_or_path=PATH)
-def load_scene(name_or_path: str | Path, edit: Edit | None = None, seed: int | None = None) -> Scene:
+def load_scene(
+    name_or_path: str | Path, edit: Edit | None = None, seed: int | None = None, change: Change | None = None
+) -> Scene:
     """Load a shipped scene by its name, or any scene by the path of its TOML file.
 
     Parameters
@@ -47,6 +50,8 @@ def load_scene(name_or_path: str | Path, edit: Edit | None = None, seed: int | N
         Called with the model's specification (`mujoco.MjSpec`) before it is compiled, to change it in place.
     seed : int, optional
         In place of the one of the file's `[random]`.
+    change : callable, optional
+        Called with the file's table, of dictionaries and lists, before it is checked, to change it in place.
 
     Raises
     ------
@@ -55,7 +60,7 @@ def load_scene(name_or_path: str | Path, edit: Edit | None = None, seed: int | N
         geom or camera is not in it.
     """
     path = _scene_path(str(name_or_path))
-    content = _read(path)
+    content = _read(path, change)
     random = content.random if seed is None else _seeded(path, content.random, seed)
     model, shifts = load_model(path.parent / content.model, random, edit)
     scene = Scene(
@@ -92,10 +97,10 @@ def _seeded(path: Path, random: RandomEntry | None, seed: int) -> RandomEntry:
 
 def _target(model: mujoco.MjModel, entry: RippleEntry) -> RippleEntry:
     """The entry with its geom called as everybody calls it."""
-    return msgspec.structs.replace(entry, geom=geom_name(model, find_target(model, entry.geom)))
+    return msgspec.structs.replace(entry, geom=target_name(model, find_target(model, entry.geom)))
 
 
-def _read(path: Path) -> SceneFile:
+def _read(path: Path, change: Change | None) -> SceneFile:
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -104,6 +109,8 @@ def _read(path: Path) -> SceneFile:
         raise SceneError(f"scene file {str(path)!r} is nested too deeply; a scene has three levels") from error
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from error
+    if change is not None:
+        change(table)
     return parse_scene(table, str(path))
 
 
@@ -115,6 +122,8 @@ def _scene_path(name_or_path: str) -> Path:
     with contextlib.suppress(OSError):  # a name longer than the system's
         if path.is_file():
             return path
+        if path.exists() and not path.is_dir():
+            raise SceneError(f"scene {shown(name_or_path)} is not a regular file; give the path of a TOML file")
     raise SceneError(
         f"there is no scene {shown(name_or_path)}; shipped scenes are {', '.join(shipped)}, or give the path of a TOML "
         "file"
@@ -153,11 +162,16 @@ def load_model(
         if edit is not None:
             edit(spec)
         model = spec.compile()
-    for name, given in keys:
+    for number, (name, given) in enumerate(keys):
         if edit is None and given not in (0, model.nq):
             raise SceneError(
-                f"keyframe {name!r} of {str(path)!r} has {given} positions (qpos); valid are {model.nq}, as the model "
-                "has"
+                f"keyframe {name or number!r} of {str(path)!r} has {given} positions (qpos); valid are {model.nq}, "
+                "as the model has"
+            )
+    for key, numbers in enumerate(np.hstack([model.key_qpos, model.key_qvel])):
+        if not np.isfinite(numbers).all():
+            raise SceneError(
+                f"keyframe {model.key(key).name or key!r} of {str(path)!r} holds NaN or inf; valid are finite numbers"
             )
     return model, shifts
 
@@ -168,4 +182,7 @@ def refusal_of(name: str) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        raise SceneError(f"MuJoCo refuses {name}: {' '.join(str(error).split())}") from error
+        reason = " ".join(str(error).split())
+        if "allocate memory" in reason:  # by default it takes as much as all bodies in one heap would need
+            reason += '; name in the MJCF how much it may take, such as <size memory="4G"/>'
+        raise SceneError(f"MuJoCo refuses {name}: {reason}") from error

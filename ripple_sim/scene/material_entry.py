@@ -12,13 +12,16 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
 from ripple_sim.solver.operator.presets import PRESETS
 
 # Constructors of `Material`; the presets of a scene file are these and the real materials by name.
-LAWS = ("membrane", "layer", "jelly", "plate", "dent")
+LAWS = ("membrane", "layer", "jelly", "plate", "dent", "water")
+_LAYERED = ("layer", "jelly")
 
 # The numbers among `Material`'s fields; the others are flags.
 COEFFICIENTS = tuple(field.name for field in dataclasses.fields(Material) if isinstance(field.default, float))
@@ -39,6 +42,8 @@ class MapEntry(msgspec.Struct, forbid_unknown_fields=True):
 
 Coefficient = float | str | MapEntry
 
+_LAYER = "write preset = {name = 'layer', modulus = ...} or another of a layer under [ripple.material]"
+
 
 def _struct(fields: Iterable[str], kind: Any, *required: tuple[str, type]) -> Any:
     """A struct with fields of one kind that may be left out (None)."""
@@ -58,11 +63,12 @@ _Numbers: Any = _struct(COEFFICIENTS, float)
 class PresetEntry(_OfPresets):
     """A preset by name, with its parameters in their units.
 
-    The name is a constructor of `Material`, membrane, layer, jelly, plate or dent, or a real material, see `PRESETS`.
+    The name is a constructor of `Material`, membrane, layer, jelly, plate, dent or water, or that of a real material,
+    see `PRESETS`.
     """
 
-    def material(self) -> Material:
-        """The preset's material.
+    def material(self, thickness: NDArray[np.float64] | None = None) -> Material:
+        """The preset's material; its layer's thickness may be one at every texel [m], [C, n, n].
 
         Raises
         ------
@@ -74,7 +80,14 @@ class PresetEntry(_OfPresets):
                 f"ripple.material.preset {self.name!r} does not exist; valid are {', '.join((*LAWS, *PRESETS))}"
             )
         given, real = given_fields(self, without="name"), self.name in PRESETS
-        parameters = _parameters(PRESETS[self.name].law if real else self.name)
+        law = PRESETS[self.name].law if real else self.name
+        parameters = _parameters(law)
+        if thickness is not None:
+            if law not in _LAYERED:
+                raise SceneError(
+                    f"[[ripple.inside]] needs a material with a layer, not the preset {self.name!r}; {_LAYER}"
+                )
+            given["thickness"] = thickness
         for key in given:
             if key not in parameters:
                 raise SceneError(
@@ -100,8 +113,13 @@ class MaterialEntry(_OfMaterial):
     preset: str | PresetEntry | None = None
     """Gives the coefficients that are left out; by its name, or as a table with its parameters."""
 
-    def material(self) -> Material:
+    def material(self, thickness: NDArray[np.float64] | None = None) -> Material:
         """The solver's material; where a coefficient is a map, with its value for white.
+
+        Parameters
+        ----------
+        thickness : [C, n, n], optional
+            Of the layer at every texel [m].
 
         Raises
         ------
@@ -111,10 +129,12 @@ class MaterialEntry(_OfMaterial):
             For an invalid coefficient.
         """
         preset = PresetEntry(name=self.preset) if isinstance(self.preset, str) else self.preset
+        if preset is None and thickness is not None:
+            raise SceneError(f"[[ripple.inside]] needs a layer; {_LAYER}")
         coefficients = given_fields(self, without="preset")
         numbers = {name: value for name, value in coefficients.items() if isinstance(value, int | float)}
         white = {name: entry.high for name, entry in self.maps().items()}
-        return dataclasses.replace(preset.material() if preset is not None else Material(), **numbers, **white)
+        return dataclasses.replace(Material() if preset is None else preset.material(thickness), **numbers, **white)
 
     def maps(self) -> dict[str, MapEntry]:
         """The coefficients that are maps."""

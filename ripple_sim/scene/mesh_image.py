@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.solver.image_file import read_image
 
 _SUFFIXES = (".png", ".jpg", ".jpeg")
 _SCENES = (".glb", ".gltf")
@@ -49,13 +51,9 @@ def load_image(source: Any) -> NDArray[np.uint8]:
     Raises
     ------
     SceneError
-        If the file cannot be read as an image.
+        If the file cannot be read as an image, or is too large.
     """
-    try:
-        image = source if isinstance(source, Image.Image) else Image.open(source)
-        return np.asarray(image.convert("RGB"))
-    except (OSError, ValueError, Image.DecompressionBombError) as error:
-        raise SceneError(f"texture {str(source)!r} cannot be read: {error}") from error
+    return read_image(SceneError, source, "texture", lambda mode: "RGB")
 
 
 def _of_materials(mesh_path: Path) -> list[Path]:
@@ -90,10 +88,31 @@ def _statements(path: Path) -> list[tuple[str, str]]:
 
 def _embedded(mesh_path: Path) -> list[Image.Image]:
     """Base colour images in a GLB or glTF file."""
+    bombs, log = _Bombs(), logging.getLogger("trimesh")
+    level = log.level
+    log.addHandler(bombs)
+    log.setLevel(logging.DEBUG)
+    try:
+        parts = trimesh.load_scene(mesh_path).geometry.values()
+    finally:
+        log.removeHandler(bombs)
+        log.setLevel(level)
+    if bombs.first is not None:
+        raise SceneError(f"an image in {mesh_path.name} cannot be read: {bombs.first} Scale it down")
     materials = {
-        id(material): material
-        for part in trimesh.load_scene(mesh_path).geometry.values()
-        if (material := getattr(part.visual, "material", None)) is not None
+        id(material): material for part in parts if (material := getattr(part.visual, "material", None)) is not None
     }
     images = (getattr(material, "baseColorTexture", None) for material in materials.values())
     return list({id(image): image for image in images if image is not None}.values())
+
+
+class _Bombs(logging.Handler):
+    """Hears of images beyond pillow's limit, which trimesh logs and leaves out."""
+
+    first: BaseException | None = None
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep the first."""
+        error = record.exc_info[1] if record.exc_info else None
+        if self.first is None and isinstance(error, Image.DecompressionBombError):
+            self.first = error

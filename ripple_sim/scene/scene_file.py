@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ from ripple_sim.solver.checked import shown
 
 from .camera import CameraEntry
 from .events import ChangeEntry, ControlEntry, PokeEntry
+from .height_entry import HeightEntry
+from .inside import InsideEntry
 from .material_entry import MapEntry, MaterialChange, MaterialEntry, PresetEntry
 from .motion import DropEntry, PlaceEntry, ThrowEntry, Vector
 from .randomize import RandomEntry
@@ -49,17 +52,30 @@ class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
     """Discs without waves, see below."""
     still_map: str | None = None
     """Path of an image in the mesh's own texture coordinates: no waves where it is black."""
+    inside: list[InsideEntry] = []
+    """What lies under a layer, see below."""
+    height: HeightEntry | None = None
+    """The shape of the surface at the beginning, see below; by default it is flat."""
+    thickness_limits: tuple[float, float] = (0.0, math.inf)
+    """Least and greatest thickness of a layer over what is inside [m]: beyond them it counts as these."""
     contacts: list[str] | None = None
     """Geoms that collide for a geom that is only visible; by default those of its body."""
+    high_pass: bool = False
+    """Whether a flex keeps to itself the coarse motion that contacts give it; its waves get the fine rest."""
     limit: bool = True
     """Bend heights that are too large for the object where they are drawn, and warn of them."""
     warn: bool = True
     """Whether to warn of them."""
 
     def located(self, folder: Path) -> RippleEntry:
-        """The same with the images' paths made relative to a folder."""
-        still_map = None if self.still_map is None else str(folder / self.still_map)
-        return msgspec.structs.replace(self, material=self.material.located(folder), still_map=still_map)
+        """The same with its files' paths made relative to a folder."""
+        return msgspec.structs.replace(
+            self,
+            material=self.material.located(folder),
+            still_map=None if self.still_map is None else str(folder / self.still_map),
+            inside=[entry.located(folder) for entry in self.inside],
+            height=None if self.height is None else self.height.located(folder),
+        )
 
 
 class SceneFile(msgspec.Struct, forbid_unknown_fields=True):
@@ -144,6 +160,8 @@ _TABLES: dict[str, type[msgspec.Struct]] = {
     **{f"ripple.material.{field.name}": MapEntry for field in msgspec.structs.fields(MaterialEntry)},
     "ripple.material.preset": PresetEntry,
     "ripple.still": StillEntry,
+    "ripple.inside": InsideEntry,
+    "ripple.height": HeightEntry,
     "camera": CameraEntry,
     "drop": DropEntry,
     "throw": ThrowEntry,

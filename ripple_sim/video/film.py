@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
+from ripple_sim.encode.pass_files import PassFiles
 from ripple_sim.overlay.colormap import color_table
 from ripple_sim.overlay.comparison import TITLES, compared_operators
 from ripple_sim.overlay.heatmap import grid_spacing
@@ -25,6 +27,7 @@ from ripple_sim.simulation import Simulation
 from ripple_sim.solver.compilation import work_clock
 
 from .options import VideoOptions
+from .pass_writer import PassWriter, segmented
 from .shot import Shot
 
 
@@ -39,6 +42,8 @@ class Film:
         Settled. Linear frames are without overlays, and of one run.
     frames : int
         How many.
+    on_frame : callable, optional
+        Called with the first simulation at the time of each frame, in the thread that runs `shots`.
 
     Attributes
     ----------
@@ -46,14 +51,21 @@ class Film:
         Time spent on frames so far [s].
     """
 
-    def __init__(self, simulations: Sequence[Simulation], options: VideoOptions, frames: int) -> None:
-        self.simulations, self._options, self._frames = simulations, options, frames
+    def __init__(
+        self,
+        simulations: Sequence[Simulation],
+        options: VideoOptions,
+        frames: int,
+        on_frame: Callable[[Simulation], None] | None = None,
+    ) -> None:
+        self.simulations, self._options, self._frames, self._on_frame = simulations, options, frames, on_frame
         self._request = parse_request(options.overlay or ())
         self._layout = Layout(*options.size)
         self._notebook = Notebook(self._request, simulations, frames, options.rate)
         self._sources: list[FrameSource] = []
         self._submitted: deque[Shot] = deque()
         self._marks: list[list[PlacedMark]] = []
+        self._passes: PassWriter | None = None
         self.seconds = 0.0
         operators = compared_operators(options.compare)
         self._painter = Painter(
@@ -63,6 +75,12 @@ class Film:
             spacing=_common_spacing(simulations[0]),
             titles=[TITLES[operator] for operator in operators] if len(operators) > 1 else [],
         )
+
+    def write_passes(self, output: Path) -> None:
+        """Write the passes that the options ask for beside an output."""
+        options = self._options
+        files = PassFiles(output, options.pass_format, segmented(self.simulations[0]))
+        self._passes = PassWriter(files, tuple(options.passes))
 
     def prepare(self) -> None:
         """Make the renderers, which takes a while, before the first frame; the simulations may run meanwhile."""
@@ -89,6 +107,8 @@ class Film:
         for exposures in zip(*runs, strict=True):
             if exposures[0].exposure == 0:
                 notes = self._notebook.follow()
+                if self._on_frame is not None:
+                    self._on_frame(self.simulations[0])
             yield Shot(exposures, notes)
 
     def render_all(self, shots: Iterable[Shot], ahead: int = 0) -> Iterator[NDArray]:
@@ -100,6 +120,8 @@ class Film:
         while self._submitted:
             if (frame := self.fetch()) is not None:
                 yield frame
+        if self._passes is not None:
+            self._passes.finish()
 
     def render(self, shot: Shot) -> NDArray | None:
         """Render an exposure; return the frame after its last, [height, width, 3], or 4 if it is transparent."""
@@ -119,6 +141,8 @@ class Film:
                 for name, heatmap in shot.notes.heatmaps[number].items():
                     source.renderer.set_heatmap(geoms[name], heatmap, shot.notes.heatmap_scale.value)
             source.submit(snapshot)
+            if self._passes is not None and shot.exposure == 0:
+                self._passes.add(source, snapshot)
         self._submitted.append(shot)
         self.seconds += work_clock() - start
 

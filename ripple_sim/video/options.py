@@ -39,6 +39,11 @@ class VideoOptions:
     frame_format: Literal["png", "exr"] = "png"
     """Format of the frames in a folder: PNG, or EXR for linear light, without tone mapping or overlays (needs
     OpenEXR)."""
+    passes: Sequence[str] = ()
+    """Passes beside every frame, in a folder NAME.passes: depth, normal, segmentation, flow, position, height.
+    Example: depth,flow."""
+    pass_format: Literal["npz", "exr"] = "npz"
+    """Format of the passes: NumPy's, or EXR (needs OpenEXR)."""
     overlay: Sequence[str] | None = None
     """Overlays on the video: height or velocity as a heatmap, contacts, grid, time, energy. Examples:
     height,contacts,time or velocity=0.5,energy, where the colours end at 0.5 m/s."""
@@ -48,6 +53,8 @@ class VideoOptions:
     """Texels along the edge of a cube's chart; more resolve finer waves and take longer."""
     layout: str | None = None
     """How surfaces get their charts: cube (closed, one part, no handles), patches (any), or auto."""
+    rim: str | None = None
+    """What the rims of open surfaces do: free, or fixed as that of a drum's skin."""
     backend: Backend = "auto"
     """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
     resume: bool = False

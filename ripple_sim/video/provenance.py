@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from importlib.metadata import version
 from pathlib import Path
@@ -21,8 +22,13 @@ def provenance(scene: Scene, gl: GLContext) -> dict[str, str]:
     return {
         "the scene's fingerprint": scene_digest(scene),
         "the OpenGL driver": f"{gl.renderer}, {gl.version}",
-        **{f"the version of {package}": version(package) for package in _PACKAGES},
+        **_versions(),
     }
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    return {f"the version of {package}": version(package) for package in _PACKAGES}
 
 
 def scene_digest(scene: Scene) -> str:

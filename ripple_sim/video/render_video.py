@@ -45,6 +45,7 @@ def render_video(
     *,
     progress: Progress | None = None,
     on_step: Callable[[Simulation], None] | None = None,
+    on_frame: Callable[[Simulation], None] | None = None,
 ) -> Summary:
     """Simulate a scene and write its video.
 
@@ -61,7 +62,9 @@ def render_video(
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
     on_step : callable, optional
-        As for `Simulation`. While waves are computed on the CPU, it is called in a thread of its own.
+        As for `Simulation`. It is called in a thread of its own, unless waves are computed by a software driver.
+    on_frame : callable, optional
+        Called with the simulation at the time of each frame, to record what it wants to; in the same thread.
 
     Raises
     ------
@@ -88,7 +91,9 @@ def render_video(
         overwrite=options.overwrite,
     ) as writer:
         resumed_at = writer.frames
-        film = Film(_simulations(scene, options, on_step), options, frames)
+        film = Film(_simulations(scene, options, on_step), options, frames, on_frame)
+        if options.passes:
+            film.write_passes(output)
         ready = _write_frames(film, writer, frames, gl, progress)
     return Summary.of(film, writer, gl, resumed_at=resumed_at, started=times, ready=ready)
 
@@ -101,6 +106,7 @@ def _simulations(scene: Scene, options: VideoOptions, on_step: Callable[[Simulat
             fps=options.rate,
             resolution=options.resolution,
             layout=options.layout,
+            rim=options.rim,
             backend=options.backend,
             operator=operator,
             on_step=on_step,
@@ -114,9 +120,9 @@ def _write_frames(film: Film, writer: FrameWriter, frames: int, gl: GLContext, p
     # a software driver renders on the processor, which is busy enough with one frame
     ahead = 0 if gl.software else 1
     shots = film.shots(alive=_WAITING + ahead + 2)
-    # waves on the GPU share the renderer's OpenGL context, which belongs to one thread at a time
-    on_cpu = film.simulations[0].backend == "cpu"
-    with Prefetch(shots, _WAITING) if on_cpu else contextlib.nullcontext(shots) as shots:
+    # waves on a GPU and the renderer take turns with the OpenGL context; a software driver computes during its turn
+    own_thread = film.simulations[0].backend == "cpu" or not gl.software
+    with Prefetch(shots, _WAITING) if own_thread else contextlib.nullcontext(shots) as shots:
         film.prepare()
         ready = Times.now()
         for frame in film.render_all(_missing(shots, writer, progress, frames), ahead):

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import cast
 
 from ripple_sim.encode import check_output, default_fps
-from ripple_sim.errors import SceneError
+from ripple_sim.encode.pass_files import check_passes
+from ripple_sim.errors import SceneError, VideoError
 from ripple_sim.overlay.comparison import compared_operators
 from ripple_sim.scene.overlays import parse_request
 from ripple_sim.scene.scene import MAX_DURATION, Scene
@@ -39,8 +40,17 @@ def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
         fps=default_fps(output) if options.fps is None else options.fps,
         duration=scene.duration if options.duration is None else options.duration,
         overlay=tuple(scene.overlay if options.overlay is None else options.overlay),
-        backend=cast(Backend, auto_backend()) if options.backend == "auto" else options.backend,
+        backend=_backend(options, scene),
     )
+
+
+def _backend(options: VideoOptions, scene: Scene) -> Backend:
+    """The backend that is meant, for the largest target of known resolution."""
+    if options.backend != "auto":
+        return options.backend
+    sides = [options.resolution or entry.resolution for entry in scene.targets]
+    known = [6 * n * n for n in sides if n is not None]
+    return cast(Backend, auto_backend(max(known)) if known else auto_backend())
 
 
 def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLContext) -> dict[str, str | int | float]:
@@ -74,6 +84,7 @@ def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLCont
         "the operators": ",".join(compared_operators(options.compare)),
         "the resolution": options.resolution or "the scene's",
         "the layout": options.layout or "the scene's",
+        "the rims": options.rim or "the scene's",
         "the wave solver": options.backend,
         **provenance(scene, gl),
         **({"the version of OpenEXR": version("OpenEXR")} if options.linear else {}),
@@ -98,6 +109,11 @@ def check_options(options: VideoOptions, output: Path) -> None:
         overlaid=bool(options.overlay) or len(operators) > 1,
         overwrite=options.overwrite,
     )
+    if options.passes:
+        check_passes(output, tuple(options.passes), options.pass_format, options.overwrite)
+        if options.resume or len(operators) > 1:
+            other = "--resume" if options.resume else "--compare"
+            raise VideoError(f"passes cannot be written with {other}; leave one of the two out")
 
 
 def frame_count(options: VideoOptions) -> int:

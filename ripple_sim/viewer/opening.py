@@ -10,6 +10,8 @@ import mujoco
 import numpy as np
 
 from ripple_sim.coupling.model.geoms import find_target
+from ripple_sim.coupling.model.soft_ids import is_soft
+from ripple_sim.coupling.model.soft_surfaces import SoftSurface
 from ripple_sim.coupling.model.suited_target import suited_targets
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
@@ -112,5 +114,11 @@ def open_scene(
 
 def surface_size(scene: Scene) -> float:
     """Longest extent of the smallest rippling surface [m]."""
-    geoms = [find_target(scene.model, entry.geom) for entry in scene.targets]
-    return float(2 * scene.model.geom_aabb[geoms, 3:].max(axis=1).min())
+    targets = [find_target(scene.model, entry.geom) for entry in scene.targets]
+    return min(_extent(scene.model, target) for target in targets)
+
+
+def _extent(model: mujoco.MjModel, target: int) -> float:
+    if is_soft(model, target):
+        return float(np.ptp(SoftSurface(model, target).mesh.V, axis=0).max())
+    return float(2 * model.geom_aabb[target, 3:].max())

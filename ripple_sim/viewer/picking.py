@@ -9,6 +9,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.coupling.model.soft_ids import target_pose
 from ripple_sim.simulation import Simulation
 
 
@@ -35,13 +36,16 @@ class Picker:
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._scenes = {name: _ray_scene(simulation, name) for name in simulation.ripples}
+        self._scenes: dict[str, tuple[NDArray[np.float64] | None, EmbreeScene]] = {
+            name: (None, _ray_scene(simulation, name)) for name in simulation.ripples
+        }
 
     def pick(self, origin: ArrayLike, direction: ArrayLike) -> Hit | None:
         """Nearest point of a target on a ray from a point [m] of the world, or None."""
         start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
         hits = []
-        for name, scene in self._scenes.items():
+        for name in self._scenes:
+            scene = self._scene(name)
             position, rotation = self._pose(name)
             local, heading = (start - position) @ rotation, along @ rotation
             found = scene.run(local[None].astype(np.float32), heading[None].astype(np.float32), output=1)
@@ -59,10 +63,17 @@ class Picker:
         middle, _ = self._pose(self._simulation.scene.targets[0].geom)
         return max(float((middle - start) @ along / (along @ along)), 0.0)
 
+    def _scene(self, name: str) -> EmbreeScene:
+        """A target's surface where it is."""
+        V, scene = self._scenes[name]
+        if self._simulation.ripples[name].vertices is not V:
+            scene = _ray_scene(self._simulation, name)
+            self._scenes[name] = self._simulation.ripples[name].vertices, scene
+        return scene
+
     def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Position [m] and rotation matrix of a geom in the world."""
-        geom, data = self._simulation.ripples.geom_ids[name], self._simulation.data
-        return data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
+        return target_pose(self._simulation.data, self._simulation.ripples.geom_ids[name])
 
 
 def _ray_scene(simulation: Simulation, name: str) -> EmbreeScene:

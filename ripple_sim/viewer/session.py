@@ -61,7 +61,7 @@ class Session:
         self._balls = Balls(self.simulation.model)
         self._material: dict[str, float] = {}
         ripples, limited = self.simulation.ripples, self.simulation.limited
-        self.skins = {name: Skin(ripples[name].atlas, limited[name]) for name in ripples}
+        self.skins = {name: Skin(ripples[name].rest, limited[name]) for name in ripples}
         self._picker = Picker(self.simulation)
         self._size = surface_size(scene)
         self._strength = poke_strength(ripples[scene.targets[0].geom].material, self._size)
@@ -115,7 +115,8 @@ class Session:
         """Bring the skins and the range of the colours up to date."""
         wanted = _FAINT * self._size
         for name, skin in self.skins.items():
-            skin.update(self.simulation.ripples[name].height)
+            ripples = self.simulation.ripples
+            skin.update(ripples[name].height, ripples.vertices(name, self.simulation.data))
             wanted = max(wanted, _FULL * float(np.abs(skin.height).max()))
         self.color_range = max(wanted, _FADE * self.color_range)
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.render.surfaces.moving_surface import MovingSurface
 from ripple_sim.render.surfaces.vertices import COORDINATES, DIRECTION, NORMAL, POSITION, tessellated
 from ripple_sim.render.visuals.corners import smooth_normals
 from ripple_sim.solver import Atlas, HeightMap
@@ -55,13 +56,17 @@ class Skin:
         chart_points = charts.map.chart_points(vertices[:, COORDINATES], atlas.resolution)
         self._rest = _Rest(rest, direction, normals, *_bilinear(*chart_points, atlas.resolution))
         self._height_map = HeightMap.drawn(atlas, limit)
+        self._moving = MovingSurface(atlas, rest, direction, normals)
         self.points, self.normals = rest.copy(), normals.copy()
         self.height = np.zeros(len(vertices), np.float32)
 
-    def update(self, height: NDArray[np.float32]) -> None:
-        """Follow a height field, float32 [C, n, n], in metres."""
-        height_map = self._height_map(height).reshape(-1, 4)
-        _displace(height_map, self._rest, self.points, self.normals, self.height)
+    def update(self, height: NDArray[np.float32], V: NDArray[np.float64] | None = None) -> None:
+        """Follow a height field, float32 [C, n, n], and the vertices of the mesh, [vertex_count, 3], in metres."""
+        height_map, rest = self._height_map(height), self._rest
+        if V is not None:
+            height_map, moved = self._moving(height_map, V)
+            rest = rest._replace(points=moved.points, directions=moved.directions, normals=moved.normals)
+        _displace(height_map.reshape(-1, 4), rest, self.points, self.normals, self.height)
 
 
 def _bilinear(

@@ -7,6 +7,7 @@ import math
 import pyvista as pv
 
 from ripple_sim.capture.viewpoint import viewpoint
+from ripple_sim.coupling.model.soft_ids import is_soft, target_pose
 from ripple_sim.render.surfaces.surface import target_color
 
 from .actors import HEIGHT, BodyActors, SkinActor
@@ -55,7 +56,8 @@ class Stage:
         }
         self._bodies = BodyActors(plotter, session, pose.focus, _REACH * pose.distance)
         floor = find_floor(simulation.model, simulation.data)
-        casting = [*simulation.ripples.geom_ids.values(), *self._bodies.solid]
+        rigid = [geom for geom in simulation.ripples.geom_ids.values() if not is_soft(simulation.model, geom)]
+        casting = [*rigid, *self._bodies.solid]
         self.shadows = None if floor is None else Shadows(plotter, session, casting, floor)
         self._add_bar()
         camera = plotter.camera
@@ -68,7 +70,7 @@ class Stage:
         data, limit = session.simulation.data, _round_up(session.color_range)
         for name, skin in self.skins.items():
             geom = session.simulation.ripples.geom_ids[name]
-            skin.update(data.geom_xpos[geom], data.geom_xmat[geom])
+            skin.update(*target_pose(data, geom))
             skin.color_by_height(limit if self._heatmap else None)
         self._bodies.update()
         if self.shadows is not None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.cache import cache_path, make_room, mark_used
 from ripple_sim.solver.checked import checked, instance
-from ripple_sim.solver.cube_map.convention import check_resolution
+from ripple_sim.solver.cube_map.convention import check_memory, check_resolution
 from ripple_sim.solver.cube_map.cube_atlas import atlas_from_sphere_map
 from ripple_sim.solver.errors import AtlasError, MeshError, SphereMapError
 from ripple_sim.solver.mesh.genus_zero import check_genus_zero
@@ -64,7 +64,8 @@ def build_atlas(
     Raises
     ------
     AtlasError
-        For an invalid resolution, method or layout, or a mesh of which the patch layout finds no charts.
+        For an invalid resolution, method or layout, a mesh of which the patch layout finds no charts, or an atlas that
+        cannot fit into memory.
     MeshError
         For the cube layout, if the mesh is not a closed surface of genus 0 in one part.
     SphereMapError
@@ -74,6 +75,7 @@ def build_atlas(
     for kind, name, valid in (("sphere map method", method, tuple(SPHERE_MAPS)), ("layout", layout, LAYOUTS)):
         if name not in valid:
             raise AtlasError(f"{kind} {name!r} does not exist; valid are {', '.join(map(repr, valid))}")
+    check_memory(resolution)
     if layout == "cube":
         check_genus_zero(mesh)
     cube = layout == "cube" or (layout == "auto" and _fits_cube(mesh))

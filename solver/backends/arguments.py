@@ -32,8 +32,8 @@ class Halo(NamedTuple):
 class Links(NamedTuple):
     """The irregular links of a stencil; see `IrregularLinks`. Often none.
 
-    Flat indices of the texels, their addresses in a field with halo, where the links of each begin, the addresses of
-    their other ends, their weights.
+    Flat indices of the texels in coefficients, their addresses in a field with halo, where the links of each begin, the
+    addresses of their other ends, their weights.
     """
 
     texels: Ints
@@ -44,9 +44,10 @@ class Links(NamedTuple):
 
 
 class Weights(NamedTuple):
-    """A stencil: its rows, [C, 4, n + 1, as wide as a field], and its irregular links."""
+    """A stencil: its rows, [C, 4, n + 1, as wide as a field], the columns of texels, and its irregular links."""
 
     rows: Floats32
+    columns: int
     irregular: Links
 
 
@@ -74,7 +75,9 @@ class Kick(NamedTuple):
 
 
 class Drift(NamedTuple):
-    """v += shift as far as texels respond, then h += dt v."""
+    """v += shift as far as texels respond, then h += dt v, in so many columns."""
+
+    columns: int
 
     response: Coefficient
     shift: Pressure
@@ -114,7 +117,9 @@ class Bending(NamedTuple):
 
 
 class Plasticity(NamedTuple):
-    """Yield height, and the field with halo of what stays."""
+    """Yield height, and the field with halo of what stays, in so many columns."""
+
+    columns: int
 
     limit: Coefficient
     dent: Floats32

@@ -17,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ripple_sim.solver.kernel import kernel
+from ripple_sim.solver.texels.irregular import IrregularLinks
 
-from .arguments import Drift, Halo, Kick, Links, Loads, State
+from .arguments import Drift, Halo, Kick, Loads, State
 from .kernels import drift_row, fill
 from .kicks import kick_drift_row, kick_drift_sides, kick_irregular
 
@@ -42,11 +43,12 @@ class Pace(NamedTuple):
     last: np.float32
 
 
-def on_borders(links: Links, shape: tuple[int, ...]) -> bool:
-    """Whether all irregular links are between texels on charts' borders, of fields of a shape [C, n + 2, pitch]."""
-    addresses = np.concatenate([links.addresses, links.others])
-    r, c = addresses // shape[2] % shape[1], addresses % shape[2]
-    return bool((np.minimum(np.minimum(r, c), shape[1] - 1 - np.maximum(r, c)) == 1).all())
+def on_borders(links: IrregularLinks | None, n: int) -> bool:
+    """Whether all irregular links are between texels on the borders of charts of n x n texels."""
+    if links is None:
+        return True
+    r, c = links.texels // n % n, links.texels % n
+    return bool((np.minimum(np.minimum(r, c), n - 1 - np.maximum(r, c)) == 0).all())
 
 
 @kernel

@@ -6,8 +6,6 @@ may wait for its core while other threads render and encode. Waiting for it then
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +15,7 @@ from ripple_sim.solver.operator.wave_operator import WaveOperator
 
 from . import blocks, kernels, threads
 from .arguments import Amplitude, Balance, Bending, ByPart, Drift, Kick, Loads, Plasticity, Pressure, State
-from .cpu_fields import LARGE, LINE, PAGE, FieldLayout, aligned
+from .cpu_fields import LARGE, LINE, PAGE, FieldLayout
 
 
 class CPUBackend:
@@ -38,7 +36,14 @@ class CPUBackend:
     def __init__(self, operator: WaveOperator, thread_count: int | None = None, *, keeps_volume: bool = False) -> None:
         self._operator = operator
         self.keeps_volume = keeps_volume
-        self._fields = fields = FieldLayout(operator.topology)
+        plain = operator.viscous_stencil is operator.laplace_stencil is operator.yield_height is None
+        plain = plain and blocks.on_borders(operator.stencil.irregular, operator.mass.shape[1])
+        large = operator.mass.size >= 6 * LARGE**2
+        if thread_count is None:
+            thread_count = threads.available() if large else 1
+        self._threads = thread_count if plain else 1
+        self._in_blocks = plain and (large or thread_count > 1)
+        self._fields = fields = FieldLayout(operator.topology, alone=self._in_blocks)
         self._stencil = fields.weights(operator.stencil)
         self._viscous = None if operator.viscous_stencil is None else fields.weights(operator.viscous_stencil)
         # the processor takes a store to one field and a load from another at the same place of a page for a conflict:
@@ -46,22 +51,17 @@ class CPUBackend:
         self._h, self._h_next, self._v = (fields.zeros(shift * PAGE // 3 // LINE * LINE) for shift in range(3))
         self._bending = self._plasticity = self._dent = None
         if operator.laplace_stencil is not None and operator.rigidity is not None:
-            rigidity = operator.rigidity.astype(np.float32)
+            rigidity = fields.coefficients(operator.rigidity.astype(np.float32))
             self._bending = Bending(fields.weights(operator.laplace_stencil), rigidity, fields.zeros())
         if operator.yield_height is not None:
             self._dent = fields.zeros()
-            self._plasticity = Plasticity(number_or_field(operator.yield_height), self._dent)
+            limit = fields.coefficients(number_or_field(operator.yield_height))
+            self._plasticity = Plasticity(fields.columns, limit, self._dent)
         drags = self._bending is not None or self._viscous is not None
         self._extra = fields.zeros() if drags else np.float32(0)
-        large = operator.mass.size >= 6 * LARGE**2
-        if thread_count is None:
-            thread_count = threads.available() if large else 1
-        plain = not drags and self._plasticity is None and blocks.on_borders(self._stencil.irregular, self._h.shape)
-        self._threads = thread_count if plain else 1
-        self._in_blocks = plain and (large or thread_count > 1)
         self._most = blocks.block_length(fields.n, self._h.shape[2])
-        self._response = number_or_field(operator.response)
-        self._chart_parts, self._parts = _parts_by_chart(operator)
+        self._response = fields.coefficients(number_or_field(operator.response))
+        self._chart_parts, self._parts = _parts_by_chart(operator.parts, fields)
         self._balance: Balance | None = None
         self._shift: Amplitude = 0.0
         self._prepared = (0.0, keeps_volume)
@@ -76,6 +76,10 @@ class CPUBackend:
         """Copy of the height [m], [C, n, n]."""
         elastic = self.elastic()
         return elastic if self._dent is None else elastic + self.dent()
+
+    def snapshot(self) -> NDArray[np.float32]:
+        """The same as `height`."""
+        return self.height()
 
     def elastic(self) -> NDArray[np.float32]:
         """Copy of the part of the height that springs back [m], [C, n, n]."""
@@ -94,6 +98,7 @@ class CPUBackend:
 
     def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
         """Replace the elastic height, and the permanent one: 0 unless given."""
+        self._h[:] = 0  # what is no number between charts too
         self._fields.texels(self._h)[:] = height
         if self._dent is None and dent is not None and dent.any():
             # what another material has left, in a surface that does not yield itself
@@ -103,6 +108,7 @@ class CPUBackend:
 
     def set_velocity(self, velocity: NDArray[np.float32]) -> None:
         """Replace the velocity."""
+        self._v[:] = 0
         self._fields.texels(self._v)[:] = velocity
         self._shift = 0.0
 
@@ -136,6 +142,19 @@ class CPUBackend:
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
 
+    def move(self, operator: WaveOperator) -> None:
+        """Take over the stencils of the same surface with its texels elsewhere."""
+        self._operator, fields = operator, self._fields
+        self._stencil = fields.fill(self._stencil.rows, operator.stencil)
+        if self._viscous is not None and operator.viscous_stencil is not None:
+            self._viscous = fields.fill(self._viscous.rows, operator.viscous_stencil)
+        if self._bending is not None and operator.laplace_stencil is not None and operator.rigidity is not None:
+            laplace = fields.fill(self._bending.laplace.rows, operator.laplace_stencil)
+            rigidity = fields.coefficients(operator.rigidity.astype(np.float32))
+            self._bending = self._bending._replace(laplace=laplace, rigidity=rigidity)
+        if operator.density is not None:
+            self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
+
     def wait(self) -> None:
         """Return when all steps are done: at once, they are."""
 
@@ -150,7 +169,7 @@ class CPUBackend:
 
     def _start(self, dt: float) -> Drift:
         """The drift by which a step begins; the noted shift is in it."""
-        drift = Drift(self._response, self._pressure(self._shift), np.float32(dt))
+        drift = Drift(self._fields.columns, self._response, self._pressure(self._shift), np.float32(dt))
         self._shift = 0.0
         return drift
 
@@ -168,14 +187,13 @@ class CPUBackend:
         new_length = self._prepared != (dt, self.keeps_volume)
         if new_length:
             k = step_coefficients(self._operator, dt)
-            gain = aligned(k.gain.shape, 0)
-            gain[:] = k.gain
-            self._coefficients = dataclasses.replace(k, gain=gain)
+            laid_out = map(self._fields.coefficients, (k.gain, k.decay, k.spring, k.span))
+            self._coefficients = StepCoefficients(*laid_out)
             self._balance = self._keep_volume(dt)
             self._prepared = (dt, self.keeps_volume)
         k = self._coefficients
         if new_length or self._load_is_new:
-            kicks = k.gain.reshape(-1)[self._loaded] * self._forces.astype(np.float32)
+            kicks = k.gain.reshape(-1)[self._fields.places[self._loaded]] * self._forces.astype(np.float32)
             addresses = self._fields.addresses[self._loaded]
             order = np.argsort(addresses, kind="stable")
             self._loads = Loads(addresses[order], kicks[order])
@@ -206,10 +224,13 @@ class CPUBackend:
         )
 
 
-def _parts_by_chart(operator: WaveOperator) -> tuple[NDArray[np.int64], NDArray[np.int32] | None]:
-    """Part of each chart, [C], and, where parts share a chart, that of each texel, [C, n, n]."""
-    parts = operator.parts
-    if parts is None:
-        return np.zeros(len(operator.mass), np.int64), None
-    greatest = parts.max(axis=(1, 2))
-    return greatest.astype(np.int64), None if (parts == greatest[:, None, None]).all() else parts
+def _parts_by_chart(
+    parts: NDArray[np.int32] | None, fields: FieldLayout
+) -> tuple[NDArray[np.int64], NDArray[np.int32] | None]:
+    """Part of each chart of the fields, and, where parts share a chart, that of each texel, as coefficients."""
+    count = len(fields.zeros())
+    if parts is None or not parts.any():
+        return np.zeros(count, np.int64), None
+    laid_out = fields.coefficients(parts)
+    greatest = laid_out.max(axis=(1, 2))
+    return greatest.astype(np.int64), None if (laid_out == greatest[:, None, None]).all() else laid_out

@@ -12,8 +12,10 @@ from ripple_sim.solver.operator.volume_rate import volume_rate
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 
 from .arguments import Amplitude
+from .device_field import DeviceField
 from .gl_dispatch import Dispatch
 from .gl_fields import FieldLayout, LinkBuffers, TexelList
+from .gl_forces import ExtraForces
 from .gl_pressure import Pressure, VolumeKeeper
 
 
@@ -28,7 +30,7 @@ class GLBackend:
         self._operator = operator
         self._fields = fields = FieldLayout(self._gl, operator.topology)
         self._dispatch = Dispatch(self._gl, fields)
-        self._viscous = self._laplace = self._dent = self._yield = self._extra = None
+        self._dent = self._yield = None
         self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
         self._stencil = fields.upload_stencil(operator.stencil)
         self._response = fields.upload(operator.response)
@@ -36,18 +38,7 @@ class GLBackend:
         self._held = None if operator.parts is None else Pressure(self._gl, fields, operator)
         self._given = None if operator.parts is None else Pressure(self._gl, fields, operator)
         self._kicks, self._forces = TexelList(self._gl), TexelList(self._gl)
-        if operator.viscous_stencil is not None:
-            self._viscous = fields.upload_stencil(operator.viscous_stencil)
-            self._viscous_links = LinkBuffers(self._gl, fields, operator.viscous_stencil, np.ones_like(operator.mass))
-        if operator.laplace_stencil is not None and operator.rigidity is not None:
-            self._laplace = fields.upload_stencil(operator.laplace_stencil)
-            self._rigidity, self._moment = fields.upload(operator.rigidity), fields.zeros()
-            self._moment_links, self._bending_links = (
-                LinkBuffers(self._gl, fields, operator.laplace_stencil, factors)
-                for factors in (operator.rigidity, -np.ones_like(operator.mass))
-            )
-        if self._viscous or self._laplace:
-            self._extra = fields.zeros()
+        self._extra = ExtraForces(self._gl, fields, self._dispatch, operator)
         if operator.yield_height is not None:
             self._dent, self._yield = fields.zeros(), fields.upload(operator.yield_height)
         self._compile()
@@ -60,6 +51,13 @@ class GLBackend:
         """Copy of the height [m], [C, n, n]."""
         elastic = self.elastic()
         return elastic if self._dent is None else elastic + self.dent()
+
+    def snapshot(self) -> NDArray[np.float32] | DeviceField:
+        """Copy of the height [m], [C, n, n], on the GPU; where the driver is software, in the host's memory."""
+        if self._gl.software:
+            return self.height()
+        fields = [self._h, *([] if self._dent is None else [self._dent])]
+        return DeviceField.gathered(self._gl, self._operator.mass.shape, self._fields.texel_addresses, *fields)
 
     def elastic(self) -> NDArray[np.float32]:
         """Copy of the part of the height that springs back [m], [C, n, n]."""
@@ -110,20 +108,30 @@ class GLBackend:
             self._flow()
             for step in range(substeps):
                 drift = dt if step < substeps - 1 else dt / 2
-                self._fill_halo(self._h)
-                self._gather_extra_forces()
+                self._dispatch.fill_halo(self._h)
+                self._extra.gather(self._h, self._v)
                 if isinstance(self._held, VolumeKeeper):
                     self._held.follow(self._h, self._v)
                 kick_drift["dt"] = drift
                 pressure = (self._held.parts, self._held.amplitudes) if self._held is not None else ()
                 self._dispatch.bind(
-                    self._h, self._v, self._h_next, self._stencil, self._coefficients, self._extra, *pressure
+                    self._h, self._v, self._h_next, self._stencil, self._coefficients, self._extra.field, *pressure
                 )
                 self._dispatch.run_blocks(kick_drift)
                 self._kick_irregular(drift)
                 self._h, self._h_next = self._h_next, self._h
                 self._kick_texels(self._forces, drift)
                 self._flow()
+
+    def move(self, operator: WaveOperator) -> None:
+        """Take over the stencils of the same surface with its texels elsewhere."""
+        self._operator, fields = operator, self._fields
+        fields.write_stencil(self._stencil, operator.stencil)
+        self._extra.move(operator)
+        if self._prepared[0]:
+            self._links = LinkBuffers(self._gl, fields, operator.stencil, self._step.gain)
+        if operator.density is not None:
+            self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
 
     def wait(self) -> None:
         """Return when all steps are done."""
@@ -134,16 +142,9 @@ class GLBackend:
         return True
 
     def _compile(self) -> None:
-        self._halo, self._kick = (self._dispatch.shader(name) for name in ("halo", "kick"))
+        self._kick = self._dispatch.shader("kick")
         self._drift = self._dispatch.shader("drift", **({} if self._given is None else {"PARTS": 1}))
-        if self._viscous:
-            self._apply_viscous = self._dispatch.block_shader("apply")
-        if self._laplace:
-            self._apply_rigidity = self._dispatch.block_shader("apply", FACTOR=1)
-            self._subtract_laplace = self._dispatch.block_shader(
-                "apply", SUBTRACT=1, **({"ADD": 1} if self._viscous else {})
-            )
-        self._irregular_kick, self._irregular_apply = (self._dispatch.shader("irregular", KICK=kick) for kick in (1, 0))
+        self._irregular_kick = self._dispatch.shader("irregular", KICK=1)
         if self._yield:
             self._yielding = self._dispatch.shader("flow")
 
@@ -171,28 +172,6 @@ class GLBackend:
             self._dispatch.bind(self._h, self._dent, self._yield)
             self._dispatch.run_list(self._yielding, self._fields.eights)
 
-    def _gather_extra_forces(self) -> None:
-        """Forces beside tension and stiffness: viscous, and of bending."""
-        if self._viscous and self._extra:
-            self._fill_halo(self._v)
-            self._dispatch.bind(self._v, self._extra, None, self._viscous)
-            self._dispatch.run_blocks(self._apply_viscous)
-            self._apply_irregular(self._viscous_links, self._v, self._extra)
-        if self._laplace and self._extra:
-            self._dispatch.bind(self._h, self._moment, None, self._laplace, self._rigidity)
-            self._dispatch.run_blocks(self._apply_rigidity)
-            self._apply_irregular(self._moment_links, self._h, self._moment)
-            self._fill_halo(self._moment)
-            self._dispatch.bind(self._moment, self._extra, None, self._laplace)
-            self._dispatch.run_blocks(self._subtract_laplace)
-            self._apply_irregular(self._bending_links, self._moment, self._extra)
-
-    def _apply_irregular(self, links: LinkBuffers, field: moderngl.Buffer, result: moderngl.Buffer) -> None:
-        if links.count:
-            self._irregular_apply["count"] = links.count
-            self._dispatch.bind(field, result, None, links.texels, links.links)
-            self._dispatch.run_list(self._irregular_apply, links.count)
-
     def _kick_irregular(self, dt: float) -> None:
         """What the irregular links add to a substep."""
         if self._links.count:
@@ -217,7 +196,7 @@ class GLBackend:
             if self._held is not None:
                 self._held.set(self._acceleration)
             self._load_is_new = False
-        defines = {"EXTRA": self._extra, "MAPS": self._maps, "PARTS": self._held}
+        defines = {"EXTRA": self._extra.field, "MAPS": self._maps, "PARTS": self._held}
         kick_drift = self._dispatch.block_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
         if self._held is None:
             kick_drift["acceleration"] = self._acceleration
@@ -238,9 +217,3 @@ class GLBackend:
             self._kick["count"], self._kick["dt"] = kicks.count, dt
             self._dispatch.bind(self._h, self._v, kicks.places, kicks.values)
             self._dispatch.run_list(self._kick, kicks.count)
-
-    def _fill_halo(self, field: moderngl.Buffer) -> None:
-        if self._fields.halo_count:
-            self._dispatch.bind(field, self._fields.halo_pairs)
-            self._halo["count"] = self._fields.halo_count
-            self._dispatch.run_list(self._halo, self._fields.halo_count)

@@ -23,6 +23,7 @@ class Dispatch:
         self._gl = gl
         self._fields = fields
         self._rows, self._group = _SOFTWARE_BLOCK if gl.software else _HARDWARE_BLOCK
+        self._halo = self.shader("halo")
 
     def shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
         """A shader that runs over a list."""
@@ -59,3 +60,11 @@ class Dispatch:
         """Run a shader over a list of so many entries."""
         shader.run(-(-count // _LIST_GROUP))
         self._gl.barrier()
+
+    def fill_halo(self, field: moderngl.Buffer) -> None:
+        """Fill the halo of a field."""
+        count = self._fields.halo_count
+        if count:
+            self.bind(field, self._fields.halo_pairs)
+            self._halo["count"] = count
+            self.run_list(self._halo, count)

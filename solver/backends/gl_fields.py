@@ -1,6 +1,8 @@
-"""Fields in storage buffers: charts cut into strips with a halo round each, laid out to be read by eights."""
+"""Fields in storage buffers: strips with a halo round each, cut from charts or of several charts, read by eights."""
 
 from __future__ import annotations
+
+import functools
 
 import moderngl
 import numpy as np
@@ -23,6 +25,9 @@ _STRIP = 64
 class FieldLayout:
     """Strips of [N + 2, stride] float32, the texels from row 1 and column 8 on.
 
+    Small charts lie side by side in a strip, each with its halo. Shaders run over the halo between them too, where
+    coefficients are 0, and what they leave there is filled again.
+
     Attributes
     ----------
     n, width, stride, strips, eights : int
@@ -39,8 +44,10 @@ class FieldLayout:
         self._topology = topology
         self._charts, self.n, _ = topology.shape
         self._chart_strips = -(-self.n // _STRIP)
-        self.strips = self._charts * self._chart_strips
-        self.width = EIGHT * -(-self.n // (EIGHT * self._chart_strips))
+        self._together = min(max(1, (_STRIP + 2) // (self.n + 2)), self._charts)
+        self.strips = -(-self._charts // self._together) * self._chart_strips
+        columns = self._together * (self.n + 2) - 2
+        self.width = EIGHT * -(-columns // (EIGHT * self._chart_strips))
         self.stride = EIGHT + self.width + EIGHT
         self.eights = self.strips * (self.n + 2) * self.stride // EIGHT
         self.texels, ghosts, sources = self._addresses()
@@ -49,6 +56,12 @@ class FieldLayout:
             pairs = np.stack([ghosts, sources], axis=1).astype(np.int32)
             # one chart within fixed rims has none
             self.halo_pairs = ctx.buffer(pairs.tobytes() or bytes(8))
+
+    @functools.cached_property
+    def texel_addresses(self) -> moderngl.Buffer:
+        """`texels`, on the GPU."""
+        with self._gl as ctx:
+            return ctx.buffer(self.texels.astype(np.int32).tobytes())
 
     def zeros(self) -> moderngl.Buffer:
         """A field of zeros."""
@@ -65,24 +78,25 @@ class FieldLayout:
 
         A column further to the right than the field: what a thread reads begins with the links of its west neighbours.
         """
-        places = self._empty(4)
-        for strip, first, last in self._columns():
-            cells = stencil.weights[..., first : last + 1]
-            places[:, strip, : self.n + 1, EIGHT : EIGHT + cells.shape[-1]] = np.moveaxis(cells, 1, -1)
         with self._gl as ctx:
-            return ctx.buffer(places.tobytes())
+            buffer = ctx.buffer(reserve=16 * EIGHT * self.eights)
+        self.write_stencil(buffer, stencil)
+        return buffer
+
+    def write_stencil(self, buffer: moderngl.Buffer, stencil: Stencil) -> None:
+        """Write another stencil over one that was uploaded."""
+        places = np.zeros((EIGHT * self.eights, 4), np.float32)
+        for block, first, last in self._blocks():
+            places[block[:, :-1, :-1] + 1] = np.moveaxis(stencil.weights[..., first : last + 1], 1, -1)
+        with self._gl:
+            buffer.write(places)
 
     def read(self, buffer: moderngl.Buffer) -> NDArray[np.float32]:
         """A field's texels, [C, n, n]."""
         with self._gl:
             self._gl.wait()
-            places = np.frombuffer(buffer.read(), np.float32).reshape(
-                self._charts, self._chart_strips, self.n + 2, self.stride
-            )
-        texels = np.empty(self._topology.shape, np.float32)
-        for strip, first, last in self._columns():
-            texels[:, :, first:last] = places[:, strip, 1:-1, EIGHT : EIGHT + last - first]
-        return texels
+            places = np.frombuffer(buffer.read(), np.float32)
+        return places[self.texels].reshape(self._topology.shape)
 
     def write(self, buffer: moderngl.Buffer, field: NDArray[np.float32]) -> None:
         """Replace a field's texels; the halo becomes 0."""
@@ -90,36 +104,41 @@ class FieldLayout:
             buffer.write(self._pack(field))
 
     def _pack(self, *fields: NDArray | np.float32) -> bytes:
-        packed = np.stack([self._empty(1)] * len(fields))
+        packed = np.zeros((len(fields), EIGHT * self.eights), np.float32)
         for places, field in zip(packed, fields, strict=True):
-            for strip, first, last in self._columns():
-                texels = np.broadcast_to(field, self._topology.shape)[:, :, first:last]
-                places[:, strip, 1:-1, EIGHT : EIGHT + last - first, 0] = texels
+            places[self.texels] = np.broadcast_to(field, self._topology.shape).reshape(-1)
         return packed.tobytes()
 
-    def _empty(self, components: int) -> NDArray[np.float32]:
-        return np.zeros((self._charts, self._chart_strips, self.n + 2, self.stride, components), np.float32)
-
-    def _columns(self) -> list[tuple[int, int, int]]:
-        """(strip of a chart, its first column, one after its last)."""
-        return [(s, s * self.width, min((s + 1) * self.width, self.n)) for s in range(self._chart_strips)]
+    def _blocks(self) -> list[tuple[NDArray[np.int64], int, int]]:
+        """Addresses of charts with halo, [C, n + 2, k + 2], for columns from a first one to before a last."""
+        n, place = self.n, np.arange(EIGHT * self.eights)
+        if self._chart_strips == 1:
+            beside = place.reshape(self.strips, n + 2, self.stride)[..., EIGHT - 1 :][..., : self._together * (n + 2)]
+            charts = beside.reshape(self.strips, n + 2, self._together, n + 2).swapaxes(1, 2)
+            return [(charts.reshape(-1, n + 2, n + 2)[: self._charts], 0, n)]
+        strips = place.reshape(self._charts, self._chart_strips, n + 2, self.stride)
+        ends = [(s * self.width, min((s + 1) * self.width, n)) for s in range(self._chart_strips)]
+        return [
+            (strips[:, s, :, EIGHT - 1 : EIGHT + last - first + 1], first, last) for s, (first, last) in enumerate(ends)
+        ]
 
     def _addresses(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-        """Where each texel lies, each place of the halo that shows a texel, and that texel."""
-        n = self.n
-        place = np.arange(EIGHT * self.eights).reshape(self._charts, self._chart_strips, n + 2, self.stride)
-        texels = np.empty(self._topology.shape, np.int64)
-        for strip, first, last in self._columns():
-            texels[:, :, first:last] = place[:, strip, 1:-1, EIGHT : EIGHT + last - first]
-        shown = self._topology.halo
+        """Where each texel lies, each place of the halo that is to be filled, and what with: texels, or a 0."""
+        topology, blocks = self._topology, self._blocks()
+        texels = np.empty(topology.shape, np.int64)
+        for block, first, last in blocks:
+            texels[:, :, first:last] = block[:, 1:-1, 1:-1]
         ghosts, sources = [], []
-        for strip, first, last in self._columns():
+        for block, first, last in blocks:
             columns = slice(first, last + 2)
-            own = np.zeros((self._charts, n + 2, last + 2 - first), bool)
+            own = np.zeros(block.shape, bool)
             own[:, 1:-1, 1:-1] = True
-            exists = ~own & (self._topology.ghosts | self._topology.own)[:, :, columns]
-            ghosts.append(place[:, strip, :, EIGHT - 1 : EIGHT + last - first + 1][exists])
-            sources.append(texels.reshape(-1)[shown[:, :, columns][exists]])
+            exists = ~own & (topology.ghosts | topology.own)[:, :, columns]
+            ghosts.append(block[exists])
+            sources.append(texels.reshape(-1)[topology.halo[:, :, columns][exists]])
+            if self._together > 1 and topology.fixed_rim:
+                ghosts.append(block[topology.rim])
+                sources.append(np.zeros_like(ghosts[-1]))  # the first place, which nothing writes to
         return texels.reshape(-1), np.concatenate(ghosts), np.concatenate(sources)
 
 

@@ -36,7 +36,7 @@ def drift_row(h: Floats32, v: Floats32, drift: Drift, chart: int, r: int) -> Non
     """Add the shift to v, as far as texels respond to it, then dt v to h, in one row."""
     heights, velocities = h[chart, r], v[chart, r]
     shift, response = row_of(drift.shift, chart, r - 1), row_of(drift.response, chart, r - 1)
-    for c in range(1, h.shape[1] - 1):
+    for c in range(1, drift.columns + 1):
         velocities[c] += value_in(shift, c - 1) * value_in(response, c - 1)
         heights[c] += drift.dt * velocities[c]
 
@@ -56,7 +56,7 @@ def flow(h: Floats32, plasticity: Plasticity) -> None:
     dent = plasticity.dent
     for i in range(len(h) * n):
         chart, r = i // n, i % n + 1
-        for c in range(1, n + 1):
+        for c in range(1, plasticity.columns + 1):
             most = value_in(row_of(plasticity.limit, chart, r - 1), c - 1)
             kept = min(max(h[chart, r, c], -most), most)
             dent[chart, r, c] += h[chart, r, c] - kept

@@ -86,10 +86,9 @@ def kick_drift_sides(state: State, kick: Kick, dt: np.float32, chart: int, width
 @kernel
 def kick_drift(state: State, kick: Kick, dt: np.float32, first: int, last: int) -> None:
     """One substep of some charts: v = decay v + gain force - spring h + span acceleration, then h_next = h + dt v."""
-    n = state.h.shape[1] - 2
     for chart in range(first, last):
-        for r in range(1, n + 1):
-            kick_drift_row(state, kick, dt, chart, r, 1, n)
+        for r in range(1, state.h.shape[1] - 1):
+            kick_drift_row(state, kick, dt, chart, r, 1, kick.stencil.columns)
 
 
 @kernel

@@ -67,7 +67,7 @@ def apply(stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Fl
         chart, r = i // n, i % n + 1
         rows, links = (h[chart, r - 1], h[chart, r], h[chart, r + 1]), links_of(stencil.rows, chart, r)
         result = out[chart, r]
-        for c in range(1, n + 1):
+        for c in range(1, stencil.columns + 1):
             force = value_in(row_of(factor, chart, r - 1), c - 1) * force_at(rows, links, c)
             result[c] = result[c] + force if add else force
     irregular, flat, sums = stencil.irregular, h.reshape(-1), out.reshape(-1)

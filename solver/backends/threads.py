@@ -86,7 +86,7 @@ def _advance(
     substeps, most, dt = plan.substeps, plan.most, plan.dt
     h, v, h_next = state
     charts, taken = len(h), passes(substeps, most)
-    still = Drift(start.response, start.shift, np.float32(0))
+    still = Drift(start.columns, start.response, start.shift, np.float32(0))
     while True:
         ticket = _add(counters, _DRAWN, 1)
         if ticket >= charts * len(taken):

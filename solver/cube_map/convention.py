@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.errors import AtlasError
+from ripple_sim.solver.memory import require_memory
 from ripple_sim.solver.texels.glue import glue
 from ripple_sim.solver.texels.topology import TexelTopology
 
@@ -24,6 +25,9 @@ CHART_V = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 1, 0], [0, -
 
 MIN_RESOLUTION = 4
 MAX_RESOLUTION = 4096
+
+# Memory for each texel while an atlas is built, at least [bytes].
+_TEXEL = 200
 
 
 def check_resolution(resolution: int) -> int:
@@ -35,6 +39,12 @@ def check_resolution(resolution: int) -> int:
             f"from {MIN_RESOLUTION} to {MAX_RESOLUTION}"
         )
     return int(resolution)
+
+
+def check_memory(resolution: int) -> None:
+    """Raise `AtlasError` if an atlas of about 6 N^2 texels cannot fit into memory."""
+    what = f"an atlas of resolution {resolution}"
+    require_memory(AtlasError, _TEXEL * 6 * resolution**2, what, "take a lower resolution")
 
 
 def texel_directions(resolution: int) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from ripple_sim.solver.texels.atlas import Atlas, check_points
 from ripple_sim.solver.texels.nearest import nearest_places
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
-from .convention import check_resolution, cube_topology, texel_directions
+from .convention import check_memory, check_resolution, cube_topology, texel_directions
 from .cube_chart_map import CubeChartMap
 from .nearest import Ball
 
@@ -55,9 +55,10 @@ def sphere_atlas(radius: float = 1.0, resolution: int = 128) -> SphereAtlas:
     Raises
     ------
     AtlasError
-        If the radius is not positive and finite, or the resolution is invalid.
+        If the radius is not positive and finite, the resolution is invalid, or the atlas cannot fit into memory.
     """
     resolution = check_resolution(resolution)
+    check_memory(resolution)
     directions, topology = texel_directions(resolution), cube_topology(resolution)
     F, triangles, barycentrics = _texel_triangulation(topology.halo, resolution)
     return SphereAtlas(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -14,10 +15,15 @@ from ripple_sim.solver.errors import GLError
 from .drivers import is_software
 from .egl import create_context, current_context, load_egl, release_current
 from .fence import Fences
+from .program_pool import ProgramPool
 from .shader import load_shader
 
 # How long a thread waits for another to leave the context [s]: longer than any frame takes.
 _PATIENCE = 120.0
+
+# How long a thread that waits for the driver keeps others from the context [s], and how long it leaves it to them: a
+# lock that is let go and taken at once is not handed on.
+_TURN, _PAUSE = 1e-3, 1e-4
 
 
 class GLContext:
@@ -53,6 +59,7 @@ class GLContext:
         self._fences = Fences(load_egl().eglGetProcAddress)
         self._shared_shaders: dict[str, moderngl.ComputeShader] = {}
         self._before: int | None = None
+        self._pool = ProgramPool()
         release_current()
 
     @property
@@ -127,8 +134,7 @@ class GLContext:
 
         moderngl holds the interpreter's lock while it waits, in `finish` as well as in reading back.
         """
-        with self:
-            self.wait_for(self.put_fence())
+        self.wait_for(self.put_fence())
 
     def put_fence(self) -> int:
         """Put a fence behind all commands so far, and return its handle; wait for each fence once."""
@@ -136,13 +142,22 @@ class GLContext:
             return self._fences.put()
 
     def wait_for(self, fence: int) -> None:
-        """Wait until the driver has reached a fence, as `wait` does for all commands."""
-        with self:
-            self._fences.wait(fence)
+        """Wait until the driver has reached a fence, as `wait` does for all commands.
+
+        Outside of the context's `with` block other threads may enter meanwhile.
+        """
+        reached = False
+        while not reached:
+            with self:
+                reached = self._fences.reached(fence, _TURN)
+            if not reached:
+                time.sleep(_PAUSE)
 
     def compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
         """Compile `{name}.glsl` below `package` as a compute shader; see `load_shader`."""
-        return self._compute_shader(name, load_shader(package, name, **defines))
+        source = load_shader(package, name, **defines)
+        with self:
+            return self._pooled((source,), lambda: self._compute_shader(name, source))
 
     def shared_compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
         """Compile a compute shader once and share it: set all uniforms before each use."""
@@ -156,10 +171,26 @@ class GLContext:
         vertex_source = load_shader(package, vertex, **defines)
         fragment_source = load_shader(package, fragment, **defines)
         with self as ctx:
-            return _compiled(
-                f"{vertex} + {fragment}",
-                lambda: ctx.program(vertex_shader=vertex_source, fragment_shader=fragment_source),
+            return self._pooled(
+                (vertex_source, fragment_source),
+                lambda: _compiled(
+                    f"{vertex} + {fragment}",
+                    lambda: ctx.program(vertex_shader=vertex_source, fragment_shader=fragment_source),
+                ),
             )
+
+    def release(self, created: Any) -> None:
+        """Release an object; programs and compute shaders are kept for whoever asks for the same ones next."""
+        with self:
+            if not (isinstance(created, moderngl.Program | moderngl.ComputeShader) and self._pool.give_back(created)):
+                created.release()
+
+    def _pooled(self, sources: tuple[str, ...], compiled: Callable[[], Any]) -> Any:
+        program = self._pool.take(sources)
+        if program is None:
+            program = compiled()
+            self._pool.note(sources, program)
+        return program
 
     def _compute_shader(self, name: str, source: str) -> moderngl.ComputeShader:
         with self as ctx:

@@ -10,7 +10,6 @@ from ripple_sim.solver.errors import GLError
 _COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
 _FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
 _TIMEOUT_EXPIRED, _FAILED = 0x911B, 0x911D
-_PATIENCE = 100_000_000  # [ns], after which Python checks for an interrupt
 
 
 class Fences:
@@ -32,19 +31,22 @@ class Fences:
         """Put a fence behind all commands so far, and return its handle."""
         return self._create(_COMMANDS_COMPLETE, 0)
 
-    def wait(self, fence: int) -> None:
-        """Wait until the driver has finished all commands before the fence, and delete it.
+    def reached(self, fence: int, patience: float) -> bool:
+        """Wait until the driver has finished all commands before the fence, for so long [s] at most.
+
+        A fence that was reached is deleted.
 
         Raises
         ------
         GLError
             If the driver reports a failure.
         """
+        state = _FAILED
         try:
-            state = _TIMEOUT_EXPIRED
-            while state == _TIMEOUT_EXPIRED:
-                state = self._wait(fence, _FLUSH, _PATIENCE)
+            state = self._wait(fence, _FLUSH, round(1e9 * patience))
         finally:
-            self._delete(fence)
+            if state != _TIMEOUT_EXPIRED:
+                self._delete(fence)
         if state == _FAILED:
             raise GLError("OpenGL cannot wait for its own commands; see `ripple-sim info`")
+        return state != _TIMEOUT_EXPIRED

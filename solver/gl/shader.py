@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.resources
+from importlib.resources.abc import Traversable
 
 from ripple_sim.solver.errors import GLError
 
@@ -26,7 +28,7 @@ def load_shader(package: str, name: str, **defines: object) -> str:
     GLError
         If a file is missing, or the shader does not start with `#version`.
     """
-    text = _read(package, f"{name}.glsl", set())
+    text = _read(importlib.resources.files(package), f"{name}.glsl", set())
     head, _, body = text.partition("\n")
     if not head.startswith("#version"):
         raise GLError(f"shader {name}.glsl of {package} must start with #version, found {head!r}")
@@ -34,15 +36,20 @@ def load_shader(package: str, name: str, **defines: object) -> str:
     return f"{head}\n{lines}{body}"
 
 
-def _read(package: str, path: str, seen: set[str]) -> str:
+def _read(folder: Traversable, path: str, seen: set[str]) -> str:
     """Text of a file with what it includes, unless it has been seen."""
     if path in seen:
         return ""
     seen.add(path)
-    file = importlib.resources.files(package).joinpath(*path.split("/"))
+    file = folder.joinpath(path)
     if not file.is_file():
-        raise GLError(f"package {package} has no shader {path}")
+        raise GLError(f"package {folder.name} has no shader {path}")
     lines = []
-    for line in file.read_text().splitlines():
-        lines.append(_read(package, line.split('"')[1], seen) if line.startswith("#include") else line)
+    for line in _lines(file):  # type: ignore[arg-type]  # a path can be hashed
+        lines.append(_read(folder, line.split('"')[1], seen) if line.startswith("#include") else line)
     return "\n".join(lines) + "\n"
+
+
+@functools.cache  # a batch makes a renderer for every scene
+def _lines(file: Traversable) -> list[str]:
+    return file.read_text().splitlines()

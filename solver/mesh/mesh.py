@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ripple_sim.solver.errors import MeshError
 
 from .cleaning import cleaned
+from .normals import vertex_normals
 from .orientation import part_volumes
 from .topology import distinct, genera, rims_of, sides_of
 from .winding import labels
@@ -130,21 +131,8 @@ class Mesh:
 
     @functools.cached_property
     def vertex_normals(self) -> NDArray[np.float64]:
-        """Unit normals weighted by corner angle, shape [vertex_count, 3] (Thuermer and Wuethrich 1998)."""
-        corners = self.V[self.F]
-        triangle_normals = _area_vectors(self.V, self.F)[0]
-        length = np.linalg.norm(triangle_normals, axis=1, keepdims=True)
-        triangle_normals = triangle_normals / np.where(length > 0, length, 1)
-        normals = np.zeros_like(self.V)
-        for k in range(3):
-            a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
-            angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
-            for axis in range(3):
-                normals[:, axis] += np.bincount(
-                    self.F[:, k], weights=angle * triangle_normals[:, axis], minlength=len(self.V)
-                )
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        return np.where(length > 0, normals / np.where(length > 0, length, 1), [0.0, 0.0, 1.0])
+        """Unit normals, shape [vertex_count, 3]; see `normals.vertex_normals`."""
+        return vertex_normals(self.V, self.F)
 
 
 def _checked(V: ArrayLike, F: ArrayLike, name: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

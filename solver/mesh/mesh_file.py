@@ -14,6 +14,7 @@ import trimesh
 
 from ripple_sim.solver.checked import PATH, checked
 from ripple_sim.solver.errors import MeshError
+from ripple_sim.solver.memory import require_memory
 
 from .counting import counted
 from .genus_zero import many_parts
@@ -26,6 +27,12 @@ from .wrap import wrap as wrapped
 
 # trimesh logs whole tracebacks; without a handler Python prints them to stderr
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
+
+# A few kilobytes of which may become any number of gigabytes; unpacked files are read.
+_ARCHIVES = ("zip", "bz2")
+
+# Memory for a byte of a mesh file [bytes], at least.
+_BYTE = 3
 
 _READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
 
@@ -72,15 +79,17 @@ def _read(path: Path) -> Soup:
         if path.is_dir():
             raise MeshError(f"{str(path)!r} is a folder; give the path of an OBJ, PLY, STL, OFF or GLB file")
         if not path.is_file():
-            raise MeshError(
-                f"mesh file {str(path)!r} does not exist; give the path of an OBJ, PLY, STL, OFF or GLB file"
-            )
+            problem = "is not a regular file" if path.exists() else "does not exist"
+            raise MeshError(f"mesh file {str(path)!r} {problem}; give the path of an OBJ, PLY, STL, OFF or GLB file")
         if path.stat().st_size == 0:
             raise MeshError(f"mesh file {str(path)!r} is empty")
+        require_memory(MeshError, _BYTE * path.stat().st_size, f"mesh file {str(path)!r}", "take a coarser mesh")
         if path.suffix.lower() in _READERS:
             return _READERS[path.suffix.lower()](path.read_bytes())
-        if kind.lower() not in trimesh.available_formats():
-            raise MeshError(f"mesh file {str(path)!r} has an unknown ending; valid are .obj, .off, .ply, .stl and .glb")
+        if kind.lower() not in trimesh.available_formats() or kind.lower() in _ARCHIVES:
+            raise MeshError(
+                f"mesh file {str(path)!r} has an unknown ending; valid are .obj, .off, .ply, .stl and .glb, unpacked"
+            )
         if path.suffix.lower() == ".gltf":
             _check_buffers(path)
         with path.open("rb"), warnings.catch_warnings():
@@ -92,6 +101,8 @@ def _read(path: Path) -> Soup:
         raise MeshError(f"mesh file {str(path)!r} cannot be read: {error}") from error
     except OSError as error:
         raise MeshError(f"mesh file {str(path)!r} cannot be read: {error.strerror or error}") from error
+    except MemoryError:
+        raise
     except Exception as error:  # trimesh lets its parsers' exceptions through
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise MeshError(

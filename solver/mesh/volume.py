@@ -27,12 +27,15 @@ class Volume:
         Between nodes [m].
     origin : [3]
         Where node (0, 0, 0) is [m].
+    directions : [3, 3]
+        Its columns are the ways along which i, j and k grow: unit vectors at right angles.
     """
 
     values: ArrayLike
     threshold: float
     spacing: float | ArrayLike = 1.0
     origin: ArrayLike = (0.0, 0.0, 0.0)
+    directions: ArrayLike = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
     def surface(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Vertices [n, 3] [m] and triangles [m, 3] of the surface at the threshold, by marching cubes; often noisy.
@@ -58,4 +61,7 @@ class Volume:
                 f"the volume's values are from {values.min():g} to {values.max():g}; valid is a threshold between, not "
                 f"{self.threshold:g}"
             )
-        return zero_surface(self.threshold - values, np.asarray(self.origin, dtype=np.float64), spacing)
+        V, F = zero_surface(self.threshold - values, np.zeros(3), spacing)
+        directions = np.asarray(self.directions, dtype=np.float64)
+        turned = V @ directions.T + np.asarray(self.origin, dtype=np.float64)
+        return turned, F if np.linalg.det(directions) > 0 else F[:, ::-1]

@@ -15,10 +15,11 @@ from ripple_sim.solver.texels.stencil import Stencil
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
 from .coefficients import LIMITS
+from .fluid_operator import over_fluid
 from .material import Material
+from .rims import RIMS
 from .wave_operator import WaveOperator
 
-RIMS = ("free", "fixed")
 OPERATORS = ("fem", "paper", "uncorrected", "dynamic-paint")
 
 # Below this share of the greatest pull on the surface sources lose their grip: where waves run at 3 % of the speed.
@@ -50,23 +51,16 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: str = "free
         raise SolverError(f"rim {rim!r} does not exist; valid are {', '.join(map(repr, RIMS))}")
     if kind not in OPERATORS:
         raise SolverError(f"operator {kind!r} does not exist; valid are {', '.join(map(repr, OPERATORS))}")
-    field = {name: material.texels(name, atlas.areas.shape) for name in (*LIMITS, "fixed")}
-    density, area, texels = field["density"], atlas.areas, atlas.texels
-    if rim == "fixed":
-        texels = texels.with_fixed_rim()
-        field["fixed"] |= texels.bare_rim
+    texels, field = texel_fields(atlas, material, rim)
+    density, area = field["density"], atlas.areas
     if kind == "fem":
         assemble = functools.partial(texels.stencil, softening=softening(texels))
     else:
         # these formulas give accelerations without masses: one area for all keeps the units, one density as well
         area, density = np.full_like(area, area.mean()), np.full_like(density, density.mean())
         assemble = functools.partial(_difference_stencil, texels, kind, area[0, 0, 0])
-    # rigid texels are not dragged along by their neighbours either
-    moves = (field["speed"] > 0) | (field["stiffness"] > 0) | (field["bending"] > 0)
-    if moves.any():
-        field["viscosity"] *= moves
     viscous, bends, yields = field["viscosity"].any(), field["bending"].any(), np.isfinite(field["yield_height"]).any()
-    return WaveOperator(
+    operator = WaveOperator(
         stencil=assemble(density * field["speed"] ** 2),
         mass=density * area,
         damping=field["damping"],
@@ -79,6 +73,21 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: str = "free
         density=density if np.ptp(density) else None,
         grip=source_grip(field["speed"] ** 2, field["stiffness"], field["bending"]),
     )
+    return over_fluid(operator, material.deep, assemble(np.ones_like(area)), area) if material.deep else operator
+
+
+def texel_fields(atlas: Atlas, material: Material, rim: str) -> tuple[TexelMesh, dict[str, NDArray]]:
+    """Texel mesh with its rim, and the coefficients of a material at each of its texels, [C, n, n]."""
+    field = {name: material.texels(name, atlas.areas.shape) for name in (*LIMITS, "fixed")}
+    texels = atlas.texels
+    if rim == "fixed":
+        texels = texels.with_fixed_rim()
+        field["fixed"] |= texels.bare_rim
+    # rigid texels are not dragged along by their neighbours either
+    moves = (field["speed"] > 0) | (field["stiffness"] > 0) | (field["bending"] > 0)
+    if moves.any():
+        field["viscosity"] *= moves
+    return texels, field
 
 
 def source_grip(*pulls: NDArray[np.float64]) -> NDArray[np.float64] | None:

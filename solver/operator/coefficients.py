@@ -17,6 +17,7 @@ LIMITS = {
     "density": ("kg/m^2", 0.0, True, False),
     "bending": ("m^4/s^2", 0.0, False, False),
     "yield_height": ("m", 0.0, True, True),
+    "deep": ("1/m", 0.0, False, False),
 }
 
 # Beyond any physical value, and small enough that nothing overflows on the way to the time step.
@@ -45,6 +46,16 @@ def check_mask(name: str, value: ArrayLike) -> None:
     if mask.dtype != bool:
         raise SolverError(f"material {name} has type {mask.dtype}; valid is bool: a mask [C, n, n], or False")
     _check_shape(name, mask)
+
+
+def check_wavelengths(value: ArrayLike) -> None:
+    """Raise `SolverError` unless a value is a shortest and a longest wave."""
+    numbers = _numbers("wavelengths", value)
+    if numbers.shape != (2,) or not 0 <= numbers[0] <= numbers[1]:
+        raise SolverError(
+            f"material wavelengths is {shown(value)} m; valid are two numbers: the shortest, 0 or greater, and the "
+            "longest"
+        )
 
 
 def _numbers(name: str, value: object) -> NDArray[np.float64]:

@@ -11,7 +11,10 @@ def frequency(material: Material, wave_number: float) -> float:
     """Angular frequency of a wave [1/s], 0 where it creeps back without swinging; of a wave number [1/m]."""
     q2, rate = wave_number**2, 1 / decay_time(material, wave_number)
     square = _number(material, "speed") ** 2 * q2 + _number(material, "bending") * q2**2
-    return float(np.sqrt(max(square + _number(material, "stiffness") - rate**2, 0.0)))
+    square += _number(material, "stiffness")
+    if material.deep:
+        square *= wave_number / material.deep
+    return float(np.sqrt(max(square - rate**2, 0.0)))
 
 
 def phase_speed(material: Material, wave_number: float) -> float:

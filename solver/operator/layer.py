@@ -24,7 +24,7 @@ MASS = 0.665
 SHORTEST, LONGEST = 2 * np.pi / 8, 2 * np.pi / 1.3
 
 
-def layer_coefficients(modulus: float, viscosity: float, density: float, thickness: ArrayLike) -> dict[str, ArrayLike]:
+def layer_coefficients(modulus: float, viscosity: float, density: float, thickness: ArrayLike) -> dict[str, Any]:
     """Coefficients of `Material` by their names; see `Material.layer`."""
     require_positive(modulus=(modulus, "Pa"), density=(density, "kg/m^3"))
     if not (is_finite(viscosity) and viscosity >= 0):
@@ -41,9 +41,9 @@ def layer_coefficients(modulus: float, viscosity: float, density: float, thickne
 
 
 def layer_wavelengths(thickness: ArrayLike) -> tuple[float, float]:
-    """Shortest and longest wave [m] that the fit holds for, at the thickest and at the thinnest place."""
+    """Shortest and longest wave [m] that the fit holds for somewhere: at the thinnest and at the thickest place."""
     depth = _thickness(thickness)
-    return SHORTEST * float(np.max(depth)), LONGEST * float(np.min(depth))
+    return SHORTEST * float(np.min(depth)), LONGEST * float(np.max(depth))
 
 
 def _thickness(value: Any) -> float | NDArray[np.float64]:

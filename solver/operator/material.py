@@ -1,25 +1,17 @@
-"""Materials: the coefficients of the wave equation, as numbers, as maps, and as presets."""
+"""Materials: the coefficients of the wave equation, from laws, from what is seen, and as presets."""
 
 from __future__ import annotations
 
-import dataclasses
-
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from typing import Self
 
 from ripple_sim.solver.errors import SolverError
 
-from .coefficients import LIMITS, check_mask, check_numbers, require_positive
-from .layer import layer_coefficients, layer_wavelengths
+from .material_laws import MaterialLaws
 from .presets import preset_named
 from .suited import suited_coefficients
-from .unset import Unset
-
-_ZERO, _ONE = Unset(0.0), Unset(1.0)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Material:
+class Material(MaterialLaws):
     """Coefficients of the wave equation; each is a number or one value a texel, shape [C, n, n].
 
     sigma h_tt = div(sigma c^2 grad h) - lap(sigma b lap h) - sigma zeta h_t - sigma k h + div(sigma nu grad h_t) - p,
@@ -47,6 +39,13 @@ class Material:
         Deformation beyond it is permanent (see `dent`). Infinite: fully elastic.
     fixed : bool
         Where True, the surface is clamped: its height stays 0 and waves come back inverted.
+    deep : [1/m]
+        With deep fluid below, whose flow makes long waves heavier: the wave number q_0 at which it weighs sigma. Of
+        another wave number q it weighs sigma q_0 / q, so that omega^2 is q / q_0 times the one above. 0: no fluid. One
+        number, with one density; see `water`.
+    tightening : float
+        On a surface that moves, see `WaveSolver.move`: c^2 grows as this power of the area over that at rest. 0: waves
+        stay as fast as they are; 1: the tension stays, as of a soap film; more: the tension grows, as of rubber.
     wavelengths : (float, float)
         Shortest and longest wave for which the coefficients stand for the real material [m]. `WaveSolver` warns where
         an atlas has room for none of them.
@@ -54,16 +53,6 @@ class Material:
     A density that is not given is 1 to `WaveSolver`, which knows nothing of a scale. `Ripples` takes it from the model,
     and with it those of speed, damping and stiffness that are not given; see `suited_material`.
     """
-
-    speed: float | ArrayLike = _ONE
-    damping: float | ArrayLike = _ZERO
-    stiffness: float | ArrayLike = _ZERO
-    viscosity: float | ArrayLike = 0.0
-    density: float | ArrayLike = _ONE
-    bending: float | ArrayLike = 0.0
-    yield_height: float | ArrayLike = np.inf
-    fixed: bool | ArrayLike = False
-    wavelengths: ArrayLike = (0.0, np.inf)
 
     @classmethod
     def suited(
@@ -75,7 +64,7 @@ class Material:
         amplitude: float = 0.05,
         crossing: float = 0.5,
         decay: float = 1.5,
-    ) -> Material:
+    ) -> Self:
         """Ripples that look right on an object of any size, from a marble to a building.
 
         The time that waves take is what the eye sees, so speed and the like follow from times, and the density from how
@@ -112,52 +101,9 @@ class Material:
         return cls(**suited_coefficients(size, hit, radius, amplitude, crossing, decay))
 
     @classmethod
-    def membrane(cls, tension: float = 1.0, density: float = 1.0, damping: float = 0.0) -> Material:
-        """Stretched skin: omega = c q with c = sqrt(tension / density), the same for all wave lengths.
-
-        Parameters
-        ----------
-        tension : [N/m]
-        density : [kg/m^2]
-        damping : [1/s]
-        """
-        require_positive(tension=(tension, "N/m"), density=(density, "kg/m^2"))
-        return cls(speed=(tension / density) ** 0.5, density=density, damping=damping)
-
-    @classmethod
-    def layer(
-        cls, modulus: float, viscosity: float = 0.0, density: float = 1000.0, thickness: float | ArrayLike = 0.05
-    ) -> Material:
-        """Soft layer bonded to a rigid core: where it is thin it is stiff and soon still, where thick soft and slow.
-
-        The waves that normal impacts drive: the lowest normal mode of an incompressible Kelvin-Voigt layer on a rigid
-        base, whose modulus is G + eta d/dt. With c_T^2 = G / rho its frequency is, within 3.0 % for 1.3 <= q d <= 8,
-        omega^2 = 6.527 (c_T / d)^2 + 0.7668 c_T^2 q^2, a fit to the zeros of the mode's determinant (Achenbach 1973,
-        chapter 6, for the waves in a layer); waves shorter than 0.8 d or longer than 4.8 d are outside of it.
-        All forces in the layer go with the modulus, so that eta gives damping and viscosity in the same two terms.
-        The density is the mode's share of the layer's mass, 0.665 rho d, within a quarter for 1.6 <= q d <= 8.
-
-        Parameters
-        ----------
-        modulus : G [Pa]
-            Shear modulus.
-        viscosity : eta [Pa s]
-        density : rho [kg/m^3]
-        thickness : d [m]
-            A number, or one at every texel, [C, n, n].
-
-        Raises
-        ------
-        SolverError
-            If a number is not finite and greater than 0; the viscosity may be 0.
-        """
-        coefficients = layer_coefficients(modulus, viscosity, density, thickness)
-        return cls(**coefficients, wavelengths=layer_wavelengths(thickness))
-
-    @classmethod
     def jelly(
         cls, modulus: float = 500.0, viscosity: float = 2.0, thickness: float = 0.1, density: float = 1000.0
-    ) -> Material:
+    ) -> Self:
         """Soft jelly on a rigid core: a `layer` that wobbles at its own frequency and settles.
 
         Parameters
@@ -171,7 +117,7 @@ class Material:
         return cls.layer(modulus, viscosity, density, thickness)
 
     @classmethod
-    def preset(cls, name: str, **parameters: float) -> Material:
+    def preset(cls, name: str, **parameters: float) -> Self:
         """Real material by its name in `PRESETS`, with some parameters of its constructor changed.
 
         Raises
@@ -185,82 +131,3 @@ class Material:
             valid = ", ".join(chosen.parameters)
             raise SolverError(f"the preset {name!r} has no parameter {unknown[0]!r}; valid are {valid}")
         return getattr(cls, chosen.law)(**{**chosen.parameters, **parameters})
-
-    @classmethod
-    def plate(
-        cls,
-        modulus: float = 1e6,
-        thickness: float = 0.01,
-        density: float = 1000.0,
-        poisson: float = 0.3,
-        damping: float = 0.0,
-    ) -> Material:
-        """Thin elastic shell that resists bending only: omega = sqrt(D / sigma) q^2, dispersive.
-
-        Kirchhoff's plate: rigidity D = E d^3 / 12 (1 - nu^2), sigma = rho d. The surface's own curvature is left out.
-
-        Parameters
-        ----------
-        modulus : E [Pa]
-        thickness : d [m]
-        density : rho [kg/m^3]
-        poisson : nu
-            From 0 up to 0.5.
-        damping : [1/s]
-        """
-        require_positive(modulus=(modulus, "Pa"), thickness=(thickness, "m"), density=(density, "kg/m^3"))
-        if not 0 <= poisson <= 0.5:
-            raise SolverError(f"plate poisson is {poisson!r}; valid is a number from 0 to 0.5")
-        rigidity = modulus * thickness**3 / (12 * (1 - poisson**2))
-        surface_density = density * thickness
-        return cls(speed=0.0, bending=rigidity / surface_density, density=surface_density, damping=damping)
-
-    @classmethod
-    def dent(
-        cls,
-        yield_height: float,
-        stiffness: float = 1000.0,
-        speed: float = 1.0,
-        damping: float = 1.0,
-        density: float = 1.0,
-    ) -> Material:
-        """Ideally plastic ground: deformation beyond the yield height is permanent.
-
-        Height is elastic plus permanent. Waves act on the elastic part, which never exceeds the yield height: while it
-        stands at the limit the ground flows under the constant resistance sigma k yield_height, and the flow is
-        permanent. A uniform push at velocity v leaves (v^2 / k - yield_height^2) / (2 yield_height).
-
-        Parameters
-        ----------
-        yield_height : [m]
-        stiffness : k [1/s^2]
-        speed : c [m/s]
-        damping : zeta [1/s]
-        density : sigma [kg/m^2]
-        """
-        return cls(speed=speed, damping=damping, stiffness=stiffness, density=density, yield_height=yield_height)
-
-    def __post_init__(self) -> None:
-        for name in LIMITS:
-            check_numbers(name, getattr(self, name))
-        check_mask("fixed", self.fixed)
-
-    @property
-    def unset(self) -> tuple[str, ...]:
-        """Names of the coefficients that are left to the model: none where the density is given."""
-        if not isinstance(self.density, Unset):
-            return ()
-        return tuple(name for name in LIMITS if isinstance(getattr(self, name), Unset))
-
-    def texels(self, name: str, shape: tuple[int, int, int]) -> NDArray:
-        """One coefficient at every texel, [C, n, n], float64 (bool for `fixed`).
-
-        Raises
-        ------
-        SolverError
-            If the coefficient was given for another atlas.
-        """
-        value = np.asarray(getattr(self, name), dtype=bool if name == "fixed" else np.float64)
-        if value.ndim and value.shape != shape:
-            raise SolverError(f"material {name} has shape {value.shape}, the atlas needs a number or {shape}")
-        return np.array(np.broadcast_to(value, shape))

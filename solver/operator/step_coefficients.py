@@ -7,6 +7,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver.errors import SolverError
+
 from .wave_operator import WaveOperator
 
 
@@ -33,14 +35,27 @@ class StepCoefficients:
 
 
 def step_coefficients(operator: WaveOperator, dt: float) -> StepCoefficients:
-    """Coefficients of the kick of one substep of dt [s]."""
+    """Coefficients of the kick of one substep of dt [s].
+
+    Raises
+    ------
+    SolverError
+        If float32 cannot hold one of them.
+    """
     decay, span = damped_step(operator, dt)
-    return StepCoefficients(
-        gain=np.where(operator.free, span / operator.mass, 0).astype(np.float32),
-        decay=number_or_field(decay),
-        spring=number_or_field(span * operator.stiffness),
-        span=number_or_field(span * operator.response),
-    )
+    with np.errstate(over="ignore"):
+        kick = StepCoefficients(
+            gain=np.where(operator.free, span / operator.mass, 0).astype(np.float32),
+            decay=number_or_field(decay),
+            spring=number_or_field(span * operator.stiffness),
+            span=number_or_field(span * operator.response),
+        )
+    if not all(np.isfinite(value).all() for value in (kick.gain, kick.spring, kick.span)):
+        raise SolverError(
+            f"a substep of {dt:.4g} s on texels of {operator.mass.min():.4g} kg and more is beyond float32; valid is a "
+            "shorter step, or a larger mesh or material density"
+        )
+    return kick
 
 
 def damped_step(operator: WaveOperator, dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

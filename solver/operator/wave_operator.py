@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from .components import Ties, floating_parts
 
 # Share of the theoretical stability limit that is used: round-off in float32 must not cross it.
 SAFETY = 0.99
+
+# What does not change as the surface moves.
+_OF_REST = ("free", "movable", "anchored", "source_share", "lightness", "response", "parts")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,6 +48,8 @@ class WaveOperator:
         Share of a source that sets a texel in motion, where it is movable; None: 1 everywhere.
     density : float64 [C, n, n] or None
         sigma [kg/m^2], in any unit; None where it is uniform.
+    bounded : bool
+        Whether the stable step follows from Gershgorin's bound, at once, rather than from the eigenvalue itself.
     """
 
     stencil: Stencil
@@ -57,6 +63,7 @@ class WaveOperator:
     fixed: NDArray[np.bool_] | None = None
     grip: NDArray[np.float64] | None = None
     density: NDArray[np.float64] | None = None
+    bounded: bool = False
 
     @property
     def topology(self) -> TexelTopology:
@@ -109,6 +116,30 @@ class WaveOperator:
             ties.append(Ties(self.laplace_stencil, self.rigidity))
         return floating_parts(ties, (self.stiffness > 0) | self.anchored, self.movable)
 
+    def moved(
+        self,
+        stencil: Stencil,
+        viscous_stencil: Stencil | None,
+        laplace_stencil: Stencil | None,
+        rigidity: NDArray[np.float64] | None,
+    ) -> WaveOperator:
+        """The same surface with its texels elsewhere: masses, and what holds or parts it, stay."""
+        moved = dataclasses.replace(
+            self,
+            stencil=stencil,
+            viscous_stencil=viscous_stencil,
+            laplace_stencil=laplace_stencil,
+            rigidity=rigidity,
+            bounded=True,
+        )
+        for name in _OF_REST:
+            moved.__dict__[name] = getattr(self, name)
+        return moved
+
+    def momenta(self, velocity: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Momentum of what moves with the surface [N s], float64 [C, n, n]."""
+        return self.mass * velocity
+
     def elastic_force(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
         """-(K + L B L + M k) h [N], float64 [C, n, n]; what holds the clamped texels is left out."""
         return self.link_force(height) - self.mass * self.stiffness * height
@@ -131,14 +162,18 @@ class WaveOperator:
         if self.laplace_stencil is not None and self.rigidity is not None:
             bending = self._rate_bound(self.laplace_stencil)
             bound += bending * float((self.rigidity * self.mass).max()) * bending
-        wave = largest_eigenvalue(self.link_force, self.mass, self.free, bound) + self.stiffness.max()
+        wave = self._rate(self.link_force, bound) + self.stiffness.max()
         viscous = 0.0
         if self.viscous_stencil is not None:
             bound = self._rate_bound(self.viscous_stencil)
-            viscous = largest_eigenvalue(self.viscous_stencil, self.mass, self.free, bound)
+            viscous = self._rate(self.viscous_stencil, bound)
         # the positive root, written so that nothing cancels
         rate = viscous + np.sqrt(viscous**2 + 4 * wave)
         return np.inf if rate == 0 else float(SAFETY * 4 / rate)
+
+    def _rate(self, force: Callable[[NDArray[np.float64]], NDArray[np.float64]], bound: float) -> float:
+        """Largest eigenvalue of -M^-1 force, or its bound."""
+        return bound if self.bounded else largest_eigenvalue(force, self.mass, self.free, bound)
 
     def _rate_bound(self, stencil: Stencil) -> float:
         """Gershgorin's bound of the largest eigenvalue of M^-1 K."""

@@ -33,11 +33,14 @@ class BorderedCells:
         To which each triangle belongs.
     arcs : list of lists of int64 [l]
         Of each cell, counter-clockwise, the vertices along its border from one corner to the next, both included.
+    uncut : int
+        How many vertices there were before the cut: the first ones.
     """
 
     surface: Surface
     cell: NDArray[np.int64]
     arcs: list[list[NDArray[np.int64]]]
+    uncut: int
 
     def short_of_corners(self) -> NDArray[np.int64]:
         """Cells with fewer than three corners."""
@@ -64,7 +67,7 @@ def cut_borders(metric: Metric, cells: Cells) -> BorderedCells:
     for loop in _border_loops(cut, cell, len(cells.seeds)):
         on_rim = rim_side[loop] == np.roll(loop, -1)
         arcs.append(_arcs(cut.V, loop, corner[loop], on_rim))
-    return BorderedCells(cut, cell, arcs)
+    return BorderedCells(cut, cell, arcs, len(surface.V))
 
 
 def _corners(surface: Surface, cell: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -111,7 +111,7 @@ def _moved(
     vertices, triangles = beside.vertices, beside.triangles
     before = _energy(seamless, reference, triangles)
     x, chart, freedom = seamless.x[vertices], seamless.chart[vertices], seamless.freedom[vertices]
-    moved, turn, shift = seamless.moved[vertices], seamless.turn[triangles], seamless.shift[triangles]
+    turn, shift = seamless.turn[triangles], seamless.shift[triangles]
     v, u = vertices[0], vertices[1]
     _change_frames(seamless, v, u, fan)
     degree = gather(seamless, reference, v, star)
@@ -130,7 +130,7 @@ def _moved(
             return True
     for i in range(len(vertices)):
         w = vertices[i]
-        seamless.x[w], seamless.chart[w], seamless.freedom[w], seamless.moved[w] = x[i], chart[i], freedom[i], moved[i]
+        seamless.x[w], seamless.chart[w], seamless.freedom[w] = x[i], chart[i], freedom[i]
     for i in range(len(triangles)):
         seamless.turn[triangles[i]], seamless.shift[triangles[i]] = turn[i], shift[i]
     return False

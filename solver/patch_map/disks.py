@@ -55,15 +55,23 @@ def _mended(metric: Metric, cells: Cells) -> tuple[Cells, BorderedCells]:
         few = bordered.short_of_corners()
         if not len(few):
             return cells, bordered
-        cell = int(few[0])
-        seed = int(cells.seeds[cell])
-        if seed not in tried or len(cells.seeds) <= _FEWEST:
-            tried.add(seed)
-            farthest = np.where(_beside(surface, cells, cell), cells.distance, -1.0)
-            cells = _with(metric, cells, int(np.argmax(farthest)))
-        else:
-            cells = voronoi_cells(metric, np.delete(cells.seeds, cell))
+        cells = _with_corners(metric, cells, few, tried)
     raise AtlasError("no cells found that are disks with three corners")
+
+
+def _with_corners(metric: Metric, cells: Cells, few: NDArray[np.int64], tried: set[int]) -> Cells:
+    """Give cells with too few corners a neighbour each, or take away their seeds where that was `tried` before."""
+    new: list[int] = []
+    gone: list[int] = []
+    for cell in few.tolist():
+        seed = int(cells.seeds[cell])
+        if seed not in tried or len(cells.seeds) - len(gone) <= _FEWEST:
+            tried.add(seed)
+            farthest = np.where(_beside(metric.surface, cells, cell), cells.distance, -1.0)
+            new.append(int(np.argmax(farthest)))
+        else:
+            gone.append(cell)
+    return voronoi_cells(metric, np.union1d(np.delete(cells.seeds, gone), new).astype(np.int64))
 
 
 def _with(metric: Metric, cells: Cells, seed: int) -> Cells:

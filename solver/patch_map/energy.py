@@ -23,7 +23,6 @@ from .seamless import SeamlessMap, corner_place
 FOLDED = 1e-15  # the area of a triangle on the charts must exceed this
 _FLATTEST = 0.02  # least double area over squared length that the energy believes in
 _LEAST_AREA = 1e-6  # of a triangle, in units of their mean
-_MOST_LOAD = 20.0  # area that a vertex stands for over that of its triangles
 
 
 class Reference(NamedTuple):
@@ -53,14 +52,9 @@ def density_derivatives(
     return w, slope_d, slope_j, bend_d, mixed, 2.0 * p * (2.0 * p + 1.0) * inverse / (jacobian * jacobian)
 
 
-def reference_of(V: Floats, F: Ints, gathered: Floats, charts: int, power: int) -> Reference:
-    """The shapes of the triangles F [m, 3], with the areas that their vertices stand for [n], `charts` in all."""
-    count = len(gathered)
-    tiny = np.finfo(np.float64).tiny
-    areas, cotangent = _shapes(V, F, tiny)
-    lumped = np.bincount(F.ravel(), np.repeat(areas / 3, 3), count)
-    load = np.clip(gathered / np.maximum(lumped, tiny), 1.0 / _MOST_LOAD, _MOST_LOAD)
-    areas = areas * load[F].mean(axis=1)
+def reference_of(V: Floats, F: Ints, charts: int, power: int) -> Reference:
+    """The shapes of the triangles F [m, 3], their areas in units in which they add up to the number of charts."""
+    areas, cotangent = _shapes(V, F, np.finfo(np.float64).tiny)
     areas = np.maximum(areas, _LEAST_AREA * areas.mean())
     return Reference(areas * (charts / areas.sum()), cotangent, power)
 

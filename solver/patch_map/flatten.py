@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
+from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.sphere_map.vectors import dot, row, subtract
+
 from .surface import Surface
 
 # half-angle tangents; beyond them triangles are so bad that round-off would fold them
@@ -60,11 +63,28 @@ def signed_areas(places: NDArray[np.float64]) -> NDArray[np.float64]:
     return (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
 
 
-def along(V: NDArray[np.float64], path: NDArray[np.int64]) -> NDArray[np.float64]:
-    """How far along a path [l] each of its vertices lies, from 0 to 1."""
-    step = np.linalg.norm(np.diff(V[path], axis=0), axis=1)
-    step = np.maximum(step, 1e-6 * step.max() + np.finfo(np.float64).tiny)
-    return np.concatenate([[0.0], np.cumsum(step[:-1]) / step.sum(), [1.0]])
+def along(V: NDArray[np.float64], paths: list[NDArray[np.int64]]) -> NDArray[np.float64]:
+    """How far along its path each vertex lies, from 0 to 1; the paths' one behind the other."""
+    last = np.cumsum([len(each) for each in paths])
+    return _along(V, np.concatenate(paths), last)
+
+
+@kernel
+def _along(V: Floats, vertices: Ints, last: Ints) -> Floats:
+    result, first = np.zeros(len(vertices)), 0
+    for end in last:
+        longest = 0.0
+        for i in range(first + 1, end):
+            step = subtract(row(V, vertices[i]), row(V, vertices[i - 1]))
+            result[i] = np.sqrt(dot(step, step))
+            longest = max(longest, result[i])
+        for i in range(first + 1, end):
+            result[i] = max(result[i], 1e-6 * longest + 1e-300) + result[i - 1]
+        total = result[end - 1]
+        for i in range(first + 1, end):
+            result[i] /= total
+        first = end
+    return result
 
 
 def _mean_value_weights(surface: Surface) -> NDArray[np.float64]:

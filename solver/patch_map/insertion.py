@@ -1,35 +1,16 @@
-"""Bringing vertices back: each is put inside the kernel of its star, where no triangle is folded."""
+"""Putting an inner vertex where no triangle of its star is folded, and into the chart that lies there."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.kernel import Floats, kernel
 
 from .energy import Reference
 from .frames import after, inverse, turned
-from .seamless import COLUMN, FIXED, FREE, ROW, SeamlessMap, Transitions, frame_of
-from .sweep import TERMS, gather, relax_vertex, star_energy
-from .wander import follow, rehome_vertex
-
-
-@kernel
-def insert(seamless: SeamlessMap, reference: Reference, across: Transitions, merged: Ints, first: int) -> None:
-    """Place the vertices from `first` on, none of which are neighbours, beside those that they were merged with.
-
-    A vertex that finds no place leaves a fold behind.
-    """
-    largest = 0
-    for v in range(len(seamless.x)):
-        largest = max(largest, seamless.star_start[v + 1] - seamless.star_start[v])
-    star = np.empty((largest, TERMS))
-    for u in range(first, len(seamless.x)):
-        degree = gather(seamless, reference, u, star)
-        place(seamless, reference, u, merged[u], star, degree)
-        settle(seamless, across, u)
-        x, y = seamless.x[u, 0], seamless.x[u, 1]
-        relax_vertex(seamless, reference, u, star)
-        rehome_vertex(seamless, across, u, x, y)
+from .seamless import FIXED, SeamlessMap, Transitions, frame_of
+from .sweep import star_energy
+from .wander import follow
 
 
 @kernel
@@ -37,7 +18,6 @@ def place(seamless: SeamlessMap, reference: Reference, u: int, v: int, star: Flo
     """Put u, in the frame that it begins with, on a way from v, where its star's energy is least."""
     start = seamless.star_start[u]
     x = y = left_x = left_y = right_x = right_y = middle_x = middle_y = 0.0
-    end_x = end_y = 0.0
     for i in range(degree):
         f, k = seamless.star[start + i] // 3, seamless.star[start + i] % 3
         a, b = seamless.F[f, (k + 1) % 3], seamless.F[f, (k + 2) % 3]
@@ -47,11 +27,6 @@ def place(seamless: SeamlessMap, reference: Reference, u: int, v: int, star: Flo
             x, y, left_x, left_y = star[i, 0], star[i, 1], star[i, 2], star[i, 3]
         elif b == v:
             x, y, right_x, right_y = star[i, 2], star[i, 3], star[i, 0], star[i, 1]
-    if seamless.freedom[u] != FREE:
-        # on the rim: towards the other end
-        end_x, end_y = _other_end(seamless, u, v, star, degree)
-        middle_x, middle_y = end_x, end_y
-        left_x, left_y, right_x, right_y = end_x, end_y, end_x, end_y
     inward_x, inward_y = _inward(x, y, left_x, left_y, right_x, right_y)
     least, best_x, best_y = np.inf, x, y
     for way in range(2):
@@ -86,24 +61,6 @@ def _inward(x: float, y: float, lx: float, ly: float, rx: float, ry: float) -> t
 
 
 @kernel
-def _other_end(seamless: SeamlessMap, u: int, v: int, star: Floats, degree: int) -> tuple[float, float]:
-    """Place of the rim's vertex behind u, seen from v."""
-    start = seamless.star_start[u]
-    for i in range(degree):
-        f, k = seamless.star[start + i] // 3, seamless.star[start + i] % 3
-        for j in (1, 2):
-            w = seamless.F[f, (k + j) % 3]
-            count = 0
-            for m in range(degree):
-                g, n = seamless.star[start + m] // 3, seamless.star[start + m] % 3
-                count += seamless.F[g, (n + 1) % 3] == w
-                count += seamless.F[g, (n + 2) % 3] == w
-            if count == 1 and w != v:
-                return star[i, 2 * j - 2], star[i, 2 * j - 1]
-    return 0.0, 0.0
-
-
-@kernel
 def settle(seamless: SeamlessMap, across: Transitions, u: int) -> None:
     """Find the chart in which u lies, on a straight way from a neighbour, and take its frame."""
     first, last = seamless.star_start[u], seamless.star_start[u + 1]
@@ -124,9 +81,6 @@ def settle(seamless: SeamlessMap, across: Transitions, u: int) -> None:
     )
     change = after(change, (turn, sx, sy))
     seamless.chart[u], seamless.x[u, 0], seamless.x[u, 1] = chart, px, py
-    seamless.moved[u, 0], seamless.moved[u, 1], seamless.moved[u, 2] = change
-    if change[0] % 2 == 1 and seamless.freedom[u] != FREE:
-        seamless.freedom[u] = COLUMN + ROW - seamless.freedom[u]
     back = inverse(change)
     for i in range(first, last):
         f, k = seamless.star[i] // 3, seamless.star[i] % 3

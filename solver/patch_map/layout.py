@@ -10,12 +10,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from .cells import centred_cells, spread_seeds
+from .collapse import without_cuts
 from .disks import disk_cells
 from .distances import Metric
 from .quads import Quads, cut_into_quads
 from .refine import refined
-from .relax import relaxed
-from .seamless import SeamlessMap
+from .relax import relax
+from .seamless import SeamlessMap, seamless_map
 from .sizes import cell_sizes
 from .surface import Surface
 
@@ -58,7 +59,9 @@ def patch_map(V: NDArray[np.float64], F: NDArray[np.int64], cells: int = CELLS) 
     for i in np.flatnonzero(shares > _NEGLIGIBLE) if len(parts) > 1 else ():
         quads[i] = _recut(V, F, parts[i], quads[i], counts[i], wanted[i])
     whole = _joined(quads)
-    return PatchMap(whole.surface, relaxed(whole))
+    surface, seamless = without_cuts(whole.surface, seamless_map(whole), whole.cut)
+    relax(surface.V, seamless)
+    return PatchMap(surface, seamless)
 
 
 def _recut(
@@ -89,7 +92,7 @@ def _components(
     areas = Surface.of(V, F).areas
     share = np.bincount(of, areas / areas.sum()).astype(np.float64)
     # a small part has a few cells at least; where others have more, its texels are less tiny beside theirs
-    small = share[share > _NEGLIGIBLE].min()
+    small = share[share >= min(_NEGLIGIBLE, share.max())].min()
     count = np.maximum(1, np.rint(np.clip(_FEWEST / small, cells, _MOST * cells) * share)).astype(int)
     return [np.flatnonzero(of == each) for each in range(len(number))], count.tolist(), share
 
@@ -128,4 +131,5 @@ def _joined(parts: list[Quads]) -> Quads:
         np.concatenate([each.chart + first for each, first in zip(parts, charts, strict=False)]),
         np.concatenate([each.places for each in parts]),
         np.concatenate(glued),
+        np.concatenate([each.cut for each in parts]),
     )

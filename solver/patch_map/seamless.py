@@ -15,8 +15,9 @@ import numpy as np
 
 from ripple_sim.solver.kernel import Floats, Ints, kernel
 
+from .charts import CORNERS
 from .frames import Frame, turned
-from .quads import CORNERS, Quads
+from .quads import Quads
 
 FIXED, COLUMN, ROW, FREE = range(4)  # in which directions a vertex may move
 
@@ -29,7 +30,6 @@ class SeamlessMap(NamedTuple):
     chart: Ints  # [n], in which each vertex lies
     x: Floats  # [n, 2], its place there
     freedom: Ints  # [n]
-    moved: Ints  # [n, 3], change from the frame that it had at first
     turn: Ints  # [m, 3], right angles from the vertex's frame to the triangle's
     shift: Ints  # [m, 3, 2], after that
     glued: Ints  # [C, 4, 2]
@@ -52,7 +52,6 @@ def seamless_map(quads: Quads) -> SeamlessMap:
         np.zeros(count, np.int64),
         np.zeros((count, 2)),
         np.full(count, FREE),
-        np.zeros((count, 3), np.int64),
         np.zeros((len(F), 3), np.int64),
         np.zeros((len(F), 3, 2), np.int64),
         quads.glued,

@@ -8,6 +8,8 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver.kernel import Ints, kernel
+
 # Of a triangle abc: its corners, a point on each of its sides, and one inside.
 A, B, C, AB, BC, CA, MIDDLE = range(7)
 
@@ -23,35 +25,47 @@ class Edges:
     ends : int64 [e, 2]
     of : int64 [m, 3]
         Of each triangle, the edges ab, bc, ca.
-    count : int64 [e]
-        Of triangles at each: 1 at a rim, else 2.
+    sides : int64 [e, 2]
+        The two sides that lie on each edge: 3 triangle + k for side k of a triangle; -1 beyond a rim.
     """
 
     ends: NDArray[np.int64]
     of: NDArray[np.int64]
-    count: NDArray[np.int64]
+    sides: NDArray[np.int64]
 
     @property
     def rim(self) -> NDArray[np.bool_]:
         """Which edges lie at a rim, [e]."""
-        return self.count == 1
-
-    @functools.cached_property
-    def sides(self) -> NDArray[np.int64]:
-        """The two sides that lie on each edge, [e, 2]: 3 triangle + k for side k of a triangle; -1 beyond a rim."""
-        order = np.argsort(self.of.ravel(), kind="stable")
-        first = np.cumsum(self.count) - self.count
-        second = np.where(self.count == 2, order[np.minimum(first + 1, len(order) - 1)], -1)
-        return np.stack([order[first], second], axis=1)
+        return self.sides[:, 1] < 0
 
 
 def edges_of(F: NDArray[np.int64]) -> Edges:
-    """Edges of the triangles F [m, 3], which form a manifold."""
-    tail, head = F, np.roll(F, -1, axis=1)
+    """Edges of the triangles F [m, 3], which form a manifold; sorted by their lower ends, then by the higher."""
+    tail, head = F.ravel(), np.roll(F, -1, axis=1).ravel()
+    low, high = np.minimum(tail, head), np.maximum(tail, head)
     size = int(F.max()) + 1 if len(F) else 1
-    key = (np.minimum(tail, head) * size + np.maximum(tail, head)).ravel()
-    unique, of, count = np.unique(key, return_inverse=True, return_counts=True)
-    return Edges(np.stack(np.divmod(unique, size), axis=1), of.reshape(-1, 3), count)
+    order = _sorted(low, _sorted(high, np.arange(len(low)), size), size)
+    first = np.ones(len(order), bool)
+    first[1:] = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
+    of = np.empty(len(order), np.int64)
+    of[order] = np.cumsum(first) - 1
+    sides = np.full((int(first.sum()), 2), -1)
+    sides[:, 0], sides[of[order[~first]], 1] = order[first], order[~first]
+    return Edges(np.stack([low[sides[:, 0]], high[sides[:, 0]]], axis=1), of.reshape(-1, 3), sides)
+
+
+@kernel
+def _sorted(key: Ints, order: Ints, size: int) -> Ints:
+    """An order [k] sorted by a key below `size`, stable (a counting sort: a third of the layout went into others)."""
+    start, result = np.zeros(size + 1, np.int64), np.empty(len(order), np.int64)
+    for i in order:
+        start[key[i] + 1] += 1
+    for j in range(size):
+        start[j + 1] += start[j]
+    for i in order:
+        result[start[key[i]]] = i
+        start[key[i]] += 1
+    return result
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

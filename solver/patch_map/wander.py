@@ -27,8 +27,6 @@ def rehome_vertex(seamless: SeamlessMap, across: Transitions, v: int, px: float,
     chart, turn, sx, sy, x, y = follow(seamless.chart[v], px, py, qx, qy, seamless.glued, across)
     seamless.chart[v], seamless.x[v, 0], seamless.x[v, 1] = chart, x, y
     change = turn, sx, sy
-    moved = seamless.moved[v]
-    seamless.moved[v, 0], seamless.moved[v, 1], seamless.moved[v, 2] = after((moved[0], moved[1], moved[2]), change)
     if turn % 2 == 1 and seamless.freedom[v] != FREE:
         seamless.freedom[v] = COLUMN + ROW - seamless.freedom[v]
     back = inverse(change)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ripple_sim.solver.errors import AtlasError
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 from ripple_sim.solver.patch_map.frames import turned
 from ripple_sim.solver.patch_map.seamless import FIXED, SeamlessMap, Transitions, corner_place, transitions
 from ripple_sim.solver.patch_map.wander import follow
 
 _ROUND_OFF = 1e-7  # barycentric coordinates of a texel outside of all triangles may be so far below 0
+_REACH = 2  # of triangles, in charts beyond that in which they begin
 
 
 def locate_texels(seamless: SeamlessMap, n: int) -> tuple[Ints, Floats]:
@@ -21,13 +22,24 @@ def locate_texels(seamless: SeamlessMap, n: int) -> tuple[Ints, Floats]:
     AtlasError
         If a texel lies in no triangle, which a map without a fold rules out.
     """
-    charts = len(seamless.glued)
-    triangles, barycentrics = np.full((charts, n, n), -1), np.zeros((charts, n, n, 3))
-    best = np.full((charts, n, n), -np.inf)
-    _draw(seamless, transitions(seamless.glued), n, triangles, barycentrics, best)
-    missed = int((best < -_ROUND_OFF).sum())
+    triangles, barycentrics = locate_in_charts(seamless, n, np.arange(len(seamless.glued)))
+    missed = int((triangles < 0).sum())
     if missed:
         raise AtlasError(f"{missed} texels lie in no triangle of the map onto the charts")
+    return triangles, barycentrics
+
+
+def locate_in_charts(seamless: SeamlessMap, n: int, charts: Ints) -> tuple[Ints, Floats]:
+    """The same in some charts [k] alone; -1 where a triangle may be missed that reaches far over other charts."""
+    number = np.full(len(seamless.glued), -1)
+    number[charts] = np.arange(len(charts))
+    near, beside = number >= 0, seamless.glued[..., 0]
+    for _ in range(_REACH):
+        near |= (near[beside] & (beside >= 0)).any(axis=1)
+    triangles, barycentrics = np.full((len(charts), n, n), -1), np.zeros((len(charts), n, n, 3))
+    best = np.full((len(charts), n, n), -np.inf)
+    _draw(seamless, transitions(seamless.glued), n, number, near, triangles, barycentrics, best)
+    triangles[best < -_ROUND_OFF] = -1
     return triangles, barycentrics
 
 
@@ -52,14 +64,23 @@ def anchor(seamless: SeamlessMap, f: int) -> int:
 
 @kernel
 def _draw(
-    seamless: SeamlessMap, across: Transitions, n: int, triangles: Ints, barycentrics: Floats, best: Floats
+    seamless: SeamlessMap,
+    across: Transitions,
+    n: int,
+    number: Ints,
+    near: Bools,
+    triangles: Ints,
+    barycentrics: Floats,
+    best: Floats,
 ) -> None:
     p = np.empty((3, 2))
     slack = 1e-9
     for f in range(len(seamless.F)):
         k = anchor(seamless, f)
-        corners_in_frame_of(seamless, f, k, p)
         home = seamless.chart[seamless.F[f, k]]
+        if not near[home]:
+            continue
+        corners_in_frame_of(seamless, f, k, p)
         ux, uy, vx, vy = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[2, 0] - p[0, 0], p[2, 1] - p[0, 1]
         area = ux * vy - uy * vx
         first = int(np.ceil((min(p[0, 1], p[1, 1], p[2, 1]) - slack) * n - 0.5))
@@ -75,9 +96,9 @@ def _draw(
                 least = min(s, t, 1 - s - t)
                 if least < -1e-6:
                     continue
-                chart, _, _, _, u, v = follow(home, p[k, 0], p[k, 1], x, y, seamless.glued, across)
-                row, column = int(np.floor(v * n)), int(np.floor(u * n))
-                if not (0 <= row < n and 0 <= column < n) or least <= best[chart, row, column]:
+                found, _, _, _, u, v = follow(home, p[k, 0], p[k, 1], x, y, seamless.glued, across)
+                chart, row, column = number[found], int(np.floor(v * n)), int(np.floor(u * n))
+                if chart < 0 or not (0 <= row < n and 0 <= column < n) or least <= best[chart, row, column]:
                     continue
                 best[chart, row, column] = least
                 triangles[chart, row, column] = f

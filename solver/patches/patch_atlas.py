@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,10 +15,12 @@ from ripple_sim.solver.texels.atlas import Atlas
 from ripple_sim.solver.texels.glue import glue
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
-from .located import locate_texels
 from .patch_chart_map import PatchChartMap
 from .pieces import chart_pieces
 from .rims import positions_beyond
+from .samples import Sampler
+from .untangled import untangled
+from .warp import warped
 
 _LEAST_TEXELS = 4  # along a chart's side
 
@@ -32,33 +36,39 @@ def patch_atlas(mesh: Mesh, resolution: int) -> Atlas:
     AtlasError
         If the mesh cannot be laid out.
     """
-    cells = int(np.clip(6 * resolution**2 / _TEXELS_OF_CELL, _LEAST_CELLS, CELLS))
-    return atlas_from_patch_map(mesh, patch_map(mesh.V, mesh.F, cells), resolution)
+    start = time.perf_counter()
+    patches = patch_map(mesh.V, mesh.F, cells_for(resolution))
+    mapped = time.perf_counter()
+    atlas = atlas_from_patch_map(mesh, patches, resolution)
+    atlas.timings.update(patch_map=mapped - start, texels=time.perf_counter() - mapped)
+    return atlas
+
+
+def cells_for(resolution: int) -> int:
+    """How many cells a mesh is cut into."""
+    return int(np.clip(6 * resolution**2 / _TEXELS_OF_CELL, _LEAST_CELLS, CELLS))
 
 
 def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atlas:
     """Put texels on a mesh that is laid out on charts."""
-    surface, glued = patches.surface, patches.seamless.glued
+    glued = patches.seamless.glued
     n = max(round(resolution * np.sqrt(6 / len(glued))), _LEAST_TEXELS)
-    small, weights = locate_texels(patches.seamless, n)
-    positions = np.einsum("...k,...kj->...j", weights, surface.V[surface.F[small]])
-    triangles = surface.parent[small]
-    barycentrics = np.einsum("...k,...kj->...j", weights, surface.inside[small])
-    normals = np.einsum("...k,...kj->...j", barycentrics, mesh.vertex_normals[mesh.F[triangles]])
-    length = np.linalg.norm(normals, axis=-1, keepdims=True)
-    normals = np.where(
-        length > 1e-9, normals / np.maximum(length, 1e-9), mesh.vertex_normals[mesh.F[triangles][..., 0]]
-    )
+    sampler = Sampler(mesh, patches)
+    samples = sampler.everywhere(n)
     topology = glue(glued, n)
-    beyond = positions_beyond(patches, topology, positions)
-    spanned = TexelMesh.of(topology, positions, normals=normals, beyond=beyond)
-    areas = levelled_areas(topology, spanned.areas, _map_ratios(patches)[small] / n**2)
+    beyond = positions_beyond(patches, topology, samples.positions)
+    samples, offsets = untangled(sampler, topology, samples, beyond)
+    pieces = chart_pieces(patches)
+    if offsets.any():
+        pieces, beyond = warped(pieces, offsets), positions_beyond(patches, topology, samples.positions)
+    spanned = TexelMesh.of(topology, samples.positions, normals=samples.normals, beyond=beyond)
+    areas = levelled_areas(topology, spanned.areas, _map_ratios(patches)[samples.small] / n**2)
     return Atlas(
         mesh=mesh,
-        texels=TexelMesh(topology, positions, normals, areas, beyond),
-        chart_map=PatchChartMap(chart_pieces(patches)),
-        triangles=triangles,
-        barycentrics=barycentrics,
+        texels=TexelMesh(topology, samples.positions, samples.normals, areas, beyond),
+        chart_map=PatchChartMap(pieces),
+        triangles=samples.triangles,
+        barycentrics=samples.barycentrics,
     )
 
 

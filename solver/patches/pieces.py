@@ -15,8 +15,8 @@ from ripple_sim.solver.patch_map.wander import follow
 
 from .located import anchor, corners_in_frame_of
 
-_LEAST = 1e-12  # area on a chart below which a piece is left out
-_MOST_CORNERS = 12
+LEAST = 1e-12  # area on a chart below which a piece is left out
+MOST_CORNERS = 12
 
 
 class Pieces(NamedTuple):
@@ -59,7 +59,7 @@ def _cut(seamless: SeamlessMap, across: Transitions, origin: Ints, weights: Floa
     """Fill in the pieces as far as there is room, and return how many there are."""
     count, room = 0, len(origin)
     p = np.empty((3, 2))
-    whole, column, square = np.empty((_MOST_CORNERS, 5)), np.empty((_MOST_CORNERS, 5)), np.empty((_MOST_CORNERS, 5))
+    whole, column, square = np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5)), np.empty((MOST_CORNERS, 5))
     for f in range(len(seamless.F)):
         k = anchor(seamless, f)
         corners_in_frame_of(seamless, f, k, p)
@@ -74,7 +74,7 @@ def _cut(seamless: SeamlessMap, across: Transitions, origin: Ints, weights: Floa
             width = _between(whole, 3, 0, float(i), column)
             for j in range(low, high):
                 corners = _between(column, width, 1, float(j), square)
-                if corners < 3 or _area(square, corners) < _LEAST:
+                if corners < 3 or area(square, corners) < LEAST:
                     continue
                 x, y = square[:corners, 0].mean(), square[:corners, 1].mean()
                 target, turn, sx, sy, _, _ = follow(home, p[k, 0], p[k, 1], x, y, seamless.glued, across)
@@ -100,7 +100,7 @@ def _squares(x: Floats) -> tuple[int, int]:
 @kernel
 def _between(corners: Floats, count: int, axis: int, low: float, result: Floats) -> int:
     """Cut a convex polygon at low and at low + 1 along an axis (Sutherland and Hodgman 1974); return its corners."""
-    middle = np.empty((_MOST_CORNERS, 5))
+    middle = np.empty((MOST_CORNERS, 5))
     count = _half(corners, count, axis, low, 1.0, middle)
     return _half(middle, count, axis, low + 1.0, -1.0, result)
 
@@ -124,9 +124,10 @@ def _half(corners: Floats, count: int, axis: int, border: float, sign: float, re
 
 
 @kernel
-def _area(corners: Floats, count: int) -> float:
-    area = 0.0
+def area(corners: Floats, count: int) -> float:
+    """Area of a polygon whose first two columns are its places on a chart."""
+    total = 0.0
     for i in range(count):
         j = (i + 1) % count
-        area += 0.5 * (corners[i, 0] * corners[j, 1] - corners[i, 1] * corners[j, 0])
-    return area
+        total += 0.5 * (corners[i, 0] * corners[j, 1] - corners[i, 1] * corners[j, 0])
+    return total

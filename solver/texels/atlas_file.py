@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.atomic_file import atomic_write
+from ripple_sim.solver.atomic_file import atomic_write, final_path
 from ripple_sim.solver.errors import AtlasError
 
 from .array_file import read_arrays, write_arrays
 
 # Raise it when a layout's map or the file's contents change: older files are rebuilt.
-FORMAT = 10
+FORMAT = 12
 ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
 
 _NEEDED = {"V", "F", "kind", "format", "glued", "positions", "normals", "areas", "triangles", "barycentrics"}
@@ -44,8 +44,12 @@ def check_atlas_place(path: Path, overwrite: bool) -> None:
     Raises
     ------
     AtlasError
-        If another file is there, unless it is empty or `overwrite` says that it is to go.
+        If there can be no such name, or another file is there, unless it is empty or `overwrite` says that it is to go.
     """
+    try:
+        final_path(path)
+    except OSError as error:
+        raise AtlasError(f"atlas file {str(path)!r} cannot be written: {error.strerror}; name another file") from error
     if overwrite or not path.is_file() or path.stat().st_size == 0:
         return
     try:
@@ -68,10 +72,10 @@ def read_atlas_file(path: Path) -> dict[str, NDArray]:
     AtlasError
         If the file is missing, truncated, changed, or not an atlas of this version.
     """
-    if not path.is_file():
-        problem = "is not a file" if path.exists() else "does not exist"
-        raise AtlasError(f"atlas file {str(path)!r} {problem}; make one with `ripple-sim atlas MESH -o FILE`")
     try:
+        if not path.is_file():
+            problem = "is not a file" if path.exists() else "does not exist"
+            raise AtlasError(f"atlas file {str(path)!r} {problem}; make one with `ripple-sim atlas MESH -o FILE`")
         arrays = read_arrays(path)
     except (OSError, ValueError) as error:
         raise AtlasError(f"atlas file {str(path)!r} is damaged or not an atlas ({error}); {ADVICE}") from error

@@ -98,7 +98,7 @@ def _add_up(cells: Cells, charts: slice, rows: slice) -> _Sums:
     exists = (np.minimum(np.minimum(halo[0], halo[1]), np.minimum(halo[2], halo[3]))) >= 0
     at_rim = rim[0] | rim[1] | rim[2] | rim[3]
     *sides, rising, falling, whole = quad(*x)
-    conductance = _conductance(k, s)
+    conductance = conductances(k, s)
     inner = exists & ~at_rim
     south, north, west, east = sides
     weights = [conductance * weight for weight in (north, south, east, west, rising, falling)]
@@ -121,7 +121,7 @@ def _add_up(cells: Cells, charts: slice, rows: slice) -> _Sums:
     return sums
 
 
-def _conductance(k: list[Floats], s: list[Floats]) -> Floats:
+def conductances(k: list[Floats], s: list[Floats]) -> Floats:
     """Harmonic mean of the coefficients at the corners of cells, 0 where one is, softened by the least factor."""
     product, resistance, softest = k[0], 1 / k[0], s[0]
     for other, factor in zip(k[1:], s[1:], strict=True):
@@ -141,7 +141,7 @@ def _add_triangles(sums: _Sums, cells: Cells, charts: slice, rows: slice) -> Non
         c0, c1 = (1, 0) if c == 0 else (c, c + 1)
         places = [(charts.start + chart, row, column) for row, column in ((r0, c0), (r0, c1), (r1, c0))]
         _, vertical, horizontal, whole = triangle(*(cells.positions[place].T for place in places))
-        conductance = _conductance([cells.coefficient[p] for p in places], [cells.softening[p] for p in places])
+        conductance = conductances([cells.coefficient[p] for p in places], [cells.softening[p] for p in places])
         place = chart, np.full_like(chart, r - rows.start), np.full_like(chart, c)
         sums.other_corners.append((_CORNERS.index((r0 - r, c0 - c)), place, whole / 3))
         sums.other_links.append((_EAST if c == 0 else _WEST, place, conductance * vertical))

@@ -18,18 +18,18 @@ from numpy.typing import NDArray
 
 # Stiffness of a square against the hourglass. At 1 waves lag along its sides as much as they lead along its diagonals,
 # 1/2 makes the 5-point stencil, 1/3 an isotropic one, 1/4 allows the longest time step.
-_HOURGLASS = 0.4
+HOURGLASS = 0.4
 
 # Elongated quads take up to this share of the hourglass stiffness that would begin to shorten their own time step.
-_SHARE = 0.75
+SHARE = 0.75
 
 # A quad whose diagonals have their middles further apart than the root of this, in units of the diagonals, counts as
 # uneven. In an even one what linear functions have of the hourglass is of second order, and makes up for some of the
 # waves' lag: on the sphere N = 64 is a third more exact with it.
-_UNEVEN = 1e-3
+UNEVEN = 1e-3
 
 # A cell folded to a line would ask for an infinitely short time step: least area, in units of a square's as large.
-_LEAST_AREA = 0.02
+LEAST_AREA = 0.02
 
 Numbers: TypeAlias = Any  # a float, or an array of them
 Points: TypeAlias = Any  # coordinates [3] of a point, or [3, ...] of many
@@ -46,7 +46,7 @@ def quad(sw: Points, se: Points, nw: Points, ne: Points) -> tuple[Numbers, ...]:
     """
     p, q = _between(sw, ne), _between(se, nw)
     pp, qq, pq, cross = _dot(p, p), _dot(q, q), _dot(p, q), _cross_length(p, q)
-    twice = _or_one(2 * np.maximum(cross, _LEAST_AREA / 2 * (pp + qq)))
+    twice = _or_one(2 * np.maximum(cross, LEAST_AREA / 2 * (pp + qq)))
     hourglass = np.where(pp + qq == 0, 0.0, _hourglass(_or_one(pp), _or_one(qq), pq, twice / 4))
     a, b = _unevenness(p, q, _between(_between(sw, se), _between(nw, ne)), twice / 2)
     return (
@@ -56,7 +56,7 @@ def quad(sw: Points, se: Points, nw: Points, ne: Points) -> tuple[Numbers, ...]:
         hourglass * (1 - a) * (1 - b) - pq / twice,
         qq / twice - hourglass * (1 - a * a),
         pp / twice - hourglass * (1 - b * b),
-        _quad_area(sw, se, nw, ne),
+        quad_area(sw, se, nw, ne),
     )
 
 
@@ -67,7 +67,7 @@ def _unevenness(p: Points, q: Points, way: Points, cross: Numbers) -> tuple[Numb
     """
     pp, qq, pq, along_p, along_q = _dot(p, p), _dot(q, q), _dot(p, q), _dot(way, p), _dot(way, q)
     a, b = (along_p * qq - along_q * pq) / cross**2, (along_q * pp - along_p * pq) / cross**2
-    share = (a * a + b * b) / (a * a + b * b + _UNEVEN)
+    share = (a * a + b * b) / (a * a + b * b + UNEVEN)
     return np.clip(share * a, -1.0, 1.0), np.clip(share * b, -1.0, 1.0)
 
 
@@ -76,7 +76,7 @@ def triangle(a: Points, b: Points, c: Points) -> tuple[Numbers, Numbers, Numbers
     ab, ac, bc = _between(a, b), _between(a, c), _between(b, c)
     double_area = _cross_length(ab, ac)
     longest = np.maximum(np.maximum(_dot(ab, ab), _dot(ac, ac)), _dot(bc, bc))
-    twice = _or_one(2 * np.maximum(double_area, _LEAST_AREA * longest))
+    twice = _or_one(2 * np.maximum(double_area, LEAST_AREA * longest))
     return _dot(ab, ac) / twice, -_dot(ab, bc) / twice, _dot(ac, bc) / twice, double_area / 2
 
 
@@ -89,45 +89,55 @@ def strip(a: Points, b: Points, beside_a: Points, beside_b: Points) -> Numbers:
     rim, link = _between(beside_a, beside_b), _between(a, b)
     squared = _dot(rim, rim)
     along = _dot(rim, link) ** 2 / _or_one(squared)
-    least = _LEAST_AREA * np.maximum(squared, _dot(link, link))
-    weight = _quad_area(a, b, beside_a, beside_b) / _or_one(np.maximum(along, least))
+    least = LEAST_AREA * np.maximum(squared, _dot(link, link))
+    weight = quad_area(a, b, beside_a, beside_b) / _or_one(np.maximum(along, least))
     return np.where(squared == 0, 0.0, weight)
 
 
 def polygon(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Link weights [k, k] (0 on the diagonal) and the corners' shares of the area [k] of a polygon [k, 3] in space.
+    """Link weights [..., k, k] (0 on the diagonal) and the corners' shares of the area [..., k] of polygons in space.
 
-    A virtual node in the middle cuts it into triangles; it is an affine combination of the corners, so that linear
-    functions stay exact, and is eliminated (Bunge, Herholz, Kazhdan and Botsch 2020).
+    A virtual node in the middle cuts each into triangles; it is an affine combination of the corners [..., k, 3], so
+    that linear functions stay exact, and is eliminated (Bunge, Herholz, Kazhdan and Botsch 2020).
     """
-    count = len(corners)
-    following = np.roll(np.arange(count), -1)
+    count = corners.shape[-2]
     shares = _virtual_node(corners)
-    middle = shares @ corners
-    weights, areas = np.zeros((count + 1, count + 1)), np.zeros(count + 1)
-    for i, j in enumerate(following):
-        to_j, to_middle, to_i, area = triangle(corners[i], corners[j], middle)
+    points = [np.moveaxis(corners[..., i, :], -1, 0) for i in range(count)]
+    middle = np.moveaxis((shares[..., None, :] @ corners)[..., 0, :], -1, 0)
+    weights = np.zeros((*corners.shape[:-2], count + 1, count + 1))
+    areas = np.zeros((*corners.shape[:-2], count + 1))
+    for i in range(count):
+        j = (i + 1) % count
+        to_j, to_middle, to_i, area = triangle(points[i], points[j], middle)
         for a, b, weight in ((j, count, to_j), (count, i, to_middle), (i, j, to_i)):
-            weights[a, b] += weight
-            weights[b, a] += weight
-        for corner in (i, int(j), count):
-            areas[corner] += area / 3
-    prolong = np.concatenate([np.eye(count), shares[None]])
-    stiffness = prolong.T @ (np.diag(weights.sum(axis=1)) - weights) @ prolong
-    links = -stiffness
-    np.fill_diagonal(links, 0.0)
-    return links, areas[:count] + shares * areas[count]
+            weights[..., a, b] += weight
+            weights[..., b, a] += weight
+        for corner in (i, j, count):
+            areas[..., corner] += area / 3
+    prolong = np.concatenate([np.broadcast_to(np.eye(count), (*shares.shape, count)), shares[..., None, :]], axis=-2)
+    diagonal = weights.sum(axis=-1)[..., None] * np.eye(count + 1)
+    links = -np.swapaxes(prolong, -1, -2) @ (diagonal - weights) @ prolong
+    links[..., np.arange(count), np.arange(count)] = 0.0
+    return links, areas[..., :count] + shares * areas[..., count:]
 
 
 def _virtual_node(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weights [k], of sum 1, of the point whose triangles with the polygon's sides have the least squared areas."""
-    sides = np.roll(corners, -1, axis=0) - corners
+    """Weights [..., k], of sum 1, of the point whose triangles with a polygon's sides have the least squared areas."""
+    sides = np.roll(corners, -1, axis=-2) - corners
     # |x - c| x side, squared: x' A x - 2 b' x, with A = sum of |s|^2 1 - s s'
-    projectors = np.einsum("ij,ij->i", sides, sides)[:, None, None] * np.eye(3) - sides[:, :, None] * sides[:, None, :]
-    best = np.linalg.lstsq(projectors.sum(axis=0), np.einsum("ijk,ik->j", projectors, corners), rcond=None)[0]
-    system = np.concatenate([(corners - corners.mean(axis=0)).T, np.ones((1, len(corners)))])
-    weights = np.linalg.lstsq(system, np.append(best - corners.mean(axis=0), 1.0), rcond=None)[0]
-    return weights / weights.sum()
+    squared = (sides**2).sum(axis=-1)[..., None, None]
+    projectors = squared * np.eye(3) - sides[..., :, None] * sides[..., None, :]
+    best = _least_squares(projectors.sum(axis=-3), np.einsum("...ijk,...ik->...j", projectors, corners))
+    mean = corners.mean(axis=-2)
+    ones = np.ones((*corners.shape[:-2], 1, corners.shape[-2]))
+    system = np.concatenate([np.swapaxes(corners - mean[..., None, :], -1, -2), ones], axis=-2)
+    weights = _least_squares(system, np.concatenate([best - mean, ones[..., 0, :1]], axis=-1))
+    return weights / weights.sum(axis=-1, keepdims=True)
+
+
+def _least_squares(system: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The shortest x with the least |system x - right|, also of many."""
+    return (np.linalg.pinv(system, rcond=max(system.shape[-2:]) * np.finfo(np.float64).eps) @ right[..., None])[..., 0]
 
 
 def _or_one(x: Numbers) -> Numbers:
@@ -151,7 +161,7 @@ def _between(a: Points, b: Points) -> Points:
     return (b[0] - a[0], b[1] - a[1], b[2] - a[2])
 
 
-def _quad_area(sw: Points, se: Points, nw: Points, ne: Points) -> Numbers:
+def quad_area(sw: Points, se: Points, nw: Points, ne: Points) -> Numbers:
     """Area of a quad that need not be flat: that of its smaller triangulation.
 
     The flat area p x q / 2 misses what a fold holds, the other triangulation spans it twice.
@@ -174,4 +184,4 @@ def _hourglass(pp: Numbers, qq: Numbers, pq: Numbers, area: Numbers) -> Numbers:
     a, d = (both_sides + np.abs(pq)) / 2, (pp - qq) / 4
     in_time = both_sides * area / (2 * (area * area + 3 * d * d))
     free = (a * a - d * d) / (4 * a * area)
-    return np.minimum(in_time, np.maximum(_SHARE * free, _HOURGLASS * 2 * area / both_sides))
+    return np.minimum(in_time, np.maximum(SHARE * free, HOURGLASS * 2 * area / both_sides))

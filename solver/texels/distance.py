@@ -58,17 +58,19 @@ def _distance_scratch(size: int, thread: int) -> NDArray[np.float64]:
 
 
 @kernel
-def _through(p: Floats, q: Floats, s: Floats, dp: float, dq: float) -> float:
+def _through(positions: Floats, p: int, q: int, s: int, dp: float, dq: float) -> float:
     """Distance at s of a point source that is dp from p and dq from q, unfolded into the plane of the triangle.
 
     Infinite if the straight way does not cross the edge pq (Novotni and Klein 2002).
     """
-    length2 = (q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2 + (q[2] - p[2]) ** 2
+    length2 = ps2 = along = 0.0
+    for k in range(3):
+        pq, ps = positions[q, k] - positions[p, k], positions[s, k] - positions[p, k]
+        length2, ps2, along = length2 + pq * pq, ps2 + ps * ps, along + ps * pq
     length = np.sqrt(length2)
     if length == 0:
         return np.inf
-    along = ((s[0] - p[0]) * (q[0] - p[0]) + (s[1] - p[1]) * (q[1] - p[1]) + (s[2] - p[2]) * (q[2] - p[2])) / length
-    ps2 = (s[0] - p[0]) ** 2 + (s[1] - p[1]) ** 2 + (s[2] - p[2]) ** 2
+    along /= length
     above = np.sqrt(max(ps2 - along * along, 0.0))
     source_along = (dp * dp - dq * dq + length2) / (2 * length)
     below2 = dp * dp - source_along * source_along
@@ -117,19 +119,14 @@ def march(halo: Ints, positions: Floats, seeds: Ints, limit: float, distance: Fl
             a = around[k]
             if a < 0 or done[a]:
                 continue
-            dx, dy, dz = (
-                positions[a, 0] - positions[t, 0],
-                positions[a, 1] - positions[t, 1],
-                positions[a, 2] - positions[t, 2],
-            )
-            best = d + np.sqrt(dx * dx + dy * dy + dz * dz)
+            best = d + distance_to(positions, a, positions[t])
             # triangles (t, b, a): b one step round the texel, or two where a is straight ahead (the other diagonal)
             for turn in (-2, -1, 1, 2):
                 if (turn == 2 or turn == -2) and k % 2 == 1:
                     continue
                 b = around[(k + turn) % 8]
                 if b >= 0 and distance[b] < np.inf:
-                    best = min(best, _through(positions[t], positions[b], positions[a], d, distance[b]))
+                    best = min(best, _through(positions, t, b, a, d, distance[b]))
             if best < distance[a]:
                 if distance[a] == np.inf:
                     touched.append(a)
@@ -156,9 +153,25 @@ def march_from_point(
             # beyond a rim the halo shows the texel beside it once more
             if t >= 0 and scratch[t] == np.inf:
                 seeds[count] = t
-                scratch[t] = np.sqrt(((positions[t] - point) ** 2).sum())
+                scratch[t] = distance_to(positions, t, point)
                 count += 1
     texels, touched = march(halo, positions, seeds[:count], limit, scratch)
-    distance = scratch[texels]
-    scratch[touched] = np.inf
-    return texels, distance
+    return texels, taken(scratch, texels, touched)
+
+
+@kernel
+def taken(scratch: Floats, texels: Ints, touched: Ints) -> Floats:
+    """The scratch's distances at some texels; it is then infinite again wherever it was touched."""
+    distance = np.empty(len(texels))
+    for i in range(len(texels)):
+        distance[i] = scratch[texels[i]]
+    for i in range(len(touched)):
+        scratch[touched[i]] = np.inf
+    return distance
+
+
+@kernel
+def distance_to(positions: Floats, t: int, point: Floats) -> float:
+    """Straight distance of texel t from a point [m]."""
+    x, y, z = positions[t, 0] - point[0], positions[t, 1] - point[1], positions[t, 2] - point[2]
+    return np.sqrt(x * x + y * y + z * z)

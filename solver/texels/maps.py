@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from PIL import Image
 
 from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.image_file import read_image
 
 from .atlas import Atlas
 
@@ -86,13 +86,7 @@ def _interpolate(atlas: Atlas, corners: NDArray[np.float64]) -> NDArray[np.float
 def _pixels(image: str | Path | ArrayLike) -> NDArray[np.float64]:
     """Values from 0 to 1, [height, width, channels]."""
     if isinstance(image, str | Path):
-        try:
-            with Image.open(image) as file:
-                # the numbers of a palette are not brightness
-                plain = file if file.mode in ("L", "LA", "RGB", "RGBA") or file.mode[0] == "I" else None
-                pixels = np.asarray(plain if plain is not None else file.convert("RGBA"))
-        except (OSError, ValueError) as error:
-            raise SolverError(f"image {str(image)!r} cannot be read: {error}") from error
+        pixels = read_image(SolverError, image, "image", _brightness)
         largest = 255.0 if pixels.dtype == np.uint8 else 65535.0
         pixels = pixels / largest
     else:
@@ -102,6 +96,11 @@ def _pixels(image: str | Path | ArrayLike) -> NDArray[np.float64]:
     if pixels.ndim != 3 or 0 in pixels.shape or pixels.shape[2] > 4:
         raise SolverError(f"image has shape {pixels.shape}; valid is [height, width] with up to 4 channels")
     return pixels
+
+
+def _brightness(mode: str) -> str:
+    """The numbers of a palette are not brightness."""
+    return mode if mode in ("L", "LA", "RGB", "RGBA") or mode[0] == "I" else "RGBA"
 
 
 def _channel(pixels: NDArray[np.float64], channel: str) -> NDArray[np.float64]:

@@ -8,12 +8,9 @@ from ripple_sim.solver.mesh.mesh import Mesh
 
 from .links import EAST, NORTH, link_lengths
 from .softening import softening
-from .spectrum import largest_eigenvalue
+from .spectrum import EVEN_RATE, largest_eigenvalue
 from .stiffness import lumped_areas
 from .texel_mesh import TexelMesh
-
-# Largest eigenvalue of an even grid's stencil times its spacing squared: that of the chessboard pattern.
-_EVEN_RATE = 6.4
 
 
 def texel_quality(texels: TexelMesh, mesh: Mesh) -> dict[str, float]:
@@ -48,4 +45,4 @@ def _timestep(texels: TexelMesh, area: float) -> float:
     stencil = texels.stencil(np.ones(texels.shape), softening(texels))
     bound = float((2 * stencil.absolute_sums() / texels.areas).max())
     rate = largest_eigenvalue(stencil, texels.areas, np.ones(texels.shape, bool), bound)
-    return float(np.sqrt(_EVEN_RATE * texels.topology.texel_count / area / rate)) if rate > 0 else np.inf
+    return float(np.sqrt(EVEN_RATE * texels.topology.texel_count / area / rate)) if rate > 0 else np.inf

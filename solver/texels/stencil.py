@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver.kernel import Floats, kernel
 
 from .irregular import IrregularLinks, gather_links
+from .links import ties_to_rim
 from .topology import TexelTopology
 
 
@@ -45,11 +46,16 @@ class Stencil:
         return result
 
     def absolute_sums(self) -> NDArray[np.float64]:
-        """Sum of |w| over the links that meet in each texel, [C, n, n]."""
-        sums = np.zeros(self.topology.shape)
-        n, magnitudes = sums.shape[1], np.abs(self.weights)
-        for link, i, j, _, _ in _SIDES + _DIAGONALS:
-            sums += magnitudes[:, link, 1 + i : 1 + i + n, 1 + j : 1 + j + n]
+        """Sum of |w| over the links that meet in each texel, half of |w| for those to a fixed rim, [C, n, n].
+
+        Twice that is Gershgorin's bound: the other end of a link to a rim does not move.
+        """
+        sums, weights = np.empty(self.topology.shape), self.weights
+        if self.topology.fixed_rim:
+            weights = weights.copy()
+            for link in range(4):
+                weights[:, link][ties_to_rim(self.topology, link)] /= 2
+        _add_magnitudes(weights, sums)
         if self.irregular is not None:
             sums.reshape(-1)[self.irregular.texels] += np.add.reduceat(
                 np.abs(self.irregular.weights), self.irregular.begins[:-1]
@@ -60,6 +66,20 @@ class Stencil:
 # link, the place from which it starts relative to the texel, and its other end
 _SIDES = ((0, 0, 0, 0, 1), (0, 0, -1, 0, -1), (1, 0, 0, 1, 0), (1, -1, 0, -1, 0))
 _DIAGONALS = ((2, 0, 0, 1, 1), (2, -1, -1, -1, -1), (3, -1, 0, -1, 1), (3, 0, -1, 1, -1))
+
+
+@kernel
+def _add_magnitudes(w: Floats, sums: Floats) -> None:
+    """Sum of |weight| over the stencil."""
+    n = sums.shape[1]
+    for chart in range(len(sums)):
+        for r in range(1, n + 1):
+            for c in range(1, n + 1):
+                total = 0.0
+                for links in (_SIDES, _DIAGONALS):
+                    for link, i, j, _, _ in links:
+                        total += abs(w[chart, link, r + i, c + j])
+                sums[chart, r - 1, c - 1] = total
 
 
 @kernel

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from ripple_sim.solver.checked import Valid, checked, instance
 from ripple_sim.solver.errors import AtlasError, RippleWarning
 from ripple_sim.solver.mesh.mesh import Mesh
 from ripple_sim.solver.mesh.volume import Volume
@@ -21,7 +23,28 @@ from .smoothing import smoothed
 _LEAST = 1e-4
 
 
-def thickness_map(atlas: Atlas, inside: Mesh | Volume | Sequence[Mesh | Volume]) -> NDArray[np.float64]:
+def _are_bodies(value: object) -> bool:
+    return isinstance(value, Mesh | Volume) or (
+        isinstance(value, Sequence) and all(isinstance(each, Mesh | Volume) for each in value)
+    )
+
+
+def _are_limits(value: Any) -> bool:
+    try:
+        least, greatest = value
+        return bool(0 <= least <= greatest)
+    except (TypeError, ValueError):
+        return False
+
+
+_BODIES = Valid(_are_bodies, "a Mesh, a Volume, or several of them")
+_LIMITS = Valid(_are_limits, "a least and a greatest thickness [m], 0 or greater")
+
+
+@checked(AtlasError, atlas=instance(Atlas, ", as `build_atlas` makes it"), inside=_BODIES, limits=_LIMITS)
+def thickness_map(
+    atlas: Atlas, inside: Mesh | Volume | Sequence[Mesh | Volume], limits: tuple[float, float] = (0.0, np.inf)
+) -> NDArray[np.float64]:
     """Way from each texel along the inward normal to what lies inside [m], [C, n, n], smoothed over a few texels.
 
     Parameters
@@ -30,17 +53,19 @@ def thickness_map(atlas: Atlas, inside: Mesh | Volume | Sequence[Mesh | Volume])
         Of the outer surface.
     inside : Mesh, Volume, or several
         In the frame of the atlas.
+    limits : (float, float)
+        Least and greatest thickness [m]: beyond them it counts as these.
 
     Warns
     -----
     RippleWarning
-        Where rays miss what lies inside: they get the greatest thickness of the others. Where it comes out through the
-        surface: the layer is as thin there as it can be.
+        Where rays miss what lies inside and there is no greatest limit: they get the greatest thickness of the others.
+        Where it comes out through the surface and there is no least limit: the layer is as thin there as it can be.
 
     Raises
     ------
     AtlasError
-        If no ray meets what lies inside.
+        If no ray meets what lies inside, or an argument is invalid.
     MeshError
         For an invalid volume.
     """
@@ -55,13 +80,14 @@ def thickness_map(atlas: Atlas, inside: Mesh | Volume | Sequence[Mesh | Volume])
             "what lies inside is met by no ray from the surface inwards; valid is a body within it, in the same frame "
             f"and in metres: the surface goes from {points.min(axis=0).round(4)} to {points.max(axis=0).round(4)}"
         )
-    if out.any():
+    if out.any() and limits[0] == 0:
         _warn(f"what lies inside comes out of the surface at {out.mean():.1%} of the texels: no layer is left")
-    if not met.all():
+    way = np.clip(way, max(limits[0], _LEAST * size), limits[1])
+    if np.isinf(way).any():
         greatest = float(way[met].max())
         _warn(f"{1 - met.mean():.1%} of the texels have nothing below them; they get the greatest: {greatest:.3g} m")
         way = np.where(met, way, greatest)
-    return smoothed(atlas.texels.topology, np.maximum(way, _LEAST * size).reshape(atlas.areas.shape))
+    return smoothed(atlas.texels.topology, way.reshape(atlas.areas.shape))
 
 
 def _triangles(body: Mesh | Volume) -> NDArray[np.float64]:

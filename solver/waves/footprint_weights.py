@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ripple_sim.solver.kernel import Floats, Ints, kernel
-from ripple_sim.solver.texels.distance import march_from_point
+from ripple_sim.solver.texels.distance import distance_to, march_from_point, taken
 from ripple_sim.solver.texels.texel_mesh import TexelGrid
 
 # Fewer texels across than this and the source would excite waves that the grid cannot resolve.
@@ -31,7 +31,9 @@ def weigh(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: F
             texels[kept], weights[kept] = texels[i], weight
             total += weight * grid.areas[texels[i]]
             kept += 1
-    return texels[:kept], weights[:kept] / total, radius
+    for i in range(kept):
+        weights[i] /= total
+    return texels[:kept], weights[:kept], radius
 
 
 @kernel
@@ -44,7 +46,7 @@ def _spacing(grid: TexelGrid, center: int) -> float:
     for down, right in ((0, 1), (1, 0), (1, 2), (2, 1)):
         t = halo[chart, row + down, column + right]
         if t >= 0:
-            greatest = max(greatest, _distance(positions[t], positions[center]))
+            greatest = max(greatest, distance_to(positions, t, positions[center]))
     return greatest
 
 
@@ -61,7 +63,7 @@ def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, scratch:
     texels = np.empty(room, np.int64)
     count, done, flat = 1, 0, True
     texels[0] = center
-    scratch[center] = _distance(positions[center], point)
+    scratch[center] = distance_to(positions, center, point)
     while done < count and flat:
         t = texels[done]
         done += 1
@@ -82,13 +84,11 @@ def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, scratch:
             for j in range(3):
                 a = halo[chart, row + i, column + j]
                 if a >= 0 and scratch[a] == np.inf:
-                    scratch[a] = _distance(positions[a], point)
+                    scratch[a] = distance_to(positions, a, point)
                     texels[count] = a
                     count += 1
     texels = texels[:count]
-    distance = scratch[texels]
-    scratch[texels] = np.inf
-    return texels, distance, flat
+    return texels, taken(scratch, texels, texels), flat
 
 
 @kernel
@@ -96,16 +96,9 @@ def _blended(grid: TexelGrid, center: int, point: Floats, radius: float, scratch
     """Texels within a little more than the radius along the surface, and the distances that count."""
     texels, distance = march_from_point(grid.halo, grid.positions, center, point, 1.1 * radius, scratch)
     for i in range(len(texels)):
-        straight = _distance(grid.positions[texels[i]], point)
+        straight = distance_to(grid.positions, texels[i], point)
         if straight > 0:
             bend = min(max((distance[i] / straight - _FLAT) / (_BENT - _FLAT), 0.0), 1.0)
             bend = bend * bend * (3 - 2 * bend)
             distance[i] = (1 - bend) * straight + bend * distance[i]
     return texels, distance
-
-
-@kernel
-def _distance(a: Floats, b: Floats) -> float:
-    """Straight distance of two points [m]."""
-    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    return np.sqrt(x * x + y * y + z * z)

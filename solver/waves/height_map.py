@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from typing import overload
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver.backends.device_field import DeviceField
+from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.gl import GLContext
 from ripple_sim.solver.kernel import Floats32, kernel
+from ripple_sim.solver.memory import require_memory
 from ripple_sim.solver.texels.atlas import Atlas
 from ripple_sim.solver.texels.halo import fill_halo
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 from ripple_sim.solver.texels.topology import TexelTopology
 
+from .device_height_map import DeviceHeightMap, HeightMapShaders
 from .displacement_limit import DisplacementLimit
 
 # Weight of the second-order terms' regularisation, relative to the squared distances that they multiply.
 _REGULARISATION = 1e-4
+
+# Memory for each texel that is kept [bytes], and texels whose weights are fitted at a time: that takes 1,400 each.
+_TEXEL, _BLOCK = 110, 16_384
 
 
 class HeightMap:
@@ -33,20 +43,29 @@ class HeightMap:
     def __init__(self, texels: TexelMesh, limit: DisplacementLimit | None = None) -> None:
         self._topology = texels.topology
         self._limit = limit
-        self._weights = _gradient_weights(texels).astype(np.float32)
+        count = texels.positions[..., 0].size
+        require_memory(SolverError, _TEXEL * count, f"the height map of {count:,} texels", "take a lower resolution")
+        self._weights = _gradient_weights(texels)
+        self._shaders: HeightMapShaders | None = None
 
     @classmethod
     def drawn(cls, atlas: Atlas, limit: bool = True) -> HeightMap:
         """Height map for drawing the surface of an atlas: with its `DisplacementLimit`, unless that is turned off."""
         return cls(atlas.texels, DisplacementLimit(atlas) if limit else None)
 
-    def __call__(self, height: NDArray[np.float32]) -> NDArray[np.float32]:
+    @overload
+    def __call__(self, height: NDArray[np.float32]) -> NDArray[np.float32]: ...
+
+    @overload
+    def __call__(self, height: DeviceField) -> DeviceHeightMap: ...
+
+    def __call__(self, height: NDArray[np.float32] | DeviceField) -> NDArray[np.float32] | DeviceHeightMap:
         """Height map of a height field.
 
         Parameters
         ----------
         height : float32 [C, n, n]
-            [m].
+            [m]. Or one that is on the GPU: then so is the height map, made where it is drawn.
 
         Returns
         -------
@@ -55,19 +74,35 @@ class HeightMap:
             [m]. For the halo see `fill_halo`; beyond a fixed rim lie the negative heights, so that those drawn come
             to 0 at the rim.
         """
+        if isinstance(height, DeviceField):
+            return DeviceHeightMap(self._shaders_on(height.gl), height, self)
         around = np.zeros(self._topology.halo.shape, np.float32)
         around[:, 1:-1, 1:-1] = height if self._limit is None else self._limit(height)
         fill_halo(self._topology, around)
         height_map = np.zeros((*around.shape, 4), np.float32)
         _differentiate(self._weights, around, height_map)
         fill_halo(self._topology, height_map)
-        if self._topology.fixed_rim:
-            _mirror_at_rim(self._topology, height_map)
+        mirror_at_rim(self._topology, height_map)
         return height_map
 
+    def rates(self, height: NDArray[np.float32], velocity: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Rate of the heights in the height map [m/s], [C, n + 2, n + 2], under a height and a velocity [C, n, n]."""
+        rates = np.zeros((*self._topology.halo.shape, 4), np.float32)
+        rates[:, 1:-1, 1:-1, 3] = velocity if self._limit is None else self._limit.rate(height, velocity)
+        fill_halo(self._topology, rates)
+        mirror_at_rim(self._topology, rates)
+        return rates[..., 3]
 
-def _mirror_at_rim(topology: TexelTopology, height_map: NDArray[np.float32]) -> None:
-    """Fill in what lies beyond a fixed rim: the texels' mirror image, with heights turned over."""
+    def _shaders_on(self, gl: GLContext) -> HeightMapShaders:
+        if self._shaders is None:
+            self._shaders = HeightMapShaders(gl, self._topology, self._weights, self._limit)
+        return self._shaders
+
+
+def mirror_at_rim(topology: TexelTopology, height_map: NDArray[np.float32]) -> None:
+    """Fill in what lies beyond a fixed rim, if there is one: the texels' mirror image, with heights turned over."""
+    if not topology.fixed_rim:
+        return
     turned = np.array([1, 1, 1, -1], np.float32)
     height_map[topology.rim] = height_map[:, 1:-1, 1:-1].reshape(-1, 4)[topology.halo[topology.rim]] * turned
     last = height_map.shape[1] - 1
@@ -83,21 +118,29 @@ def _mirror_at_rim(topology: TexelTopology, height_map: NDArray[np.float32]) -> 
 _AROUND = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 
 
-def _gradient_weights(texels: TexelMesh) -> NDArray[np.float64]:
+def _gradient_weights(texels: TexelMesh) -> NDArray[np.float32]:
     """Vectors g with gradient = sum over the 8 neighbours of g (h_j - h_i), shape [C n^2, 8, 3] in [1/m]."""
-    n = texels.resolution
     around = texels.halo_positions.copy()
     if not texels.topology.fixed_rim:
         # beyond a free rim the halo repeats heights: nothing is known there; a fixed one's own points are at 0
         around[texels.topology.rim] = np.nan
-    center = texels.positions.reshape(-1, 3)
-    normal = texels.normals.reshape(-1, 3)
+    normals = texels.normals.reshape(-1, 3)
+    weights = np.empty((len(normals), 8, 3), np.float32)
+    for first in range(0, len(normals), _BLOCK):
+        block = np.arange(first, min(first + _BLOCK, len(normals)))
+        weights[block] = _fit(around, block, normals[block])
+    return weights
+
+
+def _fit(around: NDArray[np.float64], texels: NDArray[np.int64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same vectors of some texels [k], from all positions with halo and the texels' normals: [k, 8, 3]."""
+    n = around.shape[1] - 2
+    f, r, c = np.unravel_index(texels, (len(around), n, n))
+    center = around[f, r + 1, c + 1]
     tangent = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     bitangent = np.cross(normal, tangent)
-    offset = np.stack(
-        [around[:, 1 + r : n + 1 + r, 1 + c : n + 1 + c].reshape(-1, 3) - center for r, c in _AROUND], axis=1
-    )
+    offset = np.stack([around[f, r + 1 + down, c + 1 + right] - center for down, right in _AROUND], axis=1)
     exists = np.isfinite(offset[..., :1])
     offset = np.where(exists, offset, 0.0)
     scale = np.sqrt((offset**2).sum(axis=(1, 2)) / exists.sum(axis=(1, 2)))[:, None]

@@ -52,7 +52,7 @@ class HeldLoad:
         """Hold a load beside what is held."""
         self._held = Load.together([self._held, load]).merged(self._size)
 
-    def upload(self, extra: Load | None, counterpart: Counterpart) -> None:
+    def upload(self, extra: Load | None, counterpart: Counterpart) -> float | None:
         """Hand the backend the load of the coming step, with `extra` for that step alone, unless it has it already.
 
         Parameters
@@ -62,6 +62,11 @@ class HeldLoad:
             From texels and the forces on them, outwards [N], to the acceleration that balances them; see
             `VolumeBalance.counterpart`.
 
+        Returns
+        -------
+        float or None
+            Sum of a new load's forces [N], positive inwards.
+
         Raises
         ------
         SolverError
@@ -69,11 +74,12 @@ class HeldLoad:
         """
         load = self._held if extra is None else Load.together([self._held, extra])
         if load is self._uploaded or not (len(load.texels) or len(self._uploaded.texels)):
-            return
+            return None
         once = load.merged(self._size)
         forces = -once.forces * self._share[once.texels]
-        total = float(forces.sum())
+        total = -float(forces.sum())
         if not np.isfinite(total):
-            raise SolverError(f"the forces of a load add up to {-total!r} N; valid are finite numbers")
+            raise SolverError(f"the forces of a load add up to {total!r} N; valid are finite numbers")
         self._backend.load(once.texels, forces, counterpart(once.texels, forces))
         self._uploaded = load
+        return total

@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 from exposed_scene import FPS, SPEED, THROW
 
+from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import Snapshot, snapshots
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import HeightMap
+from ripple_sim.solver.backends.device_field import DeviceField
+from ripple_sim.solver.gl import GLContext
 
 POKE = '[[poke]]\ngeom = "egg"\ntime = 0.01\npoint = [0.0, 0.0, 0.05]\nimpulse = 1e-4\nradius = 0.02\n'
 HITTING = '<body name="shot" pos="0 0 0.1005"><freejoint/><geom size="0.05" mass="0.1"/></body>'
@@ -93,3 +96,21 @@ def test_no_frames_take_no_step(make_scene) -> None:
     assert not list(snapshots(simulation, 0))
     assert len(list(snapshots(simulation, 1))) == 1
     assert simulation.data.time == 0
+
+
+def test_on_a_gpu_heights_stay_there_and_the_frames_are_the_same(make_scene, monkeypatch) -> None:
+    """The software driver taken for hardware; with motion blur, so that heights are interpolated there too."""
+    scene = make_scene(script=THROW + POKE, shutter=180.0, exposures=3)
+    frames, digests = [], []
+    for software in (True, False):
+        monkeypatch.setattr(GLContext, "software", software)
+        simulation = Simulation(scene, fps=FPS, backend="gl")
+        source = FrameSource(simulation, width=64, height=48)
+        states = list(snapshots(simulation, 3, alive=9))
+        assert isinstance(states[-1].heights["egg"], np.ndarray if software else DeviceField)
+        digests.append([state.digest() for state in states if state.exposure == 0])
+        rendered = (source.render(state) for state in states)
+        frames.append(np.array([frame for frame in rendered if frame is not None], int))
+    assert digests[0] == digests[1]
+    assert len(set(digests[0])) == 3
+    assert np.abs(frames[0] - frames[1]).max() <= 1

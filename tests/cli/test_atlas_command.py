@@ -147,3 +147,17 @@ def test_a_layout_that_does_not_exist_is_refused(capsys, tmp_path):
 def test_a_wrong_method_is_refused(animal):
     with pytest.raises(AtlasError, match="'progressive', 'conformal'"):
         build_atlas(animal.mesh, 8, method="mercator")
+
+
+def test_the_thickness_over_what_is_inside_is_told_and_drawn(tmp_path, capsys, ball_file):
+    core, plot = tmp_path / "core.off", tmp_path / "thickness.png"
+    trimesh.creation.icosphere(subdivisions=3, radius=1.5).export(core)
+    argv = ["atlas", str(ball_file), "--resolution", "8", "--inside", str(core), "--plot", str(plot)]
+    assert cli.main([*argv, "--json"]) == 0
+    thickness = json.loads(capsys.readouterr().out)["thickness"]
+    assert thickness["least"] <= thickness["median"] <= thickness["greatest"]
+    assert thickness["median"] == pytest.approx(0.5, rel=0.08)  # over a ball of radius 2 with flat sides
+    pixels = np.asarray(Image.open(plot).convert("RGB"))
+    assert pixels[200:900, 200:800].std() > 20
+    assert refusal(capsys, *argv, "--threshold", "3").count("takes no threshold") == 1
+    assert "--inside" in refusal(capsys, "atlas", str(ball_file), "--threshold", "3")

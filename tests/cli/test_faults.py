@@ -1,11 +1,15 @@
-"""Closed and full standard streams, no home, no cache: the right status, no traceback, nothing in the wrong place."""
+"""A full disk, closed and full standard streams, no home, no cache: the right status, nothing in the wrong place."""
 
+import errno
 import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import BinaryIO
 
 import pytest
+
+from ripple_sim.cli import main as cli
 
 MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 
@@ -48,3 +52,19 @@ def test_without_streams_home_and_cache_an_atlas_is_whole(tmp_path: Path) -> Non
     assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
     assert load_atlas(tmp_path / "mesh.npz").resolution == 4
     assert sorted(each.name for each in tmp_path.iterdir()) == ["mesh.npz", "mesh.obj"]
+
+
+def test_a_full_disk_is_no_bad_input(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from ripple_sim.solver.texels import atlas_file
+
+    def full(file: BinaryIO, *_: object) -> None:
+        file.write(b"half")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(atlas_file, "write_arrays", full)
+    (tmp_path / "mesh.obj").write_text(MESH)
+    assert cli.main(["atlas", str(tmp_path / "mesh.obj"), "--resolution", "4", "-o", str(tmp_path / "a.npz")]) == 1
+    assert capsys.readouterr().err.endswith("a.npz' cannot be written: No space left on device\n")
+    assert [each.name for each in tmp_path.iterdir()] == ["mesh.obj"]

@@ -6,12 +6,13 @@ import re
 import signal
 import subprocess
 import sys
+import warnings
 
 import pytest
 
 from ripple_sim.cli import info_command
 from ripple_sim.cli import main as cli
-from ripple_sim.errors import EncodingError, SceneError
+from ripple_sim.errors import EncodingError, RippleWarning, SceneError
 from ripple_sim.solver.errors import GLError
 
 
@@ -54,7 +55,7 @@ def test_help_is_given(capsys, command):
 @pytest.mark.parametrize(
     ("argv", "named"),
     [
-        ([], "render, drop, atlas, info"),
+        ([], "render, drop, export, batch, atlas, info"),
         (["fly"], "fly"),
         (["render", "duck"], "--output"),
         (["render", "-o", "x.mp4"], "SCENE"),
@@ -232,6 +233,17 @@ def test_an_interrupted_command_says_what_is_left(monkeypatch, capsys):
     monkeypatch.setattr(info_command.Info, "run", run)
     assert cli.main(["info"]) == 130
     assert capsys.readouterr().err == "ripple-sim: interrupted; 48 frames are kept\n"
+
+
+def test_a_warning_is_one_line_and_the_handler_is_given_back(monkeypatch, capsys):
+    def run(self):
+        warnings.warn("the hull is\noff the surface", RippleWarning, stacklevel=1)
+
+    before = warnings.showwarning
+    monkeypatch.setattr(info_command.Info, "run", run)
+    assert cli.main(["info"]) == 0
+    assert capsys.readouterr().err == "ripple-sim: warning: the hull is off the surface\n"
+    assert warnings.showwarning is before
 
 
 def test_help_loads_nothing_heavy():

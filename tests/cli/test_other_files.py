@@ -1,5 +1,6 @@
 """Nothing that was not made here is replaced or deleted without `--overwrite`, and links are written through."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ from PIL import Image
 from ripple_sim.cli import main as cli
 from ripple_sim.encode import FrameWriter, check_output, open_writer
 from ripple_sim.encode.mark import made_here
-from ripple_sim.errors import EncodingError, VideoError
-from ripple_sim.solver import AtlasError, load_atlas, sphere_atlas
+from ripple_sim.errors import EncodingError, ExportError, VideoError
+from ripple_sim.export.endings import check_export
+from ripple_sim.figures.plot_page import check_plot_path
+from ripple_sim.solver import AtlasError, RippleError, load_atlas, sphere_atlas
 from ripple_sim.solver.texels.atlas_file import check_atlas_place
 
 SIZE = {"width": 32, "height": 16, "fps": 25}
@@ -164,3 +167,33 @@ def test_an_atlas_replaces_an_older_one_and_goes_through_links(tmp_path: Path) -
         check_atlas_place(tmp_path / "mine.npz", overwrite=False)
     sphere_atlas(resolution=4).save(tmp_path / "mine.npz", overwrite=True)
     assert load_atlas(tmp_path / "mine.npz").resolution == 4
+
+
+@pytest.mark.parametrize("kind", ["circle", "long"])
+@pytest.mark.parametrize(
+    ("ending", "check"),
+    [
+        (".mp4", lambda path: check_output(path, 32, 16, 25)),
+        ("", lambda path: check_output(path, 32, 16, 25)),
+        (".csv", lambda path: check_export(path, False)),
+        (".usda", lambda path: check_export(path, False)),
+        (".npz", lambda path: check_atlas_place(path, False)),
+        (".png", lambda path: check_plot_path(path, False)),
+    ],
+)
+def test_names_that_cannot_be_are_bad_input_before_work_begins(
+    tmp_path: Path, ending: str, check: Callable[[Path], None], kind: str
+) -> None:
+    path = tmp_path / (f"circle{ending}" if kind == "circle" else (250 - len(ending)) * "a" + ending)
+    if kind == "circle":
+        path.symlink_to(path.name)
+    with pytest.raises(RippleError, match=r"File name too long|Too many levels of symbolic links") as refusal:
+        check(path)
+    assert isinstance(refusal.value, VideoError | ExportError | AtlasError)
+
+
+def test_a_file_where_the_part_folder_would_be_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "clip.mp4.part").write_bytes(b"precious")
+    with pytest.raises(VideoError, match=r"clip\.mp4\.part beside it is no folder; move it away"):
+        write(tmp_path / "clip.mp4", overwrite=True)
+    assert tree(tmp_path) == {"clip.mp4.part": b"precious"}

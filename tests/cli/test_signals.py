@@ -71,6 +71,20 @@ def test_before_a_command_and_during_imports_the_process_ends_with_one_line(
     assert (result.stdout, result.stderr) == ("", f"ripple-sim: {line}\n")
 
 
+@pytest.mark.parametrize(("number", "line"), [(signal.SIGTERM, "terminated"), (signal.SIGHUP, "hung up")])
+def test_the_rule_holds_from_the_first_import_on(number: int, line: str) -> None:
+    program = (
+        "import signal, sys\n"
+        "class Meanwhile:\n"
+        "    def find_spec(self, name, *rest):\n"
+        f"        name == 'ripple_sim.cli.main' and signal.raise_signal({int(number)})\n"
+        "sys.meta_path.insert(0, Meanwhile())\n"
+        "sys.argv = ['ripple-sim', 'info']\nimport ripple_sim.__main__\n"
+    )
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout, result.stderr) == (128 + number, "", f"ripple-sim: {line}\n")
+
+
 def within(file: str, number: int) -> list[str]:
     """Send a signal while a function of a file is running; return what had happened when the exception came."""
     happened: list[str] = []
@@ -92,6 +106,7 @@ def test_no_exception_is_raised_within_a_call_of_moderngls_but_soon_after(number
 
     assert within(moderngl.__file__, number) == ["call ended"]
     assert within(open_writer.__code__.co_filename, number) == ["call ended"]
+    assert within("/lib/pyvista/plotting/render_window_interactor.py", number) == ["call ended"]  # VTK calls back
     assert within("elsewhere.py", number) == []
 
 

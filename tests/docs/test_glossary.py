@@ -65,12 +65,15 @@ ALLOWED = [
     ("solver/sphere_map/", "ahead", "a trial step of the descent"),
     ("solver/sphere_map/", "folded", "a triangle that the map turns over"),
     ("solver/patch_map/", "folded", "a triangle that the map turns over"),
+    ("solver/patches/", "folded", "a texel whose neighbours turn over"),
     ("solver/texels/quality.py", "folded", "a texel whose neighbours turn over"),
     ("solver/mesh/", "folded", "a polygon that turns over"),
     ("solver/", "piece", "part of a triangle, cut at the edges of the cube"),
     ("solver/", "pieces", "parts of a triangle"),
     ("ripple_sim/cli/", "shell", "bash, zsh, fish"),
     ("ripple_sim/coupling/colliders/", "shell", "MuJoCo's name for the inertia of a hollow mesh"),
+    ("ripple_sim/scene/drop_model", "shell", "likewise"),
+    ("ripple_sim/coupling/model/", "shell", "MuJoCo's name for the outside of a soft flex"),
     (
         "ripple_sim/render/",
         "shell",
@@ -107,11 +110,10 @@ def retired_names(root: Path) -> list[str]:
             if path.suffix not in (".py", ".glsl"):
                 continue
             place = path.relative_to(root).as_posix()
-            for name in names(path):
-                for word, instead in RETIRED.items():
-                    kept = any(place.startswith(start) and word == each for start, each, _ in ALLOWED)
-                    if f"_{word}_" in words(name) and not kept:
-                        found.add(f"{place}: {name} (say {instead})")
+            for name in set(names(path)):
+                for word in re.findall("(?<=_)(?:" + "|".join(RETIRED) + ")(?=_)", words(name)):
+                    if not any(place.startswith(start) and word == each for start, each, _ in ALLOWED):
+                        found.add(f"{place}: {name} (say {RETIRED[word]})")
     return sorted(found)
 
 

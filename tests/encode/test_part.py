@@ -17,7 +17,7 @@ from unfinished_videos import contents
 
 from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.encode.formats import FRAMES_IN_CLIP
-from ripple_sim.errors import EncodingError, SimulationError, VideoError
+from ripple_sim.errors import SimulationError, VideoError
 
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
 FRAMES, SIZE, FPS = 2 * FRAMES_IN_CLIP + 10, (64, 48), 25
@@ -71,14 +71,16 @@ def test_killed_again_and_again_videos_become_the_same_bytes(tmp_path):
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     begun = time.perf_counter()
     assert start(whole).wait() == 0
-    length = time.perf_counter() - begun
+    longest = (time.perf_counter() - begun) / 6
     chance = random.Random(6)
     kills = 0
     for _ in range(20):
         process = start(broken)
-        time.sleep(chance.uniform(0, length / 6))
+        time.sleep(chance.uniform(0, longest))
         process.send_signal(signal.SIGKILL)
-        kills += process.wait() == -signal.SIGKILL
+        killed = process.wait() == -signal.SIGKILL
+        kills += killed
+        longest /= 1 if killed else 2  # it was done: the machine had more to do in the first run
         for clip in broken.glob("*.part/frames/[!.]*"):  # what is left plays
             if clip.suffix in (".mp4", ".webm", ".mkv"):
                 with av.open(str(clip)) as container:
@@ -199,9 +201,3 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_broken(tmp_path, ending):
     assert "Traceback" not in result.stderr
     left = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert all(path.name in ("settings.json", "states.txt") or path.name.startswith("frame") for path in left)
-
-
-def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
-    (tmp_path / "clip.mp4.part").write_text("in the way")
-    with pytest.raises(EncodingError, match=r"cannot write the video .*clip\.mp4: "):
-        write(tmp_path / "clip.mp4", 0, FRAMES)

@@ -2,6 +2,8 @@
 
 import importlib.util
 import json
+import os
+import subprocess
 import sys
 import types
 from pathlib import Path
@@ -35,7 +37,7 @@ def run(name: str, monkeypatch, folder: Path, *arguments: str) -> None:
         ("own_deformation", []),
         ("gymnasium_ant", []),
         ("gymnasium_humanoid", []),
-        ("random_batch", ["--scenes", "2", "--seconds", "0.8"]),
+        ("batch_impulses", ["--scenes", "2", "--seconds", "0.8", "--workers", "1"]),
     ],
 )
 def test_an_example_makes_its_picture(name, arguments, monkeypatch, tmp_path, capsys):
@@ -45,6 +47,19 @@ def test_an_example_makes_its_picture(name, arguments, monkeypatch, tmp_path, ca
     assert f"out/{name}.png" in capsys.readouterr().out
     with Image.open(tmp_path / "out" / f"{name}.png") as picture:
         assert np.asarray(picture.convert("L")).std() > 10
+
+
+def test_a_skin_shows_the_ripples_to_mujocos_own_renderer(tmp_path):
+    # in a process of its own: that renderer takes the OpenGL context away
+    command = [sys.executable, str(EXAMPLES / "passive_viewer.py"), "--picture"]
+    subprocess.run(command, cwd=tmp_path, env={**os.environ, "MUJOCO_GL": "egl"}, check=True, capture_output=True)
+    before, _, after = np.split(np.asarray(Image.open(tmp_path / "out" / "passive_viewer.png")).astype(int), 3, axis=1)
+    crown = slice(110, 150), slice(200, 250)  # beside the shadow of the ball
+
+    def bend(frame):
+        return np.minimum(np.abs(np.diff(frame[crown].sum(axis=2), 2, axis=0)), 40).mean()
+
+    assert bend(after) > 1.5 * bend(before)  # crests and troughs on what was smooth
 
 
 def test_the_mesh_that_any_mesh_writes_is_displaced(monkeypatch, tmp_path):

@@ -78,9 +78,10 @@ class Still:
     def __init__(self) -> None:
         self.atlas = sphere_atlas(0.5, 8)
         self.turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-        waves = SimpleNamespace(atlas=self.atlas, height=np.zeros((6, 8, 8)))
+        waves = SimpleNamespace(atlas=self.atlas, height=np.zeros((6, 8, 8)), vertices=None)
         self.ripples = type("Named", (dict,), {"geom_ids": {"ball": 0}})(ball=waves)
-        self.data = SimpleNamespace(geom_xpos=np.array([[1.0, 2.0, 3.0]]), geom_xmat=self.turn.reshape(1, 9))
+        pose = {"geom_xpos": np.array([[1.0, 2.0, 3.0]]), "geom_xmat": self.turn.reshape(1, 9)}
+        self.data = SimpleNamespace(model=SimpleNamespace(ngeom=1), **pose)
         self.impulses: list[Impulse] = []
 
     def touch(self, impulse: float, texel: tuple[int, int, int] = (0, 4, 4), other: str = "stone") -> Impulse:

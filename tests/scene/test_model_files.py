@@ -68,6 +68,26 @@ def test_a_keyframe_of_another_size_is_refused(tmp_path: Path) -> None:
     assert load_scene(scene(tmp_path, BALL + key.format("0 0 2 1 0 0 0"))).model.nkey == 1
 
 
+def test_a_keyframe_that_is_not_finite_is_refused(tmp_path: Path) -> None:
+    key = '<keyframe><key/><key qvel="0 0 nan 0 0 0"/></keyframe>'
+    with (
+        pytest.warns(RippleWarning, match="NaN"),
+        pytest.raises(SceneError, match=r"keyframe 1 of .* holds NaN or inf; valid are finite numbers"),
+    ):
+        load_scene(scene(tmp_path, BALL + key))
+
+
+def test_more_memory_than_there_is_names_the_setting(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r'allocate memory; name in the MJCF how much .* <size memory="4G"/>'):
+        load_scene(scene(tmp_path, f'<size memory="100000000G"/>{BALL}'))
+
+
+def test_a_scene_file_that_is_a_fifo_is_named_as_what_it_is(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "scene.toml")
+    with pytest.raises(SceneError, match=r"scene\.toml' is not a regular file"):
+        load_scene(tmp_path / "scene.toml")
+
+
 def test_what_mujoco_warns_of_is_our_warning_and_litters_no_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -81,3 +101,11 @@ def test_what_mujoco_warns_of_is_our_warning_and_litters_no_folder(
             load_scene(path)
     assert sorted(each.name for each in tmp_path.iterdir()) == ["model.xml", "scene.toml"]
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("reference", ["&#0;", "&#x00;"])
+def test_names_with_a_nul_are_refused_rather_than_cut(tmp_path: Path, reference: str) -> None:
+    model = tmp_path / "model.xml"
+    model.write_text(f'<mujoco><worldbody>\n<geom name="e{reference}gg" size="1"/></worldbody></mujoco>')
+    with pytest.raises(SceneError, match=r"model\.xml.* line 2, .*NUL"):
+        check_files(model)

@@ -11,14 +11,17 @@ from ripple_sim.simulation import Simulation
 
 NAMES = [
     "animal",
+    "arm",
     "drum",
     "duck",
     "finger",
     "heavy",
+    "jelly",
     "kick",
     "pair",
     "pretzel",
     "rolling",
+    "skull",
     "sphere",
     "teapot",
     "terrain",

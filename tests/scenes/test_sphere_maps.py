@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.model.geoms import TARGET_TYPES, find_geom
+from ripple_sim.coupling.model.geoms import TARGET_TYPES, find_geom, find_target
+from ripple_sim.coupling.model.soft_ids import is_soft
 from ripple_sim.coupling.model.target_mesh import target_atlas, target_mesh
 from ripple_sim.scene.load_scene import load_scene, shipped_scenes
 from ripple_sim.scenes.sphere_maps import FOLDER, shipped_sphere_map, sphere_map_path
@@ -15,12 +16,14 @@ from ripple_sim.solver.sphere_map import certify
 
 @pytest.fixture(scope="module")
 def meshes() -> list[Mesh]:
-    """The targets of the shipped scenes that are closed, one part and of genus 0, and no spheres."""
+    """The geoms among the shipped scenes' targets that are closed, one part and of genus 0, and no spheres."""
     found = []
     for name in shipped_scenes():
         scene = load_scene(name)
         for target in scene.targets:
-            geom = find_geom(scene.model, target.geom)
+            geom = find_target(scene.model, target.geom)
+            if is_soft(scene.model, geom):
+                continue
             mesh = target_mesh(scene.model, geom)
             if mesh.closed and mesh.genus.tolist() == [0] and TARGET_TYPES[scene.model.geom_type[geom]] != "sphere":
                 found.append(mesh)

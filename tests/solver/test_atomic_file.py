@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from ripple_sim.solver.atomic_file import atomic_write
+from ripple_sim.solver.atomic_file import OF_THE_NAME, atomic_write, final_path
 
 
 def names(folder: Path) -> list[str]:
@@ -72,3 +72,21 @@ def test_nothing_written_is_an_error_and_no_empty_file(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError), atomic_write(tmp_path / "a.bin"):
         pass
     assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("kind", ["circle", "long"])
+def test_a_name_that_cannot_be_written_is_refused_before_anything_is(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / (250 * "a" if kind == "long" else "circle")
+    if kind == "circle":
+        path.symlink_to("other")
+        (tmp_path / "other").symlink_to("circle")
+    with pytest.raises(OSError, match=r"too long|symbolic links") as refusal:
+        final_path(path)
+    assert refusal.value.errno in OF_THE_NAME
+    with pytest.raises(OSError, match=r"too long|symbolic links"), atomic_write(path):
+        pytest.fail("nothing may be written")
+
+
+def test_a_link_to_what_is_not_there_yet_is_followed(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to("folder/new")
+    assert final_path(tmp_path / "link") == tmp_path.resolve() / "folder" / "new"

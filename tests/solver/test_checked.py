@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 from ripple_sim import Ripples, load_scene
-from ripple_sim.solver import Material, RippleError, WaveSolver, build_atlas, load_atlas, load_mesh, sphere_atlas
+from ripple_sim.solver import (
+    Material,
+    RippleError,
+    WaveSolver,
+    build_atlas,
+    load_atlas,
+    load_mesh,
+    sphere_atlas,
+    thickness_map,
+)
 from ripple_sim.solver.checked import PATH, POSITIVE, Valid, checked, instance, shown, whole
 
 HUGE = 10**400  # no float holds it
@@ -20,6 +29,13 @@ MODEL = mujoco.MjModel.from_xml_string(
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "speed too large": (lambda: Material(speed=HUGE), "material speed is 1000.*valid is a number"),
+    "waves of nothing": (lambda: Material(wavelengths=None), "wavelengths is None m; valid are two numbers"),
+    "longest first": (lambda: Material(wavelengths=(2, 1)), r"wavelengths is \(2, 1\) m; valid are two numbers"),
+    "poisson of text": (lambda: Material.plate(poisson="a"), "poisson is 'a'; valid is a number from 0 to 0.5"),
+    "preset of a list": (lambda: Material.preset([]), r"preset \[\] does not exist; valid are gelatine-3, "),
+    "nothing inside": (lambda: thickness_map(ATLAS, None), "inside is None; valid is a Mesh, a Volume, or several"),
+    "inside nothing": (lambda: thickness_map(None, ATLAS.mesh), "atlas is None; valid is an Atlas"),
+    "limits of text": (lambda: thickness_map(ATLAS, ATLAS.mesh, "ab"), "limits is 'ab'; valid is a least and"),
     "tension of text": (lambda: Material.membrane(tension="a"), "tension is 'a' N/m; valid is a finite number"),
     "huge density": (lambda: Material.membrane(density=HUGE), "density is 1000.*valid is a finite number"),
     "size of text": (lambda: Material.suited("a", 1.0), "size is 'a' m; valid is"),
@@ -35,6 +51,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "path with NUL": (lambda: load_mesh("a\0b"), r"path is 'a\\x00b'; valid is a path"),
     "atlas from nothing": (lambda: load_atlas(None), "path is None; valid is a path"),
     "long name": (lambda: load_mesh("a" * 5000), "cannot be read: File name too long"),
+    "long atlas": (lambda: load_atlas("a" * 5000), "atlas file 'aaa.*File name too long"),
     "long scene": (lambda: load_scene("a" * 5000), "there is no scene 'aaa"),
     "no mesh": (lambda: build_atlas(None), "mesh is None; valid is a Mesh"),
     "radius of text": (lambda: sphere_atlas(radius="a"), "radius is 'a'; valid is a finite number greater than 0"),

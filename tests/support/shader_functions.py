@@ -1,6 +1,7 @@
 """Functions of the renderer's shaders, called with many inputs."""
 
 import importlib
+import itertools
 import shutil
 import sys
 import tempfile
@@ -30,6 +31,7 @@ void main()
 }}
 """
 _folder = tempfile.TemporaryDirectory(prefix="ripple-sim-shaders-")
+_numbers = itertools.count()
 _cleanup = weakref.finalize(_folder, _folder.cleanup)
 
 
@@ -42,8 +44,9 @@ def _source(include: str, expression: str, defines: dict[str, object]) -> str:
         sys.path.append(_folder.name)
         importlib.invalidate_caches()
     text = _FRAGMENT.format(include=f'#include "{include}"', expression=expression)
-    (package / "under_test.glsl").write_text(text)
-    return load_shader(_PACKAGE, "under_test", **{**DEFINES, **defines})
+    name = f"under_test_{next(_numbers)}"  # sources are read once
+    (package / f"{name}.glsl").write_text(text)
+    return load_shader(_PACKAGE, name, **{**DEFINES, **defines})
 
 
 def evaluated(gl: GLContext, include: str, expression: str, inputs: np.ndarray, **defines: object) -> np.ndarray:

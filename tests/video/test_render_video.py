@@ -4,14 +4,18 @@ import json
 import re
 import subprocess
 import sys
+import threading
 
+import numpy as np
 import pytest
+from PIL import Image
 from unfinished_videos import MJCF, contents
 
 from ripple_sim.encode.formats import FRAMES_IN_CLIP
 from ripple_sim.errors import VideoError
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.scene import Scene
+from ripple_sim.solver.gl import GLContext
 from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import render_video
 
@@ -99,3 +103,25 @@ def test_a_lost_context_is_one_line_and_the_frames_stay(scene, tmp_path, ahead):
         r"ripple-sim: the OpenGL context .* is lost; .* frames are kept in .*; --resume carries on", lines[0]
     )
     assert render_video(scene, tmp_path / "frames", VideoOptions(resume=True, **OPTIONS, backend="cpu")).resumed_at > 8
+
+
+def test_waves_on_a_gpu_run_beside_the_drawing_and_the_video_is_the_same(scene, tmp_path, monkeypatch):
+    """The software driver taken for hardware: two threads share its context, and two frames are on their way."""
+    threads = set()
+    for hardware in (False, True):
+        monkeypatch.setattr(GLContext, "software", not hardware)
+        seen = set()
+        render_video(
+            scene,
+            tmp_path / f"{hardware}" / "frames",
+            VideoOptions(**{**OPTIONS, "duration": 0.2}, backend="gl"),
+            on_step=lambda simulation, seen=seen: seen.add(threading.current_thread().name),
+        )
+        threads.add((hardware, *seen))
+    assert threads == {(False, "MainThread"), (True, "simulation")}
+    host, device = (
+        [np.asarray(Image.open(path), int) for path in sorted((tmp_path / f"{hardware}" / "frames").glob("*.png"))]
+        for hardware in (False, True)
+    )
+    assert len(host) == len(device) == 6
+    assert max(np.abs(a - b).max() for a, b in zip(host, device, strict=True)) <= 1

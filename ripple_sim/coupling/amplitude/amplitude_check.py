@@ -43,7 +43,7 @@ class AmplitudeCheck:
 
     def __init__(self, waves: Mapping[int, WaveSolver], names: Sequence[str]) -> None:
         self._waves, self._names = waves, names
-        self._watched = {geom: _Watch(each.atlas) for geom, each in waves.items()}
+        self._watched = {geom: _Watch(each.rest) for geom, each in waves.items()}
         self._steps = 0
 
     def __call__(self) -> None:

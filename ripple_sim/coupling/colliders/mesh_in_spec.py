@@ -44,8 +44,10 @@ def is_closed(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
 
 def _compiled(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjModel:
     trial = spec.copy()
-    # whose signed distance would take long, and needs no rim
-    trial.geom(geom.name).type = mujoco.mjtGeom.mjGEOM_MESH
+    # a signed distance would take long, and a flat mesh has no convex hull
+    trial.compiler.discardvisual = False
+    own = trial.geom(geom.name)
+    own.type, own.contype, own.conaffinity = mujoco.mjtGeom.mjGEOM_MESH, 0, 0
     try:
         return trial.compile()
     except ValueError as error:

@@ -18,7 +18,7 @@ class _Flexes(NamedTuple):
     Attributes
     ----------
     geoms : int64 [nflex]
-        Geom that a flex collides for, -1 for none.
+        Geom that a flex collides for, or itself where it is a target; -1 for none.
     first : int64 [nflex]
         Collider id of the first vertex.
     """
@@ -54,10 +54,15 @@ class ColliderIds:
         geoms = np.full(model.nflex, -1)
         geoms[list(coupled.flex_colliders.values())] = list(coupled.flex_colliders)
         first = model.ngeom + model.flex_vertadr.astype(np.int64)
-        self._plain = not (model.nflex or coupled.convex_colliders)
+        self._soft = bool(coupled.soft)
+        self._plain = not (model.nflex or coupled.convex_colliders or self._soft)
         self._whole = np.arange(model.ngeom)
         for geom, parts in coupled.convex_colliders.items():
             self._whole[parts] = geom
+        for target, surface in coupled.soft.items():
+            self._whole[surface.geoms] = target
+            if surface.flex >= 0:
+                geoms[surface.flex] = target
         self._flexes = _Flexes(
             geoms, first, model.flex_vertadr, model.flex_elemdataadr, model.flex_elem, model.flex_dim
         )
@@ -68,7 +73,10 @@ class ColliderIds:
         if self._plain:
             return contacts.geom.astype(np.int64)
         sides = _Sides(contacts.geom, contacts.flex, contacts.elem, contacts.vert, contacts.pos)
-        return _collider_ids(sides, self._whole, self._flexes, data.flexvert_xpos)
+        found = _collider_ids(sides, self._whole, self._flexes, data.flexvert_xpos)
+        if self._soft:
+            found[found[:, 0] == found[:, 1]] = -1  # what is soft touches itself
+        return found
 
 
 @kernel

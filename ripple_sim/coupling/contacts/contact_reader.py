@@ -32,13 +32,14 @@ class ContactReader:
 
     def __init__(self, coupled: CoupledModel, atlases: Mapping[int, Atlas]) -> None:
         self._coupled = coupled
-        self._collision_contacts = CollisionContacts(coupled, atlases)
-        meshes = {target: atlas.mesh for target, atlas in atlases.items()}
+        rigid = {target: atlas for target, atlas in atlases.items() if target not in coupled.soft}
+        self._collision_contacts = CollisionContacts(coupled, rigid)
+        meshes = {target: atlas.mesh for target, atlas in rigid.items()}
         for geom in coupled.flex_colliders.keys() & self._collision_contacts.geoms:
             meshes[geom] = target_mesh(coupled.model, geom)
         self._colliders = ColliderIds(coupled)
         self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
-        self._is_read[[*meshes, *self._collision_contacts.geoms]] = True
+        self._is_read[[*meshes, *self._collision_contacts.geoms, *coupled.soft]] = True
         self._has_flex = np.zeros(len(coupled.owners), dtype=np.bool_)
         self._has_flex[list(coupled.flex_colliders)] = True
         self._adhesion = Adhesion(coupled.model)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ripple_sim.solver.kernel import Bools, Floats, Ints, Ints32, kernel
 
-from .target_contacts import PairContacts, group_by_pair, room_for, trimmed
+from .target_contacts import PairContacts, close, group_by_pair, room_for, trimmed
 
 # Cosine between the normals of a contact and of the surface, up to which MuJoCo is taken to push sideways: geoms that
 # hit an edge or a corner push at down to 0.5.
@@ -49,7 +49,6 @@ class MujocoFlexContacts(NamedTuple):
     geom_xmat: Floats
 
 
-@kernel
 def summed_contacts(
     colliders: Ints, contacts: MujocoFlexContacts, flex: FlexNormals, extents: Floats, pyramidal: bool
 ) -> tuple[PairContacts, Floats]:
@@ -69,6 +68,14 @@ def summed_contacts(
     pyramidal : bool
         Whether MuJoCo's friction cones are.
     """
+    found, counts, amounts = _summed_contacts(colliders, contacts, flex, extents, pyramidal)
+    return trimmed(found, counts), amounts
+
+
+@kernel
+def _summed_contacts(
+    colliders: Ints, contacts: MujocoFlexContacts, flex: FlexNormals, extents: Floats, pyramidal: bool
+) -> tuple[PairContacts, tuple[int, int, int], Floats]:
     pairs, forces = group_by_pair(colliders, contacts.efc_address, flex.first >= 0), _whole_forces(contacts, pyramidal)
     found, found_pairs, row, amounts = room_for(pairs), 0, 0, np.zeros((len(flex.first), 2))
     for pair in range(len(pairs.targets)):
@@ -112,7 +119,7 @@ def summed_contacts(
         found.forces[first:row] *= force / sum_of_weights
         found.targets[found_pairs], found.others[found_pairs], found.begins[found_pairs] = target, other, first
         found_pairs += 1
-    return trimmed(found, found_pairs, row), amounts
+    return found, close(found, found_pairs, row), amounts
 
 
 @kernel

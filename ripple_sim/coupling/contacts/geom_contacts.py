@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Bools, Floats, Ints, Ints32, kernel
 
-from .target_contacts import PairContacts, TargetContacts, group_by_pair, room_for, trimmed
+from .target_contacts import PairContacts, TargetContacts, close, group_by_pair, room_for, trimmed
 
 PYRAMIDAL = int(mujoco.mjtCone.mjCONE_PYRAMIDAL)
 
@@ -66,16 +66,19 @@ def geom_contacts(
     contacts = _MujocoContacts(address, dim, frame, pos, dist, data.efc_force, pulls)
     has_flex = np.zeros(len(is_target), dtype=np.bool_) if has_flex is None else has_flex
     pyramidal = model.opt.cone == PYRAMIDAL
-    return _normal_contacts(colliders, contacts, is_target, has_flex, extents, pyramidal).by_target()
+    return trimmed(*_normal_contacts(colliders, contacts, is_target, has_flex, extents, pyramidal)).by_target()
 
 
 @kernel
 def _normal_contacts(
     colliders: Ints, contacts: _MujocoContacts, is_target: Bools, has_flex: Bools, extents: Floats, pyramidal: bool
-) -> PairContacts:
-    """Contacts that push or pull; pairs without one are left out."""
-    # those within the gap pull without a row in the constraint solver
-    address = np.where(contacts.pulls > 0, np.int32(0), contacts.efc_address)
+) -> tuple[PairContacts, tuple[int, int, int]]:
+    """Contacts that push or pull, and how many; pairs without one are left out."""
+    address = contacts.efc_address.copy()
+    for i in range(len(address)):
+        # those within the gap pull without a row in the constraint solver
+        if contacts.pulls[i] > 0:
+            address[i] = 0
     pairs = group_by_pair(colliders, address, is_target)
     found, found_pairs, row = room_for(pairs), 0, 0
     for pair in range(len(pairs.targets)):
@@ -100,14 +103,14 @@ def _normal_contacts(
             # the pair's own force, shared among its contacts by how much they bear
             _multiply(found.forces, first, row, (whole - pull) / whole)
         if has_flex[pairs.others[pair]] and row > first and pull != whole:
-            _multiply(found.forces, first, row, _unity(found.forces[first:row], found.normals[first:row]))
+            _multiply(found.forces, first, row, _unity(found.forces, found.normals, first, row))
         if row > first and pull != whole:
             found.targets[found_pairs], found.others[found_pairs] = pairs.targets[pair], pairs.others[pair]
             found.begins[found_pairs] = first
             found_pairs += 1
         else:
             row = first
-    return trimmed(found, found_pairs, row)
+    return found, close(found, found_pairs, row)
 
 
 @kernel
@@ -118,20 +121,26 @@ def _multiply(forces: Floats, first: int, last: int, factor: float) -> None:
 
 
 @kernel
-def _unity(forces: Floats, normals: Floats) -> float:
-    """Amount of the sum of forces along normals, over the sum of their amounts."""
-    square = 0.0
+def _unity(forces: Floats, normals: Floats, first: int, last: int) -> float:
+    """Amount of the sum of forces from `first` to `last` along normals, over the sum of their amounts."""
+    whole, square = 0.0, 0.0
+    for i in range(first, last):
+        whole += forces[i]
     for k in range(3):
-        square += (forces * normals[:, k]).sum() ** 2
-    return np.sqrt(square) / abs(forces.sum())
+        along = 0.0
+        for i in range(first, last):
+            along += forces[i] * normals[i, k]
+        square += along**2
+    return np.sqrt(square) / abs(whole)
 
 
 @kernel
 def _normal_force(contacts: _MujocoContacts, i: int, pyramidal: bool) -> float:
     """Normal force of a contact [N]."""
-    address, dim = contacts.efc_address[i], contacts.dim[i]
+    address, dim, force = contacts.efc_address[i], contacts.dim[i], 0.0
     if address < 0:
-        return 0.0
+        return force
     # the edges of a friction pyramid share the normal force among them
-    edges = 2 * (dim - 1) if pyramidal and dim > 1 else 1
-    return contacts.efc_force[address : address + edges].sum()
+    for edge in range(2 * (dim - 1) if pyramidal and dim > 1 else 1):
+        force += contacts.efc_force[address + edge]
+    return force

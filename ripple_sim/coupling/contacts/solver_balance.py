@@ -73,6 +73,7 @@ class SolverBalance:
 
     def __call__(self, data: mujoco.MjData, contacts: Mapping[int, TargetContacts]) -> None:
         """Warn of the targets whose contact forces and bodies disagree. Call it with the contacts of each step."""
+        contacts = {target: each for target, each in contacts.items() if target < self._model.ngeom}
         for target in self._touched.keys() - contacts.keys():
             self._judge(target)
         self._touched = {target: self._touched.get(target, -1) + 1 for target in contacts}
@@ -111,7 +112,9 @@ def _missing(contacts: TargetContacts, trees: _Trees, missing: Floats, constrain
     """Sum of the forces of contacts [N], and the part of it that shows in neither body's motion [N]."""
     total, unseen = 0.0, 0.0
     for i in range(len(contacts.others)):
-        force = np.abs(contacts.forces[contacts.begins[i] : contacts.begins[i + 1]]).sum()
+        force = 0.0
+        for k in range(contacts.begins[i], contacts.begins[i + 1]):
+            force += abs(contacts.forces[k])
         one, other = trees.of_collider[contacts.target], trees.of_collider[contacts.others[i]]
         at_free, at_joints = np.inf, np.inf
         for tree in (one, other):
@@ -120,10 +123,19 @@ def _missing(contacts: TargetContacts, trees: _Trees, missing: Floats, constrain
             first, last = trees.starts[tree], trees.starts[tree + 1]
             if trees.free[tree]:
                 # a heavy body may hardly feel what moves a light one
-                at_free = min(at_free, np.sqrt((missing[first : first + 3] ** 2).sum()))
+                at_free = min(at_free, np.sqrt(_square(missing, first, first + 3)))
             else:
-                share = np.sqrt((missing[first:last] ** 2).sum() / max((constraint[first:last] ** 2).sum(), _TINY))
+                share = np.sqrt(_square(missing, first, last) / max(_square(constraint, first, last), _TINY))
                 at_joints = min(at_joints, share * force)
         total += force
         unseen += at_free if np.isfinite(at_free) else at_joints if np.isfinite(at_joints) else 0.0
     return total, unseen
+
+
+@kernel
+def _square(values: Floats, first: int, last: int) -> float:
+    """Sum of the squares of the values from `first` to `last`."""
+    total = 0.0
+    for i in range(first, last):
+        total += values[i] ** 2
+    return total

@@ -94,34 +94,74 @@ def group_by_pair(colliders: Ints, address: Ints32, is_target: Bools) -> Pairs:
     Parameters
     ----------
     colliders : int64 [ncon, 2]
-        Collider ids.
+        Collider ids, -1 for what is none.
     address : int32 [ncon]
         Their rows in the constraint solver. A contact without one (excluded, or in the margin only) carries no force.
     is_target : bool [c]
     """
-    size, count = len(is_target), 0
-    keys, sources = np.empty(2 * len(colliders), np.int64), np.empty(2 * len(colliders), np.int64)
+    count = 0
     for i in range(len(colliders)):
-        if address[i] < 0:
-            continue
         for side in range(2):
-            if is_target[colliders[i, side]]:
-                keys[count], sources[count] = colliders[i, side] * size + colliders[i, 1 - side], 2 * i + side
+            if _bears(colliders, address, is_target, i, side):
                 count += 1
-    # a stable sort keeps the contacts of a pair in their order
-    order = np.argsort(keys[:count], kind="mergesort")
-    targets, others, begins = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count + 1, np.int64)
-    contacts, sides = np.empty(count, np.int64), np.empty(count, np.int64)
-    pairs, latest = 0, -1
+    order = np.empty(count, np.int64)
+    count = 0
+    for i in range(len(colliders)):
+        for side in range(2):
+            if _bears(colliders, address, is_target, i, side):
+                order[count] = 2 * i + side
+                count += 1
+    order = _sorted_by(_sorted_by(order, colliders, 1, len(is_target)), colliders, 0, len(is_target))
+    pairs = 0
     for j in range(count):
-        if keys[order[j]] != latest:
-            latest = keys[order[j]]
-            targets[pairs], others[pairs] = divmod(latest, size)
+        if j == 0 or not _same_pair(order[j - 1], order[j], colliders):
+            pairs += 1
+    targets, others, begins = np.empty(pairs, np.int64), np.empty(pairs, np.int64), np.empty(pairs + 1, np.int64)
+    contacts, sides = np.empty(count, np.int64), np.empty(count, np.int64)
+    pairs = 0
+    for j in range(count):
+        contacts[j], sides[j] = order[j] // 2, order[j] % 2
+        if j == 0 or not _same_pair(order[j - 1], order[j], colliders):
+            targets[pairs], others[pairs] = _collider(order[j], colliders, 0), _collider(order[j], colliders, 1)
             begins[pairs] = j
             pairs += 1
-        contacts[j], sides[j] = divmod(sources[order[j]], 2)
     begins[pairs] = count
-    return Pairs(targets[:pairs], others[:pairs], begins[: pairs + 1], contacts, sides)
+    return Pairs(targets, others, begins, contacts, sides)
+
+
+# In these kernels there are loops only: slices, sorts and expressions of arrays take many times longer to compile.
+@kernel
+def _bears(colliders: Ints, address: Ints32, is_target: Bools, i: int, side: int) -> bool:
+    """Whether contact i bears on the target that is its side."""
+    return address[i] >= 0 and min(colliders[i, 0], colliders[i, 1]) >= 0 and is_target[colliders[i, side]]
+
+
+@kernel
+def _collider(source: int, colliders: Ints, role: int) -> int:
+    """Target, role 0, or other, 1, of a contact i as seen from a side: source 2 i + side."""
+    return colliders[source // 2, (source + role) % 2]
+
+
+@kernel
+def _same_pair(one: int, two: int, colliders: Ints) -> bool:
+    """Whether two sources have the same target and other."""
+    targets_agree = _collider(one, colliders, 0) == _collider(two, colliders, 0)
+    return targets_agree and _collider(one, colliders, 1) == _collider(two, colliders, 1)
+
+
+@kernel
+def _sorted_by(sources: Ints, colliders: Ints, role: int, size: int) -> Ints:
+    """Sources sorted by their colliders in a role, by counting: those with the same one stay in their order."""
+    starts, found = np.zeros(size + 1, np.int64), np.empty(len(sources), np.int64)
+    for j in range(len(sources)):
+        starts[_collider(sources[j], colliders, role) + 1] += 1
+    for i in range(size):
+        starts[i + 1] += starts[i]
+    for j in range(len(sources)):
+        collider = _collider(sources[j], colliders, role)
+        found[starts[collider]] = sources[j]
+        starts[collider] += 1
+    return found
 
 
 @kernel
@@ -135,19 +175,25 @@ def room_for(pairs: Pairs) -> PairContacts:
 
 
 @kernel
-def trimmed(room: PairContacts, pairs: int, contacts: int) -> PairContacts:
-    """The first pairs and contacts that were written to the arrays, with one entry for each target."""
-    targets, starts, begins, count = room.targets, room.starts, room.begins, 0
+def close(room: PairContacts, pairs: int, contacts: int) -> tuple[int, int, int]:
+    """Sum up the first pairs and contacts that were written to the arrays; how many targets they have, and they are."""
+    targets, count = room.targets, 0
     for pair in range(pairs):
         if count == 0 or targets[pair] != targets[count - 1]:
-            targets[count], starts[count] = targets[pair], pair
+            targets[count], room.starts[count] = targets[pair], pair
             count += 1
-    starts[count], begins[pairs] = pairs, contacts
+    room.starts[count], room.begins[pairs] = pairs, contacts
+    return count, pairs, contacts
+
+
+def trimmed(room: PairContacts, counts: tuple[int, int, int]) -> PairContacts:
+    """Arrays that were closed, cut to what is in them."""
+    targets, pairs, contacts = counts
     return PairContacts(
-        targets[:count],
-        starts[: count + 1],
+        room.targets[:targets],
+        room.starts[: targets + 1],
         room.others[:pairs],
-        begins[: pairs + 1],
+        room.begins[: pairs + 1],
         room.points[:contacts],
         room.forces[:contacts],
         room.normals[:contacts],

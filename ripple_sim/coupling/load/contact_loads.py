@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.coupling.contacts.at_rest import at_rest
 from ripple_sim.coupling.contacts.contact_reader import ContactReader
 from ripple_sim.coupling.contacts.sleeping_contacts import SleepingContacts
 from ripple_sim.coupling.model.coupled_model import CoupledModel
+from ripple_sim.coupling.model.soft_ids import target_pose
 from ripple_sim.coupling.patches.pose import Pose
 from ripple_sim.solver import Load, WaveSolver
 
@@ -36,7 +39,7 @@ class ContactLoads:
         """Forget all contacts."""
         self._sleeping, self._begins = SleepingContacts(self._coupled), True
         self._targets = {
-            geom: TargetLoad(waves, self._coupled.footprint_radii, self._coupled.convex)
+            geom: TargetLoad(waves, self._coupled.footprint_radii, self._convex(geom))
             for geom, waves in self._waves.items()
         }
         self.skip()
@@ -67,14 +70,19 @@ class ContactLoads:
         contacts = self._sleeping.add(data, self._contacts.read(data))
         for geom, target in self._targets.items():
             if geom in contacts:
-                # copies, since MuJoCo's own arrays will move on
-                pose = Pose(data.geom_xpos[geom].copy(), data.geom_xmat[geom].reshape(3, 3).copy())
+                target.follow(self._waves[geom].atlas)
+                pose = Pose(*target_pose(data, geom))
                 loads[geom], record = target.touched(contacts[geom], pose, self._timestep, elapsed)
                 self._records.append(record)
                 self._touching.append(record)
             else:
                 loads[geom] = target.untouched(elapsed)
         return loads
+
+    def _convex(self, target: int) -> NDArray[np.bool_]:
+        """Colliders that touch between the points where they touch: a flex has a contact at each of its vertices."""
+        convex = self._coupled.convex
+        return np.zeros_like(convex) if target in self._coupled.soft else convex
 
     @property
     def impulses(self) -> list[Impulse]:

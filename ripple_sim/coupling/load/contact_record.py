@@ -115,7 +115,7 @@ class ContactRecord(NamedTuple):
             How long the forces were held [s].
         """
         points, forces, texels, inner = self.told[:4]
-        n, geom, others = atlas.areas.shape[1], names[self.contacts.target], owners[self.contacts.others]
+        n, geom, others = atlas.areas.shape[1], names[owners[self.contacts.target]], owners[self.contacts.others]
         # the last ids are those of a flex's vertices, which touch for themselves and are told of together
         if others[-1] != self.contacts.others[-1]:
             first = np.flatnonzero(np.diff(others, prepend=-1))

@@ -76,25 +76,26 @@ def reusable(cache: FootprintCache, points: LoadPoints, states: np.ndarray) -> t
     lost : int64 [l]
         Load points that no footprint serves, and whose places on the surface are not known either.
     """
-    n, count = len(points.geoms), len(points.geoms)
-    rows, touching = np.full(n + len(cache.geoms), -1), np.zeros(len(states), np.bool_)
-    first = 0
+    n, first, count, losses = len(points.geoms), 0, len(points.geoms), 0
+    rows, lost, touching = np.empty(n + len(cache.geoms), np.int64), np.empty(n, np.int64), np.zeros(len(states))
     for i in range(n):
-        geom = points.geoms[i]
-        if not touching[geom]:
-            touching[geom] = True
-            first = _first_row(cache, geom)
+        geom, rows[i] = points.geoms[i], -1
+        if touching[geom] == 0:
+            touching[geom], first = 1, _first_row(cache, geom)
         row = first
         while rows[i] < 0 and row < len(cache.geoms) and cache.geoms[row] == geom:
             moved = np.sqrt(squared_distance(cache.points, row, points.points, i))
             if max(moved, abs(cache.radii[row] - points.radii[i])) <= cache.tolerances[row]:
                 rows[i] = row
             row += 1
+        if rows[i] < 0 and points.texels[i] < 0:
+            lost[losses] = i
+            losses += 1
     for row in range(len(cache.geoms)):
-        if states[cache.geoms[row]].active and not touching[cache.geoms[row]]:
+        if states[cache.geoms[row]].active and touching[cache.geoms[row]] == 0:
             rows[count] = row
             count += 1
-    return rows[:count], np.flatnonzero((rows[:n] < 0) & (points.texels < 0))
+    return rows[:count], lost[:losses]
 
 
 @kernel
@@ -118,25 +119,27 @@ def rebuild(
     count, room = len(rows), 2 * len(cache.texels) + 1024
     geoms, places = np.empty(count, np.int64), np.empty((count, 3))
     radii, tolerances = np.empty(count), np.empty(count)
-    begins, all_texels, all_shares = np.zeros(count + 1, np.int64), np.empty(room, np.int64), np.empty(room)
+    begins, texels, shares = np.zeros(count + 1, np.int64), np.empty(room, np.int64), np.empty(room)
     for i in range(count):
-        j = rows[i]
+        j, at = rows[i], begins[i]
         if j >= 0:
-            geoms[i], places[i], radii[i] = cache.geoms[j], cache.points[j], cache.radii[j]
-            tolerances[i], old = cache.tolerances[j], slice(cache.begins[j], cache.begins[j + 1])
-            texels, shares = cache.texels[old], cache.shares[old]
+            geoms[i], radii[i], tolerances[i] = cache.geoms[j], cache.radii[j], cache.tolerances[j]
+            first, last, under, weights = cache.begins[j], cache.begins[j + 1], cache.texels, cache.shares
         else:
-            geoms[i], places[i], radii[i] = points.geoms[i], points.points[i], points.radii[i]
+            geoms[i], radii[i] = points.geoms[i], points.radii[i]
             tolerances[i] = _SAME_PLACE * np.sqrt(grid.areas[points.texels[i]])
-            texels, weights, _ = weigh(grid, points.texels[i], points.places[i], radii[i], scratch)
-            shares = weights * movable_area[texels]
-        begins[i + 1] = begins[i] + len(texels)
-        while begins[i + 1] > len(all_texels):
-            all_texels, all_shares = _doubled(all_texels), _doubled(all_shares)
-        new = slice(begins[i], begins[i + 1])
-        all_texels[new], all_shares[new] = texels, shares
+            under, weights, _ = weigh(grid, points.texels[i], points.places[i], radii[i], scratch)
+            first, last = 0, len(under)
+        begins[i + 1] = at + last - first
+        while begins[i + 1] > len(texels):
+            texels, shares = _doubled(texels, shares)
+        for k in range(3):
+            places[i, k] = cache.points[j, k] if j >= 0 else points.points[i, k]
+        for k in range(first, last):
+            texels[at + k - first] = under[k]
+            shares[at + k - first] = weights[k] if j >= 0 else weights[k] * movable_area[under[k]]
     end = begins[count]
-    return FootprintCache(geoms, places, radii, tolerances, begins, all_texels[:end], all_shares[:end])
+    return FootprintCache(geoms, places, radii, tolerances, begins, texels[:end], shares[:end])
 
 
 @kernel
@@ -149,9 +152,9 @@ def _first_row(cache: FootprintCache, geom: int) -> int:
 
 
 @kernel
-def _doubled(array: np.ndarray) -> np.ndarray:
-    """An array with room for twice as many entries."""
-    longer = np.empty(2 * len(array), array.dtype)
-    for i in range(len(array)):
-        longer[i] = array[i]
-    return longer
+def _doubled(texels: Ints, shares: Floats) -> tuple[Ints, Floats]:
+    """Both with room for twice as many entries."""
+    more_texels, more_shares = np.empty(2 * len(texels), np.int64), np.empty(2 * len(shares))
+    for i in range(len(texels)):
+        more_texels[i], more_shares[i] = texels[i], shares[i]
+    return more_texels, more_shares

@@ -10,18 +10,25 @@ surface has yet to receive, so that nothing is lost.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ripple_sim.solver.kernel import Floats, Ints, kernel
-from ripple_sim.solver.waves.load import add_up_by
 
 from .contact_state import miss, touch, turn
 from .texel_forces import MeanShares, TexelForces
 
 # Shares below this are dropped from a mean.
 _LEAST_SHARE = 1e-6
+
+
+class _Room(NamedTuple):
+    """Texels under the geoms, their new mean shares, and the shares of this step, which become forces [N]."""
+
+    texels: Ints
+    shares: Floats
+    given: Floats
 
 
 @kernel
@@ -50,57 +57,74 @@ def rest_filter(
     over : bool
         Whether all geoms have left, and there is no deficit.
     """
-    room = len(before.texels) + len(present.texels)
-    texels, given, shares = np.empty(room, np.int64), np.empty(room), np.empty(room)
-    count, i, over = 0, 0, True
+    size = len(before.texels) + len(present.texels)
+    room = _Room(np.empty(size, np.int64), np.empty(size), np.empty(size))
+    end, row, over = 0, 0, True
     for geom in range(len(states)):
-        state, rows, force = states[geom], slice(0, 0), 0.0
-        if i < len(present.geoms) and present.geoms[i] == geom:
-            rows = slice(present.begins[i], present.begins[i + 1])
-            force = present.forces[rows].sum()
-            i += 1
-        old = slice(state.first, state.last)
-        mean, now = MeanShares(before.texels[old], before.shares[old]), np.zeros(0)
+        state, begin, force = states[geom], end, 0.0
+        if row < len(present.geoms) and present.geoms[row] == geom:
+            for i in range(present.begins[row], present.begins[row + 1]):
+                force += present.forces[i]
+            row += 1
         if force != 0:
             turn(state, 1.0 if force > 0 else -1.0)
-            total = state.side * touch(state, abs(force), present.middles[i - 1], present.place_radii[i - 1], dt)
-            mean, now = _mean_shares(state, mean, present.texels[rows], present.forces[rows] / force, dt, scratch)
+            total = state.side * touch(state, abs(force), present.middles[row - 1], present.place_radii[row - 1], dt)
+            pace = dt / (dt + state.memory) if state.first < state.last else 1.0
+            if pace < 1:
+                end = _add_before(room, end, before, state, 1 - pace, scratch)
+            end = _add_present(room, begin, end, present, row - 1, force, pace, scratch)
             state.active = True
+            steady = state.side * min(state.mean, state.side * total)
         elif state.active:
-            total = state.side * miss(state, dt)
+            total = steady = state.side * miss(state, dt)
+            for i in range(state.first, state.last):
+                room.texels[end], room.shares[end], room.given[end] = before.texels[i], before.shares[i], 0.0
+                end += 1
         else:
             continue
         over = over and not state.active
-        state.first, state.last = count, count + len(mean.texels)
-        count = state.last
-        new = slice(state.first, state.last)
-        texels[new], shares[new] = mean.texels, mean.shares
-        steady = state.side * min(state.mean, state.side * total) if len(now) else total
-        given[new] = steady * mean.shares
-        if len(now):
-            given[new] += (total - steady) * now
-    return MeanShares(texels[:count], shares[:count]), given[:count], over
+        state.first, state.last = begin, end
+        for i in range(begin, end):
+            room.given[i] = steady * room.shares[i] + (total - steady) * room.given[i]
+    return MeanShares(room.texels[:end], room.shares[:end]), room.given[:end], over
+
+
+# Loops only: slices and expressions of arrays take many times longer to compile.
+@kernel
+def _add_before(room: _Room, end: int, before: MeanShares, state: Any, part: float, scratch: Ints) -> int:
+    """Add the mean shares of a geom so far, as a part of the new ones; where they end."""
+    total = 0.0
+    for i in range(state.first, state.last):
+        if before.shares[i] > _LEAST_SHARE:
+            total += before.shares[i]
+    fading = part / total
+    for i in range(state.first, state.last):
+        if before.shares[i] > _LEAST_SHARE:
+            end = _add(room, end, before.texels[i], fading * before.shares[i], 0.0, scratch)
+    return end
 
 
 @kernel
-def _mean_shares(
-    state: Any, before: MeanShares, texels: Ints, shares: Floats, dt: float, scratch: Ints
-) -> tuple[MeanShares, Floats]:
-    """Mean shares of a geom's texels in its force, over its memory, and those of this step, at the same texels."""
-    pace = dt / (dt + state.memory)
-    if pace == 1 or not len(before.texels):
-        return MeanShares(texels, shares), shares
-    room = len(before.texels) + len(texels)
-    at, values, count = np.empty(room, np.int64), np.zeros((2, room)), 0
-    for i in range(len(before.texels)):
-        if before.shares[i] > _LEAST_SHARE:
-            at[count], values[0, count] = before.texels[i], before.shares[i]
-            count += 1
-    fading = (1 - pace) / values[0, :count].sum()
-    for i in range(count):
-        values[0, i] *= fading
-    for i in range(len(texels)):
-        at[count + i], values[0, count + i], values[1, count + i] = texels[i], pace * shares[i], shares[i]
-    count += len(texels)
-    at, sums = add_up_by(scratch, at[:count], values[:, :count])
-    return MeanShares(at, sums[0]), sums[1]
+def _add_present(
+    room: _Room, begin: int, end: int, present: TexelForces, row: int, force: float, pace: float, scratch: Ints
+) -> int:
+    """Add the shares of this step, times the pace; where they end. All from `begin` on are the geom's."""
+    for i in range(present.begins[row], present.begins[row + 1]):
+        share = present.forces[i] / force
+        end = _add(room, end, present.texels[i], pace * share, share, scratch)
+    for i in range(begin, end):
+        scratch[room.texels[i]] = -1
+    return end
+
+
+@kernel
+def _add(room: _Room, end: int, texel: int, mean: float, now: float, scratch: Ints) -> int:
+    """Add shares of a texel, which is told of once for each geom."""
+    slot = scratch[texel]
+    if slot < 0:
+        scratch[texel] = slot = end
+        room.texels[slot], room.shares[slot], room.given[slot] = texel, 0.0, 0.0
+        end += 1
+    room.shares[slot] += mean
+    room.given[slot] += now
+    return end

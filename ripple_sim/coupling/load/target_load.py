@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.contacts.target_contacts import TargetContacts
-from ripple_sim.coupling.patches.contact_patches import find_load_points, find_patches
+from ripple_sim.coupling.patches.contact_patches import LoadPoints, Patches, find_load_points, find_patches
 from ripple_sim.coupling.patches.pose import Pose, in_world
-from ripple_sim.solver import Load, WaveSolver
+from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 from ripple_sim.solver.texels.distance import distance_scratch
 from ripple_sim.solver.texels.nearest import nearest_place, nearest_places
@@ -66,17 +66,30 @@ class TargetLoad:
 
     def __init__(self, waves: WaveSolver, radii: NDArray[np.float64], convex: NDArray[np.bool_]) -> None:
         atlas, unmoved = waves.atlas, np.zeros(waves.atlas.areas.size)
+        self._atlas = atlas
         self._target = _Target(atlas.places, atlas.texels.grid, unmoved, radii, convex, not atlas.mesh.closed)
         self._state = _State(EMPTY_CACHE, np.zeros(len(radii), CONTACT_STATE), NO_SHARES, True)
         self.set_waves(waves)
 
     def set_waves(self, waves: WaveSolver) -> None:
         """Go on with new waves on the same atlas; deficits stay."""
-        movable_area = (waves.atlas.areas * waves.operator.movable).reshape(-1)
-        self._target = self._target._replace(movable_area=movable_area)
+        self._movable = waves.operator.movable.reshape(-1)
+        self._target = self._target._replace(movable_area=waves.atlas.areas.reshape(-1) * self._movable)
         self._state = self._state._replace(cache=EMPTY_CACHE)
         # texels that carry no load any more are forgotten at the next touch
         self._state.geoms["memory"] = 0.0
+
+    def follow(self, atlas: Atlas) -> None:
+        """Go on where the surface is now, if it has moved."""
+        if atlas is not self._atlas:
+            self._atlas = atlas
+            old, new = self._target.grid.positions, atlas.texels.grid
+            cache, area = self._state.cache, new.areas * self._movable
+            self._target = self._target._replace(surface=atlas.places, grid=new, movable_area=area)
+            # footprints ride on their texels
+            under = cache.texels[cache.begins[:-1]]
+            points = cache.points + new.positions[under] - old[under]
+            self._state = self._state._replace(cache=cache._replace(points=points))
 
     def touched(
         self, contacts: TargetContacts, pose: Pose, timestep: float, elapsed: float
@@ -128,30 +141,41 @@ def _touched(
     places, texels = nearest_places(target.surface, patches.points)
     points = find_load_points(patches, places, texels, timestep / elapsed)
     rows, lost = reusable(state.cache, points, state.geoms)
-    for i in lost:
-        x, y, z = points.points[i]
+    for k in range(len(lost)):
+        i = lost[k]
+        x, y, z = points.points[i, 0], points.points[i, 1], points.points[i, 2]
         x, y, z, points.texels[i] = nearest_place(target.surface, x, y, z)
         points.places[i, 0], points.places[i, 1], points.places[i, 2] = x, y, z
-    middles = patches.begins[:-1]
-    inner = np.zeros(len(middles), np.bool_)
-    if target.is_open:
-        inner = _from_inside(contacts, pose, target.grid.normals[texels[middles]])
-        for i in np.flatnonzero(inner):
-            points.forces[points.begins[i] : points.begins[i + 1]] *= -1.0
+    middles, under = _at_middles(patches, places, texels)
+    inner = _from_inside(contacts, pose, target, under)
+    _turn_outwards(points, inner)
     cache = rebuild(state.cache, points, rows, target.grid, target.movable_area, scratch.distances)
     forces = texel_forces(patches, points, cache)
     mean, given, over = rest_filter(state.geoms, state.mean, forces, elapsed, scratch.slots)
     touches = Touches(
-        in_world(places[middles], pose), patches.forces, texels[middles], inner,
-        forces.begins, forces.texels, forces.forces,
-    )  # fmt: skip
+        in_world(middles, pose), patches.forces, under, inner, forces.begins, forces.texels, forces.forces
+    )
     return _State(cache, state.geoms, mean, over), given, touches
 
 
 @kernel
-def _from_inside(contacts: TargetContacts, pose: Pose, normals: Floats) -> Bools:
-    """Whether each geom touches from inside, [p]; the surface's normals are those at the middles of its contacts."""
+def _at_middles(patches: Patches, places: Floats, texels: Ints) -> tuple[Floats, Ints]:
+    """Surface points [m], [p, 3], nearest to the middles of the patches, and the texels there, [p]."""
+    count = len(patches.geoms)
+    middles, under = np.empty((count, 3)), np.empty(count, np.int64)
+    for i in range(count):
+        under[i] = texels[patches.begins[i]]
+        for k in range(3):
+            middles[i, k] = places[patches.begins[i], k]
+    return middles, under
+
+
+@kernel
+def _from_inside(contacts: TargetContacts, pose: Pose, target: _Target, under: Ints) -> Bools:
+    """Whether each geom touches an open surface from inside, [p]; `under` are the texels at their middles."""
     inside = np.zeros(len(contacts.others), np.bool_)
+    if not target.is_open:
+        return inside
     for i in range(len(inside)):
         along = 0.0
         for row in range(contacts.begins[i], contacts.begins[i + 1]):
@@ -159,6 +183,15 @@ def _from_inside(contacts: TargetContacts, pose: Pose, normals: Floats) -> Bools
                 normal = 0.0
                 for j in range(3):
                     normal += contacts.normals[row, j] * pose.rotation[j, k]
-                along += abs(contacts.forces[row]) * normal * normals[i, k]
+                along += abs(contacts.forces[row]) * normal * target.grid.normals[under[i], k]
         inside[i] = along < 0
     return inside
+
+
+@kernel
+def _turn_outwards(points: LoadPoints, inner: Bools) -> None:
+    """Let what touches from inside push outwards."""
+    for i in range(len(inner)):
+        if inner[i]:
+            for j in range(points.begins[i], points.begins[i + 1]):
+                points.forces[j] *= -1.0

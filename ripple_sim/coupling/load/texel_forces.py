@@ -61,7 +61,8 @@ def texel_forces(patches: Patches, points: LoadPoints, cache: FootprintCache) ->
     middles, place_radii, begins = np.empty((geoms, 3)), np.empty(geoms), np.zeros(geoms + 1, np.int64)
     forces = np.empty(count)
     for i in range(geoms):
-        middles[i] = patches.points[patches.begins[i]]
+        for k in range(3):
+            middles[i, k] = patches.points[patches.begins[i], k]
         place_radii[i] = points.radii[points.begins[i]] / 2
         begins[i + 1] = cache.begins[points.begins[i + 1]]
         for j in range(points.begins[i], points.begins[i + 1]):

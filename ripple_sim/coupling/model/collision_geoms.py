@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 
-from .geoms import ByGeom, GeomKey, by_name, find_geom, geom_name
+from .geoms import ByGeom, GeomKey, by_name, find_any, find_geom, geom_name
 
 _ENDLESS = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
 
@@ -28,10 +28,10 @@ def named_collision_geoms(
     """
     if not isinstance(contacts, Mapping):
         raise SceneError(f"contacts is {contacts!r}; valid is a mapping of rippling geoms to lists of geoms")
-    rippling = {find_geom(model, name): name for name in targets}
+    rippling = {find_any(model, name): name for name in targets}
     found = {}
     for name, keys in by_name(model, contacts, "contacts").items():
-        target = find_geom(model, name)
+        target = find_any(model, name)
         if target not in rippling:
             raise SceneError(
                 f"contacts names geom {name!r}, which does not ripple; the rippling geoms are "

@@ -13,8 +13,10 @@ from .collision_geoms import find_collision_geoms
 from .contact_masks import ContactMasks
 from .convex_colliders import find_convex_colliders
 from .flex_colliders import find_flex_colliders, flex_thickness
-from .flex_vertices import flex_name, vertex_flexes, vertex_spacing
+from .flex_vertices import vertex_flexes, vertex_spacing
 from .geoms import geom_name
+from .soft_ids import is_soft, soft_names
+from .soft_surfaces import SoftSurface
 
 _GEOM = mujoco.mjtGeom
 _ENDLESS = (int(_GEOM.mjGEOM_PLANE), int(_GEOM.mjGEOM_HFIELD))
@@ -32,14 +34,15 @@ class CoupledModel:
 
     A mesh geom may collide through a flex, its flex collider: then the flex's contact settings are the geom's. It may
     collide through its convex parts, which then touch as that geom. Of any other flex each vertex is a collider.
-    Collider ids are those of the geoms, and after them one for each vertex; there are c of them. A target may have
+    Collider ids are those of the geoms, and after them one for each vertex, each flex and each skin; there are c of
+    them. A flex or a skin that ripples touches as a whole, with the last ones, see `soft_ids`. A target may have
     collision geoms, whose contacts load it; see `find_collision_geoms`.
 
     Parameters
     ----------
     model : mujoco.MjModel
     targets : iterable of int
-        Geom ids.
+        Geom ids, and of soft targets.
     named : mapping
         Of some targets' ids to those of their collision geoms.
 
@@ -47,7 +50,7 @@ class CoupledModel:
     ----------
     model : mujoco.MjModel
     names : list of str
-        Of all geoms, see `geom_name`, and then of all flexes.
+        Of all geoms, see `geom_name`, and then of all flexes and skins.
     owners : int64 [c]
         What a collider is part of, by its place among the names: a geom itself, or the flex of a vertex.
     bodies : int64 [c]
@@ -69,6 +72,8 @@ class CoupledModel:
     convex : bool [c]
         Whether what touches at two points touches between them too.
     masks : ContactMasks
+    soft : dict of int to SoftSurface
+        The soft targets.
     """
 
     def __init__(
@@ -78,10 +83,11 @@ class CoupledModel:
         named: Mapping[int, Sequence[int]] = _NONE_NAMED,
     ) -> None:
         self.model = model
-        geoms, flexes = range(model.ngeom), range(model.nflex)
-        self.names = [geom_name(model, geom) for geom in geoms] + [flex_name(model, flex) for flex in flexes]
-        self.owners = np.concatenate([geoms, model.ngeom + vertex_flexes(model)]).astype(np.int64)
-        self.bodies = np.concatenate([model.geom_bodyid, model.flex_vertbodyid]).astype(np.int64)
+        geoms, softs = range(model.ngeom), model.nflex + model.nskin
+        self.names = [geom_name(model, geom) for geom in geoms] + soft_names(model)
+        whole = model.ngeom + np.arange(softs)
+        self.owners = np.concatenate([geoms, model.ngeom + vertex_flexes(model), whole]).astype(np.int64)
+        self.bodies = np.concatenate([model.geom_bodyid, model.flex_vertbodyid, np.full(softs, -1)]).astype(np.int64)
         self.flex_colliders = find_flex_colliders(model)
         self.convex_colliders = find_convex_colliders(model)
         self.has_flex = np.zeros(model.ngeom, dtype=np.bool_)
@@ -91,13 +97,19 @@ class CoupledModel:
         for geom, flex in self.flex_colliders.items():
             self.collider_extents[geom], self.solref[geom] = flex_thickness(model, flex), model.flex_solref[flex]
         spacing = vertex_spacing(model)
-        self.extents = np.concatenate([extents, spacing])
-        self.footprint_radii = np.concatenate([_FOOTPRINT * extents, spacing])
+        endless = np.full(softs, np.inf)
+        self.extents = np.concatenate([extents, spacing, endless])
+        self.footprint_radii = np.concatenate([_FOOTPRINT * extents, spacing, endless])
         convex = ~np.isin(model.geom_type, _NOT_CONVEX) & ~self.has_flex
         convex[[geom for geom, parts in self.convex_colliders.items() if len(parts) > 1]] = False
-        self.convex = np.concatenate([convex, np.zeros(model.nflexvert, dtype=np.bool_)])
+        self.convex = np.concatenate([convex, np.zeros(model.nflexvert + softs, dtype=np.bool_)])
         self.masks = ContactMasks(model, self.flex_colliders, self.convex_colliders)
-        self._collision_geoms = find_collision_geoms(model, self.masks.collides, targets, named)
+        targets = list(targets)
+        self.soft = {each: SoftSurface(model, each) for each in targets if is_soft(model, each)}
+        for target, surface in self.soft.items():
+            self.footprint_radii[target] = surface.spacing
+        geoms_alone = [each for each in targets if each not in self.soft]
+        self._collision_geoms = find_collision_geoms(model, self.masks.collides, geoms_alone, named)
 
     def collision_geoms(self, geom: int) -> tuple[int, ...]:
         """Geoms whose contacts are those of this one: itself, or of a target those that collide for it."""

@@ -10,6 +10,8 @@ import numpy as np
 
 from ripple_sim.errors import SceneError
 
+from .soft_ids import find_soft, is_soft, soft_name, soft_names
+
 TARGET_TYPES = {
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}")): name
     for name in ("mesh", "sdf", "sphere", "ellipsoid", "capsule", "cylinder", "box", "hfield")
@@ -53,21 +55,29 @@ def find_geom(model: mujoco.MjModel, key: GeomKey) -> int:
             return int(geom)
     names = [repr(geom_name(model, geom)) for geom in range(model.ngeom)]
     more = f" and {model.ngeom - _LISTED} more" if model.ngeom > _LISTED else ""
+    soft = f"; its flexes and skins are {', '.join(map(repr, soft_names(model)))}" if soft_names(model) else ""
     raise SceneError(
-        f"the model has no geom {key!r}; its geoms are {', '.join(names[:_LISTED]) or 'none'}{more}: give a name, "
-        '"body/index", or an id'
+        f"the model has no geom {key!r}; its geoms are {', '.join(names[:_LISTED]) or 'none'}{more}{soft}: give a "
+        'name, "body/index", or an id'
     )
 
 
+def target_name(model: mujoco.MjModel, target: int) -> str:
+    """Name of a geom, see `geom_name`, or of a soft target."""
+    return soft_name(model, target) if is_soft(model, target) else geom_name(model, target)
+
+
 def find_target(model: mujoco.MjModel, key: GeomKey) -> int:
-    """Id of the geom that is to ripple; see `find_geom`.
+    """Id of what is to ripple: a geom, see `find_geom`, or else the flex or skin of a name, see `soft_ids`.
 
     Raises
     ------
     SceneError
-        If there is no such geom, or its type has no closed surface.
+        If there is nothing of that name, or a geom's type has no closed surface.
     """
-    geom = find_geom(model, key)
+    geom = find_any(model, key)
+    if is_soft(model, geom):
+        return geom
     if int(model.geom_type[geom]) not in TARGET_TYPES:
         kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
         raise SceneError(f"geom {key!r} is a {kind}, which cannot ripple; valid are {', '.join(TARGET_TYPES.values())}")
@@ -75,7 +85,7 @@ def find_target(model: mujoco.MjModel, key: GeomKey) -> int:
 
 
 def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str, Value]:
-    """Values by the names that `geom_name` gives to their geoms.
+    """Values by the names that `target_name` gives to their geoms, flexes and skins.
 
     Raises
     ------
@@ -84,11 +94,25 @@ def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str
     """
     found: dict[str, Value] = {}
     for key, value in values.items():
-        name = geom_name(model, find_geom(model, key))
+        name = target_name(model, find_any(model, key))
         if name in found:
             raise SceneError(f"{what} has two entries for geom {name!r}, one of them as {key!r}; valid is one")
         found[name] = value
     return found
+
+
+def find_any(model: mujoco.MjModel, key: GeomKey) -> int:
+    """Id of a geom, whatever its type, or else of the flex or skin of a name.
+
+    Raises
+    ------
+    SceneError
+        If there is nothing of that name.
+    """
+    soft = find_soft(model, key)
+    if soft >= 0 and mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, str(key)) < 0:
+        return soft
+    return find_geom(model, key)
 
 
 def _by_place(model: mujoco.MjModel, key: str) -> int:

@@ -89,6 +89,20 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
 
 
+def suited_soft_material(model: mujoco.MjModel, extent: Extent, mass: float, material: Material) -> Material:
+    """The same for a flex or a skin, by its size and the mass of its bodies [kg]: what may hit it is not looked at."""
+    if not material.unset:
+        return material
+    speed = max(extent.size / _CROSSING, _fall(model, extent))
+    suited = {
+        "speed": speed,
+        "damping": damping_for(_DECAY),
+        "stiffness": narrow_stiffness(extent.size, speed),
+        "density": float(np.clip((mass if mass > 0 else _DENSITY * extent.volume) / extent.area, 1e-12, 1e12)),
+    }
+    return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
+
+
 def _density(model: mujoco.MjModel, geom: int, extent: Extent) -> float:
     mass = float(model.body_mass[model.geom_bodyid[geom]])
     density = (mass if mass > 0 else _DENSITY * extent.volume) / extent.area

@@ -9,10 +9,14 @@ import mujoco
 from ripple_sim.solver import Material
 
 from .coupled_model import CoupledModel
-from .geoms import find_geom
-from .suited_material import Extent, suited_material
+from .geoms import find_target
+from .soft_ids import is_soft
+from .soft_surfaces import SoftSurface
+from .suited_material import Extent, suited_material, suited_soft_material
 from .suited_resolution import suited_resolution
 from .target_mesh import target_mesh
+
+_SOFT = 64  # resolution of flexes and skins
 
 
 def suited_targets(
@@ -26,8 +30,13 @@ def suited_targets(
         If a target's mesh cannot ripple.
     """
     suited, texels = dict(materials), {name: n for name, n in resolutions.items() if n is not None}
-    geoms = {name: find_geom(model, name) for name in materials}
-    left = [name for name in materials if materials[name].unset or name not in texels]
+    geoms = {name: find_target(model, name) for name in materials}
+    for name, target in list(geoms.items()):
+        if is_soft(model, target):
+            surface = SoftSurface(model, geoms.pop(name))
+            suited[name] = suited_soft_material(model, Extent.of(surface.mesh), surface.mass, materials[name])
+            texels.setdefault(name, _SOFT)
+    left = [name for name in geoms if materials[name].unset or name not in texels]
     if not left:
         return suited, texels
     coupled = CoupledModel(model, geoms.values())

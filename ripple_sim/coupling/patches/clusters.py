@@ -24,9 +24,9 @@ def cluster(points: Floats, forces: Floats, radius: float) -> tuple[Floats, Floa
         All of one sign [N].
     radius : float
     """
-    owner = np.full(len(forces), -1)
-    seeds = np.empty(MAX_CLUSTERS, np.int64)
-    count = 0
+    owner, seeds, count = np.empty(len(forces), np.int64), np.empty(MAX_CLUSTERS, np.int64), 0
+    for i in range(len(forces)):
+        owner[i] = -1
     while count < MAX_CLUSTERS:
         seed = -1
         for i in range(len(forces)):
@@ -54,8 +54,8 @@ def cluster(points: Floats, forces: Floats, radius: float) -> tuple[Floats, Floa
 @kernel
 def merge_near(points: Floats, forces: Floats, near: float) -> tuple[Floats, Floats]:
     """Force-weighted means and sums of the points, each merged with the first one within `near` [m]."""
-    means, totals, first = np.zeros_like(points), np.zeros_like(forces), np.empty(len(forces), np.int64)
-    count = 0
+    means, totals, count = np.zeros((len(forces), 3)), np.zeros(len(forces)), 0
+    first = np.empty(len(forces), np.int64)
     for i in range(len(forces)):
         owner = 0
         while owner < count and squared_distance(points, i, points, first[owner]) > near**2:

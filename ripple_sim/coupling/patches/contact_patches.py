@@ -98,20 +98,33 @@ def find_patches(contacts: TargetContacts, pose: Pose, radii: Floats, convex: Bo
     for i in range(count):
         first, last = contacts.begins[i], contacts.begins[i + 1]
         local, pushing = in_frame(contacts.points[first:last], pose), contacts.forces[first:last]
-        middle = np.zeros(3)
-        for j in range(len(local)):
-            forces[i] += pushing[j]
-            middle += pushing[j] * local[j]
         used[i] = min(radii[contacts.target], radii[contacts.others[i]])
         at_corners, found = find_probes(local, pushing, used[i], convex[contacts.others[i]])
         corners[i] = len(at_corners)
-        points[begins[i]] = middle / forces[i]
+        forces[i] = _middle(local, pushing, points[begins[i]])
         probes[i] = row = begins[i] + 1 if corners[i] > 1 else begins[i]
         begins[i + 1] = row + len(found)
-        points[row : begins[i + 1]] = found
-        corner_forces[row : row + corners[i]] = at_corners
+        for j in range(len(found)):
+            for k in range(3):
+                points[row + j, k] = found[j, k]
+        for j in range(corners[i]):
+            corner_forces[row + j] = at_corners[j]
     end = begins[count]
     return Patches(contacts.others, forces, used, begins, probes, corners, points[:end], corner_forces[:end])
+
+
+@kernel
+def _middle(points: Floats, forces: Floats, middle: Floats) -> float:
+    """Fill in the force-weighted middle [3] of some points, and return the sum of the forces."""
+    total = 0.0
+    for i in range(len(forces)):
+        total += forces[i]
+    for k in range(3):
+        middle[k] = 0.0
+        for i in range(len(forces)):
+            middle[k] += forces[i] * points[i, k]
+        middle[k] /= total
+    return total
 
 
 @kernel
@@ -129,19 +142,24 @@ def find_load_points(patches: Patches, surface: Floats, texels: Ints, share: flo
     """
     most, begins = len(patches.points), np.zeros(len(patches.geoms) + 1, np.int64)
     geoms, points, forces, radii = np.empty(most, np.int64), np.empty((most, 3)), np.empty(most), np.empty(most)
-    places, nearest = np.empty((most, 3)), np.full(most, -1)
+    places, nearest = np.empty((most, 3)), np.empty(most, np.int64)
     for i in range(len(patches.geoms)):
         first, last = patches.probes[i], patches.begins[i + 1]
-        at_corners = share * patches.corner_forces[first : first + patches.corners[i]]
+        at_corners = np.empty(patches.corners[i])
+        for j in range(len(at_corners)):
+            at_corners[j] = share * patches.corner_forces[first + j]
         at, pushing, radius, rows = spread(
             at_corners, patches.points[first:last], surface[first:last], patches.radii[i]
         )
-        row = begins[i]
-        begins[i + 1] = row + len(pushing)
+        begins[i + 1] = begins[i] + len(pushing)
         for j in range(len(pushing)):
-            geoms[row + j], points[row + j] = patches.geoms[i], at[j]
-            forces[row + j], radii[row + j] = pushing[j], radius
+            row, probe = begins[i] + j, first + rows[j]
+            geoms[row], forces[row], radii[row], nearest[row] = patches.geoms[i], pushing[j], radius, -1
+            for k in range(3):
+                points[row, k] = at[j, k]
             if rows[j] >= 0:
-                places[row + j], nearest[row + j] = surface[first + rows[j]], texels[first + rows[j]]
-    n = begins[-1]
+                nearest[row] = texels[probe]
+                for k in range(3):
+                    places[row, k] = surface[probe, k]
+    n = begins[len(patches.geoms)]
     return LoadPoints(begins, geoms[:n], points[:n], forces[:n], radii[:n], places[:n], nearest[:n])

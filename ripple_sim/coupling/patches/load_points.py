@@ -79,40 +79,63 @@ def spread(corner_forces: Floats, probes: Floats, surface: Floats, radius: float
     rows : int64 [n]
         Which of the probes the points are, -1 for those that are none.
     """
-    count = len(corner_forces)
-    if len(probes) == count:
-        return probes, corner_forces, radius, np.arange(count)
+    if len(probes) == len(corner_forces):
+        rows = np.empty(len(probes), np.int64)
+        for i in range(len(rows)):
+            rows[i] = i
+        return probes, corner_forces, radius, rows
     forces, size = _probe_forces(corner_forces, probes, surface, radius)
-    touching = np.flatnonzero(forces)
+    touching = _touching(forces)
     if len(touching) < len(probes):
-        return probes[touching], forces[touching], radius, touching
-    total, middle = corner_forces.sum(), np.zeros(3)
-    for i in range(count):
-        for k in range(3):
-            middle[k] += corner_forces[i] / total * probes[i, k]
-    inset = np.empty_like(probes)
-    for i in range(len(probes)):
-        for k in range(3):
-            inset[i, k] = middle[k] + _INSET * (probes[i, k] - middle[k])
-    points, forces = merge_near(inset, forces, size / 8)
-    return points, forces, max(radius, _OVERLAP * size), np.full(len(forces), -1)
+        points, pushing = np.empty((len(touching), 3)), np.empty(len(touching))
+        for i in range(len(touching)):
+            pushing[i] = forces[touching[i]]
+            for k in range(3):
+                points[i, k] = probes[touching[i], k]
+        return points, pushing, radius, touching
+    total, inset = 0.0, np.empty((len(probes), 3))
+    for i in range(len(corner_forces)):
+        total += corner_forces[i]
+    for k in range(3):
+        middle = 0.0
+        for i in range(len(corner_forces)):
+            middle += corner_forces[i] / total * probes[i, k]
+        for i in range(len(probes)):
+            inset[i, k] = middle + _INSET * (probes[i, k] - middle)
+    points, pushing = merge_near(inset, forces, size / 8)
+    for i in range(len(pushing)):
+        touching[i] = -1
+    return points, pushing, max(radius, _OVERLAP * size), touching[: len(pushing)]
+
+
+@kernel
+def _touching(forces: Floats) -> Ints:
+    """Where there is a force."""
+    count, found = 0, np.empty(len(forces), np.int64)
+    for i in range(len(forces)):
+        if forces[i] != 0:
+            found[count] = i
+            count += 1
+    return found[:count]
 
 
 @kernel
 def _probe_forces(corner_forces: Floats, probes: Floats, surface: Floats, radius: float) -> tuple[Floats, float]:
     """Forces at the probes [N], [q], 0 for midpoints off the surface, and the size of the patch [m]."""
-    count, total = len(corner_forces), corner_forces.sum()
-    away = np.array([np.sqrt(squared_distance(surface, i, probes, i)) for i in range(len(probes))])
+    count, total, forces = len(corner_forces), 0.0, np.zeros(len(probes))
     # contact points lie a little outside the surface, by up to their depth: so may the midpoints
-    limit = away[:count].max() + radius / 10
-    forces = np.zeros(len(probes))
+    limit = 0.0
+    for i in range(count):
+        total += corner_forces[i]
+        limit = max(limit, np.sqrt(squared_distance(surface, i, probes, i)))
+    limit += radius / 10
     for i in range(count):
         forces[i] = corner_forces[i] ** 2 / total
     size, row = 0.0, count
     for i in range(count):
         for j in range(i + 1, count):
             share = corner_forces[i] * corner_forces[j] / total
-            if away[row] <= limit:
+            if np.sqrt(squared_distance(surface, row, probes, row)) <= limit:
                 forces[row] = 2 * share
             else:
                 # where there is no touch between two corners, they keep their shares

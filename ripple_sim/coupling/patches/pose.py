@@ -19,10 +19,9 @@ class Pose(NamedTuple):
 @kernel
 def in_frame(points: Floats, pose: Pose) -> Floats:
     """Points in the world [m], [k, 3], taken into the frame of a geom."""
-    local = np.empty_like(points)
+    local = np.zeros((len(points), 3))
     for i in range(len(points)):
         for k in range(3):
-            local[i, k] = 0.0
             for j in range(3):
                 local[i, k] += (points[i, j] - pose.position[j]) * pose.rotation[j, k]
     return local
@@ -31,7 +30,7 @@ def in_frame(points: Floats, pose: Pose) -> Floats:
 @kernel
 def in_world(points: Floats, pose: Pose) -> Floats:
     """Points in the frame of a geom [m], [k, 3], taken into the world."""
-    world = np.empty_like(points)
+    world = np.empty((len(points), 3))
     for i in range(len(points)):
         for k in range(3):
             across = 0.0

@@ -43,6 +43,19 @@ class Binding(IntEnum):
     OBJECTS = 5
 
 
+class Splitting(IntEnum):
+    """Bindings of the storage buffers of adaptive tessellation, all before those above; `NAME_BINDING` in GLSL."""
+
+    SPLIT = 0
+    LONG_EDGES = 1
+    LOOKUPS = 2
+    FACES = 3
+    BEFORE = 4
+    TOTALS = 5
+    INDICES = 6
+    COMMAND = 7
+
+
 class MappingKind(IntEnum):
     """How a texture lies on an object; the same names in GLSL."""
 
@@ -121,6 +134,7 @@ DEFINES: dict[str, object] = {
     "VERTEX_GROUP": VERTEX_GROUP,
     **numbered(Unit, "_UNIT"),
     **numbered(Binding, "_BINDING"),
+    **numbered(Splitting, "_BINDING"),
     **numbered(MappingKind),
     **{f"{name}_LEVEL": level for name, level in LEVELS.items()},
     **LIGHT.defines(),

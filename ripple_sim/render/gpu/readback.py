@@ -67,8 +67,8 @@ class Readback:
         if not self._pending:
             raise RippleError("no frame is on its way from the GPU; submit one before each that is fetched")
         buffer, fence = self._pending.popleft()
+        self._gl.wait_for(fence)
         with self._gl:
-            self._gl.wait_for(fence)
             buffer.read_into(self._pixels)
         self._free.append(buffer)
         frame = np.empty((*self._pixels.shape[:2], 4 if self._format.alpha else 3), self._pixels.dtype)

@@ -67,5 +67,5 @@ def _release(gl: GLContext, created: list[Any]) -> None:
         # a deleted framebuffer must not stay bound
         ctx.detect_framebuffer(0).use()
         for each in reversed(created):
-            each.release()
+            gl.release(each)
         created.clear()

@@ -18,6 +18,7 @@ from .background import CoarseBackground
 from .floor import Floor
 from .frame_pass import FramePass
 from .layers import TransparentLayers
+from .screen_bounds import scissor_of
 from .tiles import Tiles
 
 
@@ -113,13 +114,22 @@ class DeferredShading:
         ctx.depth_func = "=="
         self.frame.depth_mask = False
         self._shaded_background.run(self.frame, LEVELS["SHADED"])
-        self._shaded_background.run(self.frame, LEVELS["MIXED"])
-        self._solids.run(self.frame, LEVELS["SOLID"])
-        ctx.enable(moderngl.BLEND)
-        ctx.blend_func = moderngl.ONE, moderngl.ONE
-        self._solids.run(self.frame, LEVELS["MIXED"])
+        self._shade_solids(ctx, scissor_of(boxes))
         self.frame.depth_mask = True
         ctx.depth_func = "<="
+
+    def _shade_solids(self, ctx: moderngl.Context, scissor: tuple[int, int, int, int] | None) -> None:
+        """Shade pixels with solids: first what the background contributes, where it shows too."""
+        if scissor is None:
+            return
+        # a software driver also takes its time over pixels that the depth test leaves out
+        self.frame.scissor = scissor
+        self._shaded_background.run(self.frame, LEVELS["MIXED"])
+        ctx.enable(moderngl.BLEND)
+        ctx.blend_func = moderngl.ONE, moderngl.ONE
+        ctx.depth_func = ">="  # solids in some or all of the samples
+        self._solids.run(self.frame, LEVELS["MIXED"])
+        self.frame.scissor = (0, 0, *self.frame.size)
 
 
 def _check_size(resources: Resources, size: tuple[int, int]) -> None:

@@ -17,6 +17,7 @@ out vec4 fragment;
 const float FULL_LIGHT = 0.70;  // sRGB value from which a heatmap's colour is shown as it is
 const float DARKEST = 0.45;
 const float NEUTRAL = 0.62;     // albedo under a heatmap
+const float CREASE = 0.35;      // difference of the unit normals of two pixels: a radius of three pixels
 const vec3 INK = vec3(0.09, 0.11, 0.16);
 
 #if LAYER
@@ -53,8 +54,11 @@ SurfaceSample surface_sample(ivec2 pixel, int s)
     surface.ink = blue_ink.y;
     Object object = objects[surface.object];
     vec2 place = color.xy * vec2(textureSize(height_maps, 0).xy);
-    vec4 ripple = spline_at(height_maps, vec3(place, object.height_map.x));
-    ripple *= object.height_map.y > 0.0 ? (unpack_inner(normal.z) ? -1.0 : 1.0) : 0.0;
+    vec4 ripple = vec4(0.0);
+    // a loop, not a branch: see light_visibility
+    int looks = int(object.height_map.y);
+    for (int i = 0; i < looks; ++i)
+        ripple = spline_at(height_maps, vec3(place, object.height_map.x)) * (unpack_inner(normal.z) ? -1.0 : 1.0);
     surface.rippled = normalize(surface.normal - object.rotation * ripple.xyz);
     // cavity occlusion: less light reaches the troughs
     surface.visibility = baked.x * (1.0 - 0.4 * smoothstep(0.0, 0.03, -ripple.w / object.place.y));
@@ -69,11 +73,14 @@ bvec2 same_beside(SurfaceSample surface, float at)
     return bvec2(dFdx(object) == 0.0 && abs(dFdx(at)) < 0.02 * at, dFdy(object) == 0.0 && abs(dFdy(at)) < 0.02 * at);
 }
 
-// Variance of the normals in the pixel, which widens highlights (specular antialiasing).
+// Variance of the normals in the pixel, which widens highlights (specular antialiasing). Creases do not count: both of
+// their sides are sharp.
 float spread_of(SurfaceSample surface, bvec2 same)
 {
     vec3 across = dFdx(surface.rippled), up = dFdy(surface.rippled);
-    return min(0.5 * ((same.x ? dot(across, across) : 0.0) + (same.y ? dot(up, up) : 0.0)), 0.2);
+    bool smooth_across = same.x && length(dFdx(surface.normal)) < CREASE;
+    bool smooth_up = same.y && length(dFdy(surface.normal)) < CREASE;
+    return min(0.5 * ((smooth_across ? dot(across, across) : 0.0) + (smooth_up ? dot(up, up) : 0.0)), 0.2);
 }
 
 // Colour and opacity; `spread` is the variance of the normals in the pixel, `block` says which neighbours in the block of

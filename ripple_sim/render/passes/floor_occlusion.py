@@ -55,16 +55,17 @@ class FloorOcclusion:
         if floor is None:
             return
         top = floor.half_width
-        # height above the floor becomes depth; this mirrors the scene, so nothing is culled
+        # height above the floor becomes depth; this mirrors the scene: what faces the floor goes clockwise
         view = np.eye(4)
         view[:3, :3] = np.diag([1.0, 1.0, -1.0]) @ floor.rotation.T
         view[:3, 3] = -view[:3, :3] @ (floor.origin + floor.rotation[:, :2] @ floor.centre[:2])
         matrix = orthographic(floor.half_width, top) @ view
         self._ceiling_framebuffer.use()
-        ctx.disable(moderngl.CULL_FACE)
-        ctx.enable(moderngl.DEPTH_TEST)
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        ctx.front_face = "cw"
         self._ceiling_framebuffer.clear(depth=1.0)
         draw_depth(tuple(matrix.T.ravel()))
+        ctx.front_face = "ccw"
         self._map_framebuffer.use()
         ctx.disable(moderngl.DEPTH_TEST)
         shadows.bind()

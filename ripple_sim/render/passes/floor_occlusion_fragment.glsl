@@ -11,8 +11,8 @@ uniform vec3 extent;  // width of the map [m], height of its top [m], radius of 
 in vec2 screen;
 out vec4 fragment;  // r: ambient visibility; g: 1 where a shadow may fall
 
-const int TAPS = 48;
-const int SHADOW_TAPS = 16;
+const int TAPS = 28;
+const int SHADOW_TAPS = 10;
 
 // Whether anything shades any of a texel of the floor, which is `texel` wide [m].
 bool is_shaded(int light, vec3 world, float texel)

@@ -16,6 +16,7 @@ from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.gpu.textures import SRGB8_ALPHA8
 
 from .frame_pass import FramePass
+from .screen_bounds import scissor_of
 
 
 class TransparentLayers:
@@ -62,11 +63,9 @@ class TransparentLayers:
         boxes : int64 [k, 4]
             Where it may show; see `boxes_of`.
         """
-        boxes = boxes[(boxes[:, :2] < boxes[:, 2:]).all(axis=1)]
-        if not len(boxes):
+        scissor = scissor_of(boxes)
+        if scissor is None:
             return
-        left, lower = (int(edge) for edge in boxes[:, :2].min(axis=0))
-        right, upper = (int(edge) for edge in boxes[:, 2:].max(axis=0))
         self._g_buffer.use(ctx)
         draw()
         frame = self._frame
@@ -75,7 +74,7 @@ class TransparentLayers:
         frame.use()
         ctx.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-        frame.scissor = left, lower, right - left, upper - lower
+        frame.scissor = scissor
         self._behind.use(Unit.BEHIND)
         for each in (self._classify, self._shade):
             each.program["layer"] = number

@@ -44,3 +44,13 @@ def boxes_of(balls: Balls, pose: Pose, size: tuple[int, int]) -> NDArray[np.int6
     boxes[seen, 2:] = np.clip(np.ceil(origin + scale * corners.max(axis=0)), 0, size)
     boxes[far <= 0] = 0
     return boxes
+
+
+def scissor_of(boxes: NDArray[np.int64]) -> tuple[int, int, int, int] | None:
+    """Smallest scissor (left, lower, width, height) about boxes [k, 4]; None if all are empty."""
+    boxes = boxes[(boxes[:, :2] < boxes[:, 2:]).all(axis=1)]
+    if not len(boxes):
+        return None
+    left, lower = (int(edge) for edge in boxes[:, :2].min(axis=0))
+    right, upper = (int(edge) for edge in boxes[:, 2:].max(axis=0))
+    return left, lower, right - left, upper - lower

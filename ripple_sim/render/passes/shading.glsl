@@ -37,9 +37,14 @@ float ggx(float n_h, float roughness)
     return a2 / (d * d);
 }
 
+float fifth_power(float x)
+{
+    return x * x * (x * x) * x;
+}
+
 vec3 fresnel(vec3 f0, float cosine)
 {
-    return f0 + (1.0 - f0) * pow(max(1.0 - cosine, 0.0), 5.0);
+    return f0 + (1.0 - f0) * fifth_power(max(1.0 - cosine, 0.0));
 }
 
 vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_geom, float spread)
@@ -84,12 +89,14 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     around *= mix(m.albedo * (1.0 - open) + open, vec3(1.0), open);
     vec3 base = m.albedo * (direct + around) * (1.0 - m.metallic) + m.translucency * m.albedo * glow;
     base += m.emission * m.albedo;
+#if LAYER
     // transparent objects show what is behind them, refracted, and tinted by their thickness
     base = mix(base, m.behind * pow(m.albedo, vec3(0.15 + 0.8 * m.thickness)), m.transparency);
-    base += m.sheen * m.albedo * around * pow(1.0 - n_v, 3.0);
+#endif
+    base += m.sheen * m.albedo * around * ((1.0 - n_v) * (1.0 - n_v) * (1.0 - n_v));
 
     float hidden = clamp(open * open + 0.15, 0.0, 1.0);
-    vec3 at_edge = f0 + (max(vec3(1.0 - rough), f0) - f0) * pow(1.0 - n_v, 5.0);
+    vec3 at_edge = f0 + (max(vec3(1.0 - rough), f0) - f0) * fifth_power(1.0 - n_v);
     vec3 gloss = environment(reflected, rough, mirrored) * at_edge * hidden + highlight;
     float coat = m.coat * fresnel(vec3(0.04), n_v).x;
     vec3 film = environment(reflected, 0.06, mirrored) * hidden;

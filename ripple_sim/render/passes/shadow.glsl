@@ -6,7 +6,7 @@
 layout(binding = SHADOW_TEST_UNIT) uniform sampler2DShadow shadow_test;
 layout(binding = SHADOW_MAPS_UNIT) uniform sampler2D shadow_maps;
 
-const int SEARCH_TAPS = 10;
+const int SEARCH_TAPS = 5;
 const int FILTER_TAPS = 16;
 
 // Texture coordinates of a point of one light's map.

@@ -15,7 +15,8 @@ from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.projection import orthographic, perspective
 from ripple_sim.render.visuals.lights import Light
 
-_SIZE = 1536
+# Texels along a side: as many as make one about as wide as a pixel, where the casters fill the frame.
+_LEAST, _MOST, _PER_PIXEL, _STEP = 512, 1536, 1.4, 256
 _WIDEST = 0.022  # penumbra, as a share of the map
 _STEEPEST_FOV = 130.0  # [degrees]
 _REACH = 30.0  # how far behind the casters shadows fall, in radii of the casters' ball
@@ -29,12 +30,15 @@ class ShadowMaps:
     resources : Resources
     count : int
         How many lights may cast shadows, 1 to MAX_SHADOWS.
+    height : int
+        Of the frame [pixels].
     """
 
-    def __init__(self, resources: Resources, count: int) -> None:
+    def __init__(self, resources: Resources, count: int, height: int) -> None:
         self._count = count
+        self._size = size = int(np.clip(_STEP * round(_PER_PIXEL * height / _STEP), _LEAST, _MOST))
         self._views: list[tuple[float, ...]] = []
-        self._depth = resources.depth_texture((count * _SIZE, _SIZE))
+        self._depth = resources.depth_texture((count * size, size))
         self._depth.compare_func = ""
         self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._target = resources.framebuffer(depth_attachment=self._depth)
@@ -52,7 +56,7 @@ class ShadowMaps:
         self._views = []
         for shadow, light in zip(frame.values["shadows"], casting, strict=False):
             aim = _fit_far if light.position is None else _fit_near
-            matrix = aim(shadow, light, centre, radius)
+            matrix = aim(shadow, light, self._size, centre, radius)
             to_map = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1]]) @ matrix
             shadow["matrix"], shadow["planes"] = to_map.T, np.linalg.inv(to_map)
             self._views.append(tuple(matrix.T.ravel()))
@@ -61,7 +65,7 @@ class ShadowMaps:
     def draw(self, draw_depth: Callable[[tuple[float, ...]], None]) -> None:
         """Draw all maps; `draw_depth` draws the casters' depth under a matrix of 16 numbers."""
         for index, view in enumerate(self._views):
-            self._target.viewport = (index * _SIZE, 0, _SIZE, _SIZE)
+            self._target.viewport = (index * self._size, 0, self._size, self._size)
             self._target.use()
             if index == 0:
                 self._target.clear(depth=1.0)
@@ -74,25 +78,25 @@ class ShadowMaps:
         self._depth.use(Unit.SHADOW_MAPS)
 
 
-def _fit_far(shadow: NDArray, light: Light, centre: NDArray, radius: float) -> NDArray[np.float64]:
+def _fit_far(shadow: NDArray, light: Light, size: int, centre: NDArray, radius: float) -> NDArray[np.float64]:
     """Fit a box to the ball; it grows in coarse steps and moves by whole texels, so that shadow edges do not crawl.
 
     It extends behind the ball, where the shadows fall.
     """
     half_width = 2.0 ** (np.ceil(4 * np.log2(radius)) / 4)
-    texel = 2 * half_width / _SIZE
+    texel = 2 * half_width / size
     rotation = _axes(light.direction)
     eye = rotation @ centre
     eye[:2] = np.round(eye[:2] / texel) * texel
     eye[2] += half_width
     depth = (2 + _REACH) * half_width
     shadow["depth"] = depth, 0, 0, 1
-    shadow["width"] = 2 * half_width, 0, _SIZE, 0
+    shadow["width"] = 2 * half_width, 0, size, 0
     shadow["penumbra"] = light.size, 0, _WIDEST, 0
     return orthographic(half_width, depth) @ _view(rotation, eye)
 
 
-def _fit_near(shadow: NDArray, light: Light, centre: NDArray, radius: float) -> NDArray[np.float64]:
+def _fit_near(shadow: NDArray, light: Light, size: int, centre: NDArray, radius: float) -> NDArray[np.float64]:
     """Fit the light's view to the ball, no wider than its beam."""
     position: Any = light.position
     away = float(np.linalg.norm(centre - position))
@@ -103,7 +107,7 @@ def _fit_near(shadow: NDArray, light: Light, centre: NDArray, radius: float) -> 
     far = away + _REACH * radius
     near = max(0.5 * (away - radius), 0.004 * far)
     shadow["depth"] = 0, near * far, near - far, far
-    shadow["width"] = 0, 2 * np.tan(half), _SIZE, 0
+    shadow["width"] = 0, 2 * np.tan(half), size, 0
     shadow["penumbra"] = 0, light.size, _WIDEST, 0
     rotation = _axes(towards)
     return perspective(float(np.degrees(2 * half)), 1.0, near, far) @ _view(rotation, rotation @ position)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver.kernel import Bools, Floats, Floats32, Ints32, kernel
 from ripple_sim.solver.texels.chart_page import ChartPage
 
+from .spline_heights import spline_heights, spline_samples
 from .tessellation import Edges
 
 
@@ -37,6 +38,17 @@ class AdaptiveTessellation:
     ----------
     base_count : int
         Number n of vertices, without midpoints.
+    faces, sides : int32 [m, 3]
+        Triangles, and their edges.
+    length : float64 [k]
+        Of the edges [m].
+    long : int32 [l]
+        Edges that may be split.
+    ends : int32 [l, 2]
+        Lookups of their ends; those of their midpoints are the last l.
+    texel, offset : int32 and float32, [..., 3] and [..., 2]
+        Of each lookup: chart, row and column of the first of the 3 x 3 texels about it, in a chart with its halo, and
+        how far it is off their centre, in rows and columns.
     """
 
     def __init__(
@@ -50,53 +62,29 @@ class AdaptiveTessellation:
         min_length: float,
     ) -> None:
         self.base_count = len(positions) - len(edges.ends)
-        self._faces, self._sides = np.asarray(F, np.int32), np.asarray(edges.of_side, np.int32)
-        self._length = np.linalg.norm(positions[edges.ends[:, 1]] - positions[edges.ends[:, 0]], axis=1)
-        self._tolerance = np.float32(tolerance)
+        self.faces, self.sides = np.asarray(F, np.int32), np.asarray(edges.of_side, np.int32)
+        self.length = np.linalg.norm(positions[edges.ends[:, 1]] - positions[edges.ends[:, 0]], axis=1)
+        self.tolerance = np.float32(tolerance)
         # heights are looked up at the ends of the edges that may be split, and then at these edges' midpoints
-        self._long = np.flatnonzero(self._length >= min_length).astype(np.int32)
-        ends, index = np.unique(edges.ends[self._long], return_inverse=True)
-        self._ends = index.reshape(-1, 2).astype(np.int32)
-        chart, row, column = page.locate(places[np.concatenate([ends, self.base_count + self._long])])
-        place = np.stack([row, column], axis=1)
-        nearest = np.clip(np.floor(place + 0.5), 0, page.resolution - 1)
-        # the first of the 3 x 3 texels about each point, in a chart with its halo, and how far off the centre it is
-        self._texel = np.column_stack([chart, nearest]).astype(np.int32)
-        self._offset = (place - nearest).astype(np.float32)
+        self.long = np.flatnonzero(self.length >= min_length).astype(np.int32)
+        ends, index = np.unique(edges.ends[self.long], return_inverse=True)
+        self.ends = index.reshape(-1, 2).astype(np.int32)
+        self.texel, self.offset = spline_samples(page, places[np.concatenate([ends, self.base_count + self.long])])
 
     def __call__(self, height_map: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Triangles [t, 3] for a height map [C, n + 2, n + 2, 4], and the midpoints [s], as vertices, that they use.
 
         Where no edge is split, the triangles are the same array each time.
         """
-        whole = self._faces, np.empty(0, np.int32)
-        if not len(self._long) or not height_map[..., 3].any():
+        whole = self.faces, np.empty(0, np.int32)
+        if not len(self.long) or not height_map[..., 3].any():
             return whole
-        split = self._long[_departing(_heights(height_map, self._texel, self._offset), self._ends, self._tolerance)]
+        split = self.long[_departing(spline_heights(height_map, self.texel, self.offset), self.ends, self.tolerance)]
         if not len(split):
             return whole
-        midpoint = np.full(len(self._length), -1, np.int32)
+        midpoint = np.full(len(self.length), -1, np.int32)
         midpoint[split] = used = np.int32(self.base_count) + split
-        return _triangles(self._faces, self._sides, midpoint, self._length), used
-
-
-@kernel
-def _heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Floats32:
-    """Heights [k] by the quadratic B-spline of spline.glsl: at offsets [k, 2] in texels [k, 3] (chart, row, column)."""
-    height = np.empty(len(texel), np.float32)
-    half = np.float32(0.5)
-    for i in range(len(texel)):
-        chart, row, column = texel[i]
-        s, t = offset[i]
-        left, right = half * (half - t) * (half - t), half * (half + t) * (half + t)
-        middle = np.float32(0.75) - t * t
-        line = np.empty(3, np.float32)
-        for k in range(3):
-            across = height_map[chart, row + k]
-            line[k] = left * across[column, 3] + middle * across[column + 1, 3] + right * across[column + 2, 3]
-        height[i] = half * (half - s) ** 2 * line[0] + (np.float32(0.75) - s * s) * line[1]
-        height[i] += half * (half + s) ** 2 * line[2]
-    return height
+        return _triangles(self.faces, self.sides, midpoint, self.length), used
 
 
 @kernel

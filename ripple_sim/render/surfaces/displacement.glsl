@@ -9,7 +9,7 @@ layout(local_size_x = VERTEX_GROUP) in;
 struct Vertex { float position[3], direction[3], place[2]; };
 layout(std430, binding = REST_VERTICES_BINDING) readonly buffer RestVertices { Vertex rest[]; };
 layout(std430, binding = MOVED_VERTICES_BINDING) writeonly buffer MovedVertices { vec4 moved[]; };
-layout(std430, binding = MIDPOINTS_BINDING) readonly buffer Midpoints { int midpoints[]; };  // used by this frame
+layout(std430, binding = MIDPOINTS_BINDING) readonly buffer Midpoints { int midpoints[]; };
 
 uniform mat3 rotation;
 uniform vec3 origin;
@@ -17,14 +17,19 @@ uniform int count, base_count;
 uniform float layer;
 uniform float geom;
 uniform int occluder_count;
+uniform bool flagged;  // midpoints are not a list of those in use, but say of each whether it is
 
 void main()
 {
     int i = int(gl_GlobalInvocationID.x);
     if (i >= count)
         return;
-    if (i >= base_count)
-        i = midpoints[i - base_count];
+    if (i >= base_count) {
+        int midpoint = midpoints[i - base_count];
+        if (flagged && midpoint == 0)
+            return;
+        i = flagged ? i : midpoint;
+    }
     Vertex v = rest[i];
     float height = spline_at(height_maps, vec3(v.place[0], v.place[1], layer)).w;
     vec3 direction = vec3(v.direction[0], v.direction[1], v.direction[2]);

@@ -9,7 +9,6 @@ from typing import Any
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from ripple_sim.render.color import srgb_to_linear
 from ripple_sim.render.gpu.contract import MappingKind
@@ -20,6 +19,7 @@ from ripple_sim.render.visuals.materials import look_of
 from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of
 from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.solver.errors import RippleError
+from ripple_sim.solver.image_file import read_image
 
 from .charts import Charts
 from .heatmap import UNDER_HEATMAP
@@ -64,7 +64,8 @@ class Surface:
         """Whether it has a rim."""
         F = np.asarray(self.F, dtype=np.int64)
         ends = np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        return bool((np.unique(ends, axis=0, return_counts=True)[1] == 1).any())
+        edges = ends[:, 0] * (ends.max(initial=0) + 1) + ends[:, 1]  # one number an edge sorts ten times as fast as two
+        return bool((np.unique(edges, return_counts=True)[1] == 1).any())
 
 
 def appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[np.float64], Mapping]:
@@ -96,8 +97,5 @@ def target_color(model: Any, geom: int, look: str, given: tuple[float, float, fl
 
 def load_image(resources: Resources, surface: Surface) -> moderngl.Texture:
     """Upload the texture of a surface, or raise `RippleError` if its file cannot be read."""
-    try:
-        image = Image.open(str(surface.image)).convert("RGB")
-    except OSError as error:
-        raise RippleError(f"texture image {surface.image} cannot be read: {error}") from error
-    return srgb_texture(resources, np.asarray(image))
+    pixels = read_image(RippleError, str(surface.image), "texture image", lambda mode: "RGB")
+    return srgb_texture(resources, pixels)

@@ -59,10 +59,11 @@ class SurfaceDrawing:
         depth = resources.program("surfaces/surface_depth_vertex", "glsl/depth_fragment")
         attributes = vertices.attributes
         mapped = mapped_coordinates(attributes, mapping)
-        columns = [attributes[:, NORMAL], vertices.places, attributes[:, BAKED], mapped]
+        self._normals = resources.buffer(attributes[:, NORMAL].astype("f4").tobytes())
+        columns = [vertices.places, attributes[:, BAKED], mapped]
         still = resources.buffer(np.concatenate(columns, axis=1).astype("f4").tobytes())
-        names = ("in_normal", "in_place", "in_baked", "in_mapped")
-        content = [(moved, "4f", "in_moved"), (still, "3f 2f 3f 3f", *names)]
+        names = ("in_place", "in_baked", "in_mapped")
+        content = [(moved, "4f", "in_moved"), (self._normals, "3f", "in_normal"), (still, "2f 3f 3f", *names)]
         # what a program does not use is optimised away
         self._solid = resources.vertex_array(self._program, content, indices, skip_errors=True)
         self._depth = resources.vertex_array(depth, content[:1], indices)
@@ -89,17 +90,31 @@ class SurfaceDrawing:
         if self._heatmap is not None:
             self._heatmap.set(values, limit)
 
-    def draw(self, rotation: NDArray[np.float64], count: int) -> None:
-        """Draw the first `count` indices into the G-buffer; normals are turned by the rotation, [3, 3]."""
+    def move(self, normals: NDArray[np.float32]) -> None:
+        """Replace the vertices' normals, [n, 3]."""
+        self._normals.write(normals)
+
+    def draw(self, rotation: NDArray[np.float64], count: int | moderngl.Buffer) -> None:
+        """Draw the first `count` indices into the G-buffer; normals are turned by the rotation, [3, 3].
+
+        The count is a number, or an indirect draw call's buffer.
+        """
         if self._image is not None:
             self._image.use(self._paint.mapping.unit)
         if self._heatmap is not None:
             self._heatmap.use(self._program)
         self._program["rotation"] = tuple(rotation.T.ravel())
         self._program["color"] = self._paint.color
-        self._solid.render(vertices=count)
+        _render(self._solid, count)
 
-    def draw_depth(self, view_projection: tuple[float, ...], count: int) -> None:
+    def draw_depth(self, view_projection: tuple[float, ...], count: int | moderngl.Buffer) -> None:
         """Draw the depth of the first `count` indices, under a matrix of 16 numbers, column by column."""
         self._depth.program["view_projection"] = view_projection
-        self._depth.render(vertices=count)
+        _render(self._depth, count)
+
+
+def _render(triangles: moderngl.VertexArray, count: int | moderngl.Buffer) -> None:
+    if isinstance(count, moderngl.Buffer):
+        triangles.render_indirect(count, count=1)
+    else:
+        triangles.render(vertices=count)

@@ -9,22 +9,26 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.model.soft_ids import is_soft
 from ripple_sim.render.bounds import Balls, balls_about
 from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.solver.errors import RippleError
 
 from .adaptive_tessellation import AdaptiveTessellation
 from .charts import Charts
+from .device_tessellation import DeviceTessellation
 from .displacement import Displacement, Place
-from .height_maps import HeightMapTextures
+from .height_maps import AnyHeightMap, HeightMapTextures, MovedHeightMap
+from .kept_vertices import bounded_vertices
+from .moving_vertices import MovingVertices
 from .surface import Surface, appearance
 from .surface_drawing import Paint, SurfaceDrawing
-from .vertices import POSITION, SurfaceVertices, surface_vertices
+from .vertices import DIRECTION, NORMAL, POSITION, SurfaceVertices
 
-_PIXELS = 4.0  # length of an edge where the target fills the frame's height
-_PIXELS_PER_FACE = 48  # of the frame
+_PIXELS = 5.6  # length of an edge where the target fills the frame's height
+_PIXELS_PER_FACE = 96  # of the frame
 _TOLERANCE = 0.15  # [pixels], likewise: edges from which the waves depart further are split
-_BALLS = 16  # that bound the mesh
+_BALLS = 16  # that bound a mesh that moves
 _NO_SHADOW = 0.75  # transparency from which a target casts no shadow
 _HIGHEST_BIAS = 0.05  # of shadows, in radii
 
@@ -65,7 +69,10 @@ class SurfaceMesh:
     ) -> None:
         self.geom, self._charts, self._open, self._gl = geom, surface.charts, surface.open, assets.resources.gl
         self._objects, self._height_maps, self._layer = assets.objects, height_maps, index
-        self._radius = float(np.linalg.norm(surface.V, axis=1).max())
+        self._middle = np.zeros(3)  # of what is soft its own, of a geom that of its frame
+        if is_soft(assets.model, geom):
+            self._middle = (surface.V.min(axis=0) + surface.V.max(axis=0)) / 2
+        self._radius = self._reach = float(np.linalg.norm(surface.V - self._middle, axis=1).max())
         look, rgb, mapping = appearance(assets.model, geom, surface)
         self.transparent = look.transparency > 0.0
         self.casts_shadow = look.transparency < _NO_SHADOW
@@ -77,25 +84,33 @@ class SurfaceMesh:
             height_map=index,
         )
         pixel = 2 * self._radius / size[1]
-        vertices = surface_vertices(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
-        middle = len(vertices.attributes) - len(vertices.edges.ends) + vertices.edges.of_side
-        corners = np.concatenate([vertices.F, middle])
-        self._balls = balls_about(vertices.attributes[:, POSITION][corners], _BALLS)
+        vertices, self._balls = bounded_vertices(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
         self._tessellation = _adaptive(vertices, surface.charts, pixel)
-        self._triangles: NDArray[np.int32] | None = None  # on the GPU
+        self._triangles: NDArray[np.int32] | None = None  # on the GPU, from the host
+        self._resources = assets.resources
+        self._on_device: DeviceTessellation | None = None
+        self._midpoints: NDArray[np.int32] | moderngl.Buffer
+        self._index_count: int | moderngl.Buffer
         self._displacement = Displacement(assets.resources, vertices, geom=geom, layer=index)
         self._indices = assets.resources.buffer(reserve=4 * 12 * len(vertices.F), dynamic=True)
         paint = Paint(surface, mapping, (*rgb, float(self.number)))
         self._drawing = SurfaceDrawing(assets, paint, vertices, self._displacement.moved, self._indices)
+        self._mesh, self._vertices = (surface.V, surface.F), vertices
+        self._moving: MovingVertices | None = None
 
-    def update(self, ctx: moderngl.Context, place: Place, height_map: NDArray[np.float32] | None) -> None:
-        """Displace the vertices by a height map [C, n + 2, n + 2, 4] (none: flat) where the geom is.
+    def ripple(self, ctx: moderngl.Context, height_map: AnyHeightMap | None) -> None:
+        """Take in a height map [C, n + 2, n + 2, 4] (none: flat), and find the triangles for it.
+
+        Storage buffers are bound for that; `update` displaces the vertices.
 
         Raises
         ------
         RippleError
             If the height map has another shape.
         """
+        if isinstance(height_map, MovedHeightMap):
+            self._move(height_map.V)
+            height_map = height_map.height_map
         shape = (*self._charts.halo_shape, 4)
         if height_map is None:
             height_map = np.zeros(shape, dtype=np.float32)
@@ -104,17 +119,52 @@ class SurfaceMesh:
                 f"the height map of geom {self.geom} has shape {list(height_map.shape)}; valid is {list(shape)}: "
                 "charts with a halo of one texel, gradient and height"
             )
-        self._pose, self._highest = (place.rotation, place.origin), float(np.abs(height_map[..., 3]).max())
+        if not isinstance(height_map, np.ndarray) and height_map.gl is not self._gl:
+            height_map = np.asarray(height_map)  # it is in the memory of another device
+        self._highest = self._height_maps.write(self._layer, height_map)
+        if isinstance(height_map, np.ndarray):
+            self._find_triangles(height_map)
+        else:
+            self._find_triangles_on_device(ctx)
+
+    def update(self, ctx: moderngl.Context, place: Place) -> None:
+        """Displace the vertices by the height map where the geom is."""
+        self._pose = place.rotation, place.origin
         bias = min(1.5 * self._highest, _HIGHEST_BIAS * self._radius)
         self._objects.set_height_map(self.number, bias, place.rotation)
-        triangles, midpoints = self._tessellation(height_map)
+        self._height_maps.bind()
+        self._displacement.run(ctx, place, self._midpoints)
+
+    def _move(self, V: NDArray[np.float64]) -> None:
+        """Take the vertices along with those of the mesh, [n, 3] [m]."""
+        if self._moving is None:
+            attributes = self._vertices.attributes
+            rest = (attributes[:, columns] for columns in (POSITION, DIRECTION, NORMAL))
+            self._moving = MovingVertices(*self._mesh, *rest)
+        moved = self._moving(V)
+        self._displacement.move(moved.points, moved.directions)
+        self._drawing.move(moved.normals)
+        self._balls = balls_about(V[self._mesh[1]], _BALLS)
+        self._middle = (V.min(axis=0) + V.max(axis=0)) / 2
+        # in steps, so that shadow maps stay as they are while the surface wobbles
+        need = 1.02 * float(np.linalg.norm(V - self._middle, axis=1).max())
+        self._reach = max(self._reach, float(2 ** (np.ceil(8 * np.log2(need)) / 8)))
+
+    def _find_triangles(self, height_map: NDArray[np.float32]) -> None:
+        triangles, self._midpoints = self._tessellation(height_map)
         if triangles is not self._triangles:
             self._indices.write(triangles)
             self._triangles = triangles
         self._index_count = triangles.size
-        self._height_maps.write(self._layer, height_map)
+
+    def _find_triangles_on_device(self, ctx: moderngl.Context) -> None:
+        if self._on_device is None:
+            self._on_device = DeviceTessellation(
+                self._resources, self._tessellation, self._charts.page, self._layer, self._indices
+            )
         self._height_maps.bind()
-        self._displacement.run(ctx, place, midpoints)
+        self._on_device.run(ctx)
+        self._midpoints, self._index_count, self._triangles = self._on_device.split, self._on_device.command, None
 
     def set_heatmap(self, values: NDArray[np.float32], limit: float) -> None:
         """Replace the heatmap's values, [C, n + 2, n + 2] with a halo; the colours range from -limit to limit.
@@ -130,7 +180,8 @@ class SurfaceMesh:
 
     def ball(self) -> Balls:
         """Ball about the geom's origin that contains the displaced mesh; it stays the same as the geom turns."""
-        return Balls(self._pose[1][None], np.array([self._radius + self._highest]))
+        rotation, origin = self._pose
+        return Balls((origin + rotation @ self._middle)[None], np.array([self._reach + self._highest]))
 
     def balls(self) -> Balls:
         """Balls that together contain the displaced mesh."""
@@ -142,14 +193,10 @@ class SurfaceMesh:
         with self._sides():
             self._drawing.draw(self._pose[0], self._index_count)
 
-    def draw_shadow(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the depth of the sides that are shown, as `draw_depth` does without culling."""
-        with self._sides():
-            self.draw_depth(view_projection)
-
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth only, under a matrix of 16 numbers, column by column."""
-        self._drawing.draw_depth(view_projection, self._index_count)
+        with self._sides():
+            self._drawing.draw_depth(view_projection, self._index_count)
 
     @contextlib.contextmanager
     def _sides(self) -> Iterator[None]:

@@ -6,6 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+_ASTRAY = 60.0  # [degrees] between a triangle's normal and the one that it shares at a vertex
 
 
 class SplitMesh(NamedTuple):
@@ -51,31 +55,48 @@ def split_corners(
 
 def smooth_normals(V: NDArray, F: NDArray) -> NDArray[np.float64]:
     """One normal a vertex, shape [n, 3]; zero where a vertex has no triangle."""
-    smooth = np.zeros((len(V), 3))
-    smooth[F] = corner_normals(V, F, crease=180.0)
-    return smooth
+    return _sums(_weighted(V, F), F.ravel(), len(V))
 
 
 def corner_normals(V: NDArray, F: NDArray, crease: float = 45.0) -> NDArray[np.float64]:
     """Angle-weighted unit normals of every triangle's corners, shape [m, 3, 3].
 
-    Triangles at more than `crease` degrees to the corner's own do not count, so sharp edges stay sharp; 180 gives one
-    smooth normal a vertex.
+    The triangles round a vertex share one normal from crease to crease, edges that bend by more than `crease` degrees:
+    sharp edges stay sharp and run out smoothly where they end. A triangle that is turned far away from that normal, as
+    at the tip of a cone, keeps its own.
     """
-    triangle = triangle_normals(V, F)
-    weighted = (_corner_angles(V, F)[:, :, None] * triangle[:, None, :]).reshape(-1, 3)
-    # every ordered pair of corners that share a vertex
-    corners = np.argsort(F.ravel(), kind="stable")
-    degree = np.bincount(F.ravel(), minlength=len(V))
-    count = degree[F.ravel()[corners]]
-    one = np.repeat(np.arange(len(corners)), count)
-    start = np.repeat((np.cumsum(degree) - degree)[F.ravel()[corners]], count)
-    other = start + np.arange(len(one)) - np.repeat(np.cumsum(count) - count, count)
-    one, other = corners[one], corners[other]
-    close = np.einsum("ij,ij->i", triangle[one // 3], triangle[other // 3]) >= np.cos(np.radians(crease)) - 1e-9
-    normals = np.zeros_like(weighted)
-    np.add.at(normals, one[close], weighted[other[close]])
-    return normalized(normals).reshape(len(F), 3, 3)
+    own = np.repeat(triangle_normals(V, F), 3, axis=0)
+    fan = _fans(F, own[::3], crease)
+    shared = _sums(_weighted(V, F), fan, len(fan))[fan]
+    far = (np.einsum("ij,ij->i", shared, own) < np.cos(np.radians(_ASTRAY))) & own.any(axis=1)
+    return np.where(far[:, None], own, shared).reshape(len(F), 3, 3)
+
+
+def _fans(F: NDArray, triangle: NDArray[np.float64], crease: float) -> NDArray[np.int64]:
+    """Numbers of the corners [3 m] that are equal where their triangles hang together round a vertex."""
+    ends = np.stack([F, np.roll(F, -1, axis=1)], axis=2).reshape(-1, 2)
+    number = np.arange(F.size).reshape(F.shape)
+    corners = np.stack([number, np.roll(number, -1, axis=1)], axis=2).reshape(-1, 2)
+    corners = np.take_along_axis(corners, ends.argsort(axis=1), axis=1)
+    _, edge, count = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(edge.ravel(), kind="stable")
+    one, other = order[count[edge.ravel()[order]] == 2].reshape(-1, 2).T
+    a, b = triangle[one // 3], triangle[other // 3]
+    # a triangle without area bends nowhere
+    even = (np.einsum("ij,ij->i", a, b) >= np.cos(np.radians(crease)) - 1e-9) | ~a.any(axis=1) | ~b.any(axis=1)
+    pairs = np.stack([corners[one[even]], corners[other[even]]], axis=1).reshape(-1, 2, 2)
+    i, j = pairs[:, 0].ravel(), pairs[:, 1].ravel()
+    return connected_components(coo_array((np.ones(len(i)), (i, j)), shape=(F.size, F.size)), directed=False)[1]
+
+
+def _weighted(V: NDArray, F: NDArray) -> NDArray[np.float64]:
+    """Normals of the triangles, weighted with their angles at the corners [3 m, 3]."""
+    return (_corner_angles(V, F)[:, :, None] * triangle_normals(V, F)[:, None, :]).reshape(-1, 3)
+
+
+def _sums(weighted: NDArray[np.float64], group: NDArray, count: int) -> NDArray[np.float64]:
+    """Unit sums of vectors [k, 3] that belong to the same of `count` groups [k]."""
+    return normalized(np.stack([np.bincount(group, column, count) for column in weighted.T], axis=1))
 
 
 def triangle_normals(V: NDArray, F: NDArray) -> NDArray[np.float64]:

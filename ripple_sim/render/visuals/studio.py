@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,15 +22,33 @@ SOFT_BOX_LIGHTS = (
     (-68.0, 28.0, 0.16, 0.75, (4.2, 4.7, 5.4)),
     (10.0, 66.0, 0.65, 0.20, (3.6, 3.7, 3.8)),
 )
-_BESIDE_LIGHTS = 0.5  # brightness of the soft boxes' reflections beside lights of the MJCF
+BESIDE_LIGHTS = 0.5  # brightness of the soft boxes' reflections beside lights of the MJCF
 _FLOOR_IN_BACKGROUND = 0.6  # most of the floor's colour that the background takes on
-_STUDIO_FADE, _FADE = (0.4, 3.4), (1.5, 10.0)  # of the floor into the background, in distances of the focus
+STUDIO_FADE, FADE = (0.4, 3.4), (1.5, 10.0)  # of the floor into the background, in distances of the focus
 
 
 def studio_lighting(pose: Pose) -> Lighting:
     """One key light that turns with the camera, as with a turntable: ripples look alike from all sides."""
     key = Light(_direction(pose, _KEY_AZIMUTH, _KEY_ELEVATION), _KEY_RADIANCE, size=_KEY_TANGENT, shadow=True)
     return Lighting([key], np.zeros(3), studio=True)
+
+
+class SkyColors(NamedTuple):
+    """Linear colours [3] of the background at the horizon and overhead, and the radiance that lights what is below."""
+
+    horizon: NDArray[np.float64]
+    zenith: NDArray[np.float64]
+    light: NDArray[np.float64]
+
+
+def sky_colors(lighting: Lighting, pose: Pose, floor_albedo: NDArray | None, sky: NDArray | None) -> SkyColors:
+    """Colours of the background; parameters as for `set_lighting`."""
+    tint = np.array([0.40, 0.42, 0.46]) if floor_albedo is None else _far_light(lighting, pose) * floor_albedo
+    zenith = tint * np.array([0.36, 0.40, 0.48])
+    if lighting.studio:
+        return SkyColors(tint, zenith, 0.75 * (0.7 * tint + 0.3 * zenith))
+    hue = np.ones(3) if sky is None else sky / max(sky.mean(), 1e-6)
+    return SkyColors(tint, zenith, lighting.ambient * (0.5 + 0.5 * hue))
 
 
 def set_lighting(
@@ -52,17 +72,12 @@ def set_lighting(
         record["direction"] = [*light.direction, np.cos(light.cutoff)]
         record["radiance"] = [*light.radiance, light.exponent]
         record["falloff"] = [*light.falloff, 0]
-    _set_soft_boxes(frame, pose, 1.0 if lighting.studio else _BESIDE_LIGHTS)
-    tint = np.array([0.40, 0.42, 0.46]) if floor_albedo is None else _far_light(lighting, pose) * floor_albedo
-    horizon, zenith = tint, tint * np.array([0.36, 0.40, 0.48])
-    frame.set_vector("horizon", horizon)
-    frame.set_vector("zenith", zenith)
-    if lighting.studio:
-        frame.set_vector("sky", 0.75 * (0.7 * horizon + 0.3 * zenith), 1.0)
-    else:
-        hue = np.ones(3) if sky is None else sky / max(sky.mean(), 1e-6)
-        frame.set_vector("sky", lighting.ambient * (0.5 + 0.5 * hue), 0.0)
-    frame.set_vector("floor_fade", [*(_STUDIO_FADE if lighting.studio else _FADE), 0.0])
+    _set_soft_boxes(frame, pose, 1.0 if lighting.studio else BESIDE_LIGHTS)
+    colors = sky_colors(lighting, pose, floor_albedo, sky)
+    frame.set_vector("horizon", colors.horizon)
+    frame.set_vector("zenith", colors.zenith)
+    frame.set_vector("sky", colors.light, 1.0 if lighting.studio else 0.0)
+    frame.set_vector("floor_fade", [*(STUDIO_FADE if lighting.studio else FADE), 0.0])
 
 
 def _set_soft_boxes(frame: FrameUniforms, pose: Pose, strength: float) -> None:

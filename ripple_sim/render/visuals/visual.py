@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.model.soft_ids import first_flex, first_skin, is_soft
 from ripple_sim.render.bounds import Balls
 from ripple_sim.render.color import srgb_to_linear
 
@@ -81,8 +82,18 @@ class Visual:
 
 
 def geom_visual(model: Any, geom: int) -> Visual:
-    """Geom of a model."""
+    """Geom of a model, or a soft target, see `soft_ids`."""
+    if is_soft(model, geom):
+        return _soft_visual(model, geom)
     return _visual(model, "geom", geom, int(model.geom_dataid[geom]))
+
+
+def _soft_visual(model: Any, target: int) -> Visual:
+    skin = target - first_skin(model)
+    which, index = ("skin", skin) if skin >= 0 else ("flex", target - first_flex(model))
+    rgba, material, group = (getattr(model, f"{which}_{name}")[index] for name in ("rgba", "matid", "group"))
+    rgba = np.array(model.mat_rgba[material] if material >= 0 and np.array_equal(rgba, _UNSET) else rgba, np.float64)
+    return Visual(False, target, int(_GEOM.mjGEOM_MESH), np.ones(3), -1, rgba, int(material), int(group))
 
 
 def site_visual(model: Any, site: int) -> Visual:

@@ -49,3 +49,20 @@ def test_a_format_knows_its_shape_and_channels(linear, dtype):
     frame_format = FrameFormat((16, 9), linear=linear)
     assert frame_format.aspect == pytest.approx(16 / 9)
     assert frame_format.dtype == dtype
+
+
+def test_a_sharp_edge_of_polished_metal_is_no_brighter_than_its_sides(gl):
+    xml = """<mujoco><asset><material name="metal" metallic="1" roughness="0.1" rgba=".7 .4 .2 1"/>
+      <mesh name="prism" vertex="1 0 -1 -1 1 -1 -1 -1 -1 1 0 1 -1 1 1 -1 -1 1"/></asset><worldbody>
+      <light type="directional" dir="-.5 0 -1"/>
+      <geom type="mesh" mesh="prism" material="metal"/></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with Renderer(gl, model, {}, size=(64, 64), samples=0) as renderer:
+        column = renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 6.0, 60.0, -40.0, 15.0))[8:56, 24, 0].astype(int)
+    edge = int(np.abs(np.diff(column)).argmax())
+    above, beside, below = column[edge - 5], column[edge - 3 : edge + 5], column[edge + 6]
+    assert above > below + 40
+    assert beside.min() >= below - 4
+    assert beside.max() <= above + 4

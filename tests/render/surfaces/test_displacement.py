@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from sphere_height_maps import cube_charts, height_map_of
 
-from ripple_sim.render.surfaces.adaptive_tessellation import _heights
 from ripple_sim.render.surfaces.displacement import Displacement, Place
 from ripple_sim.render.surfaces.height_maps import HeightMapTextures
+from ripple_sim.render.surfaces.spline_heights import spline_heights
 from ripple_sim.render.surfaces.tessellation import Edges
 from ripple_sim.render.surfaces.vertices import DIRECTION, POSITION, UV, SurfaceVertices
 from ripple_sim.render.visuals.occluders import Occluders
@@ -94,7 +94,7 @@ def test_gpu_and_cpu_look_up_the_same_height(resources, seed):
     grid = np.stack([row, column], axis=1)
     nearest = np.clip(np.floor(grid + 0.5), 0, N - 1)
     texel = np.column_stack([on_chart, nearest]).astype(np.int32)
-    own = _heights(height_map, texel, (grid - nearest).astype(np.float32))
+    own = spline_heights(height_map, texel, (grid - nearest).astype(np.float32))
     np.testing.assert_allclose(own, expected, atol=1e-5)
 
 

@@ -1,12 +1,15 @@
 """Backends by name."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hand_made import square
 
 from ripple_sim.solver import GLError, Material, SolverError, texel_atlas
+from ripple_sim.solver.backends import measured
 from ripple_sim.solver.backends.backend import auto_backend, make_backend
-from ripple_sim.solver.gl import GLContext
+from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.operator.assembly import build_operator
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 
@@ -22,13 +25,41 @@ def test_an_unknown_backend_is_named_beside_the_valid_ones(operator: WaveOperato
         make_backend(name, operator)
 
 
-@pytest.mark.parametrize(("software", "chosen"), [(True, "cpu"), (False, "gl")])
-def test_auto_takes_gl_on_hardware_only(
-    opengl: None, operator: WaveOperator, monkeypatch: pytest.MonkeyPatch, software: bool, chosen: str
+def test_auto_takes_the_cpu_where_opengl_is_software(opengl: None, operator: WaveOperator) -> None:
+    assert auto_backend() == "cpu"
+    assert make_backend("auto", operator).name == "cpu"
+
+
+@pytest.fixture
+def hardware(opengl: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> GLContext:
+    """The software driver, taken for hardware of which nothing is known."""
+    monkeypatch.setattr(GLContext, "software", False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(measured, "_SIZES", (8, 24))
+    measured.measured.cache_clear()
+    yield shared_context()
+    measured.measured.cache_clear()
+
+
+def test_auto_takes_what_was_measured_to_be_faster(
+    hardware: GLContext, operator: WaveOperator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(GLContext, "software", software)
-    assert auto_backend() == chosen
-    assert make_backend("auto", operator).name == chosen
+    """A GPU that takes 1 ms for any number of texels, a processor that takes 1 ms for 4,000."""
+    known = measured.Measured((1000.0, 8000.0), (1e-3, 1e-3), (0.25e-3, 2e-3))
+    monkeypatch.setattr(measured, "measure", lambda gl: known)
+    assert [auto_backend(texels) for texels in (16, 3900, 4100, 10**6)] == ["cpu", "cpu", "gl", "gl"]
+    assert make_backend("auto", operator).name == "cpu"
+    assert str(known) == "1,000 texels: 1.00 ms GL, 0.25 ms CPU; 8,000 texels: 1.00 ms GL, 2.00 ms CPU"
+
+
+def test_a_machine_is_measured_once(hardware: GLContext, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = measured.measured(hardware)
+    assert first.texels == (384.0, 3456.0)
+    assert min(first.gl + first.cpu) > 0
+    measured.measured.cache_clear()  # as another process does
+    monkeypatch.setattr(measured, "measure", lambda gl: pytest.fail("measured twice"))
+    assert measured.measured(hardware) == first
+    assert auto_backend(10**6) == first.faster(10**6)
 
 
 def test_without_opengl_auto_takes_the_cpu_and_gl_is_an_error(

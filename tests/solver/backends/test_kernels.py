@@ -38,7 +38,7 @@ def test_the_stencil_on_a_field_is_its_matrix(texels: TexelMesh, add: bool, unif
     factor = np.float32(-1) if uniform else noise(texels, 3)
     h, out = laid_out(layout, field), laid_out(layout, before)
     fill(h, layout.halo)
-    apply(layout.weights(stencil), h, factor, add, out)
+    apply(layout.weights(stencil), h, layout.coefficients(factor), add, out)
     sums = (matrix(stencil, field.size) @ field.ravel().astype(float)).reshape(texels.shape)
     expected = factor * sums + (before if add else 0)
     np.testing.assert_allclose(layout.texels(out), expected, atol=1e-5 * max(1, np.abs(expected).max()))
@@ -57,7 +57,7 @@ def test_a_drift_shifts_movable_texels_and_moves_all(texels: TexelMesh, everywhe
     layout, h, v = FieldLayout(texels.topology), noise(texels, 1), noise(texels, 2)
     movable = np.float32(1) if everywhere else (noise(texels, 3) > 0).astype(np.float32)
     height, velocity = laid_out(layout, h), laid_out(layout, v)
-    drift(height, velocity, Drift(movable, np.float32(0.5), np.float32(0.1)))
+    drift(height, velocity, Drift(layout.columns, layout.coefficients(movable), np.float32(0.5), np.float32(0.1)))
     shifted = v + np.float32(0.5) * movable
     np.testing.assert_allclose(layout.texels(velocity), shifted, rtol=1e-6)
     np.testing.assert_allclose(layout.texels(height), h + np.float32(0.1) * shifted, rtol=1e-5, atol=1e-6)
@@ -68,7 +68,7 @@ def test_a_flow_keeps_the_whole_height_and_at_most_the_yield_height_elastic(texe
     layout, h, dent = FieldLayout(texels.topology), noise(texels, 1), noise(texels, 2)
     most = np.abs(noise(texels, 3)) if limit == "map" else np.float32(limit)
     elastic = laid_out(layout, h)
-    plasticity = Plasticity(most, laid_out(layout, dent))
+    plasticity = Plasticity(layout.columns, layout.coefficients(most), laid_out(layout, dent))
     for _ in range(2):  # once more changes nothing
         flow(elastic, plasticity)
         np.testing.assert_array_equal(layout.texels(elastic), np.clip(h, -most, most))

@@ -168,3 +168,9 @@ def test_a_gltf_whose_buffer_is_a_fifo_does_not_wait_for_it(tmp_path: Path, kind
         MeshError, match=r"mesh\.gltf' cannot be read: it names 'a%20pipe', which .* not a regular file"
     ):
         load_mesh(tmp_path / "mesh.gltf")
+
+
+def test_a_fifo_is_no_mesh_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "mesh.obj")
+    with pytest.raises(MeshError, match=r"mesh\.obj' is not a regular file; give the path of an OBJ"):
+        load_mesh(tmp_path / "mesh.obj")

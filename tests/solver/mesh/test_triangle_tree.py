@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver.mesh.triangle_tree import closest_points, triangle_tree
+from ripple_sim.solver.mesh.triangle_tree import TriangleTree, closest_points, refitted, triangle_tree
 from ripple_sim.solver.texels.barycentrics import barycentrics_in
 
 
@@ -16,9 +16,9 @@ def by_igl(V: np.ndarray, F: np.ndarray, points: np.ndarray) -> tuple[np.ndarray
     return np.sqrt(squared), closest
 
 
-def check(V: np.ndarray, F: np.ndarray, points: np.ndarray) -> np.ndarray:
+def check(V: np.ndarray, F: np.ndarray, points: np.ndarray, tree: TriangleTree | None = None) -> np.ndarray:
     distances, expected = by_igl(V, F, points)
-    triangles, closest = closest_points(triangle_tree(V, F), points)
+    triangles, closest = closest_points(tree or triangle_tree(V, F), points)
     np.testing.assert_allclose(np.linalg.norm(closest - points, axis=1), distances, rtol=1e-12, atol=1e-14)
     corners = V[F[triangles]]
     on_them = np.einsum("kc,kcj->kj", barycentrics_in(corners, closest), corners)
@@ -32,6 +32,14 @@ def test_nearest_points_are_those_of_libigl(away: float) -> None:
     rng = np.random.default_rng(0)
     points = V[F[rng.integers(len(F), size=2000)]].mean(axis=1) + away * rng.standard_normal((2000, 3))
     assert check(V, F, points).max() < 1e-9
+
+
+def test_the_tree_of_a_mesh_whose_vertices_moved_finds_its_points() -> None:
+    V, F = limbed()
+    rng = np.random.default_rng(1)
+    moved = V @ np.linalg.qr(rng.standard_normal((3, 3)))[0] + 0.2 * np.sin(5 * V[:, [1, 2, 0]])
+    points = rng.uniform(-1, 1, (500, 3))
+    assert check(moved, F, points, refitted(triangle_tree(V, F), moved, F)).max() < 1e-9
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 9, 100])

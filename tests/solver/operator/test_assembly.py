@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hand_made import disk, flat_torus, polygon, square, two_squares
 from modes import mode_error
+from scipy.special import erf
 
 from ripple_sim.solver import Material, SolverError, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
 from ripple_sim.solver.operator.assembly import source_grip
@@ -31,6 +32,19 @@ def test_needles_do_not_set_the_time_step_of_all() -> None:
     assert factors.min() < 0.3
     steps = [WaveSolver(atlas, backend="cpu").stable_timestep for atlas in (ball, needles)]
     assert steps[1] > 0.9 * steps[0]
+
+
+def test_a_smooth_surface_loses_half_a_texel_at_most_to_the_time_step_whatever_the_resolution() -> None:
+    for n in (48, 96):
+        # a grid that is denser in the middle
+        u = ((np.arange(n + 2) - 0.5) / n).clip(0, 1)
+        place = u - 0.45 * 0.05 * erf((u - 0.5) / 0.05)
+        x, y = np.meshgrid(place, place)
+        places = np.stack([x, y, 0 * x], axis=-1)[None]
+        texels = TexelMesh.of(square(n).topology, places[:, 1:-1, 1:-1], beyond=places)
+        factors = softening(texels)
+        assert ((1 - factors) * texels.areas).sum() < 0.501 * texels.areas.mean()
+        np.testing.assert_allclose(softening(texels.with_fixed_rim()), factors)
 
 
 def test_unknown_names_list_the_valid_ones() -> None:

@@ -1,12 +1,13 @@
 """Values that are not finite, or of the wrong kind, are named."""
 
+import copy
 import re
 import warnings
 
 import numpy as np
 import pytest
 
-from ripple_sim.solver import SolverError, WaveSolver, sphere_atlas
+from ripple_sim.solver import Material, SolverError, WaveSolver, sphere_atlas
 
 
 @pytest.mark.parametrize(
@@ -49,11 +50,67 @@ def test_what_is_not_finite_is_reported_with_place_and_time(backend: str) -> Non
 
 def test_overflow_is_reported(backend: str) -> None:
     waves = WaveSolver(sphere_atlas(1.0, 8), backend=backend)
-    with pytest.raises(SolverError, match="no longer finite"):
+    with pytest.raises(
+        SolverError, match=r"no longer finite .* the largest source is the impulse of 5e\+37 N s at time"
+    ):
         for _ in range(50):
-            waves.add_impulse([0, 0, 1], 1e38, 0.5)
+            waves.add_impulse([0, 0, 1], 5e37, 0.5)
             waves.step(1.0)
             _ = waves.height
+
+
+STRIPES = np.broadcast_to(3e38 * (-1.0) ** np.arange(8), (6, 8, 8))
+SOURCES = {
+    "impulse of 8e+37 N s": lambda w: [w.add_impulse([0, 0, 1], 8e37, 0.5) for _ in range(3)],
+    "forces of 1e+40 N": lambda w: w.add_force([0, 0, 1], 1e40, 0.5),
+    "height of 3e+38 m": lambda w: setattr(w, "height", STRIPES),
+    "velocity of 3e+38 m/s": lambda w: setattr(w, "velocity", STRIPES),
+}
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_the_error_names_the_source_and_comes_without_a_look_of_the_users(source: str) -> None:
+    waves = WaveSolver(sphere_atlas(1.0, 8), backend="cpu", conserve_volume=False)
+    waves.add_impulse([1, 0, 0], 1.0, 0.5)
+    waves.step(0.1)
+    SOURCES[source](waves)
+    with pytest.raises(SolverError, match=re.escape(f"the largest source is the {source} at time 0.1 s")):
+        for _ in range(32):
+            waves.step(waves.stable_timestep)
+
+
+READ = {
+    "height": lambda w: w.height,
+    "velocity": lambda w: w.velocity,
+    "energy": lambda w: w.energy(),
+    "volume": lambda w: w.volume(),
+    "momentum": lambda w: w.momentum(),
+    "state": lambda w: w.state,
+    "copy": copy.copy,
+}
+
+
+@pytest.mark.parametrize("name", READ)
+def test_nothing_that_is_not_finite_leaves_the_solver_without_an_error(name: str, backend: str) -> None:
+    waves = WaveSolver(sphere_atlas(1.0, 8), backend=backend)
+    waves._backend.set_height(np.full((6, 8, 8), np.nan, np.float32))
+    waves._backend.set_velocity(np.full((6, 8, 8), np.nan, np.float32))
+    with pytest.raises(SolverError, match=r"no longer finite .* no source was given"):
+        READ[name](waves)
+
+
+def test_an_impulse_beyond_float32_is_refused_and_changes_nothing() -> None:
+    waves = WaveSolver(sphere_atlas(1.0, 8), backend="cpu")
+    with pytest.raises(SolverError, match=r"impulse is 1e\+300 N s, which would move the surface at .* beyond float32"):
+        waves.add_impulse([0, 0, 1], 1e300, 0.5)
+    waves.step(0.1)
+    assert not waves.height.any()
+
+
+def test_a_step_whose_coefficients_are_beyond_float32_is_refused() -> None:
+    waves = WaveSolver(sphere_atlas(1.0, 8), Material(speed=1e-40), backend="cpu")
+    with pytest.raises(SolverError, match=r"a substep of 1e\+39 s on texels of .* kg and more is beyond float32"):
+        waves.step(1e39)
 
 
 @pytest.mark.parametrize(
@@ -96,9 +153,12 @@ def test_what_float32_cannot_hold_is_one_error_and_no_warning() -> None:
     waves = WaveSolver(sphere_atlas(1.0, 8), backend="cpu")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        waves.add_impulse([0, 0, 1], 1e38, 0.5)
+        waves.add_impulse([0, 0, 1], 5e37, 0.5)
+        waves.add_impulse([0, 0, 1], 5e37, 0.5)
+        waves.add_impulse([0, 0, 1], 5e37, 0.5)
         with pytest.raises(SolverError, match="no longer finite"):
             waves.step(0.1)
+            _ = waves.height
         assert np.isnan(waves.energy())
 
 

@@ -1,7 +1,21 @@
-"""Exact waves over an incompressible layer on a rigid base: shear modulus, density and thickness are 1."""
+"""Exact waves over an incompressible layer on a rigid base, which `Material.layer` is a fit to.
+
+Shear modulus, density and thickness are 1, so that frequencies are in c_T / d and wave numbers in 1 / d.
+"""
+
+from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import brentq
+
+
+def lowest_square(q: float) -> float:
+    """Square of the angular frequency of the lowest normal mode, of a wave number from 1 to 10."""
+    # the determinant is 0 at 0 as well, where s is q
+    squares = np.linspace(1.0, q**2 + 20.0, 800)
+    signs = np.sign([determinant(q, square) for square in squares])
+    first = int(np.flatnonzero(np.diff(signs) != 0)[0])
+    return float(brentq(lambda square: determinant(q, square), squares[first], squares[first + 1], xtol=1e-12))
 
 
 def determinant(q: float, square: float) -> float:
@@ -19,12 +33,3 @@ def determinant(q: float, square: float) -> float:
     pressure = square * np.array([np.sinh(q) / q, np.cosh(q) / q, 0, 0])
     rows = np.array([start, start_slope, curvature + q**2 * displacement, 2 * slope - pressure])
     return float(np.linalg.det(rows / np.abs(rows).max(axis=0)).real)
-
-
-def lowest_square(q: float) -> float:
-    """Square of the angular frequency of the lowest mode of wave number q, which is from 1 to 10."""
-    # the determinant is 0 at 0 as well, where s is q
-    squares = np.linspace(1.0, q**2 + 20.0, 800)
-    signs = np.sign([determinant(q, square) for square in squares])
-    first = int(np.flatnonzero(np.diff(signs) != 0)[0])
-    return brentq(lambda square: determinant(q, square), squares[first], squares[first + 1], xtol=1e-12)

@@ -1,0 +1,44 @@
+"""A batch on a Kubernetes cluster, by dask-kubernetes.
+
+    pip install 'ripple-sim[batch,dask]' dask-kubernetes
+    python examples/batch_kubernetes.py PLAN.toml /data/DIR IMAGE VOLUME_CLAIM [--workers 100]
+
+The cluster has the Dask operator. IMAGE holds ripple-sim with these extras; VOLUME_CLAIM names a volume claim that all
+pods can write to and that is mounted at /data, where PLAN.toml and DIR lie, also for this program.
+"""
+
+import argparse
+from pathlib import Path
+
+from dask_kubernetes.operator import KubeCluster, make_cluster_spec
+
+from ripple_sim.batch.plan import read_plan
+from ripple_sim.batch.run_batch import run_batch
+from ripple_sim.batch.run_options import RunOptions
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Makes a batch on a Kubernetes cluster.")
+    parser.add_argument("plan", type=Path)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("image")
+    parser.add_argument("claim")
+    parser.add_argument("--workers", type=int, default=100)
+    options = parser.parse_args()
+    spec = make_cluster_spec(
+        name="ripple-sim",
+        image=options.image,
+        n_workers=options.workers,
+        worker_command=["dask", "worker", "--nthreads", "1"],
+        env={"LP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "MUJOCO_GL": "disable"},
+        resources={"requests": {"cpu": "1", "memory": "2Gi"}, "limits": {"cpu": "1", "memory": "2Gi"}},
+    )
+    pod = spec["spec"]["worker"]["spec"]
+    pod["volumes"] = [{"name": "data", "persistentVolumeClaim": {"claimName": options.claim}}]
+    pod["containers"][0]["volumeMounts"] = [{"name": "data", "mountPath": "/data"}]
+    with KubeCluster(custom_cluster_spec=spec) as cluster:
+        print(run_batch(read_plan(options.plan), options.folder, RunOptions(dask=cluster.scheduler_address)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,40 @@
+"""A batch on a Slurm cluster, by dask-jobqueue.
+
+    pip install 'ripple-sim[batch,dask]' dask-jobqueue
+    python examples/batch_slurm.py PLAN.toml DIR [--jobs 25] [--cores 40]
+
+Run it on a node that may submit jobs. PLAN.toml and DIR lie on a file system that all nodes share. A job that ends at
+its time limit gives way to the next one: scenes that were not finished are made again.
+"""
+
+import argparse
+from pathlib import Path
+
+from dask_jobqueue import SLURMCluster
+
+from ripple_sim.batch.plan import read_plan
+from ripple_sim.batch.run_batch import run_batch
+from ripple_sim.batch.run_options import RunOptions
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Makes a batch on a Slurm cluster.")
+    parser.add_argument("plan", type=Path)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--jobs", type=int, default=25)
+    parser.add_argument("--cores", type=int, default=40, help="of a node")
+    options = parser.parse_args()
+    cluster = SLURMCluster(
+        cores=options.cores,
+        processes=options.cores,  # one thread each: a renderer belongs to one process
+        memory=f"{2 * options.cores} GB",
+        walltime="08:00:00",
+        worker_extra_args=["--lifetime", "7h50m", "--lifetime-stagger", "5m"],
+        job_script_prologue=["export LP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 MUJOCO_GL=disable"],
+    )
+    cluster.adapt(maximum_jobs=options.jobs)
+    print(run_batch(read_plan(options.plan), options.folder, RunOptions(dask=cluster.scheduler_address)))
+
+
+if __name__ == "__main__":
+    main()

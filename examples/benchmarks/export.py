@@ -1,0 +1,51 @@
+"""How fast the frames of an export are written, and how much memory that takes.
+
+    python examples/benchmarks/export.py [FRAMES]
+
+Writes a sphere of 124,416 points with waves all over it to a USD file. The first frames, which load kernels, do not
+count. Linux tells the memory of a process.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from ripple_sim import Exporter, load_scene
+from ripple_sim.simulation import Simulation
+
+RESOLUTION, TRIANGLES, WARM_UP = 144, 200_000, 25
+
+
+def memory() -> float:
+    """Of this process [MB]."""
+    status = Path("/proc/self/status").read_text()
+    return int(status.split("VmRSS:")[1].split()[0]) / 1000
+
+
+def main(frames: int = 75) -> None:
+    simulation = Simulation(load_scene("sphere"), resolution=RESOLUTION, backend="cpu")
+    [name] = simulation.ripples
+    waves = simulation.ripples[name]
+    x, y, _ = np.moveaxis(waves.atlas.normals, -1, 0)
+    waves.height = 0.02 * np.sin(9 * x) * np.cos(7 * y)
+    seconds = []
+    with tempfile.TemporaryDirectory() as folder:
+        output = Path(folder) / "run.usdc"
+        with Exporter(simulation.model, simulation.ripples, output, triangles=TRIANGLES) as exporter:
+            for frame in range(frames):
+                waves.step(1 / 60)
+                start = time.perf_counter()
+                exporter.write(simulation.data)
+                seconds.append(time.perf_counter() - start)
+                if frame == WARM_UP - 1:
+                    before = memory()
+        rate = (frames - WARM_UP) / sum(seconds[WARM_UP:])
+        print(f"{rate:.1f} frames a second, {before:.0f} MB after {WARM_UP} frames, {memory():.0f} MB after {frames}")
+        print(f"{output.stat().st_size / 1e6:.0f} MB")
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

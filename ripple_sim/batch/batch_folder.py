@@ -1,0 +1,174 @@
+"""The folder of a batch: where things stand in it, what is finished, and who works on what.
+
+`plan.json` is what the scenes are made by; `scenes/000012` is a finished scene, or a member of `tars/000000.tar`;
+`work/000012` is one that is being made, locked by whoever makes it; `failed/000012.json` and `.log` tell what went
+wrong. A scene is finished when its folder is renamed from `work` to `scenes`: nothing else has to be kept in step.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from ripple_sim.errors import BatchError
+from ripple_sim.solver.atomic_file import atomic_write
+
+from .tars import NUMBER, packed
+
+# Until a scene is put aside: errors of its own, and deaths of its worker, which may have another reason.
+ERRORS, DEATHS = 3, 9
+
+
+class Failure(msgspec.Struct):
+    """How often a scene has failed, how often its worker died meanwhile, and what was said of the last time."""
+
+    errors: int = 0
+    deaths: int = 0
+    error: str = ""
+
+    @property
+    def attempts(self) -> int:
+        """How often it was tried."""
+        return self.errors + self.deaths
+
+    @property
+    def aside(self) -> bool:
+        """Whether it is not tried again by itself."""
+        return self.errors >= ERRORS or self.deaths >= DEATHS
+
+
+class Claim(NamedTuple):
+    """A scene that this process makes: the folder to make it in, and where it goes when it is finished."""
+
+    work: Path
+    finished: Path
+
+    def finish(self) -> None:
+        """Put the scene in its place, whole and on the disk."""
+        for path in (*self.work.rglob("*"), self.work):
+            handle = os.open(path, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
+        self.work.rename(self.finished)
+
+
+class BatchFolder:
+    """The folder of a batch on the disk."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.plan, self.scenes, self.tars = path / "plan.json", path / "scenes", path / "tars"
+        self.failed, self.thumbnails, self.work = path / "failed", path / "thumbnails", path / "work"
+        self.index, self.page = path / "index.parquet", path / "index.html"
+
+    def make(self) -> None:
+        """Make the folders."""
+        for folder in (self.scenes, self.tars, self.failed, self.thumbnails, self.work):
+            folder.mkdir(parents=True, exist_ok=True)
+
+    def scene(self, number: int) -> Path:
+        """Folder of a finished scene."""
+        return self.scenes / f"{number:06d}"
+
+    def thumbnail(self, number: int) -> Path:
+        """A small image of a scene."""
+        return self.thumbnails / f"{number:06d}.jpg"
+
+    def finished(self) -> set[int]:
+        """Numbers of the scenes that are there."""
+        return self.loose().union(*map(packed, self.tar_files()))  # in this order: scenes move into tar files
+
+    def loose(self) -> set[int]:
+        """Numbers of the scenes that have a folder."""
+        return {int(path.name) for path in _entries(self.scenes) if NUMBER.fullmatch(path.name)}
+
+    def is_finished(self, number: int) -> bool:
+        """Whether a scene is there."""
+        if self.scene(number).exists():
+            return True
+        tars = [tar for tar in self.tar_files() if int(tar.stem) <= number]  # named by their first scene
+        return bool(tars) and number in packed(tars[-1])
+
+    def tar(self, first: int) -> Path:
+        """Tar file of the scenes from a number on."""
+        return self.tars / f"{first:06d}.tar"
+
+    def tar_files(self) -> list[Path]:
+        """The tar files, in their order."""
+        return sorted(path for path in _entries(self.tars) if path.suffix == ".tar" and path.stem.isdecimal())
+
+    @contextlib.contextmanager
+    def claimed(self, number: int) -> Iterator[Claim | None]:
+        """Lock a scene against other processes; None if another one makes it now, or it is finished.
+
+        A process that dies leaves no lock behind.
+        """
+        work = self.work / f"{number:06d}"
+        work.mkdir(parents=True, exist_ok=True)
+        handle = os.open(work, os.O_RDONLY | os.O_NOFOLLOW)
+        try:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                yield None
+                return
+            if self.is_finished(number):  # by another process, meanwhile
+                _remove_empty(work)
+                yield None
+            else:
+                yield Claim(work, self.scene(number))
+        finally:
+            os.close(handle)
+
+    def failures(self) -> dict[int, Failure]:
+        """The scenes that have failed, also those that may yet succeed."""
+        found = {}
+        for path in _entries(self.failed):
+            if path.suffix == ".json" and NUMBER.fullmatch(path.stem):
+                with contextlib.suppress(msgspec.DecodeError):
+                    found[int(path.stem)] = msgspec.json.decode(path.read_bytes(), type=Failure)
+        return found
+
+    def note_failure(self, number: int, failure: Failure, log: str) -> None:
+        """Keep what went wrong with a scene."""
+        with (self.failed / f"{number:06d}.log").open("a") as file:
+            file.write(f"attempt {failure.attempts}: {failure.error}\n{log}\n")
+        with atomic_write(self.failed / f"{number:06d}.json") as path:
+            path.write_bytes(msgspec.json.encode(failure))
+
+    def forget_failure(self, number: int) -> None:
+        """Remove what went wrong with a scene."""
+        for ending in ("json", "log"):
+            (self.failed / f"{number:06d}.{ending}").unlink(missing_ok=True)
+
+    def check(self) -> None:
+        """Make sure that this is the folder of a batch; raises `BatchError`."""
+        if not self.plan.is_file():
+            raise BatchError(
+                f"{self.path} is not the folder of a batch: it has no plan.json; make one by "
+                "`ripple-sim batch PLAN.toml -o DIR`"
+            )
+
+
+def clear(folder: Path) -> None:
+    """Remove everything in a folder."""
+    for path in folder.iterdir():
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def _entries(folder: Path) -> list[Path]:
+    return sorted(folder.iterdir()) if folder.is_dir() else []
+
+
+def _remove_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        folder.rmdir()

@@ -1,0 +1,141 @@
+"""`make_scene`: one scene of a batch, made in a folder of its own by whatever process is told to."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import socket
+import threading
+import time
+import traceback
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from ripple_sim.errors import EncodingError
+from ripple_sim.scene.scene import Scene
+from ripple_sim.simulation import Simulation
+from ripple_sim.video.render_video import render_video
+from ripple_sim.video.settings import frame_count, settled
+
+from .batch_folder import BatchFolder, Claim, clear
+from .finished_scene import FACTS, TIMES
+from .frame_record import FrameRecord
+from .plan import Plan
+from .store_entry import StoreEntry, options_of, video_name
+from .stored_plan import load_plan
+from .thumbnail import write_thumbnail
+from .variation import Variation
+
+# The renderer's context belongs to one scene at a time, also where an executor has threads.
+_one_at_a_time = threading.Lock()
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """What became of a scene that a worker was told to make.
+
+    Attributes
+    ----------
+    state : str
+        "made"; "there", finished by another process before; "busy", being made by one; "full", for lack of room on
+        the disk; "failed"; "died", its worker, without a word.
+    times : dict
+        How long it took [s]: `seconds` by the clock, `cpu_seconds` of the worker's threads.
+    row : dict
+        What the index says of it.
+    error, log : str
+        What went wrong, in a line and in full.
+    """
+
+    number: int
+    state: Literal["made", "there", "busy", "full", "failed", "died"]
+    times: dict[str, float] = {}
+    row: dict[str, Any] = {}
+    error: str = ""
+    log: str = ""
+
+
+def make_scene(folder: str, number: int) -> Outcome:
+    """Make a scene of the batch in a folder, unless it is there or another process makes it.
+
+    Its files are the same, byte for byte, whoever makes it and when, but for `times.json`, which tells these.
+    """
+    batch = BatchFolder(Path(folder))
+    start, work = time.perf_counter(), time.process_time()
+    with _one_at_a_time, batch.claimed(number) as claim:
+        if claim is None:
+            return Outcome(number, "there" if batch.is_finished(number) else "busy")
+        try:
+            facts = _make(load_plan(batch.plan), number, claim, batch)
+        except Exception as error:  # of any kind: the batch goes on without this scene
+            clear(claim.work)
+            state: Literal["full", "failed"] = "full" if _is_full(error) else "failed"
+            reason = " ".join(str(error).split()) or type(error).__name__
+            return Outcome(number, state, error=reason, log=traceback.format_exc())
+        seconds = time.perf_counter() - start
+        times = {"seconds": seconds, "cpu_seconds": time.process_time() - work}
+        _write_json(claim.work / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()})
+        claim.finish()
+    return Outcome(number, "made", times, facts)
+
+
+def _make(plan: Plan, number: int, claim: Claim, batch: BatchFolder) -> dict[str, Any]:
+    """Fill the folder of a scene; return what is to be known of it."""
+    clear(claim.work)  # of one that was killed
+    variation = Variation(plan, number)
+    scene, values = variation.load()
+    record, video = render_scene(scene, plan.store, claim.work)
+    facts = {
+        "number": number,
+        "seed": variation.seed,
+        "source": Path(variation.source).name,
+        "fps": plan.store.fps,
+        "values": values,
+        **record.finish(),
+    }
+    facts["files"] = {path.relative_to(claim.work).as_posix(): _digest(path) for path in _files(claim.work)}
+    facts["bytes"] = sum(path.stat().st_size for path in _files(claim.work))
+    facts["hash"] = hashlib.blake2b(msgspec.json.encode(facts), digest_size=16).hexdigest()
+    _write_json(claim.work / FACTS, facts)
+    if video is not None:
+        write_thumbnail(video, batch.thumbnail(number))
+    return facts
+
+
+def render_scene(scene: Scene, store: StoreEntry, folder: Path) -> tuple[FrameRecord, Path | None]:
+    """Simulate a scene, render it if it is to be drawn, and record it; return the record and the video's path."""
+    name = video_name(store)
+    path = folder / (name or "frames")
+    options = settled(options_of(store), scene, path)
+    record = FrameRecord(folder, store, frame_count(options), options.rate)
+    if name is not None:
+        render_video(scene, path, options, on_frame=record)
+        return record, path
+    simulation = Simulation(scene, fps=options.rate, resolution=store.resolution, backend=options.backend)
+    for number in range(frame_count(options)):
+        if number:
+            simulation.advance_frame()
+        record(simulation)
+    return record, None
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.rglob("*") if path.is_file() and path.name not in (FACTS, TIMES))
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+
+
+def _write_json(path: Path, content: Any) -> None:
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(content), indent=1))
+
+
+def _is_full(error: Exception) -> bool:
+    reason: BaseException | None = error
+    while isinstance(reason, EncodingError):  # which names the file
+        reason = reason.__cause__
+    return isinstance(reason, OSError) and reason.errno in (errno.ENOSPC, errno.EDQUOT)

@@ -1,0 +1,220 @@
+"""`Exporter`: a run of anybody's own loop, written frame by frame to the file of another program."""
+
+from __future__ import annotations
+
+import contextlib
+import html
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self, Unpack
+
+import mujoco
+
+from ripple_sim.coupling.arguments import own_data, own_model
+from ripple_sim.coupling.model.geoms import ByGeom, by_name
+from ripple_sim.coupling.ripples import Impulse, Ripples
+from ripple_sim.errors import EncodingError, ExportError
+from ripple_sim.render.visuals.looks import find_look
+from ripple_sim.scene.camera import CameraEntry, check_camera
+from ripple_sim.solver.checked import PATH, POSITIVE, checked, instance
+
+from .endings import check_export
+from .html.notebook import framed
+from .options import WRITE_OPTIONS, WriteOptions
+from .place import Unfinished
+from .settings import check_write_options
+from .source import Moment, Paint, Source
+
+
+class Exporter:
+    """Writes a model and its rippling surfaces to a file, frame by frame.
+
+    Use it as a context manager: the file appears, complete, when the block is left; after an exception there is none.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+        Or dm_control's wrapper of one; likewise the data of each frame.
+    ripples : Ripples
+        Whose targets are written with their ripples.
+    output : path
+        Its ending says what is written: .usdc, .usda, .usdz, .html, .zarr, .csv or .parquet.
+    fps : float
+        Frames per second of the file.
+    camera : str or CameraEntry, optional
+        Name of a camera in the MJCF, or what `[camera]` of a scene file says; by default MuJoCo's free camera.
+    looks : mapping, optional
+        Geom, by its name or id, to the look of its surface, one of `LOOKS`; rubber by default.
+    lighting : str
+        "model", "studio" or "auto", see `Renderer`.
+    **options
+        `tessellation` (str, "refined"): surfaces with triangles as fine as their texels, or "own", the object's own;
+        `triangles` (int, 100,000): about how many a refined surface may have; `size` (width, height): of the frames
+        that the camera is meant for [pixels]; `limit` (bool, True): whether heights that are too large for the object
+        are written smaller, see `DisplacementLimit`; `overwrite` (bool, False): replace a file that ripple-sim has not
+        made.
+
+    Raises
+    ------
+    RippleError
+        If the ending is unknown or needs a package that is not installed, something foreign stands in the output's
+        place, or an argument is invalid.
+
+    Attributes
+    ----------
+    frames : int
+        Written so far.
+    output : Path
+    """
+
+    @checked(
+        ExportError, output=PATH, fps=POSITIVE, ripples=instance(Ripples, ", for instance Ripples(model, materials)")
+    )
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        ripples: Ripples,
+        output: str | Path,
+        *,
+        fps: float = 60,
+        camera: str | CameraEntry | None = None,
+        looks: ByGeom[str] | None = None,
+        lighting: str = "auto",
+        **options: Unpack[WriteOptions],
+    ) -> None:
+        written = WRITE_OPTIONS | options
+        model = own_model(model)
+        named = by_name(model, looks or {}, "looks")
+        check_write_options(written)
+        for look in named.values():
+            find_look(look)
+        source = Source(
+            model=model,
+            ripples=ripples,
+            fps=fps,
+            camera=camera_entry(model, camera),
+            size=written["size"],
+            lighting=lighting,
+            paints={name: Paint(named.get(name, "rubber")) for name in ripples},
+            limited=dict.fromkeys(ripples, written["limit"]),
+            tessellation=written["tessellation"],
+            triangles=written["triangles"],
+        )
+        self._begin(source, output, written["overwrite"])
+
+    @classmethod
+    def of(cls, source: Source, output: str | Path, overwrite: bool = False) -> Self:
+        """Exporter of a source."""
+        exporter = cls.__new__(cls)
+        exporter._begin(source, output, overwrite)
+        return exporter
+
+    def _begin(self, source: Source, output: str | Path, overwrite: bool) -> None:
+        self.output, self.frames, self._source = Path(output), 0, source
+        ending = check_export(self.output, overwrite)
+        with self._reported():
+            self._place: Unfinished | None = Unfinished(self.output, ending.made_here, overwrite)
+            try:
+                self._writer = ending.writer(source, self._place.path)
+            except BaseException:
+                self._place.remove()
+                raise
+
+    def write(self, data: mujoco.MjData, impulses: Sequence[Impulse] | None = None) -> None:
+        """Add the present state as a frame.
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+            After `mj_step` or `mj_forward`.
+        impulses : sequence of Impulse, optional
+            All since the frame before; by default those of the latest step.
+
+        Raises
+        ------
+        ExportError
+            If the export is closed.
+        EncodingError
+            If it cannot be written, for instance on a full disk.
+        """
+        if self._place is None:
+            raise ExportError(f"the export {self.output} is closed; make another Exporter")
+        given = self._source.ripples.last_impulses if impulses is None else impulses
+        with self._reported():
+            self._writer.write(Moment(self.frames, own_data(self._source.model, data), list(given)))
+        self.frames += 1
+
+    def close(self) -> None:
+        """Complete the file and move it to its place. Repeated calls do nothing.
+
+        Raises
+        ------
+        ExportError
+            If there is no frame, or something foreign stands in the file's place by now.
+        EncodingError
+            If it cannot be written.
+        """
+        if self._place is None:
+            return
+        try:
+            if not self.frames:
+                raise ExportError(f"the export {self.output} has no frame; write at least one")
+            with self._reported():
+                self._writer.finish()
+                self._place.finish()
+        finally:
+            self.discard()
+
+    def discard(self) -> None:
+        """Stop, and remove what was written. An earlier file in the same place stays."""
+        if self._place is not None:
+            self._writer.close()
+            self._place.remove()
+            self._place = None
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the player of a complete page, or what was written."""
+        complete = self._place is None and self.output.is_file()
+        if complete and self.output.suffix.lower() == ".html":
+            width, height = self._source.size
+            return framed(self.output, width / height)
+        state = "complete" if complete else "not complete"
+        return f"<code>{html.escape(str(self.output))}</code>: {self.frames} frames, {state}"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        else:
+            self.discard()
+
+    @contextlib.contextmanager
+    def _reported(self) -> Iterator[None]:
+        """Say of what fails while it is written which file it was."""
+        try:
+            yield
+        except OSError as error:
+            raise EncodingError(f"cannot write {self.output}: {error.strerror or error}") from error
+
+
+def camera_entry(model: mujoco.MjModel, camera: str | CameraEntry | None) -> CameraEntry:
+    """What `[camera]` of a scene file would say; MuJoCo's free camera by default.
+
+    Raises
+    ------
+    SceneError
+        If the model has not what it names.
+    """
+    free = model.vis.global_
+    entry = (
+        camera
+        if isinstance(camera, CameraEntry)
+        else CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)
+    )
+    check_camera(model, entry)
+    return entry

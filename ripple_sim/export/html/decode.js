@@ -1,0 +1,87 @@
+"use strict";
+// Reading the page's own data: arrays of meshes, and chunks of frames.
+
+async function bytesOf(text) {
+  const raw = Uint8Array.from(atob(text), character => character.charCodeAt(0));
+  const stream = new Blob([raw]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+// Gives each part its points [m], directions, triangles F and texture coordinates of their corners.
+function readArrays(parts, bytes) {
+  let at = 0;
+  const take = (Type, count) => {
+    const size = count * Type.BYTES_PER_ELEMENT;
+    at += size;
+    return new Type(bytes.slice(at - size, at).buffer);
+  };
+  for (const part of parts) {
+    const places = take(Uint16Array, 3 * part.points), directions = take(Int16Array, 3 * part.points);
+    part.rest = Float32Array.from(places, (place, i) => part.low[i % 3] + place / 65535 * part.size);
+    part.directions = Float32Array.from(directions, value => value / 32767);
+    part.F = take(Uint32Array, 3 * part.triangles);
+    part.uv = part.textured ? take(Float32Array, 6 * part.triangles) : null;
+  }
+}
+
+// Two earlier vertices from which each is predicted; coding.py finds the same ones. The last entry stands for none.
+function parentsOf(part) {
+  const parents = new Int32Array(2 * part.points).fill(part.points);
+  const second = new Uint8Array(part.points), third = new Uint8Array(part.points);
+  for (let t = 0; t < part.F.length; t += 3) {
+    const [a, b, c] = part.F.slice(t, t + 3).sort();
+    if (!third[c]) { third[c] = 1; parents[2 * c] = a; parents[2 * c + 1] = b; }
+    if (!third[b] && !second[b]) { second[b] = 1; parents[2 * b] = parents[2 * b + 1] = a; }
+  }
+  return parents;
+}
+
+// The frames of the page, decoded chunk by chunk; the latest chunks are kept.
+class Frames {
+  constructor(meta, targets) {
+    this.meta = meta;
+    this.targets = targets;
+    this.parents = targets.map(parentsOf);
+    this.kept = new Map();
+    this.most = 24;
+  }
+
+  get count() {
+    const end = document.getElementById("end");
+    return end ? JSON.parse(end.textContent).frames : this.meta.chunk * this.tags.length;
+  }
+
+  get tags() { return document.querySelectorAll("script.chunk"); }
+
+  async get(number) {
+    const chunk = Math.floor(number / this.meta.chunk);
+    if (!this.kept.has(chunk)) {
+      this.kept.set(chunk, bytesOf(this.tags[chunk].textContent).then(bytes => this.decoded(bytes)));
+      if (this.kept.size > this.most) this.kept.delete(this.kept.keys().next().value);
+    }
+    return (await this.kept.get(chunk))[number % this.meta.chunk];
+  }
+
+  decoded(bytes) {
+    const size = new DataView(bytes.buffer).getUint32(0, true);
+    const {poses, arrows} = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + size)));
+    let at = 4 + size;
+    let before = this.targets.map(part => new Int32Array(part.points));
+    return poses.map((pose, i) => {
+      const steps = this.targets.map((part, k) => {
+        const count = part.points, parents = this.parents[k], last = before[k];
+        const change = new Int32Array(count + 1), now = new Int32Array(count);
+        for (let v = 0; v < count; v++) {
+          const code = bytes[at + v] | bytes[at + count + v] << 8 | bytes[at + 2 * count + v] << 16;
+          const left = code & 1 ? -(code + 1 >> 1) : code >> 1;
+          change[v] = left + (change[parents[2 * v]] + change[parents[2 * v + 1]] >> 1);
+          now[v] = last[v] + change[v];
+        }
+        at += 3 * count;
+        return now;
+      });
+      before = steps;
+      return {pose, arrows: arrows[i], steps};
+    });
+  }
+}

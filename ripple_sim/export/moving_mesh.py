@@ -1,0 +1,174 @@
+"""A target's surface as a mesh of constant triangles, whose points, normals and velocities follow the waves."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.render.surfaces.moving_surface import MovingSurface
+from ripple_sim.render.surfaces.vertices import COORDINATES, DIRECTION, NORMAL, POSITION, UV, tessellated
+from ripple_sim.render.visuals.corners import normalized, smooth_normals, split_corners
+from ripple_sim.solver import Atlas, HeightMap
+from ripple_sim.solver.kernel import Floats32, Ints32, kernel
+
+from .options import MOST_TRIANGLES
+
+
+class Shape(NamedTuple):
+    """A displaced surface in the frame of its geom.
+
+    Attributes
+    ----------
+    points : float32 [n, 3]
+        [m].
+    normals : float32 [n, 3]
+        Unit vectors.
+    velocities : float32 [n, 3]
+        [m/s].
+    heights : float32 [n]
+        [m].
+    """
+
+    points: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    velocities: NDArray[np.float32]
+    heights: NDArray[np.float32]
+
+
+class MovingMesh:
+    """The surface of an atlas, displaced as the renderer displaces it.
+
+    A point lies at its place on the mesh plus its height times the smooth normal there; heights are interpolated
+    between the texels by the quadratic B-spline. Its normal is tipped against the gradient of the height, to first
+    order in the height. Creases stay sharp: a vertex has a point for each of its normals.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    tessellation : str
+        One of `TESSELLATIONS`: the mesh's "own" triangles, or "refined" until no edge is longer than a mean texel, and
+        round in outline.
+    limit : bool
+        Whether heights that are too large for the object are bent, see `DisplacementLimit`.
+    triangles : int
+        About how many triangles a refined mesh may have, unless the mesh's own are more.
+
+    Attributes
+    ----------
+    F : int64 [m, 3]
+        Triangles, counter-clockwise from outside.
+    rest, directions : float32 [n, 3]
+        Points without waves [m], and the unit vectors along which these move them.
+    uv : float64 [m, 3, 2], optional
+        Texture coordinates of the triangles' corners, v from the image's lower edge.
+    """
+
+    def __init__(
+        self, atlas: Atlas, tessellation: str = "refined", limit: bool = True, triangles: int = MOST_TRIANGLES
+    ) -> None:
+        tessellate = _own if tessellation == "own" else _refined
+        self.F, self.uv, points, directions, normals, places = tessellate(atlas, triangles)
+        self.rest, self.directions = points.astype(np.float32), normalized(directions).astype(np.float32)
+        chart, place = places[0], np.stack(places[1:], axis=1)
+        nearest = np.clip(np.floor(place + 0.5), 0, atlas.resolution - 1)
+        texels = np.column_stack([chart, nearest]).astype(np.int32)
+        offsets, normals = (place - nearest).astype(np.float32), normalized(normals).astype(np.float32)
+        self._rest = _Rest(self.rest, self.directions, normals, texels, offsets)
+        self._height_map = HeightMap.drawn(atlas, limit)
+        self._moving = MovingSurface(atlas, self.rest, self.directions, normals)
+
+    def shape(
+        self, height: NDArray[np.float32], velocity: NDArray[np.float32], V: NDArray[np.float64] | None = None
+    ) -> Shape:
+        """The surface under waves of a height [m] and a velocity [m/s], float32 [C, n, n] both.
+
+        With the vertices of its mesh at V [vertex_count, 3] [m], where they have moved; velocities are those of the
+        waves alone.
+        """
+        points, normals, velocities = (np.empty_like(self.rest) for _ in range(3))
+        shape = Shape(points, normals, velocities, np.empty(len(self.rest), np.float32))
+        height_map, rates = self._height_map(height), self._height_map.rates(height, velocity)
+        rest = self._rest
+        if V is not None:
+            height_map, moved = self._moving(height_map, V)
+            rest = rest._replace(points=moved.points, directions=moved.directions, normals=moved.normals)
+        _displace(height_map, rates, rest, shape)
+        return shape
+
+
+# triangles, texture coordinates of their corners, points, directions, normals, and their charts, rows and columns
+_Vertices = tuple[NDArray, NDArray | None, NDArray, NDArray, NDArray, tuple[NDArray, NDArray, NDArray]]
+
+
+def _own(atlas: Atlas, triangles: int) -> _Vertices:
+    """The mesh's own triangles, their vertices split at creases."""
+    V, F = atlas.mesh.V, atlas.mesh.F
+    split = split_corners(V, F)
+    each = split.vertices
+    chart, row, column = atlas.locate(V)
+    places = chart[each], row[each], column[each]
+    return split.F, atlas.mesh.corner_uv, V[each], smooth_normals(V, F)[each], split.normals, places
+
+
+def _refined(atlas: Atlas, triangles: int) -> _Vertices:
+    """Triangles as the renderer makes them, of about the size of texels."""
+    mesh, charts = atlas.mesh, Charts.of(atlas)
+    F, attributes, same = tessellated(
+        mesh,
+        charts,
+        smooth=smooth_normals(mesh.V, mesh.F),
+        max_length=float(np.sqrt(atlas.areas.mean())),
+        max_faces=triangles,
+        corner_uv=mesh.corner_uv,
+    )
+    # vertices that differ in their texture coordinates or charts alone become one
+    _, first, point = np.unique(same, return_index=True, return_inverse=True)
+    vertices, uv = attributes[first], None if mesh.corner_uv is None else attributes[F][:, :, UV]
+    places = charts.map.chart_points(vertices[:, COORDINATES], atlas.resolution)
+    return point.ravel()[F], uv, vertices[:, POSITION], vertices[:, DIRECTION], vertices[:, NORMAL], places
+
+
+class _Rest(NamedTuple):
+    """The surface without waves: points, directions and normals [n, 3], and where the points lie on the texels.
+
+    `texels` [n, 3] are the first of 3 x 3 (chart, row, column) on charts with halo, `offsets` [n, 2] are from the
+    middle one [texels].
+    """
+
+    points: Floats32
+    directions: Floats32
+    normals: Floats32
+    texels: Ints32
+    offsets: Floats32
+
+
+@kernel
+def _displace(height_map: Floats32, rates: Floats32, rest: _Rest, shape: Shape) -> None:
+    """Fill in a shape from a height map [C, n + 2, n + 2, 4] and the rates of its heights [C, n + 2, n + 2]."""
+    points, normals, velocities, heights = shape
+    half, most = np.float32(0.5), np.float32(0.75)
+    down, across = np.empty(3, np.float32), np.empty(3, np.float32)
+    for i in range(len(points)):
+        chart, row, column = rest.texels[i]
+        s, t = rest.offsets[i]
+        down[0], down[1], down[2] = half * (half - s) ** 2, most - s * s, half * (half + s) ** 2
+        across[0], across[1], across[2] = half * (half - t) ** 2, most - t * t, half * (half + t) ** 2
+        gx = gy = gz = h = v = np.float32(0)
+        for j in range(3):
+            for k in range(3):
+                weight, texel = down[j] * across[k], height_map[chart, row + j, column + k]
+                gx += weight * texel[0]
+                gy += weight * texel[1]
+                gz += weight * texel[2]
+                h += weight * texel[3]
+                v += weight * rates[chart, row + j, column + k]
+        heights[i] = h
+        for k in range(3):
+            points[i, k] = rest.points[i, k] + h * rest.directions[i, k]
+            velocities[i, k] = v * rest.directions[i, k]
+        x, y, z = rest.normals[i, 0] - gx, rest.normals[i, 1] - gy, rest.normals[i, 2] - gz
+        scale = 1 / np.sqrt(x * x + y * y + z * z)
+        normals[i, 0], normals[i, 1], normals[i, 2] = x * scale, y * scale, z * scale

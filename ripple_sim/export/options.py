@@ -1,0 +1,59 @@
+"""`ExportOptions`: every option of an export, listed once for Python and for the command line."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Literal, TypedDict
+
+TESSELLATIONS = ("refined", "own")
+MOST_TRIANGLES = 100_000
+
+Backend = Literal["auto", "gl", "cpu"]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ExportOptions:
+    """How a scene is exported.
+
+    The docstring of a field is its help on the command line. None leaves an option to the scene.
+    """
+
+    fps: int = 60
+    """Frames per second."""
+    duration: float | None = None
+    """Seconds of the scene to export."""
+    slow_motion: float = 1.0
+    """Seconds of the file per second of the scene: 4 is four times slower."""
+    tessellation: Literal["refined", "own"] = "refined"
+    """Triangles of rippling surfaces: as fine as their texels, or the object's own."""
+    triangles: int = MOST_TRIANGLES
+    """About how many triangles a refined surface may have."""
+    size: tuple[int, int] = (1280, 720)
+    """Size in pixels of the frames that the camera is meant for."""
+    resolution: int | None = None
+    """Texels along the edge of a cube's chart; more resolve finer waves and take longer."""
+    layout: str | None = None
+    """How surfaces get their charts: cube (closed, one part, no handles), patches (any), or auto."""
+    backend: Backend = "auto"
+    """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
+    overwrite: bool = False
+    """Replace an output that ripple-sim has not made."""
+
+
+class WriteOptions(TypedDict, total=False):
+    """Options of an export in anybody's own loop; see `Exporter`."""
+
+    tessellation: str
+    triangles: int
+    size: tuple[int, int]
+    limit: bool
+    overwrite: bool
+
+
+WRITE_OPTIONS: WriteOptions = {
+    "tessellation": "refined",
+    "triangles": MOST_TRIANGLES,
+    "size": (1280, 720),
+    "limit": True,
+    "overwrite": False,
+}

@@ -1,0 +1,102 @@
+"""What an export records: a model with its ripples, and how they are to be seen."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Protocol
+
+import mujoco
+
+from ripple_sim.capture.viewpoint import focal_distance, viewpoint
+from ripple_sim.coupling.ripples import Impulse, Ripples
+from ripple_sim.render.camera import Pose
+from ripple_sim.scene.camera import CameraEntry
+
+from .moving_mesh import MovingMesh
+
+
+@dataclasses.dataclass(frozen=True)
+class Paint:
+    """What colours a target: its look, one of `LOOKS`, and its sRGB colour if it is given one."""
+
+    look: str = "rubber"
+    color: tuple[float, float, float] | None = None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Source:
+    """What is recorded.
+
+    Attributes
+    ----------
+    model : mujoco.MjModel
+    ripples : Ripples
+    fps : float
+        Frames in a second of the file.
+    slow_motion : float
+        Seconds of the file per second of the simulation.
+    camera : CameraEntry
+    size : (width, height)
+        Of the frames that the camera is meant for [pixels].
+    lighting : str
+        One of `LIGHTING`.
+    paints : mapping
+        By the target's name.
+    limited : mapping
+        Whether heights are bent, by the target's name.
+    tessellation, triangles : str, int
+        Of the surfaces, see `MovingMesh`.
+    """
+
+    model: mujoco.MjModel
+    ripples: Ripples
+    fps: float
+    camera: CameraEntry
+    size: tuple[int, int]
+    lighting: str
+    paints: Mapping[str, Paint]
+    limited: Mapping[str, bool]
+    tessellation: str
+    triangles: int
+    slow_motion: float = 1.0
+
+    def mesh(self, name: str) -> MovingMesh:
+        """The surface of a target."""
+        return MovingMesh(self.ripples[name].rest, self.tessellation, self.limited[name], self.triangles)
+
+    def pose(self, data: mujoco.MjData) -> tuple[Pose, float]:
+        """The camera in the world, and its focal distance [m]."""
+        pose = viewpoint(self.model, data, self.camera, data.time).pose()
+        return pose, focal_distance(self.model, data, self.camera, pose)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Moment:
+    """A frame of an export. The waves are those of the source's ripples at the same time.
+
+    Attributes
+    ----------
+    number : int
+        Of the frame, from 0.
+    data : mujoco.MjData
+    impulses : list of Impulse
+        Since the frame before.
+    """
+
+    number: int
+    data: mujoco.MjData
+    impulses: list[Impulse]
+
+
+class Writer(Protocol):
+    """Writes a run to a file or folder, frame by frame; it is made with its source and path."""
+
+    def write(self, moment: Moment) -> None:
+        """Add a frame."""
+
+    def finish(self) -> None:
+        """Complete the file."""
+
+    def close(self) -> None:
+        """Leave the file incomplete."""

@@ -1,0 +1,121 @@
+"""The impulses of a run as a table: a .csv or .parquet file."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ripple_sim.encode.mark import MARK
+
+from .source import Moment, Source
+
+# Name and unit of every column, and its type for pyarrow.
+COLUMNS = {
+    "frame": ("", "int64"),
+    "time": ("s", "float64"),
+    "geom": ("", "string"),
+    "other": ("", "string"),
+    "x": ("m", "float64"),
+    "y": ("m", "float64"),
+    "z": ("m", "float64"),
+    "impulse": ("N s", "float64"),
+    "chart": ("", "int64"),
+    "row": ("", "int64"),
+    "column": ("", "int64"),
+    "inner": ("", "bool"),
+}
+HEADER = [f"{name} [{unit}]" if unit else name for name, (unit, _) in COLUMNS.items()]
+_GROUP = 10_000  # rows that are kept in memory
+
+
+def rows(moment: Moment) -> Iterator[tuple]:
+    """The impulses of a frame, in the order of the columns."""
+    for each in moment.impulses:
+        point = (float(x) for x in each.point)
+        yield (moment.number, moment.data.time, each.geom, each.other, *point, each.impulse, *each.texel, each.inner)
+
+
+class CsvWriter:
+    """Writes impulses as comma-separated values, one row an impulse, units in the header."""
+
+    def __init__(self, source: Source, path: Path) -> None:
+        self._file = path.open("w", newline="", encoding="utf-8")
+        self._writer = csv.writer(self._file)
+        self._writer.writerow(HEADER)
+
+    def write(self, moment: Moment) -> None:
+        """Add the impulses of a frame."""
+        self._writer.writerows(rows(moment))
+
+    def finish(self) -> None:
+        """Complete the file."""
+        self._file.close()
+
+    def close(self) -> None:
+        """Leave the file incomplete."""
+        with contextlib.suppress(OSError):
+            self._file.close()
+
+
+class ParquetWriter:
+    """Writes impulses as columns, units in their metadata."""
+
+    def __init__(self, source: Source, path: Path) -> None:
+        import pyarrow
+        import pyarrow.parquet
+
+        fields = [
+            pyarrow.field(name, getattr(pyarrow, f"{kind}_" if kind == "bool" else kind)(), metadata={"unit": unit})
+            for name, (unit, kind) in COLUMNS.items()
+        ]
+        self._schema = pyarrow.schema(fields, metadata={"software": MARK})
+        self._writer = pyarrow.parquet.ParquetWriter(path, self._schema)
+        self._rows: list[tuple] = []
+
+    def write(self, moment: Moment) -> None:
+        """Add the impulses of a frame."""
+        self._rows += rows(moment)
+        if len(self._rows) >= _GROUP:
+            self._flush()
+
+    def finish(self) -> None:
+        """Complete the file."""
+        self._flush()
+        self._writer.close()
+
+    def close(self) -> None:
+        """Leave the file incomplete."""
+        with contextlib.suppress(OSError):
+            self._writer.close()
+
+    def _flush(self) -> None:
+        import pyarrow
+
+        columns: list[Any] = [list(column) for column in zip(*self._rows, strict=True)] or [[] for _ in COLUMNS]
+        self._writer.write_table(pyarrow.table(columns, schema=self._schema))
+        self._rows = []
+
+
+def writer(source: Source, path: Path) -> CsvWriter | ParquetWriter:
+    """Begin a file."""
+    return (CsvWriter if path.suffix.lower() == ".csv" else ParquetWriter)(source, path)
+
+
+def made_here(path: Path) -> bool:
+    """Whether a file has the header, or the metadata, of a table from here."""
+    if not path.is_file():
+        return False
+    if path.suffix.lower() == ".csv":
+        with path.open("rb") as file:
+            return file.readline(1000).decode("utf-8", "replace").rstrip("\r\n") == ",".join(HEADER)
+    import pyarrow
+    import pyarrow.parquet
+
+    try:
+        metadata = pyarrow.parquet.read_schema(path).metadata or {}
+    except (pyarrow.ArrowException, OSError):
+        return False
+    return metadata.get(b"software") == MARK.encode()

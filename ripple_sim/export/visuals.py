@@ -1,0 +1,140 @@
+"""The bodies of a model as meshes: what the renderer draws beside the targets."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render.color import srgb_to_linear
+from ripple_sim.render.gpu.contract import MappingKind
+from ripple_sim.render.visuals.looks import MODEL_LOOK, Look, find_look
+from ripple_sim.render.visuals.materials import look_of, texture_pixels
+from ripple_sim.render.visuals.shapes import shape_of, sizes
+from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of
+from ripple_sim.render.visuals.visual import Visual, geom_visual, site_visual, visible_geoms, visible_sites
+
+from .moving_mesh import MovingMesh
+from .source import Paint
+
+_SEGMENTS = 12  # to a right angle
+
+
+class Solid(NamedTuple):
+    """A geom or site as a mesh in its own frame.
+
+    Attributes
+    ----------
+    visual : Visual
+    name : str
+    body : int
+    position, quaternion : float64 [3], [4]
+        In its body's frame [m], w first.
+    points, normals : float64 [n, 3]
+    F : int64 [m, 3]
+    uv : float64 [m, 3, 2], optional
+        Of the corners in its flat texture, v from the image's lower edge; images repeat.
+    """
+
+    visual: Visual
+    name: str
+    body: int
+    position: NDArray[np.float64]
+    quaternion: NDArray[np.float64]
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    F: NDArray[np.int64]
+    uv: NDArray[np.float64] | None
+
+
+class Finish(NamedTuple):
+    """How a surface looks: parameters, linear colour [3], opacity, and the id of its flat texture, -1 without."""
+
+    look: Look
+    color: NDArray[np.float64]
+    opacity: float
+    texture: int
+
+
+def solids(model: mujoco.MjModel, targets: set[int], segments: int = _SEGMENTS) -> list[Solid]:
+    """Everything that is drawn of a model but its targets, which are geom ids."""
+    visuals = [geom_visual(model, geom) for geom in visible_geoms(model) if geom not in targets]
+    visuals += [site_visual(model, site) for site in visible_sites(model)]
+    found = (_solid(model, visual, segments) for visual in visuals)
+    return [each for each in found if each is not None]
+
+
+def solid_finish(model: mujoco.MjModel, visual: Visual) -> Finish:
+    """How a geom or site looks."""
+    mapping = mapping_of(model, visual)
+    look, color = look_of(model, visual), visual.color
+    flat = mapping.kind == MappingKind.FLAT_IMAGE
+    return Finish(look, color if flat else color * mean_color(model, mapping), visual.opacity, _flat_texture(mapping))
+
+
+def target_finish(model: mujoco.MjModel, geom: int, paint: Paint, has_uv: bool) -> Finish:
+    """How a target looks; see `appearance` of the renderer."""
+    visual = geom_visual(model, geom)
+    mapping, modelled = mapping_of(model, visual), paint.look == MODEL_LOOK
+    if mapping.own and not has_uv:
+        mapping = Mapping()
+    look = look_of(model, visual) if modelled else find_look(paint.look)
+    if paint.color is not None:
+        color = srgb_to_linear(paint.color)
+        return Finish(look, color, 1.0, _flat_texture(mapping) if modelled else -1)
+    if modelled or mapping.kind != MappingKind.NO_IMAGE:
+        flat = mapping.kind == MappingKind.FLAT_IMAGE
+        mean = 1.0 if flat else mean_color(model, mapping)
+        return Finish(look, visual.color * mean, 1.0, _flat_texture(mapping))
+    return Finish(look, visual.color if visual.colored else srgb_to_linear(look.color), 1.0, -1)
+
+
+def target_uv(model: mujoco.MjModel, geom: int, mesh: MovingMesh) -> NDArray[np.float64]:
+    """Places [m, 3, 2] of the corners of a target's mesh in its flat texture; see `Solid`."""
+    mapping = mapping_of(model, geom_visual(model, geom))
+    if not mapping.own or mesh.uv is None:
+        return texture_places(mapping, mapping.at(mesh.rest.astype(np.float64))[mesh.F])
+    return texture_places(mapping, np.array([0.0, 1.0]) + np.array([1.0, -1.0]) * mesh.uv)  # v from the upper edge
+
+
+def texture_places(mapping: Mapping, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places [..., 2] in a flat texture, v from its lower edge, of a mapping's coordinates [..., 2 or 3]."""
+    scale, offset = np.array(mapping.tiling[:2]), np.array(mapping.tiling[2:])
+    places = coordinates[..., :2] * scale + offset
+    return np.stack([places[..., 0], 1.0 - places[..., 1]], axis=-1)
+
+
+def mean_color(model: mujoco.MjModel, mapping: Mapping) -> NDArray[np.float64]:
+    """Mean linear colour of a mapping's texture [3], white without one."""
+    if mapping.texture < 0:
+        return np.ones(3)
+    return srgb_to_linear(texture_pixels(model, mapping.texture)[::4, ::4] / 255.0).mean(axis=(0, 1))
+
+
+def _flat_texture(mapping: Mapping) -> int:
+    return mapping.texture if mapping.kind == MappingKind.FLAT_IMAGE else -1
+
+
+def _solid(model: mujoco.MjModel, visual: Visual, segments: int) -> Solid | None:
+    shape = shape_of(model, visual)
+    if shape is None:
+        return None
+    mesh = shape[1](segments)
+    points, mapping = mesh.positions(*sizes(model, visual)), mapping_of(model, visual)
+    uv = None
+    if mapping.kind == MappingKind.FLAT_IMAGE:
+        # a mesh asset counts v as MuJoCo does, from the upper edge
+        own = mesh.uv if mapping.own and mesh.uv is not None else mapping.at(points)
+        uv = texture_places(mapping, own)[mesh.faces]
+    kind, index = ("site", visual.index) if visual.site else ("geom", visual.index)
+    name = mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), index) or f"{kind}_{index}"
+    position, quaternion = (np.array(getattr(model, f"{kind}_{what}")[index]) for what in ("pos", "quat"))
+    body = int(getattr(model, f"{kind}_bodyid")[index])
+    size = np.linalg.norm(mesh.normals, axis=1, keepdims=True)
+    normals = mesh.normals / np.where(size > 0, size, 1.0)
+    if visual.kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # the ball's normals, stretched
+        normals = normals / visual.half_sizes
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Solid(visual, name, body, position, quaternion, points, normals, mesh.faces, uv)

@@ -1,0 +1,36 @@
+#version 430
+// What is seen at the middle of each pixel, without light: of solids, transparent or not, and of the floor.
+#include "gpu/frame_uniforms.glsl"
+#include "gpu/g_buffer_read.glsl"
+#include "visuals/object_table.glsl"
+#include "glsl/ray.glsl"
+#include "surfaces/height_maps.glsl"
+
+uniform float floor_geom;
+
+layout(location = 0) out vec4 shown;   // normal with ripples, in the world; distance along the camera's axis [m]
+layout(location = 1) out vec4 smooth_surface;  // normal without ripples; geom + 1, 0: nothing
+layout(location = 2) out vec4 rippling;  // place on the page of charts [texels]; layer of the height map, -1: none; height [m]
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    float depth = texelFetch(depths, pixel, 0).r;
+    shown = smooth_surface = vec4(0.0);
+    rippling = vec4(0.0, 0.0, -1.0, 0.0);
+    if (depth < min(floor_depth(), 0.99999994)) {
+        vec4 normal = texelFetch(normals, pixel, 0), color = texelFetch(colors, pixel, 0);
+        Object object = objects[unpack_object(normal.z)];
+        vec2 place = color.xy * vec2(textureSize(height_maps, 0).xy);
+        vec4 ripple = spline_at(height_maps, vec3(place, object.height_map.x)) * object.height_map.y;
+        vec3 out_of = octahedral_decode(normal.xy);
+        float side = unpack_inner(normal.z) ? -1.0 : 1.0;
+        shown = vec4(normalize(out_of - side * object.rotation * ripple.xyz), eye_distance(depth));
+        smooth_surface = vec4(side * out_of, object.place.x + 1.0);
+        if (object.height_map.y > 0.0)
+            rippling = vec4(place, object.height_map.x, ripple.w);
+    } else if (meets_floor()) {
+        shown = vec4(floor_normal.xyz, floor_distance());
+        smooth_surface = vec4(floor_normal.xyz, floor_geom + 1.0);
+    }
+}

@@ -1,0 +1,44 @@
+"""Heights between the texels on the processor, by the quadratic B-spline of spline.glsl."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.kernel import Floats32, Ints32, kernel
+from ripple_sim.solver.texels.chart_page import ChartPage
+
+
+def spline_samples(page: ChartPage, places: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Where places [k, 2] on a page of charts [texels] lie between the texels.
+
+    Returns
+    -------
+    texel : int32 [k, 3]
+        Chart, row and column, in a chart with its halo, of the first of the 3 x 3 texels about each place.
+    offset : float32 [k, 2]
+        How far off the middle one's centre it is [texels].
+    """
+    chart, row, column = page.locate(places)
+    place = np.stack([row, column], axis=1)
+    nearest = np.clip(np.floor(place + 0.5), 0, page.resolution - 1)
+    return np.column_stack([chart, nearest]).astype(np.int32), (place - nearest).astype(np.float32)
+
+
+@kernel
+def spline_heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Floats32:
+    """Heights [k] of a height map [C, n + 2, n + 2, 4] at offsets [k, 2] in texels [k, 3]; see `spline_samples`."""
+    height = np.empty(len(texel), np.float32)
+    half = np.float32(0.5)
+    for i in range(len(texel)):
+        chart, row, column = texel[i]
+        s, t = offset[i]
+        left, right = half * (half - t) * (half - t), half * (half + t) * (half + t)
+        middle = np.float32(0.75) - t * t
+        line = np.empty(3, np.float32)
+        for k in range(3):
+            across = height_map[chart, row + k]
+            line[k] = left * across[column, 3] + middle * across[column + 1, 3] + right * across[column + 2, 3]
+        height[i] = half * (half - s) ** 2 * line[0] + (np.float32(0.75) - s * s) * line[1]
+        height[i] += half * (half + s) ** 2 * line[2]
+    return height

@@ -1,0 +1,38 @@
+"""A scene by its name, its file, or the mesh on which bodies drop."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ripple_sim.errors import SceneError
+
+from .drop import drop_scene
+from .load_scene import load_scene, shipped_scenes
+from .scene import Scene
+
+
+def find_scene(target: str | Path, *, seed: int | None = None) -> Scene:
+    """Scene of a shipped scene's name, a TOML file or a mesh file.
+
+    Parameters
+    ----------
+    target : str or path
+    seed : int, optional
+        As for `load_scene`, or of `drop_scene`.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene or file, or it is invalid.
+    MeshError
+        If a mesh cannot be read.
+    """
+    path = Path(target)
+    if str(target) in shipped_scenes() or path.suffix.lower() == ".toml":
+        return load_scene(target, seed=seed)
+    if path.is_file():
+        return drop_scene(path, seed=seed or 0)
+    raise SceneError(
+        f"there is no scene or mesh {str(target)!r}; shipped scenes are {', '.join(shipped_scenes())}, or give the "
+        "path of a scene file (TOML) or of a mesh"
+    )

@@ -1,0 +1,73 @@
+"""The wave operator of a surface that moves: masses stay with the texels, stiffness follows their positions."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.texels.atlas import Atlas
+from ripple_sim.solver.texels.moving_cells import CellCoefficient, MovingCells
+from ripple_sim.solver.texels.softening import softening
+from ripple_sim.solver.texels.stencil import Stencil
+
+from .assembly import texel_fields
+from .fluid_operator import FluidOperator
+from .material import Material
+from .wave_operator import WaveOperator
+
+Floats: TypeAlias = NDArray[np.float64]
+
+
+class MovingOperator:
+    """Makes the operator of a material anew wherever the texels are.
+
+    The mass sigma A of each texel is that at rest, so that its density falls as its area grows, and with it tension
+    sigma c^2 and viscous resistance sigma nu. Rates and speeds are the material's own, but that c^2 goes with a power
+    of the area, `Material.tightening`; so does the square of a plate's frequency with b.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        At rest.
+    material : Material
+    operator : WaveOperator
+        At rest, of kind "fem".
+
+    Raises
+    ------
+    SolverError
+        If there is deep fluid below.
+    """
+
+    def __init__(self, atlas: Atlas, material: Material, operator: WaveOperator) -> None:
+        if isinstance(operator, FluidOperator):
+            raise SolverError("a surface with deep fluid below cannot move; take a material without `deep`")
+        rim = "fixed" if operator.topology.fixed_rim else "free"
+        texels, field = texel_fields(atlas, material, rim)
+        self._rest, self._cells = operator, MovingCells(texels)
+        soft, density = softening(texels), field["density"]
+        self._tension = self._cells.coefficient(density * field["speed"] ** 2, soft, material.tightening - 1.0)
+        self._viscous = self._laplace = None
+        if operator.viscous_stencil is not None:
+            self._viscous = self._cells.coefficient(density * field["viscosity"], soft, -1.0)
+        if operator.laplace_stencil is not None:
+            self._laplace = self._cells.coefficient(np.ones_like(density), soft, 0.0)
+        self._level = atlas.areas / self._cells.assemble(texels.halo_positions, self._tension)[1]
+        self._areas = atlas.areas
+
+    def at(self, around: Floats) -> tuple[WaveOperator, Floats]:
+        """Operator, and areas of the texels [m^2], for their positions with halo [m], [C, n + 2, n + 2, 3]."""
+        tension, spanned = self._cells.assemble(around, self._tension)
+        areas = np.maximum(spanned * self._level, 1e-3 * self._areas)
+        viscous, laplace = (self._stencil(around, each) for each in (self._viscous, self._laplace))
+        rigidity = self._rest.rigidity
+        if rigidity is not None:
+            # sigma b / A, with sigma = M / A
+            rigidity = rigidity * (self._areas / areas) ** 2
+        return self._rest.moved(tension, viscous, laplace, rigidity), areas
+
+    def _stencil(self, around: Floats, coefficient: CellCoefficient | None) -> Stencil | None:
+        return None if coefficient is None else self._cells.assemble(around, coefficient)[0]

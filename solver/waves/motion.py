@@ -1,0 +1,148 @@
+"""An atlas whose vertices move, and the operator on it."""
+
+from __future__ import annotations
+
+import functools
+import warnings
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ripple_sim.solver.checked import shown
+from ripple_sim.solver.errors import RippleWarning, SolverError
+from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.mesh.folds import Folds
+from ripple_sim.solver.mesh.mesh import Mesh
+from ripple_sim.solver.mesh.triangle_tree import refitted
+from ripple_sim.solver.operator.material import Material
+from ripple_sim.solver.operator.moving import MovingOperator
+from ripple_sim.solver.operator.wave_operator import WaveOperator
+from ripple_sim.solver.texels.atlas import Atlas
+from ripple_sim.solver.texels.riding import SurfaceRide
+from ripple_sim.solver.texels.texel_mesh import TexelMesh
+
+# The stiffness is made anew once the square of an edge's length has changed by this share since it was made.
+_CHANGED = 2e-4
+
+# Folds are looked for once in so many times that the stiffness is made anew: it takes about as long.
+_EVERY = 8
+
+# What is known of a mesh at rest, and stays.
+_OF_REST = ("components", "rims", "genus")
+
+
+class Motion:
+    """Moves the texels of an atlas with its vertices.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        At rest.
+    material : Material
+    operator : WaveOperator
+        At rest.
+
+    Attributes
+    ----------
+    rest : Atlas
+    V : float64 [n, 3]
+        The vertices now [m].
+    """
+
+    def __init__(self, atlas: Atlas, material: Material, operator: WaveOperator) -> None:
+        self.rest, self.V = atlas, atlas.mesh.V
+        self._ride = SurfaceRide(atlas)
+        self._operator = MovingOperator(atlas, material, operator)
+        self._folds = Folds(atlas.mesh.V, np.asarray(atlas.mesh.F, np.int64))
+        F = self._folds.F
+        self._edges = np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+        self._squares = np.empty(len(self._edges))
+        _square_lengths(atlas.mesh.V, self._edges, self._squares)
+        self.areas = atlas.areas
+        self._warned, self._looks = False, 0
+
+    def to(self, vertices: ArrayLike) -> WaveOperator | None:
+        """Move the vertices [n, 3] [m]; return the operator there, or None where lengths are as they were.
+
+        Raises
+        ------
+        SolverError
+            If the vertices are not finite, or others than those of the mesh.
+        """
+        self.V = self._checked(vertices)
+        self.__dict__.pop("atlas", None)
+        if not _stretches(self.V, self._edges, self._squares):
+            return None
+        _square_lengths(self.V, self._edges, self._squares)
+        positions, beyond = self._ride.positions(self.V)
+        operator, self.areas = self._operator.at(self.rest.texels.around(positions, beyond))
+        self._warn_of_folds()
+        return operator
+
+    @functools.cached_property
+    def atlas(self) -> Atlas:
+        """The atlas where the vertices are."""
+        rest, V = self.rest, self.V
+        mesh = Mesh(V, rest.mesh.F, rest.mesh.uv, rest.mesh.corner_uv, rest.mesh.notes, rest.mesh.name)
+        mesh.__dict__.update({name: rest.mesh.__dict__[name] for name in _OF_REST if name in rest.mesh.__dict__})
+        mesh.__dict__["vertex_normals"] = self._folds.vertex_normals(V)
+        positions, beyond = self._ride.positions(V)
+        normals = self._ride.normals(mesh.vertex_normals)
+        texels = TexelMesh(rest.texels.topology, positions, normals, self.areas, beyond)
+        moved = Atlas(mesh, texels, rest.chart_map, rest.triangles, rest.barycentrics)
+        moved.__dict__["tree"] = refitted(rest.tree, V, mesh.F)
+        return moved
+
+    def _checked(self, vertices: ArrayLike) -> NDArray[np.float64]:
+        shape = self.rest.mesh.V.shape
+        try:
+            V = np.array(vertices, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise SolverError(f"vertices are {shown(vertices)}; valid are numbers of shape {shape}, in m") from error
+        if V.shape != shape:
+            raise SolverError(
+                f"vertices have shape {V.shape}; the mesh of this surface has {shape}: give all of its vertices, in "
+                "the order of `atlas.mesh.V`"
+            )
+        if not np.isfinite(V).all():
+            raise SolverError(f"{(~np.isfinite(V)).sum()} numbers of the vertices are not finite; valid are metres")
+        return V
+
+    def _warn_of_folds(self) -> None:
+        self._looks += 1
+        if self._warned or self._looks % _EVERY != 1:
+            return
+        count = self._folds.count(self.V)
+        if count:
+            self._warned = True
+            warnings.warn(
+                f"{count} of {len(self._folds.F)} triangles of the moving surface are turned over or without area; "
+                "waves there are wrong: move the vertices less, or use a stiffer body",
+                RippleWarning,
+                stacklevel=4,
+            )
+
+
+@kernel
+def _square_lengths(V: Floats, edges: Ints, squares: Floats) -> None:
+    """Fill in the squared lengths [k] of edges [k, 2]."""
+    for i in range(len(edges)):
+        squares[i] = _squared(V, edges, i)
+
+
+@kernel
+def _stretches(V: Floats, edges: Ints, squares: Floats) -> bool:
+    """Whether any edge has another length than it had."""
+    i = 0
+    while i < len(edges) and abs(_squared(V, edges, i) - squares[i]) <= _CHANGED * squares[i]:
+        i += 1
+    return i < len(edges)
+
+
+@kernel
+def _squared(V: Floats, edges: Ints, i: int) -> float:
+    """Squared length of an edge."""
+    a, b, total = edges[i, 0], edges[i, 1], 0.0
+    for k in range(3):
+        total += (V[b, k] - V[a, k]) ** 2
+    return total

@@ -1,0 +1,125 @@
+"""Flexes and skins as targets: where their texels are, and what contacts give them."""
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from ripple_sim import Ripples
+from ripple_sim.errors import SceneError
+from ripple_sim.solver import Material
+
+SOFT = Material(speed=1.0, density=5.0, damping=2.0, stiffness=100.0)
+HEAD = '<option timestep="0.001" solver="CG" tolerance="1e-8"/><size memory="20M"/>'
+JELLY = f"""<mujoco>{HEAD}<worldbody>
+<flexcomp name="jelly" type="grid" count="4 4 4" spacing=".1 .1 .1" pos="0 0 .2" dim="3" radius=".005" dof="trilinear"
+ mass="5"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3" damping=".02"/></flexcomp>
+<geom type="plane" size="3 3 .1" pos="0 0 .04"/>
+<body name="ball" pos="0.03 0.02 .45"><freejoint/><geom name="ball" type="sphere" size=".06" mass=".4"/></body>
+</worldbody></mujoco>"""
+CLOTH = f"""<mujoco>{HEAD}<worldbody>
+<flexcomp name="cloth" type="grid" count="6 6 1" spacing=".1 .1 .1" pos="0 0 1" dim="2" radius=".01" mass="1">
+<contact selfcollide="none"/><edge equality="true" damping=".01"/>
+<pin id="0 1 2 3 4 5 6 11 12 17 18 23 24 29 30 31 32 33 34 35"/></flexcomp>
+<body name="ball" pos="0 0 1.2"><freejoint/><geom name="ball" type="sphere" size=".06" mass=".4"/></body>
+</worldbody></mujoco>"""
+
+
+def skinned() -> str:
+    """A box of skin over two links, of which the second one turns."""
+    x, corners = np.linspace(-0.5, 0.5, 5), [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    V = np.array([[each, 0.06 * y, 0.06 * z] for each in x for y, z in corners])
+    F = [(0, 3, 2), (0, 2, 1), (16, 17, 18), (16, 18, 19)]
+    for i in range(4):
+        for j in range(4):
+            a, b = 4 * i + j, 4 * i + (j + 1) % 4
+            F += [(a, b, b + 4), (a, b + 4, a + 4)]
+    far = np.clip((V[:, 0] + 0.1) / 0.2, 0, 1)
+    bones = ""
+    for body, weights, at in (("near", 1 - far, "0 0 0"), ("far", far, "0 0 0")):
+        which = np.flatnonzero(weights)
+        bones += (
+            f'<bone body="{body}" bindpos="{at}" bindquat="1 0 0 0" vertid="{" ".join(map(str, which))}" '
+            f'vertweight="{" ".join(f"{weight:g}" for weight in weights[which])}"/>'
+        )
+    return f"""<mujoco><option timestep="0.001" gravity="0 0 -9.81"/><worldbody>
+<body name="near"><geom name="upper" type="capsule" fromto="-.5 0 0 0 0 0" size=".05"/>
+<body name="far"><joint name="elbow" type="hinge" axis="0 0 1" damping="1"/>
+<geom name="lower" type="capsule" fromto="0 0 0 .5 0 0" size=".05" mass="2"/></body></body>
+<body name="ball" pos="-.25 0 .3"><freejoint/><geom name="ball" type="sphere" size=".04" mass=".2"/></body>
+</worldbody><deformable><skin name="arm" vertex="{" ".join(f"{each:g}" for each in V.ravel())}"
+face="{" ".join(str(each) for triangle in F for each in triangle)}">{bones}</skin></deformable></mujoco>"""
+
+
+def run(xml: str, name: str, steps: int, **options: object) -> tuple[Ripples, mujoco.MjData, float, float]:
+    """Step a model: ripples, data, impulse of the ball on the target, and the ball's upward momentum gained."""
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    ripples = Ripples(model, {name: SOFT}, resolution=8, backend="cpu", **options)
+    impulse, dof = 0.0, model.body("ball").dofadr[0] + 2
+    for _ in range(steps):
+        ripples.mj_step(data)
+        impulse += sum(each.impulse for each in ripples.last_impulses if each.other == "ball")
+    gained = float(model.body("ball").mass[0] * (data.qvel[dof] + 9.81 * data.time))
+    return ripples, data, impulse, gained
+
+
+TARGETS = {"3d": (JELLY, "jelly"), "2d": (CLOTH, "cloth"), "skin": (skinned(), "arm")}
+
+
+@pytest.mark.parametrize("xml, name", TARGETS.values(), ids=TARGETS)
+def test_the_balls_momentum_reaches_the_surface(xml, name):
+    ripples, _, impulse, gained = run(xml, name, 350)
+    assert gained > 0.2
+    assert impulse == pytest.approx(gained, rel=0.06)
+    assert np.abs(ripples[name].height).max() > 1e-3
+    assert np.isfinite(ripples[name].height).all()
+    assert ripples[name].atlas.layout == ("patches" if name == "cloth" else "cube")
+
+
+def test_texels_lie_where_the_flex_is():
+    ripples, data, _, _ = run(JELLY, "jelly", 100)
+    corners = data.flexvert_xpos
+    V = ripples["jelly"].vertices
+    assert all(np.linalg.norm(corners - each, axis=1).min() < 1e-12 for each in V)
+    assert_allclose(V[ripples["jelly"].atlas.mesh.F].min(axis=(0, 1)), corners.min(axis=0))
+
+
+def test_a_skin_follows_its_bones():
+    ripples, data, _, _ = run(skinned(), "arm", 1)
+    before = ripples["arm"].rest.mesh.V
+    data.qpos[0] = np.pi / 2
+    ripples.mj_step(data)
+    after = ripples["arm"].vertices
+    near, far = before[:, 0] < -0.2, before[:, 0] > 0.2
+    assert_allclose(after[near], before[near], atol=1e-6)
+    assert_allclose(after[far][:, 1], before[far][:, 0], atol=2e-3)
+
+
+def test_names_that_no_surface_has_are_refused():
+    model = mujoco.MjModel.from_xml_string(JELLY)
+    with pytest.raises(SceneError, match="its flexes and skins are 'jelly'"):
+        Ripples(model, {"jam": SOFT})
+    with pytest.raises(SceneError, match="cannot push back yet"):
+        Ripples(model, {"jelly": SOFT}, resolution=8, two_way=True)
+
+
+def test_what_a_material_leaves_open_is_chosen_by_the_model():
+    model = mujoco.MjModel.from_xml_string(JELLY)
+    waves = Ripples(model, {"jelly": Material()}, resolution=8)["jelly"]
+    assert waves.material.density * waves.rest.areas.sum() == pytest.approx(5.0, rel=1e-2)
+    assert waves.material.speed > 1
+
+
+def test_a_geom_moved_by_hand_takes_its_contacts_along():
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><worldbody><geom name="target" type="sphere" size=".2"/>
+        <body pos="0 0 .26"><freejoint/><geom name="ball" type="sphere" size=".05"/></body></worldbody></mujoco>"""
+    )
+    data, ripples = mujoco.MjData(model), Ripples(model, {"target": SOFT}, resolution=8)
+    for i in range(100):
+        ripples["target"].move(ripples["target"].rest.mesh.V * [1, 1, 1 - 0.002 * i])
+        ripples.mj_step(data)
+    assert ripples.last_impulses[0].point[2] == pytest.approx(0.2 * (1 - 0.002 * 99), rel=0.01)
+    ripples.change_material("target", damping=5.0)
+    assert_allclose(ripples["target"].vertices, ripples["target"].atlas.mesh.V)

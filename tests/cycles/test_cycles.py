@@ -1,0 +1,141 @@
+"""Frames by Cycles: what Blender is told, what becomes of its frames, and what is said where it is missing or fails.
+
+A small program stands in for Blender, which few machines that run the tests have.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from PIL import Image
+
+from ripple_sim import VideoOptions, load_scene
+from ripple_sim.cycles.blender import PYTHON
+from ripple_sim.cycles.render_cycles import check_cycles, render_cycles
+from ripple_sim.cycles.tone_mapping import tone_mapped
+from ripple_sim.errors import RippleError, VideoError
+from ripple_sim.render import Camera, Renderer
+from ripple_sim.solver.gl import shared_context
+
+pytest.importorskip("pxr")
+
+MODEL = """<mujoco><worldbody><light pos="1 0 2" dir="-1 0 -2" diffuse="1 1 1"/>
+<geom type="plane" name="ground" size="1 1 .1" rgba="1 1 1 1"/>
+<geom name="egg" size="0.2" pos="0 0 0.2"/><body pos="0 0 0.6"><freejoint/><geom size="0.05"/></body>
+</worldbody></mujoco>"""
+
+# makes frames of its settings: as bright as their numbers, of the size that is asked for
+STAND_IN = """#!{python}
+import json, sys, tempfile
+from pathlib import Path
+import numpy as np
+settings = json.loads(Path(sys.argv[2]).read_text())
+assert tempfile.gettempdir() == settings["folder"]  # it may leave things there
+Path({told!r}).write_text(json.dumps(settings))
+assert Path(settings["stage"]).stat().st_size > 1000
+for number in range(settings["frames"]):
+    if number == {fails}:
+        sys.exit("out of memory")
+    width, height = settings["size"]
+    np.save(Path(settings["folder"], f"{{number}}.npy"), np.full((height, width, 3), 0.2 * number, np.float32))
+    print("Blender's own words")
+    print(f"frame {{number}}", flush=True)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "scene.xml").write_text(MODEL)
+    (tmp_path / "scene.toml").write_text(
+        'model = "scene.xml"\nduration = 0.1\n[[ripple]]\ngeom = "egg"\nresolution = 8\nlook = "jelly"\n'
+        "material = {speed = 0.3, density = 1000.0}\n"
+    )
+    return tmp_path
+
+
+def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, fails: int = -1) -> None:
+    program = folder / "blender"
+    program.write_text(STAND_IN.format(python=sys.executable, told=str(folder / "told.json"), fails=fails))
+    program.chmod(0o755)
+    monkeypatch.setenv(PYTHON, str(program))
+
+
+def test_frames_come_back_in_order_and_tone_mapped(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stand_in(folder, monkeypatch)
+    options = VideoOptions(size=(64, 36), fps=20)
+    summary = render_cycles(load_scene(folder / "scene.toml"), folder / "frames", options, samples=4)
+    shown = [np.asarray(Image.open(file)) for file in sorted((folder / "frames").glob("*.png"))]
+    assert summary.frames == len(shown) == 2
+    assert not shown[0].any()
+    assert (shown[1] == tone_mapped(np.full((36, 64, 3), 0.2, np.float32))).all()
+    told = json.loads((folder / "told.json").read_text())
+    assert (told["samples"], told["floor"], told["fps"]) == (4, "ground", 20)
+    assert not Path(told["folder"]).exists()
+
+
+def test_the_stage_keeps_what_preview_surfaces_have_no_word_for(folder: Path) -> None:
+    from pxr import Usd
+
+    from ripple_sim import ExportOptions, export_scene
+
+    export_scene(load_scene(folder / "scene.toml"), folder / "run.usda", ExportOptions(fps=20, duration=0.05))
+    stage = Usd.Stage.Open(str(folder / "run.usda"))
+    prims = [prim for prim in stage.Traverse() if prim.HasAttribute("userProperties:translucency")]
+    kept = {prim.GetAttribute("userProperties:translucency").Get() for prim in prims}
+    assert max(kept) == pytest.approx(0.7)
+    lamps = [prim for prim in stage.Traverse() if prim.HasAttribute("userProperties:power")]
+    assert {prim.GetParent().GetName() for prim in lamps} == {"lights"}
+    assert all(prim.GetAttribute("userProperties:power").Get() > 0 for prim in lamps)
+
+
+def test_a_blender_that_fails_leaves_no_video(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stand_in(folder, monkeypatch, fails=1)
+    options = VideoOptions(size=(64, 36), fps=20)
+    with pytest.raises(VideoError, match=r"ended before frame 1 with status 1: out of memory"):
+        render_cycles(load_scene(folder / "scene.toml"), folder / "frames", options)
+    assert not list(folder.glob("frames*"))
+
+
+def test_without_bpy_the_command_that_installs_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(PYTHON, raising=False)
+    monkeypatch.setitem(sys.modules, "bpy", None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "bpy" else object())
+    with pytest.raises(VideoError, match=r"pip install 'ripple-sim\[cycles\]'"):
+        check_cycles(VideoOptions(), tmp_path / "a.mp4")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"overlay": ("height",)}, "has no --overlay"),
+        ({"transparent": True}, "has no --transparent"),
+        ({"compare": "paper"}, "has no --compare"),
+    ],
+    ids=["overlay", "transparent", "compare"],
+)
+def test_options_of_ours_alone_are_refused(given: dict, said: str, tmp_path: Path) -> None:
+    with pytest.raises(RippleError, match=said):
+        check_cycles(VideoOptions(**given), tmp_path / "a.webp")
+
+
+def test_a_python_that_cannot_be_run_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(PYTHON, str(tmp_path / "none"))
+    with pytest.raises(VideoError, match="cannot be run"):
+        check_cycles(VideoOptions(), tmp_path / "a.mp4")
+
+
+def test_tone_mapping_is_the_shaders(opengl: None) -> None:
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    camera = Camera(lookat=(0.0, 0.0, 0.2), distance=1.0, azimuth=40.0, elevation=-30.0)
+    frames = [
+        Renderer(shared_context(), model, {}, size=(96, 54), linear=linear).render(data, {}, camera)
+        for linear in (True, False)
+    ]
+    assert frames[1].max() > 225  # above the shoulder
+    difference = np.abs(tone_mapped(frames[0].astype(np.float32)).astype(int) - frames[1])
+    assert np.quantile(difference, 0.98) <= 1  # edges are smoothed after tone mapping

@@ -1,0 +1,42 @@
+"""A rippling egg under a stone, and a run of it in a loop of its own."""
+
+from pathlib import Path
+
+import mujoco
+import pytest
+
+from ripple_sim import Material, Ripples
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene import Scene
+
+MJCF = """<mujoco><option timestep="0.001"/>
+<asset><texture name="tiles" type="2d" builtin="checker" width="8" height="8"/>
+<material name="tiles" texture="tiles" texrepeat="4 4"/></asset>
+<worldbody><light pos="1 0 2" dir="-1 0 -2" type="spot"/>
+<camera name="side" pos="0 -2 0.5" xyaxes="1 0 0 0 0.2 1" fovy="40"/>
+<geom name="floor" type="plane" size="2 2 .1" pos="0 0 -0.4" material="tiles"/>
+<body name="nest" pos="0.1 0 0" euler="0 0 30"><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/></body>
+<body name="stone" pos="0.15 0 0.245"><freejoint/><geom name="stone" size="0.05" rgba="1 0 0 1"/></body>
+</worldbody></mujoco>"""
+
+TOML = """model = "scene.xml"
+duration = 0.05
+[[ripple]]
+geom = "egg"
+resolution = 12
+material = {speed = 0.3, density = 1500.0}
+"""
+
+
+@pytest.fixture(scope="session")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    folder: Path = tmp_path_factory.mktemp("scene")
+    (folder / "scene.xml").write_text(MJCF)
+    (folder / "scene.toml").write_text(TOML)
+    return load_scene(folder / "scene.toml")
+
+
+@pytest.fixture(scope="module")
+def ripples() -> Ripples:
+    model = mujoco.MjModel.from_xml_string(MJCF)
+    return Ripples(model, {"egg": Material(speed=0.3, density=1500.0)}, resolution=12, backend="cpu")

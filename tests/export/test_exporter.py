@@ -1,0 +1,99 @@
+"""What an exporter refuses, and what it leaves behind."""
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import pytest
+
+from ripple_sim import Exporter, RippleError, Ripples
+from ripple_sim.cli.main import main
+from ripple_sim.errors import EncodingError
+
+pytest.importorskip("pxr")
+
+
+def export(ripples: Ripples, path: Path, **options: Any) -> None:
+    data = mujoco.MjData(ripples.model)
+    mujoco.mj_forward(ripples.model, data)
+    with Exporter(ripples.model, ripples, path, tessellation="own", **options) as exporter:
+        exporter.write(data)
+
+
+@pytest.mark.parametrize("name", ["run.obj", "run", ".usdc"])
+def test_unknown_endings_name_the_valid_ones(ripples: Ripples, tmp_path: Path, name: str) -> None:
+    with pytest.raises(RippleError, match=r"\.usdc, \.usda, \.usdz, \.zarr, \.html, \.csv, \.parquet"):
+        export(ripples, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_missing_packages_are_named_with_the_command_that_brings_them(
+    ripples: Ripples, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(RippleError, match=r"pip install 'ripple-sim\[usd\]'"):
+        export(ripples, tmp_path / "run.usdc")
+
+
+@pytest.mark.parametrize("name", ["run.usdc", "run.usda", "run.usdz"])
+def test_files_from_here_are_replaced_and_others_only_when_told_to(ripples: Ripples, tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    export(ripples, path)
+    export(ripples, path)
+    path.write_text("#usda 1.0\n")
+    with pytest.raises(RippleError, match="--overwrite"):
+        export(ripples, path)
+    assert path.read_text() == "#usda 1.0\n"
+    export(ripples, path, overwrite=True)
+    assert path.stat().st_size > 1000
+    assert {each.name for each in tmp_path.iterdir()} <= {name, "run.textures"}
+
+
+def test_folders_of_other_things_are_never_replaced(ripples: Ripples, tmp_path: Path) -> None:
+    (tmp_path / "run.textures").mkdir()
+    (tmp_path / "run.textures" / "texture_0.png").write_text("mine")
+    with pytest.raises(RippleError, match="other files"):
+        export(ripples, tmp_path / "run.usdc")
+    assert (tmp_path / "run.textures" / "texture_0.png").read_text() == "mine"
+    assert [each.name for each in tmp_path.iterdir()] == ["run.textures"]
+
+
+def test_nothing_is_left_after_an_exception_and_an_earlier_file_stays(ripples: Ripples, tmp_path: Path) -> None:
+    export(ripples, path := tmp_path / "run.usdc")
+    before = path.read_bytes()
+    data = mujoco.MjData(ripples.model)
+    with pytest.raises(KeyboardInterrupt), Exporter(ripples.model, ripples, path) as exporter:
+        exporter.write(data)
+        raise KeyboardInterrupt
+    assert path.read_bytes() == before
+    assert {each.name for each in tmp_path.iterdir()} == {"run.usdc", "run.textures"}
+    with pytest.raises(RippleError, match="closed"):
+        exporter.write(data)
+
+
+def test_a_file_without_frames_is_refused(ripples: Ripples, tmp_path: Path) -> None:
+    with pytest.raises(RippleError, match="at least one"), Exporter(ripples.model, ripples, tmp_path / "run.usdc"):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_is_an_error_that_names_the_file(
+    ripples: Ripples, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from ripple_sim.export.usd.usd_writer import UsdWriter
+
+    def full(self: UsdWriter) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(UsdWriter, "_save", full)
+    with pytest.raises(EncodingError, match=r"run\.usdc: No space left"):
+        export(ripples, tmp_path / "run.usdc")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_line_refuses_before_it_simulates(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "duck", "-o", str(tmp_path / "run.fbx")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert main(["export", "nothing", "-o", str(tmp_path / "run.usdc")]) == 2
+    assert "no scene or mesh" in capsys.readouterr().err

@@ -1,0 +1,93 @@
+"""Runs written as Zarr stores and tables of impulses, and read by xarray, pandas and pyarrow."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim import Exporter, RippleError, Ripples
+
+FRAMES = 20  # more than one chunk
+HEADER = "frame,time [s],geom,other,x [m],y [m],z [m],impulse [N s],chart,row,column,inner"
+
+
+def run(ripples: Ripples, path: Path, **options: Any) -> list[dict[str, Any]]:
+    """Export a run, and return what was at each frame."""
+    data, seen = mujoco.MjData(ripples.model), []
+    ripples.reset()
+    with Exporter(ripples.model, ripples, path, **options) as exporter:
+        for _ in range(FRAMES):
+            ripples.mj_step(data, nstep=2)
+            exporter.write(data)
+            waves = ripples["egg"]
+            seen.append(
+                {
+                    "time": data.time,
+                    "height": waves.height,
+                    "velocity": waves.velocity,
+                    "energy": waves.energy(),
+                    "position": data.xpos.copy(),
+                    "impulses": list(ripples.last_impulses),
+                }
+            )
+    return seen
+
+
+def test_xarray_opens_a_run_in_one_line_with_units_and_coordinates(ripples: Ripples, tmp_path: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("zarr")
+    path = tmp_path / "run.zarr"
+    seen = run(ripples, path)
+    fields = xarray.open_zarr(path)
+    assert fields.height_egg.dims == ("time", "chart_egg", "row_egg", "column_egg")
+    assert np.array_equal(fields.time, [each["time"] for each in seen])
+    for name in ("height", "velocity", "energy"):
+        assert np.array_equal(fields[f"{name}_egg"], [each[name] for each in seen])
+    assert np.abs(fields.height_egg).max() > 0
+    assert np.array_equal(fields.position, [each["position"] for each in seen])
+    assert fields.position.sel(body="stone", axis="z")[-1] == seen[-1]["position"][2, 2]
+    assert fields.velocity_egg.attrs["units"] == "m/s"
+    assert np.array_equal(fields.x_egg, ripples["egg"].atlas.positions[..., 0])
+    assert np.array_equal(fields.impulse_impulse, [hit.impulse for each in seen for hit in each["impulses"]])
+    assert fields.sizes["impulse"] > 0
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.parquet"])
+def test_a_table_has_a_row_for_each_impulse(ripples: Ripples, tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    seen = run(ripples, path)
+    expected = [(frame, hit) for frame, each in enumerate(seen) for hit in each["impulses"]]
+    assert expected
+    if path.suffix == ".csv":
+        header, *found = csv.reader(path.open())
+        assert ",".join(header) == HEADER
+        rows = [(int(row[0]), row[3], float(row[7]), [float(x) for x in row[4:7]]) for row in found]
+    else:
+        table = pytest.importorskip("pyarrow.parquet").read_table(path)
+        assert table.schema.field("impulse").metadata[b"unit"] == b"N s"
+        rows = [
+            (row["frame"], row["other"], row["impulse"], [row["x"], row["y"], row["z"]]) for row in table.to_pylist()
+        ]
+    assert rows == [(frame, hit.other, hit.impulse, list(hit.point)) for frame, hit in expected]
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.parquet", "run.zarr"])
+def test_what_is_from_here_is_replaced_and_nothing_else(ripples: Ripples, tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    run(ripples, path)
+    run(ripples, path)
+    if path.is_dir():
+        (path / "thesis.txt").write_text("mine")
+        with pytest.raises(RippleError, match="folder of other things"):
+            run(ripples, path, overwrite=True)
+        assert (path / "thesis.txt").read_text() == "mine"
+    else:
+        path.write_text("mine")
+        with pytest.raises(RippleError, match="--overwrite"):
+            run(ripples, path)
+        assert path.read_text() == "mine"
+        run(ripples, path, overwrite=True)
+    assert [each.name for each in tmp_path.iterdir()] == [name]

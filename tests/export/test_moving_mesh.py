@@ -1,0 +1,115 @@
+"""Points, normals and velocities of moving meshes."""
+
+import numpy as np
+import pytest
+
+from ripple_sim import Material
+from ripple_sim.export.moving_mesh import MovingMesh
+from ripple_sim.render.visuals.corners import smooth_normals
+from ripple_sim.scenes.shapes import limbed
+from ripple_sim.solver import Atlas, Mesh, WaveSolver, build_atlas, sphere_atlas
+from ripple_sim.solver.texels.halo import with_filled_halo
+
+RESOLUTION = 16
+
+
+@pytest.fixture(scope="module", params=["cube", "patches"])
+def atlas(request: pytest.FixtureRequest) -> Atlas:
+    V, F = limbed() if request.param == "cube" else drum()
+    return build_atlas(Mesh.from_arrays(V, F), RESOLUTION, layout=request.param, cache=False)
+
+
+def drum() -> tuple[np.ndarray, np.ndarray]:
+    """An open square sheet."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9))
+    corner = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
+    a, b, c, d = corner, corner + 1, corner + 10, corner + 9
+    F = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return np.stack([x, y, 0.1 * x * y], axis=2).reshape(-1, 3), F
+
+
+def smooth_field(atlas: Atlas, amplitude: float) -> np.ndarray:
+    x, y, z = np.moveaxis(atlas.positions, -1, 0)
+    return (amplitude * np.sin(3 * x + 1) * np.cos(2 * y) * np.cos(z)).astype(np.float32)
+
+
+def height_at(atlas: Atlas, field: np.ndarray, point: np.ndarray) -> float:
+    """The quadratic B-spline over a field, by its definition, in float64."""
+    around = with_filled_halo(atlas.texels.topology, field).astype(np.float64)
+    [chart], [row], [column] = atlas.locate(point[None])
+
+    def weight(distance: float) -> float:
+        d = abs(distance)
+        return 0.75 - d**2 if d <= 0.5 else 0.5 * (1.5 - d) ** 2 if d <= 1.5 else 0.0
+
+    size = range(RESOLUTION + 2)
+    return sum(
+        weight(r - 1 - row) * weight(c - 1 - column) * around[chart, r, c]
+        for r in size
+        if weight(r - 1 - row)
+        for c in size
+        if weight(c - 1 - column)
+    )
+
+
+def test_own_vertices_are_raised_by_the_spline_along_the_smooth_normals(atlas: Atlas) -> None:
+    mesh, field = MovingMesh(atlas, "own", limit=False), smooth_field(atlas, 0.05)
+    shape = mesh.shape(field, 2 * field)
+    V, F = atlas.mesh.V, atlas.mesh.F
+    normals = smooth_normals(V, F)
+    size = np.ptp(V, axis=0).max()
+    for face in range(0, len(F), max(len(F) // 20, 1)):
+        vertex, point = F[face, 0], mesh.F[face, 0]
+        height = height_at(atlas, field, V[vertex])
+        assert np.abs(shape.points[point] - (V[vertex] + height * normals[vertex])).max() < 1e-6 * size
+        assert np.abs(shape.velocities[point] - 2 * height * normals[vertex]).max() < 1e-6 * size
+        assert shape.heights[point] == pytest.approx(height, abs=1e-6)
+
+
+def test_refined_meshes_stay_closed_and_no_edge_is_longer_than_about_a_texel(atlas: Atlas) -> None:
+    mesh = MovingMesh(atlas, "refined")
+    points = mesh.shape(smooth_field(atlas, 0.05), smooth_field(atlas, 0.0)).points
+    edges = np.sort(mesh.F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    length = np.linalg.norm(mesh.rest[edges[:, 0]] - mesh.rest[edges[:, 1]], axis=1)
+    assert length.max() <= 1.001 * np.sqrt(atlas.areas.mean())
+    places = np.unique(points, axis=0, return_inverse=True)[1].ravel()
+    sides = np.unique(np.sort(places[edges], axis=1), axis=0, return_counts=True)[1]
+    assert (sides == 1).any() == (not atlas.mesh.closed)
+    assert sides.max() == 2
+
+
+def test_normals_tip_against_the_gradient_of_the_height() -> None:
+    atlas, amplitude = sphere_atlas(1.0, 32), 0.01
+    mesh = MovingMesh(atlas, "refined", limit=False)
+    shape = mesh.shape(smooth_field(atlas, amplitude), smooth_field(atlas, 0.0))
+    out = mesh.rest / np.linalg.norm(mesh.rest, axis=1, keepdims=True)
+    x, y, z = out.T
+    gradient = amplitude * np.stack(
+        [
+            3 * np.cos(3 * x + 1) * np.cos(2 * y) * np.cos(z),
+            -2 * np.sin(3 * x + 1) * np.sin(2 * y) * np.cos(z),
+            -np.sin(3 * x + 1) * np.cos(2 * y) * np.sin(z),
+        ],
+        axis=1,
+    )
+    tangent = gradient - (gradient * out).sum(axis=1, keepdims=True) * out
+    still = mesh.shape(smooth_field(atlas, 0.0), smooth_field(atlas, 0.0)).normals
+    slope = np.linalg.norm(tangent, axis=1).max()
+    assert slope > 0.01
+    assert np.linalg.norm(shape.normals - (still - tangent), axis=1).max() < 0.1 * slope
+
+
+@pytest.mark.parametrize("limit", [False, True])
+def test_velocities_are_the_rates_of_the_points_also_where_heights_are_bent(limit: bool) -> None:
+    atlas = sphere_atlas(1.0, 16)
+    waves = WaveSolver(atlas, Material(speed=1.0), backend="cpu")
+    waves.height, waves.velocity = smooth_field(atlas, 0.5), smooth_field(atlas, 0.3)
+    mesh = MovingMesh(atlas, "refined", limit=limit)
+    step, shapes = 1e-3, []
+    for _ in range(3):
+        waves.step(step)
+        shapes.append(mesh.shape(waves.height, waves.velocity))
+    differences = (shapes[2].points.astype(float) - shapes[0].points) / (2 * step)
+    peak = np.linalg.norm(differences, axis=1).max()
+    assert peak > 0.01
+    assert np.linalg.norm(shapes[1].velocities - differences, axis=1).max() < 0.01 * peak

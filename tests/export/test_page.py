@@ -1,0 +1,181 @@
+"""Pages that play a run: their coding, and what a browser shows."""
+
+import base64
+import html
+import io
+import re
+import shutil
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from PIL import Image
+
+from ripple_sim import Exporter, ExportOptions, Ripples, export_scene
+from ripple_sim.capture.frame_source import FrameSource
+from ripple_sim.capture.snapshot import snapshots
+from ripple_sim.encode.mark import made_here
+from ripple_sim.export.html.coding import packed, parents_of, quantised, residuals
+from ripple_sim.export.html.ordering import local_order
+from ripple_sim.export.moving_mesh import MovingMesh
+from ripple_sim.scene.scene import Scene
+from ripple_sim.simulation import Simulation
+
+playwright = pytest.importorskip("playwright.sync_api")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+browsing = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (on Debian: apt-get install chromium)")
+
+SIZE, FPS, FRAMES, SEEN = (320, 180), 100, 20, 18
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
+
+
+@pytest.fixture(scope="module")
+def page(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("page") / "run.html"
+    export_scene(scene, path, ExportOptions(fps=FPS, duration=FRAMES / FPS, size=SIZE))
+    return path
+
+
+@pytest.fixture(scope="module")
+def ours(scene: Scene, opengl: None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A frame of our renderer, which of its pixels show the egg, and the heights of the page's vertices."""
+    simulation = Simulation(scene, fps=FPS)
+    source = FrameSource(simulation, width=SIZE[0], height=SIZE[1])
+    *_, snapshot = snapshots(simulation, SEEN + 1)
+    frame = source.render(snapshot)
+    assert frame is not None
+    egg = source.sighting(snapshot).image.geom == simulation.ripples.geom_ids["egg"]
+    waves = simulation.ripples["egg"]
+    mesh = MovingMesh(waves.atlas, triangles=16_000)
+    heights = mesh.shape(waves.height, waves.velocity).heights
+    return frame, egg, heights[local_order(mesh.rest, mesh.F)[1]]
+
+
+@pytest.fixture(scope="module")
+def shown(page: Path) -> Iterator[Any]:
+    """The page in a browser, paused."""
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
+        faults: list[str] = []
+        tab.on("pageerror", lambda error: faults.append(str(error)))
+        tab.on("request", lambda request: faults.append(request.url) if request.url.startswith("http") else None)
+        tab.goto(page.as_uri())
+        tab.evaluate("ripplePlayer.ready.then(player => { player.playing = false; })")
+        yield tab
+        assert faults == []
+        browser.close()
+
+
+def pixels(tab: Any) -> np.ndarray:
+    uri = tab.evaluate("ripplePlayer.player.canvas.toDataURL()")
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(uri.split(",")[1]))).convert("RGB")).astype(int)
+
+
+def test_residuals_are_small_and_give_the_heights_back() -> None:
+    rng = np.random.default_rng(1)
+    x = np.arange(400) % 20
+    F = np.concatenate([np.stack([i, i + 1, i + 21], axis=1) for i in [np.arange(19) + 20 * r for r in range(19)]])
+    before, now = (quantised(0.1 * np.sin(x / 4 + k) + 1e-4 * rng.random(400), 1e-4) for k in (0, 1))
+    parents, coded = parents_of(F, 400), residuals(now, before, parents_of(F, 400))
+    assert (parents < np.arange(400)[:, None]).all()
+    planes = np.frombuffer(coded, np.uint8).reshape(3, 400).astype(int)
+    code = planes[0] | planes[1] << 8 | planes[2] << 16
+    change = np.zeros(401, int)
+    for i in range(400):
+        left = -(code[i] + 1 >> 1) if code[i] & 1 else code[i] >> 1
+        change[i] = left + (change[parents[i, 0]] + change[parents[i, 1]] >> 1)
+    assert np.array_equal(before + change[:400], now)
+    assert zlib.decompress(base64.b64decode(packed(coded))) == coded
+    assert len(packed(coded)) < 0.5 * now.astype(np.int32).nbytes
+
+
+def test_triangles_and_vertices_lie_close_to_their_neighbours_in_order() -> None:
+    rng = np.random.default_rng(2)
+    x, y = np.divmod(np.arange(900), 30)
+    points = np.stack([x, y, 0 * x], axis=1)[shuffled := rng.permutation(900)].astype(float)
+    corner = np.arange(900).reshape(30, 30)[:-1, :-1].ravel()
+    F = np.argsort(shuffled)[np.concatenate([corner[:, None] + [0, 30, 31], corner[:, None] + [0, 31, 1]])]
+    F = F[rng.permutation(len(F))]
+    triangles, vertices, renumbered = local_order(points, F)
+    assert np.array_equal(points[vertices][renumbered], points[F[triangles]])
+    assert np.array_equal(np.sort(vertices), np.arange(900))
+    again = [len(set(block.ravel())) for block in np.split(renumbered[:1664], 52)]
+    assert np.mean(again) < 32  # different vertices of 32 triangles in a row; at random 93
+
+
+def test_a_page_is_one_file_that_asks_for_nothing_else(page: Path) -> None:
+    text = page.read_text()
+    assert not re.search(r'https?://|src="|href="', text)
+    assert [each.name for each in page.parent.iterdir()] == ["run.html"]
+    assert made_here(page)
+
+
+def test_in_a_notebook_a_complete_page_plays(scene: Scene, ripples: Ripples, tmp_path: Path) -> None:
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_forward(scene.model, data)
+    with Exporter(scene.model, ripples, tmp_path / "run.html") as exporter:
+        exporter.write(data)
+        assert "not complete" in exporter._repr_html_()
+    shown = exporter._repr_html_()
+    assert shown.startswith("<iframe srcdoc=")
+    assert html.unescape(shown.split('"')[1]) == (tmp_path / "run.html").read_text()
+
+
+@browsing
+def test_the_browser_has_every_height_to_half_a_step(shown: Any, ours: tuple) -> None:
+    assert shown.evaluate("ripplePlayer.player.frames.count") == FRAMES
+    steps, step = shown.evaluate(
+        f"ripplePlayer.player.frames.get({SEEN}).then(f => [Array.from(f.steps[0]), ripplePlayer.player.meta.steps[0]])"
+    )
+    assert np.abs(ours[2]).max() > 20 * step
+    assert np.abs(np.array(steps) * step - ours[2]).max() < 0.51 * step
+
+
+@browsing
+def test_the_browser_shows_what_our_renderer_shows(shown: Any, ours: tuple) -> None:
+    frame, egg, _ = ours
+    shown.evaluate(f"ripplePlayer.player.show({SEEN})")
+    difference = np.abs(pixels(shown) - frame)
+    assert difference.mean() < 6  # of 255
+    assert difference[egg].mean() < 12
+    # the outline: where the heights are in colours, and where not
+    plain = pixels(shown)
+    shown.evaluate("(ripplePlayer.player.heat = true, ripplePlayer.player.redraw())")
+    changed = np.abs(pixels(shown) - plain).max(axis=2) > 8
+    shown.evaluate("(ripplePlayer.player.heat = false, ripplePlayer.player.redraw())")
+    assert (changed & egg).sum() > 0.95 * egg.sum()
+    assert (changed & ~egg).sum() < 0.05 * egg.sum()
+
+
+@browsing
+def test_a_drag_turns_the_camera_and_the_button_brings_it_back(shown: Any) -> None:
+    shown.evaluate(f"ripplePlayer.player.show({SEEN})")
+    before = pixels(shown)
+    shown.mouse.move(150, 60)
+    shown.mouse.down()
+    shown.mouse.move(220, 70, steps=3)
+    shown.mouse.up()
+    assert np.abs(pixels(shown) - before).mean() > 2
+    shown.click("#camera")
+    assert np.abs(pixels(shown) - before).mean() < 0.1
+
+
+@browsing
+def test_it_plays_and_contacts_are_arrows(shown: Any) -> None:
+    hit = shown.evaluate(
+        "(async () => { const frames = ripplePlayer.player.frames;"
+        " for (let i = 0; ; i++) if ((await frames.get(i)).arrows.length) return i; })()"
+    )
+    shown.evaluate(f"ripplePlayer.player.show({hit})")
+    before = pixels(shown)
+    shown.evaluate("(ripplePlayer.player.contacts = true, ripplePlayer.player.redraw())")
+    assert (np.abs(pixels(shown) - before).max(axis=2) > 30).sum() > 10
+    shown.evaluate("(ripplePlayer.player.contacts = false, ripplePlayer.player.show(0))")
+    shown.click("#play")
+    shown.wait_for_function("ripplePlayer.player.number > 2")
+    shown.click("#play")

@@ -1,0 +1,138 @@
+"""Runs written as USD and read again by usd-core."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim import Exporter, ExportOptions, Ripples, export_scene
+from ripple_sim.export.moving_mesh import MovingMesh
+from ripple_sim.scene.camera import CameraEntry
+from ripple_sim.scene.scene import Scene
+
+pxr = pytest.importorskip("pxr")
+from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdValidation  # noqa: E402
+
+FRAMES, FPS = 6, 500
+SURFACE = "/World/bodies/nest/egg"
+
+
+@pytest.fixture(scope="module", params=[".usdc", ".usda", ".usdz"])
+def run(request: pytest.FixtureRequest, ripples: Ripples, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A stage, and what was at each frame: points, velocities, and the stone's pose."""
+    path = tmp_path_factory.mktemp("run") / f"run{request.param}"
+    model, data = ripples.model, mujoco.MjData(ripples.model)
+    mujoco.mj_forward(model, data)
+    ripples.reset()
+    mesh, seen = MovingMesh(ripples["egg"].atlas), []
+    camera = CameraEntry(name="side", aperture=0.02, focus=1.5, shutter=180.0)
+    with Exporter(model, ripples, path, fps=FPS, camera=camera) as exporter:
+        for _ in range(FRAMES):
+            ripples.mj_step(data, nstep=2)
+            exporter.write(data)
+            shape = mesh.shape(ripples["egg"].height, ripples["egg"].velocity)
+            seen.append((shape.points, shape.velocities, data.xpos.copy(), data.xmat.copy(), data.geom_xpos.copy()))
+    return Usd.Stage.Open(str(path)), seen
+
+
+def at(stage: Any, path: str, frame: int) -> np.ndarray:
+    """The matrix of a prim into the world, for column vectors."""
+    prim = UsdGeom.Xformable(stage.GetPrimAtPath(path))
+    return np.array(prim.ComputeLocalToWorldTransform(Usd.TimeCode(frame))).T
+
+
+def test_stage_is_in_metres_with_z_up_and_a_time_code_a_frame(run: Any) -> None:
+    stage, _ = run
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
+    assert UsdGeom.GetStageUpAxis(stage) == "Z"
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0, FRAMES - 1)
+    assert stage.GetTimeCodesPerSecond() == stage.GetFramesPerSecond() == FPS
+    assert stage.GetDefaultPrim().GetPath() == "/World"
+
+
+def test_every_validator_of_usd_is_content(run: Any) -> None:
+    stage, _ = run
+    registry = UsdValidation.ValidationRegistry()
+    errors = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators()).Validate(stage)
+    assert [error.GetErrorAsString() for error in errors] == []
+
+
+def test_points_and_velocities_are_ours_at_every_frame_to_a_millionth(run: Any) -> None:
+    stage, seen = run
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath(SURFACE))
+    assert max(np.abs(points - seen[0][0]).max() for points, *_ in seen) > 1e-5  # it moves
+    for frame, (points, velocities, *_) in enumerate(seen):
+        assert np.abs(np.array(mesh.GetPointsAttr().Get(frame)) - points).max() < 1e-6 * 0.6
+        assert np.abs(np.array(mesh.GetVelocitiesAttr().Get(frame)) - velocities).max() < 1e-6
+        assert len(mesh.GetNormalsAttr().Get(frame)) == len(points)
+    assert mesh.GetSubdivisionSchemeAttr().Get() == "none"
+    assert UsdGeom.Mesh.ValidateTopology(
+        mesh.GetFaceVertexIndicesAttr().Get(), mesh.GetFaceVertexCountsAttr().Get(), len(seen[0][0])
+    )[0]
+
+
+def test_bodies_and_surfaces_stand_where_mujoco_has_them(run: Any) -> None:
+    stage, seen = run
+    stone, egg = 2, 1
+    for frame, (_, _, xpos, xmat, geom_xpos) in enumerate(seen):
+        world = at(stage, "/World/bodies/stone", frame)
+        assert np.abs(world[:3, 3] - xpos[stone]).max() < 1e-9
+        assert np.abs(world[:3, :3] - xmat[stone].reshape(3, 3)).max() < 1e-9
+        assert np.abs(at(stage, SURFACE, frame)[:3, 3] - geom_xpos[egg]).max() < 1e-9
+    assert stage.GetPrimAtPath("/World/bodies/nest").GetAttribute("xformOp:translate").GetNumTimeSamples() == 1
+
+
+def test_camera_has_the_angle_of_view_the_lens_and_the_shutter(run: Any) -> None:
+    stage, _ = run
+    camera = UsdGeom.Camera(stage.GetPrimAtPath("/World/camera")).GetCamera(2)
+    assert camera.GetFieldOfView(camera.FOVVertical) == pytest.approx(40, abs=1e-4)
+    assert camera.aspectRatio == pytest.approx(1280 / 720)
+    assert camera.focusDistance == 1.5
+    # focal length over f-number is the diameter of the lens, in tenths of a metre
+    assert camera.focalLength / camera.fStop == pytest.approx(0.2)
+    assert UsdGeom.Camera(stage.GetPrimAtPath("/World/camera")).GetShutterCloseAttr().Get() == 0.5
+    forward = -np.array(camera.transform).T[:3, 2]
+    assert np.abs(forward - np.array([0, 1, -0.2]) / math.hypot(1, 0.2)).max() < 1e-9
+
+
+def test_lamps_light_the_middle_as_strongly_as_ours(run: Any) -> None:
+    stage, _ = run
+    lamps = [UsdLux.LightAPI(prim) for prim in stage.Traverse() if prim.HasAPI(UsdLux.LightAPI)]
+    kinds = {lamp.GetPrim().GetTypeName() for lamp in lamps}
+    assert {"DistantLight", "SphereLight", "DomeLight"} == kinds  # headlight, spot lamp, ambient light
+
+
+def test_looks_and_textures_are_bound(run: Any) -> None:
+    stage, _ = run
+
+    def surface(path: str) -> Any:
+        material, _ = UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()
+        return material.ComputeSurfaceSource()[0]
+
+    assert surface(SURFACE).GetInput("roughness").Get() == pytest.approx(0.36)  # rubber
+    assert tuple(surface("/World/bodies/stone/stone").GetInput("diffuseColor").Get()) == (1, 0, 0)
+    image = surface("/World/bodies/world/floor").GetInput("diffuseColor").GetConnectedSources()[0][0].source
+    file = UsdShade.Shader(image.GetPrim()).GetInput("file").Get()
+    assert file.resolvedPath
+    st = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/World/bodies/world/floor")).GetPrimvar("st").ComputeFlattened()
+    assert np.ptp(np.array(st), axis=0) == pytest.approx([4, 4])  # the image repeats as often as the MJCF says
+
+
+def test_velocities_of_a_scene_are_the_rates_of_its_points(scene: Scene, tmp_path: Path) -> None:
+    path = tmp_path / "scene.usdc"
+    options = ExportOptions(fps=250, slow_motion=4.0, duration=0.04, tessellation="own")
+    summary = export_scene(scene, path, options)
+    stage = Usd.Stage.Open(str(path))
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath(SURFACE))
+    points = np.array([mesh.GetPointsAttr().Get(frame) for frame in range(summary.frames)], dtype=float)
+    velocities = np.array([mesh.GetVelocitiesAttr().Get(frame) for frame in range(summary.frames)])
+    assert summary.frames == 40
+    differences = (points[2:] - points[:-2]) * 250 / 2  # a second of the file
+    quiet = slice(-10, None)  # after the stone has left
+    peak = np.linalg.norm(differences, axis=2).max()
+    assert peak > 1e-4
+    error = np.linalg.norm(differences - velocities[1:-1], axis=2)[quiet]
+    assert error.max() < 0.01 * peak

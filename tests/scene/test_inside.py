@@ -1,0 +1,113 @@
+"""What lies inside a target of a scene file: its thickness, wherever the geom is, and what is refused."""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+import trimesh
+
+from ripple_sim import RippleError
+from ripple_sim.scene.inside import InsideEntry, load_inside
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.simulation import Simulation
+from ripple_sim.solver.operator.layer import STIFF
+
+RADIUS, CORE, SHIFT = 0.5, 0.3, 0.08  # m; the core is shifted towards the body's x
+MODULUS, DENSITY = 500.0, 1000.0
+VOXEL = 0.05
+
+MJCF = f"""<mujoco><worldbody><body pos="3 0 0" euler="0 0 90">
+<geom name="egg" type="sphere" size="{RADIUS}" pos="0 2 0" euler="0 90 0"/></body></worldbody></mujoco>"""
+TOML = """model = "egg.xml"
+[[ripple]]
+geom = "egg"
+resolution = 24
+[ripple.material]
+preset = {name = "layer", modulus = 500, density = 1000}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A scene of a sphere that stands apart and turned in its body, and its core in millimetres and in voxels."""
+    (tmp_path / "egg.xml").write_text(MJCF)
+    core = trimesh.creation.icosphere(subdivisions=4, radius=1e3 * CORE)
+    core.apply_translation([1e3 * SHIFT, 2e3, 0.0]).export(tmp_path / "core.stl")
+    nodes = np.arange(-0.5, 0.5 + VOXEL / 2, VOXEL)
+    x, y, z = np.meshgrid(nodes, nodes, nodes, indexing="ij")
+    np.save(tmp_path / "core.npy", CORE - np.sqrt((x - SHIFT) ** 2 + y**2 + z**2))
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        "mesh = 'core.stl'\nscale = 1e-3",
+        "volume = 'core.npy'\nthreshold = 0.0\nspacing = 0.05\norigin = [-0.5, 1.5, -0.5]",
+    ],
+    ids=["mesh", "volume"],
+)
+def test_the_layer_is_as_thick_as_what_is_inside_leaves_it(folder: Path, inside: str) -> None:
+    (folder / "egg.toml").write_text(TOML + f"[[ripple.inside]]\n{inside}\n")
+    simulation = Simulation(load_scene(folder / "egg.toml"), backend="cpu")
+    waves = simulation.ripples["egg"]
+    along = np.array([SHIFT, 2.0, 0.0])
+    middle = simulation.ripples.to_geom("egg", along)  # where the core is in the frame of the geom
+    to, n = middle - waves.atlas.positions, -waves.atlas.normals
+    near = (to * n).sum(axis=-1)
+    exact = near - np.sqrt(CORE**2 - (to**2).sum(axis=-1) + near**2)
+    thickness = np.sqrt(STIFF * MODULUS / DENSITY / waves.material.stiffness)
+    assert np.quantile(np.abs(thickness / exact - 1), 0.99) < 0.03
+    assert exact.max() > 2 * exact.min()
+    np.testing.assert_allclose(waves.material.density, 0.665 * DENSITY * thickness)
+
+
+def test_limits_hold(folder: Path) -> None:
+    limits = "thickness_limits = [0.15, 0.25]"
+    toml = TOML.replace("resolution = 24", f"resolution = 24\n{limits}")
+    (folder / "egg.toml").write_text(toml + "[[ripple.inside]]\nmesh = 'core.stl'\nscale = 1e-3\n")
+    density = np.asarray(Simulation(load_scene(folder / "egg.toml"), backend="cpu").ripples["egg"].material.density)
+    assert density.min() == pytest.approx(0.665 * DENSITY * 0.15)
+    assert density.max() == pytest.approx(0.665 * DENSITY * 0.25)
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ({}, "neither or both of mesh and volume"),
+        ({"mesh": "a.obj", "volume": "b.nii"}, "neither or both of mesh and volume"),
+        ({"volume": "b.nii"}, "needs a threshold"),
+        ({"mesh": "a.obj", "threshold": 1.0}, "takes no threshold"),
+        ({"mesh": "a.obj", "scale": 0.0}, "scale of a .* is 0.0; valid is a number greater than 0"),
+        ({"volume": "b.npy", "threshold": 1.0, "spacing": -1.0}, "spacing of a .* is -1.0"),
+    ],
+)
+def test_senseless_entries_are_refused(entry: dict, message: str) -> None:
+    with pytest.raises(RippleError, match=message):
+        msgspec.convert(entry, InsideEntry).check()
+
+
+@pytest.mark.parametrize(
+    ("toml", "message"),
+    [
+        (TOML.replace("preset", "#"), r"needs a layer; write preset = \{name = 'layer'"),
+        (TOML.replace('"layer", modulus = 500', '"plate", modulus = 500'), "not the preset 'plate'"),
+        (TOML.replace("resolution = 24", "thickness_limits = [2, 1]"), "the least first"),
+    ],
+    ids=["without-preset", "no-layer", "limits"],
+)
+def test_a_scene_without_a_layer_is_refused(folder: Path, toml: str, message: str) -> None:
+    (folder / "egg.toml").write_text(toml + "[[ripple.inside]]\nmesh = 'core.stl'\n")
+    with pytest.raises(RippleError, match=message):
+        load_scene(folder / "egg.toml")
+
+
+def test_files_are_told_apart_by_their_endings(folder: Path) -> None:
+    with pytest.raises(RippleError, match="is a volume, which needs a threshold"):
+        load_inside(folder / "core.npy")
+    with pytest.raises(RippleError, match="is a mesh, which takes no threshold"):
+        load_inside(folder / "core.stl", 0.5)
+    assert np.ptp(load_inside(folder / "core.npy", 0.0, VOXEL, scale=2.0).surface()[0][:, 0]) == pytest.approx(
+        4 * CORE, rel=0.02
+    )
