@@ -25,7 +25,7 @@ def run(folder: Path, words: str, redirections: str = "", **environment: str | N
         env={**kept, **{name: value for name, value in environment.items() if value is not None}},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=False,
     )
 

@@ -219,7 +219,7 @@ def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_
         "sys.exit(cli.main(['info']))\n"
     )
     result = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, timeout=300, check=False
     )
     assert (result.returncode, result.stderr) == (status, f"ripple-sim: {word}\n")
 

@@ -61,6 +61,7 @@ def shown(page: Path) -> Iterator[Any]:
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
+        tab.set_default_timeout(180_000)  # [ms]; the machine may be busy
         faults: list[str] = []
         tab.on("pageerror", lambda error: faults.append(str(error)))
         tab.on("request", lambda request: faults.append(request.url) if request.url.startswith("http") else None)

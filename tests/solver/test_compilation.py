@@ -3,7 +3,6 @@
 import time
 
 import numba
-import pytest
 
 from ripple_sim.solver.compilation import compile_times, compiling, work_clock
 
@@ -17,12 +16,16 @@ def test_the_first_call_is_compilation_and_the_second_is_work() -> None:
     def outer(x):
         return inner(x) * 2
 
-    start, clock = time.perf_counter(), work_clock()
+    before = time.perf_counter()
+    clock = work_clock()
+    start = time.perf_counter()
     assert outer(1) == 4
-    wall, work = time.perf_counter() - start, work_clock() - clock
+    least = time.perf_counter() - start
+    work = work_clock() - clock
+    most = time.perf_counter() - before  # the process may have been held up at any of the clocks
     compiled = compile_times()[__name__]
-    assert 0 < compiled < wall, "a kernel that is compiled for another does not count twice"
-    assert wall - work == pytest.approx(compiled, abs=1e-3)
+    assert 0 < compiled < least, "a kernel that is compiled for another does not count twice"
+    assert least - work - 1e-9 <= compiled <= most - work + 1e-9
     assert compiling() is None
     assert outer(2) == 6
     assert compile_times()[__name__] == compiled

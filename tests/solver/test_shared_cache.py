@@ -41,7 +41,7 @@ def run(program: str, cache: Path) -> list[str]:
         capture_output=True,
         text=True,
         check=False,
-        timeout=120,
+        timeout=600,
     )
     assert (result.returncode, result.stderr) == (0, "")
     return [each.name for each in cache.rglob("*") if each.is_file()]

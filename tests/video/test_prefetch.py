@@ -33,7 +33,7 @@ def test_it_runs_ahead_as_far_as_it_may_and_no_further():
 
     with Prefetch(items(), 3) as prefetched:
         for number in prefetched:
-            waited = time.monotonic() + 5
+            waited = time.monotonic() + 60
             # one is in the taker's hands, three wait, one is held until there is room
             while len(begun) < min(number + 5, 50) and time.monotonic() < waited:
                 time.sleep(0.001)

@@ -16,7 +16,7 @@ msgpack = pytest.importorskip("msgpack")
 from ripple_sim.viewer import access  # noqa: E402
 
 SECRET = access.new_secret()
-LIMIT = 10.0  # [s]
+LIMIT = 60.0  # [s]
 
 
 def free_port() -> int:
