@@ -17,29 +17,12 @@ import tempfile
 import time
 from pathlib import Path
 
+from sample_batch import SMALL, start, write_plan
+
 from ripple_sim import load_batch
 from ripple_sim.batch.batch_folder import BatchFolder
 
-PLAN = """
-scenes = ["{scene}"]
-count = {count}
-[vary]
-camera.azimuth = {{uniform = [0, 360]}}
-"ripple.material.speed" = {{uniform = [0.8, 1.25], apply = "multiply"}}
-[store]
-size = [64, 64]
-fps = 24
-duration = 0.5
-resolution = 32
-heights = true
-format = "webdataset"
-scenes_per_tar = 8
-"""
-
-
-def start(plan: Path, output: Path, workers: int) -> subprocess.Popen:
-    command = [sys.executable, "-m", "ripple_sim", "batch", plan, "-o", output, "--workers", str(workers)]
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+STORE = f'{SMALL}format = "webdataset"\nscenes_per_tar = 8\n'
 
 
 def workers_of(parent: int) -> list[int]:
@@ -88,10 +71,11 @@ def main() -> None:
     random.seed(options.seed)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        plan, whole, broken = folder / "plan.toml", folder / "whole", folder / "broken"
-        plan.write_text(PLAN.format(scene=options.scene, count=options.scenes))
-        start(plan, whole, options.workers).wait()
-        process, killed, target = start(plan, broken, options.workers), [], 0
+        plan = write_plan(folder / "plan.toml", [options.scene], options.scenes, STORE)
+        whole, broken = folder / "whole", folder / "broken"
+        workers = ("--workers", str(options.workers))
+        start(plan, whole, *workers).wait()
+        process, killed, target = start(plan, broken, *workers), [], 0
         while len(killed) < options.kills and process.poll() is None:
             target += random.randrange(2 * options.scenes // options.kills)
             while process.poll() is None and len(finished(broken)) < min(target, options.scenes - 1):
@@ -99,7 +83,7 @@ def main() -> None:
             time.sleep(random.uniform(0, 3))
             killed.append(kill(process, parent=len(killed) % 2 == 0))
             if killed[-1] == "parent":
-                process = start(plan, broken, options.workers)
+                process = start(plan, broken, *workers)
         ended = process.wait()
         logs = sorted(path.name for path in (broken / "failed").glob("*.log"))
         expected, found = hashes(whole), hashes(broken)

@@ -11,26 +11,12 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from sample_batch import write_plan
 
 from ripple_sim.batch.batch_folder import BatchFolder
 from ripple_sim.batch.make_scene import make_scene
 from ripple_sim.batch.plan import read_plan
 from ripple_sim.batch.stored_plan import keep_plan, stored
-
-PLAN = """
-scenes = {scenes}
-count = {count}
-[vary]
-camera.azimuth = {{uniform = [0, 360]}}
-"ripple.material.speed" = {{uniform = [0.8, 1.25], apply = "multiply"}}
-[store]
-size = [64, 64]
-fps = 24
-duration = 0.25
-resolution = 32
-heights = true
-passes = ["depth"]
-"""
 
 
 def resident() -> float:
@@ -45,8 +31,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=200)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        path = Path(name) / "plan.toml"
-        path.write_text(PLAN.format(scenes=str(options.names).replace("'", '"'), count=options.scenes))
+        path = write_plan(Path(name) / "plan.toml", options.names, options.scenes)
         batch = BatchFolder(Path(name) / "out")
         keep_plan(batch, stored(read_plan(path)))
         sizes = []

@@ -8,34 +8,13 @@ cluster of two processes; videos, passes, heights, impulses and tar files are co
 
 import argparse
 import hashlib
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-PLAN = """
-scenes = ["{scene}"]
-count = {count}
-[vary]
-camera.azimuth = {{uniform = [0, 360]}}
-"ripple.material.speed" = {{uniform = [0.8, 1.25], apply = "multiply"}}
-[store]
-size = [64, 64]
-fps = 24
-duration = 0.5
-resolution = 32
-heights = true
-passes = ["depth", "flow"]
-format = "{form}"
-scenes_per_tar = 3
-"""
+from sample_batch import SMALL, start, write_plan
 
 VERDICT = {True: "the same bytes", False: "DIFFERENT"}
-
-
-def start(plan: Path, output: Path, *options: str) -> subprocess.Popen:
-    command = [sys.executable, "-m", "ripple_sim", "batch", plan, "-o", output, *options]
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL)
 
 
 def digests(output: Path) -> dict[str, str]:
@@ -59,8 +38,8 @@ def main() -> None:
     for form in ("folders", "webdataset"):
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            plan = folder / "plan.toml"
-            plan.write_text(PLAN.format(scene=options.scene, count=options.scenes, form=form))
+            store = f'{SMALL}format = "{form}"\nscenes_per_tar = 3\n'
+            plan = write_plan(folder / "plan.toml", [options.scene], options.scenes, store)
             start(plan, folder / "whole", "--workers", "1").wait()
             expected = digests(folder / "whole")
             print(f"{form}: {len(expected)} files by one worker", flush=True)
