@@ -11,6 +11,7 @@ _GELATINE = (
     "Nguyen et al. 2014, Ultrasound in Medicine and Biology 40, 168 (shear wave elastography, Voigt model; "
     "the viscosity is that of 3 % gelatine)"
 )
+_SILICONE = "Ba et al. 2017, Scientific Reports 7, 40106 (soft silicone rubber: its shear modulus and density"
 _LAYER = "waves of 0.8 to 4.8 times the thickness, lower than a tenth of it"
 
 
@@ -71,15 +72,17 @@ PRESETS: dict[str, Preset] = {
     ),
     "rubber-layer": Preset(
         "layer",
-        {"modulus": 0.45e6, "viscosity": 20.0, "density": 1000.0, "thickness": 0.05},
-        "Lindley 1974, Engineering Design with Natural Rubber (40 IRHD; the viscosity is chosen)",
+        {"modulus": 0.3e6, "viscosity": 20.0, "density": 1040.0, "thickness": 0.05},
+        f"{_SILICONE}; the viscosity is chosen)",
         _LAYER,
+        checked=True,
     ),
     "rubber-sheet": Preset(
         "plate",
-        {"modulus": 1.5e6, "thickness": 0.002, "density": 1000.0, "poisson": 0.5, "damping": 2.0},
-        "Lindley 1974, Engineering Design with Natural Rubber (40 IRHD; the damping is chosen)",
+        {"modulus": 0.9e6, "thickness": 0.002, "density": 1040.0, "poisson": 0.5, "damping": 2.0},
+        f"{_SILICONE}, here three times the former; the damping is chosen)",
         "waves longer than ten times the thickness; no tension",
+        checked=True,
     ),
     "drum-skin": Preset(
         "membrane",
