@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import glob
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import trimesh
 
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.load_scene import shipped_scenes
+from ripple_sim.scene.toml_file import read_toml
 from ripple_sim.solver.checked import shown
 
 from .distributions import KINDS, Distribution
@@ -90,12 +90,7 @@ def read_plan(path: Path) -> Plan:
     """
     if path.exists() and not path.is_file():
         raise SceneError(f"plan {str(path)!r} is not a regular file; give the path of a TOML file")
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, RecursionError) as error:
-        raise SceneError(f"plan {str(path)!r} cannot be read: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"plan {str(path)!r} is not valid TOML: {error}") from error
+    table = read_toml(path, "plan")
     valid = [field.name for field in msgspec.structs.fields(PlanFile)]
     for key in table:
         if key not in valid:

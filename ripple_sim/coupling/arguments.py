@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -14,6 +13,9 @@ from ripple_sim.solver import Material
 
 # Numbers that two models of one signature share.
 _SIZES = ("nq", "nv", "nu", "nbody", "ngeom")
+
+# Of physics [s]: no contact is met in longer ones.
+_LONGEST_STEP = 1.0
 
 
 def own_model(model: Any) -> mujoco.MjModel:
@@ -27,10 +29,10 @@ def own_model(model: Any) -> mujoco.MjModel:
     found = getattr(model, "ptr", model)
     if not isinstance(found, mujoco.MjModel):
         raise SceneError(f"model is {type(model).__name__}; valid is a compiled mujoco.MjModel, or dm_control's")
-    if not 0 < found.opt.timestep < math.inf:
+    if not 0 < found.opt.timestep <= _LONGEST_STEP:
         raise SceneError(
-            f"the model's timestep is {found.opt.timestep:g} s; valid is a finite number greater than 0, such as 0.002 "
-            "(<option timestep=...>)"
+            f"the model's timestep is {found.opt.timestep:g} s; valid is a number greater than 0 and up to "
+            f"{_LONGEST_STEP:g}, such as 0.002 (<option timestep=...>)"
         )
     return found
 

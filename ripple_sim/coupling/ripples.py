@@ -29,6 +29,7 @@ from .arguments import for_each, integrator_warning, own_data, own_model
 from .stepping.clock import StepClock, missed_warning
 from .stepping.divergence import divergence_warning, goes_on_broken
 from .stepping.followed import followed
+from .stepping.physics_messages import adopt_warnings, physics_errors
 from .stepping.solved import UNSOLVED_WARNING, SolvedForces
 from .targets import Targets
 
@@ -46,7 +47,8 @@ class WaveOptions(TypedDict, total=False):
 class Ripples(Targets):
     """Ripples on geoms of a MuJoCo model, driven by its contact forces.
 
-    Call `step(data)` after each `mujoco.mj_step(model, data)`, or `mj_step(data)` instead of both.
+    Call `step(data)` after each `mujoco.mj_step(model, data)`, or `mj_step(data)` instead of both. From now on MuJoCo's
+    warnings are given as `RippleWarning`, unless `mujoco.set_mju_user_warning` was told otherwise.
 
     Parameters
     ----------
@@ -105,6 +107,7 @@ class Ripples(Targets):
         **wave_options: Unpack[WaveOptions],
     ) -> None:
         super().__init__(own_model(model), materials, resolution, layout, rim, wave_options)
+        adopt_warnings()
         coupled = CoupledModel(self.model, self._waves, named_collision_geoms(self.model, self, contacts or {}))
         rigid = {geom: waves for geom, waves in self._waves.items() if geom not in coupled.soft}
         for geom, waves in rigid.items():
@@ -170,12 +173,15 @@ class Ripples(Targets):
         ------
         SceneError
             If `data` belongs to another model.
+        SimulationError
+            If MuJoCo cannot go on, as with too little memory for its contacts.
         """
         self._loads.skip()
         data = own_data(self.model, data)
-        for _ in range(nstep):
-            mujoco.mj_step(self.model, data)
-            self._follow(data)
+        with physics_errors():
+            for _ in range(nstep):
+                mujoco.mj_step(self.model, data)
+                self._follow(data)
 
     @contextlib.contextmanager
     def following(self, data: mujoco.MjData) -> Iterator[None]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import importlib.resources
-import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,6 +24,7 @@ from .motion import DropEntry, ThrowEntry
 from .randomize import RandomEntry, randomize
 from .scene import Scene
 from .scene_file import RippleEntry, SceneFile, parse_scene
+from .toml_file import read_toml
 
 Moved = TypeVar("Moved", DropEntry, ThrowEntry)
 Edit = Callable[[mujoco.MjSpec], None]
@@ -101,14 +101,7 @@ def _target(model: mujoco.MjModel, entry: RippleEntry) -> RippleEntry:
 
 
 def _read(path: Path, change: Change | None) -> SceneFile:
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SceneError(f"scene file {str(path)!r} cannot be read: {error}") from error
-    except RecursionError as error:
-        raise SceneError(f"scene file {str(path)!r} is nested too deeply; a scene has three levels") from error
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"scene file {str(path)!r} is not valid TOML: {error}") from error
+    table = read_toml(path, "scene file")
     if change is not None:
         change(table)
     return parse_scene(table, str(path))

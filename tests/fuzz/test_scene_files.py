@@ -93,5 +93,5 @@ def test_a_model_with_any_numbers(tmp_path_factory: pytest.TempPathFactory, opti
     found = outcome(lambda: load_scene(folder / "scene.toml"))
     assert isinstance(found, Scene | RippleError)
     if isinstance(found, Scene):
-        assert 0 < found.model.opt.timestep < float("inf")
+        assert 0 < found.model.opt.timestep <= 1
     assert sorted(each.name for each in folder.iterdir()) == ["model.xml", "scene.toml"]

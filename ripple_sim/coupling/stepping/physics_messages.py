@@ -15,21 +15,29 @@ from ripple_sim.errors import RippleWarning, SimulationError
 def adopt_warnings() -> None:
     """Have MuJoCo's warnings given as `RippleWarning`, from now on, each once.
 
-    Of itself it writes them to standard error and to MUJOCO_LOG.TXT in the current folder.
+    Of itself it writes them to standard error and to MUJOCO_LOG.TXT in the current folder. A handler that the user has
+    given to `mujoco.set_mju_user_warning` stays.
     """
-    said: set[str] = set()
+    handler = mujoco.get_mju_user_warning()
+    if handler is None or isinstance(handler, _Warner):
+        mujoco.set_mju_user_warning(_Warner())
 
-    def warn(message: str) -> None:
+
+class _Warner:
+    """What MuJoCo calls with its warnings."""
+
+    def __init__(self) -> None:
+        self._said: set[str] = set()
+
+    def __call__(self, message: str) -> None:
         text = re.sub(r" *Time = [0-9.]+", "", " ".join(message.split()))
         kind = re.sub(r"[0-9]+", "", text)
         # an unstable simulation ends in an error, or begins anew with a warning
-        if kind in said or "simulation is unstable" in text:
+        if kind in self._said or "simulation is unstable" in text:
             return
-        said.add(kind)
+        self._said.add(kind)
         with contextlib.suppress(RippleWarning):  # no exception can pass through MuJoCo
             warnings.warn(f"MuJoCo: {text}", RippleWarning, stacklevel=2)
-
-    mujoco.set_mju_user_warning(warn)
 
 
 @contextlib.contextmanager
