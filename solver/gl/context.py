@@ -182,7 +182,9 @@ class GLContext:
     def release(self, created: Any) -> None:
         """Release an object; programs and compute shaders are kept for whoever asks for the same ones next."""
         with self:
-            if not (isinstance(created, moderngl.Program | moderngl.ComputeShader) and self._pool.give_back(created)):
+            if isinstance(created, moderngl.Program | moderngl.ComputeShader):
+                created = self._pool.give_back(created)
+            if created is not None:
                 created.release()
 
     def _pooled(self, sources: tuple[str, ...], compiled: Callable[[], Any]) -> Any:

@@ -13,31 +13,35 @@ class ProgramPool:
     """Compiled programs and compute shaders by their sources, with the uniforms that they began with."""
 
     def __init__(self) -> None:
-        self._idle: dict[tuple[str, ...], list[Any]] = {}
+        self._idle: dict[int, Any] = {}  # by their number in OpenGL, the longest idle first
         self._begun: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
 
     def take(self, sources: tuple[str, ...]) -> Any:
         """A program with its uniforms as after compilation, or None; within the context."""
-        idle = self._idle.get(sources)
-        if not idle:
-            return None
-        program = idle.pop()
-        for name, value in self._begun[program.glo][1].items():
-            program[name].write(value)
-        return program
+        for number in reversed(self._idle):
+            known, begun = self._begun[number]
+            if known == sources:
+                program = self._idle.pop(number)
+                for name, value in begun.items():
+                    program[name].write(value)
+                return program
+        return None
 
     def note(self, sources: tuple[str, ...], program: Any) -> None:
         """Remember a program that was compiled just now; within the context."""
         begun = {name: program[name].read() for name in program if isinstance(program[name], moderngl.Uniform)}
         self._begun[program.glo] = sources, begun
 
-    def give_back(self, program: Any) -> bool:
-        """Take back a program that is used no longer; False if it is to be released."""
-        known = self._begun.get(program.glo)
-        if known is None:
-            return False
-        if sum(map(len, self._idle.values())) >= _MOST:
-            del self._begun[program.glo]
-            return False
-        self._idle.setdefault(known[0], []).append(program)
-        return True
+    def give_back(self, program: Any) -> Any:
+        """Take back a program that is used no longer; return the one to be released for it, or None.
+
+        That is the longest idle one where there are too many, and the program itself where it is unknown.
+        """
+        if program.glo not in self._begun:
+            return program
+        self._idle[program.glo] = program
+        if len(self._idle) <= _MOST:
+            return None
+        oldest = next(iter(self._idle))
+        del self._begun[oldest]
+        return self._idle.pop(oldest)

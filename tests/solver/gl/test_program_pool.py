@@ -2,7 +2,7 @@ import sys
 
 import pytest
 
-from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.gl import program_pool, shared_context
 
 _SHADER = """#version 430
 layout(local_size_x = 1) in;
@@ -31,3 +31,26 @@ def test_a_program_is_used_again_with_the_uniforms_that_it_began_with(tmp_path, 
     assert again is first
     with gl:
         assert (again["factor"].value, again["more"].value) == (3.0, 0.0)
+
+
+class Compiled:
+    """A program without uniforms."""
+
+    def __init__(self, number: int) -> None:
+        self.glo = number
+
+    def __iter__(self):
+        return iter(())
+
+
+def test_a_full_pool_lets_go_of_what_has_been_idle_for_longest(monkeypatch):
+    """It refused what came later, so that what was used now was compiled each time."""
+    monkeypatch.setattr(program_pool, "_MOST", 2)
+    pool, programs = program_pool.ProgramPool(), [Compiled(number) for number in range(4)]
+    for program in programs[:3]:
+        pool.note((f"source {program.glo}",), program)
+    assert [pool.give_back(program) for program in programs] == [None, None, programs[0], programs[3]]
+    assert pool.take(("source 0",)) is None
+    assert pool.take(("source 2",)) is programs[2]
+    assert pool.take(("source 2",)) is None
+    assert pool.take(("source 1",)) is programs[1]
