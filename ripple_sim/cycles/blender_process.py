@@ -11,9 +11,8 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Vector
 
-_FAR = 30.0  # of the soft boxes, in distances of the camera
 _DEEP = 0.02  # how far light of a translucent look gets, likewise
 
 
@@ -26,19 +25,20 @@ def main(settings):
     scene = bpy.context.scene
     scene.camera = next(each for each in scene.objects if each.type == "CAMERA")
     set_rendering(scene, settings)
-    set_world(scene, settings)
+    box_axes = set_world(scene, settings)
     for lamp in (each for each in scene.objects if each.type == "LIGHT"):
-        lamp.data.energy = lamp.data["power"]
+        lamp.data.energy = lamp.data["power"]  # the importer makes lamps four times as strong, and suns twice as wide
+        if lamp.data.type == "SUN":
+            lamp.data.angle = lamp.data["angle"]
     for material in bpy.data.materials:
         set_look(material, _DEEP * settings["distance"])
-    boxes = [soft_box(scene, box, settings) for box in settings["boxes"]]
     fade = fading_floor(settings)
     for number in range(settings["frames"]):
         scene.frame_set(number)
         camera = scene.camera.matrix_world
-        for box, lights in zip(settings["boxes"], boxes, strict=True):
-            for light in lights:
-                light.matrix_world = box_place(camera, box, settings["distance"])
+        for box, axes in zip(settings["boxes"], box_axes, strict=True):
+            for node, axis in zip(axes, axes_of(camera, box), strict=True):
+                node.inputs[1].default_value = axis
         if fade is not None:
             fade.inputs[1].default_value = camera @ Vector((0, 0, -settings["distance"]))
         save(scene, Path(settings["folder"]), number)
@@ -76,17 +76,44 @@ def save(scene, folder, number):
 
 
 def set_world(scene, settings):
-    """The sky as the camera sees it, as it is reflected, and as it lights the rest."""
+    """The sky and the soft boxes: as the camera sees them, as they are reflected, and as they light the rest.
+
+    Return the nodes that take the axes of each box. Where directions are chosen for lamps alone, Cycles does not know what
+    kind of ray will meet the sky: the surfaces choose them.
+    """
     scene.world = bpy.data.worlds.new("sky")
     scene.world.use_nodes = True
+    scene.world.cycles.sampling_method = "NONE"
     nodes, links = scene.world.node_tree.nodes, scene.world.node_tree.links
     nodes.clear()
     rays, seen = nodes.new("ShaderNodeLightPath"), sky_colors(nodes, links, settings)
-    color = mixed(nodes, links, rays.outputs["Is Glossy Ray"], settings["sky"], scaled(nodes, links, seen, 0.75))
-    color = mixed(nodes, links, rays.outputs["Is Camera Ray"], color, seen)
+    boxes, axes = soft_boxes(nodes, links, settings["boxes"])
+    diffuse = vectors(nodes, links, "ADD", settings["sky"], scaled(nodes, links, boxes, settings["boxes_diffuse"]))
+    glossy = scaled(nodes, links, boxes, settings["boxes_reflected"])
+    glossy = vectors(nodes, links, "ADD", glossy, scaled(nodes, links, seen, 0.75))
+    color = mixed(nodes, links, rays.outputs["Is Glossy Ray"], diffuse, glossy)
+    for kind in ("Is Camera Ray", "Is Transmission Ray"):
+        color = mixed(nodes, links, rays.outputs[kind], color, seen)
     background, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
     links.new(color, background.inputs["Color"])
     links.new(background.outputs[0], output.inputs["Surface"])
+    return axes
+
+
+def soft_boxes(nodes, links, boxes):
+    """Radiance of the boxes, far away, and for each the nodes that take its axes: to it, across, up."""
+    direction = nodes.new("ShaderNodeTexCoord").outputs["Generated"]
+    total, axes = [0.0, 0.0, 0.0], []
+    for box in boxes:
+        shares = [vectors(nodes, links, "DOT_PRODUCT", direction, [0.0, 0.0, 0.0]) for _ in range(3)]
+        inside = maths(nodes, links, "GREATER_THAN", shares[0], 0.0)
+        for share, half in zip(shares[1:], box["half"], strict=True):
+            limit = maths(nodes, links, "MULTIPLY", shares[0], half)
+            near = maths(nodes, links, "LESS_THAN", maths(nodes, links, "ABSOLUTE", share, 0.0), limit)
+            inside = maths(nodes, links, "MULTIPLY", inside, near)
+        total = vectors(nodes, links, "ADD", total, scaled(nodes, links, box["radiance"], inside))
+        axes.append([share.node for share in shares])
+    return total, axes
 
 
 def sky_colors(nodes, links, settings):
@@ -112,20 +139,43 @@ def mixed(nodes, links, share, first, second):
     mix.data_type = "RGBA"
     links.new(share, mix.inputs[0])
     for socket, color in zip((mix.inputs[6], mix.inputs[7]), (first, second), strict=True):
-        if isinstance(color, list):
-            socket.default_value = (*color, 1.0)
-        else:
-            links.new(color, socket)
+        set_input(links, socket, [*color, 1.0] if isinstance(color, list) else color)
     return mix.outputs[2]
+
+
+def vectors(nodes, links, operation, first, second):
+    """Vector or number of an operation on two vectors, given as lists or as sockets."""
+    node = nodes.new("ShaderNodeVectorMath")
+    node.operation = operation
+    set_input(links, node.inputs[0], first)
+    set_input(links, node.inputs[1], second)
+    return node.outputs["Value" if operation == "DOT_PRODUCT" else "Vector"]
 
 
 def scaled(nodes, links, color, factor):
     """Brighten or darken a colour."""
-    scale = nodes.new("ShaderNodeVectorMath")
-    scale.operation = "SCALE"
-    scale.inputs["Scale"].default_value = factor
-    links.new(color, scale.inputs[0])
-    return scale.outputs[0]
+    node = nodes.new("ShaderNodeVectorMath")
+    node.operation = "SCALE"
+    set_input(links, node.inputs[0], color)
+    set_input(links, node.inputs["Scale"], factor)
+    return node.outputs[0]
+
+
+def maths(nodes, links, operation, first, second):
+    """Number of an operation on two numbers, given as they are or as sockets."""
+    node = nodes.new("ShaderNodeMath")
+    node.operation = operation
+    set_input(links, node.inputs[0], first)
+    set_input(links, node.inputs[1], second)
+    return node.outputs[0]
+
+
+def set_input(links, socket, value):
+    """Link a socket, or set it to a number or a list."""
+    if isinstance(value, bpy.types.NodeSocket):
+        links.new(value, socket)
+    else:
+        socket.default_value = value
 
 
 def set_look(material, depth):
@@ -138,40 +188,21 @@ def set_look(material, depth):
     shader.inputs["Subsurface Radius"].default_value = tuple(max(each, 0.05) for each in color[:3])
     shader.inputs["Subsurface Scale"].default_value = depth
     shader.inputs["Sheen Weight"].default_value = material["sheen"]
+    shader.inputs["Sheen Tint"].default_value = color
     shader.inputs["Transmission Weight"].default_value = material["transparency"]
     shader.inputs["Alpha"].default_value = material["opacity"]
 
 
-def soft_box(scene, box, settings):
-    """Two lights in one place: what is reflected, and the little that ours gives to diffuse surfaces."""
-    away = _FAR * settings["distance"]
-    lights = []
-    for name in ("reflected", "diffuse"):
-        light = bpy.data.lights.new(name, "AREA")
-        light.shape, light.size, light.size_y = "RECTANGLE", 2 * box["half"][0] * away, 2 * box["half"][1] * away
-        brightest = max(box["radiance"])
-        light.color = [each / brightest for each in box["radiance"]]
-        light.energy = settings[f"boxes_{name}"] * math.pi * brightest * light.size * light.size_y
-        thing = bpy.data.objects.new(name, light)
-        thing.visible_camera = thing.visible_transmission = False
-        thing.visible_diffuse, thing.visible_glossy = name == "diffuse", name == "reflected"
-        scene.collection.objects.link(thing)
-        lights.append(thing)
-    return lights
-
-
-def box_place(camera, box, distance):
-    """A soft box turns with the camera round the vertical."""
+def axes_of(camera, box):
+    """Axes of a soft box, which turns with the camera round the vertical: to it, across, up."""
     right = camera.to_3x3() @ Vector((1, 0, 0))
     right = Vector((right.x, right.y, 0)).normalized()
     up = Vector((0, 0, 1))
     forward = up.cross(right)
     turn, rise = math.radians(box["azimuth"]), math.radians(box["elevation"])
     way = (forward * math.cos(turn) - right * math.sin(turn)) * math.cos(rise) + up * math.sin(rise)
-    focus = camera @ Vector((0, 0, -distance))
     across = up.cross(way).normalized()
-    turned = Matrix((across, way.cross(across), way)).transposed()  # lights shine along their -z
-    return Matrix.Translation(focus + way * _FAR * distance) @ turned.to_4x4()
+    return way, across, way.cross(across)
 
 
 def fading_floor(settings):

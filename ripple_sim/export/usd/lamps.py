@@ -61,10 +61,12 @@ class Lamps:
 
 def _far(stage: Usd.Stage, path: Sdf.Path, light: Light, middle: NDArray) -> UsdGeom.Xformable:
     lamp = UsdLux.DistantLight.Define(stage, path)
-    lamp.CreateAngleAttr(float(np.degrees(2 * np.arctan(light.size))))
+    angle = 2 * np.arctan(light.size)
+    lamp.CreateAngleAttr(float(np.degrees(angle)))
     lamp.CreateNormalizeAttr(True)
     _set_light(lamp, light.radiance, np.pi)
     keep(lamp.GetPrim(), "power", np.pi * light.radiance.max())  # [W/m^2], as Blender has it
+    keep(lamp.GetPrim(), "angle", angle)  # [radians], likewise
     return lamp
 
 

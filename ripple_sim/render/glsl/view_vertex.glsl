@@ -8,13 +8,15 @@ uniform vec2 span = vec2(1.0);  // of the framebuffer, in frames
 uniform float reach = 1.0;      // of the viewport, in framebuffers
 
 flat out vec3 focus_local;
-flat out vec3 around;  // ambient light on the open floor
+flat out vec3 around;   // ambient light on the open floor, without the soft box of the key light
+flat out vec3 key_box;  // and that
 
 void main()
 {
     vec2 corner = 4.0 * vec2(gl_VertexID == 1, gl_VertexID == 2);
     cast_ray(corner * span - 1.0);
     focus_local = along_floor(focus.xyz - floor_origin.xyz);
-    around = ambient(floor_normal.xyz, vec3(0.0));
+    around = ambient(floor_normal.xyz, vec3(0.0), 0.0);
+    key_box = diffuse_box(0, floor_normal.xyz);
     gl_Position = vec4(corner / reach - 1.0, 2.0 * level - 1.0, 1.0);
 }

@@ -17,6 +17,7 @@ uniform vec3 tint;     // of the image
 
 flat in vec3 focus_local;
 flat in vec3 around;
+flat in vec3 key_box;
 out vec4 fragment;
 
 #if MIRROR
@@ -73,16 +74,12 @@ void main()
     vec2 near = textureLod(floor_visibility, place, 0.0).rg;
 #endif
 #if SHADOW
-    // The filters of neighbouring pixels are turned differently: their mean has half the noise. It is taken where all
-    // four pixels of a block belong to this pass; derivatives across others are undefined.
+    // Shadows are averaged where all four pixels of a block belong to this pass; derivatives across others are undefined.
     int solid = bitCount(covered(pixel, floor_depth()));
     bool whole = block_inside(pixel) && block_mean(solid > 0 || !met ? 1.0 : 0.0) == 0.0;
     float shadow[SHADOWS], share = 1.0 - float(solid) / float(SAMPLES);
-    for (int i = 0; i < SHADOWS; ++i) {
-        shadow[i] = light_visibility(i, world, floor_normal.xyz, 0.0);
-        float mean = block_mean(shadow[i]);
-        shadow[i] = whole ? mean : shadow[i];
-    }
+    for (int i = 0; i < SHADOWS; ++i)
+        shadow[i] = light_visibility(i, world, floor_normal.xyz, 0.0, bvec2(whole));
 #else
     const float share = 1.0;
     bool shaded = met && may_be_shaded(place, near);
@@ -112,10 +109,15 @@ void main()
     }
 #endif
 #endif
-    light += around * (0.15 + 0.85 * near.r);
+    float key = 1.0;
+#if SHADOW
+    key = shadow[0];
+#endif
+    unshaded += around + key_box;
+    light += (around + key * key_box) * (0.15 + 0.85 * near.r);
 #if CUT_OUT
     // only the shadows are left of the floor
-    fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g + around.g, 1e-6)));
+    fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g, 1e-6)));
 #else
     vec3 direction = normalize(way);
     vec3 far = sky_at(met && edge == 0.0 ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);

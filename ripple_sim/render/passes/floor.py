@@ -84,7 +84,7 @@ class Floor:
         """Set where the floor is, and let the floor map cover what is under a ball [m]."""
         self.rotation = rotation = data.geom_xmat[self.geom].reshape(3, 3)
         self.origin = np.array(data.geom_xpos[self.geom])
-        self.centre, self.half_width = local, half_width = rotation.T @ (centre - self.origin), 1.2 * radius
+        self.centre, self.half_width = local, half_width = rotation.T @ (centre - self.origin), 1.8 * radius
         frame.set_vector("floor_origin", self.origin, 1.0)
         frame.set_vector("floor_u", rotation[:, 0], self._half[0])
         frame.set_vector("floor_v", rotation[:, 1], self._half[1])

@@ -1,7 +1,8 @@
 // The floor map; see floor_occlusion_fragment.glsl.
 #include "gpu/frame_uniforms.glsl"
 
-layout(binding = FLOOR_MAP_UNIT) uniform sampler2D floor_visibility;  // r: ambient visibility; g: 1 where shadows may fall
+// r: ambient visibility; g: 1 where shadows may fall; b: share of the lights that arrives
+layout(binding = FLOOR_MAP_UNIT) uniform sampler2D floor_visibility;
 
 // Texture coordinates in the floor map of a point given along the floor's axes.
 vec2 floor_map_position(vec2 local)

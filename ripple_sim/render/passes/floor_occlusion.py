@@ -14,8 +14,8 @@ from ripple_sim.render.projection import orthographic
 from .floor import Floor
 from .shadow import ShadowMaps
 
-_CEILING_SIZE, _MAP_SIZE = 224, 112
-_INFLUENCE = 0.35  # radius, in half widths of the map
+_CEILING_SIZE, _MAP_SIZE = 288, 144
+_INFLUENCE = 0.8  # radius, in half widths of the map
 
 
 class FloorOcclusion:
@@ -34,7 +34,7 @@ class FloorOcclusion:
     def __init__(self, resources: Resources, shadows: int, floor: Floor | None) -> None:
         self._floor = floor
         if floor is None:
-            self._map = resources.texture((1, 1), 2, np.ones(2, dtype=np.float16).tobytes(), dtype="f2")
+            self._map = resources.texture((1, 1), 4, np.ones(4, dtype=np.float16).tobytes(), dtype="f2")
             return
         program = resources.program(
             "glsl/screen_vertex", "passes/floor_occlusion_fragment", NEAR_LIGHTS=1, SHADOWS=shadows
@@ -43,7 +43,7 @@ class FloorOcclusion:
         self._ceiling = resources.depth_texture((_CEILING_SIZE, _CEILING_SIZE))
         self._ceiling.compare_func = ""
         self._ceiling_framebuffer = resources.framebuffer(depth_attachment=self._ceiling)
-        self._map = resources.texture((_MAP_SIZE, _MAP_SIZE), 2, dtype="f2")
+        self._map = resources.texture((_MAP_SIZE, _MAP_SIZE), 4, dtype="f2")
         self._map.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         for texture in (self._ceiling, self._map):
             texture.repeat_x = texture.repeat_y = False

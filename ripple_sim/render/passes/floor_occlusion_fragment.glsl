@@ -1,18 +1,19 @@
 #version 430
-// Ambient visibility of a point of the floor, from the height of what hangs above it. The form factor of horizontal
-// patches at height h and horizontal distance d is h^2 / (pi (h^2 + d^2)^2) per unit area.
+// What light reaches a point of the floor. Its ambient visibility comes from the height of what hangs above it: the form
+// factor of horizontal patches at height h and horizontal distance d is h^2 / (pi (h^2 + d^2)^2) per unit area.
 #include "gpu/frame_uniforms.glsl"
 #include "passes/shadow.glsl"
+#include "visuals/lights.glsl"
 
 layout(binding = CEILING_UNIT) uniform sampler2D ceiling;  // 0 at the floor, 1 at the top
 
 uniform vec3 extent;  // width of the map [m], height of its top [m], radius of influence [m]
 
 in vec2 screen;
-out vec4 fragment;  // r: ambient visibility; g: 1 where a shadow may fall
+out vec4 fragment;  // r: ambient visibility; g: 1 where a shadow may fall; b: share of the lights that arrives
 
-const int TAPS = 28;
-const int SHADOW_TAPS = 10;
+const int TAPS = 20;
+const int SHADOW_TAPS = 24;
 
 // Whether anything shades any of a texel of the floor, which is `texel` wide [m].
 bool is_shaded(int light, vec3 world, float texel)
@@ -21,17 +22,18 @@ bool is_shaded(int light, vec3 world, float texel)
     vec3 p = clip.xyz / clip.w;
     vec2 off = abs(p.xy - 0.5);
     float to_light = light_distance(light, p.z), margin = texel / (width.x + width.y * to_light);
-    float reach = shadows[light].penumbra.z + margin, closest = 1e9, widest = 0.0;
+    float reach = widest_penumbra(light, to_light) + margin, closest = 1e9, widest = 0.0;
     vec2 direction = vec2(1.0, 0.0);
     for (int i = 0; i < SHADOW_TAPS; ++i) {
-        float offset = reach * sqrt((float(i) + 0.5) / float(SHADOW_TAPS));
+        // denser in the middle: what is close casts narrow shadows
+        float offset = reach * (float(i) + 0.5) / float(SHADOW_TAPS);
         direction = GOLDEN_TURN * direction;
         float depth = textureLod(shadow_maps, in_maps(light, p.xy + offset * direction), 0.0).r;
         closest = depth < 1.0 ? min(closest, offset) : closest;
         widest = depth < 1.0 ? max(widest, penumbra_of(light, light_distance(light, depth), to_light)) : widest;
     }
     // something closer may lie between two points
-    bool any = closest < widest + margin + 0.3 * reach;
+    bool any = closest < widest + margin + 0.2 * reach;
     return counts.w > float(light) && clip.w > 0.0 && any && max(off.x, off.y) < 0.5 + reach;
 }
 
@@ -40,22 +42,33 @@ void main()
     vec2 uv = 0.5 * screen + 0.5;
     float texel = extent.x / float(textureSize(ceiling, 0).x);
     float covered = 0.0;
-    float turn = TWO_PI * gradient_noise(gl_FragCoord.xy);
-    vec2 direction = vec2(cos(turn), sin(turn));
+    float first = first_point();
+    vec2 direction = spiral_direction(first);
     for (int i = 0; i < TAPS; ++i) {
         // radii grow with the square of the index: dense near contacts, each tap with the area that it stands for
-        float s = (float(i) + 0.5) / float(TAPS);
+        float s = (float(i) + 0.25 * first) / float(TAPS);
         float distance = extent.z * s * s, area = TWO_PI * distance * 2.0 * extent.z * s / float(TAPS);
-        direction = GOLDEN_TURN * direction;
+        direction = FOURTH_TURN * direction;
         float height = textureLod(ceiling, uv + distance * direction / extent.x, 0.0).r;
         float h = max(height * extent.y, 0.6 * texel), r2 = h * h + distance * distance;
         covered += height < 1.0 ? h * h * area / (3.14159265 * r2 * r2) : 0.0;
     }
+    // nothing is known beyond the map
+    vec2 off = abs(screen);
+    covered = block_mean(covered) * (1.0 - smoothstep(0.7, 1.0, max(off.x, off.y)));
     vec2 local = floor_map.xy + screen * floor_map.z;
     vec3 world = floor_origin.xyz + local.x * floor_u.xyz + local.y * floor_v.xyz;
     float size = floor_map.z * dFdx(screen.x);
     bool shaded = false;
-    for (int i = 0; i < SHADOWS; ++i)
-        shaded = shaded || is_shaded(i, world, size);
-    fragment = vec4(1.0 - min(covered, 1.0), shaded ? 1.0 : 0.0, 0.0, 1.0);
+    vec3 arrives = vec3(0.0), unshaded = vec3(1e-6);
+    for (int i = 0; i < int(counts.y); ++i) {
+        vec3 towards;
+        vec3 light = incident(lights[i], world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
+        bool casts = i < SHADOWS;
+        shaded = shaded || casts && is_shaded(i, world, size);
+        arrives += light * (casts ? light_visibility(i, world, floor_normal.xyz, 0.0, bvec2(true)) : 1.0);
+        unshaded += light;
+    }
+    float share = dot(arrives, vec3(1.0)) / dot(unshaded, vec3(1.0));
+    fragment = vec4(1.0 - min(covered, 1.0), shaded ? 1.0 : 0.0, share, 1.0);
 }

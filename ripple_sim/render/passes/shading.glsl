@@ -7,6 +7,9 @@
 #include "visuals/lights.glsl"
 #include "visuals/occluders.glsl"
 
+flat in vec3 around;   // ambient light on the open floor, without the soft box of the key light
+flat in vec3 key_box;  // and that
+
 struct Material {
     vec3 albedo;
     float roughness, metallic, sheen, coat, translucency, transparency, emission;
@@ -18,15 +21,16 @@ struct Material {
     bvec2 block;        // neighbours in the block of 2 x 2 pixels that share their shadows with this one
 };
 
-// Light that the floor reflects up to a point; what is close above the floor shades it.
-vec3 floor_bounce(vec3 position)
+const float COAT_ROUGHNESS = 0.25;  // of a lamp's highlight: lamps are not points
+
+// Radiance of the floor about a point of it, as far as the radius [m].
+vec3 floor_radiance(vec3 position, float radius)
 {
     vec3 local = position - floor_origin.xyz;
     vec2 place = floor_map_position(vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)));
-    float open = textureLod(floor_visibility, place, 3.0).r;
-    vec3 lit = floor_albedo.rgb * (floor_light.rgb * 0.7 * open * open + sky.rgb * 0.5 * open);
-    // less saturated: a coloured floor would stain everything
-    lit = mix(lit, vec3(dot(lit, vec3(0.2126, 0.7152, 0.0722))), 0.5);
+    float texel = 2.0 * floor_map.z / float(textureSize(floor_visibility, 0).x);
+    vec4 open = textureLod(floor_visibility, place, log2(max(radius / texel, 1.0)));
+    vec3 lit = floor_albedo.rgb * ((floor_light.rgb + key_box) * open.b + around * (0.15 + 0.85 * open.r));
     return floor_origin.w > 0.0 ? lit : sky.rgb * 0.8;
 }
 
@@ -56,9 +60,10 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     float n_v = clamp(dot(normal, view), 0.1, 1.0);
 
     float open = m.visibility * occluder_visibility(position, flat_normal, own_geom, m.occluders);
-    vec3 bounce = floor_bounce(position);
     float height = max(dot(position - floor_origin.xyz, floor_normal.xyz), 0.0);
-    vec3 mirrored = 1.7 * floor_bounce(position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2));
+    // a wall sees the floor before it, about as far away as it is high
+    vec3 bounce = floor_radiance(position + 1.2 * height * normal, height);
+    vec3 mirrored = floor_radiance(position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2), 0.3 * height);
     // narrow highlights of distant ripples would flicker
     float rough = sqrt(clamp(m.roughness * m.roughness + spread, 0.004, 1.0));
     vec3 f0 = mix(vec3(0.04), m.albedo, m.metallic);
@@ -69,8 +74,8 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     float thin = exp(-4.0 * m.thickness);
     float shadow[SHADOWS];
     for (int i = 0; i < SHADOWS; ++i)
-        shadow[i] = block_mean(light_visibility(i, position, flat_normal, m.shadow_bias), m.block);
-    vec3 direct = vec3(0.0), highlight = vec3(0.0), glow = vec3(0.0);
+        shadow[i] = light_visibility(i, position, flat_normal, m.shadow_bias, m.block);
+    vec3 direct = vec3(0.0), highlight = vec3(0.0), coated = vec3(0.0), glow = vec3(0.0);
     for (int i = 0; i < int(counts.y); ++i) {
         vec3 light;
         vec3 radiance = incident(lights[i], position, light);
@@ -78,27 +83,29 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
         vec3 halfway = normalize(view + light);
         vec3 diffuse = max(n_l + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
         direct += radiance * diffuse * mix(visible, 1.0, 0.35 * m.translucency);
-        highlight += radiance * visible * clamp(n_l * 4.0, 0.0, 1.0) * fresnel(f0, max(dot(view, halfway), 0.0))
-                   * ggx(max(dot(normal, halfway), 0.0), rough) * 0.25;
+        vec3 arrives = 0.25 * radiance * visible * clamp(n_l * 4.0, 0.0, 1.0);
+        float n_h = max(dot(normal, halfway), 0.0), v_h = max(dot(view, halfway), 0.0);
+        highlight += arrives * fresnel(f0, v_h) * ggx(n_h, rough);
+        coated += arrives * fresnel(vec3(0.04), v_h) * ggx(n_h, COAT_ROUGHNESS);
         float behind = clamp(0.5 - 0.5 * n_l, 0.0, 1.0);
         glow += radiance * thin * (0.35 + 0.65 * behind * behind);
     }
-    vec3 around = ambient(normal, bounce) * open;
-    around *= mix(vec3(1.0), m.albedo / max(max(m.albedo.r, m.albedo.g), max(m.albedo.b, 1e-3)), 0.8 * m.translucency);
+    vec3 surround = ambient(normal, bounce, shadow[0]) * open;
+    surround *= mix(vec3(1.0), m.albedo / max(max(m.albedo.r, m.albedo.g), max(m.albedo.b, 1e-3)), 0.8 * m.translucency);
     // light bounces between coloured walls: occlusion is less deep and more saturated
-    around *= mix(m.albedo * (1.0 - open) + open, vec3(1.0), open);
-    vec3 base = m.albedo * (direct + around) * (1.0 - m.metallic) + m.translucency * m.albedo * glow;
+    surround *= mix(m.albedo * (1.0 - open) + open, vec3(1.0), open);
+    vec3 base = m.albedo * (direct + surround) * (1.0 - m.metallic) + m.translucency * m.albedo * glow;
     base += m.emission * m.albedo;
 #if LAYER
     // transparent objects show what is behind them, refracted, and tinted by their thickness
     base = mix(base, m.behind * pow(m.albedo, vec3(0.15 + 0.8 * m.thickness)), m.transparency);
 #endif
-    base += m.sheen * m.albedo * around * ((1.0 - n_v) * (1.0 - n_v) * (1.0 - n_v));
+    base += m.sheen * m.albedo * surround * ((1.0 - n_v) * (1.0 - n_v) * (1.0 - n_v));
 
     float hidden = clamp(open * open + 0.15, 0.0, 1.0);
     vec3 at_edge = f0 + (max(vec3(1.0 - rough), f0) - f0) * fifth_power(1.0 - n_v);
     vec3 gloss = environment(reflected, rough, mirrored) * at_edge * hidden + highlight;
     float coat = m.coat * fresnel(vec3(0.04), n_v).x;
     vec3 film = environment(reflected, 0.06, mirrored) * hidden;
-    return (base + gloss) * (1.0 - coat) + coat * film;
+    return (base + gloss) * (1.0 - coat) + coat * film + m.coat * coated;
 }

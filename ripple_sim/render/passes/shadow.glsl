@@ -1,12 +1,13 @@
 // Soft shadows: percentage-closer soft shadows (PCSS). SHADOWS lights may cast them; their maps lie side by side.
 #include "gpu/frame_uniforms.glsl"
 #include "glsl/disc.glsl"
-#include "glsl/noise.glsl"
+#include "glsl/pixel_block.glsl"
 
 layout(binding = SHADOW_TEST_UNIT) uniform sampler2DShadow shadow_test;
 layout(binding = SHADOW_MAPS_UNIT) uniform sampler2D shadow_maps;
 
-const int SEARCH_TAPS = 5;
+// Points of the discs, for each pixel of a block of 2 x 2: together they are four times as many points of one spiral.
+const int SEARCH_TAPS = 6;
 const int FILTER_TAPS = 16;
 
 // Texture coordinates of a point of one light's map.
@@ -34,9 +35,16 @@ float penumbra_of(int light, float blocker, float behind)
     return min((behind - blocker) * blur / (width.x + width.y * behind), penumbra.z);
 }
 
-// Share of a light that arrives. The normal is that of the surface without ripples; `bias` [m] raises the position above
-// bumps, which shall not shade each other.
-float light_visibility(int light, vec3 position, vec3 normal, float bias)
+// Radius, in the map, of what may shade a point at a distance from the light [m]: a penumbra of the nearest blocker.
+float widest_penumbra(int light, float to_light)
+{
+    return penumbra_of(light, light_distance(light, 0.0), to_light);
+}
+
+// Share of a light that arrives, as the mean over the part of the pixel's block of 2 x 2 that lies to the given sides.
+// The normal is that of the surface without ripples; `bias` [m] raises the position above bumps, which shall not shade
+// each other.
+float light_visibility(int light, vec3 position, vec3 normal, float bias, bvec2 block)
 {
     vec4 place = lights[light].position, of_depth = shadows[light].depth, of_width = shadows[light].width;
     bool far_away = NEAR_LIGHTS == 0 || place.w == 0.0;
@@ -55,11 +63,10 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias)
     float steepest = 10.0 * width * metre;
     vec2 slope = -plane.xy * (abs(plane.z) > 1e-9 ? 1.0 / plane.z : 1e9);
     slope = clamp(slope, -steepest, steepest);
-    // another noise in each exposure: a step along the diagonal turns the filter by about the golden angle
-    float turn = TWO_PI * gradient_noise(gl_FragCoord.xy + 5.588238 * counts.z);
-    vec2 direction = vec2(cos(turn), sin(turn));
+    float first = first_point();
+    vec2 start = spiral_direction(first + counts.z), direction = start;  // another one in each exposure
     float depth_bias = 0.5 * texel * metre;
-    float widest = shadows[light].penumbra.z;
+    float widest = widest_penumbra(light, to_light);
 
     // loops that run zero times instead of branches: software drivers execute both sides of a branch
     bool inside = counts.w > float(light) && facing > -0.5 && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
@@ -67,21 +74,24 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias)
     int taps = inside ? SEARCH_TAPS : 0;
     for (int i = 0; i < taps; ++i) {
         // denser in the middle, where a near blocker must not be missed
-        vec2 offset = widest * (float(i) + 0.1) / float(SEARCH_TAPS) * direction;
-        direction = GOLDEN_TURN * direction;
+        vec2 offset = widest * (float(i) + 0.25 * first) / float(SEARCH_TAPS) * direction;
+        direction = FOURTH_TURN * direction;
         float d = textureLod(shadow_maps, in_maps(light, p.xy + offset), 0.0).r;
         float blocks = step(d, p.z + dot(slope, offset) - 2.0 * depth_bias);
         depth += blocks * d;
         blockers += blocks;
     }
-    float blocker = light_distance(light, depth / max(blockers, 1.0));
+    depth = block_mean(depth, block);
+    blockers = block_mean(blockers, block);
+    float blocker = light_distance(light, depth / max(blockers, 0.1));
     float penumbra = max(penumbra_of(light, blocker, to_light), 1.5 / of_width.z);
     float lit = 0.0;
-    taps = blockers > 0.0 ? FILTER_TAPS : 0;
+    taps = inside && blockers > 0.1 ? FILTER_TAPS : 0;
+    direction = start;
     for (int i = 0; i < taps; ++i) {
-        vec2 offset = penumbra * sqrt((float(i) + 0.5) / float(FILTER_TAPS)) * direction;
-        direction = GOLDEN_TURN * direction;
+        vec2 offset = penumbra * sqrt((float(i) + 0.25 * first) / float(FILTER_TAPS)) * direction;
+        direction = FOURTH_TURN * direction;
         lit += textureLod(shadow_test, vec3(in_maps(light, p.xy + offset), p.z + dot(slope, offset) - depth_bias), 0.0);
     }
-    return taps > 0 ? lit / float(FILTER_TAPS) : 1.0;
+    return block_mean(taps > 0 ? lit / float(FILTER_TAPS) : 1.0, block);
 }

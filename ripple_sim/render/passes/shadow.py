@@ -17,7 +17,7 @@ from ripple_sim.render.visuals.lights import Light
 
 # Texels along a side: as many as make one about as wide as a pixel, where the casters fill the frame.
 _LEAST, _MOST, _PER_PIXEL, _STEP = 512, 1536, 1.4, 256
-_WIDEST = 0.022  # penumbra, as a share of the map
+_WIDEST = 0.15  # penumbra, as a share of the map
 _STEEPEST_FOV = 130.0  # [degrees]
 _REACH = 30.0  # how far behind the casters shadows fall, in radii of the casters' ball
 

@@ -29,22 +29,27 @@ float soft_box(vec3 direction, vec4 normal, vec4 tangent, float blur)
 // Radiance that a lobe about the direction, of the given roughness, collects; `bounce` comes from below.
 vec3 environment(vec3 direction, float roughness, vec3 bounce)
 {
-    // wide lobes get most of the soft boxes' light from the key light itself
-    float width = 0.04 + 0.9 * roughness, boxes = mix(1.0, 0.3, smoothstep(0.08, 0.4, roughness));
+    float width = 0.04 + 0.9 * roughness;
     vec3 radiance = mix(bounce, 0.75 * sky_at(direction, roughness), smoothstep(-width, width, direction.z));
     for (int i = 0; i < SOFT_BOXES; ++i)
-        radiance += boxes * soft_box_radiance[i].rgb * soft_box(direction, soft_box_normal[i], soft_box_tangent[i], width);
+        radiance += soft_box_radiance[i].rgb * soft_box(direction, soft_box_normal[i], soft_box_tangent[i], width);
     return radiance;
 }
 
-// Ambient light on a diffuse surface, over pi.
-vec3 ambient(vec3 normal, vec3 bounce)
+// Light of a soft box on a diffuse surface, over pi.
+vec3 diffuse_box(int i, vec3 normal)
 {
-    vec3 radiance = mix(0.75 * bounce, sky.rgb, 0.5 + 0.5 * normal.z);
-    for (int i = 0; i < SOFT_BOXES; ++i) {
-        float wrapped = max(0.35 + 0.65 * dot(normal, soft_box_normal[i].xyz), 0.0);
-        float size = soft_box_normal[i].w * soft_box_tangent[i].w * 0.13;
-        radiance += sky.w * soft_box_radiance[i].rgb * size * wrapped * wrapped;
-    }
+    float wrapped = max(0.35 + 0.65 * dot(normal, soft_box_normal[i].xyz), 0.0);
+    float size = soft_box_normal[i].w * soft_box_tangent[i].w * 0.13;
+    return sky.w * soft_box_radiance[i].rgb * size * wrapped * wrapped;
+}
+
+// Ambient light on a diffuse surface, over pi. The first soft box stands where the key light does: `key` is the share of
+// that which arrives.
+vec3 ambient(vec3 normal, vec3 bounce, float key)
+{
+    vec3 radiance = mix(bounce, sky.rgb, 0.5 + 0.5 * normal.z) + key * diffuse_box(0, normal);
+    for (int i = 1; i < SOFT_BOXES; ++i)
+        radiance += diffuse_box(i, normal);
     return radiance;
 }
