@@ -78,8 +78,8 @@ def save(scene, folder, number):
 def set_world(scene, settings):
     """The sky and the soft boxes: as the camera sees them, as they are reflected, and as they light the rest.
 
-    Return the nodes that take the axes of each box. Where directions are chosen for lamps alone, Cycles does not know what
-    kind of ray will meet the sky: the surfaces choose them.
+    Return the nodes that take the axes of each box. Where directions are chosen for light alone, Cycles does not know
+    what kind of ray will meet the sky: surfaces choose them.
     """
     scene.world = bpy.data.worlds.new("sky")
     scene.world.use_nodes = True

@@ -103,6 +103,9 @@ def test_lamps_light_the_middle_as_strongly_as_ours(run: Any) -> None:
     lamps = [UsdLux.LightAPI(prim) for prim in stage.Traverse() if prim.HasAPI(UsdLux.LightAPI)]
     kinds = {lamp.GetPrim().GetTypeName() for lamp in lamps}
     assert {"DistantLight", "SphereLight", "DomeLight"} == kinds  # headlight, spot lamp, ambient light
+    (far,) = (prim for prim in stage.Traverse() if prim.GetTypeName() == "DistantLight")
+    degrees = np.degrees(far.GetAttribute("userProperties:angle").Get())  # which Blender doubles
+    assert degrees == pytest.approx(UsdLux.DistantLight(far).GetAngleAttr().Get())
 
 
 def test_looks_and_textures_are_bound(run: Any) -> None:

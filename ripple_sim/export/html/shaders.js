@@ -52,14 +52,14 @@ float softBox(vec3 d, vec4 n, vec4 t, float blur) {
 }
 
 vec3 environment(vec3 d, float r, vec3 bounce) {
-  float width = 0.04 + 0.9 * r, boxes = mix(1.0, 0.3, smoothstep(0.08, 0.4, r));
+  float width = 0.04 + 0.9 * r;
   vec3 radiance = mix(bounce, 0.75 * skyAt(d, r), smoothstep(-width, width, d.z));
-  for (int i = 0; i < 3; ++i) radiance += boxes * boxStrength * boxRadiance[i] * softBox(d, boxNormal[i], boxTangent[i], width);
+  for (int i = 0; i < 3; ++i) radiance += boxStrength * boxRadiance[i] * softBox(d, boxNormal[i], boxTangent[i], width);
   return radiance;
 }
 
 vec3 ambient(vec3 n, vec3 bounce) {
-  vec3 radiance = mix(0.75 * bounce, sky, 0.5 + 0.5 * n.z);
+  vec3 radiance = mix(bounce, sky, 0.5 + 0.5 * n.z);
   for (int i = 0; i < 3; ++i) {
     float w = max(0.35 + 0.65 * dot(n, boxNormal[i].xyz), 0.0);
     radiance += boxShare * boxStrength * boxRadiance[i] * boxNormal[i].w * boxTangent[i].w * 0.13 * w * w;
@@ -90,8 +90,7 @@ vec3 lit(vec3 point, vec3 normal, vec3 albedo) {
   n = normalize(n + max(0.1 - dot(n, view), 0.0) * view);
   float nv = clamp(dot(n, view), 0.1, 1.0), rough = max(base.x, 0.0632), edge = 1.0 - nv;
   vec3 f0 = mix(vec3(0.04), albedo, base.y), mirror = reflect(-view, n);
-  vec3 below = floorAlbedo * (floorLight * 0.7 + sky * 0.5), bounce = mix(below, vec3(dot(below, vec3(0.2126, 0.7152, 0.0722))), 0.5);
-  bounce = hasFloor > 0.0 ? bounce : sky * 0.8;
+  vec3 bounce = hasFloor > 0.0 ? floorAlbedo * (0.7 * floorLight + around) : sky * 0.8;  // about a third lies in shadow
   vec3 wrap = 0.6 * volume.x * albedo, direct = vec3(0.0), highlight = vec3(0.0);
   float shadow = shadowAt(point, n);
   for (int i = 0; i < LAMPS; ++i) {
@@ -105,10 +104,10 @@ vec3 lit(vec3 point, vec3 normal, vec3 albedo) {
   vec3 shade = albedo * (direct + ambience) * (1.0 - base.y) + volume.z * albedo;
   shade += base.z * albedo * ambience * edge * edge * edge;
   vec3 atEdge = f0 + (max(vec3(1.0 - rough), f0) - f0) * edge * edge * edge * edge * edge;
-  vec3 gloss = environment(mirror, rough, 1.7 * bounce) * atEdge + highlight;
+  vec3 gloss = environment(mirror, rough, bounce) * atEdge + highlight;
   if (base.w == 0.0) return shade + gloss;
   float coat = base.w * fresnel(vec3(0.04), nv).x;
-  return (shade + gloss) * (1.0 - coat) + coat * environment(mirror, 0.06, 1.7 * bounce);
+  return (shade + gloss) * (1.0 - coat) + coat * environment(mirror, 0.06, bounce);
 }
 float opacityAt(vec3 point, vec3 normal) { return volume.w * (1.0 - 0.6 * volume.y * clamp(dot(normalize(normal), normalize(eye - point)), 0.1, 1.0)); }
 `;

@@ -5,6 +5,8 @@ import pytest
 from drawn import BALL, FLOOR, FRONT, SIZE, SPOT, SUN, frame_of
 from scipy.ndimage import binary_erosion
 
+from ripple_sim.render.color import srgb_to_linear
+
 
 @pytest.mark.parametrize("direction", [-1.0, 1.0])
 def test_a_shadow_falls_where_the_light_of_the_mjcf_casts_it(gl, direction):
@@ -68,6 +70,28 @@ def test_a_shadow_falls_far_below_its_caster(gl):
     pixels = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))
     x = int(SIZE[0] / 2 + 0.5 * pixels)
     assert frame[58:62, x - 2 : x + 2].mean() < frame[58:62, x + 20 : x + 30].mean() - 60
+
+
+def test_a_penumbra_is_as_wide_as_the_light_and_the_height_make_it(gl):
+    """A sun of tangent 0.05 shines past the edge of a plate 1.4 m up, under 45 degrees: the floor lies 2 m behind."""
+    plate = '<geom type="box" size=".5 .5 .01" pos="-1.4 0 1.4"/>'
+    size = (320, 240)
+    frame = frame_of(gl, FLOOR + plate + SUN.format(1.0, "true"), size=size)
+    metre = size[1] / (2 * 4.0 * np.tan(np.radians(20)))
+    across = srgb_to_linear(frame[: size[1] // 2, size[0] // 2, 1] / 255)  # from beyond the shadow to its middle
+    share = (across - across.min()) / (across[0] - across.min())
+    width = (np.argmax(share < 0.1) - np.argmax(share < 0.9)) / metre
+    # of a disc's light, 0.9 and 0.1 pass at 0.69 of its radius
+    assert width == pytest.approx(2 * 0.69 * 0.05 * np.hypot(1.4, 1.4), rel=0.25)
+
+
+def test_penumbras_have_neither_noise_nor_hatching(gl):
+    """Along the edge of a plate all pixels of a penumbra are alike."""
+    plate = '<geom type="box" size=".9 .5 .01" pos="-1.4 0 1.4"/>'
+    frame = frame_of(gl, FLOOR + plate + SUN.format(1.0, "true"), size=(320, 240))
+    edge = frame[40:120, 140:180, 1]
+    assert np.ptp(edge.mean(axis=1)) > 60
+    assert edge.std(axis=1).max() < 1.5
 
 
 def test_the_edges_of_a_coarse_ball_do_not_shade_it(gl):
