@@ -157,7 +157,7 @@ class GLContext:
         """Compile `{name}.glsl` below `package` as a compute shader; see `load_shader`."""
         source = load_shader(package, name, **defines)
         with self:
-            return self._pooled((source,), lambda: self._compute_shader(name, source))
+            return self._pool.take((source,), lambda: self._compute_shader(name, source))
 
     def shared_compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
         """Compile a compute shader once and share it: set all uniforms before each use."""
@@ -171,7 +171,7 @@ class GLContext:
         vertex_source = load_shader(package, vertex, **defines)
         fragment_source = load_shader(package, fragment, **defines)
         with self as ctx:
-            return self._pooled(
+            return self._pool.take(
                 (vertex_source, fragment_source),
                 lambda: _compiled(
                     f"{vertex} + {fragment}",
@@ -186,13 +186,6 @@ class GLContext:
                 created = self._pool.give_back(created)
             if created is not None:
                 created.release()
-
-    def _pooled(self, sources: tuple[str, ...], compiled: Callable[[], Any]) -> Any:
-        program = self._pool.take(sources)
-        if program is None:
-            program = compiled()
-            self._pool.note(sources, program)
-        return program
 
     def _compute_shader(self, name: str, source: str) -> moderngl.ComputeShader:
         with self as ctx:
@@ -211,25 +204,3 @@ def _compiled(name: str, compile_shader: Callable[[], Any]) -> Any:
         return compile_shader()
     except moderngl.Error as error:
         raise GLError(f"shader {name} does not compile: {error}") from error
-
-
-_shared: dict[int | None, GLContext] = {}
-_selected: int | None = None
-_lock = threading.Lock()
-
-
-def select_device(device: int | None) -> None:
-    """Select the EGL device of `shared_context`; None: the first that yields a context."""
-    global _selected
-    with _lock:
-        _selected = device
-
-
-def shared_context(device: int | None = None) -> GLContext:
-    """Return the process-wide context of a device (by default the selected one), created at the first call."""
-    with _lock:
-        device = _selected if device is None else device
-        if device not in _shared:
-            _shared[device] = GLContext(device)
-        _shared[device].check_process()
-        return _shared[device]

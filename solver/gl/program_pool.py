@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import moderngl
@@ -16,8 +17,8 @@ class ProgramPool:
         self._idle: dict[int, Any] = {}  # by their number in OpenGL, the longest idle first
         self._begun: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
 
-    def take(self, sources: tuple[str, ...]) -> Any:
-        """A program with its uniforms as after compilation, or None; within the context."""
+    def take(self, sources: tuple[str, ...], compiled: Callable[[], Any]) -> Any:
+        """An idle program with its uniforms as after compilation, or else a new one; within the context."""
         for number in reversed(self._idle):
             known, begun = self._begun[number]
             if known == sources:
@@ -25,12 +26,10 @@ class ProgramPool:
                 for name, value in begun.items():
                     program[name].write(value)
                 return program
-        return None
-
-    def note(self, sources: tuple[str, ...], program: Any) -> None:
-        """Remember a program that was compiled just now; within the context."""
+        program = compiled()
         begun = {name: program[name].read() for name in program if isinstance(program[name], moderngl.Uniform)}
         self._begun[program.glo] = sources, begun
+        return program
 
     def give_back(self, program: Any) -> Any:
         """Take back a program that is used no longer; return the one to be released for it, or None.

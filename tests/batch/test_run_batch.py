@@ -11,7 +11,9 @@ import pyarrow.parquet
 import pytest
 from small_batch import PLAN, files, new_batch, small_plan
 
-from ripple_sim.batch import run_batch as module
+from ripple_sim.batch import batch_run
+from ripple_sim.batch import run_batch as command
+from ripple_sim.batch.batch_folder import BatchFolder
 from ripple_sim.batch.make_scene import Outcome, make_scene
 from ripple_sim.batch.run_batch import run_batch
 from ripple_sim.batch.run_options import RunOptions
@@ -40,8 +42,8 @@ class Here(Executor):
 
 @pytest.fixture
 def here(monkeypatch):
-    monkeypatch.setattr(module, "LocalExecutor", Here)
-    monkeypatch.setattr(module, "_PATIENCE", 0.01)
+    monkeypatch.setattr(command, "LocalExecutor", Here)
+    monkeypatch.setattr(batch_run, "_PATIENCE", 0.01)
 
 
 def same_scenes(batch, reference, numbers=range(5)):
@@ -54,7 +56,7 @@ def same_scenes(batch, reference, numbers=range(5)):
 
 def test_shards_and_limits_share_out_the_scenes(here, unbroken, tmp_path):
     plan, folder = small_plan(tmp_path, DATA), tmp_path / "out"
-    batch = module.BatchFolder(folder)
+    batch = BatchFolder(folder)
     assert run_batch(plan, folder, RunOptions(shard=(2, 2), limit=1)).made == 1
     assert batch.finished() == {1}
     assert run_batch(plan, folder, RunOptions(shard=(2, 2))).made == 1
@@ -88,7 +90,7 @@ def test_a_scene_that_fails_three_times_is_put_aside_and_can_be_tried_again(here
             return Outcome(number, "failed", error="stone too soft", log="Traceback of it")
         return make_scene(folder, number)
 
-    monkeypatch.setattr(module, "make_scene", make)
+    monkeypatch.setattr(batch_run, "make_scene", make)
     folder = tmp_path / "out"
     progress = run_batch(small_plan(tmp_path, DATA), folder)
     assert (progress.made, progress.aside, progress.failures) == (4, 1, 1)
@@ -113,7 +115,7 @@ def test_a_scene_whose_worker_dies_is_tried_nine_times(here, tmp_path, monkeypat
         tried.append(number)
         raise RuntimeError("terminated abruptly")
 
-    monkeypatch.setattr(module, "make_scene", die)
+    monkeypatch.setattr(batch_run, "make_scene", die)
     plan = small_plan(tmp_path, DATA, PLAN.replace("count = 5", "count = 1"))
     assert run_batch(plan, tmp_path / "out").aside == 1
     assert len(tried) == 9
@@ -122,7 +124,7 @@ def test_a_scene_whose_worker_dies_is_tried_nine_times(here, tmp_path, monkeypat
 
 def test_a_scene_that_another_process_makes_is_waited_for(here, tmp_path, monkeypatch):
     answers = iter(["busy", "busy", "there"])
-    monkeypatch.setattr(module, "make_scene", lambda folder, number: Outcome(number, next(answers)))
+    monkeypatch.setattr(batch_run, "make_scene", lambda folder, number: Outcome(number, next(answers)))
     plan = small_plan(tmp_path, DATA, PLAN.replace("count = 5", "count = 1"))
     progress = run_batch(plan, tmp_path / "out")
     assert (progress.made, progress.finished) == (0, 1)
@@ -133,10 +135,10 @@ def test_a_full_disk_stops_the_batch_and_counts_as_no_failure(here, tmp_path, mo
     plan = small_plan(tmp_path, DATA)
     with pytest.raises(BatchError, match="GB left, less than the 1e\\+06 GB to be kept free; make room"):
         run_batch(plan, tmp_path / "out", RunOptions(keep_free=1e15))
-    monkeypatch.setattr(module, "make_scene", lambda folder, number: Outcome(number, "full", error="No space left"))
+    monkeypatch.setattr(batch_run, "make_scene", lambda folder, number: Outcome(number, "full", error="No space left"))
     with pytest.raises(BatchError, match="the disk is full: No space left"):
         run_batch(plan, tmp_path / "out")
-    assert module.BatchFolder(tmp_path / "out").failures() == {}
+    assert BatchFolder(tmp_path / "out").failures() == {}
 
 
 def test_a_plan_that_has_changed_is_refused_with_what_changed(tmp_path):
@@ -192,7 +194,7 @@ def wait_for(condition):
 def test_killed_workers_and_a_killed_parent_lose_and_change_nothing(unbroken, tmp_path):
     small_plan(tmp_path, "heights = true\n")
     folder = tmp_path / "out"
-    batch = module.BatchFolder(folder)
+    batch = BatchFolder(folder)
     command = [sys.executable, "-m", "ripple_sim", "batch", str(tmp_path / "plan.toml"), "-o", str(folder)]
     command += ["--workers", "1", "--keep-free", "0.001"]
     parent = subprocess.Popen(command, stdout=subprocess.DEVNULL)
@@ -218,7 +220,7 @@ def test_killed_workers_and_a_killed_parent_lose_and_change_nothing(unbroken, tm
 
 def test_tar_files_are_packed_as_they_fill_up(here, tmp_path):
     plan = small_plan(tmp_path, 'video = "none"\nformat = "webdataset"\nscenes_per_tar = 2\n')
-    batch = module.BatchFolder(tmp_path / "out")
+    batch = BatchFolder(tmp_path / "out")
     run_batch(plan, tmp_path / "out", RunOptions(limit=3))
     assert ([tar.name for tar in batch.tar_files()], batch.loose()) == (["000000.tar"], {2})
     run_batch(None, tmp_path / "out")
@@ -240,7 +242,7 @@ def test_a_dask_cluster_makes_the_same_scenes(unbroken, tmp_path):
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None
     ) as cluster:
         assert run_batch(plan, tmp_path / "out", RunOptions(dask=cluster.scheduler_address)).made == 5
-    same_scenes(module.BatchFolder(tmp_path / "out"), unbroken)
+    same_scenes(BatchFolder(tmp_path / "out"), unbroken)
 
 
 def test_a_scheduler_that_does_not_answer_is_named(tmp_path, monkeypatch):

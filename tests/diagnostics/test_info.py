@@ -8,8 +8,8 @@ from ripple_sim.cli import main as cli
 from ripple_sim.diagnostics import info
 from ripple_sim.solver.backends import backend
 from ripple_sim.solver.errors import GLError
-from ripple_sim.solver.gl import context as gl
 from ripple_sim.solver.gl import egl
+from ripple_sim.solver.gl import shared as gl
 
 
 @pytest.fixture

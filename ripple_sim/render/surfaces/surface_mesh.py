@@ -14,20 +14,16 @@ from ripple_sim.render.bounds import Balls, balls_about
 from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.solver.errors import RippleError
 
-from .adaptive_tessellation import AdaptiveTessellation
-from .charts import Charts
-from .device_tessellation import DeviceTessellation
 from .displacement import Displacement, Place
 from .height_maps import AnyHeightMap, HeightMapTextures, MovedHeightMap
 from .kept_vertices import bounded_vertices
 from .moving_vertices import MovingVertices
 from .surface import Surface, appearance
 from .surface_drawing import Paint, SurfaceDrawing
-from .vertices import DIRECTION, NORMAL, POSITION, SurfaceVertices
+from .surface_triangles import PIXELS, SurfaceTriangles
+from .vertices import DIRECTION, NORMAL, POSITION
 
-_PIXELS = 5.6  # length of an edge where the target fills the frame's height
 _PIXELS_PER_FACE = 96  # of the frame
-_TOLERANCE = 0.15  # [pixels], likewise: edges from which the waves depart further are split
 _BALLS = 16  # that bound a mesh that moves
 _NO_SHADOW = 0.75  # transparency from which a target casts no shadow
 _HIGHEST_BIAS = 0.05  # of shadows, in radii
@@ -84,17 +80,11 @@ class SurfaceMesh:
             height_map=index,
         )
         pixel = 2 * self._radius / size[1]
-        vertices, self._balls = bounded_vertices(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
-        self._tessellation = _adaptive(vertices, surface.charts, pixel)
-        self._triangles: NDArray[np.int32] | None = None  # on the GPU, from the host
-        self._resources = assets.resources
-        self._on_device: DeviceTessellation | None = None
-        self._midpoints: NDArray[np.int32] | moderngl.Buffer
-        self._index_count: int | moderngl.Buffer
+        vertices, self._balls = bounded_vertices(surface, pixel * PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
+        self._triangles = SurfaceTriangles(assets.resources, vertices, surface.charts, index, pixel)
         self._displacement = Displacement(assets.resources, vertices, geom=geom, layer=index)
-        self._indices = assets.resources.buffer(reserve=4 * 12 * len(vertices.F), dynamic=True)
         paint = Paint(surface, mapping, (*rgb, float(self.number)))
-        self._drawing = SurfaceDrawing(assets, paint, vertices, self._displacement.moved, self._indices)
+        self._drawing = SurfaceDrawing(assets, paint, vertices, self._displacement.moved, self._triangles.indices)
         self._mesh, self._vertices = (surface.V, surface.F), vertices
         self._moving: MovingVertices | None = None
 
@@ -123,9 +113,10 @@ class SurfaceMesh:
             height_map = np.asarray(height_map)  # it is in the memory of another device
         self._highest = self._height_maps.write(self._layer, height_map)
         if isinstance(height_map, np.ndarray):
-            self._find_triangles(height_map)
+            self._triangles.find(height_map)
         else:
-            self._find_triangles_on_device(ctx)
+            self._height_maps.bind()
+            self._triangles.find_on_device(ctx)
 
     def update(self, ctx: moderngl.Context, place: Place) -> None:
         """Displace the vertices by the height map where the geom is."""
@@ -133,7 +124,7 @@ class SurfaceMesh:
         bias = min(1.5 * self._highest, _HIGHEST_BIAS * self._radius)
         self._objects.set_height_map(self.number, bias, place.rotation)
         self._height_maps.bind()
-        self._displacement.run(ctx, place, self._midpoints)
+        self._displacement.run(ctx, place, self._triangles.midpoints)
 
     def _move(self, V: NDArray[np.float64]) -> None:
         """Take the vertices along with those of the mesh, [n, 3] [m]."""
@@ -149,22 +140,6 @@ class SurfaceMesh:
         # in steps, so that shadow maps stay as they are while the surface wobbles
         need = 1.02 * float(np.linalg.norm(V - self._middle, axis=1).max())
         self._reach = max(self._reach, float(2 ** (np.ceil(8 * np.log2(need)) / 8)))
-
-    def _find_triangles(self, height_map: NDArray[np.float32]) -> None:
-        triangles, self._midpoints = self._tessellation(height_map)
-        if triangles is not self._triangles:
-            self._indices.write(triangles)
-            self._triangles = triangles
-        self._index_count = triangles.size
-
-    def _find_triangles_on_device(self, ctx: moderngl.Context) -> None:
-        if self._on_device is None:
-            self._on_device = DeviceTessellation(
-                self._resources, self._tessellation, self._charts.page, self._layer, self._indices
-            )
-        self._height_maps.bind()
-        self._on_device.run(ctx)
-        self._midpoints, self._index_count, self._triangles = self._on_device.split, self._on_device.command, None
 
     def set_heatmap(self, values: NDArray[np.float32], limit: float) -> None:
         """Replace the heatmap's values, [C, n + 2, n + 2] with a halo; the colours range from -limit to limit.
@@ -191,12 +166,12 @@ class SurfaceMesh:
     def draw(self) -> None:
         """Draw into the G-buffer."""
         with self._sides():
-            self._drawing.draw(self._pose[0], self._index_count)
+            self._drawing.draw(self._pose[0], self._triangles.count)
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth only, under a matrix of 16 numbers, column by column."""
         with self._sides():
-            self._drawing.draw_depth(view_projection, self._index_count)
+            self._drawing.draw_depth(view_projection, self._triangles.count)
 
     @contextlib.contextmanager
     def _sides(self) -> Iterator[None]:
@@ -207,15 +182,3 @@ class SurfaceMesh:
             yield
             if self._open:
                 ctx.enable(moderngl.CULL_FACE)
-
-
-def _adaptive(vertices: SurfaceVertices, charts: Charts, pixel: float) -> AdaptiveTessellation:
-    return AdaptiveTessellation(
-        vertices.F,
-        vertices.edges,
-        vertices.attributes[:, POSITION],
-        vertices.lookups,
-        charts.page,
-        tolerance=_TOLERANCE * pixel,
-        min_length=1.5 * _PIXELS * pixel,
-    )

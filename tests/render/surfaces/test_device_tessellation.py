@@ -56,16 +56,17 @@ def test_the_triangles_are_the_hosts_in_their_order(gl, scene, group, monkeypatc
     monkeypatch.setattr(device_tessellation, "_GROUP", group)  # of 32 there are more than a group has threads
     renderer, atlas, frame = scene
     (target,) = renderer._scene._targets
-    adaptive, target._on_device = target._tessellation, None
+    found = target._triangles
+    adaptive, found._on_device = found._tessellation, None
     for seed, depth in ((0, 0.0), (1, 0.02), (2, 0.2)):
         noise = np.random.default_rng(seed).normal(0.0, 1.0, (6, N, N)).astype(np.float32)
         heights = np.float32(depth) * noise * (np.abs(noise) > 1)
         frame(heights, True)
         triangles, used = adaptive(HeightMap(atlas.texels)(heights))
         with gl:
-            split = np.frombuffer(target._on_device.split.read(), np.int32)
-            count = np.frombuffer(target._on_device.command.read(), np.int32)
-            indices = np.frombuffer(target._indices.read(), np.int32)[: count[0]]
+            split = np.frombuffer(found.midpoints.read(), np.int32)
+            count = np.frombuffer(found.count.read(), np.int32)
+            indices = np.frombuffer(found.indices.read(), np.int32)[: count[0]]
         np.testing.assert_array_equal(count[1:], [1, 0, 0, 0])
         np.testing.assert_array_equal(indices.reshape(-1, 3), triangles)
         np.testing.assert_array_equal(np.flatnonzero(split) + adaptive.base_count, used)

@@ -69,7 +69,7 @@ def test_without_opengl_auto_takes_the_cpu_and_gl_is_an_error(
         raise GLError("no OpenGL 4.3 context")
 
     monkeypatch.setattr("ripple_sim.solver.gl.context.create_context", fail)
-    monkeypatch.setattr("ripple_sim.solver.gl.context._shared", {})
+    monkeypatch.setattr("ripple_sim.solver.gl.shared._shared", {})
     assert make_backend("auto", operator).name == "cpu"
     with pytest.raises(GLError, match=r"no OpenGL 4\.3"):
         make_backend("gl", operator)
