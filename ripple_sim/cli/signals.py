@@ -4,7 +4,8 @@ Before a command begins, and during imports, where an exception could be taken f
 clean up, and the process ends at once. Later the signal becomes an exception, but never within a call of moderngl's,
 which would end in a segmentation fault, nor within VTK's, which swallows exceptions of what it calls back or exits by
 itself, nor while a video is being opened: then a timer tries again until it is over.
-A second signal ends the process at once; what is left is then as whole as after a kill.
+A second signal ends the process at once; what is left is then as whole as after a kill. One that comes after the
+command, while the interpreter shuts down, changes nothing.
 """
 
 from __future__ import annotations
@@ -46,7 +47,15 @@ def end_in_good_order() -> None:
     _handle(_raise)
 
 
-def _handle(handler: Callable[[int, FrameType | None], None]) -> None:
+def finish_undisturbed() -> None:
+    """Ignore the signals from here on: the command is done, and its status stands.
+
+    While the interpreter shuts down it would give them back to the system, which ends the process without a word.
+    """
+    _handle(signal.SIG_IGN)
+
+
+def _handle(handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
     for number in _WORDS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, handler)

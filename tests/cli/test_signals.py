@@ -85,6 +85,18 @@ def test_the_rule_holds_from_the_first_import_on(number: int, line: str) -> None
     assert (result.returncode, result.stdout, result.stderr) == (128 + number, "", f"ripple-sim: {line}\n")
 
 
+@pytest.mark.parametrize("number", ALL)
+def test_after_the_command_while_the_interpreter_shuts_down_its_status_stands(number: int) -> None:
+    program = (
+        "import os\nimport ripple_sim.cli.start\n"
+        "class Last:\n"
+        f"    def __del__(self, kill=os.kill, own=os.getpid()):\n        kill(own, {int(number)})\n"
+        "last = Last()\nprint('done')\n"
+    )
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout, result.stderr) == (0, "done\n", "")
+
+
 def within(file: str, number: int) -> list[str]:
     """Send a signal while a function of a file is running; return what had happened when the exception came."""
     happened: list[str] = []
