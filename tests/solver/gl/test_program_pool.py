@@ -47,10 +47,10 @@ def test_a_full_pool_lets_go_of_what_has_been_idle_for_longest(monkeypatch):
     """It refused what came later, so that what was used now was compiled each time."""
     monkeypatch.setattr(program_pool, "_MOST", 2)
     pool, programs = program_pool.ProgramPool(), [Compiled(number) for number in range(4)]
+    new = Compiled(4)
     for program in programs[:3]:
-        pool.note((f"source {program.glo}",), program)
+        assert pool.take((f"source {program.glo}",), lambda program=program: program) is program
     assert [pool.give_back(program) for program in programs] == [None, None, programs[0], programs[3]]
-    assert pool.take(("source 0",)) is None
-    assert pool.take(("source 2",)) is programs[2]
-    assert pool.take(("source 2",)) is None
-    assert pool.take(("source 1",)) is programs[1]
+    assert pool.take(("source 0",), lambda: new) is new
+    for program in programs[2:0:-1]:
+        assert pool.take((f"source {program.glo}",), lambda: pytest.fail("compiled again")) is program
