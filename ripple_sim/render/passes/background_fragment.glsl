@@ -130,7 +130,7 @@ void main()
     float rim = beside_floor();
     bool steep = any(greaterThan(fwidth(shown), vec3(STEEPEST)));
     // shadows are marked with a margin, so that leaving out the nearest blocks is enough
-    bool rough = steep || abs(rim) < 2.0 * fwidth(rim);
+    bool rough = steep || abs(rim) < 1.5 * fwidth(rim);
     fragment = vec4(shown, rough ? 0.5 : shaded ? 1.0 - 2.0 * UNSURE : met ? 1.0 : 0.0);
 #else
     fragment = share * vec4(dithered(shown), 1.0);

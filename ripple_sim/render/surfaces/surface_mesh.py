@@ -23,7 +23,7 @@ from .surface_drawing import Paint, SurfaceDrawing
 from .surface_triangles import PIXELS, SurfaceTriangles
 from .vertices import DIRECTION, NORMAL, POSITION
 
-_PIXELS_PER_FACE = 96  # of the frame
+_PIXELS_PER_FACE = 192  # of the frame: fewer than about eight pixels each cost more than they show
 _BALLS = 16  # that bound a mesh that moves
 _NO_SHADOW = 0.75  # transparency from which a target casts no shadow
 _HIGHEST_BIAS = 0.05  # of shadows, in radii

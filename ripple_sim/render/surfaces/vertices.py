@@ -18,7 +18,7 @@ from .surface import Surface
 from .tessellation import Edges, edges_of, midpoints, tessellate
 from .vertex_order import in_memory_order
 
-_LEAST_FACES, _MOST_FACES = 20_000, 400_000
+_LEAST_FACES, _MOST_FACES = 8_000, 400_000
 # columns of the vertex attributes: along DIRECTION, the smooth normal, a vertex is displaced; COORDINATES are for the
 # chart map
 POSITION, DIRECTION, COORDINATES, NORMAL, BAKED, UV = (
