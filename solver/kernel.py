@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 import numba
 import numpy as np
-from numba.extending import overload
+from numba.extending import overload, register_jitable
 from numpy.typing import NDArray
 
 from . import compilation  # noqa: F401 - watches from the first kernel on
@@ -44,6 +44,11 @@ def _call_template(dispatcher: Any, args: Sequence[Any], kws: Mapping[str, Any])
     """What numba asks of a kernel that others call: one version for all numbers, not one more for each literal."""
     of_any = {name: numba.types.unliteral(each) for name, each in kws.items()}
     return type(dispatcher).get_call_template(dispatcher, [*map(numba.types.unliteral, args)], of_any)
+
+
+def shared(function: Callable) -> Any:
+    """Declare a function, written for numbers and arrays alike, that both kernels and plain Python call."""
+    return register_jitable(function)
 
 
 def variant(declared: Callable, first: type) -> Callable[[Callable], Callable]:

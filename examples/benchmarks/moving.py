@@ -38,7 +38,7 @@ def rebuilds() -> None:
         V, T = atlas.mesh.V, atlas.areas.size
         waves = {backend: WaveSolver(atlas, SPEED, backend=backend) for backend in ("cpu", "gl")}
         operator = MovingOperator(atlas, SPEED, waves["cpu"].operator)
-        around = atlas.texels.around(*SurfaceRide(atlas).positions(V))
+        around = SurfaceRide(atlas).around(V)
         stiffness = best(lambda i, operator=operator, around=around: operator.at(around))
         row = []
         for each in waves.values():

@@ -51,18 +51,24 @@ class MovingOperator:
         soft, density = softening(texels), field["density"]
         self._tension = self._cells.coefficient(density * field["speed"] ** 2, soft, material.tightening - 1.0)
         self._viscous = self._laplace = None
+        self._viscous_share = None
         if operator.viscous_stencil is not None:
+            self._viscous_share = _share(field["viscosity"], field["speed"] ** 2, material.tightening)
             self._viscous = self._cells.coefficient(density * field["viscosity"], soft, -1.0)
         if operator.laplace_stencil is not None:
             self._laplace = self._cells.coefficient(np.ones_like(density), soft, 0.0)
-        self._level = atlas.areas / self._cells.assemble(texels.halo_positions, self._tension)[1]
+        self._level = atlas.areas / self._cells.assemble(_coordinates(texels.halo_positions), self._tension)[1]
         self._areas = atlas.areas
 
     def at(self, around: Floats) -> tuple[WaveOperator, Floats]:
-        """Operator, and areas of the texels [m^2], for their positions with halo [m], [C, n + 2, n + 2, 3]."""
+        """Operator, and areas of the texels [m^2], for their coordinates with halo [m], [3, C, n + 2, n + 2]."""
         tension, spanned = self._cells.assemble(around, self._tension)
         areas = np.maximum(spanned * self._level, 1e-3 * self._areas)
-        viscous, laplace = (self._stencil(around, each) for each in (self._viscous, self._laplace))
+        laplace = self._stencil(around, self._laplace)
+        if self._viscous_share is not None:
+            viscous: Stencil | None = tension.scaled(self._viscous_share)
+        else:
+            viscous = self._stencil(around, self._viscous)
         rigidity = self._rest.rigidity
         if rigidity is not None:
             # sigma b / A, with sigma = M / A
@@ -71,3 +77,16 @@ class MovingOperator:
 
     def _stencil(self, around: Floats, coefficient: CellCoefficient | None) -> Stencil | None:
         return None if coefficient is None else self._cells.assemble(around, coefficient)[0]
+
+
+def _coordinates(halo_positions: Floats) -> Floats:
+    """Positions [C, n + 2, n + 2, 3] as coordinates [3, C, n + 2, n + 2]."""
+    return np.ascontiguousarray(np.moveaxis(halo_positions, -1, 0))
+
+
+def _share(viscosity: Floats, squared_speed: Floats, tightening: float) -> float | None:
+    """What the viscous stencil is of that of tension, where it is the same share everywhere and at any time."""
+    if tightening or not squared_speed.all():
+        return None
+    share = viscosity / squared_speed
+    return float(share.flat[0]) if (share == share.flat[0]).all() else None

@@ -14,7 +14,8 @@ from __future__ import annotations
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ripple_sim.solver.kernel import Floats, kernel, shared
 
 # Stiffness of a square against the hourglass. At 1 waves lag along its sides as much as they lead along its diagonals,
 # 1/2 makes the 5-point stencil, 1/3 an isotropic one, 1/4 allows the longest time step.
@@ -31,10 +32,15 @@ UNEVEN = 1e-3
 # A cell folded to a line would ask for an infinitely short time step: least area, in units of a square's as large.
 LEAST_AREA = 0.02
 
+# A polygon flatter than this, in units of its size, counts as flat: many combinations of its corners then make the node
+# in its middle. Its square is well above round-off.
+_FLAT = 1e-5
+
 Numbers: TypeAlias = Any  # a float, or an array of them
 Points: TypeAlias = Any  # coordinates [3] of a point, or [3, ...] of many
 
 
+@shared
 def quad(sw: Points, se: Points, nw: Points, ne: Points) -> tuple[Numbers, ...]:
     """Weights of a quad's links: south, north, west and east side, diagonal sw-ne, diagonal se-nw; its area.
 
@@ -47,7 +53,7 @@ def quad(sw: Points, se: Points, nw: Points, ne: Points) -> tuple[Numbers, ...]:
     p, q = _between(sw, ne), _between(se, nw)
     pp, qq, pq, cross = _dot(p, p), _dot(q, q), _dot(p, q), _cross_length(p, q)
     twice = _or_one(2 * np.maximum(cross, LEAST_AREA / 2 * (pp + qq)))
-    hourglass = np.where(pp + qq == 0, 0.0, _hourglass(_or_one(pp), _or_one(qq), pq, twice / 4))
+    hourglass = (pp + qq != 0) * _hourglass(_or_one(pp), _or_one(qq), pq, twice / 4)
     a, b = _unevenness(p, q, _between(_between(sw, se), _between(nw, ne)), twice / 2)
     return (
         pq / twice + hourglass * (1 + a) * (1 - b),
@@ -60,6 +66,7 @@ def quad(sw: Points, se: Points, nw: Points, ne: Points) -> tuple[Numbers, ...]:
     )
 
 
+@shared
 def _unevenness(p: Points, q: Points, way: Points, cross: Numbers) -> tuple[Numbers, Numbers]:
     """Twice the way between the middles of the diagonals p, q, in units of these; next to none in an even quad.
 
@@ -68,9 +75,10 @@ def _unevenness(p: Points, q: Points, way: Points, cross: Numbers) -> tuple[Numb
     pp, qq, pq, along_p, along_q = _dot(p, p), _dot(q, q), _dot(p, q), _dot(way, p), _dot(way, q)
     a, b = (along_p * qq - along_q * pq) / cross**2, (along_q * pp - along_p * pq) / cross**2
     share = (a * a + b * b) / (a * a + b * b + UNEVEN)
-    return np.clip(share * a, -1.0, 1.0), np.clip(share * b, -1.0, 1.0)
+    return np.minimum(np.maximum(share * a, -1.0), 1.0), np.minimum(np.maximum(share * b, -1.0), 1.0)
 
 
+@shared
 def triangle(a: Points, b: Points, c: Points) -> tuple[Numbers, Numbers, Numbers, Numbers]:
     """Cotangent weights of the links bc, ca, ab, and the area of a triangle (Pinkall and Polthier 1993)."""
     ab, ac, bc = _between(a, b), _between(a, c), _between(b, c)
@@ -80,6 +88,7 @@ def triangle(a: Points, b: Points, c: Points) -> tuple[Numbers, Numbers, Numbers
     return _dot(ab, ac) / twice, -_dot(ab, bc) / twice, _dot(ac, bc) / twice, double_area / 2
 
 
+@shared
 def strip(a: Points, b: Points, beside_a: Points, beside_b: Points) -> Numbers:
     """Weight of the link between two texels at a free rim, by the strip from them to the rim's points beside them.
 
@@ -91,76 +100,115 @@ def strip(a: Points, b: Points, beside_a: Points, beside_b: Points) -> Numbers:
     along = _dot(rim, link) ** 2 / _or_one(squared)
     least = LEAST_AREA * np.maximum(squared, _dot(link, link))
     weight = quad_area(a, b, beside_a, beside_b) / _or_one(np.maximum(along, least))
-    return np.where(squared == 0, 0.0, weight)
+    return (squared != 0) * weight
 
 
-def polygon(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Link weights [..., k, k] (0 on the diagonal) and the corners' shares of the area [..., k] of polygons in space.
+@kernel
+def polygon(corners: Floats) -> tuple[Floats, Floats]:
+    """Link weights [k, k] (0 on the diagonal) and the corners' shares of the area [k] of a polygon in space [k, 3].
 
-    A virtual node in the middle cuts each into triangles; it is an affine combination of the corners [..., k, 3], so
-    that linear functions stay exact, and is eliminated (Bunge, Herholz, Kazhdan and Botsch 2020).
+    A virtual node in the middle cuts it into triangles; it is an affine combination of the corners, so that linear
+    functions stay exact, and is eliminated (Bunge, Herholz, Kazhdan and Botsch 2020).
     """
-    count = corners.shape[-2]
+    count = len(corners)
     shares = _virtual_node(corners)
-    points = [np.moveaxis(corners[..., i, :], -1, 0) for i in range(count)]
-    middle = np.moveaxis((shares[..., None, :] @ corners)[..., 0, :], -1, 0)
-    weights = np.zeros((*corners.shape[:-2], count + 1, count + 1))
-    areas = np.zeros((*corners.shape[:-2], count + 1))
+    middle = _middle(corners, shares)
+    links, spokes, areas, inner = np.zeros((count, count)), np.zeros(count), np.zeros(count), 0.0
     for i in range(count):
         j = (i + 1) % count
-        to_j, to_middle, to_i, area = triangle(points[i], points[j], middle)
-        for a, b, weight in ((j, count, to_j), (count, i, to_middle), (i, j, to_i)):
-            weights[..., a, b] += weight
-            weights[..., b, a] += weight
-        for corner in (i, j, count):
-            areas[..., corner] += area / 3
-    prolong = np.concatenate([np.broadcast_to(np.eye(count), (*shares.shape, count)), shares[..., None, :]], axis=-2)
-    diagonal = weights.sum(axis=-1)[..., None] * np.eye(count + 1)
-    links = -np.swapaxes(prolong, -1, -2) @ (diagonal - weights) @ prolong
-    links[..., np.arange(count), np.arange(count)] = 0.0
-    return links, areas[..., :count] + shares * areas[..., count:]
+        to_j, to_i, side, area = triangle(corners[i], corners[j], middle)
+        spokes[j] += to_j
+        spokes[i] += to_i
+        links[i, j] += side
+        links[j, i] += side
+        areas[i] += area / 3
+        areas[j] += area / 3
+        inner += area / 3
+    total = spokes.sum()
+    for i in range(count):
+        areas[i] += shares[i] * inner
+        for j in range(count):
+            if i != j:
+                links[i, j] += shares[j] * spokes[i] + shares[i] * spokes[j] - shares[i] * shares[j] * total
+    return links, areas
 
 
-def _virtual_node(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weights [..., k], of sum 1, of the point whose triangles with a polygon's sides have the least squared areas."""
-    sides = np.roll(corners, -1, axis=-2) - corners
+@kernel
+def _virtual_node(corners: Floats) -> Floats:
+    """Weights [k], of sum 1, of the point whose triangles with a polygon's sides have the least squared areas.
+
+    Of all weights that make it the most even ones.
+    """
+    count = len(corners)
+    mean = _middle(corners, np.full(count, 1 / count))
     # |x - c| x side, squared: x' A x - 2 b' x, with A = sum of |s|^2 1 - s s'
-    squared = (sides**2).sum(axis=-1)[..., None, None]
-    projectors = squared * np.eye(3) - sides[..., :, None] * sides[..., None, :]
-    best = _least_squares(projectors.sum(axis=-3), np.einsum("...ijk,...ik->...j", projectors, corners))
-    mean = corners.mean(axis=-2)
-    ones = np.ones((*corners.shape[:-2], 1, corners.shape[-2]))
-    system = np.concatenate([np.swapaxes(corners - mean[..., None, :], -1, -2), ones], axis=-2)
-    weights = _least_squares(system, np.concatenate([best - mean, ones[..., 0, :1]], axis=-1))
-    return weights / weights.sum(axis=-1, keepdims=True)
+    squares, right, spread = np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
+    for i in range(count):
+        here, side = _between(mean, corners[i]), _between(corners[i], corners[(i + 1) % count])
+        squared, along = _dot(side, side), _dot(side, here)
+        for a in range(3):
+            squares[a, a] += squared
+            right[a] += squared * here[a] - side[a] * along
+            for b in range(3):
+                squares[a, b] -= side[a] * side[b]
+                spread[a, b] += here[a] * here[b]
+    slope = _solved(spread, _solved(squares, right))
+    weights = np.empty(count)
+    for i in range(count):
+        weights[i] = 1 / count + _dot(slope, _between(mean, corners[i]))
+    return weights / weights.sum()
 
 
-def _least_squares(system: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The shortest x with the least |system x - right|, also of many."""
-    return (np.linalg.pinv(system, rcond=max(system.shape[-2:]) * np.finfo(np.float64).eps) @ right[..., None])[..., 0]
+@kernel
+def _middle(corners: Floats, weights: Floats) -> tuple[float, float, float]:
+    """The point with such weights at the corners."""
+    x, y, z = 0.0, 0.0, 0.0
+    for i in range(len(corners)):
+        x, y, z = x + weights[i] * corners[i, 0], y + weights[i] * corners[i, 1], z + weights[i] * corners[i, 2]
+    return x, y, z
 
 
+@kernel
+def _solved(matrix: Floats, right: Points) -> tuple[float, float, float]:
+    """Solution of a symmetric positive semidefinite system [3, 3]; next to 0 where this leaves it open."""
+    ridge = _FLAT**2 * (matrix[0, 0] + matrix[1, 1] + matrix[2, 2]) + 1e-300
+    first = matrix[0, 0] + ridge
+    a, b = matrix[0, 1] / first, matrix[0, 2] / first
+    second, coupling = matrix[1, 1] + ridge - a * matrix[0, 1], matrix[1, 2] - a * matrix[0, 2]
+    c = coupling / second
+    third = matrix[2, 2] + ridge - b * matrix[0, 2] - c * coupling
+    p = right[1] - a * right[0]
+    z = (right[2] - b * right[0] - c * p) / third
+    y = p / second - c * z
+    return right[0] / first - a * y - b * z, y, z
+
+
+@shared
 def _or_one(x: Numbers) -> Numbers:
     """1 in place of 0: what is divided by it is 0 as well."""
-    return np.where(x == 0, 1.0, x)
+    return x + (x == 0)
 
 
+@shared
 def _dot(a: Points, b: Points) -> Numbers:
     """Inner product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+@shared
 def _cross_length(a: Points, b: Points) -> Numbers:
     """Length of the vector product."""
     x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     return np.sqrt(x * x + y * y + z * z)
 
 
+@shared
 def _between(a: Points, b: Points) -> Points:
     """Difference b - a."""
     return (b[0] - a[0], b[1] - a[1], b[2] - a[2])
 
 
+@shared
 def quad_area(sw: Points, se: Points, nw: Points, ne: Points) -> Numbers:
     """Area of a quad that need not be flat: that of its smaller triangulation.
 
@@ -172,6 +220,7 @@ def quad_area(sw: Points, se: Points, nw: Points, ne: Points) -> Numbers:
     return np.minimum(rising, falling) / 2
 
 
+@shared
 def _hourglass(pp: Numbers, qq: Numbers, pq: Numbers, area: Numbers) -> Numbers:
     """Hourglass stiffness of a quad of given area whose diagonals p and q have the products pp, qq and pq.
 

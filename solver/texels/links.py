@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,20 @@ def ties_to_rim(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
     a, b = LINK_ENDS[link]
     own, rim = topology.own, topology.rim & topology.fixed_rim
     return (own[a] & rim[b]) | (rim[a] & own[b])
+
+
+@functools.lru_cache(maxsize=4)  # asked for in every step, where a surface moves
+def rim_ties(topology: TexelTopology) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Flat texels [k] that links tie to a fixed rim, and the flat places [k] of these among a stencil's weights."""
+    place = np.arange(4 * topology.shape[0] * (topology.shape[1] + 1) ** 2)
+    place = place.reshape(topology.shape[0], 4, topology.shape[1] + 1, -1)
+    texels, places = [], []
+    for link, (a, b) in enumerate(LINK_ENDS):
+        tied = ties_to_rim(topology, link)
+        own = np.where(topology.own[a], topology.halo[a], topology.halo[b])
+        texels.append(own[tied])
+        places.append(place[:, link][tied])
+    return np.concatenate(texels), np.concatenate(places)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -7,16 +7,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver.kernel import Floats, Ints, kernel
+
 from .cell_sums import conductances
 from .cells import quad_area
 from .irregular import IrregularLinks
 from .links import CrossingLinks, link_exists, ties_to_rim
 from .quad_pass import LEAST_RATIO, QuadCells, quad_pass
-from .special_cells import special_cells, whole_quads
+from .special_cells import Added, special_cells, whole_quads
 from .stencil import Stencil
 from .texel_mesh import TexelMesh
-
-Floats = NDArray[np.float64]
+from .topology import TexelTopology
 
 _CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
 
@@ -43,19 +44,16 @@ class MovingCells:
     def __init__(self, texels: TexelMesh) -> None:
         self._topology = topology = texels.topology
         charts, n, _ = topology.shape
-        self._shape, around = (charts, 4, n + 1, n + 1), texels.halo_positions
-        self._special = special_cells(topology, around)
-        self._rest = [each.weigh(around.reshape(-1, 3)[each.corners]).areas for each in self._special]
-        x = [np.moveaxis(around[:, r : r + n + 1, c : c + n + 1], -1, 0) for r, c in _CORNERS]
+        self._shape, around = (charts, 4, n + 1, n + 1), np.moveaxis(texels.halo_positions, -1, 0)
+        self._special = special_cells(topology, texels.halo_positions)
+        self._rest = [each.weigh(np.ascontiguousarray(around).reshape(3, -1)).areas for each in self._special]
+        x = [around[..., r : r + n + 1, c : c + n + 1] for r, c in _CORNERS]
         with np.errstate(invalid="ignore"):
             areas = np.where(whole_quads(topology), quad_area(*x), 0.0)
         self._scale = float(1 / np.sqrt(areas[areas > 0].mean())) if areas.any() else 1.0
         areas *= self._scale**2
-        self._per_area: NDArray[np.float32] = np.divide(1, areas, out=np.zeros_like(areas), where=areas > 0).astype(
-            np.float32
-        )
-        self._clear, self._copies, self._pair = _borders(texels)
-        self._pair_sizes = np.bincount(self._pair)
+        self._per_area = _at_places(np.divide(1, areas, out=np.zeros_like(areas), where=areas > 0))
+        self._borders = Borders.of(topology)
         ends = np.concatenate([np.zeros((0, 2), np.int64), *(each.irregular[1] for each in self._special)])
         self._links = IrregularLinks.of(ends, np.arange(len(ends), dtype=np.float64))
 
@@ -68,7 +66,7 @@ class MovingCells:
             special = tuple(
                 conductances(*(list(field.reshape(-1)[each.corners].T) for field in (k, s))) for each in self._special
             )
-        at_rest = np.where(self._per_area > 0, quads, 0.0).astype(np.float32)
+        at_rest = np.where(self._per_area > 0, _at_places(quads), np.float32(0))
         return CellCoefficient(QuadCells(at_rest, self._per_area, self._scale, power), special)
 
     def assemble(self, around: Floats, coefficient: CellCoefficient) -> tuple[Stencil, Floats]:
@@ -76,46 +74,93 @@ class MovingCells:
 
         Parameters
         ----------
-        around : float64 [C, n + 2, n + 2, 3]
-            Positions with halo [m], see `TexelMesh`.
+        around : float64 [3, C, n + 2, n + 2]
+            Coordinates of the texels with halo [m], see `SurfaceRide.around`.
         coefficient : CellCoefficient
         """
         weights, areas = np.zeros(self._shape), np.zeros(self._topology.shape)
-        x, y, z = (np.ascontiguousarray(around[..., k]) for k in range(3))
-        quad_pass(x, y, z, coefficient.quads, weights, areas)
-        flat, flat_areas, irregular = weights.reshape(-1), areas.reshape(-1), []
-        points, power = around.reshape(-1, 3), coefficient.quads.power
-        of_polygons = []
+        quad_pass(around, coefficient.quads, weights, areas)
+        flat, irregular, of_polygons = weights.reshape(-1), [np.zeros(0)], []
         for cells, rest, at_rest in zip(self._special, self._rest, coefficient.special, strict=True):
-            added = cells.weigh(points[cells.corners])
-            ratio = np.maximum(added.areas / np.where(rest > 0, rest, 1.0), LEAST_RATIO)
-            links = (added.links * (at_rest * ratio**power)[:, None]).reshape(-1)
-            np.add.at(flat_areas, cells.shares[1], added.shares.reshape(-1)[cells.shares[0]])
-            mine = cells.links[1], links[cells.links[0]]
+            added = cells.weigh(around.reshape(3, -1))
+            _scale(added, rest, at_rest, coefficient.quads.power)
+            _scatter(added.shares.reshape(-1), *cells.shares, areas.reshape(-1))
+            links = added.links.reshape(-1)
             if cells.on_all_copies:
-                of_polygons.append(mine)
+                of_polygons.append((links, cells.links))
             else:
-                np.add.at(flat, *mine)
+                _scatter(links, *cells.links, flat)
             irregular.append(links[cells.irregular[0]])
-        flat[self._clear] = 0.0
-        copies = flat[self._copies]
-        flat[self._copies] = (np.bincount(self._pair, copies) / self._pair_sizes)[self._pair]
-        for mine in of_polygons:
-            np.add.at(flat, *mine)
+        _close(flat, self._borders)
+        for links, places in of_polygons:
+            _scatter(links, *places, flat)
         if self._links is None:
             return Stencil(self._topology, weights), areas
         beside = np.concatenate(irregular)[self._links.weights.astype(np.int64)]
         return Stencil(self._topology, weights, self._links._replace(weights=beside)), areas
 
 
-def _borders(texels: TexelMesh) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Flat places, among a stencil's weights, of what is no link, and of the copies of links; the pair of each copy."""
-    topology = texels.topology
-    charts, n, _ = topology.shape
-    shape = charts, 4, n + 1, n + 1
-    missing = np.zeros(shape, bool)
-    for link in range(4):
-        missing[:, link] = ~(link_exists(topology, link) | ties_to_rim(topology, link))
-    crossing = CrossingLinks.of(topology)
-    _, pair = np.unique(crossing.keys, return_inverse=True)
-    return np.flatnonzero(missing), np.ravel_multi_index(crossing.places, shape), pair
+class Borders(NamedTuple):
+    """Flat places, among a stencil's weights, of what is no link, and of the copies of links, those of each together.
+
+    Attributes
+    ----------
+    missing : int64 [m]
+    copies : int64 [k]
+    begins : int64 [p + 1]
+        Where the copies of each link begin.
+    """
+
+    missing: Ints
+    copies: Ints
+    begins: Ints
+
+    @classmethod
+    def of(cls, topology: TexelTopology) -> Borders:
+        """Those of a topology."""
+        charts, n, _ = topology.shape
+        shape = charts, 4, n + 1, n + 1
+        missing = np.zeros(shape, bool)
+        for link in range(4):
+            missing[:, link] = ~(link_exists(topology, link) | ties_to_rim(topology, link))
+        crossing = CrossingLinks.of(topology)
+        order = np.argsort(crossing.keys, kind="stable")
+        _, counts = np.unique(crossing.keys, return_counts=True)
+        places = np.ravel_multi_index(crossing.places, shape)[order]
+        return cls(np.flatnonzero(missing), places, np.concatenate([[0], np.cumsum(counts)]))
+
+
+def _at_places(quads: Floats) -> NDArray[np.float32]:
+    """Values of quads [C, n + 1, n + 1] at their south-west corners among the places of a field with halo."""
+    return np.pad(quads, ((0, 0), (0, 1), (0, 1))).astype(np.float32)
+
+
+@kernel
+def _scale(added: Added, rest: Floats, at_rest: Floats, power: float) -> None:
+    """Multiply links by what the coefficient at rest [k] has become, with the cells' areas at rest [k]."""
+    for i in range(len(rest)):
+        ratio = max(added.areas[i] / rest[i] if rest[i] > 0 else added.areas[i], LEAST_RATIO)
+        factor = at_rest[i] * ratio**power
+        for link in range(added.links.shape[1]):
+            added.links[i, link] *= factor
+
+
+@kernel
+def _scatter(values: Floats, sources: Ints, places: Ints, out: Floats) -> None:
+    """Add some of the values to places."""
+    for i in range(len(sources)):
+        out[places[i]] += values[sources[i]]
+
+
+@kernel
+def _close(weights: Floats, borders: Borders) -> None:
+    """Clear what is no link, and give all copies of a link their mean."""
+    for i in range(len(borders.missing)):
+        weights[borders.missing[i]] = 0.0
+    for pair in range(len(borders.begins) - 1):
+        begin, end = borders.begins[pair], borders.begins[pair + 1]
+        total = 0.0
+        for i in range(begin, end):
+            total += weights[borders.copies[i]]
+        for i in range(begin, end):
+            weights[borders.copies[i]] = total / (end - begin)

@@ -23,14 +23,18 @@ _SLIGHTEST = np.float32(1e-12)  # in units of a quad at rest
 LEAST_RATIO = np.float32(1e-3)
 
 
+# Places that are worked on at once, in whole wide instructions; and about how many a band of rows has.
+_BLOCK, _BAND = 64, 1024
+
+
 class QuadCells(NamedTuple):
     """What does not change while the quads move.
 
     Attributes
     ----------
-    conductance : float32 [C, n + 1, n + 1]
-        Coefficient of each quad at rest, 0 where there is none.
-    per_area : float32 [C, n + 1, n + 1]
+    conductance : float32 [C, n + 2, n + 2]
+        Coefficient at rest of the quad whose south-west corner is at each place, 0 where there is none.
+    per_area : float32 [C, n + 2, n + 2]
         One over its area at rest, in units of 1 / scale^2.
     scale : float
         One over the length of a quad at rest, about: all that is computed is then about 1.
@@ -45,46 +49,65 @@ class QuadCells(NamedTuple):
 
 
 @kernel
-def quad_pass(x: Floats, y: Floats, z: Floats, cells: QuadCells, weights: Floats, areas: Floats) -> None:
+def quad_pass(around: Floats, cells: QuadCells, weights: Floats, areas: Floats) -> None:
     """Fill in what the quads give to the weights [C, 4, n + 1, n + 1] and the texels' areas [m^2], [C, n, n].
 
-    The positions x, y, z are [C, n + 2, n + 2] each, with halo.
+    Coordinates are [3, C, n + 2, n + 2], with halo. Rows and charts follow one another in memory, so that a band is one
+    loop over places; those at the end of a row are no quads.
     """
-    charts, size = cells.conductance.shape[:2]
-    sides = np.zeros((7, size), np.float32)
-    below = np.zeros((2, size), np.float32)
+    charts, width = cells.conductance.shape[:2]
+    rows = max(_BAND // width, 1)
+    sides = np.zeros((7, max(rows * width, _BLOCK)), np.float32)
+    below = np.zeros((2, width - 1), np.float32)
+    for first in range(0, charts * width, rows):
+        begin, last = first * width, min(first + rows, charts * width)
+        _band(around.reshape(3, -1), cells, begin, min(last * width, charts * width**2 - width - 1), sides)
+        for row in range(first, last):
+            chart, r = row // width, row % width
+            if r == 0:
+                below[:] = 0
+            if r < width - 1:
+                _add_row(sides, row * width - begin, below, weights[chart], areas[chart], r)
     for chart in range(charts):
-        below[:] = 0
-        for r in range(size):
-            _row(x[chart, r : r + 2], y[chart, r : r + 2], z[chart, r : r + 2], cells.scale, sides)
-            _scale(cells, chart, r, sides)
-            _add_row(sides, below, weights[chart], areas[chart], r)
-    for chart in range(charts):
-        for r in range(size - 1):
-            for c in range(size - 1):
+        for r in range(width - 2):
+            for c in range(width - 2):
                 areas[chart, r, c] /= cells.scale**2
 
 
 @kernel
-def _row(x: Floats, y: Floats, z: Floats, scale: float, sides: Floats32) -> None:
-    """Geometry of a row of quads between two rows of places: weights of the six links, and area times scale squared."""
-    for c in range(sides.shape[1]):
+def _band(places: Floats, cells: QuadCells, begin: int, end: int, sides: Floats32) -> None:
+    """What the quads of consecutive places give, from column 0 on: weights of the six links, a quarter of the area."""
+    block = np.zeros((7, _BLOCK), np.float32)
+    for start in range(begin, end, _BLOCK):
+        first = max(min(start, end - _BLOCK), begin)
+        count = min(_BLOCK, end - first)
+        _geometry(places, first, count, cells, block)
+        _scale(block, cells, first, sides, first - begin, count)
+
+
+@kernel
+def _geometry(places: Floats, first: int, count: int, cells: QuadCells, block: Floats32) -> None:
+    """Geometric weights of the six links of a block of quads, and their areas times scale squared."""
+    scale, above = cells.scale, first + cells.conductance.shape[1]
+    x, y, z = places[0, first:], places[1, first:], places[2, first:]
+    x_above, y_above, z_above = places[0, above:], places[1, above:], places[2, above:]
+    for c in range(count):
         # differences from the south-west corner
-        ox, oy, oz = x[0, c], y[0, c], z[0, c]
+        ox, oy, oz = x[c], y[c], z[c]
         ex, ey, ez = (
-            np.float32(scale * (x[0, c + 1] - ox)),
-            np.float32(scale * (y[0, c + 1] - oy)),
-            np.float32(scale * (z[0, c + 1] - oz)),
+            np.float32(scale * (x[c + 1] - ox)),
+            np.float32(scale * (y[c + 1] - oy)),
+            np.float32(scale * (z[c + 1] - oz)),
         )
         nx, ny, nz = (
-            np.float32(scale * (x[1, c] - ox)),
-            np.float32(scale * (y[1, c] - oy)),
-            np.float32(scale * (z[1, c] - oz)),
+            np.float32(scale * (x_above[c] - ox)),
+            np.float32(scale * (y_above[c] - oy)),
+            np.float32(scale * (z_above[c] - oz)),
         )
         px, py, pz = (
-            np.float32(scale * (x[1, c + 1] - ox)),
-            np.float32(scale * (y[1, c + 1] - oy)),
-            np.float32(scale * (z[1, c + 1] - oz)),
+            np.float32(scale * (x_above[c + 1] - ox)),
+            np.float32(scale * (y_above[c + 1] - oy)),
+            np.float32(scale * (z_above[c + 1] - oz)),
         )
         qx, qy, qz = nx - ex, ny - ey, nz - ez
         pp, qq, pq = px * px + py * py + pz * pz, qx * qx + qy * qy + qz * qz, px * qx + py * qy + pz * qz
@@ -102,16 +125,16 @@ def _row(x: Floats, y: Floats, z: Floats, scale: float, sides: Floats32) -> None
         share = uneven / (uneven + _UNEVEN)
         a, b = min(max(share * a, -_ONE), _ONE), min(max(share * b, -_ONE), _ONE)
         hourglass, skew = _hourglass(pp, qq, pq, _HALF * half_area), pq / twice
-        sides[0, c] = skew + hourglass * (_ONE + a) * (_ONE - b)
-        sides[1, c] = skew + hourglass * (_ONE - a) * (_ONE + b)
-        sides[2, c] = hourglass * (_ONE + a) * (_ONE + b) - skew
-        sides[3, c] = hourglass * (_ONE - a) * (_ONE - b) - skew
-        sides[4, c] = qq / twice - hourglass * (_ONE - a * a)
-        sides[5, c] = pp / twice - hourglass * (_ONE - b * b)
+        block[0, c] = skew + hourglass * (_ONE + a) * (_ONE - b)
+        block[1, c] = skew + hourglass * (_ONE - a) * (_ONE + b)
+        block[2, c] = hourglass * (_ONE + a) * (_ONE + b) - skew
+        block[3, c] = hourglass * (_ONE - a) * (_ONE - b) - skew
+        block[4, c] = qq / twice - hourglass * (_ONE - a * a)
+        block[5, c] = pp / twice - hourglass * (_ONE - b * b)
         # the smaller triangulation; e, n and p are the other corners
         rising = _cross_length(ex, ey, ez, px, py, pz) + _cross_length(px, py, pz, nx, ny, nz)
         falling = _cross_length(ex, ey, ez, nx, ny, nz) + _cross_length(px - ex, py - ey, pz - ez, qx, qy, qz)
-        sides[6, c] = min(rising, falling) / _TWO
+        block[6, c] = min(rising, falling) / _TWO
 
 
 @kernel
@@ -132,29 +155,36 @@ def _hourglass(pp: np.float32, qq: np.float32, pq: np.float32, area: np.float32)
 
 
 @kernel
-def _scale(cells: QuadCells, chart: int, r: int, sides: Floats32) -> None:
-    """Multiply the weights of a row by what the coefficient has become; clear what is no quad."""
-    for c in range(sides.shape[1]):
-        rest, per_area = cells.conductance[chart, r, c], cells.per_area[chart, r, c]
-        ratio = max(sides[6, c] * per_area, LEAST_RATIO)
-        coefficient = rest / ratio if cells.power == -1 else rest * ratio ** np.float32(cells.power)
-        for k in range(6):
-            sides[k, c] = coefficient * sides[k, c] if rest > 0 else _ZERO
-        sides[6, c] = _QUARTER * sides[6, c] if per_area > 0 else _ZERO
+def _scale(block: Floats32, cells: QuadCells, first: int, sides: Floats32, at: int, count: int) -> None:
+    """Multiply the weights of a block by what the coefficient has become, into columns; clear what is no quad."""
+    conductance, per_area = cells.conductance.reshape(-1)[first:], cells.per_area.reshape(-1)[first:]
+    coefficient, area, power = np.empty(_BLOCK, np.float32), sides[6, at : at + count], np.float32(cells.power)
+    for c in range(count):
+        ratio = max(block[6, c] * per_area[c], LEAST_RATIO)
+        coefficient[c] = conductance[c] / ratio if power == -_ONE else conductance[c] * ratio**power
+        area[c] = _QUARTER * block[6, c] if per_area[c] > 0 else _ZERO
+    for k in range(6):
+        row = sides[k, at : at + count]
+        for c in range(count):
+            row[c] = coefficient[c] * block[k, c] if conductance[c] > 0 else _ZERO
 
 
 @kernel
-def _add_row(sides: Floats32, below: Floats32, weights: Floats, areas: Floats, r: int) -> None:
-    """Give a row's weights and areas to links and texels; `below` holds north sides and areas of the row below."""
-    size = sides.shape[1]
+def _add_row(sides: Floats32, begin: int, below: Floats32, weights: Floats, areas: Floats, r: int) -> None:
+    """Give a chart's row of weights and areas to links and texels; `below` has north sides and areas of the last."""
+    size = below.shape[1]
     for c in range(size):
-        weights[0, r, c] = below[0, c] + sides[0, c]
-        weights[2, r, c], weights[3, r, c] = sides[4, c], sides[5, c]
-    weights[1, r, 0] = sides[2, 0]
+        i = begin + c
+        weights[0, r, c] = below[0, c] + sides[0, i]
+        weights[2, r, c], weights[3, r, c] = sides[4, i], sides[5, i]
+    weights[1, r, 0] = sides[2, begin]
     for c in range(1, size):
-        weights[1, r, c] = sides[3, c - 1] + sides[2, c]
+        i = begin + c
+        weights[1, r, c] = sides[3, i - 1] + sides[2, i]
     if r > 0:
         for c in range(1, size):
-            areas[r - 1, c - 1] = (below[1, c - 1] + below[1, c]) + (sides[6, c - 1] + sides[6, c])
+            i = begin + c
+            areas[r - 1, c - 1] = (below[1, c - 1] + below[1, c]) + (sides[6, i - 1] + sides[6, i])
     for c in range(size):
-        below[0, c], below[1, c] = sides[1, c], sides[6, c]
+        i = begin + c
+        below[0, c], below[1, c] = sides[1, i], sides[6, i]

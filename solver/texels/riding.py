@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.kernel import Floats, Ints, Ints32, kernel
 from ripple_sim.solver.mesh.triangle_tree import closest_points
 
 from .atlas import Atlas
 from .barycentrics import barycentrics_in
-from .topology import TexelTopology
 
 # Rest positions further off their triangles than this, in units of the surface's size, keep that distance.
 _OFF = 1e-9
@@ -23,7 +22,7 @@ class Ride(NamedTuple):
 
     Attributes
     ----------
-    corners : int64 [k, 3]
+    corners : int32 [k, 3]
         Vertices of their triangles.
     weights : float64 [k, 3]
         Barycentric coordinates.
@@ -32,7 +31,7 @@ class Ride(NamedTuple):
         the root of twice its area; 0 rows where none does.
     """
 
-    corners: Ints
+    corners: Ints32
     weights: Floats
     offsets: Floats
 
@@ -40,22 +39,30 @@ class Ride(NamedTuple):
     def of(cls, V: Floats, corners: Ints, weights: Floats, points: Floats) -> Ride:
         """The ride of points [k, 3] whose triangles and barycentric coordinates are known."""
         off = points - np.einsum("ij,ijk->ik", weights, V[corners])
+        corners = corners.astype(np.int32)
         if np.abs(off).max(initial=0.0) <= _OFF * np.ptp(V, axis=0).max():
             return cls(corners, weights, np.zeros((0, 3)))
         frames = _frames(V, corners)
         return cls(corners, weights, np.linalg.solve(np.swapaxes(frames, 1, 2), off[..., None])[..., 0])
 
     def at(self, V: Floats) -> Floats:
-        """Positions [k, 3] for the vertices V [n, 3] [m]."""
-        points = np.empty((len(self.corners), 3))
-        interpolate(V, self.corners, self.weights, points)
+        """Positions [3, k] for the vertices V [n, 3] [m]."""
+        points = np.empty((3, len(self.corners)))
+        _interpolate(V, self.corners, self.weights, points)
         if len(self.offsets):
-            points += np.einsum("ij,ijk->ik", self.offsets, _frames(V, self.corners))
+            points += np.einsum("ij,ijk->ki", self.offsets, _frames(V, self.corners))
         return points
+
+    def of_each(self, which: Ints) -> Ride:
+        """The ride of some of the points, by their numbers; -1: of one that is nowhere."""
+        nowhere = which < 0
+        corners, weights, offsets = self.corners[which], self.weights[which], self.offsets
+        weights[nowhere] = np.nan
+        return Ride(corners, weights, offsets[which] if len(offsets) else offsets)
 
 
 class SurfaceRide:
-    """All places of an atlas, on vertices that move.
+    """All places of an atlas, with halo, on vertices that move.
 
     Parameters
     ----------
@@ -64,50 +71,50 @@ class SurfaceRide:
     """
 
     def __init__(self, atlas: Atlas) -> None:
-        self._topology: TexelTopology = atlas.texels.topology
+        topology, around = atlas.texels.topology, atlas.texels.halo_positions
+        self._shape = topology.halo.shape
+        self._has_beyond = atlas.texels.beyond is not None
         V, F = atlas.mesh.V, np.asarray(atlas.mesh.F, np.int64)
-        self._texels = Ride.of(
+        texels = Ride.of(
             V, F[atlas.triangles.reshape(-1)], atlas.barycentrics.reshape(-1, 3), atlas.positions.reshape(-1, 3)
         )
-        self._rim: Ride | None = None
-        around = atlas.texels.halo_positions
-        self._nothing = ~np.isfinite(around[..., 0])
-        beyond = atlas.texels.beyond
-        self._has_beyond = beyond is not None
-        if beyond is None:
-            return
-        halo = self._topology.halo
-        self._on_rim = self._topology.rim & ~self._nothing
-        points = np.ascontiguousarray(around[self._on_rim])
-        if len(points):
+        nothing = ~np.isfinite(around[..., 0])
+        self._ride = texels.of_each(np.where(nothing, -1, topology.halo).reshape(-1))
+        rim = topology.rim & ~nothing
+        self._rim = np.flatnonzero(rim)
+        if len(self._rim):
+            points = np.ascontiguousarray(around[rim])
             triangle, closest = closest_points(atlas.tree, points)
             corners = F[triangle]
-            self._rim = Ride.of(V, corners, barycentrics_in(V[corners], closest), points)
+            self._on_rim = Ride.of(V, corners, barycentrics_in(V[corners], closest), points)
         # images of a periodic surface keep their way to the texels that they show
-        self._image = ~self._topology.own & ~self._topology.rim & (halo >= 0) & ~self._nothing
-        self._shift = around[self._image] - atlas.positions.reshape(-1, 3)[halo[self._image]]
+        image = ~topology.own & ~topology.rim & ~nothing
+        shift = around[image] - atlas.positions.reshape(-1, 3)[topology.halo[image]]
+        self._image, self._shift = (np.flatnonzero(image), shift.T) if shift.any() else (np.zeros(0, np.int64), shift.T)
+
+    def around(self, V: Floats) -> NDArray[np.float64]:
+        """Coordinates of the texels with halo, [3, C, n + 2, n + 2]; NaN where there is nothing."""
+        points = self._ride.at(V)
+        if len(self._image):
+            points[:, self._image] += self._shift
+        if len(self._rim):
+            points[:, self._rim] = self._on_rim.at(V)
+        return points.reshape(3, *self._shape)
 
     def positions(self, V: Floats) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
         """Positions of the texels [C, n, n, 3] and what lies beyond them; see `TexelMesh`."""
-        points = self._texels.at(V)
-        if not self._has_beyond:
-            return points.reshape(*self._topology.shape, 3), None
-        beyond = self._topology.with_halo(points.reshape(*self._topology.shape, 3))
-        beyond[self._image] += self._shift
-        if self._rim is not None:
-            beyond[self._on_rim] = self._rim.at(V)
-        beyond[self._nothing] = np.nan
-        return points.reshape(*self._topology.shape, 3), beyond
+        around = np.ascontiguousarray(np.moveaxis(self.around(V), 0, -1))
+        return around[:, 1:-1, 1:-1].copy(), around if self._has_beyond else None
 
     def normals(self, vertex_normals: Floats) -> NDArray[np.float64]:
         """Unit normals of the texels [C, n, n, 3], from those of the vertices [n, 3]."""
-        normals = np.empty((len(self._texels.corners), 3))
-        interpolate(vertex_normals, self._texels.corners, self._texels.weights, normals)
-        length = np.sqrt(np.einsum("ij,ij->i", normals, normals))[:, None]
-        return (normals / np.maximum(length, 1e-30)).reshape(*self._topology.shape, 3)
+        charts, width, _ = self._shape
+        normals = np.empty((charts, width - 2, width - 2, 3))
+        _interpolate_units(vertex_normals, self._ride.corners, self._ride.weights, normals)
+        return normals
 
 
-def _frames(V: Floats, corners: Ints) -> NDArray[np.float64]:
+def _frames(V: Floats, corners: NDArray[np.integer]) -> NDArray[np.float64]:
     """First side, direction across it, and normal of triangles, as rows as long as the root of twice the area."""
     x = V[corners]
     along, across = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
@@ -119,9 +126,27 @@ def _frames(V: Floats, corners: Ints) -> NDArray[np.float64]:
 
 
 @kernel
-def interpolate(values: Floats, corners: Ints, weights: Floats, out: Floats) -> None:
-    """Values [n, 3] of vertices at points with weights [k, 3] at corners [k, 3], into [k, 3]."""
+def _interpolate(values: Floats, corners: Ints32, weights: Floats, out: Floats) -> None:
+    """Values [n, 3] of vertices at points with weights [k, 3] at corners [k, 3], into [3, k]."""
     for i in range(len(corners)):
         a, b, c = corners[i, 0], corners[i, 1], corners[i, 2]
         for k in range(3):
-            out[i, k] = weights[i, 0] * values[a, k] + weights[i, 1] * values[b, k] + weights[i, 2] * values[c, k]
+            out[k, i] = weights[i, 0] * values[a, k] + weights[i, 1] * values[b, k] + weights[i, 2] * values[c, k]
+
+
+@kernel
+def _interpolate_units(values: Floats, corners: Ints32, weights: Floats, out: Floats) -> None:
+    """Unit vectors between those of vertices [n, 3], at the texels among places with halo, into [C, n, n, 3]."""
+    charts, n = out.shape[:2]
+    for chart in range(charts):
+        for r in range(n):
+            for column in range(n):
+                i = (chart * (n + 2) + r + 1) * (n + 2) + column + 1
+                a, b, c = corners[i, 0], corners[i, 1], corners[i, 2]
+                unit, square = out[chart, r, column], 0.0
+                for k in range(3):
+                    unit[k] = weights[i, 0] * values[a, k] + weights[i, 1] * values[b, k] + weights[i, 2] * values[c, k]
+                    square += unit[k] ** 2
+                length = max(np.sqrt(square), 1e-30)
+                for k in range(3):
+                    unit[k] /= length

@@ -1,24 +1,23 @@
 """The few cells of a texel mesh that are no plain quads: strips at rims, triangles and polygons in corners.
 
-Where they lie and what they add to is worked out once; for a surface that moves, numpy then does all of a kind
-together.
+Where they lie and what they add to is worked out once; for a surface that moves, one compiled loop then does all of a
+kind together.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver.kernel import Floats, Ints, kernel
+
 from .cells import polygon, quad, quad_area, strip, triangle
 from .links import CrossingLinks
 from .topology import TRIANGLE, TexelTopology
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
 # the links of a cell at (r, c), in the order of `quad`: link, and the place where it is stored
@@ -43,8 +42,10 @@ class SpecialCells:
     ----------
     corners : int64 [k, j]
         Flat places of their corners in a field with halo.
-    weigh : callable
-        From the corners' positions [k, j, 3] [m] to what they add.
+    fill : kernel
+        Fills in what they add, from coordinates [3, p] of all places [m] and the corners.
+    counts : (int, int)
+        How many links, and shares, a cell has.
     links : (int64 [m], int64 [m])
         Of their weights [k, l], flat, those that are added, and the flat places among a stencil's weights.
     shares : (int64 [s], int64 [s])
@@ -56,11 +57,19 @@ class SpecialCells:
     """
 
     corners: Ints
-    weigh: Callable[[Floats], Added]
+    fill: Callable[[Floats, Ints, Added], None]
+    counts: tuple[int, int]
     links: tuple[Ints, Ints]
     shares: tuple[Ints, Ints]
     irregular: tuple[Ints, Ints] = (np.zeros(0, np.int64), np.zeros((0, 2), np.int64))
     on_all_copies: bool = False
+
+    def weigh(self, places: Floats) -> Added:
+        """What they add where the places of a field with halo lie at coordinates [3, p] [m]."""
+        count, (links, shares) = len(self.corners), self.counts
+        added = Added(np.empty((count, links)), np.empty((count, shares)), np.empty(count))
+        self.fill(places, self.corners, added)
+        return added
 
 
 def special_cells(topology: TexelTopology, halo_positions: Floats) -> list[SpecialCells]:
@@ -96,14 +105,14 @@ def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[Spec
     texels = _own_texels(topology, np.take_along_axis(corners, belongs, axis=1))
     shares = np.flatnonzero(texels.ravel() >= 0), texels.ravel()[texels.ravel() >= 0]
     if topology.fixed_rim:
-        yield SpecialCells(corners, _weigh_quads, _link_places(topology, cell, _LINKS), shares)
+        yield SpecialCells(corners, _fill_quads, (6, 4), _link_places(topology, cell, _LINKS), shares)
         return
     nothing = np.zeros(0, np.int64), np.zeros(0, np.int64)
-    yield SpecialCells(corners, _weigh_areas, nothing, shares)
+    yield SpecialCells(corners, _fill_areas, (0, 4), nothing, shares)
     for i, j, p, q, link in _STRIPS:
         here = ~at_rim[:, i] & ~at_rim[:, j] & at_rim[:, p] & at_rim[:, q]
         strips = corners[here][:, [i, j, p, q]]
-        yield SpecialCells(strips, _weigh_strips, _link_places(topology, cell[here], (_LINKS[link],)), nothing)
+        yield SpecialCells(strips, _fill_strips, (1, 0), _link_places(topology, cell[here], (_LINKS[link],)), nothing)
 
 
 def _triangles(topology: TexelTopology) -> Iterator[SpecialCells]:
@@ -117,8 +126,8 @@ def _triangles(topology: TexelTopology) -> Iterator[SpecialCells]:
         corners = np.stack([places[chart, r0, c0], places[chart, r0, c1], places[chart, r1, c0]], axis=1)
         cell = np.stack([chart, np.full_like(chart, r), np.full_like(chart, c)], axis=1)
         links = _LINKS[2 + (c == 0)], _LINKS[r == 0]  # along the column and along the row
-        own = np.arange(len(chart)) * 3, topology.halo.reshape(-1)[corners[:, 0]]
-        yield SpecialCells(corners, _weigh_triangles, _link_places(topology, cell, links), own)
+        own = np.arange(len(chart)), topology.halo.reshape(-1)[corners[:, 0]]
+        yield SpecialCells(corners, _fill_triangles, (2, 1), _link_places(topology, cell, links), own)
 
 
 def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
@@ -138,7 +147,8 @@ def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
         beside = np.flatnonzero(copies == 0)
         yield SpecialCells(
             topology.addresses.texels[texels],
-            _weigh_polygons,
+            _fill_polygons,
+            (count * (count - 1) // 2, count),
             (source, places[first[source] + nth]),
             (np.arange(texels.size), texels.ravel()),
             (beside, pairs[beside]),
@@ -165,33 +175,73 @@ def _link_places(topology: TexelTopology, cell: Ints, links: tuple[tuple[int, in
     return np.flatnonzero(stored.ravel()), np.stack(flat, axis=1)[stored]
 
 
-def _weigh_quads(x: Floats) -> Added:
-    *weights, area = quad(*_corners(x))
-    south, north, west, east, rising, falling = weights
-    return Added(np.stack([south, north, west, east, rising, falling], axis=1), np.tile(area[:, None] / 4, 4), area)
+@kernel
+def _fill_quads(places: Floats, corners: Ints, added: Added) -> None:
+    """Whole quads: six links, and a quarter of the area each."""
+    for i in range(len(corners)):
+        a, b, c, d = _quad(places, corners[i])
+        south, north, west, east, rising, falling, area = quad(a, b, c, d)
+        links = added.links[i]
+        links[0], links[1], links[2], links[3], links[4], links[5] = south, north, west, east, rising, falling
+        added.shares[i] = area / 4
+        added.areas[i] = area
 
 
-def _weigh_areas(x: Floats) -> Added:
-    area = quad_area(*_corners(x))
-    return Added(np.zeros((len(x), 0)), np.tile(area[:, None] / 4, 4), area)
+@kernel
+def _fill_areas(places: Floats, corners: Ints, added: Added) -> None:
+    """Quads without links."""
+    for i in range(len(corners)):
+        a, b, c, d = _quad(places, corners[i])
+        area = quad_area(a, b, c, d)
+        added.shares[i] = area / 4
+        added.areas[i] = area
 
 
-def _weigh_strips(x: Floats) -> Added:
-    a, b, beside_a, beside_b = points = _corners(x)
-    return Added(strip(a, b, beside_a, beside_b)[:, None], np.zeros((len(x), 0)), quad_area(*points))
+@kernel
+def _fill_strips(places: Floats, corners: Ints, added: Added) -> None:
+    """Strips: the link of their first two corners."""
+    for i in range(len(corners)):
+        a, b, c, d = _quad(places, corners[i])
+        added.links[i, 0] = strip(a, b, c, d)
+        added.areas[i] = quad_area(a, b, c, d)
 
 
-def _weigh_triangles(x: Floats) -> Added:
-    _, along_column, along_row, area = triangle(*_corners(x))
-    return Added(np.stack([along_column, along_row], axis=1), np.tile(area[:, None] / 3, 3), area)
+@kernel
+def _fill_triangles(places: Floats, corners: Ints, added: Added) -> None:
+    """Triangles, as their first corner's chart sees them: two links, and its share."""
+    for i in range(len(corners)):
+        a, b, c = _at(places, corners[i, 0]), _at(places, corners[i, 1]), _at(places, corners[i, 2])
+        _, added.links[i, 0], added.links[i, 1], area = triangle(a, b, c)
+        added.shares[i, 0] = area / 3
+        added.areas[i] = area
 
 
-def _weigh_polygons(x: Floats) -> Added:
-    weights, shares = polygon(x)
-    first, second = np.triu_indices(x.shape[1], 1)
-    return Added(weights[:, first, second], shares, shares.sum(axis=1))
+@kernel
+def _fill_polygons(places: Floats, corners: Ints, added: Added) -> None:
+    """Polygons: the links between all pairs of corners."""
+    count = corners.shape[1]
+    points = np.empty((count, 3))
+    for i in range(len(corners)):
+        for j in range(count):
+            for k in range(3):
+                points[j, k] = places[k, corners[i, j]]
+        weights, shares = polygon(points)
+        link = 0
+        for a in range(count):
+            for b in range(a + 1, count):
+                added.links[i, link] = weights[a, b]
+                link += 1
+        added.shares[i] = shares
+        added.areas[i] = shares.sum()
 
 
-def _corners(x: Floats) -> list[Floats]:
-    """Positions [k, j, 3] corner by corner, each [3, k]."""
-    return [x[:, corner].T for corner in range(x.shape[1])]
+@kernel
+def _at(places: Floats, i: int) -> tuple[float, float, float]:
+    """A place among coordinates [3, p]."""
+    return places[0, i], places[1, i], places[2, i]
+
+
+@kernel
+def _quad(places: Floats, corners: Ints) -> tuple[Any, Any, Any, Any]:
+    """The four corners of a quad."""
+    return _at(places, corners[0]), _at(places, corners[1]), _at(places, corners[2]), _at(places, corners[3])

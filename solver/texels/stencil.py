@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver.kernel import Floats, kernel
 
 from .irregular import IrregularLinks, gather_links
-from .links import ties_to_rim
+from .links import rim_ties
 from .topology import TexelTopology
 
 
@@ -45,17 +45,23 @@ class Stencil:
             gather_links(self.irregular, field.reshape(-1), result.reshape(-1))
         return result
 
+    def scaled(self, factor: float) -> Stencil:
+        """The same with all weights multiplied by a factor."""
+        links = self.irregular
+        if links is not None:
+            links = links._replace(weights=factor * links.weights)
+        return Stencil(self.topology, factor * self.weights, links)
+
     def absolute_sums(self) -> NDArray[np.float64]:
         """Sum of |w| over the links that meet in each texel, half of |w| for those to a fixed rim, [C, n, n].
 
         Twice that is Gershgorin's bound: the other end of a link to a rim does not move.
         """
-        sums, weights = np.empty(self.topology.shape), self.weights
+        sums = np.empty(self.topology.shape)
+        _add_magnitudes(self.weights, sums)
         if self.topology.fixed_rim:
-            weights = weights.copy()
-            for link in range(4):
-                weights[:, link][ties_to_rim(self.topology, link)] /= 2
-        _add_magnitudes(weights, sums)
+            texels, ties = rim_ties(self.topology)
+            np.subtract.at(sums.reshape(-1), texels, np.abs(self.weights.reshape(-1)[ties]) / 2)
         if self.irregular is not None:
             sums.reshape(-1)[self.irregular.texels] += np.add.reduceat(
                 np.abs(self.irregular.weights), self.irregular.begins[:-1]

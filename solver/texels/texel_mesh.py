@@ -96,10 +96,6 @@ class TexelMesh:
         """Positions with halo [m], [C, n + 2, n + 2, 3]; NaN where there is nothing."""
         return _with_halo(self.topology, self.positions, self.beyond)
 
-    def around(self, positions: NDArray[np.float64], beyond: NDArray[np.float64] | None) -> NDArray[np.float64]:
-        """`halo_positions` for other positions, and what then lies beyond."""
-        return _with_halo(self.topology, positions, beyond)
-
     @functools.cached_property
     def grid(self) -> TexelGrid:
         """The texel mesh as compiled code reads it."""

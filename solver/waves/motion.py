@@ -22,7 +22,7 @@ from ripple_sim.solver.texels.riding import SurfaceRide
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
 # The stiffness is made anew once the square of an edge's length has changed by this share since it was made.
-_CHANGED = 2e-4
+_CHANGED = 2e-3
 
 # Folds are looked for once in so many times that the stiffness is made anew: it takes about as long.
 _EVERY = 8
@@ -74,8 +74,7 @@ class Motion:
         if not _stretches(self.V, self._edges, self._squares):
             return None
         _square_lengths(self.V, self._edges, self._squares)
-        positions, beyond = self._ride.positions(self.V)
-        operator, self.areas = self._operator.at(self.rest.texels.around(positions, beyond))
+        operator, self.areas = self._operator.at(self._ride.around(self.V))
         self._warn_of_folds()
         return operator
 

@@ -30,7 +30,7 @@ class MovedGradients:
     def __call__(self, height_map: NDArray[np.float32], V: NDArray[np.float64]) -> NDArray[np.float32]:
         """Height map [C, n + 2, n + 2, 4], see `HeightMap`, where the vertices are at V [vertex_count, 3] [m]."""
         moved = np.array(height_map, np.float32)
-        _carry(self._rest, _tangents(self._texels.around(*self._ride.positions(V))), moved)
+        _carry(self._rest, _tangents(np.moveaxis(self._ride.around(V), 0, -1)), moved)
         fill_halo(self._texels.topology, moved)
         mirror_at_rim(self._texels.topology, moved)
         return moved

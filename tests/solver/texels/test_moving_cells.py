@@ -27,22 +27,23 @@ def test_weights_and_areas_are_those_of_the_texels_where_they_are(name, fixed):
     texels = atlas.texels.with_fixed_rim() if fixed else atlas.texels
     rng = np.random.default_rng(4)
     V = atlas.mesh.V @ (np.eye(3) + 0.3 * rng.standard_normal((3, 3))) + 10.0
-    around = texels.around(*SurfaceRide(atlas).positions(V))
+    around = SurfaceRide(atlas).around(V)
     speeds, soft = rng.uniform(1, 2, (2, *texels.shape)) / [[[[1]]], [[[2]]]]
     cells = MovingCells(texels)
     stencil, areas = cells.assemble(around, cells.coefficient(speeds, soft, 0.0))
-    exact = stiffness_stencil(texels.topology, around, speeds, soft)
+    beside = np.moveaxis(around, 0, -1)
+    exact = stiffness_stencil(texels.topology, beside, speeds, soft)
     assert_allclose(stencil.weights, exact.weights, atol=3e-6 * np.abs(exact.weights).max())
     if exact.irregular is not None:
         assert_allclose(stencil.irregular.weights, exact.irregular.weights, atol=1e-6)
         assert_allclose(stencil.irregular.others, exact.irregular.others)
-    assert_allclose(areas, lumped_areas(texels.topology, around), rtol=3e-6)
+    assert_allclose(areas, lumped_areas(texels.topology, beside), rtol=3e-6)
 
 
 def test_a_coefficient_follows_a_power_of_the_area():
     atlas = SURFACES["five charts round a point"]()
     cells, ones = MovingCells(atlas.texels), np.ones(atlas.areas.shape)
-    twice = atlas.texels.around(*SurfaceRide(atlas).positions(2 * atlas.mesh.V))
+    twice = SurfaceRide(atlas).around(2 * atlas.mesh.V)
     plain, thinner = (cells.assemble(twice, cells.coefficient(ones, ones, power))[0] for power in (0.0, -1.0))
     assert_allclose(thinner.weights, plain.weights / 4, atol=1e-6)
     assert_allclose(thinner.irregular.weights, plain.irregular.weights / 4, atol=1e-6)
@@ -52,9 +53,7 @@ def test_crushed_cells_have_finite_weights():
     atlas = SURFACES["disk"]()
     cells, ones = MovingCells(atlas.texels), np.ones(atlas.areas.shape)
     for V in (0 * atlas.mesh.V, atlas.mesh.V * [1, 0, 1]):
-        stencil, areas = cells.assemble(
-            atlas.texels.around(*SurfaceRide(atlas).positions(V)), cells.coefficient(ones, ones, -1.0)
-        )
+        stencil, areas = cells.assemble(SurfaceRide(atlas).around(V), cells.coefficient(ones, ones, -1.0))
         assert np.isfinite(stencil.weights).all()
         assert np.isfinite(areas).all()
 
