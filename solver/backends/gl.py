@@ -17,6 +17,7 @@ from .gl_dispatch import Dispatch
 from .gl_fields import FieldLayout, LinkBuffers, TexelList
 from .gl_forces import ExtraForces
 from .gl_pressure import Pressure, VolumeKeeper
+from .gl_stencil import StencilBuffer
 
 
 class GLBackend:
@@ -32,7 +33,7 @@ class GLBackend:
         self._dispatch = Dispatch(self._gl, fields)
         self._dent = self._yield = None
         self._h, self._h_next, self._v = (fields.zeros() for _ in range(3))
-        self._stencil = fields.upload_stencil(operator.stencil)
+        self._stencil = StencilBuffer(self._gl, fields, self._dispatch, operator.stencil)
         self._response = fields.upload(operator.response)
         # a number for each part, where there are several: held by the load, and given at once
         self._held = None if operator.parts is None else Pressure(self._gl, fields, operator)
@@ -115,7 +116,13 @@ class GLBackend:
                 kick_drift["dt"] = drift
                 pressure = (self._held.parts, self._held.amplitudes) if self._held is not None else ()
                 self._dispatch.bind(
-                    self._h, self._v, self._h_next, self._stencil, self._coefficients, self._extra.field, *pressure
+                    self._h,
+                    self._v,
+                    self._h_next,
+                    self._stencil.buffer,
+                    self._coefficients,
+                    self._extra.field,
+                    *pressure,
                 )
                 self._dispatch.run_blocks(kick_drift)
                 self._kick_irregular(drift)
@@ -125,11 +132,11 @@ class GLBackend:
 
     def move(self, operator: WaveOperator) -> None:
         """Take over the stencils of the same surface with its texels elsewhere."""
-        self._operator, fields = operator, self._fields
-        fields.write_stencil(self._stencil, operator.stencil)
+        self._operator = operator
+        self._stencil.write(operator.stencil, operator.mass)
         self._extra.move(operator)
         if self._prepared[0]:
-            self._links = LinkBuffers(self._gl, fields, operator.stencil, self._step.gain)
+            self._links = LinkBuffers(self._gl, self._fields, self._stencil.irregular, self._step.gain)
         if operator.density is not None:
             self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
 
@@ -186,7 +193,7 @@ class GLBackend:
             self._step = k = step_coefficients(self._operator, dt)
             self._maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
             self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
-            self._links = LinkBuffers(self._gl, self._fields, self._operator.stencil, k.gain)
+            self._links = LinkBuffers(self._gl, self._fields, self._stencil.irregular, k.gain)
             self._keep_volume(dt)
             self._prepared = (dt, self.keeps_volume)
         k = self._step

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.texels.irregular import NO_LINKS
+from ripple_sim.solver.texels.irregular import NO_LINKS, IrregularLinks
 from ripple_sim.solver.texels.stencil import Stencil
 from ripple_sim.solver.texels.topology import TexelTopology
 
@@ -91,6 +91,16 @@ class FieldLayout:
         with self._gl:
             buffer.write(places)
 
+    def link_addresses(self) -> NDArray[np.int64]:
+        """Pairs [k, 2]: a place of [C, n + 2, n + 2], and where the links that start there lie in a stencil."""
+        charts, n = self._charts, self.n
+        places = np.arange(charts * (n + 2) ** 2).reshape(charts, n + 2, n + 2)[:, :-1, :-1]
+        pairs = [
+            np.stack([places[:, :, first : last + 1], block[:, :-1, :-1] + 1], axis=-1).reshape(-1, 2)
+            for block, first, last in self._blocks()
+        ]
+        return np.concatenate(pairs)
+
     def read(self, buffer: moderngl.Buffer) -> NDArray[np.float32]:
         """A field's texels, [C, n, n]."""
         with self._gl:
@@ -147,6 +157,7 @@ class LinkBuffers:
 
     Parameters
     ----------
+    links : IrregularLinks or None
     factors : [C, n, n]
         By which the forces on each texel are multiplied.
 
@@ -159,16 +170,16 @@ class LinkBuffers:
         bits of its weight.
     """
 
-    def __init__(self, gl: GLContext, fields: FieldLayout, stencil: Stencil, factors: NDArray) -> None:
-        irregular = stencil.irregular if stencil.irregular is not None else NO_LINKS
+    def __init__(self, gl: GLContext, fields: FieldLayout, links: IrregularLinks | None, factors: NDArray) -> None:
+        irregular = links if links is not None else NO_LINKS
         self.count = len(irregular.texels)
         scale = np.repeat(factors.reshape(-1)[irregular.texels], np.diff(irregular.begins))
         texels = [fields.texels[irregular.texels], irregular.begins[:-1], irregular.begins[1:]]
         bits = (scale * irregular.weights).astype(np.float32).view(np.int32)
-        links = np.stack([fields.texels[irregular.others].astype(np.int32), bits], axis=1)
+        others = np.stack([fields.texels[irregular.others].astype(np.int32), bits], axis=1)
         with gl as ctx:
             self.texels = ctx.buffer(np.stack(texels, axis=1).astype(np.int32).tobytes() or bytes(4))
-            self.links = ctx.buffer(links.tobytes() or bytes(4))
+            self.links = ctx.buffer(others.tobytes() or bytes(4))
 
 
 class TexelList:

@@ -50,11 +50,11 @@ class FluidOperator(WaveOperator):
     @functools.cached_property
     def stable_timestep(self) -> float:
         """Largest stable step of the leapfrog scheme [s]; see `WaveOperator.stable_timestep`."""
-        wave = largest_eigenvalue(self.link_force, self.mass, self.free, self._rate_bound(self.stencil))
+        wave = largest_eigenvalue(self.link_force, self.mass, self.free, self.stencil.fastest(self.mass))
         square = (wave + self.stiffness.max()) * self.root.most / self.deep
         viscous = 0.0
         if self.viscous_stencil is not None:
-            bound = self._rate_bound(self.viscous_stencil)
+            bound = self.viscous_stencil.fastest(self.mass)
             viscous = largest_eigenvalue(self.viscous_stencil, self.mass, self.free, bound)
         return float(SAFETY * 4 / (viscous + np.sqrt(viscous**2 + 4 * square)))
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.errors import SolverError
 from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.texels.moving_cells import CellCoefficient, MovingCells
+from ripple_sim.solver.texels.moved_stencil import MovedPlaces, MovedStencil
+from ripple_sim.solver.texels.moving_cells import MovingCells
 from ripple_sim.solver.texels.softening import softening
 from ripple_sim.solver.texels.stencil import Stencil
 
@@ -60,23 +61,24 @@ class MovingOperator:
         self._level = atlas.areas / self._cells.assemble(_coordinates(texels.halo_positions), self._tension)[1]
         self._areas = atlas.areas
 
-    def at(self, around: Floats) -> tuple[WaveOperator, Floats]:
-        """Operator, and areas of the texels [m^2], for their coordinates with halo [m], [3, C, n + 2, n + 2]."""
-        tension, spanned = self._cells.assemble(around, self._tension)
-        areas = np.maximum(spanned * self._level, 1e-3 * self._areas)
-        laplace = self._stencil(around, self._laplace)
-        if self._viscous_share is not None:
-            viscous: Stencil | None = tension.scaled(self._viscous_share)
-        else:
-            viscous = self._stencil(around, self._viscous)
-        rigidity = self._rest.rigidity
-        if rigidity is not None:
+    def at(self, places: MovedPlaces) -> WaveOperator:
+        """Operator where the places are."""
+        tension, rigidity = MovedStencil(self._cells, self._tension, places), self._rest.rigidity
+        viscous = laplace = None
+        if self._viscous is not None:
+            like = None if self._viscous_share is None else (tension, self._viscous_share)
+            viscous = MovedStencil(self._cells, self._viscous, places, like)
+        if self._laplace is not None and rigidity is not None:
+            laplace = MovedStencil(self._cells, self._laplace, places)
             # sigma b / A, with sigma = M / A
-            rigidity = rigidity * (self._areas / areas) ** 2
-        return self._rest.moved(tension, viscous, laplace, rigidity), areas
+            rigidity = rigidity * (self._areas / self.areas(laplace)) ** 2
+        return self._rest.moved(tension, viscous, laplace, rigidity)
 
-    def _stencil(self, around: Floats, coefficient: CellCoefficient | None) -> Stencil | None:
-        return None if coefficient is None else self._cells.assemble(around, coefficient)[0]
+    def areas(self, stencil: Stencil) -> Floats:
+        """Area of each texel [m^2], [C, n, n], under a stencil of `at`; that at rest under any other."""
+        if not isinstance(stencil, MovedStencil):
+            return self._areas
+        return np.maximum(stencil.areas * self._level, 1e-3 * self._areas)
 
 
 def _coordinates(halo_positions: Floats) -> Floats:

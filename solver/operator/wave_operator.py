@@ -158,14 +158,14 @@ class WaveOperator:
         A mode with omega^2 = lambda + k and viscous rate mu is stable if dt^2 omega^2 + 2 dt mu <= 4. Infinite if
         nothing moves.
         """
-        bound = self._rate_bound(self.stencil)
+        bound = self.stencil.fastest(self.mass)
         if self.laplace_stencil is not None and self.rigidity is not None:
-            bending = self._rate_bound(self.laplace_stencil)
+            bending = self.laplace_stencil.fastest(self.mass)
             bound += bending * float((self.rigidity * self.mass).max()) * bending
         wave = self._rate(self.link_force, bound) + self.stiffness.max()
         viscous = 0.0
         if self.viscous_stencil is not None:
-            bound = self._rate_bound(self.viscous_stencil)
+            bound = self.viscous_stencil.fastest(self.mass)
             viscous = self._rate(self.viscous_stencil, bound)
         # the positive root, written so that nothing cancels
         rate = viscous + np.sqrt(viscous**2 + 4 * wave)
@@ -174,7 +174,3 @@ class WaveOperator:
     def _rate(self, force: Callable[[NDArray[np.float64]], NDArray[np.float64]], bound: float) -> float:
         """Largest eigenvalue of -M^-1 force, or its bound."""
         return bound if self.bounded else largest_eigenvalue(force, self.mass, self.free, bound)
-
-    def _rate_bound(self, stencil: Stencil) -> float:
-        """Gershgorin's bound of the largest eigenvalue of M^-1 K."""
-        return float((stencil.absolute_sums() * 2 / self.mass).max())

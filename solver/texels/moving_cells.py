@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +43,7 @@ class MovingCells:
     """
 
     def __init__(self, texels: TexelMesh) -> None:
-        self._topology = topology = texels.topology
+        self.topology = topology = texels.topology
         charts, n, _ = topology.shape
         self._shape, around = (charts, 4, n + 1, n + 1), np.moveaxis(texels.halo_positions, -1, 0)
         self._special = special_cells(topology, texels.halo_positions)
@@ -50,16 +51,16 @@ class MovingCells:
         x = [around[..., r : r + n + 1, c : c + n + 1] for r, c in _CORNERS]
         with np.errstate(invalid="ignore"):
             areas = np.where(whole_quads(topology), quad_area(*x), 0.0)
-        self._scale = float(1 / np.sqrt(areas[areas > 0].mean())) if areas.any() else 1.0
+        self._scale = float(np.float32(1 / np.sqrt(areas[areas > 0].mean()))) if areas.any() else 1.0
         areas *= self._scale**2
         self._per_area = _at_places(np.divide(1, areas, out=np.zeros_like(areas), where=areas > 0))
-        self._borders = Borders.of(topology)
+        self.borders = Borders.of(topology)
         ends = np.concatenate([np.zeros((0, 2), np.int64), *(each.irregular[1] for each in self._special)])
         self._links = IrregularLinks.of(ends, np.arange(len(ends), dtype=np.float64))
 
     def coefficient(self, values: Floats, softening: Floats, power: float) -> CellCoefficient:
         """Of values at the texels at rest [C, n, n]; `softening` as for `stiffness_stencil`."""
-        k, s = (self._topology.with_halo(field) for field in (values, softening))
+        k, s = (self.topology.with_halo(field) for field in (values, softening))
         size = self._shape[-1]
         with np.errstate(divide="ignore"):
             quads = conductances(*([field[:, r : r + size, c : c + size] for r, c in _CORNERS] for field in (k, s)))
@@ -78,26 +79,64 @@ class MovingCells:
             Coordinates of the texels with halo [m], see `SurfaceRide.around`.
         coefficient : CellCoefficient
         """
-        weights, areas = np.zeros(self._shape), np.zeros(self._topology.shape)
+        weights, areas = np.zeros(self._shape), np.zeros(self.topology.shape)
         quad_pass(around, coefficient.quads, weights, areas)
-        flat, irregular, of_polygons = weights.reshape(-1), [np.zeros(0)], []
+        links = self._add_special(around, coefficient, weights.reshape(-1), areas.reshape(-1))
+        return Stencil(self.topology, weights, links), areas
+
+    def special(self, around: Floats, coefficient: CellCoefficient) -> tuple[Floats, IrregularLinks | None]:
+        """What all cells but the quads give to the links at `special_links`, and the irregular links.
+
+        Only the places at `special_places` of those around are looked at.
+        """
+        weights = self._empty
+        links = self._add_special(around, coefficient, weights, np.zeros(self.topology.texel_count))
+        values = weights[self.special_links]
+        weights[self.special_links] = 0.0
+        return values, links
+
+    @functools.cached_property
+    def special_places(self) -> Ints:
+        """Flat places, of a field with halo, of the corners of all cells but the quads."""
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *(each.corners.ravel() for each in self._special)]))
+
+    @functools.cached_property
+    def special_links(self) -> Ints:
+        """Flat places, among a stencil's weights, of the links to which other cells than quads add, with all copies."""
+        touched = np.zeros(np.prod(self._shape), bool)
+        for cells in self._special:
+            touched[cells.links[1]] = True
+        borders = self.borders
+        if len(borders.copies):
+            any_copy = np.logical_or.reduceat(touched[borders.copies], borders.begins[:-1])
+            touched[borders.copies] = np.repeat(any_copy, np.diff(borders.begins))
+        return np.flatnonzero(touched)
+
+    @functools.cached_property
+    def _empty(self) -> Floats:
+        return np.zeros(np.prod(self._shape))
+
+    def _add_special(
+        self, around: Floats, coefficient: CellCoefficient, weights: Floats, areas: Floats
+    ) -> IrregularLinks | None:
+        """Add the other cells to flat weights and areas; the copies of a link then agree."""
+        irregular, of_polygons = [np.zeros(0)], []
         for cells, rest, at_rest in zip(self._special, self._rest, coefficient.special, strict=True):
             added = cells.weigh(around.reshape(3, -1))
             _scale(added, rest, at_rest, coefficient.quads.power)
-            _scatter(added.shares.reshape(-1), *cells.shares, areas.reshape(-1))
+            _scatter(added.shares.reshape(-1), *cells.shares, areas)
             links = added.links.reshape(-1)
             if cells.on_all_copies:
                 of_polygons.append((links, cells.links))
             else:
-                _scatter(links, *cells.links, flat)
+                _scatter(links, *cells.links, weights)
             irregular.append(links[cells.irregular[0]])
-        _close(flat, self._borders)
+        _close(weights, self.borders)
         for links, places in of_polygons:
-            _scatter(links, *places, flat)
+            _scatter(links, *places, weights)
         if self._links is None:
-            return Stencil(self._topology, weights), areas
-        beside = np.concatenate(irregular)[self._links.weights.astype(np.int64)]
-        return Stencil(self._topology, weights, self._links._replace(weights=beside)), areas
+            return None
+        return self._links._replace(weights=np.concatenate(irregular)[self._links.weights.astype(np.int64)])
 
 
 class Borders(NamedTuple):

@@ -37,8 +37,8 @@ class Ride(NamedTuple):
 
     @classmethod
     def of(cls, V: Floats, corners: Ints, weights: Floats, points: Floats) -> Ride:
-        """The ride of points [k, 3] whose triangles and barycentric coordinates are known."""
-        off = points - np.einsum("ij,ijk->ik", weights, V[corners])
+        """The ride of points [k, 3] whose triangles and barycentric coordinates are known; NaN: of none."""
+        off = np.nan_to_num(points - np.einsum("ij,ijk->ik", weights, V[corners]))
         corners = corners.astype(np.int32)
         if np.abs(off).max(initial=0.0) <= _OFF * np.ptp(V, axis=0).max():
             return cls(corners, weights, np.zeros((0, 3)))
@@ -54,11 +54,9 @@ class Ride(NamedTuple):
         return points
 
     def of_each(self, which: Ints) -> Ride:
-        """The ride of some of the points, by their numbers; -1: of one that is nowhere."""
-        nowhere = which < 0
-        corners, weights, offsets = self.corners[which], self.weights[which], self.offsets
-        weights[nowhere] = np.nan
-        return Ride(corners, weights, offsets[which] if len(offsets) else offsets)
+        """The ride of some of the points, by their numbers."""
+        offsets = self.offsets[which] if len(self.offsets) else self.offsets
+        return Ride(self.corners[which], self.weights[which], offsets)
 
 
 class SurfaceRide:
@@ -68,37 +66,40 @@ class SurfaceRide:
     ----------
     atlas : Atlas
         At rest.
+
+    Attributes
+    ----------
+    ride : Ride
+        Of all places; weights are NaN where there is nothing.
+    images : int64 [k]
+        Those that show a texel where it is not, on a periodic surface.
     """
 
     def __init__(self, atlas: Atlas) -> None:
         topology, around = atlas.texels.topology, atlas.texels.halo_positions
         self._shape = topology.halo.shape
         self._has_beyond = atlas.texels.beyond is not None
-        V, F = atlas.mesh.V, np.asarray(atlas.mesh.F, np.int64)
-        texels = Ride.of(
-            V, F[atlas.triangles.reshape(-1)], atlas.barycentrics.reshape(-1, 3), atlas.positions.reshape(-1, 3)
-        )
-        nothing = ~np.isfinite(around[..., 0])
-        self._ride = texels.of_each(np.where(nothing, -1, topology.halo).reshape(-1))
-        rim = topology.rim & ~nothing
-        self._rim = np.flatnonzero(rim)
-        if len(self._rim):
-            points = np.ascontiguousarray(around[rim])
-            triangle, closest = closest_points(atlas.tree, points)
-            corners = F[triangle]
-            self._on_rim = Ride.of(V, corners, barycentrics_in(V[corners], closest), points)
+        V, F, places = atlas.mesh.V, np.asarray(atlas.mesh.F, np.int64), around.reshape(-1, 3)
+        halo, nothing = topology.halo.reshape(-1), ~np.isfinite(places[:, 0])
+        corners, weights = F[atlas.triangles.reshape(-1)[halo]], atlas.barycentrics.reshape(-1, 3)[halo]
+        rim = np.flatnonzero(topology.rim.reshape(-1) & ~nothing)
+        if len(rim):
+            triangle, closest = closest_points(atlas.tree, np.ascontiguousarray(places[rim]))
+            corners[rim], weights[rim] = F[triangle], barycentrics_in(V[F[triangle]], closest)
+        weights[nothing] = np.nan
         # images of a periodic surface keep their way to the texels that they show
-        image = ~topology.own & ~topology.rim & ~nothing
-        shift = around[image] - atlas.positions.reshape(-1, 3)[topology.halo[image]]
-        self._image, self._shift = (np.flatnonzero(image), shift.T) if shift.any() else (np.zeros(0, np.int64), shift.T)
+        shift = np.where(
+            (topology.rim.reshape(-1) | nothing)[:, None], 0.0, places - atlas.positions.reshape(-1, 3)[halo]
+        )
+        self.images = np.flatnonzero(shift.any(axis=1))
+        self._shift = shift[self.images].T
+        self.ride = Ride.of(V, corners, weights, places - shift)
 
     def around(self, V: Floats) -> NDArray[np.float64]:
         """Coordinates of the texels with halo, [3, C, n + 2, n + 2]; NaN where there is nothing."""
-        points = self._ride.at(V)
-        if len(self._image):
-            points[:, self._image] += self._shift
-        if len(self._rim):
-            points[:, self._rim] = self._on_rim.at(V)
+        points = self.ride.at(V)
+        if len(self.images):
+            points[:, self.images] += self._shift
         return points.reshape(3, *self._shape)
 
     def positions(self, V: Floats) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
@@ -110,7 +111,7 @@ class SurfaceRide:
         """Unit normals of the texels [C, n, n, 3], from those of the vertices [n, 3]."""
         charts, width, _ = self._shape
         normals = np.empty((charts, width - 2, width - 2, 3))
-        _interpolate_units(vertex_normals, self._ride.corners, self._ride.weights, normals)
+        _interpolate_units(vertex_normals, self.ride.corners, self.ride.weights, normals)
         return normals
 
 

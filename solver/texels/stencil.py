@@ -68,6 +68,10 @@ class Stencil:
             )
         return sums
 
+    def fastest(self, mass: NDArray[np.float64]) -> float:
+        """Gershgorin's bound of the largest eigenvalue over a lumped mass [C, n, n]."""
+        return float((self.absolute_sums() * 2 / mass).max())
+
 
 # link, the place from which it starts relative to the texel, and its other end
 _SIDES = ((0, 0, 0, 0, 1), (0, 0, -1, 0, -1), (1, 0, 0, 1, 0), (1, -1, 0, -1, 0))

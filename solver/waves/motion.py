@@ -18,6 +18,7 @@ from ripple_sim.solver.operator.material import Material
 from ripple_sim.solver.operator.moving import MovingOperator
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 from ripple_sim.solver.texels.atlas import Atlas
+from ripple_sim.solver.texels.moved_stencil import MovedPlaces
 from ripple_sim.solver.texels.riding import SurfaceRide
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
@@ -58,7 +59,7 @@ class Motion:
         self._edges = np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
         self._squares = np.empty(len(self._edges))
         _square_lengths(atlas.mesh.V, self._edges, self._squares)
-        self.areas = atlas.areas
+        self._now = operator
         self._warned, self._looks = False, 0
 
     def to(self, vertices: ArrayLike) -> WaveOperator | None:
@@ -74,9 +75,14 @@ class Motion:
         if not _stretches(self.V, self._edges, self._squares):
             return None
         _square_lengths(self.V, self._edges, self._squares)
-        operator, self.areas = self._operator.at(self._ride.around(self.V))
+        self._now = self._operator.at(MovedPlaces(self._ride, self.V))
         self._warn_of_folds()
-        return operator
+        return self._now
+
+    @property
+    def areas(self) -> NDArray[np.float64]:
+        """Area of each texel [m^2], [C, n, n]."""
+        return self._operator.areas(self._now.stencil)
 
     @functools.cached_property
     def atlas(self) -> Atlas:

@@ -93,7 +93,7 @@ def test_links_stand_side_by_side_at_the_place_where_they_start(texels: TexelMes
 def test_irregular_links_are_scaled_by_the_factor_of_their_texel(texels: TexelMesh) -> None:
     layout = FieldLayout(shared_context(), texels.topology)
     stencil, factors = texels.stencil(np.ones(texels.shape)), numbers(texels)
-    buffers = LinkBuffers(shared_context(), layout, stencil, factors)
+    buffers = LinkBuffers(shared_context(), layout, stencil.irregular, factors)
     if stencil.irregular is None:
         assert buffers.count == 0
         return
