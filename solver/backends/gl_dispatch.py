@@ -25,7 +25,7 @@ class Dispatch:
         self._rows, self._group = _SOFTWARE_BLOCK if gl.software else _HARDWARE_BLOCK
         self._halo = self.shader("halo")
 
-    def shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
+    def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
         """A shader that runs over a list."""
         return self._gl.shared_compute_shader(
             "ripple_sim.solver.backends.shaders", name, LIST_GROUP=_LIST_GROUP, **defines

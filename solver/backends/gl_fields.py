@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.gl import GLContext
+from ripple_sim.solver.kernel import Floats, Floats32, Ints, kernel
 from ripple_sim.solver.texels.irregular import NO_LINKS, IrregularLinks
 from ripple_sim.solver.texels.stencil import Stencil
 from ripple_sim.solver.texels.topology import TexelTopology
@@ -85,11 +86,19 @@ class FieldLayout:
 
     def write_stencil(self, buffer: moderngl.Buffer, stencil: Stencil) -> None:
         """Write another stencil over one that was uploaded."""
-        places = np.zeros((EIGHT * self.eights, 4), np.float32)
-        for block, first, last in self._blocks():
-            places[block[:, :-1, :-1] + 1] = np.moveaxis(stencil.weights[..., first : last + 1], 1, -1)
+        places = self._stencil_scratch
+        for block, first, _ in self._places:
+            _lay_out(stencil.weights, block, first, places)
         with self._gl:
             buffer.write(places)
+
+    @functools.cached_property
+    def _stencil_scratch(self) -> NDArray[np.float32]:
+        return np.zeros((EIGHT * self.eights, 4), np.float32)
+
+    @functools.cached_property
+    def _places(self) -> list[tuple[NDArray[np.int64], int, int]]:
+        return [(np.ascontiguousarray(block), first, last) for block, first, last in self._blocks()]
 
     def link_addresses(self) -> NDArray[np.int64]:
         """Pairs [k, 2]: a place of [C, n + 2, n + 2], and where the links that start there lie in a stencil."""
@@ -97,7 +106,7 @@ class FieldLayout:
         places = np.arange(charts * (n + 2) ** 2).reshape(charts, n + 2, n + 2)[:, :-1, :-1]
         pairs = [
             np.stack([places[:, :, first : last + 1], block[:, :-1, :-1] + 1], axis=-1).reshape(-1, 2)
-            for block, first, last in self._blocks()
+            for block, first, last in self._places
         ]
         return np.concatenate(pairs)
 
@@ -205,3 +214,14 @@ class TexelList:
     def _reserve(self) -> None:
         with self._gl as ctx:
             self.places, self.values = ctx.buffer(reserve=4 * self._room), ctx.buffer(reserve=4 * self._room)
+
+
+@kernel
+def _lay_out(weights: Floats, block: Ints, first: int, places: Floats32) -> None:
+    """Write the four links of every place of a block's columns, from a first one on, at its address and one."""
+    charts, rows, columns = block.shape
+    for chart in range(charts):
+        for r in range(rows - 1):
+            for c in range(columns - 1):
+                for link in range(4):
+                    places[block[chart, r, c] + 1, link] = weights[chart, link, r, first + c]

@@ -19,12 +19,12 @@ from ripple_sim.solver.texels.topology import TexelTopology
 from .gl_dispatch import Dispatch
 from .gl_fields import FieldLayout
 
-_CELLS = {
+_CELLS: dict[str, float] = {
     "HOURGLASS": HOURGLASS,
     "SHARE": SHARE,
     "UNEVEN": UNEVEN,
     "LEAST_AREA": LEAST_AREA,
-    "LEAST_RATIO": LEAST_RATIO,
+    "LEAST_RATIO": float(LEAST_RATIO),
 }
 
 

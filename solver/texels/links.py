@@ -49,8 +49,8 @@ def ties_to_rim(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
 @functools.lru_cache(maxsize=4)  # asked for in every step, where a surface moves
 def rim_ties(topology: TexelTopology) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Flat texels [k] that links tie to a fixed rim, and the flat places [k] of these among a stencil's weights."""
-    place = np.arange(4 * topology.shape[0] * (topology.shape[1] + 1) ** 2)
-    place = place.reshape(topology.shape[0], 4, topology.shape[1] + 1, -1)
+    charts, n, _ = topology.shape
+    place = np.arange(4 * charts * (n + 1) ** 2).reshape(charts, 4, n + 1, n + 1)
     texels, places = [], []
     for link, (a, b) in enumerate(LINK_ENDS):
         tied = ties_to_rim(topology, link)

@@ -57,6 +57,8 @@ class MovedStencil(Stencil):
     cells: MovingCells
     coefficient: CellCoefficient
     places: MovedPlaces
+    _like: tuple[MovedStencil, float] | None
+    _fastest: float | None
 
     @functools.cached_property
     def _made(self) -> tuple[Stencil, NDArray[np.float64]]:
@@ -65,12 +67,12 @@ class MovedStencil(Stencil):
         return self.cells.assemble(self.places.around, self.coefficient)
 
     @functools.cached_property
-    def weights(self) -> NDArray[np.float64]:  # type: ignore[override]
+    def weights(self) -> NDArray[np.float64]:
         """Of the nine-point stencil, [C, 4, n + 1, n + 1]."""
         return self._made[0].weights
 
     @functools.cached_property
-    def irregular(self) -> IrregularLinks | None:  # type: ignore[override]
+    def irregular(self) -> IrregularLinks | None:
         """The links beyond the nine points."""
         return self._made[0].irregular
 

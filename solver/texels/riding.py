@@ -39,11 +39,11 @@ class Ride(NamedTuple):
     def of(cls, V: Floats, corners: Ints, weights: Floats, points: Floats) -> Ride:
         """The ride of points [k, 3] whose triangles and barycentric coordinates are known; NaN: of none."""
         off = np.nan_to_num(points - np.einsum("ij,ijk->ik", weights, V[corners]))
-        corners = corners.astype(np.int32)
+        short = corners.astype(np.int32)
         if np.abs(off).max(initial=0.0) <= _OFF * np.ptp(V, axis=0).max():
-            return cls(corners, weights, np.zeros((0, 3)))
-        frames = _frames(V, corners)
-        return cls(corners, weights, np.linalg.solve(np.swapaxes(frames, 1, 2), off[..., None])[..., 0])
+            return cls(short, weights, np.zeros((0, 3)))
+        frames = _frames(V, short)
+        return cls(short, weights, np.linalg.solve(np.swapaxes(frames, 1, 2), off[..., None])[..., 0])
 
     def at(self, V: Floats) -> Floats:
         """Positions [3, k] for the vertices V [n, 3] [m]."""

@@ -93,7 +93,7 @@ class WaveSolver(WaveSources):
 
         Each texel keeps its mass, so that the surface gets thinner where it stretches, and its height and velocity,
         along the normal that it has then. Stiffness and stable time step follow the lengths on the surface as soon as
-        one changes by a part in 10,000; a motion that leaves them as they are changes nothing. Speed and rates stay the
+        one changes by a part in 1,000; a motion that leaves them as they are changes nothing. Speed and rates stay the
         material's own, but for its `tightening`. The motion itself neither pushes the waves nor feels them.
 
         Parameters
