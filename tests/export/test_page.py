@@ -59,9 +59,9 @@ def ours(scene: Scene, opengl: None) -> tuple[np.ndarray, np.ndarray, np.ndarray
 def shown(page: Path) -> Iterator[Any]:
     """The page in a browser, paused."""
     with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS, timeout=180_000)  # [ms]
         tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
-        tab.set_default_timeout(180_000)  # [ms]; the machine may be busy
+        tab.set_default_timeout(180_000)  # the machine may be busy
         faults: list[str] = []
         tab.on("pageerror", lambda error: faults.append(str(error)))
         tab.on("request", lambda request: faults.append(request.url) if request.url.startswith("http") else None)

@@ -124,7 +124,9 @@ def test_lost_context_is_reported() -> None:
         except GLError as error:
             print(error)
     """
-    result = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=99)
+    result = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=300
+    )
     if result.returncode == 77:
         pytest.skip("no OpenGL")
     assert result.returncode == 0, result.stderr
@@ -190,7 +192,9 @@ def test_a_fork_is_told_to_be_spawned_and_auto_takes_the_cpu() -> None:
         except GLError as error:
             print(error, flush=True)
     """
-    result = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=99)
+    result = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, timeout=300
+    )
     if result.returncode == 77:
         pytest.skip("no OpenGL")
     assert result.returncode == 0, result.stderr
