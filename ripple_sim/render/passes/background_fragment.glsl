@@ -68,10 +68,11 @@ void main()
 #endif
     vec3 world = eye.xyz + at * way;
     vec2 place = floor_map_position(plane);
+    // the blocks of 2 x 2 that share their light are texels of the next level
 #if COARSE
-    vec2 near = texture(floor_visibility, place).rg;
+    vec2 near = texture(floor_visibility, place, 1.0).rg;
 #else
-    vec2 near = textureLod(floor_visibility, place, 0.0).rg;
+    vec2 near = textureLod(floor_visibility, place, 1.0).rg;
 #endif
 #if SHADOW
     // Shadows are averaged where all four pixels of a block belong to this pass; derivatives across others are undefined.
@@ -79,7 +80,7 @@ void main()
     bool whole = block_inside(pixel) && block_mean(solid > 0 || !met ? 1.0 : 0.0) == 0.0;
     float shadow[SHADOWS], share = 1.0 - float(solid) / float(SAMPLES);
     for (int i = 0; i < SHADOWS; ++i)
-        shadow[i] = light_visibility(i, world, floor_normal.xyz, 0.0, bvec2(whole));
+        shadow[i] = light_visibility(i, world, floor_normal.xyz, 0.0, 0.0, bvec2(whole));
 #else
     const float share = 1.0;
     bool shaded = met && may_be_shaded(place, near);

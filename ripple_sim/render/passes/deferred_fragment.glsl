@@ -17,6 +17,7 @@ out vec4 fragment;
 const float FULL_LIGHT = 0.70;  // sRGB value from which a heatmap's colour is shown as it is
 const float DARKEST = 0.45;
 const float NEUTRAL = 0.62;     // albedo under a heatmap
+const float SCATTER = 0.2;      // how far light gets under a translucent surface, in sizes of the object
 const float CREASE = 0.35;      // difference of the unit normals of two pixels: a radius of three pixels
 const vec3 INK = vec3(0.09, 0.11, 0.16);
 
@@ -96,7 +97,7 @@ vec4 lit_solid(SurfaceSample surface, vec3 position, float spread, bvec2 block)
     vec3 albedo = heatmap ? vec3(NEUTRAL) : surface.color * surface.color;
     Material m = Material(albedo, object.base.x, object.base.y, object.base.z, object.base.w, object.volume.x,
                           object.volume.y, object.volume.z, surface.thickness, behind, object.place.z,
-                          surface.visibility, object.height_map.y > 0.0 ? 0 : int(counts.x), block);
+                          SCATTER * object.volume.x * object.place.y, surface.visibility, object.height_map.y > 0.0 ? 0 : int(counts.x), block);
     vec3 shown = tone_mapped(shaded(m, position, surface.rippled, surface.normal, object.place.x, spread));
     float shade = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / FULL_LIGHT, DARKEST, 1.0);
     return vec4(mix(heatmap ? surface.color * shade : shown, INK, surface.ink), object.volume.w);

@@ -66,7 +66,7 @@ void main()
         vec3 light = incident(lights[i], world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
         bool casts = i < SHADOWS;
         shaded = shaded || casts && is_shaded(i, world, size);
-        arrives += light * (casts ? light_visibility(i, world, floor_normal.xyz, 0.0, bvec2(true)) : 1.0);
+        arrives += light * (casts ? light_visibility(i, world, floor_normal.xyz, 0.0, 0.0, bvec2(true)) : 1.0);
         unshaded += light;
     }
     float share = dot(arrives, vec3(1.0)) / dot(unshaded, vec3(1.0));

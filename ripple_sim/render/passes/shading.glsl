@@ -16,11 +16,13 @@ struct Material {
     float thickness;    // of the object under the surface, 0 to about 1
     vec3 behind;        // radiance of what is seen through the object
     float shadow_bias;  // height of bumps that the shading normal accounts for [m]
+    float scatter;      // how far light gets under the surface [m]
     float visibility;   // ambient visibility that the object itself leaves, and its neighbours where `occluders` is 0
     int occluders;
     bvec2 block;        // neighbours in the block of 2 x 2 pixels that share their shadows with this one
 };
 
+const float SOFTENED = 0.6;  // most of the ripples' shading that light under the surface takes away
 const float COAT_ROUGHNESS = 0.25;  // of a lamp's highlight: lamps are not points
 
 // Radiance of the floor about a point of it, as far as the radius [m].
@@ -29,7 +31,7 @@ vec3 floor_radiance(vec3 position, float radius)
     vec3 local = position - floor_origin.xyz;
     vec2 place = floor_map_position(vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)));
     float texel = 2.0 * floor_map.z / float(textureSize(floor_visibility, 0).x);
-    vec4 open = textureLod(floor_visibility, place, log2(max(radius / texel, 1.0)));
+    vec4 open = textureLod(floor_visibility, place, log2(max(radius / texel, 2.0)));
     vec3 lit = floor_albedo.rgb * ((floor_light.rgb + key_box) * open.b + around * (0.15 + 0.85 * open.r));
     return floor_origin.w > 0.0 ? lit : sky.rgb * 0.8;
 }
@@ -70,19 +72,24 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
 
     // in translucent objects light of their own colour wraps round the edges
     vec3 wrap = 0.6 * m.translucency * m.albedo;
+    // and it gets the further under the surface: shadows have edges of that colour, ripples are softened
+    vec3 reach = m.albedo / max(max(m.albedo.r, m.albedo.g), max(m.albedo.b, 1e-3));
+    vec3 blurred = SOFTENED * m.translucency * reach, sharpness = 1.0 / mix(vec3(1.0), 0.3 + 0.7 * reach, m.translucency);
     // light that enters elsewhere and leaves here: more of it where the object is thin
     float thin = exp(-4.0 * m.thickness);
     float shadow[SHADOWS];
     for (int i = 0; i < SHADOWS; ++i)
-        shadow[i] = light_visibility(i, position, flat_normal, m.shadow_bias, m.block);
+        shadow[i] = light_visibility(i, position, flat_normal, m.shadow_bias, m.scatter, m.block);
     vec3 direct = vec3(0.0), highlight = vec3(0.0), coated = vec3(0.0), glow = vec3(0.0);
     for (int i = 0; i < int(counts.y); ++i) {
         vec3 light;
         vec3 radiance = incident(lights[i], position, light);
         float n_l = dot(normal, light), visible = i < SHADOWS ? shadow[i] : 1.0;
         vec3 halfway = normalize(view + light);
-        vec3 diffuse = max(n_l + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
-        direct += radiance * diffuse * mix(visible, 1.0, 0.35 * m.translucency);
+        vec3 facing = mix(vec3(n_l), vec3(dot(flat_normal, light)), blurred);
+        vec3 diffuse = max(facing + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));
+        vec3 lit = clamp((visible - 0.5) * sharpness + 0.5, 0.0, 1.0);
+        direct += radiance * diffuse * mix(lit, vec3(1.0), 0.35 * m.translucency);
         vec3 arrives = 0.25 * radiance * visible * clamp(n_l * 4.0, 0.0, 1.0);
         float n_h = max(dot(normal, halfway), 0.0), v_h = max(dot(view, halfway), 0.0);
         highlight += arrives * fresnel(f0, v_h) * ggx(n_h, rough);
@@ -91,7 +98,7 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
         glow += radiance * thin * (0.35 + 0.65 * behind * behind);
     }
     vec3 surround = ambient(normal, bounce, shadow[0]) * open;
-    surround *= mix(vec3(1.0), m.albedo / max(max(m.albedo.r, m.albedo.g), max(m.albedo.b, 1e-3)), 0.8 * m.translucency);
+    surround *= mix(vec3(1.0), reach, 0.8 * m.translucency);
     // light bounces between coloured walls: occlusion is less deep and more saturated
     surround *= mix(m.albedo * (1.0 - open) + open, vec3(1.0), open);
     vec3 base = m.albedo * (direct + surround) * (1.0 - m.metallic) + m.translucency * m.albedo * glow;

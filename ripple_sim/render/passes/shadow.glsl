@@ -43,8 +43,8 @@ float widest_penumbra(int light, float to_light)
 
 // Share of a light that arrives, as the mean over the part of the pixel's block of 2 x 2 that lies to the given sides.
 // The normal is that of the surface without ripples; `bias` [m] raises the position above bumps, which shall not shade
-// each other.
-float light_visibility(int light, vec3 position, vec3 normal, float bias, bvec2 block)
+// each other; `scatter` [m] is how far light gets under the surface.
+float light_visibility(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)
 {
     vec4 place = lights[light].position, of_depth = shadows[light].depth, of_width = shadows[light].width;
     bool far_away = NEAR_LIGHTS == 0 || place.w == 0.0;
@@ -66,27 +66,28 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, bvec2 
     float first = first_point();
     vec2 start = spiral_direction(first + counts.z), direction = start;  // another one in each exposure
     float depth_bias = 0.5 * texel * metre;
-    float widest = widest_penumbra(light, to_light);
+    float least = length(vec2(1.5 / of_width.z, scatter / width)), widest = widest_penumbra(light, to_light) + least;
 
     // loops that run zero times instead of branches: software drivers execute both sides of a branch
     bool inside = counts.w > float(light) && facing > -0.5 && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
     float depth = 0.0, blockers = 0.0;
     int taps = inside ? SEARCH_TAPS : 0;
     for (int i = 0; i < taps; ++i) {
-        // denser in the middle, where a near blocker must not be missed
-        vec2 offset = widest * (float(i) + 0.25 * first) / float(SEARCH_TAPS) * direction;
+        // denser in the middle, where a near blocker must not be missed, and of no weight at the rim, where they come in
+        float away = (float(i) + 0.25 * first) / float(SEARCH_TAPS);
+        vec2 offset = widest * away * direction;
         direction = FOURTH_TURN * direction;
         float d = textureLod(shadow_maps, in_maps(light, p.xy + offset), 0.0).r;
-        float blocks = step(d, p.z + dot(slope, offset) - 2.0 * depth_bias);
+        float blocks = (1.0 - away) * step(d, p.z + dot(slope, offset) - 2.0 * depth_bias);
         depth += blocks * d;
         blockers += blocks;
     }
     depth = block_mean(depth, block);
     blockers = block_mean(blockers, block);
-    float blocker = light_distance(light, depth / max(blockers, 0.1));
-    float penumbra = max(penumbra_of(light, blocker, to_light), 1.5 / of_width.z);
+    float blocker = light_distance(light, depth / max(blockers, 1e-3));
+    float penumbra = length(vec2(penumbra_of(light, blocker, to_light), least));
     float lit = 0.0;
-    taps = inside && blockers > 0.1 ? FILTER_TAPS : 0;
+    taps = inside && blockers > 0.0 ? FILTER_TAPS : 0;
     direction = start;
     for (int i = 0; i < taps; ++i) {
         vec2 offset = penumbra * sqrt((float(i) + 0.25 * first) / float(FILTER_TAPS)) * direction;

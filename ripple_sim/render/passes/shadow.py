@@ -103,6 +103,8 @@ def _fit_near(shadow: NDArray, light: Light, size: int, centre: NDArray, radius:
     towards = light.direction if away < radius else (position - centre) / away
     widest = np.radians(_STEEPEST_FOV / 2)
     half = widest if away < 1.1 * radius else min(float(np.arcsin(radius / away)), widest)
+    if light.cutoff < half:
+        towards, half = light.direction, light.cutoff
     half = np.ceil(half * 64) / 64
     far = away + _REACH * radius
     near = max(0.5 * (away - radius), 0.004 * far)

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
-from drawn import BALL, FLOOR, FRONT, SIZE, SPOT, SUN, frame_of
+from drawn import BALL, FLOOR, FRONT, SIZE, SPOT, SUN, ball_surface, frame_of
 from scipy.ndimage import binary_erosion
 
 from ripple_sim.render.color import srgb_to_linear
+from ripple_sim.render.passes.shadow import ShadowMaps
+from ripple_sim.render.visuals.lights import Light
 
 
 @pytest.mark.parametrize("direction", [-1.0, 1.0])
@@ -102,3 +104,27 @@ def test_the_edges_of_a_coarse_ball_do_not_shade_it(gl):
     large = large.reshape(SIZE[1], 4, SIZE[0], 4, 3).mean(axis=(1, 3))
     ball = binary_erosion(large[..., 0] - large[..., 2] > 60, iterations=2)
     assert np.abs(small - large)[ball].max() < 20
+
+
+def test_the_map_of_a_spot_lamp_is_no_wider_than_its_beam(resources, frame):
+    """A lamp amid wide scenery: what its narrow beam does not reach needs no texels."""
+    spot = Light(np.array([0.0, 0.0, 1.0]), np.ones(3), np.array([0.0, 0.0, 2.0]), 0.02, np.radians(20), shadow=True)
+    ShadowMaps(resources, 1, 720).fit(frame, [spot], np.zeros(3), 5.0)
+    widths = frame.values["shadows"][0]["width"]
+    assert widths[1] == pytest.approx(2 * np.tan(np.radians(20)), rel=0.06)
+
+
+def test_shadows_on_translucent_things_are_soft_and_of_their_colour(gl):
+    """A ball's shadow on a ball of skin: its edge is wider than on clay, and redder."""
+    body = '<geom name="b" type="sphere" size=".5" pos="0 0 .5" rgba=".5 .5 .5 1"/>'
+    body += '<geom size=".1" pos="-.5 0 1.5"/>' + FLOOR + SUN.format(1.0, "{}")
+    steepest = {}
+    for look in ("clay", "skin"):
+        frames = [
+            srgb_to_linear(frame_of(gl, body.format(flag), targets={"b": ball_surface(look)}, size=(320, 240)) / 255)
+            for flag in ("true", "false")
+        ]
+        lit = (frames[0] / frames[1])[118:122, 140:180].mean(axis=0)
+        steepest[look] = np.abs(np.diff(lit, axis=0)).max(axis=0)
+    assert steepest["skin"][0] < 0.6 * steepest["clay"][0]
+    assert steepest["skin"][2] > 1.1 * steepest["skin"][0]
