@@ -38,7 +38,7 @@ class Mirror:
     ) -> None:
         self._floor, self._aspect = floor, frame_format.aspect
         width, height = frame_format.size
-        half = FrameFormat((max(width // 2, 1), max(height // 2, 1)), samples=frame_format.samples, linear=frame_format.linear)
+        half = dataclasses.replace(frame_format, size=(max(width // 2, 1), max(height // 2, 1)))
         self._size = half.size
         self._frame = FrameUniforms(resources)
         self._shading = DeferredShading(resources, half, None, light_options)
