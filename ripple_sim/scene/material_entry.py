@@ -27,6 +27,10 @@ _LAYERED = ("layer", "jelly")
 COEFFICIENTS = tuple(field.name for field in dataclasses.fields(Material) if isinstance(field.default, float))
 
 
+# Those of them that are the same everywhere: no map gives them.
+_UNIFORM = ("deep", "tightening")
+
+
 class MapEntry(msgspec.Struct, forbid_unknown_fields=True):
     """A coefficient from an image in the mesh's own texture coordinates, see `texture_map`."""
 
@@ -47,7 +51,7 @@ _LAYER = "write preset = {name = 'layer', modulus = ...} or another of a layer u
 
 def _struct(fields: Iterable[str], kind: Any, *required: tuple[str, type]) -> Any:
     """A struct with fields of one kind that may be left out (None)."""
-    optional = [(field, kind | None, None) for field in fields]
+    optional = [(field, (float if field in _UNIFORM else kind) | None, None) for field in fields]
     return msgspec.defstruct("_Fields", [*required, *optional], forbid_unknown_fields=True)
 
 

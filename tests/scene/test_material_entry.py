@@ -18,6 +18,7 @@ def material_of(table: dict) -> Material:
     [
         ({}, Material()),
         ({"speed": 2, "density": 5.0}, Material(speed=2.0, density=5.0)),
+        ({"tightening": 1.0}, Material(tightening=1.0)),
         ({"preset": "jelly"}, Material.jelly()),
         ({"preset": {"name": "layer", "modulus": 2e3, "thickness": 0.02}}, Material.layer(2e3, thickness=0.02)),
         ({"preset": "gelatine-7"}, Material.preset("gelatine-7")),
@@ -62,3 +63,9 @@ def test_preset_gives_what_is_left_out(table: dict, expected: Material) -> None:
 def test_wrong_presets_are_refused_with_what_is_valid(table: dict, message: str) -> None:
     with pytest.raises(RippleError, match=message):
         material_of(table)
+
+
+@pytest.mark.parametrize("name", ["tightening", "deep"])
+def test_what_is_the_same_everywhere_takes_no_map(name: str) -> None:
+    with pytest.raises(RippleError, match=rf"Expected `float \| null`, got `str` - at `ripple\[0\].material.{name}`"):
+        material_of({name: "map.png"})
