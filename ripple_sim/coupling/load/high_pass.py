@@ -41,7 +41,7 @@ class HighPass:
             return load
         forces = np.bincount(load.texels, load.forces, len(self._mass)).astype(np.float64)
         # sparse products, and einsum, stay off the threads of BLAS, which wait for one another on a busy machine
-        coarse = self._solve(_times(self._basis.T, forces))
+        coarse = self._solve(_times(self._basis[load.texels].T, load.forces))
         return Load(np.arange(len(forces)), forces - self._mass * _times(self._basis, coarse))
 
 
