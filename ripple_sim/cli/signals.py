@@ -3,7 +3,8 @@
 Before a command begins, and during imports, where an exception could be taken for an import error, there is nothing to
 clean up, and the process ends at once. Later the signal becomes an exception, but never within a call of moderngl's,
 which would end in a segmentation fault, nor within VTK's, which swallows exceptions of what it calls back or exits by
-itself, nor while a video is being opened: then a timer tries again until it is over.
+itself, nor within zarr's, whose threads would go on to write into a folder that is being removed, nor while a video is
+being opened: then a timer tries again until it is over.
 A second signal ends the process at once; what is left is then as whole as after a kill. One that comes after the
 command, while the interpreter shuts down, changes nothing.
 """
@@ -15,16 +16,16 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from types import FrameType
+from types import CodeType, FrameType
 from typing import Any
 
 _WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
 INTERRUPTED, TERMINATED, HUNG_UP = (128 + number for number in _WORDS)
 
 # Files within whose calls no exception is raised, by parts of their paths.
-_NEVER_IN = ("moderngl/__init__.py", "/pyvista/plotting/", "encode/open_writer.py")
-# Where an import may be under way and there is something to clean up.
-_AT_STAKE = "video/render_video.py"
+_NEVER_IN = ("moderngl/__init__.py", "/pyvista/plotting/", "encode/open_writer.py", "zarr/core/sync.py")
+# In whose functions an import may be under way and there is something to clean up.
+_AT_STAKE = ("video/render_video.py", "export/export_scene.py", "cycles/render_cycles.py")
 
 _RETRY = 0.02  # [s]
 
@@ -67,9 +68,11 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
-    files = list(_files(frame))
+    running = list(_running(frame))
+    files = [code.co_filename for code in running]
     importing = any(file.startswith("<frozen importlib") for file in files)
-    if importing and not any(file.endswith(_AT_STAKE) for file in files):
+    at_stake = any(code.co_filename.endswith(_AT_STAKE) and code.co_name != "<module>" for code in running)
+    if importing and not at_stake:
         _end(number, frame)
     if importing or any(part in file for file in files for part in _NEVER_IN):
         _retry(number)
@@ -96,8 +99,8 @@ def _retry_what_got_lost(before: Callable[[Any], object], unraisable: Any) -> No
         before(unraisable)
 
 
-def _files(frame: FrameType | None) -> Iterator[str]:
-    """Files of the functions that are running, from the innermost."""
+def _running(frame: FrameType | None) -> Iterator[CodeType]:
+    """The functions that are running, from the innermost."""
     while frame is not None:
-        yield frame.f_code.co_filename
+        yield frame.f_code
         frame = frame.f_back

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -71,6 +72,19 @@ def test_before_a_command_and_during_imports_the_process_ends_with_one_line(
     assert (result.stdout, result.stderr) == ("", f"ripple-sim: {line}\n")
 
 
+@pytest.mark.parametrize("file", ["video/render_video.py", "export/export_scene.py", "cycles/render_cycles.py"])
+def test_an_import_is_waited_for_where_something_is_to_be_cleaned_up(tmp_path: Path, file: str) -> None:
+    """An export that was interrupted while it imported its writer left a hidden folder behind."""
+    (tmp_path / "slow.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\nprint('imported')\n")
+    program = (
+        f"import sys, time\nsys.path.insert(0, {str(tmp_path)!r})\nfrom ripple_sim.cli import signals\n"
+        f"exec(compile('def call():\\n import slow\\n for _ in range(500): time.sleep(0.01)', {file!r}, 'exec'))\n"
+        "signals.end_in_good_order()\ntry:\n    call()\nfinally:\n    print('cleaned up')\n"
+    )
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout) == (128 + signal.SIGTERM, "imported\ncleaned up\n")
+
+
 @pytest.mark.parametrize(("number", "line"), [(signal.SIGTERM, "terminated"), (signal.SIGHUP, "hung up")])
 def test_the_rule_holds_from_the_first_import_on(number: int, line: str) -> None:
     program = (
@@ -115,10 +129,12 @@ def within(file: str, number: int) -> list[str]:
 @pytest.mark.parametrize("number", ALL)
 def test_no_exception_is_raised_within_a_call_of_moderngls_but_soon_after(number: int) -> None:
     import moderngl
+    from zarr.core import sync
 
     assert within(moderngl.__file__, number) == ["call ended"]
     assert within(open_writer.__code__.co_filename, number) == ["call ended"]
     assert within("/lib/pyvista/plotting/render_window_interactor.py", number) == ["call ended"]  # VTK calls back
+    assert within(sync.__file__, number) == ["call ended"]  # its threads would write on
     assert within("elsewhere.py", number) == []
 
 
