@@ -1,8 +1,8 @@
 """Ctrl-C, SIGTERM and SIGHUP: one line, status 128 + the signal's number, and what is unfinished is cleaned up.
 
 Before a command begins, and during imports, where an exception could be taken for an import error, there is nothing to
-clean up, and the process ends at once. Later the signal becomes an exception, but never within a call of moderngl's,
-which would end in a segmentation fault, nor within VTK's, which swallows exceptions of what it calls back or exits by
+clean up, and the process ends at once. Later the signal becomes an exception, but never within a call of moderngl's or
+LLVM's, which would end in a segmentation fault, nor within VTK's, which swallows exceptions of what it calls back or exits by
 itself, nor within zarr's, whose threads would go on to write into a folder that is being removed, nor while a video is
 being opened: then a timer tries again until it is over.
 A second signal ends the process at once; what is left is then as whole as after a kill. One that comes after the
@@ -23,7 +23,14 @@ _WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIG
 INTERRUPTED, TERMINATED, HUNG_UP = (128 + number for number in _WORDS)
 
 # Files within whose calls no exception is raised, by parts of their paths.
-_NEVER_IN = ("moderngl/__init__.py", "/pyvista/plotting/", "encode/open_writer.py", "zarr/core/sync.py")
+_NEVER_IN = (
+    "moderngl/__init__.py",
+    "/llvmlite/binding/",
+    "numba/core/codegen.py",
+    "/pyvista/plotting/",
+    "encode/open_writer.py",
+    "zarr/core/sync.py",
+)
 # In whose functions an import may be under way and there is something to clean up.
 _AT_STAKE = ("video/render_video.py", "export/export_scene.py", "cycles/render_cycles.py")
 
