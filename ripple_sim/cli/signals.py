@@ -2,9 +2,9 @@
 
 Before a command begins, and during imports, where an exception could be taken for an import error, there is nothing to
 clean up, and the process ends at once. Later the signal becomes an exception, but never within a call of moderngl's or
-LLVM's, which would end in a segmentation fault, nor within VTK's, which swallows exceptions of what it calls back or exits by
-itself, nor within zarr's, whose threads would go on to write into a folder that is being removed, nor while a video is
-being opened: then a timer tries again until it is over.
+LLVM's, which would end in a segmentation fault, nor within VTK's, which swallows exceptions of what it calls back or
+exits by itself, nor within zarr's, whose threads would go on to write into a folder that is being removed, nor while a
+video is being opened: then a timer tries again until it is over.
 A second signal ends the process at once; what is left is then as whole as after a kill. One that comes after the
 command, while the interpreter shuts down, changes nothing.
 """
