@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable
+from typing import Protocol, Self
 
 import mujoco
 
@@ -21,6 +22,23 @@ from .errors import SceneError, SimulationError
 
 # More is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000
+
+
+class RunOptions(Protocol):
+    """What the options of a video, an export or a batch say of the simulation itself; see `Simulation`."""
+
+    @property
+    def rate(self) -> float:
+        """Frames in a second of the scene's time."""
+
+    @property
+    def resolution(self) -> int | None: ...  # noqa: D102
+    @property
+    def layout(self) -> str | None: ...  # noqa: D102
+    @property
+    def rim(self) -> str | None: ...  # noqa: D102
+    @property
+    def backend(self) -> str: ...  # noqa: D102
 
 
 class Simulation:
@@ -101,6 +119,27 @@ class Simulation:
         self.physics_seconds = self.wave_seconds = 0.0
         self.impulses: list[Impulse] = []
         self._steps = 0  # of the next frame, already taken
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        options: RunOptions,
+        *,
+        operator: str = "fem",
+        on_step: Callable[[Simulation], None] | None = None,
+    ) -> Self:
+        """Simulation of a scene as options say."""
+        return cls(
+            scene,
+            fps=options.rate,
+            resolution=options.resolution,
+            layout=options.layout,
+            rim=options.rim,
+            backend=options.backend,
+            operator=operator,
+            on_step=on_step,
+        )
 
     @property
     def backend(self) -> str:

@@ -113,7 +113,7 @@ def render_scene(scene: Scene, store: StoreEntry, folder: Path) -> tuple[FrameRe
     if name is not None:
         render_video(scene, path, options, on_frame=record)
         return record, path
-    simulation = Simulation(scene, fps=options.rate, resolution=store.resolution, backend=options.backend)
+    simulation = Simulation.of(scene, options)
     for number in range(frame_count(options)):
         if number:
             simulation.advance_frame()

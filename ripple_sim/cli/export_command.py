@@ -11,7 +11,7 @@ from tyro.conf import Positional, arg
 
 from ripple_sim.export.options import ExportOptions
 
-from .arguments import Count, Duration, Factor, Resolution, SceneLayout, SceneSeed, Size
+from .arguments import Count, Duration, Factor, Resolution, Rim, SceneLayout, SceneSeed, Size
 
 # By field: how its word on the command line is read. The others are read as their types say.
 _WORDS: dict[str, Any] = {
@@ -22,6 +22,7 @@ _WORDS: dict[str, Any] = {
     "size": Size,
     "resolution": Resolution,
     "layout": SceneLayout,
+    "rim": Rim,
 }
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ripple_sim.encode import open_writer
+from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
 from ripple_sim.errors import ExportError, VideoError
 from ripple_sim.export.endings import ending_of
 from ripple_sim.export.export_scene import scene_source
@@ -19,6 +19,7 @@ from ripple_sim.export.options import ExportOptions
 from ripple_sim.scene.camera_override import with_exposure
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
+from ripple_sim.video.open_video import open_video
 from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.settings import EXPOSURE, check_options, frame_count, settled
 
@@ -72,20 +73,14 @@ def render_cycles(
         Before anything is simulated if bpy or usd-core is missing, an option is one of ours alone, or the output or
         the scene is invalid; later if Blender fails or the video cannot be written.
     """
+    adopt_warnings()
     output = Path(output)
     python = check_cycles(options, output, samples)
     options = settled(dataclasses.replace(options, overlay=()), scene, output)
     scene = with_exposure(scene, **{name: getattr(options, name) for name in EXPOSURE})
     frames, start = frame_count(options), time.perf_counter()
     with (
-        open_writer(
-            output,
-            width=options.size[0],
-            height=options.size[1],
-            fps=options.fps or 0,
-            frame_format=options.frame_format,
-            overwrite=options.overwrite,
-        ) as writer,
+        open_video(output, options) as writer,
         tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder,
     ):
         stage = Path(folder) / "stage.usdc"
@@ -121,14 +116,7 @@ def check_cycles(options: VideoOptions, output: Path, samples: int = SAMPLES) ->
 
 def _export(scene: Scene, stage: Path, options: VideoOptions, frames: int) -> dict:
     """Write the run, and return what Blender is told beside it."""
-    simulation = Simulation(
-        scene,
-        fps=options.rate,
-        resolution=options.resolution,
-        layout=options.layout,
-        rim=options.rim,
-        backend=options.backend,
-    )
+    simulation = Simulation.of(scene, options)
     exported = ExportOptions(fps=options.fps or 1, slow_motion=options.slow_motion, size=options.size)
     source = scene_source(scene, simulation, exported)
     with Exporter.of(source, stage) as exporter:

@@ -70,15 +70,8 @@ def export_scene(
     adopt_warnings()
     check_options(options)
     check_export(Path(output), options.overwrite)
-    frames, rate = frame_count(options, scene), options.fps * options.slow_motion
-    simulation = Simulation(
-        scene,
-        fps=rate,
-        resolution=options.resolution,
-        layout=options.layout,
-        backend=options.backend,
-        on_step=on_step,
-    )
+    frames = frame_count(options, scene)
+    simulation = Simulation.of(scene, options, on_step=on_step)
     simulated = written = 0.0
     with Exporter.of(scene_source(scene, simulation, options), output, options.overwrite) as exporter:
         for number in range(frames):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.render.surfaces.charts import Charts
 from ripple_sim.render.surfaces.moving_surface import MovingSurface
+from ripple_sim.render.surfaces.moving_vertices import Riding
 from ripple_sim.render.surfaces.vertices import COORDINATES, DIRECTION, NORMAL, POSITION, UV, tessellated
 from ripple_sim.render.visuals.corners import normalized, smooth_normals, split_corners
 from ripple_sim.solver import Atlas, HeightMap
@@ -79,6 +80,11 @@ class MovingMesh:
         self._rest = _Rest(self.rest, self.directions, normals, texels, offsets)
         self._height_map = HeightMap.drawn(atlas, limit)
         self._moving = MovingSurface(atlas, self.rest, self.directions, normals)
+
+    @property
+    def riding(self) -> Riding:
+        """How the points ride on the mesh's own vertices."""
+        return self._moving.vertices.rest
 
     def shape(
         self, height: NDArray[np.float32], velocity: NDArray[np.float32], V: NDArray[np.float64] | None = None

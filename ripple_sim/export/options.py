@@ -34,10 +34,17 @@ class ExportOptions:
     """Texels along the edge of a cube's chart; more resolve finer waves and take longer."""
     layout: str | None = None
     """How surfaces get their charts: cube (closed, one part, no handles), patches (any), or auto."""
+    rim: str | None = None
+    """What the rims of open surfaces do: free, or fixed as that of a drum's skin."""
     backend: Backend = "auto"
     """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
     overwrite: bool = False
     """Replace an output that ripple-sim has not made."""
+
+    @property
+    def rate(self) -> float:
+        """Frames in a second of the scene's time."""
+        return self.fps * self.slow_motion
 
 
 class WriteOptions(TypedDict, total=False):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
-from ripple_sim.encode import FrameWriter, open_writer
+from ripple_sim.encode import FrameWriter
 from ripple_sim.errors import VideoError
 from ripple_sim.overlay.comparison import compared_operators
 from ripple_sim.scene.camera_override import with_exposure
@@ -17,6 +17,7 @@ from ripple_sim.solver.checked import PATH, checked, instance
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .film import Film
+from .open_video import open_video
 from .options import VideoOptions
 from .prefetch import Prefetch
 from .settings import EXPOSURE, check_options, frame_count, render_settings, settled
@@ -79,17 +80,7 @@ def render_video(
     check_options(options, output)
     scene = with_exposure(scene, **{name: getattr(options, name) for name in EXPOSURE})
     frames, gl = frame_count(options), shared_context()
-    with open_writer(
-        output,
-        width=options.size[0],
-        height=options.size[1],
-        fps=options.fps or 0,
-        transparent=options.transparent,
-        frame_format=options.frame_format,
-        settings=render_settings(scene, options, frames, gl),
-        resume=options.resume,
-        overwrite=options.overwrite,
-    ) as writer:
+    with open_video(output, options, render_settings(scene, options, frames, gl)) as writer:
         resumed_at = writer.frames
         film = Film(_simulations(scene, options, on_step), options, frames, on_frame)
         if options.passes:
@@ -100,19 +91,8 @@ def render_video(
 
 def _simulations(scene: Scene, options: VideoOptions, on_step: Callable[[Simulation], None] | None) -> list[Simulation]:
     """One simulation for each of the wave operators that are shown."""
-    return [
-        Simulation(
-            scene,
-            fps=options.rate,
-            resolution=options.resolution,
-            layout=options.layout,
-            rim=options.rim,
-            backend=options.backend,
-            operator=operator,
-            on_step=on_step,
-        )
-        for operator in compared_operators(options.compare)
-    ]
+    operators = compared_operators(options.compare)
+    return [Simulation.of(scene, options, operator=operator, on_step=on_step) for operator in operators]
 
 
 def _write_frames(film: Film, writer: FrameWriter, frames: int, gl: GLContext, progress: Progress | None) -> Times:

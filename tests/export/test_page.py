@@ -1,6 +1,7 @@
 """Pages that play a run: their coding, and what a browser shows."""
 
 import base64
+import contextlib
 import html
 import io
 import re
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ripple_sim import Exporter, ExportOptions, Ripples, export_scene
+from ripple_sim import Exporter, ExportOptions, Material, Ripples, export_scene
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.encode.mark import made_here
@@ -56,20 +57,33 @@ def ours(scene: Scene, opengl: None) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 @pytest.fixture(scope="module")
-def shown(page: Path) -> Iterator[Any]:
-    """The page in a browser, paused."""
+def browser() -> Iterator[Any]:
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS, timeout=180_000)  # [ms]
-        tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
-        tab.set_default_timeout(180_000)  # the machine may be busy
-        faults: list[str] = []
-        tab.on("pageerror", lambda error: faults.append(str(error)))
-        tab.on("request", lambda request: faults.append(request.url) if request.url.startswith("http") else None)
-        tab.goto(page.as_uri())
+        yield browser
+        browser.close()
+
+
+@contextlib.contextmanager
+def opened(browser: Any, page: Path) -> Iterator[Any]:
+    """A page in a browser, in which nothing may go wrong."""
+    tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
+    tab.set_default_timeout(180_000)  # [ms]; the machine may be busy
+    faults: list[str] = []
+    tab.on("pageerror", lambda error: faults.append(str(error)))
+    tab.on("request", lambda request: faults.append(request.url) if request.url.startswith("http") else None)
+    tab.goto(page.as_uri())
+    yield tab
+    assert faults == []
+    tab.close()
+
+
+@pytest.fixture(scope="module")
+def shown(browser: Any, page: Path) -> Iterator[Any]:
+    """The page in a browser, paused."""
+    with opened(browser, page) as tab:
         tab.evaluate("ripplePlayer.ready.then(player => { player.playing = false; })")
         yield tab
-        assert faults == []
-        browser.close()
 
 
 def pixels(tab: Any) -> np.ndarray:
@@ -180,3 +194,43 @@ def test_it_plays_and_contacts_are_arrows(shown: Any) -> None:
     shown.click("#play")
     shown.wait_for_function("ripplePlayer.player.number > 2")
     shown.click("#play")
+
+
+MOVING = """<mujoco><option timestep="0.002" solver="CG"/><worldbody>
+<geom name="egg" type="ellipsoid" size="0.3 0.25 0.2" pos="1 0 0.5" quat="1 0.2 0.1 0"/>
+<flexcomp name="jelly" type="grid" count="3 3 3" spacing=".1 .1 .1" pos="0 0 .2" dim="3" radius=".005" dof="trilinear"
+  mass="2"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3" damping=".02"/></flexcomp>
+<geom type="plane" size="3 3 .1" pos="0 0 .09"/></worldbody></mujoco>"""
+
+
+@browsing
+def test_the_browser_has_every_point_of_surfaces_that_move(browser: Any, tmp_path: Path) -> None:
+    """A soft body that moves from the first frame, and a geom that is moved by hand within the second chunk."""
+    model = mujoco.MjModel.from_xml_string(MOVING)
+    data, waves = mujoco.MjData(model), Material(speed=0.3, density=1500.0)
+    ripples = Ripples(model, {"egg": waves, "jelly": waves}, resolution=8, backend="cpu")
+    meshes = {name: MovingMesh(ripples[name].rest, triangles=16_000) for name in ripples}
+    rest, seen = ripples["egg"].rest.mesh.V, {}
+    with Exporter(model, ripples, tmp_path / "run.html", size=SIZE) as exporter:
+        for frame in range(20):
+            if frame >= 18:
+                ripples["egg"].move(rest * [1.1, 1.0, 1.0 - 0.01 * frame] + 0.02 * np.sin(9 * rest[:, [1, 2, 0]]))
+            ripples["egg"].add_height(0.001 * ripples["egg"].atlas.normals[..., 0])
+            ripples.mj_step(data, nstep=10)
+            exporter.write(data)
+            for name in ripples:
+                height, V = ripples[name].height, ripples.vertices(name, data)
+                seen[frame, name] = meshes[name].shape(height, height, V).points
+    with opened(browser, tmp_path / "run.html") as tab:
+        tab.evaluate("ripplePlayer.ready.then(player => { player.playing = false; })")
+        for number, name in enumerate(ripples):
+            mesh = meshes[name]
+            order, size = local_order(mesh.rest, mesh.F)[1], np.ptp(mesh.rest, axis=0).max()
+            for frame in (17, 18, 19, 3):
+                points = tab.evaluate(
+                    f"ripplePlayer.player.show({frame}).then("
+                    f"() => Array.from(ripplePlayer.player.drawing.parts[{number}].data[0]))"
+                )
+                expected = seen[frame, name][order]
+                assert np.abs(np.reshape(points, (-1, 3)) - expected).max() < 1e-4 * size
+            assert np.abs(seen[19, name] - seen[3, name]).max() > 0.05 * size  # it moves

@@ -8,7 +8,7 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-_LARGEST = 32767
+_LARGEST = 1 << 20
 
 
 def parents_of(F: NDArray[np.int64], count: int) -> NDArray[np.int64]:
@@ -36,7 +36,7 @@ def residuals(now: NDArray[np.int64], before: NDArray[np.int64], parents: NDArra
     change = np.append(now - before, 0)  # -1: no parent, no change
     left = change[:-1] - (change[parents[:, 0]] + change[parents[:, 1]] >> 1)
     zigzag = np.where(left < 0, -2 * left - 1, 2 * left).astype("<u4")
-    # the prediction's error may take 18 bits
+    # the prediction's error may take 23 bits
     return b"".join((zigzag >> shift & 255).astype(np.uint8).tobytes() for shift in (0, 8, 16))
 
 

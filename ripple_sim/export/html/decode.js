@@ -7,14 +7,19 @@ async function bytesOf(text) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-// Gives each part its points [m], directions, triangles F and texture coordinates of their corners.
-function readArrays(parts, bytes) {
+// Takes typed arrays from bytes, one after the other.
+function reader(bytes) {
   let at = 0;
-  const take = (Type, count) => {
+  return (Type, count) => {
     const size = count * Type.BYTES_PER_ELEMENT;
     at += size;
     return new Type(bytes.slice(at - size, at).buffer);
   };
+}
+
+// Gives each part its points [m], directions, triangles F and texture coordinates of their corners.
+function readArrays(parts, bytes) {
+  const take = reader(bytes);
   for (const part of parts) {
     const places = take(Uint16Array, 3 * part.points), directions = take(Int16Array, 3 * part.points);
     part.rest = Float32Array.from(places, (place, i) => part.low[i % 3] + place / 65535 * part.size);
@@ -42,6 +47,7 @@ class Frames {
     this.meta = meta;
     this.targets = targets;
     this.parents = targets.map(parentsOf);
+    this.motions = new Map();  // of the targets that move, by their numbers
     this.kept = new Map();
     this.most = 24;
   }
@@ -62,26 +68,43 @@ class Frames {
     return (await this.kept.get(chunk))[number % this.meta.chunk];
   }
 
-  decoded(bytes) {
+  async motion(target) {
+    if (!this.motions.has(target)) {
+      const told = JSON.parse(document.querySelector(`script.motion[data-target="${target}"]`).textContent);
+      this.motions.set(target, new Motion(this.targets[target], told, await bytesOf(told.arrays)));
+    }
+    return this.motions.get(target);
+  }
+
+  async decoded(bytes) {
     const size = new DataView(bytes.buffer).getUint32(0, true);
-    const {poses, arrows} = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + size)));
+    const {poses, arrows, middles} = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + size)));
     let at = 4 + size;
+    // Whole steps: those before and what was left after prediction, in three planes of bytes.
+    const next = (before, parents) => {
+      const count = before.length, change = new Int32Array(count + 1), now = new Int32Array(count);
+      for (let v = 0; v < count; v++) {
+        const code = bytes[at + v] | bytes[at + count + v] << 8 | bytes[at + 2 * count + v] << 16;
+        const left = code & 1 ? -(code + 1 >> 1) : code >> 1;
+        change[v] = left + (change[parents[2 * v]] + change[parents[2 * v + 1]] >> 1);
+        now[v] = before[v] + change[v];
+      }
+      at += 3 * count;
+      return now;
+    };
     let before = this.targets.map(part => new Int32Array(part.points));
-    return poses.map((pose, i) => {
-      const steps = this.targets.map((part, k) => {
-        const count = part.points, parents = this.parents[k], last = before[k];
-        const change = new Int32Array(count + 1), now = new Int32Array(count);
-        for (let v = 0; v < count; v++) {
-          const code = bytes[at + v] | bytes[at + count + v] << 8 | bytes[at + 2 * count + v] << 16;
-          const left = code & 1 ? -(code + 1 >> 1) : code >> 1;
-          change[v] = left + (change[parents[2 * v]] + change[parents[2 * v + 1]] >> 1);
-          now[v] = last[v] + change[v];
-        }
-        at += 3 * count;
-        return now;
-      });
-      before = steps;
-      return {pose, arrows: arrows[i], steps};
+    const frames = poses.map((pose, i) => {
+      before = before.map((last, k) => next(last, this.parents[k]));
+      return {pose, arrows: arrows[i], steps: before, vertices: []};
     });
+    for (const [target, places] of Object.entries(middles)) {
+      const {points, step, parents} = await this.motion(target);
+      let axes = [0, 1, 2].map(() => new Int32Array(points));
+      places.forEach((middle, i) => {
+        axes = axes.map(last => next(last, parents));
+        frames[i].vertices[target] = Float32Array.from({length: 3 * points}, (_, v) => middle[v % 3] + step * axes[v % 3][Math.floor(v / 3)]);
+      });
+    }
+    return frames;
   }
 }

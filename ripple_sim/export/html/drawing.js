@@ -6,10 +6,10 @@ class Drawing {
     const software = drawsInSoftware();
     const gl = canvas.getContext("webgl2", {antialias: !software, preserveDrawingBuffer: true, alpha: false});
     if (!gl) throw new Error("this browser has no WebGL 2");
-    this.gl = gl; this.canvas = canvas; this.meta = meta;
+    this.gl = gl; this.canvas = canvas; this.meta = meta; this.software = software;
     this.shadowSize = software ? 512 : 1024;
     const lamps = meta.light.lamps;
-    this.defines = `#version 300 es\n#define LAMPS ${lamps.length}\n#define NEAR ${Number(lamps.some(lamp => lamp.position))}\n#define TAPS ${software ? 1 : 2}\n#define SHADOW_SIZE ${this.shadowSize}.0\n`;
+    this.defines = `#version 300 es\n#define LAMPS ${lamps.length}\n#define NEAR ${Number(lamps.some(lamp => lamp.position))}\n#define TAPS ${software ? 2 : 5}\n#define SHADOW_SIZE ${this.shadowSize}.0\n`;
     this.surface = this.program(SURFACE_VERTEX, SURFACE_FRAGMENT);
     this.fine = software ? this.program(FINE_VERTEX, FINE_FRAGMENT) : this.surface;
     this.depth = this.program(DEPTH_VERTEX, DEPTH_FRAGMENT);
@@ -76,7 +76,7 @@ class Drawing {
     if (row) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, source.length, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(source.flatMap(c => [...c, 255])));
     else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, source);
     gl.generateMipmap(gl.TEXTURE_2D);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, row ? gl.LINEAR : gl.LINEAR_MIPMAP_LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, row ? gl.LINEAR : this.software ? gl.LINEAR_MIPMAP_NEAREST : gl.LINEAR_MIPMAP_LINEAR);
     for (const side of ["S", "T"]) gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_WRAP_${side}`], row ? gl.CLAMP_TO_EDGE : gl.REPEAT);
     return texture;
   }
@@ -109,9 +109,9 @@ class Drawing {
     return {...part, array, buffers, data, source, index, local: placed(part.position, part.quaternion)};
   }
 
-  // Displaces a target by heights in steps [m]; normals are those of the triangles round a point, creases stay.
-  displace(part, steps, step, limit) {
-    const gl = this.gl, {rest, directions, F, source, data} = part, count = part.points;
+  // Displaces a target from its rest by heights in steps [m]; normals are those of the triangles round a point, creases stay.
+  displace(part, {rest, directions}, steps, step, limit) {
+    const gl = this.gl, {F, source, data} = part, count = part.points;
     const points = new Float32Array(3 * count), normals = new Float32Array(3 * count);
     for (let i = 0; i < count; i++) for (let k = 0; k < 3; k++) points[3 * i + k] = rest[3 * i + k] + steps[i] * step * directions[3 * i + k];
     for (let t = 0; t < F.length; t += 3) {

@@ -13,19 +13,19 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.model.soft_ids import is_soft
+from ripple_sim.coupling.model.soft_ids import target_pose
 from ripple_sim.encode.mark import MARK, made_here
-from ripple_sim.errors import ExportError
 from ripple_sim.export.source import Moment, Source
 from ripple_sim.render.passes.floor import find_floor
 from ripple_sim.render.visuals.visual import visible_geoms
 
 from .coding import packed, parents_of, quantised, residuals
+from .motion import Motion
 from .static import floor_of, heat_colors, images, light_of, solid_parts, target_mesh, target_part
 
 _CHUNK = 16  # frames that are decoded together
 _STEP = 5e-5  # of heights, in sizes of the object
-_SCRIPTS = ("decode.js", "algebra.js", "shaders.js", "light.js", "drawing.js", "player.js")
+_SCRIPTS = ("algebra.js", "decode.js", "motion.js", "shaders.js", "light.js", "drawing.js", "player.js")
 
 
 class PageWriter:
@@ -39,15 +39,15 @@ class PageWriter:
 
     def __init__(self, source: Source, path: Path) -> None:
         self._source, self._file = source, path.open("w", encoding="utf-8")
-        soft = [name for name, geom in source.ripples.geom_ids.items() if is_soft(source.model, geom)]
-        if soft:
-            raise ExportError(
-                f"a page cannot show the moving surfaces of {', '.join(map(repr, soft))}; take a USD file"
-            )
         self._meshes = {name: target_mesh(source, name) for name in source.ripples}
         self._targets = {name: target_part(source, name, mesh) for name, mesh in self._meshes.items()}
         self._parents = {name: parents_of(part.F, len(part.vertices)) for name, part in self._targets.items()}
         self._steps = {name: _STEP * float(np.ptp(mesh.rest, axis=0).max()) for name, mesh in self._meshes.items()}
+        self._motions = [
+            Motion(source.ripples[name].rest.mesh, self._meshes[name], part.vertices)
+            for name, part in self._targets.items()
+        ]
+        self._told: set[int] = set()  # targets whose motion has been told of
         self._last: dict[str, Any] = {}
         self._poses: list[list[list[float]]] = []
         self._arrows: list[list[list[float]]] = []
@@ -60,8 +60,9 @@ class PageWriter:
             self._begin(moment.data)
         self._poses.append(self._pose(moment.data))
         self._arrows.append([self._arrow(moment.data, impulse) for impulse in moment.impulses])
-        for name, mesh in self._meshes.items():
+        for (name, mesh), motion in zip(self._meshes.items(), self._motions, strict=True):
             waves = self._source.ripples[name]
+            motion.add(self._source.ripples.vertices(name, moment.data))
             heights = mesh.shape(waves.height, waves.velocity).heights[self._targets[name].vertices]
             steps = quantised(heights, self._steps[name])
             # a chunk begins from nothing, so that it can be decoded alone
@@ -120,18 +121,34 @@ class PageWriter:
     def _arrow(self, data: mujoco.MjData, impulse: Any) -> list[float]:
         """Point and inward direction in the world, and impulse [N s]."""
         ripples = self._source.ripples
-        rotation = data.geom_xmat[ripples.geom_ids[impulse.geom]].reshape(3, 3)
+        _, rotation = target_pose(data, ripples.geom_ids[impulse.geom])
         inwards = -rotation @ ripples[impulse.geom].atlas.normals[impulse.texel] * (-1 if impulse.inner else 1)
         return [round(float(x), 5) for x in (*impulse.point, *inwards, impulse.impulse)]
 
     def _flush(self) -> None:
         """Write the frames that wait as a chunk."""
         if self._poses:
-            text = json.dumps({"poses": self._poses, "arrows": self._arrows}).encode()
-            content = len(text).to_bytes(4, "little") + text + b"".join(self._planes)
+            middles, moved = self._moved()
+            text = json.dumps({"poses": self._poses, "arrows": self._arrows, "middles": middles}).encode()
+            content = len(text).to_bytes(4, "little") + text + b"".join(self._planes + moved)
             self._file.write(f'<script type="text/plain" class="chunk">{packed(content)}</script>\n')
             self._file.flush()
         self._poses, self._arrows, self._planes = [], [], []
+
+    def _moved(self) -> tuple[dict[int, list[list[float]]], list[bytes]]:
+        """Middles and coded vertices of the targets that move, by number; each is told of before it first does."""
+        middles, planes = {}, []
+        for number, motion in enumerate(self._motions):
+            places, coded = motion.chunk()
+            if not motion.moves:
+                continue
+            if number not in self._told:
+                told = json.dumps(motion.told())
+                self._file.write(f'<script type="application/json" class="motion" data-target="{number}">{told}</script>\n')
+                self._told.add(number)
+            middles[number] = places
+            planes.append(coded)
+        return middles, planes
 
 
 def writer(source: Source, path: Path) -> PageWriter:

@@ -1,7 +1,7 @@
 "use strict";
 // The player: time, camera and controls. Tests and other pages may use `ripplePlayer`.
 const ARROW_LENGTH = 0.25;  // of the strongest contact, in distances of the camera
-const SLOW = 40, COARSEST = 0.6;  // time of a frame from which fewer pixels are drawn while it plays [ms], and how few
+const SLOW = 32, COARSEST = 0.6;  // time of a frame from which fewer pixels are drawn while it plays [ms], and how few
 
 function arrowPart() {
   const points = [], normals = [], F = [], sides = 10;
@@ -39,8 +39,9 @@ class Player {
     this.frame = await this.frames.get(Math.floor(this.number));
     this.frame.steps.forEach((steps, i) => {
       this.limits[i] = steps.reduce((most, step) => Math.max(most, Math.abs(step)), this.limits[i]);
-      const part = this.drawing.parts.filter(each => each.target)[i];
-      this.drawing.displace(part, steps, this.meta.steps[i], 0.8 * this.limits[i] * this.meta.steps[i]);
+      const part = this.drawing.parts.filter(each => each.target)[i], V = this.frame.vertices[i];
+      const rest = V ? this.frames.motions.get(String(i)).at(V) : part;
+      this.drawing.displace(part, rest, steps, this.meta.steps[i], 0.8 * this.limits[i] * this.meta.steps[i]);
     });
     this.redraw();
     this.shown++;

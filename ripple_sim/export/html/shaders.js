@@ -1,6 +1,6 @@
 "use strict";
 // The renderer's surface shading (render/passes/shading.glsl) with a single shadow map and without its occlusion maps.
-// LAMPS, NEAR (whether any lamp has a position), SHADOW_SIZE and TAPS (of the shadow map, to each side) are defined when it is
+// LAMPS, NEAR (whether any lamp has a position), SHADOW_SIZE and TAPS (of the shadow map, along each side) are defined when it is
 // compiled.
 const LIGHT = `
 precision highp float;
@@ -21,9 +21,9 @@ float shadowAt(vec3 p, vec3 n) {
   vec3 c = q.xyz / q.w * 0.5 + 0.5;
   if (any(lessThan(c, vec3(0.0))) || any(greaterThan(c, vec3(1.0)))) return 1.0;
   float sum = 0.0;
-  for (int i = -TAPS; i <= TAPS; ++i) for (int j = -TAPS; j <= TAPS; ++j)
-    sum += texture(shadowMap, vec3(c.xy + vec2(i, j) / SHADOW_SIZE, c.z));
-  return sum / float((2 * TAPS + 1) * (2 * TAPS + 1));
+  for (int i = 0; i < TAPS; ++i) for (int j = 0; j < TAPS; ++j)
+    sum += texture(shadowMap, vec3(c.xy + (vec2(i, j) - 0.5 * float(TAPS - 1)) / SHADOW_SIZE, c.z));
+  return sum / float(TAPS * TAPS);
 }
 
 vec3 incident(int i, vec3 p, out vec3 way) {
@@ -77,7 +77,8 @@ vec3 toneMapped(vec3 radiance) {
   vec3 half_power = sqrt(max(c, 0.0)), fourth = sqrt(half_power), eighth = sqrt(fourth);
   return mix(12.92 * c, 0.662002687 * half_power + 0.684122060 * fourth - 0.323583601 * eighth - 0.022541147 * c, step(0.0031308, c));
 }
-vec3 linear(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c)); }
+// its inverse to half a hundredth, for the same reason
+vec3 linear(vec3 c) { return c * (c * (c * 0.305 + 0.682) + 0.013); }
 `;
 
 // How a surface is lit, in linear light; it is all that `albedo` allows.
@@ -151,8 +152,11 @@ out vec4 shown; out float height;
 void main() {
   vec4 world = model * vec4(inPoint, 1.0);
   vec3 normal = mat3(model) * inNormal;
-  if (open > 0.0 && dot(normal, eye - world.xyz) < 0.0) normal = -normal;
-  shown = vec4(toneMapped(lit(world.xyz, normal, heat > 0.0 ? vec3(0.62) : color)), opacityAt(world.xyz, normal));
+  float facing = dot(normal, normalize(eye - world.xyz));
+  if (open > 0.0 && facing < 0.0) normal = -normal;
+  shown = vec4(0.0);
+  if (open > 0.0 || facing > -0.5)  // the others are on triangles that face away
+    shown = vec4(toneMapped(lit(world.xyz, normal, heat > 0.0 ? vec3(0.62) : color)), opacityAt(world.xyz, normal));
   height = inHeight;
   gl_Position = viewProjection * world;
 }`;

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from ripple_sim.coupling.model.soft_ids import is_soft
 from ripple_sim.export.moving_mesh import MovingMesh
 from ripple_sim.export.source import Source
 from ripple_sim.export.visuals import Finish, Solid, solid_finish, solids, target_finish, target_uv
@@ -40,16 +41,17 @@ def target_mesh(source: Source, name: str) -> MovingMesh:
 
 
 def target_part(source: Source, name: str, mesh: MovingMesh) -> Part:
-    """A target without waves; its points follow along `directions`."""
+    """A target at rest; its points follow along `directions`, and with its mesh's own vertices."""
     model, geom = source.model, source.ripples.geom_ids[name]
     finish = target_finish(model, geom, source.paints[name], mesh.uv is not None)
     uv = target_uv(model, geom, mesh) if finish.texture >= 0 else None
+    soft = is_soft(model, geom)  # and so in the world
     meta = {
         "name": name,
         "target": True,
-        "body": int(model.geom_bodyid[geom]),
-        "position": model.geom_pos[geom].tolist(),
-        "quaternion": model.geom_quat[geom].tolist(),
+        "body": 0 if soft else int(model.geom_bodyid[geom]),
+        "position": [0, 0, 0] if soft else model.geom_pos[geom].tolist(),
+        "quaternion": [1, 0, 0, 0] if soft else model.geom_quat[geom].tolist(),
         "open": not source.ripples[name].atlas.mesh.closed,
         **_look(finish),
     }

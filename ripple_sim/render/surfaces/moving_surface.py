@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +14,7 @@ from .moving_vertices import Moved, MovingVertices
 
 
 class MovingSurface:
-    """Takes points, normals and height maps along; made when the surface first moves.
+    """Takes points, normals and height maps along; what that takes is made when the surface first moves.
 
     Parameters
     ----------
@@ -24,12 +26,17 @@ class MovingSurface:
 
     def __init__(self, atlas: Atlas, points: NDArray, directions: NDArray, normals: NDArray) -> None:
         self._atlas, self._rest = atlas, (points, directions, normals)
-        self._made: tuple[MovedGradients, MovingVertices] | None = None
+
+    @functools.cached_property
+    def vertices(self) -> MovingVertices:
+        """How the points ride on the mesh."""
+        mesh = self._atlas.mesh
+        return MovingVertices(mesh.V, mesh.F, *self._rest)
+
+    @functools.cached_property
+    def _gradients(self) -> MovedGradients:
+        return MovedGradients(self._atlas)
 
     def __call__(self, height_map: NDArray[np.float32], V: NDArray[np.float64]) -> tuple[NDArray[np.float32], Moved]:
         """The height map and the points where the vertices of the mesh are at V [vertex_count, 3] [m]."""
-        if self._made is None:
-            mesh = self._atlas.mesh
-            self._made = MovedGradients(self._atlas), MovingVertices(mesh.V, mesh.F, *self._rest)
-        gradients, vertices = self._made
-        return gradients(height_map, V), vertices(V)
+        return self._gradients(height_map, V), self.vertices(V)

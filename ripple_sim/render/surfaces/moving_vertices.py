@@ -21,7 +21,7 @@ class Moved(NamedTuple):
     V: Floats
 
 
-class _Rest(NamedTuple):
+class Riding(NamedTuple):
     """Points at rest: vertices and weights of their triangles [n, 3], way from there, directions, normals [n, 3]."""
 
     corners: Ints
@@ -44,6 +44,10 @@ class MovingVertices:
     F : int64 [m, 3]
     points, directions, normals : float64 [n, 3]
         Of the finer surface at rest; the latter two are unit vectors.
+
+    Attributes
+    ----------
+    rest : Riding
     """
 
     def __init__(self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, normals: NDArray) -> None:
@@ -53,14 +57,14 @@ class MovingVertices:
         corners = self._F[triangle]
         weights = barycentrics_in(self._V[corners], closest)
         off = rest[0] - np.einsum("ij,ijk->ik", weights, self._V[corners])
-        self._rest = _Rest(corners, weights, off, *rest[1:])
+        self.rest = Riding(corners, weights, off, *rest[1:])
 
     def __call__(self, V: NDArray[np.float64]) -> Moved:
         """Where the points are for vertices [k, 3] [m]."""
         V = np.ascontiguousarray(V, np.float64)
         maps = _vertex_maps(self._V, V, self._F)
-        points, directions, normals = (np.empty((len(self._rest.off), 3), np.float32) for _ in range(3))
-        _move(V, maps, self._rest, points, directions, normals)
+        points, directions, normals = (np.empty((len(self.rest.off), 3), np.float32) for _ in range(3))
+        _move(V, maps, self.rest, points, directions, normals)
         return Moved(points, directions, normals, V)
 
 
@@ -128,7 +132,7 @@ def _turn(mean: Floats, rest: Floats, i: int, out: Floats32) -> None:
 
 
 @kernel
-def _move(V: Floats, maps: Floats, rest: _Rest, points: Floats32, directions: Floats32, normals: Floats32) -> None:
+def _move(V: Floats, maps: Floats, rest: Riding, points: Floats32, directions: Floats32, normals: Floats32) -> None:
     mean = np.empty((3, 3))
     for i in range(len(points)):
         mean[:] = 0
