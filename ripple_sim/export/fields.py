@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ripple_sim.encode.mark import MARK
+from ripple_sim.solver.texels.riding import SurfaceRide
 
 from .source import Moment, Source
+from .store import CHUNK, Store, made_here
 from .tables import COLUMNS, rows
 
-_CHUNK = 16  # frames that are kept in memory, and lie in one chunk
 _IMPULSES = 4096  # in one chunk
-_METADATA, _CHUNK_NAME = (".zgroup", ".zattrs", ".zarray", ".zmetadata"), re.compile(r"\d+(\.\d+)*")
+_KINDS = {"int64": np.int64, "float64": np.float64, "bool": np.bool_, "string": "<U64"}
 
 
 class FieldWriter:
-    """Writes heights, velocities, energies, poses and impulses to a Zarr store (version 2), with units and coordinates.
+    """Writes heights, velocities, energies, poses and impulses to a Zarr store, with units and coordinates.
 
     Variables of a target end in its name: `height_duck` has the dimensions time, chart_duck, row_duck and column_duck.
+    The places of texels have no time, but for surfaces that move.
 
     Parameters
     ----------
@@ -34,101 +32,82 @@ class FieldWriter:
     """
 
     def __init__(self, source: Source, path: Path) -> None:
-        import zarr
-
-        self._source, self._names = source, {name: _identifier(name) for name in source.ripples}
-        self._group = zarr.open_group(str(path), mode="w", zarr_format=2)
-        self._group.attrs.update({"software": MARK, "fps": source.fps, "slow_motion": source.slow_motion})
-        self._growing: dict[str, Any] = {}
-        self._waiting: dict[str, list[NDArray]] = {}
+        self._source, self._frames = source, 0
+        self._store = store = Store(path, {"fps": source.fps, "slow_motion": source.slow_motion})
         model = source.model
         bodies = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, i) or f"body {i}" for i in range(model.nbody)]
-        self._fixed("body", ["body"], np.array(bodies))
-        self._fixed("axis", ["axis"], np.array(["x", "y", "z"]))
-        self._fixed("component", ["component"], np.array(["w", "x", "y", "z"]))
-        self._grow("time", ["time"], (), np.float64, "s", "time of the simulation")
-        shape = (model.nbody,)
-        self._grow(
-            "position", ["time", "body", "axis"], (*shape, 3), np.float64, "m", "position of bodies in the world"
-        )
-        self._grow("orientation", ["time", "body", "component"], (*shape, 4), np.float64, "1", "quaternion of bodies")
-        for name in source.ripples:
-            self._define_target(name)
+        store.fixed("body", ["body"], np.array(bodies))
+        store.fixed("axis", ["axis"], np.array(["x", "y", "z"]))
+        store.fixed("component", ["component"], np.array(["w", "x", "y", "z"]))
+        store.grow("time", ["time"], np.zeros(()), "s", "time of the simulation")
+        places, turns = np.zeros((model.nbody, 3)), np.zeros((model.nbody, 4))
+        store.grow("position", ["time", "body", "axis"], places, "m", "position of bodies in the world")
+        store.grow("orientation", ["time", "body", "component"], turns, "1", "quaternion of bodies")
+        self._targets = {name: _TargetFields(source, name, store) for name in source.ripples}
         for column, (unit, kind) in COLUMNS.items():
-            dtype = {"int64": np.int64, "float64": np.float64, "bool": np.bool_, "string": "<U64"}[kind]
-            self._grow(f"impulse_{column}", ["impulse"], (), dtype, unit, f"{column} of an impulse", _IMPULSES)
+            one = np.zeros((), _KINDS[kind])
+            store.grow(f"impulse_{column}", ["impulse"], one, unit, f"{column} of an impulse", chunk=_IMPULSES)
 
     def write(self, moment: Moment) -> None:
         """Add a frame."""
         data = moment.data
-        self._add("time", data.time)
-        self._add("position", data.xpos)
-        self._add("orientation", data.xquat)
-        for name, suffix in self._names.items():
-            waves = self._source.ripples[name]
-            self._add(f"height_{suffix}", waves.height)
-            self._add(f"velocity_{suffix}", waves.velocity)
-            self._add(f"energy_{suffix}", waves.energy())
+        self._store.add("time", data.time)
+        self._store.add("position", data.xpos)
+        self._store.add("orientation", data.xquat)
+        for name, fields in self._targets.items():
+            fields.write(self._source.ripples.vertices(name, data), self._frames)
         for row in rows(moment):
             for column, value in zip(COLUMNS, row, strict=True):
-                self._add(f"impulse_{column}", value)
-        if moment.number % _CHUNK == _CHUNK - 1:
-            self._flush()
+                self._store.add(f"impulse_{column}", value)
+        self._frames += 1
+        if self._frames % CHUNK == 0:
+            self._store.flush()
 
     def finish(self) -> None:
         """Complete the store."""
-        import zarr
-
-        self._flush()
-        zarr.consolidate_metadata(self._group.store)
+        self._store.finish()
 
     def close(self) -> None:
         """Do nothing: no file is open."""
 
-    def _define_target(self, name: str) -> None:
-        suffix, atlas = self._names[name], self._source.ripples[name].atlas
-        dimensions = [f"{each}_{suffix}" for each in ("chart", "row", "column")]
+
+class _TargetFields:
+    """The variables of a target."""
+
+    def __init__(self, source: Source, name: str, store: Store) -> None:
+        self._waves, self._store, self._suffix = source.ripples[name], store, re.sub(r"\W", "_", name)
+        self._dimensions = [f"{each}_{self._suffix}" for each in ("chart", "row", "column")]
+        self._ride: SurfaceRide | None = None
+        over_time, rest, suffix = ["time", *self._dimensions], self._waves.rest, self._suffix
         for axis, each in enumerate("xyz"):
-            self._fixed(
-                f"{each}_{suffix}", dimensions, atlas.positions[..., axis], "m", f"{each} of texels, geom's frame"
-            )
-        self._fixed(f"area_{suffix}", dimensions, atlas.areas, "m^2", "area of texels")
-        over_time, shape = ["time", *dimensions], atlas.areas.shape
-        self._grow(f"height_{suffix}", over_time, shape, np.float32, "m", "displacement along the outward normal")
-        self._grow(f"velocity_{suffix}", over_time, shape, np.float32, "m/s", "rate of the height")
-        self._grow(f"energy_{suffix}", ["time"], (), np.float64, "J", "kinetic plus potential energy of the waves")
+            text = f"{each} of texels, geom's frame"
+            store.fixed(f"{each}_{suffix}", self._dimensions, rest.positions[..., axis], "m", text)
+        store.fixed(f"area_{suffix}", self._dimensions, rest.areas, "m^2", "area of texels at rest")
+        one = np.zeros(rest.areas.shape, np.float32)
+        store.grow(f"height_{suffix}", over_time, one, "m", "displacement along the outward normal")
+        store.grow(f"velocity_{suffix}", over_time, one, "m/s", "rate of the height")
+        store.grow(f"energy_{suffix}", ["time"], np.zeros(()), "J", "kinetic plus potential energy of the waves")
 
-    def _fixed(self, name: str, dimensions: list[str], values: NDArray, unit: str = "", text: str = "") -> None:
-        array = self._group.create_array(
-            name, shape=values.shape, dtype=values.dtype, chunks=values.shape, fill_value=None
-        )
-        array[...] = values
-        array.attrs.update(_attributes(dimensions, unit, text))
+    def write(self, V: NDArray[np.float64] | None, number: int) -> None:
+        """Add the frame of a number, with the vertices of the mesh at V [m], or at rest."""
+        waves, suffix = self._waves, self._suffix
+        self._store.add(f"height_{suffix}", waves.height)
+        self._store.add(f"velocity_{suffix}", waves.velocity)
+        self._store.add(f"energy_{suffix}", waves.energy())
+        if V is not None and self._ride is None:
+            self._ride = SurfaceRide(waves.rest)
+            self._begin_motion(number)
+        if self._ride is not None:
+            positions, _ = self._ride.positions(waves.rest.mesh.V if V is None else V)
+            for axis, each in enumerate("xyz"):
+                self._store.add(f"{each}_{suffix}", positions[..., axis])
 
-    def _grow(
-        self,
-        name: str,
-        dimensions: list[str],
-        shape: tuple[int, ...],
-        dtype: Any,
-        unit: str,
-        text: str,
-        chunk: int = _CHUNK,
-    ) -> None:
-        array = self._group.create_array(name, shape=(0, *shape), dtype=dtype, chunks=(chunk, *shape), fill_value=None)
-        array.attrs.update(_attributes(dimensions, unit, text))
-        self._growing[name], self._waiting[name] = array, []
-
-    def _add(self, name: str, value: ArrayLike) -> None:
-        self._waiting[name].append(np.array(value))
-
-    def _flush(self) -> None:
-        for name, array in self._growing.items():
-            if values := self._waiting[name]:
-                before = array.shape[0]
-                array.resize((before + len(values), *array.shape[1:]))
-                array[before:] = np.stack(values)
-                self._waiting[name] = []
+    def _begin_motion(self, frames: int) -> None:
+        """Give the places of texels a time: at rest in the frames so far."""
+        for axis, each in enumerate("xyz"):
+            rest, text = self._waves.rest.positions[..., axis], f"{each} of texels, geom's frame; the world's if soft"
+            dimensions = ["time", *self._dimensions]
+            self._store.grow(f"{each}_{self._suffix}", dimensions, rest, "m", text, before=frames)
 
 
 def writer(source: Source, path: Path) -> FieldWriter:
@@ -136,22 +115,4 @@ def writer(source: Source, path: Path) -> FieldWriter:
     return FieldWriter(source, path)
 
 
-def made_here(path: Path) -> bool:
-    """Whether a folder is a store from here, with nothing else in it."""
-    try:
-        marked = json.loads((path / ".zattrs").read_text()).get("software") == MARK
-    except (OSError, ValueError, AttributeError):
-        return False
-    return marked and all(
-        not each.is_symlink() and (each.is_dir() or each.name in _METADATA or _CHUNK_NAME.fullmatch(each.name))
-        for each in path.rglob("*")
-    )
-
-
-def _attributes(dimensions: list[str], unit: str, text: str) -> Mapping[str, Any]:
-    attributes: dict[str, Any] = {"_ARRAY_DIMENSIONS": dimensions}
-    return {**attributes, **({"units": unit} if unit else {}), **({"long_name": text} if text else {})}
-
-
-def _identifier(name: str) -> str:
-    return re.sub(r"\W", "_", name)
+__all__ = ["FieldWriter", "made_here", "writer"]

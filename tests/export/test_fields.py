@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim import Exporter, RippleError, Ripples
+from ripple_sim import Exporter, Material, RippleError, Ripples
 
 FRAMES = 20  # more than one chunk
 HEADER = "frame,time [s],geom,other,x [m],y [m],z [m],impulse [N s],chart,row,column,inner"
@@ -53,6 +53,28 @@ def test_xarray_opens_a_run_in_one_line_with_units_and_coordinates(ripples: Ripp
     assert np.array_equal(fields.x_egg, ripples["egg"].atlas.positions[..., 0])
     assert np.array_equal(fields.impulse_impulse, [hit.impulse for each in seen for hit in each["impulses"]])
     assert fields.sizes["impulse"] > 0
+
+
+def test_texels_of_a_surface_that_moves_have_their_places_over_time(ripples: Ripples, tmp_path: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("zarr")
+    model = ripples.model
+    ripples = Ripples(model, {"egg": Material(speed=0.3)}, resolution=4, backend="cpu")
+    data, waves, seen = mujoco.MjData(model), ripples["egg"], []
+    with Exporter(model, ripples, tmp_path / "run.zarr") as exporter:
+        for frame in range(FRAMES):
+            if frame >= 5:
+                waves.move(waves.rest.mesh.V * [1.0, 1.0, 1.0 + 0.01 * frame])
+            ripples.mj_step(data)
+            exporter.write(data)
+            seen.append(waves.atlas.positions)
+    fields = xarray.open_zarr(tmp_path / "run.zarr")
+    assert fields.z_egg.dims == ("time", "chart_egg", "row_egg", "column_egg")
+    assert fields.z_egg.attrs["units"] == "m"
+    found = np.stack([fields[f"{axis}_egg"] for axis in "xyz"], axis=-1)
+    assert np.abs(found - seen).max() < 1e-12
+    assert np.array_equal(found[4], waves.rest.positions)
+    assert np.ptp(found[:, ..., 2], axis=0).max() > 0.01
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.parquet"])

@@ -144,7 +144,9 @@ class PageWriter:
                 continue
             if number not in self._told:
                 told = json.dumps(motion.told())
-                self._file.write(f'<script type="application/json" class="motion" data-target="{number}">{told}</script>\n')
+                self._file.write(
+                    f'<script type="application/json" class="motion" data-target="{number}">{told}</script>\n'
+                )
                 self._told.add(number)
             middles[number] = places
             planes.append(coded)
