@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.render.surfaces.height_maps import AnyHeightMap
@@ -47,10 +48,15 @@ class Snapshot:
 
     def digest(self) -> str:
         """Fingerprint of the state of bodies and waves: the same if and only if every bit is."""
-        hasher = hashlib.blake2b(digest_size=16)
-        for array in (self.data.qpos, self.data.qvel, self.data.act, *map(np.asarray, self.heights.values())):
-            hasher.update(array.tobytes())
-        return hasher.hexdigest()
+        return state_digest(self.data, map(np.asarray, self.heights.values()))
+
+
+def state_digest(data: mujoco.MjData, heights: Iterable[NDArray[np.float32]]) -> str:
+    """Fingerprint of the state of bodies and of the heights of all waves."""
+    hasher = hashlib.blake2b(digest_size=16)
+    for array in (data.qpos, data.qvel, data.act, *heights):
+        hasher.update(array.tobytes())
+    return hasher.hexdigest()
 
 
 def snapshots(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterator[Snapshot]:

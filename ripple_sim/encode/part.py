@@ -132,6 +132,11 @@ class Part:
         move(self.whole if self.whole.exists() else self._segments, self.video)
         self.remove()
 
+    def hand_over(self, folder: Path) -> None:
+        """Move the segments to a folder that is not there yet, and remove everything else."""
+        move(self._segments, folder)
+        self.remove()
+
     def keep(self) -> bool:
         """Leave the complete segments for later, if there are any, and return whether there are."""
         if not self.frames:

@@ -23,11 +23,14 @@ class Ending:
         Module, below this package, that has `writer` and `made_here`.
     package, extra : str, optional
         What it needs beside ripple-sim, and the extra that brings it.
+    chunks : bool
+        Whether a run can be divided over files.
     """
 
     home: str
     package: str | None = None
     extra: str | None = None
+    chunks: bool = False
 
     def writer(self, source: Source, path: Path) -> Writer:
         """Begin a file."""
@@ -38,11 +41,11 @@ class Ending:
         return importlib.import_module(self.home, __package__).made_here(path)
 
 
-_USD = Ending(".usd.usd_file", package="pxr", extra="usd")
+_LAYER = Ending(".usd.usd_file", package="pxr", extra="usd", chunks=True)
 ENDINGS = {
-    ".usdc": _USD,
-    ".usda": _USD,
-    ".usdz": _USD,
+    ".usdc": _LAYER,
+    ".usda": _LAYER,
+    ".usdz": dataclasses.replace(_LAYER, chunks=False),
     ".zarr": Ending(".fields", package="zarr", extra="zarr"),
     ".html": Ending(".html.page_writer"),
     ".csv": Ending(".tables"),
@@ -71,16 +74,20 @@ def ending_of(path: Path) -> Ending:
     return ending
 
 
-def check_export(path: Path, overwrite: bool) -> Ending:
+def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Ending:
     """Make sure, before anything that takes time, that an export can be written to a path; return how.
 
     Raises
     ------
     ExportError
-        If the ending is unknown, needs what is not installed, or something foreign stands in the path's place.
+        If the ending is unknown, needs what is not installed, has no chunks where they are wanted, or something foreign
+        stands in the path's place.
     EncodingError
         If nothing can be written there.
     """
     ending = ending_of(path)
+    if chunked and not ending.chunks:
+        able = " and ".join(suffix for suffix, each in ENDINGS.items() if each.chunks)
+        raise ExportError(f"there are chunks of {able} files alone, not of {path.name}; leave --chunk out")
     check_place(path, ending.made_here, overwrite)
     return ending

@@ -12,12 +12,13 @@ from ripple_sim.errors import ExportError
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.checked import PATH, checked, instance
+from ripple_sim.video.provenance import origin
 
 from .endings import check_export
 from .exporter import Exporter
 from .options import ExportOptions
 from .settings import check_options, frame_count
-from .source import Paint, Source
+from .source import Chunking, Paint, Source
 
 Progress = Callable[[int, int], None]
 
@@ -48,7 +49,9 @@ def export_scene(
 ) -> ExportSummary:
     """Simulate a scene and write it to the file of another program.
 
-    The same scene and options give the same numbers on the same machine. Memory does not grow with the duration.
+    The same scene and options give the same numbers on the same machine. Memory does not grow with the duration. In
+    chunks, the complete ones stay in a folder beside the output, `output` with `.part` appended, if the export is
+    interrupted. Resumed, the simulation runs again up to there and is checked to be the same.
 
     Parameters
     ----------
@@ -69,11 +72,17 @@ def export_scene(
     """
     adopt_warnings()
     check_options(options)
-    check_export(Path(output), options.overwrite)
+    check_export(Path(output), options.overwrite, chunked=options.chunk is not None)
     frames = frame_count(options, scene)
     simulation = Simulation.of(scene, options, on_step=on_step)
     simulated = written = 0.0
-    with Exporter.of(scene_source(scene, simulation, options), output, options.overwrite) as exporter:
+    source = scene_source(scene, simulation, options)
+    if options.chunk is not None:
+        settings = _settings(scene, options, frames)
+        source = dataclasses.replace(
+            source, chunking=Chunking(options.chunk, Path(output), settings, resume=options.resume)
+        )
+    with Exporter.of(source, output, options.overwrite) as exporter:
         for number in range(frames):
             start = time.perf_counter()
             if number:
@@ -102,3 +111,21 @@ def scene_source(scene: Scene, simulation: Simulation, options: ExportOptions) -
         tessellation=options.tessellation,
         triangles=options.triangles,
     )
+
+
+def _settings(scene: Scene, options: ExportOptions, frames: int) -> dict[str, str | int | float]:
+    """What decides the content of an export, by the names in messages."""
+    return {
+        "the number of frames": frames,
+        "the frame rate": options.fps,
+        "the frames in a chunk": options.chunk or 0,
+        "the slow motion": options.slow_motion,
+        "the tessellation": options.tessellation,
+        "the number of triangles": options.triangles,
+        "the size": "{}x{}".format(*options.size),
+        "the resolution": options.resolution or "the scene's",
+        "the layout": options.layout or "the scene's",
+        "the rims": options.rim or "the scene's",
+        "the wave solver": options.backend,
+        **origin(scene),
+    }

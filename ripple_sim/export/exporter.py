@@ -24,7 +24,7 @@ from .html.notebook import framed
 from .options import WRITE_OPTIONS, WriteOptions
 from .place import Unfinished
 from .settings import check_write_options
-from .source import Moment, Paint, Source
+from .source import Chunking, Moment, Paint, Source
 
 
 class Exporter:
@@ -52,8 +52,9 @@ class Exporter:
         `tessellation` (str, "refined"): surfaces with triangles as fine as their texels, or "own", the object's own;
         `triangles` (int, 100,000): about how many a refined surface may have; `size` (width, height): of the frames
         that the camera is meant for [pixels]; `limit` (bool, True): whether heights that are too large for the object
-        are written smaller, see `DisplacementLimit`; `overwrite` (bool, False): replace a file that ripple-sim has not
-        made.
+        are written smaller, see `DisplacementLimit`; `chunk` (int, none): frames in each of the files of a long USD
+        run, which lie in a folder NAME.chunks beside it; `overwrite` (bool, False): replace a file that ripple-sim has
+        not made.
 
     Raises
     ------
@@ -100,6 +101,7 @@ class Exporter:
             limited=dict.fromkeys(ripples, written["limit"]),
             tessellation=written["tessellation"],
             triangles=written["triangles"],
+            chunking=None if written["chunk"] is None else Chunking(written["chunk"], Path(output)),
         )
         self._begin(source, output, written["overwrite"])
 
@@ -112,7 +114,7 @@ class Exporter:
 
     def _begin(self, source: Source, output: str | Path, overwrite: bool) -> None:
         self.output, self.frames, self._source = Path(output), 0, source
-        ending = check_export(self.output, overwrite)
+        ending = check_export(self.output, overwrite, chunked=source.chunking is not None)
         with self._reported():
             self._place: Unfinished | None = Unfinished(self.output, ending.made_here, overwrite)
             try:
@@ -166,12 +168,17 @@ class Exporter:
         finally:
             self.discard()
 
-    def discard(self) -> None:
-        """Stop, and remove what was written. An earlier file in the same place stays."""
+    def discard(self) -> str:
+        """Stop, and remove what was written; say what is kept to be resumed, if anything.
+
+        An earlier file in the same place stays.
+        """
+        kept = ""
         if self._place is not None:
-            self._writer.close()
+            kept = self._writer.close()
             self._place.remove()
             self._place = None
+        return kept
 
     def _repr_html_(self) -> str:
         """In a notebook: the player of a complete page, or what was written."""
@@ -190,8 +197,8 @@ class Exporter:
     ) -> None:
         if error is None:
             self.close()
-        else:
-            self.discard()
+        elif kept := self.discard():
+            error.add_note(kept)
 
     @contextlib.contextmanager
     def _reported(self) -> Iterator[None]:

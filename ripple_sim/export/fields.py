@@ -67,8 +67,9 @@ class FieldWriter:
         """Complete the store."""
         self._store.finish()
 
-    def close(self) -> None:
-        """Do nothing: no file is open."""
+    def close(self) -> str:
+        """Keep nothing: no file is open."""
+        return ""
 
 
 class _TargetFields:

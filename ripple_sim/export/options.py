@@ -38,6 +38,10 @@ class ExportOptions:
     """What the rims of open surfaces do: free, or fixed as that of a drum's skin."""
     backend: Backend = "auto"
     """Where waves are computed: with OpenGL, on the CPU, or wherever it is faster."""
+    chunk: int | None = None
+    """Frames in each of the files of a long USD run, which lie in a folder NAME.chunks beside it."""
+    resume: bool = False
+    """Keep the complete chunks of an interrupted export of the same scene with the same options."""
     overwrite: bool = False
     """Replace an output that ripple-sim has not made."""
 
@@ -54,6 +58,7 @@ class WriteOptions(TypedDict, total=False):
     triangles: int
     size: tuple[int, int]
     limit: bool
+    chunk: int | None
     overwrite: bool
 
 
@@ -62,5 +67,6 @@ WRITE_OPTIONS: WriteOptions = {
     "triangles": MOST_TRIANGLES,
     "size": (1280, 720),
     "limit": True,
+    "chunk": None,
     "overwrite": False,
 }

@@ -72,7 +72,7 @@ class Unfinished:
         _check_replaceable(self._target, self._recognised, self._overwrite)  # again: a run takes long
         written = sorted(self._folder.iterdir(), key=lambda each: each == self.path)
         for each in written[:-1]:
-            check_companion(self._target.with_name(each.name), self._overwrite)
+            check_companion(self._target.with_name(each.name), self._recognised, self._overwrite)
         for each in written:
             target = self._target.with_name(each.name)
             if target.is_dir():
@@ -84,21 +84,23 @@ class Unfinished:
         shutil.rmtree(self._folder, ignore_errors=True)
 
 
-def check_companion(folder: Path, overwrite: bool) -> None:
-    """Make sure that a folder of images that belongs to an export may be replaced.
+def check_companion(folder: Path, recognised: Recognised, overwrite: bool) -> None:
+    """Make sure that a folder of images or chunks that belongs to an export may be replaced.
 
     Raises
     ------
     ExportError
-        If it holds anything but images that were made here.
+        If it holds anything but those that were made here.
     """
+    what = folder.suffix.removeprefix(".")
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise ExportError(f"cannot write textures to {folder}: it is not a folder; name another output")
+        raise ExportError(f"cannot write {what} to {folder}: it is not a folder; name another output")
     for each in folder.iterdir() if folder.is_dir() else ():
-        image = each.is_file() and not each.is_symlink() and each.suffix == ".png"
-        if not image or not (overwrite or made_here(each)):
+        plain = each.is_file() and not each.is_symlink()
+        image = plain and each.suffix == ".png" and (overwrite or made_here(each))
+        if not image and not (plain and each.suffix == ".usdc" and (overwrite or recognised(each))):
             raise ExportError(
-                f"cannot write textures to {folder}: it holds other files ({each.name}); name another output"
+                f"cannot write {what} to {folder}: it holds other files ({each.name}); name another output"
             )
 
 

@@ -21,7 +21,9 @@ def check_options(options: ExportOptions) -> None:
     """
     if not isinstance(options.fps, int) or not 1 <= options.fps <= MAX_FPS:
         raise ExportError(f"frame rate is {options.fps!r}; valid is a whole number from 1 to {MAX_FPS} frames a second")
-    check_write_options({"size": options.size, "tessellation": options.tessellation, "triangles": options.triangles})
+    if options.resume and options.chunk is None:
+        raise ExportError("only an export in chunks can be resumed; add --chunk, or leave --resume out")
+    check_write_options({name: getattr(options, name) for name in ("size", "tessellation", "triangles", "chunk")})
 
 
 def check_write_options(options: WriteOptions) -> None:
@@ -35,9 +37,11 @@ def check_write_options(options: WriteOptions) -> None:
         raise ExportError(f"there is no option {unknown[0]!r}; valid are {', '.join(WRITE_OPTIONS)}")
     given = WRITE_OPTIONS | options
     check_size(*given["size"])
-    triangles, tessellation = given["triangles"], given["tessellation"]
+    triangles, tessellation, chunk = given["triangles"], given["tessellation"], given["chunk"]
     if not isinstance(triangles, int) or not 1 <= triangles <= LARGEST_MESH:
         raise ExportError(f"there shall be {shown(triangles)} triangles; valid is a whole number, 1 to {LARGEST_MESH}")
+    if chunk is not None and (not isinstance(chunk, int) or chunk < 1):
+        raise ExportError(f"a chunk shall have {shown(chunk)} frames; valid is a whole number from 1")
     if tessellation not in TESSELLATIONS:
         raise ExportError(f"tessellation is {shown(tessellation)}; valid are {' and '.join(map(repr, TESSELLATIONS))}")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Protocol
 
 import mujoco
@@ -22,6 +23,28 @@ class Paint:
 
     look: str = "rubber"
     color: tuple[float, float, float] | None = None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Chunking:
+    """How a run is divided over files.
+
+    Attributes
+    ----------
+    frames : int
+        In each.
+    output : Path
+        Of the whole; beside it stands NAME.part with the complete chunks until all is complete.
+    settings : mapping, optional
+        Everything that decides what is written, by name. With it complete chunks survive an interruption.
+    resume : bool
+        Keep those that are there.
+    """
+
+    frames: int
+    output: Path
+    settings: Mapping[str, str | int | float] | None = None
+    resume: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -47,6 +70,8 @@ class Source:
         Whether heights are bent, by the target's name.
     tessellation, triangles : str, int
         Of the surfaces, see `MovingMesh`.
+    chunking : Chunking, optional
+        Of the formats that have it.
     """
 
     model: mujoco.MjModel
@@ -60,6 +85,7 @@ class Source:
     tessellation: str
     triangles: int
     slow_motion: float = 1.0
+    chunking: Chunking | None = None
 
     def mesh(self, name: str) -> MovingMesh:
         """The surface of a target."""
@@ -98,5 +124,5 @@ class Writer(Protocol):
     def finish(self) -> None:
         """Complete the file."""
 
-    def close(self) -> None:
-        """Leave the file incomplete."""
+    def close(self) -> str:
+        """Leave the file incomplete; say what is kept for later, if anything."""

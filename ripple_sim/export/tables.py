@@ -54,10 +54,11 @@ class CsvWriter:
         """Complete the file."""
         self._file.close()
 
-    def close(self) -> None:
+    def close(self) -> str:
         """Leave the file incomplete."""
         with contextlib.suppress(OSError):
             self._file.close()
+        return ""
 
 
 class ParquetWriter:
@@ -86,10 +87,11 @@ class ParquetWriter:
         self._flush()
         self._writer.close()
 
-    def close(self) -> None:
+    def close(self) -> str:
         """Leave the file incomplete."""
         with contextlib.suppress(OSError):
             self._writer.close()
+        return ""
 
     def _flush(self) -> None:
         import pyarrow

@@ -19,11 +19,12 @@ _PACKAGES = ("ripple-sim", "mujoco", "numpy", "numba", "moderngl", "av", "pillow
 
 def provenance(scene: Scene, gl: GLContext) -> dict[str, str]:
     """Fingerprint of a scene, name of the OpenGL driver, and versions of the packages, by name."""
-    return {
-        "the scene's fingerprint": scene_digest(scene),
-        "the OpenGL driver": f"{gl.renderer}, {gl.version}",
-        **_versions(),
-    }
+    return {**origin(scene), "the OpenGL driver": f"{gl.renderer}, {gl.version}"}
+
+
+def origin(scene: Scene) -> dict[str, str]:
+    """Fingerprint of a scene and versions of the packages, by name."""
+    return {"the scene's fingerprint": scene_digest(scene), **_versions()}
 
 
 @functools.cache

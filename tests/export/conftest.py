@@ -29,11 +29,16 @@ material = {speed = 0.3, density = 1500.0}
 
 
 @pytest.fixture(scope="session")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder: Path = tmp_path_factory.mktemp("scene")
     (folder / "scene.xml").write_text(MJCF)
     (folder / "scene.toml").write_text(TOML)
-    return load_scene(folder / "scene.toml")
+    return folder / "scene.toml"
+
+
+@pytest.fixture(scope="session")
+def scene(scene_file: Path) -> Scene:
+    return load_scene(scene_file)
 
 
 @pytest.fixture(scope="module")

@@ -80,10 +80,11 @@ class PageWriter:
         self._file.write("</body>\n</html>\n")
         self._file.close()
 
-    def close(self) -> None:
+    def close(self) -> str:
         """Leave the page incomplete."""
         with contextlib.suppress(OSError):
             self._file.close()
+        return ""
 
     def _begin(self, data: mujoco.MjData) -> None:
         source, model = self._source, self._source.model

@@ -8,7 +8,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 
 from ripple_sim.export.source import Source
 
-from .meshes import place
+from .meshes import place, placing
 
 _SENSOR = 0.024  # height [m], that of 35 mm film; the angle of view and the depth of field do not depend on it
 _TENTHS = 10.0  # USD gives lengths in a camera in tenths of a unit
@@ -33,7 +33,16 @@ class MovingCamera:
         self._camera.CreateHorizontalApertureAttr(_TENTHS * _SENSOR * width / height)
         self._camera.CreateShutterOpenAttr(0.0)
         self._camera.CreateShutterCloseAttr(source.camera.shutter / 360)
-        self._focal = 0.0
+
+    def begin(self, data: mujoco.MjData) -> None:
+        """Define what stays as it is at the first frame."""
+        pose, _ = self._source.pose(data)
+        focal, aperture = _SENSOR / 2 / np.tan(np.radians(pose.fovy) / 2), self._source.camera.aperture
+        placing(self._camera)
+        self._camera.CreateFocalLengthAttr(_TENTHS * focal)
+        self._camera.CreateFStopAttr(focal / aperture if aperture else 0.0)  # 0: all is sharp
+        self._camera.CreateClippingRangeAttr(Gf.Vec2f(_NEAR * pose.distance, _FAR * pose.distance))
+        self._camera.CreateFocusDistanceAttr()
 
     def write(self, data: mujoco.MjData, time: float) -> None:
         """Add a frame."""
@@ -41,10 +50,4 @@ class MovingCamera:
         quaternion = np.zeros(4)
         mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
         place(self._camera, pose.position, quaternion, time)
-        if not self._focal:
-            self._focal = _SENSOR / 2 / np.tan(np.radians(pose.fovy) / 2)
-            aperture = self._source.camera.aperture
-            self._camera.CreateFocalLengthAttr(_TENTHS * self._focal)
-            self._camera.CreateFStopAttr(self._focal / aperture if aperture else 0.0)  # 0: all is sharp
-            self._camera.CreateClippingRangeAttr(Gf.Vec2f(_NEAR * pose.distance, _FAR * pose.distance))
-        self._camera.CreateFocusDistanceAttr().Set(float(focus), Usd.TimeCode(time))
+        self._camera.GetFocusDistanceAttr().Set(float(focus), Usd.TimeCode(time))

@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
 from ripple_sim.export.source import Source
-from ripple_sim.render.camera import Pose
 from ripple_sim.render.visuals.lights import Light, Lighting, is_lit, model_lighting
 from ripple_sim.render.visuals.studio import studio_lighting
 
-from .meshes import keep, place
+from .meshes import keep, place, placing
 
 _LEAST_RADIUS = 0.01  # of a lamp whose MJCF gives none [m]
 _STUDIO_SKY = 0.25  # radiance that stands for the studio's soft boxes, which USD has no equal of
@@ -38,25 +37,28 @@ class Lamps:
         self._studio = source.lighting == "studio" or (source.lighting == "auto" and not is_lit(source.model))
         self._lamps: list[UsdGeom.Xformable] = []
 
-    def write(self, data: mujoco.MjData, time: float) -> None:
-        """Add a frame."""
-        pose, _ = self._source.pose(data)
-        lighting = studio_lighting(pose) if self._studio else model_lighting(self._source.model, data, pose)
-        if not self._lamps:
-            self._define(lighting, pose)
-        for lamp, light in zip(self._lamps, lighting.lights, strict=False):
-            position = np.zeros(3) if light.position is None else light.position
-            place(lamp, position, _towards(light.direction), time)
-
-    def _define(self, lighting: Lighting, pose: Pose) -> None:
+    def begin(self, data: mujoco.MjData) -> None:
+        """Define the lights of the first frame, which only move later."""
+        lighting = self._lighting(data)
         for index, light in enumerate(lighting.lights):
             path = self._path.AppendChild(f"lamp_{index}")
             define = _far if light.position is None else _near
             self._lamps.append(define(self._stage, path, light, self._source.model.stat.center))
+            placing(self._lamps[-1])
         sky = lighting.ambient + (_STUDIO_SKY if self._studio else 0.0)
         if sky.any():
             dome = UsdLux.DomeLight.Define(self._stage, self._path.AppendChild("sky"))
             _set_light(dome, sky, 1.0)
+
+    def write(self, data: mujoco.MjData, time: float) -> None:
+        """Add a frame."""
+        for lamp, light in zip(self._lamps, self._lighting(data).lights, strict=False):
+            position = np.zeros(3) if light.position is None else light.position
+            place(lamp, position, _towards(light.direction), time)
+
+    def _lighting(self, data: mujoco.MjData) -> Lighting:
+        pose, _ = self._source.pose(data)
+        return studio_lighting(pose) if self._studio else model_lighting(self._source.model, data, pose)
 
 
 def _far(stage: Usd.Stage, path: Sdf.Path, light: Light, middle: NDArray) -> UsdGeom.Xformable:

@@ -39,11 +39,18 @@ def extent(points: NDArray) -> Vt.Vec3fArray:
 def place(prim: UsdGeom.Xformable, position: NDArray, quaternion: NDArray, time: float | None = None) -> None:
     """Set where a prim is in its parent's frame: position [m], and quaternion, w first."""
     moment = Usd.TimeCode.Default() if time is None else Usd.TimeCode(time)
-    ops = prim.GetOrderedXformOps()
-    if not ops:
-        ops = [prim.AddTranslateOp(), prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)]
-    ops[0].Set(Gf.Vec3d(*map(float, position)), moment)
-    ops[1].Set(Gf.Quatd(*map(float, quaternion)), moment)
+    translate, orient = placing(prim)
+    translate.Set(Gf.Vec3d(*map(float, position)), moment)
+    orient.Set(Gf.Quatd(*map(float, quaternion)), moment)
+
+
+def placing(prim: UsdGeom.Xformable) -> tuple[UsdGeom.XformOp, UsdGeom.XformOp]:
+    """Translation and orientation of a prim, added where there are none."""
+    translate, orient = prim.GetOrderedXformOps() or (
+        prim.AddTranslateOp(),
+        prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble),
+    )
+    return translate, orient
 
 
 def child(stage: Usd.Stage, parent: Sdf.Path, name: str) -> Sdf.Path:

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
+from pxr import Sdf, Usd, UsdGeom, UsdUtils
 
 from ripple_sim.coupling.model.geoms import target_name
 from ripple_sim.coupling.model.soft_ids import is_soft
 from ripple_sim.encode.mark import MARK
-from ripple_sim.export.moving_mesh import MovingMesh
+from ripple_sim.export.moving_mesh import MovingMesh, Shape
 from ripple_sim.export.source import Moment, Source
 from ripple_sim.export.visuals import solid_finish, solids, target_finish, target_uv
 
 from .camera import MovingCamera
+from .chunks import Chunks
 from .lamps import Lamps
 from .materials import Materials
-from .meshes import child, define_mesh, extent, place, vectors
+from .meshes import child, define_mesh, extent, place, placing, vectors
+from .saving import save, succeed
 
 # Frames are kept in memory until so many are there, and then appended to the file.
 _KEPT = 8
@@ -58,51 +58,88 @@ class UsdWriter:
         self._before: dict[str, NDArray[np.float32]] = {}
         self._surfaces = {name: self._define_surface(name) for name in source.ripples}
         self._last = 0
+        self._chunks = None if source.chunking is None else Chunks(stage, world.GetPath(), source.chunking)
 
     def write(self, moment: Moment) -> None:
-        """Add a frame."""
-        time, data = moment.number, moment.data
-        for body, prim in self._bodies.items():
-            if time == 0 or not _stands(self._source.model, body):
-                place(prim, data.xpos[body], data.xquat[body], time)
-        self._camera.write(data, time)
-        self._lamps.write(data, time)
-        for name, (surface, mesh) in self._surfaces.items():
-            waves = self._source.ripples[name]
-            V = self._source.ripples.vertices(name, data)
-            shape = surface.shape(waves.height, waves.velocity / np.float32(self._source.slow_motion), V)
-            if V is not None:
-                # waves and motion together, since the frame before
-                before = self._before.get(name, shape.points)
-                shape = shape._replace(velocities=(shape.points - before) * np.float32(self._source.fps))
-                self._before[name] = shape.points
-            mesh.GetPointsAttr().Set(vectors(shape.points), time)
-            mesh.GetNormalsAttr().Set(vectors(shape.normals), time)
-            mesh.GetVelocitiesAttr().Set(vectors(shape.velocities), time)
-            mesh.GetExtentAttr().Set(extent(shape.points), time)
-        self._last = time
-        if time % _KEPT == _KEPT - 1:
+        """Add a frame, unless it is there from an earlier run."""
+        number, chunks = moment.number, self._chunks
+        if number == 0:
+            self._begin(moment.data)
+        if chunks is None:
+            self._sample(moment, self._shapes(moment.data))
+        else:
+            chunks.check_state(self._source, moment)
+            if number >= chunks.stored - 1:  # the one before tells of motion
+                shapes = self._shapes(moment.data)
+            if number >= chunks.stored:
+                chunks.write(number, lambda: self._sample(moment, shapes))
+        self._last = number
+        if number % _KEPT == _KEPT - 1:
             self._save()
 
     def finish(self) -> None:
         """Complete the file."""
         self._stage.SetStartTimeCode(0)
         self._stage.SetEndTimeCode(self._last)
+        if self._chunks is not None:
+            self._chunks.finish(self._path.with_name(f"{self._path.stem}.chunks"), self._last)
         self._save()
         match self._path.suffix.lower():
             case ".usda":
-                _succeed(self._stage.GetRootLayer().Export, str(self._path))
+                succeed(self._stage.GetRootLayer().Export, str(self._path))
             case ".usdz":
-                _succeed(UsdUtils.CreateNewUsdzPackage, Sdf.AssetPath(str(self._binary)), str(self._path))
+                succeed(UsdUtils.CreateNewUsdzPackage, Sdf.AssetPath(str(self._binary)), str(self._path))
                 self._clear_images()
         if self._binary != self._path:
             self._binary.unlink()
 
-    def close(self) -> None:
-        """Do nothing: what is not saved is dropped."""
+    def close(self) -> str:
+        """Give up what is not saved; say what is kept of an unfinished run, if anything."""
+        return "" if self._chunks is None else self._chunks.close()
+
+    def _begin(self, data: mujoco.MjData) -> None:
+        """Define what stays as it is at the first frame."""
+        self._camera.begin(data)
+        self._lamps.begin(data)
+        for body, prim in self._bodies.items():
+            if _stands(self._source.model, body):
+                place(prim, data.xpos[body], data.xquat[body], 0)
+            else:
+                placing(prim)
+
+    def _shapes(self, data: mujoco.MjData) -> dict[str, Shape]:
+        """The surfaces of a frame; call it frame by frame."""
+        source, shapes = self._source, {}
+        for name, (surface, _) in self._surfaces.items():
+            waves, V = source.ripples[name], source.ripples.vertices(name, data)
+            shape = surface.shape(waves.height, waves.velocity / np.float32(source.slow_motion), V)
+            if V is not None:
+                # waves and motion together, since the frame before
+                before = self._before.get(name, shape.points)
+                shape = shape._replace(velocities=(shape.points - before) * np.float32(source.fps))
+                self._before[name] = shape.points
+            shapes[name] = shape
+        return shapes
+
+    def _sample(self, moment: Moment, shapes: dict[str, Shape]) -> None:
+        """Set the time samples of a frame."""
+        time, data = moment.number, moment.data
+        for body, prim in self._bodies.items():
+            if not _stands(self._source.model, body):
+                place(prim, data.xpos[body], data.xquat[body], time)
+        self._camera.write(data, time)
+        self._lamps.write(data, time)
+        for name, (_, mesh) in self._surfaces.items():
+            shape = shapes[name]
+            mesh.GetPointsAttr().Set(vectors(shape.points), time)
+            mesh.GetNormalsAttr().Set(vectors(shape.normals), time)
+            mesh.GetVelocitiesAttr().Set(vectors(shape.velocities), time)
+            mesh.GetExtentAttr().Set(extent(shape.points), time)
 
     def _save(self) -> None:
-        _succeed(self._stage.GetRootLayer().Save)
+        save(self._stage.GetRootLayer())
+        if self._chunks is not None:
+            self._chunks.save()
 
     def _clear_images(self) -> None:
         """Remove the images, which are in the package now."""
@@ -143,18 +180,6 @@ class UsdWriter:
         mesh.CreatePointsAttr(), mesh.CreateNormalsAttr(), mesh.CreateVelocitiesAttr(), mesh.CreateExtentAttr()
         self._materials.bind(mesh, finish)
         return surface, mesh
-
-
-def _succeed(work: Callable[..., bool], *arguments: object) -> None:
-    """Do what says whether it could write, and raise OSError if it could not."""
-    try:
-        if work(*arguments):
-            return
-        reason = "it could not be written"
-    except Tf.ErrorException as error:
-        text = " ".join(str(error).split())
-        reason = first[1] if (first := re.search(r"line \d+ in file \S+ : '(.*?)'(?= Error in |$)", text)) else text
-    raise OSError(reason)
 
 
 def _stands(model: mujoco.MjModel, body: int) -> bool:

@@ -1,0 +1,129 @@
+"""Runs divided over files, which a root layer joins, and which continue after a kill."""
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ripple_sim import ExportOptions, RippleError, export_scene
+from ripple_sim.scene.scene import Scene
+from ripple_sim.simulation import Simulation
+
+pytest.importorskip("pxr")
+from pxr import Usd, UsdGeom, UsdValidation
+
+# 11 frames: three chunks, the last of which is short
+OPTIONS = ExportOptions(fps=250, duration=0.044, tessellation="own", chunk=4)
+SURFACE, STONE = "/World/bodies/nest/egg", "/World/bodies/stone"
+ATTRIBUTES = ("GetPointsAttr", "GetNormalsAttr", "GetVelocitiesAttr", "GetExtentAttr")
+
+
+@pytest.fixture(scope="module")
+def whole(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("whole") / "run.usdc"
+    export_scene(scene, path, dataclasses.replace(OPTIONS, chunk=None))
+    return path
+
+
+def sampled(path: Path, time: float) -> list[np.ndarray]:
+    stage = Usd.Stage.Open(str(path))
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath(SURFACE))
+    frames = [np.array(getattr(mesh, name)().Get(time), dtype=float) for name in ATTRIBUTES]
+    world = [
+        UsdGeom.Xformable(stage.GetPrimAtPath(prim)).ComputeLocalToWorldTransform(time) for prim in (STONE, SURFACE)
+    ]
+    return [*frames, *(np.array(each) for each in world)]
+
+
+def files(path: Path) -> dict[str, bytes]:
+    return {each.name: each.read_bytes() for each in path.with_name("run.chunks").iterdir()}
+
+
+@pytest.mark.parametrize("name", ["run.usdc", "run.usda"])
+def test_chunks_hold_the_run_also_between_the_frames_at_their_borders(
+    scene: Scene, whole: Path, tmp_path: Path, name: str
+) -> None:
+    path = tmp_path / name
+    assert export_scene(scene, path, OPTIONS).frames == 11
+    assert {each.name for each in tmp_path.iterdir()} == {name, "run.chunks", "run.textures"}
+    assert set(files(path)) == {
+        *(f"frames_0000{first}-000{last}.usdc" for first, last in [(0, "03"), (4, "07"), (8, "10")]),
+        "manifest.usdc",
+    }
+    stage = Usd.Stage.Open(str(path))
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0, 10)
+    for time in (0, 2, 3, 3.5, 4, 7.25, 8, 10):
+        for found, expected in zip(sampled(path, time), sampled(whole, time), strict=True):
+            assert np.abs(found - expected).max() < 1e-6 * 0.6
+    assert np.abs(sampled(path, 10)[0] - sampled(path, 0)[0]).max() > 1e-5  # it moves
+    registry = UsdValidation.ValidationRegistry()
+    errors = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators()).Validate(stage)
+    assert [error.GetErrorAsString() for error in errors] == []
+
+
+def test_a_killed_export_continues_to_the_same_files(scene: Scene, scene_file: Path, tmp_path: Path) -> None:
+    export_scene(scene, path := tmp_path / "once" / "run.usdc", OPTIONS)
+    again = tmp_path / "again" / "run.usdc"
+    code = f"""
+import os, signal
+from pathlib import Path
+from ripple_sim import ExportOptions, export_scene, load_scene
+def kill(done, frames):
+    if done == 10:
+        os.kill(os.getpid(), signal.SIGKILL)
+export_scene(load_scene({str(scene_file)!r}), Path({str(again)!r}), {OPTIONS!r}, progress=kill)
+"""
+    killed = subprocess.run([sys.executable, "-c", code], env=os.environ, check=False, capture_output=True, text=True)
+    assert killed.returncode == -signal.SIGKILL, killed.stderr
+    kept = sorted((again.with_name("run.usdc.part") / "frames").glob("frames_*"))
+    assert [each.name for each in kept] == ["frames_00000-00003.usdc", "frames_00004-00007.usdc"]
+    times = [each.stat().st_mtime_ns for each in kept]
+    with pytest.raises(RippleError, match="the frames in a chunk was 4 and now is 5"):
+        export_scene(scene, again, dataclasses.replace(OPTIONS, chunk=5, resume=True))
+    export_scene(scene, again, dataclasses.replace(OPTIONS, resume=True))
+    assert files(again) == files(path)
+    assert [(again.with_name("run.chunks") / each.name).stat().st_mtime_ns for each in kept] == times
+    assert not again.with_name("run.usdc.part").exists()
+    for time in (0, 3.5, 7, 9.5):
+        assert all(map(np.array_equal, sampled(again, time), sampled(path, time)))
+
+
+def test_an_interrupted_export_says_what_it_keeps(scene: Scene, tmp_path: Path) -> None:
+    def interrupt(done: int, frames: int) -> None:
+        if done == 6:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "run.usdc"
+    with pytest.raises(KeyboardInterrupt) as caught:
+        export_scene(scene, path, OPTIONS, progress=interrupt)
+    assert "4 frames are kept" in caught.value.__notes__[0]
+    assert [each.name for each in tmp_path.iterdir()] == ["run.usdc.part"]
+
+    def change(simulation: Simulation) -> None:
+        simulation.data.qvel[0] += 0.1
+
+    with pytest.raises(RippleError, match="not in the state"):
+        export_scene(scene, path, dataclasses.replace(OPTIONS, resume=True), on_step=change)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("run.usdz", {}, r"chunks of \.usdc and \.usda files alone"),
+        ("run.html", {}, r"chunks of \.usdc and \.usda files alone"),
+        ("run.usdc", {"chunk": 0}, "a chunk shall have 0 frames"),
+        ("run.usdc", {"chunk": None, "resume": True}, "add --chunk"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_it_is_simulated(
+    scene: Scene, tmp_path: Path, name: str, options: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(RippleError, match=message):
+        export_scene(scene, tmp_path / name, dataclasses.replace(OPTIONS, **options))
+    assert not list(tmp_path.iterdir())
