@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
 from ripple_sim.render.camera import ThroughLens, Viewpoint
+from ripple_sim.render.surfaces.height_maps import AnyHeightMap, MovedHeightMap
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.gl import shared_context
 
 from .exposure import Exposures
-from .passes import Sighting
+from .passes import SeenMesh, Sighting
 from .ripple_renderer import surface_of
 from .sensor import Sensor
 from .snapshot import Snapshot
@@ -95,7 +96,15 @@ class FrameSource:
         camera = self.camera(snapshot)
         image = self.renderer.surfaces(snapshot.data, height_maps, camera, (self.width, self.height))
         read = {geom: np.asarray(height_map) for geom, height_map in height_maps.items()}
-        return Sighting.of(image, camera.pose(), snapshot.data, read)
+        return Sighting.of(image, camera.pose(), snapshot.data, read, self._meshes(height_maps))
+
+    def _meshes(self, height_maps: Mapping[int, AnyHeightMap]) -> dict[int, SeenMesh]:
+        """The meshes of the targets where they are at a snapshot."""
+        meshes = {}
+        for name, geom in self._geoms.items():
+            mesh, height_map = self._simulation.ripples[name].rest.mesh, height_maps[geom]
+            meshes[geom] = SeenMesh(height_map.V if isinstance(height_map, MovedHeightMap) else mesh.V, mesh.F)
+        return meshes
 
     def camera(self, snapshot: Snapshot) -> Camera | FixedCamera:
         """Camera of a snapshot, through the middle of its lens."""

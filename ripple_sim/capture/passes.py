@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,8 +13,16 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.model.soft_ids import first_skin
 from ripple_sim.render.camera import Pose
 from ripple_sim.render.passes.surface_buffers import SurfaceImage
+from ripple_sim.render.surfaces.moving_vertices import MovingVertices
 from ripple_sim.render.surfaces.spline_heights import spline_heights, spline_samples
 from ripple_sim.solver.texels.chart_page import ChartPage
+
+
+class SeenMesh(NamedTuple):
+    """The mesh of a target at a time, in its frame: vertices [n, 3] [m] and triangles [m, 3]."""
+
+    V: NDArray[np.float64]
+    F: NDArray[np.int64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -29,6 +38,8 @@ class Sighting:
         Of the geoms [m].
     height_maps : mapping
         By geom id, float32 [C, n + 2, n + 2, 4].
+    meshes : mapping
+        Likewise, those of the targets.
     """
 
     image: SurfaceImage
@@ -36,17 +47,23 @@ class Sighting:
     positions: NDArray[np.float64]
     rotations: NDArray[np.float64]
     height_maps: Mapping[int, NDArray[np.float32]]
+    meshes: Mapping[int, SeenMesh]
 
     @classmethod
     def of(
-        cls, image: SurfaceImage, pose: Pose, data: mujoco.MjData, height_maps: Mapping[int, NDArray[np.float32]]
+        cls,
+        image: SurfaceImage,
+        pose: Pose,
+        data: mujoco.MjData,
+        height_maps: Mapping[int, NDArray[np.float32]],
+        meshes: Mapping[int, SeenMesh],
     ) -> Sighting:
         """Sighting with the poses in `data`, which are copied."""
         model = data.model
         more = first_skin(model) + model.nskin - model.ngeom  # what is soft is in the world
         positions = np.concatenate([data.geom_xpos, np.zeros((more, 3))])
         rotations = np.concatenate([data.geom_xmat.reshape(-1, 3, 3), np.tile(np.eye(3), (more, 1, 1))])
-        return cls(image, pose, positions, rotations, height_maps)
+        return cls(image, pose, positions, rotations, height_maps, meshes)
 
     @property
     def positions_seen(self) -> NDArray[np.float64]:
@@ -70,7 +87,8 @@ class Sighting:
     def flow_to(self, later: Sighting) -> NDArray[np.float32]:
         """How far each pixel's surface point moves in the frame [pixels], to the right and down, [height, width, 2].
 
-        The point rides on its geom, and on the waves of a target, along the smooth normal. 0 where nothing is.
+        The point rides on its geom, on a target that moves with its mesh, and on the waves, along the smooth normal. 0
+        where nothing is.
         """
         image, seen = self.image, self.positions_seen
         flow = np.zeros((*image.depth.shape, 2), np.float32)
@@ -82,11 +100,21 @@ class Sighting:
                 height_map = later.height_maps[geom]
                 page = ChartPage(len(height_map), height_map.shape[1] - 2)
                 heights = spline_heights(height_map, *spline_samples(page, image.place[mask].astype(np.float64)))
-                rise = heights.astype(np.float64) - image.height[mask]
-                local += rise[:, None] * (image.smooth_normal[mask] @ rotation)
+                direction = image.smooth_normal[mask] @ rotation
+                still = local - image.height[mask, None] * direction
+                still, direction = _carried(self.meshes[geom], later.meshes[geom], still, direction)
+                local = still + heights[:, None] * direction
             moved = local @ later.rotations[geom].T + later.positions[geom]
             flow[mask] = later.pixels(moved) - self.pixels(points)
         return flow
+
+
+def _carried(mesh: SeenMesh, later: SeenMesh, points: NDArray, directions: NDArray) -> tuple[NDArray, NDArray]:
+    """Points of a mesh and the directions in which waves move them, both [k, 3], once the mesh has moved on."""
+    if np.array_equal(mesh.V, later.V):
+        return points, directions
+    moved = MovingVertices(mesh.V, mesh.F, points, directions, directions)(later.V)
+    return moved.points.astype(np.float64), moved.directions.astype(np.float64)
 
 
 def passes_of(sighting: Sighting, later: Sighting | None, names: tuple[str, ...]) -> dict[str, NDArray]:

@@ -39,9 +39,11 @@ material = {speed = 0.5, density = 20.0}
 FLOOR, EGG, BALL = 1, 2, 3  # in the segmentation
 
 
-@pytest.fixture(scope="module")
-def seen(tmp_path_factory: pytest.TempPathFactory, opengl: None) -> list[tuple[Sighting, np.ndarray]]:
-    """Two frames: what is seen, and where points on the egg are in the world."""
+@pytest.fixture(scope="module", params=["rigid", "moving"])
+def seen(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, opengl: None
+) -> list[tuple[Sighting, np.ndarray]]:
+    """Two frames: what is seen, and where points on the egg are in the world. Its surface may move by itself, too."""
     folder: Path = tmp_path_factory.mktemp("scene")
     (folder / "scene.xml").write_text(MJCF)
     (folder / "scene.toml").write_text(TOML)
@@ -56,9 +58,12 @@ def seen(tmp_path_factory: pytest.TempPathFactory, opengl: None) -> list[tuple[S
 
     def look() -> Iterator[tuple[Sighting, np.ndarray]]:
         for snapshot in snapshots(simulation, 2):
-            rotation = snapshot.data.geom("egg").xmat.reshape(3, 3)
-            points = mesh.shape(snapshot.heights["egg"], snapshot.heights["egg"]).points.astype(float)
+            rotation, V = snapshot.data.geom("egg").xmat.reshape(3, 3), waves.vertices
+            points = mesh.shape(snapshot.heights["egg"], snapshot.heights["egg"], V).points.astype(float)
             yield source.sighting(snapshot), points @ rotation.T + snapshot.data.geom("egg").xpos
+            if request.param == "moving":
+                rest = waves.rest.mesh.V
+                waves.move(rest * [1.0, 1.1, 0.9] + 0.03 * np.sin(8 * rest[:, [1, 2, 0]]))
 
     return list(look())
 
@@ -120,7 +125,7 @@ def test_flow_is_the_displacement_of_tracked_points(seen: list[tuple[Sighting, n
     error = np.linalg.norm(flow[row, column] - moved, axis=1)
     assert np.median(error) < 0.1
     # without the waves' share it would be off
-    still = Sighting(later.image, later.pose, later.positions, later.rotations, sighting.height_maps)
+    still = Sighting(later.image, later.pose, later.positions, later.rotations, sighting.height_maps, later.meshes)
     unwaved = np.linalg.norm(sighting.flow_to(still)[row, column] - moved, axis=1)
     assert np.median(unwaved) > 3 * np.median(error)
     ball = sighting.image.geom == BALL - 1
