@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .batch.load_batch import load_batch
-    from .capture.ripple_renderer import RippleRenderer
     from .coupling.colliders.collidable import make_collidable
     from .coupling.ripples import Impulse, Ripples
     from .errors import RippleWarning
     from .export.export_scene import export_scene
     from .export.exporter import Exporter
     from .export.options import ExportOptions
+    from .export.ripple_renderer import RippleRenderer
     from .render import Camera
     from .scene.load_scene import load_scene
     from .simulation import Simulation
@@ -48,7 +48,7 @@ _HOMES = {
     "Impulse": ".coupling.ripples",
     "Material": ".solver",
     "RippleError": ".solver",
-    "RippleRenderer": ".capture.ripple_renderer",
+    "RippleRenderer": ".export.ripple_renderer",
     "RippleWarning": ".errors",
     "Ripples": ".coupling.ripples",
     "Simulation": ".simulation",

@@ -15,9 +15,9 @@ from ripple_sim.solver.gl import shared_context
 
 from .exposure import Exposures
 from .passes import SeenMesh, Sighting
-from .ripple_renderer import surface_of
 from .sensor import Sensor
 from .snapshot import Snapshot
+from .target_surface import surface_of
 from .viewpoint import focal_distance, viewpoint
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import gymnasium
 from gymnasium.utils import EzPickle, RecordConstructorArgs
 
-from ripple_sim.capture.ripple_renderer import RippleRenderer
 from ripple_sim.coupling.model.geoms import ByGeom
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import RippleWarning
+from ripple_sim.export.ripple_renderer import RippleRenderer
 from ripple_sim.solver import Material
 
 from .environment import EnvironmentCamera, frame_size, model_and_data

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ripple_sim import Exporter, ExportOptions, Material, Ripples, export_scene
+from ripple_sim import Exporter, ExportOptions, Material, RippleRenderer, Ripples, export_scene
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.encode.mark import made_here
@@ -87,7 +87,10 @@ def shown(browser: Any, page: Path) -> Iterator[Any]:
 
 
 def pixels(tab: Any) -> np.ndarray:
-    uri = tab.evaluate("ripplePlayer.player.canvas.toDataURL()")
+    return image_of(tab.evaluate("ripplePlayer.player.canvas.toDataURL()"))
+
+
+def image_of(uri: str) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(base64.b64decode(uri.split(",")[1]))).convert("RGB")).astype(int)
 
 
@@ -139,6 +142,30 @@ def test_in_a_notebook_a_complete_page_plays(scene: Scene, ripples: Ripples, tmp
     shown = exporter._repr_html_()
     assert shown.startswith("<iframe srcdoc=")
     assert html.unescape(shown.split('"')[1]) == (tmp_path / "run.html").read_text()
+
+
+@browsing
+def test_players_show_inside_the_page_of_a_notebook(browser: Any, ripples: Ripples, tmp_path: Path) -> None:
+    """Of an exporter, and of a renderer what it rendered last."""
+    data = mujoco.MjData(ripples.model)
+    mujoco.mj_forward(ripples.model, data)
+    with Exporter(ripples.model, ripples, tmp_path / "run.html", size=SIZE) as exporter:
+        exporter.write(data)
+    renderer = RippleRenderer(ripples.model, ripples, width=SIZE[0], height=SIZE[1])
+    assert renderer._repr_html_() is None
+    ours = renderer.render(data)
+    notebook = tmp_path / "notebook.html"
+    notebook.write_text(f"<!DOCTYPE html><body>{exporter._repr_html_()}{renderer._repr_html_()}</body>")
+    with opened(browser, notebook) as tab:
+        assert len(tab.frames) == 3
+        for frame in tab.frames[1:]:
+            uri = frame.evaluate("""ripplePlayer.ready.then(player => {
+                player.playing = false;
+                Object.assign(player.canvas.style, {width: '320px', height: '180px'});
+                player.redraw();
+                return player.canvas.toDataURL();
+            })""")
+            assert np.abs(image_of(uri) - ours).mean() < 8  # of 255
 
 
 @browsing

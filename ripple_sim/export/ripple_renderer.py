@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-import io
+import dataclasses
+import tempfile
+from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
+from ripple_sim.capture.drawn_heights import DrawnHeights
+from ripple_sim.capture.target_surface import surface_of
+from ripple_sim.capture.viewpoint import viewpoint
 from ripple_sim.coupling.arguments import own_data, own_model
 from ripple_sim.coupling.model.geoms import ByGeom, by_name
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
-from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.render import Camera, FixedCamera, Renderer
 from ripple_sim.scene.camera import CameraEntry
-from ripple_sim.solver import WaveSolver
 from ripple_sim.solver.gl import GLContext, shared_context
 
-from .drawn_heights import DrawnHeights
-from .viewpoint import viewpoint
+from .exporter import Exporter, camera_entry
+from .html.notebook import framed
 
 
 class RippleRenderer:
@@ -67,7 +69,8 @@ class RippleRenderer:
         surfaces = {
             geom: surface_of(ripples[name], named.get(name, "rubber")) for name, geom in ripples.geom_ids.items()
         }
-        self._shown: NDArray[np.uint8] | None = None
+        self._size, self._looks, self._limit = (width, height), named, limit
+        self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
         self._renderer = Renderer(gl or shared_context(), self._model, surfaces, size=(width, height))
 
     def render(self, data: mujoco.MjData, camera: Camera | FixedCamera | str | None = None) -> NDArray[np.uint8]:
@@ -81,35 +84,37 @@ class RippleRenderer:
             A camera, or the name of one in the MJCF; by default MuJoCo's free camera, aimed at the model's middle.
         """
         data = own_data(self._model, data)
+        entry = self._entry(camera)
+        self._seen = data, entry
         if camera is None or isinstance(camera, str):
-            free = self._model.vis.global_
-            entry = CameraEntry(name=camera, azimuth=free.azimuth, elevation=free.elevation, fovy=free.fovy)
             camera = viewpoint(self._model, data, entry, data.time)
         height_maps = {
             self._ripples.geom_ids[name]: height_map(self._ripples[name].snapshot(), data)
             for name, height_map in self._height_maps.items()
         }
-        self._shown = self._renderer.render(data, height_maps, camera)
-        return self._shown
+        return self._renderer.render(data, height_maps, camera)
 
-    def _repr_png_(self) -> bytes | None:
-        """In a notebook: what was rendered last."""
-        if self._shown is None:
+    def _entry(self, camera: Camera | FixedCamera | str | None) -> CameraEntry:
+        """What `[camera]` of a scene file would say; MuJoCo's free camera where it has no words for it."""
+        if isinstance(camera, Camera):
+            return CameraEntry(**dataclasses.asdict(camera))
+        return camera_entry(self._model, camera if isinstance(camera, str) else None)
+
+    def _repr_html_(self) -> str | None:
+        """In a notebook: the present state of what was rendered last, to turn and to zoom."""
+        if self._seen is None:
             return None
-        file = io.BytesIO()
-        Image.fromarray(self._shown).save(file, "PNG")
-        return file.getvalue()
-
-
-def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] | None = None) -> Surface:
-    """Surface to be drawn of a target."""
-    atlas = waves.rest
-    mesh = atlas.mesh
-    return Surface(
-        V=mesh.V,
-        F=mesh.F,
-        charts=Charts.of(atlas),
-        look=look,
-        color=color,
-        uv=mesh.uv if mesh.corner_uv is None else mesh.corner_uv,
-    )
+        data, camera = self._seen
+        with tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder:
+            page = Path(folder) / "now.html"
+            with Exporter(
+                self._model,
+                self._ripples,
+                page,
+                camera=camera,
+                looks=self._looks,
+                size=self._size,
+                limit=self._limit,
+            ) as exporter:
+                exporter.write(data)
+            return framed(page, self._size[0] / self._size[1])

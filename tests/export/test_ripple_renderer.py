@@ -1,11 +1,8 @@
 """Frames of a model with ripples in somebody's own loop."""
 
-import io
-
 import mujoco
 import numpy as np
 import pytest
-from PIL import Image
 
 from ripple_sim import Camera, Material, RippleError, RippleRenderer, Ripples
 
@@ -58,11 +55,3 @@ def test_an_unknown_look_or_camera_is_refused_by_name(egg):
         RippleRenderer(model, ripples, looks={"egg": "glass"})
     with pytest.raises(RippleError, match="above"):
         RippleRenderer(model, ripples, width=96, height=72).render(data, "above")
-
-
-def test_in_a_notebook_it_shows_what_it_rendered_last(egg):
-    model, data, ripples = egg
-    renderer = RippleRenderer(model, ripples, width=96, height=72)
-    assert renderer._repr_png_() is None
-    frame = renderer.render(data, "side")
-    assert np.array_equal(np.asarray(Image.open(io.BytesIO(renderer._repr_png_()))), frame)
