@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -16,7 +17,7 @@ from .store import CHUNK, Store, made_here
 from .tables import COLUMNS, rows
 
 _IMPULSES = 4096  # in one chunk
-_KINDS = {"int64": np.int64, "float64": np.float64, "bool": np.bool_, "string": "<U64"}
+_KINDS: dict[str, Any] = {"int64": np.int64, "float64": np.float64, "bool": np.bool_, "string": "<U64"}
 
 
 class FieldWriter:

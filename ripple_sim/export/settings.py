@@ -23,7 +23,14 @@ def check_options(options: ExportOptions) -> None:
         raise ExportError(f"frame rate is {options.fps!r}; valid is a whole number from 1 to {MAX_FPS} frames a second")
     if options.resume and options.chunk is None:
         raise ExportError("only an export in chunks can be resumed; add --chunk, or leave --resume out")
-    check_write_options({name: getattr(options, name) for name in ("size", "tessellation", "triangles", "chunk")})
+    check_write_options(
+        {
+            "size": options.size,
+            "tessellation": options.tessellation,
+            "triangles": options.triangles,
+            "chunk": options.chunk,
+        }
+    )
 
 
 def check_write_options(options: WriteOptions) -> None:
