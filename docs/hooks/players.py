@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,20 +11,17 @@ from ripple_sim import ExportOptions, export_scene, load_scene
 
 # By scene: how much of it is played.
 PLAYED = {
-    "sphere": ExportOptions(fps=30, duration=2.0, resolution=48),
-    "pretzel": ExportOptions(fps=30, duration=2.0, resolution=48),
+    scene: ExportOptions(fps=30, duration=duration, resolution=48)
+    for scene, duration in {"sphere": 2.0, "pretzel": 2.0, "duck": 3.0, "jelly": 1.5, "arm": 2.0}.items()
 }
+_PICTURE = re.compile(rf"!\[(.*?)\]\(pictures/({'|'.join(PLAYED)})\.webp\)")
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put a frame with its page where a player is asked for."""
+    """Put a player where one is asked for, and behind the pictures of its scene, which open it."""
     for scene in PLAYED:
-        frame = (
-            f'<iframe src="players/{scene}.html" title="{scene}" loading="lazy" allowfullscreen '
-            'style="border: 0; width: 100%; aspect-ratio: 16 / 9"></iframe>'
-        )
-        markdown = markdown.replace(f"<!-- player: {scene} -->", frame)
-    return markdown
+        markdown = markdown.replace(f"<!-- player: {scene} -->", _frame(scene))
+    return _PICTURE.sub(lambda found: _opening(html.escape(found[1]), found[2]), markdown)
 
 
 def on_post_build(config: Any, **_: Any) -> None:
@@ -31,3 +30,15 @@ def on_post_build(config: Any, **_: Any) -> None:
     folder.mkdir(exist_ok=True)
     for scene, options in PLAYED.items():
         export_scene(load_scene(scene), folder / f"{scene}.html", options)
+
+
+def _frame(scene: str) -> str:
+    return (
+        f'<iframe src="players/{scene}.html" title="{scene}" loading="lazy" allowfullscreen '
+        'style="border: 0; width: 100%; aspect-ratio: 16 / 9"></iframe>'
+    )
+
+
+def _opening(text: str, scene: str) -> str:
+    picture = f'<img src="pictures/{scene}.webp" alt="{text}" title="{text}: open the player">'
+    return f"<details><summary>{picture}</summary>{_frame(scene)}</details>"

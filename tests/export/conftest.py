@@ -19,6 +19,12 @@ MJCF = """<mujoco><option timestep="0.001"/>
 <body name="stone" pos="0.15 0 0.245"><freejoint/><geom name="stone" size="0.05" rgba="1 0 0 1"/></body>
 </worldbody></mujoco>"""
 
+SOFT = """<mujoco><option timestep="0.002" solver="CG"/><worldbody>
+<body name="nest" pos="0.1 0 0.6" euler="0 0 30"><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/></body>
+<flexcomp name="jelly" type="grid" count="3 3 3" spacing=".1 .1 .1" pos="1 0 .2" dim="3" radius=".005" dof="trilinear"
+  mass="2"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3" damping=".02"/></flexcomp>
+<geom type="plane" size="3 3 .1" pos="0 0 .09"/></worldbody></mujoco>"""
+
 TOML = """model = "scene.xml"
 duration = 0.05
 [[ripple]]
@@ -45,3 +51,9 @@ def scene(scene_file: Path) -> Scene:
 def ripples() -> Ripples:
     model = mujoco.MjModel.from_xml_string(MJCF)
     return Ripples(model, {"egg": Material(speed=0.3, density=1500.0)}, resolution=12, backend="cpu")
+
+
+@pytest.fixture
+def soft_model() -> mujoco.MjModel:
+    """An egg, and a soft body that falls."""
+    return mujoco.MjModel.from_xml_string(SOFT)
