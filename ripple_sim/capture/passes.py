@@ -102,14 +102,14 @@ class Sighting:
                 heights = spline_heights(height_map, *spline_samples(page, image.place[mask].astype(np.float64)))
                 direction = image.smooth_normal[mask] @ rotation
                 still = local - image.height[mask, None] * direction
-                still, direction = _carried(self.meshes[geom], later.meshes[geom], still, direction)
+                still, direction = _ridden(self.meshes[geom], later.meshes[geom], still, direction)
                 local = still + heights[:, None] * direction
             moved = local @ later.rotations[geom].T + later.positions[geom]
             flow[mask] = later.pixels(moved) - self.pixels(points)
         return flow
 
 
-def _carried(mesh: SeenMesh, later: SeenMesh, points: NDArray, directions: NDArray) -> tuple[NDArray, NDArray]:
+def _ridden(mesh: SeenMesh, later: SeenMesh, points: NDArray, directions: NDArray) -> tuple[NDArray, NDArray]:
     """Points of a mesh and the directions in which waves move them, both [k, 3], once the mesh has moved on."""
     if np.array_equal(mesh.V, later.V):
         return points, directions
