@@ -14,7 +14,6 @@ from ripple_sim.solver.errors import RippleError
 
 from .bounds import Balls, join
 from .camera import Pose
-from .surfaces.displacement import Place
 from .surfaces.height_maps import AnyHeightMap, HeightMapTextures
 from .surfaces.surface import Surface
 from .surfaces.surface_mesh import SurfaceMesh
@@ -64,18 +63,17 @@ class DrawnScene:
         geoms = ", ".join(str(target.geom) for target in self._targets) or "none"
         raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
 
-    def update(self, ctx: moderngl.Context, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose) -> int:
-        """Bring everything on the GPU up to date; return the number of occluders."""
+    def update(self, ctx: moderngl.Context, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose) -> None:
+        """Bring everything on the GPU up to date."""
         for target in self._targets:
             target.ripple(ctx, height_maps.get(target.geom))
-        occluders = self._geoms.occluders.bind(data, pose.focus)
+        self._geoms.occluders.bind(data, pose.focus)
         for target in self._targets:
             origin, rotation = target_pose(data, target.geom)
-            target.update(ctx, Place(rotation, origin, occluders))
+            target.update(ctx, rotation, origin, self._geoms.occluders)
         pixels = self._height / (2 * np.tan(np.radians(pose.fovy) / 2))
         self._geoms.update(data, pose.position, pixels)
         self._assets.objects.bind()
-        return occluders
 
     def balls(self, data: Any) -> Balls:
         """Balls that contain everything."""

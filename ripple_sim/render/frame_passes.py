@@ -107,7 +107,7 @@ class FramePasses:
     ) -> None:
         """Bring everything on the GPU up to date."""
         frame, floor = self._frame, self._floor
-        occluders = self._scene.update(ctx, data, height_maps, pose)
+        self._scene.update(ctx, data, height_maps, pose)
         frame.set_camera(pose, self._format.aspect)
         casters = within(self._scene.casters(data), pose.focus, _SHADOW_REACH * pose.distance)
         centre, radius = enclosing(casters) if len(casters.radii) else (pose.focus, pose.distance)
@@ -117,7 +117,7 @@ class FramePasses:
         casting = self._shadows.fit(frame, lights, centre, radius)
         if floor is not None and len(casters.radii):
             floor.shade(frame, casting, casters)
-        frame.set_vector("counts", [occluders, len(lights), exposure], len(casting))
+        frame.set_vector("counts", [0, len(lights), exposure], len(casting))
         frame.bind()
 
     def _draw_maps(self, ctx: moderngl.Context) -> None:

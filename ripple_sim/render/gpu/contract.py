@@ -117,14 +117,14 @@ FRAME = Struct(
     floor_fade="vec4",  # x, y: where it begins and ends to fade into the background, in distances of the focus
     lights=(LIGHT, MAX_LIGHTS),  # the first ones cast shadows
     shadows=(SHADOW, MAX_SHADOWS),
-    counts="vec4",  # x: occluders, y: lights, z: number of the exposure, w: lights that cast shadows
+    counts="vec4",  # y: lights, z: number of the exposure, w: lights that cast shadows
 )
 OBJECT = Struct(
     "Object",
     base="vec4",  # roughness, metallic, sheen, coat
     volume="vec4",  # translucency, transparency, emission, opacity
     place="vec4",  # geom, size [m], shadow bias [m], 1 where its colours are those of a heatmap
-    height_map="vec4",  # layer; 1 with a height map, 0 without
+    height_map="vec4",  # layer; 1 with a height map, 0 without; bits of the occluders near a geom
     rotation="mat3",  # of the height map's gradients, into the world
 )
 

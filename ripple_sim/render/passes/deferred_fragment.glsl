@@ -97,7 +97,8 @@ vec4 lit_solid(SurfaceSample surface, vec3 position, float spread, bvec2 block)
     vec3 albedo = heatmap ? vec3(NEUTRAL) : surface.color * surface.color;
     Material m = Material(albedo, object.base.x, object.base.y, object.base.z, object.base.w, object.volume.x,
                           object.volume.y, object.volume.z, surface.thickness, behind, object.place.z,
-                          SCATTER * object.volume.x * object.place.y, surface.visibility, object.height_map.y > 0.0 ? 0 : int(counts.x), block);
+                          SCATTER * object.volume.x * object.place.y, surface.visibility,
+                          int(object.height_map.z), block);
     vec3 shown = tone_mapped(shaded(m, position, surface.rippled, surface.normal, object.place.x, spread));
     float shade = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / FULL_LIGHT, DARKEST, 1.0);
     return vec4(mix(heatmap ? surface.color * shade : shown, INK, surface.ink), object.volume.w);

@@ -18,7 +18,7 @@ struct Material {
     float shadow_bias;  // height of bumps that the shading normal accounts for [m]
     float scatter;      // how far light gets under the surface [m]
     float visibility;   // ambient visibility that the object itself leaves, and its neighbours where `occluders` is 0
-    int occluders;
+    int occluders;      // bits of those that count
     bvec2 block;        // neighbours in the block of 2 x 2 pixels that share their shadows with this one
 };
 
@@ -61,7 +61,7 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     vec3 reflected = reflect(-view, normal);
     float n_v = clamp(dot(normal, view), 0.1, 1.0);
 
-    float open = m.visibility * occluder_visibility(position, flat_normal, own_geom, m.occluders);
+    float open = m.visibility * occluder_visibility(position, flat_normal, m.occluders);
     float height = max(dot(position - floor_origin.xyz, floor_normal.xyz), 0.0);
     // a wall sees the floor before it, about as far away as it is high
     vec3 bounce = floor_radiance(position + 1.2 * height * normal, height);

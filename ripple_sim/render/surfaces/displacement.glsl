@@ -15,8 +15,7 @@ uniform mat3 rotation;
 uniform vec3 origin;
 uniform int count, base_count;
 uniform float layer;
-uniform float geom;
-uniform int occluder_count;
+uniform int occluders_near;
 uniform bool flagged;  // midpoints are not a list of those in use, but say of each whether it is
 
 void main()
@@ -34,5 +33,5 @@ void main()
     float height = spline_at(height_maps, vec3(v.place[0], v.place[1], layer)).w;
     vec3 direction = vec3(v.direction[0], v.direction[1], v.direction[2]);
     vec3 world = rotation * (vec3(v.position[0], v.position[1], v.position[2]) + height * direction) + origin;
-    moved[i] = vec4(world, occluder_visibility(world, rotation * direction, geom, occluder_count));
+    moved[i] = vec4(world, occluder_visibility(world, rotation * direction, occluders_near));
 }

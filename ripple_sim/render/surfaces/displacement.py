@@ -24,7 +24,7 @@ class Place:
     origin : float64 [3]
         [m]
     occluders : int
-        How many are bound.
+        Bits of those near it; see `Occluders.near`.
     """
 
     rotation: NDArray[np.float64]
@@ -39,8 +39,6 @@ class Displacement:
     ----------
     resources : Resources
     vertices : SurfaceVertices
-    geom : int
-        The target's geom.
     layer : int
         Of its height map.
 
@@ -50,7 +48,7 @@ class Displacement:
         vec4 a vertex: displaced, in the world [m], and the ambient visibility that nearby geoms leave.
     """
 
-    def __init__(self, resources: Resources, vertices: SurfaceVertices, *, geom: int, layer: int) -> None:
+    def __init__(self, resources: Resources, vertices: SurfaceVertices, layer: int) -> None:
         attributes = vertices.attributes
         self._midpoint_count = midpoint_count = len(vertices.edges.ends)
         self._base_count = base_count = len(attributes) - midpoint_count
@@ -61,7 +59,6 @@ class Displacement:
         self.moved: moderngl.Buffer = resources.buffer(reserve=16 * len(attributes))
         self._midpoints = resources.buffer(reserve=4 * midpoint_count, dynamic=True)
         self._program["base_count"] = base_count
-        self._program["geom"] = float(geom)
         self._program["layer"] = float(layer)
 
     def move(self, points: NDArray[np.float32], directions: NDArray[np.float32]) -> None:
@@ -88,6 +85,6 @@ class Displacement:
         self._program["rotation"] = tuple(place.rotation.T.ravel())
         self._program["origin"] = tuple(place.origin)
         self._program["count"] = count
-        self._program["occluder_count"] = place.occluders
+        self._program["occluders_near"] = place.occluders
         self._program.run(-(-count // VERTEX_GROUP))
         ctx.memory_barrier()

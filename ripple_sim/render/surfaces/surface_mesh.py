@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.model.soft_ids import is_soft
 from ripple_sim.render.bounds import Balls, balls_about
 from ripple_sim.render.visuals.assets import Assets
+from ripple_sim.render.visuals.occluders import Occluders
 from ripple_sim.solver.errors import RippleError
 
 from .displacement import Displacement, Place
@@ -82,7 +83,7 @@ class SurfaceMesh:
         pixel = 2 * self._radius / size[1]
         vertices, self._balls = bounded_vertices(surface, pixel * PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
         self._triangles = SurfaceTriangles(assets.resources, vertices, surface.charts, index, pixel)
-        self._displacement = Displacement(assets.resources, vertices, geom=geom, layer=index)
+        self._displacement = Displacement(assets.resources, vertices, index)
         paint = Paint(surface, mapping, (*rgb, float(self.number)))
         self._drawing = SurfaceDrawing(assets, paint, vertices, self._displacement.moved, self._triangles.indices)
         self._mesh, self._vertices = (surface.V, surface.F), vertices
@@ -118,13 +119,16 @@ class SurfaceMesh:
             self._height_maps.bind()
             self._triangles.find_on_device(ctx)
 
-    def update(self, ctx: moderngl.Context, place: Place) -> None:
-        """Displace the vertices by the height map where the geom is."""
-        self._pose = place.rotation, place.origin
+    def update(
+        self, ctx: moderngl.Context, rotation: NDArray[np.float64], origin: NDArray[np.float64], occluders: Occluders
+    ) -> None:
+        """Displace the vertices by the height map where the geom is, among bound occluders."""
+        self._pose = rotation, origin
+        near = occluders.near(self.ball(), np.array([self.geom]))
         bias = min(1.5 * self._highest, _HIGHEST_BIAS * self._radius)
-        self._objects.set_height_map(self.number, bias, place.rotation)
+        self._objects.set_height_map(self.number, bias, rotation)
         self._height_maps.bind()
-        self._displacement.run(ctx, place, self._triangles.midpoints)
+        self._displacement.run(ctx, Place(rotation, origin, int(near[0])), self._triangles.midpoints)
 
     def _move(self, V: NDArray[np.float64]) -> None:
         """Take the vertices along with those of the mesh, [n, 3] [m]."""

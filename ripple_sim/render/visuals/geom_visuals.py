@@ -59,9 +59,12 @@ class GeomVisuals:
         self.occluders = Occluders(assets.resources, model, np.array(solid, dtype=np.int64))
         groups: dict[tuple[Any, ...], tuple[NamedShape, list[tuple[Visual, int]]]] = {}
         self.transparent: list[TransparentVisual] = []
+        self._hosts: dict[int, int] = {}  # geoms, by the number in the table of objects
         for visual, shape in shaped:
             mapping = mapping_of(model, visual)
-            number = assets.objects.add(look_of(model, visual), host_of(model, visual), opacity=visual.opacity)
+            host = host_of(model, visual)
+            number = assets.objects.add(look_of(model, visual), host, opacity=visual.opacity)
+            self._hosts[number] = host
             if visual.opacity < 1.0:
                 self.transparent.append(TransparentVisual(visual, number, self._instances(shape, [(visual, number)])))
             else:
@@ -83,8 +86,10 @@ class GeomVisuals:
         """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""
         for instances in (*self._opaque, *(each.instances for each in self.transparent)):
             instances.update(data, eye, pixels)
-            for number, bias in zip(instances.numbers, instances.shadow_biases, strict=True):
+            near = self.occluders.near(instances.balls, np.array([self._hosts[number] for number in instances.numbers]))
+            for number, bias, bits in zip(instances.numbers, instances.shadow_biases, near, strict=True):
                 self._assets.objects.set_shadow_bias(number, float(bias))
+                self._assets.objects.set_occluders(number, int(bits))
 
     def draw(self) -> None:
         """Draw the opaque visuals into the G-buffer."""

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.bounds import Balls
 from ripple_sim.render.gpu.contract import Unit
 from ripple_sim.render.gpu.resources import Resources
 
@@ -75,6 +76,8 @@ class Instances:
         Whether they are sites.
     numbers : list of int
         In the table of objects.
+    balls : Balls
+        That contain them.
     shadow_biases : float64 [k]
         How far above the surface shadows must be looked up so that its edges do not shade it [m].
     """
@@ -98,6 +101,7 @@ class Instances:
         self._arrays: dict[int, tuple[moderngl.VertexArray, moderngl.VertexArray]] = {}
         self._segments = _LEVELS[-1]
         self.shadow_biases = np.zeros(len(visuals))
+        self.balls = Balls(np.zeros((len(visuals), 3)), np.zeros(len(visuals)))
 
     def update(self, data: Any, eye: NDArray[np.float64], pixels: float) -> None:
         """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""
@@ -106,7 +110,8 @@ class Instances:
         self._records["rotation"] = rotation.reshape(-1, 3, 3).transpose(0, 2, 1)
         self._records["origin"] = position
         self._buffer.write(self._records.tobytes())
-        radius = (self._records["core_size"] + self._records["shell_size"]).max(axis=1)
+        half = self._records["core_size"] + self._records["shell_size"]
+        self.balls, radius = Balls(position, np.linalg.norm(half, axis=1)), half.max(axis=1)
         away = np.maximum(np.linalg.norm(position - eye, axis=1) - radius, 0.1 * radius)
         largest = float((radius / away).max()) * pixels
         # the sagitta of a chord over a right angle's nth part: r (1 - cos(pi / 4n))

@@ -49,6 +49,10 @@ class ObjectTable:
         """Set how far above its surface an object's shadows are looked up [m]: its bumps shall not shade each other."""
         self._rows[number]["place"][2] = bias
 
+    def set_occluders(self, number: int, near: int) -> None:
+        """Set which occluders darken an object, as bits; see `Occluders.near`."""
+        self._rows[number]["height_map"][2] = near
+
     def set_height_map(self, number: int, bias: float, rotation: NDArray[np.float64]) -> None:
         """Set an object's shadow bias [m], and the rotation of its height map into the world, shape [3, 3]."""
         self.set_shadow_bias(number, bias)

@@ -1,17 +1,19 @@
 // Nearby geoms, approximated by capsules.
-layout(std430, binding = OCCLUDERS_BINDING) readonly buffer Occluders { vec4 occluders[]; };  // end a, radius; end b, geom
+layout(std430, binding = OCCLUDERS_BINDING) readonly buffer Occluders { vec4 occluders[]; };  // end a, radius; end b
 
-// Ambient visibility about a normal: the share of the hemisphere that other geoms leave free.
-float occluder_visibility(vec3 position, vec3 normal, float own_geom, int count)
+// Ambient visibility about a normal: the share of the hemisphere that other geoms leave free. The bits of `near` are
+// those of the occluders that count.
+float occluder_visibility(vec3 position, vec3 normal, int near)
 {
     float open = 1.0;
-    for (int i = 0; i < count; ++i) {
+    for (; near != 0; near &= near - 1) {
+        int i = findLSB(near);
         vec4 a = occluders[2 * i], b = occluders[2 * i + 1];
         vec3 axis = b.xyz - a.xyz, to = a.xyz - position;
         vec3 nearest = to + axis * clamp(-dot(axis, to) / max(dot(axis, axis), 1e-12), 0.0, 1.0);
         float away = length(nearest), ratio = min(a.w / max(away, 1e-9), 1.0);
         float above = clamp((dot(normal, nearest) / max(away, 1e-9) + ratio) / (1.0 + ratio), 0.0, 1.0);
-        open *= 1.0 - (b.w == own_geom ? 0.0 : 0.9 * ratio * ratio * above * above);
+        open *= 1.0 - 0.9 * ratio * ratio * above * above;
     }
     return open;
 }

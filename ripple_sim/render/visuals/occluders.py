@@ -11,6 +11,8 @@ from ripple_sim.render.bounds import Balls
 from ripple_sim.render.gpu.contract import MAX_OCCLUDERS, Binding
 from ripple_sim.render.gpu.resources import Resources
 
+_REACH = 9.5  # in radii: what is further hides less than a hundredth of the sky
+
 
 class Occluders:
     """Capsules of about each geom's size.
@@ -27,13 +29,14 @@ class Occluders:
         self._centre, self._half_axis, self._radius = _capsules(model, geoms)
         self._bounds = np.linalg.norm(model.geom_aabb[geoms, 3:], axis=1)
         self._buffer = resources.buffer(reserve=32 * MAX_OCCLUDERS, dynamic=True)
+        self._bound, self._bound_geoms = np.zeros((0, 2, 4)), np.zeros(0, np.int64)
 
     def balls(self, data: Any) -> Balls:
         """Bounding balls of the geoms."""
         return Balls(self._middles(data)[1], self._bounds)
 
-    def bind(self, data: Any, focus: NDArray[np.float64]) -> int:
-        """Bind the capsules nearest to a point [m]; return how many there are."""
+    def bind(self, data: Any, focus: NDArray[np.float64]) -> None:
+        """Bind the capsules nearest to a point [m]."""
         rotation, middle = self._middles(data)
         axis = np.einsum("gij,gj->gi", rotation, self._half_axis)
         away = np.linalg.norm(middle - focus, axis=1)
@@ -46,10 +49,26 @@ class Occluders:
         packed[:, 0, :3] = (middle - axis)[nearest]
         packed[:, 1, :3] = (middle + axis)[nearest]
         packed[:, 0, 3] = self._radius[nearest] * fade
-        packed[:, 1, 3] = self._geoms[nearest]
         self._buffer.write(packed.tobytes())
         self._buffer.bind_to_storage_buffer(Binding.OCCLUDERS)
-        return len(nearest)
+        self._bound, self._bound_geoms = packed.astype(np.float64), self._geoms[nearest]
+
+    def near(self, balls: Balls, geoms: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Which of the bound capsules darken objects by a hundredth or more, as bits; never an object's own.
+
+        Parameters
+        ----------
+        balls : Balls
+            k of them, which contain the objects.
+        geoms : int64 [k]
+            The objects' own.
+        """
+        first, last, radius = self._bound[:, 0, :3], self._bound[:, 1, :3], self._bound[:, 0, 3]
+        axis, to = last - first, balls.centres[:, None] - first
+        along = np.einsum("ej,kej->ke", axis, to) / np.maximum(np.einsum("ej,ej->e", axis, axis), 1e-12)
+        away = np.linalg.norm(to - np.clip(along, 0, 1)[..., None] * axis, axis=2) - balls.radii[:, None]
+        counts = (away < _REACH * radius) & (geoms[:, None] != self._bound_geoms)
+        return (counts << np.arange(len(radius))).sum(axis=1)
 
     def _middles(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rotation = data.geom_xmat[self._geoms].reshape(-1, 3, 3)

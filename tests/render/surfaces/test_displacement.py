@@ -45,7 +45,7 @@ def displaced(resources, vertices, height_map, place=STILL, used=(), layers=1, l
         for each in range(layers):
             height_maps.write(each, height_map if each == layer else np.full_like(height_map, 1e6))
         height_maps.bind()
-        displacement = Displacement(resources, vertices, geom=0, layer=layer)
+        displacement = Displacement(resources, vertices, layer)
         displacement.moved.write(np.full(4 * len(vertices.attributes), np.nan, np.float32).tobytes())
         displacement.run(ctx, place, np.array(used, dtype=np.int32))
         return np.frombuffer(displacement.moved.read(), np.float32).reshape(-1, 4)[:-1]
@@ -138,9 +138,7 @@ def spline_on(resources, charts, height_map, chart, uv) -> np.ndarray:
     with resources.gl as ctx:
         height_maps.write(0, height_map)
         height_maps.bind()
-        displacement = Displacement(
-            resources, vertices._replace(lookups=np.concatenate([places, places[:1]])), geom=0, layer=0
-        )
+        displacement = Displacement(resources, vertices._replace(lookups=np.concatenate([places, places[:1]])), layer=0)
         displacement.run(ctx, STILL, np.empty(0, np.int32))
         return np.frombuffer(displacement.moved.read(), np.float32).reshape(-1, 4)[:-1, 2]
 
