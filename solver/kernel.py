@@ -10,6 +10,7 @@ others call.
 from __future__ import annotations
 
 import functools
+import types
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -30,20 +31,39 @@ Bools: TypeAlias = NDArray[np.bool_]
 def kernel(function: Callable | None = None, **options: Any) -> Any:
     """Compile a function at its first call: `@kernel`, or `@kernel(inline="always")` with options of `numba.njit`."""
     # nobody calls kernels through pointers: without the wrappers for that a tenth less is compiled
-    compiler = numba.njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)
+    options = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
 
     def compiled(function: Callable) -> Any:
-        dispatcher = compiler(function)
-        dispatcher.get_call_template = functools.partial(_call_template, dispatcher)
+        dispatcher, inner = numba.njit(**options)(function), _Inner(function, options)
+        dispatcher.get_call_template, dispatcher.get_overload = inner.call_template, inner.overload
         return dispatcher
 
     return compiled if function is None else compiled(function)
 
 
-def _call_template(dispatcher: Any, args: Sequence[Any], kws: Mapping[str, Any]) -> Any:
-    """What numba asks of a kernel that others call: one version for all numbers, not one more for each literal."""
-    of_any = {name: numba.types.unliteral(each) for name, each in kws.items()}
-    return type(dispatcher).get_call_template(dispatcher, [*map(numba.types.unliteral, args)], of_any)
+class _Inner:
+    """A kernel as others call it: without the wrapper that unpacks what Python hands over, often most of the code."""
+
+    def __init__(self, function: Callable, options: Mapping[str, Any]) -> None:
+        self._function, self._options = function, options
+
+    @functools.cached_property
+    def _dispatcher(self) -> Any:
+        original = self._function
+        twin = types.FunctionType(
+            original.__code__, original.__globals__, None, original.__defaults__, original.__closure__
+        )
+        twin.__module__, twin.__qualname__ = original.__module__, f"{original.__qualname__}.inner"  # names its file
+        return numba.njit(no_cpython_wrapper=True, **self._options)(twin)
+
+    def call_template(self, args: Sequence[Any], kws: Mapping[str, Any]) -> Any:
+        """What numba asks of a kernel that others call: one version for all numbers, not one more for each literal."""
+        of_any = {name: numba.types.unliteral(each) for name, each in kws.items()}
+        return self._dispatcher.get_call_template([*map(numba.types.unliteral, args)], of_any)
+
+    def overload(self, signature: Any) -> Any:
+        """The version of a signature."""
+        return self._dispatcher.get_overload(signature)
 
 
 def shared(function: Callable) -> Any:

@@ -56,7 +56,7 @@ def value_at(x, i):
 @overload(value_at, inline="always")
 def _texel_overload(x, i):
     if isinstance(x, numba.types.Array):
-        return lambda x, i: x.reshape(-1)[i]
+        return lambda x, i: x.flat[i]
     return lambda x, i: x
 
 

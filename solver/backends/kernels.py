@@ -26,7 +26,7 @@ from .stencil_loops import apply
 @kernel
 def fill(h: Floats32, halo: Halo) -> None:
     """Copy the texels beyond the charts' borders into the halo."""
-    flat = h.reshape(-1)
+    flat = h.flat
     for i in range(len(halo.ghosts)):
         flat[halo.ghosts[i]] = flat[halo.sources[i]]
 

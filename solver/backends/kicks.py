@@ -33,20 +33,20 @@ def kick_drift_row(state: State, kick: Kick, dt: np.float32, chart: int, r: int,
     """
     h, v, h_next = state
     wide, narrow, w = slice(first - 1, last + 2), slice(first - 1, last), kick.stencil.rows[chart]
-    row = h[chart, r][wide]
-    rows = h[chart, r - 1][wide], row, h[chart, r + 1][wide]
+    row = h[chart, r, wide]
+    rows = h[chart, r - 1, wide], row, h[chart, r + 1, wide]
     links = (
-        w[0, r][wide],
-        w[1, r][wide],
-        w[1, r - 1][wide],
-        w[2, r][wide],
-        w[2, r - 1][wide],
-        w[3, r][wide],
-        w[3, r - 1][wide],
+        w[0, r, wide],
+        w[1, r, wide],
+        w[1, r - 1, wide],
+        w[2, r, wide],
+        w[2, r - 1, wide],
+        w[3, r, wide],
+        w[3, r - 1, wide],
     )
-    velocity, result = v[chart, r][wide], h_next[chart, r][wide]
+    velocity, result = v[chart, r, wide], h_next[chart, r, wide]
     factors = (
-        kick.gain[chart, r - 1][narrow],
+        kick.gain[chart, r - 1, narrow],
         cut(row_of(kick.extra, chart, r), wide),
         cut(row_of(kick.decay, chart, r - 1), narrow),
         cut(row_of(kick.spring, chart, r - 1), narrow),
@@ -94,8 +94,8 @@ def kick_drift(state: State, kick: Kick, dt: np.float32, first: int, last: int) 
 @kernel
 def kick_irregular(state: State, kick: Kick, dt: np.float32) -> None:
     """The irregular links' part of a substep: the same kick, and the drift by it."""
-    links, gain = kick.stencil.irregular, kick.gain.reshape(-1)
-    heights, velocities, drifted = state.h.reshape(-1), state.v.reshape(-1), state.h_next.reshape(-1)
+    links, gain = kick.stencil.irregular, kick.gain.flat
+    heights, velocities, drifted = state.h.flat, state.v.flat, state.h_next.flat
     for i in range(len(links.texels)):
         kicked = gain[links.texels[i]] * irregular_force(links, i, heights)
         velocities[links.addresses[i]] += kicked
@@ -105,7 +105,7 @@ def kick_irregular(state: State, kick: Kick, dt: np.float32) -> None:
 @kernel
 def kick_texels(h: Floats32, v: Floats32, loads: Loads, dt: np.float32) -> None:
     """Kick some texels, and drift them by that."""
-    heights, velocities = h.reshape(-1), v.reshape(-1)
+    heights, velocities = h.flat, v.flat
     for i in range(len(loads.addresses)):
         velocities[loads.addresses[i]] += loads.kicks[i]
         heights[loads.addresses[i]] += dt * loads.kicks[i]

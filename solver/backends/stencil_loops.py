@@ -51,7 +51,7 @@ def links_of(w: Floats32, chart: int, r: int) -> Rows:
 
 
 @kernel
-def irregular_force(links: Links, i: int, flat: Floats32) -> np.float32:
+def irregular_force(links: Links, i: int, flat: np.flatiter) -> np.float32:
     """Sum of weight (h_j - h_i) over the irregular links of texel i of the list."""
     here, force = flat[links.addresses[i]], np.float32(0)
     for k in range(links.begins[i], links.begins[i + 1]):
@@ -70,6 +70,6 @@ def apply(stencil: Weights, h: Floats32, factor: Coefficient, add: bool, out: Fl
         for c in range(1, stencil.columns + 1):
             force = value_in(row_of(factor, chart, r - 1), c - 1) * force_at(rows, links, c)
             result[c] = result[c] + force if add else force
-    irregular, flat, sums = stencil.irregular, h.reshape(-1), out.reshape(-1)
+    irregular, flat, sums = stencil.irregular, h.flat, out.flat
     for i in range(len(irregular.texels)):
         sums[irregular.addresses[i]] += value_at(factor, irregular.texels[i]) * irregular_force(irregular, i, flat)

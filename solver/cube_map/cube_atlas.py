@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.kernel import Floats, Ints
 from ripple_sim.solver.mesh.mesh import Mesh
 from ripple_sim.solver.texels.atlas import Atlas
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
@@ -26,8 +27,7 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
     # few texels lie far apart; else a divisor of the resolution, so that every row of texels begins with a ray
     stride = math.gcd(resolution, STRIDE) if directions.size > 3 * len(mesh.F) else 1
     triangles, barycentrics = cast_rays(sphere, mesh.F, directions.reshape(-1, 3), stride)
-    positions, normals = np.empty((len(triangles), 3)), np.empty((len(triangles), 3))
-    _interpolate((mesh.V, mesh.vertex_normals), mesh.F, triangles, barycentrics, (positions, normals))
+    positions, normals = _interpolate((mesh.V, mesh.vertex_normals), mesh.F, triangles, barycentrics)
     shape = directions.shape[:3]
     triangles, barycentrics = triangles.reshape(shape), barycentrics.reshape(*shape, 3)
     topology = cube_topology(resolution)
@@ -42,27 +42,16 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
     )
 
 
-@kernel
 def _interpolate(
-    at_vertices: tuple[Floats, Floats],
-    F: Ints,
-    triangles: Ints,
-    barycentrics: Floats,
-    at_texels: tuple[Floats, Floats],
-) -> None:
+    at_vertices: tuple[Floats, Floats], F: Ints, triangles: Ints, barycentrics: Floats
+) -> tuple[Floats, Floats]:
     """Positions and unit normals, [n, 3] at the vertices, at barycentric coordinates in triangles, [k, 3]."""
-    (V, vertex_normals), (positions, normals) = at_vertices, at_texels
-    for i in range(len(triangles)):
-        corners, weights = F[triangles[i]], barycentrics[i]
-        square = 0.0
-        for k in range(3):
-            position = normal = 0.0
-            for j in range(3):
-                position += weights[j] * V[corners[j], k]
-                normal += weights[j] * vertex_normals[corners[j], k]
-            positions[i, k], normals[i, k] = position, normal
-            square += normal * normal
-        length = np.sqrt(square)
-        for k in range(3):
-            # opposite normals may cancel: any corner's will do
-            normals[i, k] = normals[i, k] / length if length > 1e-9 else vertex_normals[corners[0], k]
+    (V, vertex_normals), corners = at_vertices, F[triangles]
+    begins = np.arange(0, corners.size + 1, 3)
+    weights = csr_array((barycentrics.reshape(-1), corners.reshape(-1), begins), (len(corners), len(V)))
+    normals = weights @ vertex_normals
+    lengths = np.linalg.norm(normals, axis=1)
+    cancelled = lengths <= 1e-9  # opposite normals: any corner's will do
+    normals[cancelled], lengths[cancelled] = vertex_normals[corners[cancelled, 0]], 1.0
+    normals /= lengths[:, None]
+    return weights @ V, normals

@@ -56,52 +56,46 @@ def cast_rays(
 
 
 @kernel
-def _edge_products(sphere: Floats, corners: Ints, d: Floats, out: Floats) -> float:
+def _edge_products(sphere: Floats, corners: Ints, d: Floats) -> tuple[float, float, float]:
     """Triple products det(d, b, c) of the ray with the three edges: all >= 0 if and only if it passes inside."""
-    for k in range(3):
-        b, c = sphere[corners[(k + 1) % 3]], sphere[corners[(k + 2) % 3]]
-        out[k] = (
-            d[0] * (b[1] * c[2] - b[2] * c[1]) + d[1] * (b[2] * c[0] - b[0] * c[2]) + d[2] * (b[0] * c[1] - b[1] * c[0])
-        )
-    return min(out[0], out[1], out[2])
+    a, b, c = sphere[corners[0]], sphere[corners[1]], sphere[corners[2]]
+    return _triple_product(d, b, c), _triple_product(d, c, a), _triple_product(d, a, b)
+
+
+@kernel
+def _triple_product(a: Floats, b: Floats, c: Floats) -> float:
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 
 
 @kernel
 def _settle(sphere: Floats, F: Ints, neighbours: Ints, directions: Floats, hits: Ints, barycentrics: Floats) -> int:
     """Walk each ray's hit to the triangle that truly contains it; fill barycentrics; return how many rays are lost."""
-    product = np.empty(3)
     lost = 0
     previous = 0
     for i in range(len(directions)):
         d = directions[i]
         triangle = hits[i] if hits[i] >= 0 else previous
-        inside = False
+        x, y, z = _edge_products(sphere, F[triangle], d)
         for _ in range(200):
-            inside = _edge_products(sphere, F[triangle], d, product) >= 0
-            if inside:
+            if min(x, y, z) >= 0:
                 break
-            worst = 0
-            for k in range(1, 3):
-                if product[k] < product[worst]:
-                    worst = k
+            worst = 2 if z < min(x, y) else 1 if y < x else 0
             # libigl numbers the edge (corner k, corner k + 1) as k; the edge opposite corner k is (k + 1, k + 2)
             triangle = neighbours[triangle, (worst + 1) % 3]
-        if not inside or product.sum() <= 0:
+            x, y, z = _edge_products(sphere, F[triangle], d)
+        if min(x, y, z) < 0 or x + y + z <= 0:
             # a walk can circle on very distorted maps: look at every triangle
             best = -np.inf
             for f in range(len(F)):
-                score = _edge_products(sphere, F[f], d, product)
-                if score > best and product.sum() > 0:
-                    best, triangle = score, f
-            _edge_products(sphere, F[triangle], d, product)
+                x, y, z = _edge_products(sphere, F[f], d)
+                if min(x, y, z) > best and x + y + z > 0:
+                    best, triangle = min(x, y, z), f
+            x, y, z = _edge_products(sphere, F[triangle], d)
             if best < -1e-12:
                 lost += 1
-        total = 0.0
-        for k in range(3):
-            product[k] = max(product[k], 0.0)
-            total += product[k]
-        for k in range(3):
-            barycentrics[i, k] = product[k] / total
+        x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
+        total = x + y + z
+        barycentrics[i, 0], barycentrics[i, 1], barycentrics[i, 2] = x / total, y / total, z / total
         hits[i] = triangle
         previous = triangle
     return lost

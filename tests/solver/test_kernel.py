@@ -49,3 +49,15 @@ def test_options_are_handed_to_the_compiler() -> None:
     for each in (quotient, doubled):
         assert each.targetoptions["nogil"]
         assert "fastmath" not in each.targetoptions
+
+
+@kernel
+def twice_quotient(a, b):
+    return 2 * quotient(a, b)
+
+
+def test_a_kernel_called_by_another_is_compiled_for_that_alone_and_for_python_once_it_is_called_there() -> None:
+    assert twice_quotient(np.float32(3), np.float32(2)) == 3
+    for_float32 = [each for each in quotient.signatures if each[0].name == "float32"]
+    assert not for_float32
+    assert quotient(np.float32(3), np.float32(2)) == 1.5

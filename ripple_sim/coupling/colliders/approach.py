@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Ints, Ints32, kernel
+from ripple_sim.solver.kernel import Floats, Ints, Ints32
 
 # A pair to watch.
 APPROACH = np.dtype(
@@ -18,7 +18,6 @@ APPROACH = np.dtype(
 )
 
 
-@kernel
 def too_fast(
     pairs: np.ndarray,
     geom_xpos: Floats,
@@ -48,34 +47,18 @@ def too_fast(
     speeds : float64 [k]
         Their relative speeds [m/s].
     """
-    found, speeds = np.empty(len(pairs), np.int64), np.empty(len(pairs))
-    count = 0
+    target, other = pairs["target"], pairs["other"]
     velocities = _velocities(geom_xpos, cvel, subtree_com, bodies)
-    for i in range(len(pairs)):
-        pair = pairs[i]
-        away2, speed2, approach = 0.0, 0.0, 0.0
-        for k in range(3):
-            x = geom_xpos[pair.other, k] - geom_xpos[pair.target, k]
-            v = velocities[pair.other, k] - velocities[pair.target, k]
-            away2, speed2, approach = away2 + x * x, speed2 + v * v, approach - x * v
-        speed = np.sqrt(speed2)
-        near = np.sqrt(away2) < pair.range + (1 + steps) * speed * timestep
-        if near and approach > 0 and speed * (timestep + pair.stopping_time) > pair.limit:
-            found[count], speeds[count] = i, speed
-            count += 1
-    return found[:count], speeds[:count]
+    away, relative = geom_xpos[other] - geom_xpos[target], velocities[other] - velocities[target]
+    distances, speeds = np.linalg.norm(away, axis=1), np.linalg.norm(relative, axis=1)
+    near = distances < pairs["range"] + (1 + steps) * speeds * timestep
+    approaching = np.einsum("ij,ij->i", away, relative) < 0
+    rows = np.flatnonzero(near & approaching & (speeds * (timestep + pairs["stopping_time"]) > pairs["limit"]))
+    return rows, speeds[rows]
 
 
-@kernel
 def _velocities(geom_xpos: Floats, cvel: Floats, subtree_com: Floats, bodies: Ints32) -> Floats:
     """Velocities of all geoms' centres in the world [m/s], [ngeom, 3]."""
-    found = np.empty((len(bodies), 3))
-    for geom in range(len(bodies)):
-        body, root = bodies[geom, 0], bodies[geom, 1]
-        for k in range(3):
-            # MuJoCo gives a body's velocity at the centre of mass of the tree that it belongs to
-            y, z = (k + 1) % 3, (k + 2) % 3
-            turning = cvel[body, y] * (geom_xpos[geom, z] - subtree_com[root, z])
-            turning -= cvel[body, z] * (geom_xpos[geom, y] - subtree_com[root, y])
-            found[geom, k] = cvel[body, 3 + k] + turning
-    return found
+    body, root = bodies.T
+    # MuJoCo gives a body's velocity at the centre of mass of the tree that it belongs to
+    return cvel[body, 3:] + np.cross(cvel[body, :3], geom_xpos - subtree_com[root])

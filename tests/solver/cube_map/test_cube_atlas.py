@@ -63,8 +63,7 @@ def test_casting_a_few_rays_or_all_gives_the_same_atlas(monkeypatch: pytest.Monk
 def test_where_opposite_normals_cancel_a_corners_own_is_taken() -> None:
     normals = np.array([[0.0, 0, 1], [0, 0, -1], [1, 0, 0]])
     places = np.array([[0.5, 0.5, 0.0], [0.25, 0.25, 0.5], [0.75, 0.25, 0]])
-    positions, found = np.empty((3, 3)), np.empty((3, 3))
-    _interpolate((np.eye(3), normals), np.array([[0, 1, 2]]), np.zeros(3, np.int64), places, (positions, found))
+    positions, found = _interpolate((np.eye(3), normals), np.array([[0, 1, 2]]), np.zeros(3, np.int64), places)
     np.testing.assert_array_equal(found, [[0, 0, 1], [1, 0, 0], [0, 0, 1]])
     np.testing.assert_array_equal(positions, places)
 
