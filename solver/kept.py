@@ -1,12 +1,14 @@
-"""Results kept in memory for the next one who asks for the same, such as the next scene of a batch."""
+"""Results kept in memory for the next one who asks for the same: the next scene of a batch, or the next target."""
 
 from __future__ import annotations
 
+import functools
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Generic, TypeVar
+from weakref import WeakKeyDictionary
 
-Result = TypeVar("Result")
+Owner, Result = TypeVar("Owner"), TypeVar("Result")
 
 
 class Kept(Generic[Result]):
@@ -34,3 +36,17 @@ class Kept(Generic[Result]):
         while len(self._results) > self._count:
             self._results.popitem(last=False)
         return result
+
+
+def kept_with(make: Callable[[Owner], Result]) -> Callable[[Owner], Result]:
+    """Decorate what is made from one object, compared by identity: made once, and kept as long as the object lives."""
+    results: WeakKeyDictionary[Owner, Result] = WeakKeyDictionary()
+
+    @functools.wraps(make)
+    def kept(owner: Owner) -> Result:
+        result = results.get(owner)
+        if result is None:
+            result = results[owner] = make(owner)
+        return result
+
+    return kept

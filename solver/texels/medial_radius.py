@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ripple_sim.solver.kept import kept_with
+
 from .atlas import Atlas
 from .smoothing import smoothed
 
@@ -21,7 +23,8 @@ _ROUNDS = 12  # by then every ball has stopped to shrink
 _TOLERANCE = 1e-3
 
 
-def medial_radius(atlas: Atlas) -> NDArray[np.float64]:
+@kept_with
+def medial_radius(atlas: Atlas) -> NDArray[np.float32]:
     """Radius of the largest ball that touches the surface at a texel and holds no other part of it [m], [C, n, n].
 
     The lesser one of the balls inside and outside. A point that is moved along its normal by less than that is still
@@ -36,7 +39,7 @@ def medial_radius(atlas: Atlas) -> NDArray[np.float64]:
     inside, outside = (_shrunk(tree, points, side * normals, size) for side in (-1.0, 1.0))
     _, nearest = tree.query(atlas.positions.reshape(-1, 3))
     curvature = 1 / np.minimum(inside, outside)[nearest].reshape(atlas.areas.shape)
-    return 1 / smoothed(atlas.texels.topology, curvature)
+    return (1 / smoothed(atlas.texels.topology, curvature)).astype(np.float32)
 
 
 def _shrunk(

@@ -33,7 +33,7 @@ class DisplacementLimit:
     @functools.cached_property
     def radius(self) -> NDArray[np.float32]:
         """The medial radius R [m], [C, n, n]: it takes a while, and most waves never ask for it."""
-        return medial_radius(self._atlas).astype(np.float32)
+        return medial_radius(self._atlas)
 
     def may_bend(self, highest: float) -> bool:
         """Whether heights of at most that size [m] may be drawn otherwise than they are."""

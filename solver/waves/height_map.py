@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver.backends.device_field import DeviceField
 from ripple_sim.solver.errors import SolverError
 from ripple_sim.solver.gl import GLContext
+from ripple_sim.solver.kept import kept_with
 from ripple_sim.solver.kernel import Floats32, kernel
 from ripple_sim.solver.memory import require_memory
 from ripple_sim.solver.texels.atlas import Atlas
@@ -118,6 +119,7 @@ def mirror_at_rim(topology: TexelTopology, height_map: NDArray[np.float32]) -> N
 _AROUND = ((0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1))
 
 
+@kept_with
 def _gradient_weights(texels: TexelMesh) -> NDArray[np.float32]:
     """Vectors g with gradient = sum over the 8 neighbours of g (h_j - h_i), shape [C n^2, 8, 3] in [1/m]."""
     around = texels.halo_positions.copy()

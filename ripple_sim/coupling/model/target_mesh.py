@@ -33,9 +33,10 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str 
     if is_soft(model, geom):
         return build_atlas(SoftSurface(model, geom).mesh, resolution, layout=layout)
     if TARGET_TYPES[int(model.geom_type[geom])] == "sphere" and layout != "patches":
-        return sphere_atlas(float(model.geom_size[geom, 0]), resolution)
+        radius = float(model.geom_size[geom, 0])
+        return _kept.get(f"sphere {radius!r} {resolution}", lambda: sphere_atlas(radius, resolution))
     V, F, uv, name = _surface(model, geom)
-    key = content_key(f"{name} {resolution} {layout}", [V, F, np.zeros(0) if uv is None else uv])
+    key = content_key(f"{resolution} {layout}", [V, F, np.zeros(0) if uv is None else uv])
 
     def build() -> Atlas:
         mesh = Mesh.from_arrays(V, F, uv, name)
