@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .mesh.volume_file import load_volume
     from .mesh.wrap import Wrap, wrap
     from .operator.absorbing import absorbing_damping
+    from .operator.holding import hold
     from .operator.material import Material
     from .texels.atlas import Atlas
     from .texels.glue import glue
@@ -54,6 +55,7 @@ _HOME = {
     "absorbing_damping": "operator.absorbing",
     "build_atlas": "atlas.build",
     "glue": "texels.glue",
+    "hold": "operator.holding",
     "load_atlas": "atlas.load",
     "load_mesh": "mesh.mesh_file",
     "load_volume": "mesh.volume_file",
@@ -87,6 +89,7 @@ __all__ = [
     "absorbing_damping",
     "build_atlas",
     "glue",
+    "hold",
     "load_atlas",
     "load_mesh",
     "load_volume",

@@ -8,7 +8,8 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
-Owner, Result = TypeVar("Owner"), TypeVar("Result")
+Owner = TypeVar("Owner")
+Result = TypeVar("Result")
 
 
 class Kept(Generic[Result]):
