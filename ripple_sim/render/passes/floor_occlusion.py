@@ -14,7 +14,7 @@ from ripple_sim.render.projection import orthographic
 from .floor import Floor
 from .shadow import ShadowMaps
 
-_CEILING_SIZE, _MAP_SIZE = 288, 144
+_CEILING_SIZE, _MAP_SIZE = 224, 112
 _INFLUENCE = 0.8  # radius, in half widths of the map
 
 

@@ -12,8 +12,8 @@ uniform vec3 extent;  // width of the map [m], height of its top [m], radius of 
 in vec2 screen;
 out vec4 fragment;  // r: ambient visibility; g: 1 where a shadow may fall; b: share of the lights that arrives
 
-const int TAPS = 20;
-const int SHADOW_TAPS = 24;
+const int TAPS = 14;
+const int SHADOW_TAPS = 16;
 
 // Whether anything shades any of a texel of the floor, which is `texel` wide [m].
 bool is_shaded(int light, vec3 world, float texel)
@@ -23,11 +23,12 @@ bool is_shaded(int light, vec3 world, float texel)
     vec2 off = abs(p.xy - 0.5);
     float to_light = light_distance(light, p.z), margin = texel / (width.x + width.y * to_light);
     float reach = widest_penumbra(light, to_light) + margin, closest = 1e9, widest = 0.0;
-    vec2 direction = vec2(1.0, 0.0);
+    float first = first_point();
+    vec2 direction = spiral_direction(first);
     for (int i = 0; i < SHADOW_TAPS; ++i) {
         // denser in the middle: what is close casts narrow shadows
-        float offset = reach * (float(i) + 0.5) / float(SHADOW_TAPS);
-        direction = GOLDEN_TURN * direction;
+        float offset = reach * (float(i) + 0.25 * first) / float(SHADOW_TAPS);
+        direction = FOURTH_TURN * direction;
         float depth = textureLod(shadow_maps, in_maps(light, p.xy + offset * direction), 0.0).r;
         closest = depth < 1.0 ? min(closest, offset) : closest;
         widest = depth < 1.0 ? max(widest, penumbra_of(light, light_distance(light, depth), to_light)) : widest;
