@@ -75,15 +75,8 @@ def _corners(surface: Surface, cell: NDArray[np.int64]) -> NDArray[np.bool_]:
     count = int(cell.max()) + 1
     pairs = np.unique(surface.F * count + cell[:, None])
     meeting = np.bincount(pairs // count, minlength=len(surface.V))
-    angle = np.zeros(len(surface.V))
-    for k in range(3):
-        x, y, z = (surface.V[surface.F[:, (k + j) % 3]] for j in range(3))
-        u, v = y - x, z - x
-        inner = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v))
-        angle += np.bincount(surface.F[:, k], inner, len(surface.V))
-    at_rim = np.zeros(len(surface.V), bool)
-    at_rim[surface.edges.ends[surface.edges.rim]] = True
-    return np.where(at_rim, (meeting >= 2) | (angle < _SHARP), meeting >= 3)
+    angle = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
+    return np.where(surface.at_rim, (meeting >= 2) | (angle < _SHARP), meeting >= 3)
 
 
 def _rim_sides(surface: Surface) -> NDArray[np.int64]:

@@ -15,13 +15,13 @@ from ripple_sim.solver.errors import AtlasError
 
 from .flatten import Border, along
 from .polygons import Halves, Path
-from .rays import Flat
 from .surface import Surface
 
 # column and row of a chart's corners, counter-clockwise
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 
 Sides = tuple[Path, Path, Path, Path]
+Fans = list[list[int]]  # charts round a corner
 
 
 def chart_sides(halves: list[Halves], paths: list[list[Path]]) -> list[Sides]:
@@ -33,9 +33,8 @@ def chart_sides(halves: list[Halves], paths: list[list[Path]]) -> list[Sides]:
     return sides
 
 
-def charts_of(flat: Flat, sides: list[Sides]) -> tuple[Surface, NDArray[np.int64]]:
+def charts_of(surface: Surface, sides: list[Sides]) -> tuple[Surface, NDArray[np.int64]]:
     """The chart of each triangle: those not parted by a side of a chart hang together."""
-    surface = flat.surface
     size = len(surface.V)
     walls = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for each in sides for path in each])
     wall = np.isin(surface.edges.ends @ [size, 1], np.sort(walls, axis=1) @ [size, 1])
@@ -82,3 +81,16 @@ def glued_sides(sides: list[Sides]) -> NDArray[np.int64]:
             if other is not None:
                 table[chart, s] = other
     return table
+
+
+def fans_of(sides: list[Sides], glued: NDArray[np.int64]) -> tuple[Fans, list[int]]:
+    """The three charts round each corner where three cells meet, counter-clockwise, and all other charts."""
+    fans: Fans = []
+    used = np.zeros(len(sides), bool)
+    for a in range(len(sides)):
+        b = int(glued[a, 1, 0])
+        c = int(glued[b, 1, 0]) if b >= 0 else -1
+        if not used[a] and c >= 0 and glued[c, 1, 0] == a and len({a, b, c}) == 3:
+            fans.append([a, b, c])
+            used[[a, b, c]] = True
+    return fans, np.flatnonzero(~used).tolist()

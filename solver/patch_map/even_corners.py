@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .charts import Sides, chart_sides, charts_of, glued_sides, on_paths
+from .charts import Sides, chart_sides, charts_of, fans_of, glued_sides, on_paths
 from .polygons import cut_polygons, halves_of
 from .refine import halved_chords
 from .surface import Surface
@@ -20,7 +20,7 @@ def with_even_corners(
     a triangle between three cells' middles, are joined and cut anew as the cells were.
     """
     glued = glued_sides(sides)
-    fans, rest = _fans(sides, glued)
+    fans, rest = fans_of(sides, glued)
     if not fans:
         return surface, chart, sides
     part = np.empty(len(sides), np.int64)
@@ -45,18 +45,5 @@ def with_even_corners(
     old = chart[split.origin]
     flat, paths = cut_polygons(split.surface, part[old], halves)
     new_sides = [*chart_sides(halves, paths), *(sides[each] for each in rest)]
-    surface, chart = charts_of(flat, new_sides)
+    surface, chart = charts_of(flat.surface, new_sides)
     return surface, chart, new_sides
-
-
-def _fans(sides: list[Sides], glued: NDArray[np.int64]) -> tuple[list[list[int]], list[int]]:
-    """The three charts round each corner where three cells meet, counter-clockwise, and all other charts."""
-    fans: list[list[int]] = []
-    used = np.zeros(len(sides), bool)
-    for a in range(len(sides)):
-        b = int(glued[a, 1, 0])
-        c = int(glued[b, 1, 0]) if b >= 0 else -1
-        if not used[a] and c >= 0 and glued[c, 1, 0] == a and len({a, b, c}) == 3:
-            fans.append([a, b, c])
-            used[[a, b, c]] = True
-    return fans, np.flatnonzero(~used).tolist()

@@ -9,26 +9,17 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from .cells import centred_cells, spread_seeds
 from .collapse import without_cuts
-from .disks import disk_cells
-from .distances import Metric
-from .quads import Quads, cut_into_quads
-from .refine import refined
+from .part import CELLS, Part
+from .quads import Quads
 from .relax import relax
 from .seamless import SeamlessMap, seamless_map
-from .sizes import cell_sizes
 from .surface import Surface
 
-CELLS = 96  # of a mesh, where there are texels enough for them
 _MOST = 4 / 3  # times as many has a mesh in parts of uneven sizes
 _FEWEST = 0.5  # cells that the smallest part should have by its area; in truth it has four
 _NEGLIGIBLE = 2e-3  # share of the area of a part for which no others are cut smaller
 _MISJUDGED, _TRIES = 0.1, 3  # by so much more or less than its share of charts a part is cut again, so often
-_RADIUS = 0.75  # of a cell, over the root of its share of the area
-_REACH = 0.5  # of the radius at which a geodesic disk is wrapped round a limb
-_SMALLEST = 0.85  # of the radius of cells elsewhere
-_TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -48,25 +39,30 @@ class PatchMap:
 def patch_map(V: NDArray[np.float64], F: NDArray[np.int64], cells: int = CELLS) -> PatchMap:
     """Lay a manifold, oriented mesh out on charts, without a fold; on about so many cells of four to six charts.
 
+    Where the largest part allows it charts are large, one for each of some more cells.
+
     Raises
     ------
     AtlasError
         If its triangles are too thin, or no cells are found.
     """
     parts, counts, shares = _components(V, F, cells)
-    quads = [_component_quads(V, F, faces, count) for faces, count in zip(parts, counts, strict=True)]
+    widest = int(shares.argmax())
+    first = parts[widest].large_quads(counts[widest])
+    large = first is not None
+    quads = [
+        first if first is not None and i == widest else part.quads(counts[i], large) for i, part in enumerate(parts)
+    ]
     wanted = shares * sum(len(each.glued) for each in quads)
     for i in np.flatnonzero(shares > _NEGLIGIBLE) if len(parts) > 1 else ():
-        quads[i] = _recut(V, F, parts[i], quads[i], counts[i], wanted[i])
+        quads[i] = _recut(parts[i], quads[i], counts[i], wanted[i], large)
     whole = _joined(quads)
     surface, seamless = without_cuts(whole.surface, seamless_map(whole), whole.cut)
     relax(surface.V, seamless)
     return PatchMap(surface, seamless)
 
 
-def _recut(
-    V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArray[np.int64], quads: Quads, count: int, wanted: float
-) -> Quads:
+def _recut(part: Part, quads: Quads, count: int, wanted: float, large: bool) -> Quads:
     """Cut a part again that has come to more or less than the charts that its area should have; the best of the tries.
 
     Cells are mended until they are disks with corners enough, which changes their number.
@@ -77,15 +73,15 @@ def _recut(
         count, before = max(1, round(count * float(np.sqrt(wanted / charts)))), count
         if abs(charts / wanted - 1) < _MISJUDGED or count == before:
             break
-        quads = _component_quads(V, F, faces, count)
+        quads = part.quads(count, large)
         best = min(best, quads, key=lambda each: abs(np.log(len(each.glued) / wanted)))
     return best
 
 
 def _components(
     V: NDArray[np.float64], F: NDArray[np.int64], cells: int
-) -> tuple[list[NDArray[np.int64]], list[int], NDArray[np.float64]]:
-    """Triangles of each connected component, how many cells it gets, and its share of the area."""
+) -> tuple[list[Part], list[int], NDArray[np.float64]]:
+    """Each connected component, how many cells it gets, and its share of the area."""
     links = coo_array((np.ones(F.size), (F.ravel(), np.roll(F, -1, axis=1).ravel())), shape=(len(V), len(V)))
     _, part = connected_components(links, directed=False)
     number, of = np.unique(part[F[:, 0]], return_inverse=True)
@@ -94,19 +90,7 @@ def _components(
     # a small part has a few cells at least; where others have more, its texels are less tiny beside theirs
     small = share[share >= min(_NEGLIGIBLE, share.max())].min()
     count = np.maximum(1, np.rint(np.clip(_FEWEST / small, cells, _MOST * cells) * share)).astype(int)
-    return [np.flatnonzero(of == each) for each in range(len(number))], count.tolist(), share
-
-
-def _component_quads(V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArray[np.int64], count: int) -> Quads:
-    used, corners = np.unique(F[faces], return_inverse=True)
-    whole = Surface.of(V[used], corners.reshape(-1, 3))
-    longest = np.sqrt(whole.areas.sum() / (_TRIANGLES / CELLS * count))
-    surface = refined(dataclasses.replace(whole, parent=faces), longest)
-    metric, reach = Metric.of(surface), np.inf
-    if count > 1:
-        largest = _RADIUS * np.sqrt(whole.areas.sum() / count)
-        metric, reach = metric.in_units(cell_sizes(metric, _REACH, (_SMALLEST * largest, largest))), 1.0
-    return cut_into_quads(disk_cells(metric, centred_cells(metric, spread_seeds(metric, reach))))
+    return [Part(V, F, np.flatnonzero(of == each)) for each in range(len(number))], count.tolist(), share
 
 
 def _joined(parts: list[Quads]) -> Quads:

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from ripple_sim.solver.errors import AtlasError
 
 from .borders import BorderedCells
-from .charts import chart_sides, charts_of, glued_sides, on_paths, square_border
+from .charts import Sides, chart_sides, charts_of, glued_sides, on_paths, square_border
 from .even_corners import with_even_corners
 from .flatten import flattened, signed_areas
+from .joined import joined
 from .polygons import cut_polygons, with_middles
 from .refine import halved_chords
 from .surface import Surface
@@ -43,18 +44,37 @@ class Quads:
 
 
 def cut_into_quads(cells: BorderedCells) -> Quads:
-    """Cut cells into quads, even these out, and lay out each of them as a square.
+    """Cut cells into quads, as many as they have corners; even these out, and lay out each of them as a square.
 
     Raises
     ------
     AtlasError
         If round-off folds a triangle: they are too thin.
     """
+    return _laid_out(cells, *with_even_corners(*_cut(cells)))
+
+
+def cut_into_large_quads(cells: BorderedCells) -> Quads | None:
+    """The same with about as many quads as cells; None if there are none, as where two cells go all round a limb.
+
+    Raises
+    ------
+    AtlasError
+        If round-off folds a triangle: they are too thin.
+    """
+    large = joined(*_cut(cells))
+    return None if large is None else _laid_out(cells, *large)
+
+
+def _cut(cells: BorderedCells) -> tuple[Surface, NDArray[np.int64], list[Sides]]:
+    """A chart for each corner of each cell, with the chart of each triangle, and the sides of the charts."""
     surface, cell, halves = with_middles(cells)
     flat, paths = cut_polygons(surface, cell, halves)
     sides = chart_sides(halves, paths)
-    surface, chart = charts_of(flat, sides)
-    surface, chart, sides = with_even_corners(surface, chart, sides)
+    return *charts_of(flat.surface, sides), sides
+
+
+def _laid_out(cells: BorderedCells, surface: Surface, chart: NDArray[np.int64], sides: list[Sides]) -> Quads:
     finer = halved_chords(surface, chart, on_paths(surface, sides))
     surface, chart = finer.surface, chart[finer.origin]
     places = flattened(surface, chart, square_border(surface, sides))

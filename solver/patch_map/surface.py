@@ -110,6 +110,23 @@ class Surface:
         a, b, c = (self.V[self.F[:, k]] for k in range(3))
         return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
+    @functools.cached_property
+    def angles(self) -> NDArray[np.float64]:
+        """Angles in the corners of the triangles, [m, 3]."""
+        corners = [self.V[self.F[:, k]] for k in range(3)]
+        angles = np.empty((len(self.F), 3))
+        for k in range(3):
+            u, v = (corners[(k + j) % 3] - corners[k] for j in (1, 2))
+            angles[:, k] = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v))
+        return angles
+
+    @functools.cached_property
+    def at_rim(self) -> NDArray[np.bool_]:
+        """Vertices at a rim, [n]."""
+        at_rim = np.zeros(len(self.V), bool)
+        at_rim[self.edges.ends[self.edges.rim]] = True
+        return at_rim
+
     def subdivided(self, places: NDArray[np.float64], patterns: dict[int, tuple[Triangle, ...]]) -> Subdivision:
         """Cut edges, and the triangles beside them.
 

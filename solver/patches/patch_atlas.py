@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.patch_map.layout import CELLS, PatchMap, patch_map
+from ripple_sim.solver.patch_map.layout import PatchMap, patch_map
+from ripple_sim.solver.patch_map.part import CELLS
 from ripple_sim.solver.patch_map.seamless import corner_places
 from ripple_sim.solver.texels.areas import levelled_areas
 from ripple_sim.solver.texels.atlas import Atlas

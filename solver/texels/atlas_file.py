@@ -15,7 +15,7 @@ from ripple_sim.solver.errors import AtlasError
 from .array_file import read_arrays, write_arrays
 
 # Raise it when a layout's map or the file's contents change: older files are rebuilt.
-FORMAT = 12
+FORMAT = 13
 ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
 
 _NEEDED = {"V", "F", "kind", "format", "glued", "positions", "normals", "areas", "triangles", "barycentrics"}

@@ -15,7 +15,7 @@ _TEXELS = 0.5
 # Needles at creases may lose more, where the time step would be less than this share of an even grid's.
 _STEP = 0.45
 
-# All texels but this share at most stay as they are, and those that are hardly faster.
+# All but this share of the surface at most stays as it is, and texels that are hardly faster.
 _BULK, _FASTER = 0.99, 1.2
 
 
@@ -29,7 +29,14 @@ def softening(texels: TexelMesh) -> NDArray[np.float64]:
     rate = texels.stencil(np.ones_like(areas)).absolute_sums() / areas
     even = EVEN_RATE / (2 * areas.mean() * _STEP**2)
     bound = min(_cheapest(rate.ravel(), areas.ravel() / areas.mean()), even)
-    return np.minimum(1, max(bound, _FASTER * np.quantile(rate, _BULK)) / rate)
+    return np.minimum(1, max(bound, _FASTER * _bulk(rate.ravel(), areas.ravel())) / rate)
+
+
+def _bulk(rates: NDArray[np.float64], areas: NDArray[np.float64]) -> float:
+    """The rate that most of the surface has at most: tiny parts may have many texels."""
+    order = np.argsort(rates)
+    covered = np.cumsum(areas[order])
+    return float(rates[order[np.searchsorted(covered, _BULK * covered[-1])]])
 
 
 def _cheapest(rates: NDArray[np.float64], areas: NDArray[np.float64]) -> float:

@@ -38,7 +38,7 @@ def texel_meshes(mesh: Mesh, project: Callable[[np.ndarray], np.ndarray]) -> lis
     """At two resolutions, with the texels on the true surface."""
     patches = patch_map(mesh.V, mesh.F)
     meshes = []
-    for n in (4, 8):
+    for n in (8, 16):
         texels = atlas_from_patch_map(mesh, patches, round(n * np.sqrt(len(patches.seamless.glued) / 6))).texels
         beyond = None if texels.beyond is None else project(texels.beyond)
         meshes.append(TexelMesh.of(texels.topology, project(texels.positions), normals=texels.normals, beyond=beyond))
