@@ -16,7 +16,7 @@ N = 24
 
 def blade() -> Mesh:
     ball = sphere(3)
-    return Mesh.from_arrays(ball.V * [1.0, 0.6, 0.02], ball.F)
+    return Mesh.from_arrays(ball.V * [1.0, 0.6, 0.03], ball.F)
 
 
 @pytest.fixture(scope="module")
