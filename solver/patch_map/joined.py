@@ -62,11 +62,11 @@ def _joints(
         # the other triangle calls it otherwise; two triangles with two sides in common would be glued to themselves
         if fan[beyond] < 0 or (a < glued[beyond, 2, 0] and (fan[glued[fans[fan[a]], 0, 0]] == fan[beyond]).sum() == 1):
             found.append((a, b, glued[b, 1, 0], glued[beyond, 1, 0], beyond))
-    a, b, c, d, beyond = np.array(found, dtype=np.int64).reshape(-1, 5).T
+    first, second, third, fourth, other = np.array(found, dtype=np.int64).reshape(-1, 5).T
     middle = V[[each[0][0] for each in sides]]
-    inside, across = (np.linalg.norm(middle[p] - middle[q], axis=1) for p, q in ((a, b), (c, d)))
+    inside, across = (np.linalg.norm(middle[p] - middle[q], axis=1) for p, q in ((first, second), (third, fourth)))
     shape = np.log(np.maximum(across, 1e-300) / np.maximum(inside, 1e-300))
-    return Joints(np.stack([fan[a], fan[beyond]], axis=1), np.stack([a, b], axis=1), shape), a
+    return Joints(np.stack([fan[first], fan[other]], axis=1), np.stack([first, second], axis=1), shape), first
 
 
 def _whole(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Path:
