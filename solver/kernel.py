@@ -29,7 +29,10 @@ Bools: TypeAlias = NDArray[np.bool_]
 
 
 def kernel(function: Callable | None = None, **options: Any) -> Any:
-    """Compile a function at its first call: `@kernel`, or `@kernel(inline="always")` with options of `numba.njit`."""
+    """Compile a function at its first call: `@kernel`, or `@kernel(inline="always")` with options of `numba.njit`.
+
+    A kernel cannot call itself.
+    """
     # nobody calls kernels through pointers: without the wrappers for that a tenth less is compiled
     options = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
 

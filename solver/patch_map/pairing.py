@@ -159,23 +159,31 @@ def _augment(pairing: _Pairing, node: int, most: int, path: Ints, best: _Best) -
 def _search_from(pairing: _Pairing, node: int, most: int, path: Ints, best: _Best) -> bool:
     best.cost[0], best.length[0] = np.inf, 0
     pairing.passed[node] = True
-    _search(pairing, node, 0.0, 0, path[:most], best)
+    _search(pairing, node, path[:most], best)
     pairing.passed[node] = False
     return best.length[0] > 0
 
 
 @kernel
-def _search(pairing: _Pairing, node: int, cost: float, length: int, path: Ints, best: _Best) -> None:
-    """Try all alternating paths on from a triangle that is left, to another one."""
-    for i in range(pairing.start[node], pairing.start[node + 1]):
-        e = pairing.joint[i]
-        other = pairing.ends[e, 0] + pairing.ends[e, 1] - node
+def _search(pairing: _Pairing, node: int, path: Ints, best: _Best) -> None:
+    """Try all alternating paths from a triangle that is left to another one, depth first."""
+    nodes, following, cost = np.empty_like(path), np.empty_like(path), np.zeros(len(path))
+    nodes[0], following[0], length = node, pairing.start[node], 0
+    while length >= 0:
+        if following[length] == pairing.start[nodes[length] + 1]:
+            length -= 1
+            if length >= 0:
+                _undo(pairing, path[length], nodes[length], nodes[length + 1])
+            continue
+        e = pairing.joint[following[length]]
+        following[length] += 1
+        other = pairing.ends[e, 0] + pairing.ends[e, 1] - nodes[length]
         if pairing.passed[other]:
             continue
         f = pairing.closed[other]
         path[length] = e
         if f < 0:
-            total = cost + _change(pairing, e, -1)
+            total = cost[length] + _change(pairing, e, -1)
             _change(pairing, e, 1)
             if total < best.cost[0]:
                 best.cost[0], best.length[0] = total, length + 1
@@ -183,11 +191,18 @@ def _search(pairing: _Pairing, node: int, cost: float, length: int, path: Ints, 
         elif length + 1 < len(path):
             beyond = pairing.ends[f, 0] + pairing.ends[f, 1] - other
             pairing.passed[other] = pairing.passed[beyond] = True
-            total = cost + _change(pairing, f, 1) + _change(pairing, e, -1)
-            _search(pairing, beyond, total, length + 1, path, best)
-            _change(pairing, e, 1)
-            _change(pairing, f, -1)
-            pairing.passed[other] = pairing.passed[beyond] = False
+            cost[length + 1] = cost[length] + _change(pairing, f, 1) + _change(pairing, e, -1)
+            length += 1
+            nodes[length], following[length] = beyond, pairing.start[beyond]
+
+
+@kernel
+def _undo(pairing: _Pairing, e: int, node: int, beyond: int) -> None:
+    """Go back from a triangle to the one from which the search came over an open joint and a closed one."""
+    other = pairing.ends[e, 0] + pairing.ends[e, 1] - node
+    _change(pairing, e, 1)
+    _change(pairing, pairing.closed[other], -1)
+    pairing.passed[other] = pairing.passed[beyond] = False
 
 
 @kernel
