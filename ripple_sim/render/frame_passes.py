@@ -123,7 +123,7 @@ class FramePasses:
     def _draw_maps(self, ctx: moderngl.Context) -> None:
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.depth_func = "<="
-        self._shadows.draw(self._scene.draw_shadow)
+        self._shadows.draw(ctx, self._scene.draw_shadow)
         self._occlusion.draw(ctx, self._scene.draw_occluders, self._shadows)
 
     def _bind(self) -> None:

@@ -30,6 +30,7 @@ class Unit(IntEnum):
     HEATMAP_COLORS = 13
     MIRROR = 14
     COARSE_BACKGROUND = 15
+    BLOCKERS = 16  # what the shadow maps hold, prefiltered
 
 
 class Binding(IntEnum):

@@ -2,12 +2,14 @@
 #include "gpu/frame_uniforms.glsl"
 #include "glsl/disc.glsl"
 #include "glsl/pixel_block.glsl"
+#include "passes/light_distance.glsl"
 
 layout(binding = SHADOW_TEST_UNIT) uniform sampler2DShadow shadow_test;
 layout(binding = SHADOW_MAPS_UNIT) uniform sampler2D shadow_maps;
+layout(binding = BLOCKERS_UNIT) uniform sampler2D blockers;  // see blockers_fragment.glsl
 
 // Points of the discs, for each pixel of a block of 2 x 2: together they are four times as many points of one spiral.
-const int SEARCH_TAPS = 6;
+const int SEARCH_TAPS = 4;
 const int FILTER_TAPS = 16;
 
 // Texture coordinates of a point of one light's map.
@@ -18,13 +20,6 @@ vec2 in_maps(int light, vec2 point)
     point.x = (clamp(point.x, edge, 1.0 - edge) + float(light)) / float(SHADOWS);
 #endif
     return point;
-}
-
-// Distance from a light [m] of a depth in its map.
-float light_distance(int light, float depth)
-{
-    vec4 d = shadows[light].depth;
-    return (d.x * depth + d.y) / (d.z * depth + d.w);
 }
 
 // Radius of the penumbra, in the map, of a blocker on what lies behind it; both by their distance from the light [m].
@@ -70,24 +65,28 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
 
     // loops that run zero times instead of branches: software drivers execute both sides of a branch
     bool inside = counts.w > float(light) && facing > -0.5 && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
-    float depth = 0.0, blockers = 0.0;
+    float distances = 0.0, found = 0.0;
     int taps = inside ? SEARCH_TAPS : 0;
     for (int i = 0; i < taps; ++i) {
         // denser in the middle, where a near blocker must not be missed, and of no weight at the rim, where they come in
         float away = (float(i) + 0.25 * first) / float(SEARCH_TAPS);
         vec2 offset = widest * away * direction;
         direction = FOURTH_TURN * direction;
-        float d = textureLod(shadow_maps, in_maps(light, p.xy + offset), 0.0).r;
-        float blocks = (1.0 - away) * step(d, p.z + dot(slope, offset) - 2.0 * depth_bias);
-        depth += blocks * d;
-        blockers += blocks;
+        // the mean over as much as lies between the points: single texels would come and go from pixel to pixel
+        float footprint = widest * sqrt(TWO_PI * away / float(4 * SEARCH_TAPS));
+        float level = log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
+        vec2 mean = textureLod(blockers, in_maps(light, p.xy + offset), level).rg;
+        float before = light_distance(light, p.z + dot(slope, offset)) - mean.y / max(mean.x, 1e-4);
+        float blocks = (1.0 - away) * mean.x * smoothstep(0.0, 0.5 * footprint * width + texel, before);
+        distances += blocks * mean.y / max(mean.x, 1e-4);
+        found += blocks;
     }
-    depth = block_mean(depth, block);
-    blockers = block_mean(blockers, block);
-    float blocker = light_distance(light, depth / max(blockers, 1e-3));
+    distances = block_mean(distances, block);
+    found = block_mean(found, block);
+    float blocker = distances / max(found, 1e-4);
     float penumbra = length(vec2(penumbra_of(light, blocker, to_light), least));
     float lit = 0.0;
-    taps = inside && blockers > 0.0 ? FILTER_TAPS : 0;
+    taps = inside && found > 1e-4 ? FILTER_TAPS : 0;
     direction = start;
     for (int i = 0; i < taps; ++i) {
         vec2 offset = penumbra * sqrt((float(i) + 0.25 * first) / float(FILTER_TAPS)) * direction;

@@ -20,6 +20,7 @@ _LEAST, _MOST, _PER_PIXEL, _STEP = 512, 1536, 1.4, 256
 _WIDEST = 0.15  # penumbra, as a share of the map
 _STEEPEST_FOV = 130.0  # [degrees]
 _REACH = 30.0  # how far behind the casters shadows fall, in radii of the casters' ball
+_TEXELS_PER_BLOCKER = 4
 
 
 class ShadowMaps:
@@ -49,6 +50,14 @@ class ShadowMaps:
             repeat_x=False,
             repeat_y=False,
         )
+        self._blockers = resources.texture(
+            (count * size // _TEXELS_PER_BLOCKER, size // _TEXELS_PER_BLOCKER), 2, dtype="f2"
+        )
+        self._blockers.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        self._blockers.repeat_x = self._blockers.repeat_y = False
+        self._blockers_target = resources.framebuffer([self._blockers])
+        program = resources.program("glsl/screen_vertex", "passes/blockers_fragment", SHADOWS=count)
+        self._find_blockers = resources.vertex_array(program, [])
 
     def fit(self, frame: FrameUniforms, lights: list[Light], centre: NDArray, radius: float) -> list[Light]:
         """Aim the maps at a ball [m] that contains all casters, set the frame's shadows, and return their lights."""
@@ -62,7 +71,7 @@ class ShadowMaps:
             self._views.append(tuple(matrix.T.ravel()))
         return casting
 
-    def draw(self, draw_depth: Callable[[tuple[float, ...]], None]) -> None:
+    def draw(self, ctx: moderngl.Context, draw_depth: Callable[[tuple[float, ...]], None]) -> None:
         """Draw all maps; `draw_depth` draws the casters' depth under a matrix of 16 numbers."""
         for index, view in enumerate(self._views):
             self._target.viewport = (index * self._size, 0, self._size, self._size)
@@ -70,12 +79,19 @@ class ShadowMaps:
             if index == 0:
                 self._target.clear(depth=1.0)
             draw_depth(view)
+        self._blockers_target.use()
+        self._depth.use(Unit.SHADOW_MAPS)
+        ctx.disable(moderngl.DEPTH_TEST)
+        self._find_blockers.render(moderngl.TRIANGLES, vertices=3)
+        ctx.enable(moderngl.DEPTH_TEST)
+        self._blockers.build_mipmaps()
 
     def bind(self) -> None:
         """Bind the maps for the shaders, once with and once without the depth test."""
         self._depth.use(Unit.SHADOW_TEST)
         self._test.use(Unit.SHADOW_TEST)
         self._depth.use(Unit.SHADOW_MAPS)
+        self._blockers.use(Unit.BLOCKERS)
 
 
 def _fit_far(shadow: NDArray, light: Light, size: int, centre: NDArray, radius: float) -> NDArray[np.float64]:
