@@ -29,6 +29,8 @@ DURATION = 5.0
 # Depth of a typical hit over half the usual thickness of the target, and at most over its size.
 _AMPLITUDE, _DEEPEST = 0.9, 0.2
 
+_FLAT = 1e-6  # thickness over size of what lies down
+
 
 def drop_scene(
     mesh_path: str | Path,
@@ -52,7 +54,7 @@ def drop_scene(
     bodies, seed : int
         How many drop, 0 to 100, over the first 3.5 seconds; of their sizes, places and colours.
     up : str, optional
-        Axis of the file that points up, "y" or "z"; see `usual_up`.
+        Axis of the file that points up, "y" or "z". By default a flat sheet lies down; else see `usual_up`.
     look : str
         Of the target.
     texture : path, optional
@@ -71,10 +73,10 @@ def drop_scene(
     """
     if not 0 <= bodies <= 100:
         raise SceneError(f"the number of bodies is {bodies}; valid is 0 to 100")
-    up = up or usual_up(mesh_path)
-    if up not in UP_AXES:
+    if up is not None and up not in UP_AXES:
         raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
     mesh = load_mesh(mesh_path, **reading)
+    up = up or _flat_along(mesh) or usual_up(mesh_path)
     V = _standing(mesh, up)
     # MuJoCo may throw boxes and cylinders aside from a sheet
     shapes = [shape for shape in BODY_SHAPES if mesh.closed or shape not in ("box", "cylinder")]
@@ -121,6 +123,12 @@ def _camera(height: float) -> CameraEntry:
     return CameraEntry(
         lookat=(0.0, 0.0, 0.95 * (height / 2)), distance=3.6, azimuth=125.0, elevation=-17.0, fovy=28.0, orbit=5.0
     )
+
+
+def _flat_along(mesh: Mesh) -> str | None:
+    """Axis along which a mesh has no extent, if it is one that can point up."""
+    extents = np.ptp(mesh.V, axis=0)
+    return next((axis for axis in UP_AXES if extents["xyz".index(axis)] <= _FLAT * extents.max()), None)
 
 
 def _standing(mesh: Mesh, up: str) -> NDArray[np.float64]:

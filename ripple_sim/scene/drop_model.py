@@ -19,6 +19,9 @@ _HUES = (0.01, 0.48, 0.60, 0.08, 0.82, 0.36)
 # Of the bodies [m], [kg/m^3], and how high above the target they start [m].
 _RADII, _DENSITY, _HEIGHTS = (0.05, 0.085), 400.0, (0.8, 1.2)
 
+_FEWEST_VERTICES = 4
+_MOST_ROUNDS = 200  # of landing points that are tried: next to nothing of an upright sheet is seen from above
+
 # Mass [kg] and speed [m/s] with which a ball of mean radius falls on the target, and its footprint's radius [m].
 _MEAN_RADIUS = (_RADII[0] + _RADII[1]) / 2
 TYPICAL_HIT = (_DENSITY * 4 / 3 * np.pi * _MEAN_RADIUS**3, float(np.sqrt(2 * 9.81 * sum(_HEIGHTS) / 2)))
@@ -48,9 +51,11 @@ def drop_model(
     # springy contacts (restitution about 0.5): a spring of 0.01 s at a damping ratio of 0.2
     spec.default.geom.solref = [0.01, 0.2]
     spec.default.geom.friction = [0.4, 0.005, 0.0001]
+    # MuJoCo asks for four vertices, and a triangle has three; the last one is in no triangle
+    enough = V if len(V) >= _FEWEST_VERTICES else np.vstack([V, V[:1]])
     # sheets may have no volume
     spec.add_mesh(
-        name="target", uservert=V.ravel(), userface=F.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        name="target", uservert=enough.ravel(), userface=F.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
     )
     spec.worldbody.add_geom(name="target", type=_GEOM.mjGEOM_SDF, meshname="target")
     spec.worldbody.add_geom(
@@ -86,11 +91,14 @@ def _add_body(
 def _landing_points(
     V: NDArray[np.float64], F: NDArray[np.int64], count: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Random points of the surface with nothing above them, shape [count, 3] [m]."""
+    """Random points of the surface with nothing above them, or vertices where there are none, shape [count, 3] [m]."""
     found: list[NDArray] = []
     low, high = V.min(axis=0), V.max(axis=0)
-    while len(found) < count:
+    for _ in range(_MOST_ROUNDS):
+        if len(found) >= count:
+            break
         xy = rng.uniform(low[:2], high[:2], size=(64, 2))
         z = downward_hits(V, F, xy)
         found.extend(np.column_stack([xy, z])[np.isfinite(z)])
+    found.extend(V[rng.integers(len(V), size=max(count - len(found), 0))])
     return np.array(found[:count])

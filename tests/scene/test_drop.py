@@ -83,3 +83,25 @@ def test_waves_on_a_thinner_target_are_lower(tmp_path) -> None:
         trimesh.creation.box((1.0, 1.0, thickness)).export(tmp_path / "slab.stl")
         density.append(drop_scene(tmp_path / "slab.stl", bodies=0).targets[0].material.density)
     assert density[1] == pytest.approx(2 * density[0], rel=0.01)
+
+
+TRIANGLES = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\n"
+
+
+@pytest.mark.parametrize("more", ["", "f 2 4 3\n"])
+def test_a_sheet_of_one_triangle_or_of_two_lies_on_the_floor(tmp_path, more: str) -> None:
+    path = tmp_path / "sheet.obj"
+    path.write_text(TRIANGLES + more)
+    scene = drop_scene(path, bodies=2)
+    corners = vertices(scene)[target_mesh(scene.model, scene.model.geom("target").id).F]
+    assert len(corners) == 1 + bool(more)
+    np.testing.assert_allclose(corners[..., 2], 0, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(np.cross(*np.diff(corners, axis=1).swapaxes(0, 1)), axis=1), 1, atol=1e-6)
+
+
+def test_bodies_drop_on_the_edge_of_an_upright_sheet_that_is_not_seen_from_above(tmp_path) -> None:
+    path = tmp_path / "sheet.obj"
+    path.write_text(TRIANGLES + "f 2 4 3\n")
+    scene = drop_scene(path, bodies=3, up="y")
+    places = np.array([drop.position for drop in scene.events.drop])
+    np.testing.assert_allclose(np.abs(places[:, :2]), [[0.5, 0]] * 3, atol=1e-6)
