@@ -29,7 +29,7 @@ DURATION = 5.0
 # Depth of a typical hit over half the usual thickness of the target, and at most over its size.
 _AMPLITUDE, _DEEPEST = 0.9, 0.2
 
-_FLAT = 1e-6  # thickness over size of what lies down
+_FLAT, _LIFTED = 1e-6, 0.25  # thickness over size of what lies down; how high, so that waves have room below [m]
 
 
 def drop_scene(
@@ -132,8 +132,9 @@ def _flat_along(mesh: Mesh) -> str | None:
 
 
 def _standing(mesh: Mesh, up: str) -> NDArray[np.float64]:
-    """Vertices scaled, turned upright, standing on z = 0 over the origin [m]."""
+    """Vertices scaled, turned upright, standing on z = 0 over the origin, or hovering if they lie flat [m]."""
     V = mesh.V if up == "z" else mesh.V[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     V = V * (SIZE / np.ptp(V, axis=0).max())
     low, high = V.min(axis=0), V.max(axis=0)
-    return V - [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]
+    lift = _LIFTED if high[2] - low[2] <= _FLAT * SIZE else 0.0
+    return V - [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2] - lift]

@@ -89,13 +89,13 @@ TRIANGLES = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\n"
 
 
 @pytest.mark.parametrize("more", ["", "f 2 4 3\n"])
-def test_a_sheet_of_one_triangle_or_of_two_lies_on_the_floor(tmp_path, more: str) -> None:
+def test_a_sheet_of_one_triangle_or_of_two_lies_down_above_the_floor(tmp_path, more: str) -> None:
     path = tmp_path / "sheet.obj"
     path.write_text(TRIANGLES + more)
     scene = drop_scene(path, bodies=2)
     corners = vertices(scene)[target_mesh(scene.model, scene.model.geom("target").id).F]
     assert len(corners) == 1 + bool(more)
-    np.testing.assert_allclose(corners[..., 2], 0, atol=1e-6)
+    np.testing.assert_allclose(corners[..., 2], 0.25, atol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(np.cross(*np.diff(corners, axis=1).swapaxes(0, 1)), axis=1), 1, atol=1e-6)
 
 
