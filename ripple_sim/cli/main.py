@@ -49,9 +49,7 @@ def _run(command: Any) -> int:
         if error.filename is not None:  # not standard output, which has no name
             status = BAD_INPUT if error.errno in OF_THE_NAME else FAILED
             return _fail(f"{shown(os.fspath(error.filename))}: {error.strerror}", status)
-        # standard output has failed (full disk, closed pipe): nothing more goes there, not even at exit
-        sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115
-        return FAILED if isinstance(error, BrokenPipeError) else _fail(error.strerror or error, FAILED)
+        return _give_up_output(error)
     except (GLError, DisplayError, EncodingError) as error:  # other input would not help
         return _fail(error, FAILED)
     except RippleError as error:
@@ -71,6 +69,12 @@ def _run(command: Any) -> int:
     finally:
         end_at_once()
     return DONE
+
+
+def _give_up_output(error: OSError) -> int:
+    """Standard output has failed (full disk, closed pipe): nothing more goes there, not even at exit."""
+    sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115
+    return FAILED if isinstance(error, BrokenPipeError) else _fail(error.strerror or error, FAILED)
 
 
 def _fail(message: object, status: int, ending: BaseException | None = None) -> int:
@@ -119,6 +123,9 @@ def _parse(argv: list[str]) -> Any:
         return _fail("a word of the command line holds a NUL; no name can", BAD_INPUT)
     try:
         command = parse(argv)
+        sys.stdout.flush()  # of the help or a completion script
     except UsageError as error:
         return _fail(error, BAD_INPUT)
+    except OSError as error:
+        return _give_up_output(error)
     return DONE if command is None else command

@@ -73,7 +73,8 @@ def _parse(argv: Sequence[str]) -> Any:
             )
     except SystemExit as ending:
         if ending.code:
-            raise UsageError(_first_part(complaint.getvalue())) from None
+            command = f" {argv[0]}" if argv and argv[0] in COMMANDS else ""
+            raise UsageError(f"{_first_part(complaint.getvalue())}; see ripple-sim{command} --help") from None
         return None
 
 
@@ -86,5 +87,4 @@ def _first_part(box: str) -> str:
     parts = re.split(r"^[│╭╰ ]*(?:─ .* ─+|─{3,}|-{3,})[│╮╯ ]*$", text, flags=re.MULTILINE)
     part = parts[1] if len(parts) > 1 else text
     said = [line.strip("│ ") for line in part.splitlines() if not re.match(r"│? {9}", line)]
-    program = re.search(r"ripple-sim(?: [a-z]+)? --help", text)
-    return f"{' '.join(said).strip().rstrip('.')}; see {program[0] if program else 'ripple-sim --help'}"
+    return " ".join(said).strip().rstrip(".")

@@ -30,6 +30,8 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     name = f"{what} {str(path)!r}"
     try:
         text = path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise SceneError(f"{name} does not exist; give the path of a TOML file") from error
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(f"{name} cannot be read: {error}") from error
     parts = max(len(re.findall(r"[^.\s]\s*\.", line)) + 1 for line in re.split(r"[=,\n]", text))

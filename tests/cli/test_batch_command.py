@@ -36,7 +36,7 @@ def test_the_status_is_told_from_the_folder(tmp_path, capsys):
         (["{plan}", "-o", "{folder}/out", "--shard", "5/4"], "'5/4' is not valid; it must be a part of how many"),
         (["{plan}", "-o", "{folder}/out", "--keep-free", "1e9"], "GB to be kept free; make room"),
         (["{folder}"], "it has no plan.json"),
-        (["{folder}/lost.toml", "-o", "out"], "cannot be read"),
+        (["{folder}/lost.toml", "-o", "out"], "does not exist"),
     ],
     ids=["no folder", "shard", "full", "no batch", "no plan"],
 )

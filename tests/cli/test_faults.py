@@ -37,6 +37,8 @@ def run(folder: Path, words: str, redirections: str = "", **environment: str | N
         ("atlas missing.obj", "2>&-", 2),
         ("atlas missing.obj", "2>/dev/full", 2),
         ("completion bash", ">&-", 0),
+        ("completion bash", "| head -c 0", 0),
+        ("--help", "| head -c 0", 0),
     ],
 )
 def test_closed_and_full_streams(tmp_path: Path, words: str, redirections: str, status: int) -> None:

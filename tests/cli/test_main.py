@@ -79,7 +79,7 @@ def test_help_is_given(capsys, command):
 def test_a_usage_error_names_the_argument_and_the_help(capsys, argv, named):
     line = complaint(capsys, *argv)
     assert re.search(named, line)
-    assert re.search(r"; see ripple-sim( [a-z]+)? --help$", line)
+    assert line.rstrip().endswith(f"; see ripple-sim {argv[0]} --help" if len(argv) > 1 else "; see ripple-sim --help")
     assert line.isascii()
 
 
@@ -140,12 +140,15 @@ def test_a_camera_that_is_not_there_is_named(tmp_path, capsys):
         ["render", "missing.toml", "-o", "clip.mp4"],
         ["render", "no such scene", "-o", "clip.mp4"],
         ["drop", "missing.obj", "-o", "clip.mp4"],
+        ["batch", "missing.toml", "-o", "batch"],
         ["atlas", "missing.obj", "-o", "atlas.npz"],
     ],
 )
 def test_a_missing_input_is_named_and_nothing_written(tmp_path, monkeypatch, capsys, argv):
     monkeypatch.chdir(tmp_path)
-    assert argv[1] in complaint(capsys, *argv)
+    said = complaint(capsys, *argv)
+    assert argv[1] in said
+    assert "Errno" not in said
     assert list(tmp_path.iterdir()) == []
 
 
