@@ -9,6 +9,8 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from ripple_sim.solver.mesh.topology import edges_of
+
 _RAYS = 1_000_000
 
 
@@ -45,8 +47,8 @@ def bake(V: NDArray, F: NDArray, normals: NDArray) -> Baked:
 
     # nearby walls hide the light, those further than a radius away reflect some themselves
     outer, inner = distances(1.0), distances(-1.0)
-    values = (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0))
-    return Baked(*(_smoothed(each.mean(axis=1), F) for each in values))
+    values, (edges, _) = (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0)), edges_of(F)
+    return Baked(*(_smoothed(each.mean(axis=1), edges) for each in values))
 
 
 def _hemisphere(normals: NDArray, count: int) -> NDArray[np.float64]:
@@ -67,9 +69,8 @@ def _hemisphere(normals: NDArray, count: int) -> NDArray[np.float64]:
     )
 
 
-def _smoothed(values: NDArray, F: NDArray, rounds: int = 2) -> NDArray[np.float64]:
-    """Average over neighbours, against the noise of few rays."""
-    edges = np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+def _smoothed(values: NDArray, edges: NDArray, rounds: int = 2) -> NDArray[np.float64]:
+    """Average over neighbours along edges [k, 2], against the noise of few rays."""
     both = np.concatenate([edges, edges[:, ::-1]])
     degree = np.bincount(both[:, 0], minlength=len(values))
     for _ in range(rounds):

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver.mesh.topology import undirected
+
 
 @dataclass(frozen=True, eq=False)
 class Edges:
@@ -85,13 +87,12 @@ def tessellate(
 
 def edges_of(F: NDArray[np.int64], same: NDArray[np.int64]) -> Edges:
     """Edges of triangles, [m, 3]; `same` as for `tessellate`."""
-    sides = np.stack([F, np.roll(F, -1, axis=1)], axis=2).reshape(-1, 2)
-    ends, edge_of_side = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
-    edge_of_side = edge_of_side.ravel()
-    _, weld_of_side = np.unique(np.sort(same[sides], axis=1), axis=0, return_inverse=True)
+    keys, edge_of_side = np.unique(undirected(F)[0], return_inverse=True)
+    ends = np.stack(np.divmod(keys, F.max() + 1), axis=1)
+    _, weld_of_side = np.unique(undirected(same[F])[0], return_inverse=True)
     weld = np.empty(len(ends), dtype=np.int64)
-    weld[edge_of_side] = weld_of_side.ravel()
-    inner = np.bincount(weld_of_side.ravel())[weld] == 2
+    weld[edge_of_side] = weld_of_side
+    inner = np.bincount(weld_of_side)[weld] == 2
     return Edges(ends, edge_of_side.reshape(-1, 3), weld, inner)
 
 

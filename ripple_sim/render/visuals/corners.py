@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ripple_sim.solver.mesh.topology import undirected
+
 _ASTRAY = 60.0  # [degrees] between a triangle's normal and the one that it shares at a vertex
 
 
@@ -78,9 +80,9 @@ def _fans(F: NDArray, triangle: NDArray[np.float64], crease: float) -> NDArray[n
     number = np.arange(F.size).reshape(F.shape)
     corners = np.stack([number, np.roll(number, -1, axis=1)], axis=2).reshape(-1, 2)
     corners = np.take_along_axis(corners, ends.argsort(axis=1), axis=1)
-    _, edge, count = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
-    order = np.argsort(edge.ravel(), kind="stable")
-    one, other = order[count[edge.ravel()[order]] == 2].reshape(-1, 2).T
+    _, edge, count = np.unique(undirected(F)[0], return_inverse=True, return_counts=True)
+    order = np.argsort(edge, kind="stable")
+    one, other = order[count[edge[order]] == 2].reshape(-1, 2).T
     a, b = triangle[one // 3], triangle[other // 3]
     # a triangle without area bends nowhere
     even = (np.einsum("ij,ij->i", a, b) >= np.cos(np.radians(crease)) - 1e-9) | ~a.any(axis=1) | ~b.any(axis=1)

@@ -6,6 +6,7 @@ import pytest
 from ripple_sim.render.surfaces.ambient_occlusion import _hemisphere, _smoothed, bake
 from ripple_sim.render.visuals import primitives
 from ripple_sim.render.visuals.corners import smooth_normals
+from ripple_sim.solver.mesh.topology import edges_of
 
 
 def test_nothing_hides_the_sky_from_a_ball():
@@ -82,15 +83,16 @@ def test_a_vertex_without_triangles_has_finite_values():
 
 def test_smoothing_keeps_constants_and_spreads_a_peak_over_two_rings():
     ball = primitives.ball(6)
-    np.testing.assert_allclose(_smoothed(np.full(len(ball.shell), 0.3), ball.faces), 0.3)
+    edges, _ = edges_of(ball.faces)
+    np.testing.assert_allclose(_smoothed(np.full(len(ball.shell), 0.3), edges), 0.3)
     peak = np.zeros(len(ball.shell))
     peak[17] = 1.0
-    spread = _smoothed(peak, ball.faces)
+    spread = _smoothed(peak, edges)
     ring = {17}
     for _ in range(2):
         ring |= {int(v) for face in ball.faces if ring & set(face) for v in face}
     assert set(np.flatnonzero(spread)) == ring
     assert spread.argmax() == 17
     assert 0 < spread.min() + spread.max() < 1
-    lone = _smoothed(np.array([1.0, 1.0, 1.0, 5.0]), np.array([[0, 1, 2]]))
+    lone = _smoothed(np.array([1.0, 1.0, 1.0, 5.0]), np.array([[0, 1], [0, 2], [1, 2]]))
     np.testing.assert_allclose(lone[:3], 1.0)
