@@ -136,5 +136,5 @@ def _standing(mesh: Mesh, up: str) -> NDArray[np.float64]:
     V = mesh.V if up == "z" else mesh.V[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     V = V * (SIZE / np.ptp(V, axis=0).max())
     low, high = V.min(axis=0), V.max(axis=0)
-    lift = _LIFTED if high[2] - low[2] <= _FLAT * SIZE else 0.0
-    return V - [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2] - lift]
+    clearance = _LIFTED if high[2] - low[2] <= _FLAT * SIZE else 0.0
+    return V - [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2] - clearance]

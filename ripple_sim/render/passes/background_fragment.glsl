@@ -27,6 +27,7 @@ uniform float reflectance;
 #endif
 
 const float STEEPEST = 0.03;  // change from one block to the next up to which the background is smooth
+const float HIGHEST_LEVEL = 3.0;  // of the floor map
 
 // A skybox continues below the horizon, which the floor hides.
 #if SKYBOX
@@ -70,7 +71,9 @@ void main()
     vec2 place = floor_map_position(plane);
     // the blocks of 2 x 2 that share their light are texels of the next level
 #if COARSE
-    vec2 near = texture(floor_visibility, place, 1.0).rg;
+    // in higher levels, texels at the map's edge, which stand for all beyond it, are as dark as what is far inside
+    float level = min(textureQueryLod(floor_visibility, place).y + 1.0, HIGHEST_LEVEL);
+    vec2 near = textureLod(floor_visibility, place, level).rg;
 #else
     vec2 near = textureLod(floor_visibility, place, 1.0).rg;
 #endif
