@@ -9,9 +9,9 @@ import pytest
 if TYPE_CHECKING:
     from ripple_sim.solver import Atlas
 
-# reasons to skip a test that hold on a machine that has everything else: an extra under another licence, and data that
+# reasons to skip a test that hold on a machine that has everything else: extras under another licence, and data that
 # is not shipped
-_ALLOWED_SKIPS = ("pymeshfix", "known meshes")
+_ALLOWED_SKIPS = ("pymeshfix", "bpy", "known meshes")
 
 _cache = tempfile.TemporaryDirectory(prefix="ripple-sim-tests-")
 os.environ["XDG_CACHE_HOME"] = _cache.name
