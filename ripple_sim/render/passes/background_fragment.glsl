@@ -27,7 +27,7 @@ uniform float reflectance;
 #endif
 
 const float STEEPEST = 0.03;  // change from one block to the next up to which the background is smooth
-const float HIGHEST_LEVEL = 3.0;  // of the floor map
+const float HIGHEST_LEVEL = 4.0;  // of the floor map
 
 // A skybox continues below the horizon, which the floor hides.
 #if SKYBOX
