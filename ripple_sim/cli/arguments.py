@@ -169,7 +169,7 @@ Aperture = Annotated[float | None, _one_word(parse_diameter, "M"), arg(help_beha
 Focus = Annotated[
     float | str | None,
     _one_word(parse_focus, "M|NAME"),
-    arg(help_behavior_hint="(default: the camera's aim)"),
+    arg(help_behavior_hint="(default: the scene's, or what the camera looks at)"),
 ]
 Exposures = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's, or 32)")]
 Shard = Annotated[tuple[int, int] | None, _one_word(parse_shard, "I/N"), arg(help_behavior_hint="(default: all)")]

@@ -31,7 +31,7 @@ class Atlas:
     """Texels along the edge of a cube's chart, N: about 6 N^2 in all, in every layout."""
     layout: LayoutName = "auto"
     """Cube (closed, in one part, without handles), patches (any mesh), or auto: cube where it fits."""
-    method: Annotated[str, arg(metavar="METHOD")] = "progressive"
+    method: Annotated[str, arg(metavar="{progressive,conformal}")] = "progressive"
     """Sphere map of the cube: progressive (fold-free, even area) or conformal (preserves angles; starves limbs)."""
     plot: Annotated[Path | None, arg(metavar="PNG", help_behavior_hint="(optional)")] = None
     """Write an image of the mesh with its charts, and of the charts, coloured by stretch; with --inside, of the
@@ -87,8 +87,10 @@ class Atlas:
     def _check(self) -> None:
         """Refuse, before anything that takes time, what cannot be written or makes no sense."""
         from ripple_sim.solver import AtlasError
+        from ripple_sim.solver.mesh.mesh_file import check_mesh_file
         from ripple_sim.solver.texels.atlas_file import check_atlas_place
 
+        check_mesh_file(self.mesh)
         for path in (self.output, self.plot):
             for read in filter(None, (self.mesh, self.inside)):
                 if path is not None and path.exists() and read.exists() and path.samefile(read):

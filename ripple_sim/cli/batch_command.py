@@ -43,8 +43,8 @@ class Batch:
         """Do what is asked for."""
         from ripple_sim.batch.index import parquet
 
-        parquet()  # before anything that takes time
         plan, folder = self._plan_and_folder()
+        parquet()  # before anything that takes time
         if self.status:
             from ripple_sim.batch.status import status_text
 

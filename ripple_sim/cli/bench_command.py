@@ -15,7 +15,7 @@ from tyro.conf import Positional, arg
 class Bench:
     """Measure the wave solver: speed against rivals and the bound of memory, accuracy against exact solutions."""
 
-    meshes: Annotated[Positional[tuple[Path, ...]], arg(metavar="MESH", help_behavior_hint="(optional)")] = ()
+    meshes: Annotated[Positional[tuple[Path, ...]], arg(metavar="[MESH ...]", help_behavior_hint="(optional)")] = ()
     """Meshes on which to measure arrival times, in addition to the built-in one."""
     json: bool = False
     """Print JSON."""

@@ -11,7 +11,7 @@ from tyro.conf import Positional, arg
 
 from ripple_sim.export.options import ExportOptions
 
-from .arguments import Count, Duration, Factor, Resolution, Rim, SceneLayout, SceneSeed, Size
+from .arguments import Count, Duration, Factor, Limit, Resolution, Rim, SceneLayout, SceneSeed, Size
 
 # By field: how its word on the command line is read. The others are read as their types say.
 _WORDS: dict[str, Any] = {
@@ -19,6 +19,7 @@ _WORDS: dict[str, Any] = {
     "duration": Duration,
     "slow_motion": Factor,
     "triangles": Count,
+    "chunk": Limit,
     "size": Size,
     "resolution": Resolution,
     "layout": SceneLayout,
@@ -52,7 +53,9 @@ class Export(_ExportFields):
         """Export the scene and print a summary."""
         from ripple_sim.export.endings import check_export
         from ripple_sim.export.settings import check_options
+        from ripple_sim.scene.find_scene import find_scene, is_scene
 
+        is_scene(self.scene)
         options = ExportOptions(**{each.name: getattr(self, each.name) for each in dataclasses.fields(ExportOptions)})
         check_options(options)  # before anything that takes time
         check_export(self.output, options.overwrite)
@@ -60,7 +63,6 @@ class Export(_ExportFields):
         from ripple_sim.export.export_scene import export_scene
         from ripple_sim.export.settings import frame_count
         from ripple_sim.scene.camera_override import through_camera
-        from ripple_sim.scene.find_scene import find_scene
 
         from .progress import frame_progress
 

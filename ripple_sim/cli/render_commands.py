@@ -28,12 +28,17 @@ class _VideoCommand(VideoArguments):
     samples: Count = 64
     """Paths a pixel that Cycles takes."""
 
+    def check_input(self) -> None:
+        """Make sure that what is to be rendered exists."""
+        raise NotImplementedError
+
     def load(self) -> Scene:
         """Make the scene that is rendered."""
         raise NotImplementedError
 
     def run(self) -> None:
         """Render the scene and print a summary."""
+        self.check_input()  # before what this machine may lack
         if self.renderer == "cycles":
             self._run_cycles()
         else:
@@ -92,6 +97,12 @@ class Render(_VideoCommand):
     seed: SceneSeed = None
     """Seed of the scene's random variation, in place of the one in its [random]."""
 
+    def check_input(self) -> None:
+        """Make sure that there is such a scene."""
+        from ripple_sim.scene.load_scene import scene_path
+
+        scene_path(self.scene)
+
     def load(self) -> Scene:
         """Load the scene."""
         from ripple_sim.scene.load_scene import load_scene
@@ -110,13 +121,19 @@ class Drop(_VideoCommand):
     seed: Seed = 0
     """Seed for the bodies' places and sizes; the same seed gives the same video."""
     up: UpAxis = None
-    """Axis of the mesh that points up."""
+    """Axis of the mesh that points up; a flat sheet lies down."""
     texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
     """Image in the mesh's own texture coordinates; by default the one that the file names, or NAME_texture.png."""
     repair: bool = False
     """Close the mesh's holes (needs the package pymeshfix)."""
     wrap: bool = False
     """Take a closed surface round the mesh: for parts that pass through each other, or scans in pieces."""
+
+    def check_input(self) -> None:
+        """Make sure that there is such a file."""
+        from ripple_sim.solver.mesh.mesh_file import check_mesh_file
+
+        check_mesh_file(self.mesh)
 
     def load(self) -> Scene:
         """Build a scene around the mesh."""

@@ -16,12 +16,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class View:
-    """Open a scene or a mesh in an interactive window.
-
-    Click: poke the surface. Drag: orbit; with shift: pan; wheel: zoom. Space: pause or resume. N: next frame. R: reset.
-    T: throw a ball at the pointer. O: next operator (fem, uncorrected, paper). C: heatmap on or off. S: screenshot.
-    V: start or stop a recording. H: list of keys. Q: quit. Sliders set the poke's impulse and the material.
-    """
+    """Open a scene or a mesh in an interactive window: click to poke it, drag to turn it, H for the list of keys."""
 
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
     """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...)."""
@@ -34,7 +29,7 @@ class View:
     seed: Seed = 0
     """Seed for the bodies' places and sizes."""
     up: UpAxis = None
-    """Axis of the mesh that points up."""
+    """Axis of the mesh that points up; a flat sheet lies down."""
     repair: bool = False
     """Close the mesh's holes (needs the package pymeshfix)."""
     wrap: bool = False
@@ -53,9 +48,11 @@ class View:
     def run(self) -> None:
         """Show the scene until the user quits."""
         from ripple_sim.encode.output import check_size
+        from ripple_sim.scene.find_scene import is_scene
         from ripple_sim.viewer.display import check_display, display_problem
 
-        # refuse what cannot work before anything that takes time
+        # refuse what cannot work before anything that takes time: first what is asked for, then what this machine lacks
+        is_scene(self.scene)
         check_size(*self.size)
         if self.benchmark:
             from ripple_sim.viewer.desktop import benchmark

@@ -7,7 +7,7 @@ from pathlib import Path
 from ripple_sim.errors import SceneError
 
 from .drop import drop_scene
-from .load_scene import load_scene, shipped_scenes
+from .load_scene import load_scene, scene_path, shipped_scenes
 from .scene import Scene
 
 
@@ -27,11 +27,23 @@ def find_scene(target: str | Path, *, seed: int | None = None) -> Scene:
     MeshError
         If a mesh cannot be read.
     """
+    return load_scene(target, seed=seed) if is_scene(target) else drop_scene(target, seed=seed or 0)
+
+
+def is_scene(target: str | Path) -> bool:
+    """Whether a target is a scene, by its name or its file, and not a mesh.
+
+    Raises
+    ------
+    SceneError
+        If there is neither.
+    """
     path = Path(target)
     if str(target) in shipped_scenes() or path.suffix.lower() == ".toml":
-        return load_scene(target, seed=seed)
+        scene_path(target)
+        return True
     if path.is_file():
-        return drop_scene(path, seed=seed or 0)
+        return False
     raise SceneError(
         f"there is no scene or mesh {str(target)!r}; shipped scenes are {', '.join(shipped_scenes())}, or give the "
         "path of a scene file (TOML) or of a mesh"

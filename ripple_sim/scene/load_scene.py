@@ -59,7 +59,7 @@ def load_scene(
         If there is no such scene or file, the TOML has an unknown key or a wrong value, MuJoCo refuses the MJCF, or a
         geom or camera is not in it.
     """
-    path = _scene_path(str(name_or_path))
+    path = scene_path(name_or_path)
     content = _read(path, change)
     random = content.random if seed is None else _seeded(path, content.random, seed)
     model, shifts = load_model(path.parent / content.model, random, edit)
@@ -85,6 +85,28 @@ def load_scene(
     return scene
 
 
+def scene_path(name_or_path: str | Path) -> Path:
+    """Path of a scene's TOML file, of a shipped scene's name or as it is given.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene or file.
+    """
+    name, shipped = str(name_or_path), shipped_scenes()
+    if name in shipped:
+        return Path(str(importlib.resources.files("ripple_sim.scenes") / f"{name}.toml"))
+    path = Path(name)
+    with contextlib.suppress(OSError):  # a name longer than the system's
+        if path.is_file():
+            return path
+        if path.exists() and not path.is_dir():
+            raise SceneError(f"scene {shown(name)} is not a regular file; give the path of a TOML file")
+    raise SceneError(
+        f"there is no scene {shown(name)}; shipped scenes are {', '.join(shipped)}, or give the path of a TOML file"
+    )
+
+
 def _seeded(path: Path, random: RandomEntry | None, seed: int) -> RandomEntry:
     """The scene's random variation with another seed."""
     if random is None:
@@ -105,22 +127,6 @@ def _read(path: Path, change: Change | None) -> SceneFile:
     if change is not None:
         change(table)
     return parse_scene(table, str(path))
-
-
-def _scene_path(name_or_path: str) -> Path:
-    shipped = shipped_scenes()
-    if name_or_path in shipped:
-        return Path(str(importlib.resources.files("ripple_sim.scenes") / f"{name_or_path}.toml"))
-    path = Path(name_or_path)
-    with contextlib.suppress(OSError):  # a name longer than the system's
-        if path.is_file():
-            return path
-        if path.exists() and not path.is_dir():
-            raise SceneError(f"scene {shown(name_or_path)} is not a regular file; give the path of a TOML file")
-    raise SceneError(
-        f"there is no scene {shown(name_or_path)}; shipped scenes are {', '.join(shipped)}, or give the path of a TOML "
-        "file"
-    )
 
 
 def _shifted(entries: Sequence[Moved], shifts: dict[str, np.ndarray]) -> tuple[Moved, ...]:
@@ -147,7 +153,6 @@ def load_model(
         problem = "is not a file" if path.exists() else "does not exist"
         raise SceneError(f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file")
     check_files(path)
-    adopt_warnings()
     with refusal_of(repr(str(path))):
         spec = mujoco.MjSpec.from_file(str(path))
         keys = [(key.name, len(key.qpos)) for key in spec.keys]  # the compiler fills up what is missing
@@ -171,7 +176,8 @@ def load_model(
 
 @contextlib.contextmanager
 def refusal_of(name: str) -> Iterator[None]:
-    """Turn MuJoCo's refusal of a model, by its name in messages, into a `SceneError` with MuJoCo's reason."""
+    """Have what MuJoCo says of a model, by its name in messages, as ours: its refusal is a `SceneError`."""
+    adopt_warnings()
     try:
         yield
     except ValueError as error:

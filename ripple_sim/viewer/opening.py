@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -13,9 +14,9 @@ from ripple_sim.coupling.model.geoms import find_target
 from ripple_sim.coupling.model.soft_ids import is_soft
 from ripple_sim.coupling.model.soft_surfaces import SoftSurface
 from ripple_sim.coupling.model.suited_target import suited_targets
-from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
-from ripple_sim.scene.load_scene import load_scene, shipped_scenes
+from ripple_sim.scene.find_scene import is_scene
+from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.scene import Scene
 from ripple_sim.solver import Material
 
@@ -86,16 +87,11 @@ def open_scene(
     MeshError
         If a mesh cannot be read or does not suit the layout.
     """
-    path = Path(target)
-    if str(target) in shipped_scenes() or path.suffix.lower() == ".toml":
-        load = functools.partial(load_scene, target)
-    elif path.is_file():
-        load = functools.partial(drop_scene, path, bodies=bodies, seed=seed, up=up, repair=repair, wrap=wrap)
-    else:
-        raise SceneError(
-            f"there is no scene or mesh {str(target)!r}; shipped scenes are {', '.join(shipped_scenes())}, or give the "
-            "path of a scene file (TOML) or of a mesh"
-        )
+    load: Callable[..., Scene] = (
+        functools.partial(load_scene, target)
+        if is_scene(target)
+        else functools.partial(drop_scene, target, bodies=bodies, seed=seed, up=up, repair=repair, wrap=wrap)
+    )
     scene = load()
     size = surface_size(scene)
     first = scene.targets[0]

@@ -58,6 +58,7 @@ def load_mesh(path: str | Path, repair: bool = False, wrap: bool = False) -> Mes
         If the file is missing, cannot be read, or holds no triangle with an area.
     """
     path = Path(path)
+    check_mesh_file(path)
     soup = _read(path)
     if len(soup.F) == 0:
         raise MeshError(f"mesh file {str(path)!r} holds no triangles{_points_only(soup)}")
@@ -69,6 +70,23 @@ def load_mesh(path: str | Path, repair: bool = False, wrap: bool = False) -> Mes
     return dataclasses.replace(mesh, notes=(*mesh.notes, advice)) if advice else mesh
 
 
+def check_mesh_file(path: Path) -> None:
+    """Make sure, before anything that takes time, that there is a file to read a mesh from.
+
+    Raises
+    ------
+    MeshError
+    """
+    try:
+        if path.is_dir():
+            raise MeshError(f"{str(path)!r} is a folder; give the path of an OBJ, PLY, STL, OFF or GLB file")
+        if not path.is_file():
+            problem = "is not a regular file" if path.exists() else "does not exist"
+            raise MeshError(f"mesh file {str(path)!r} {problem}; give the path of an OBJ, PLY, STL, OFF or GLB file")
+    except OSError as error:  # a name longer than the system's
+        raise MeshError(f"mesh file {str(path)!r} cannot be read: {error.strerror or error}") from error
+
+
 def _points_only(soup: Soup) -> str:
     return f", only {counted(len(soup.V), 'point')}; make a surface of them first" if len(soup.V) else ""
 
@@ -76,11 +94,6 @@ def _points_only(soup: Soup) -> str:
 def _read(path: Path) -> Soup:
     kind = path.suffix[1:].upper()
     try:
-        if path.is_dir():
-            raise MeshError(f"{str(path)!r} is a folder; give the path of an OBJ, PLY, STL, OFF or GLB file")
-        if not path.is_file():
-            problem = "is not a regular file" if path.exists() else "does not exist"
-            raise MeshError(f"mesh file {str(path)!r} {problem}; give the path of an OBJ, PLY, STL, OFF or GLB file")
         if path.stat().st_size == 0:
             raise MeshError(f"mesh file {str(path)!r} is empty")
         require_memory(MeshError, _BYTE * path.stat().st_size, f"mesh file {str(path)!r}", "take a coarser mesh")

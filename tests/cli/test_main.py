@@ -110,10 +110,11 @@ def test_a_usage_error_reads_the_same_in_every_locale(encoding):
         (["-o", "clip.gif", "--fps", "60"], "60.*1 to 50"),
     ],
 )
-def test_a_bad_output_is_refused_before_the_scene_is_looked_at(tmp_path, monkeypatch, capsys, command, options, said):
+def test_a_bad_output_is_refused_before_the_scene_is_read(tmp_path, monkeypatch, capsys, command, options, said):
     monkeypatch.chdir(tmp_path)
-    assert re.search(said, complaint(capsys, command, "missing", *options))
-    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "broken").touch()
+    assert re.search(said, complaint(capsys, command, "broken", *options))
+    assert list(tmp_path.iterdir()) == [tmp_path / "broken"]
 
 
 def test_a_place_that_cannot_be_written_is_a_failure_in_one_line(capsys):
@@ -150,6 +151,28 @@ def test_a_missing_input_is_named_and_nothing_written(tmp_path, monkeypatch, cap
     assert argv[1] in said
     assert "Errno" not in said
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["view", "missing"],
+        ["view", "missing.toml", "--web"],
+        ["export", "missing", "-o", "run.usdc"],
+        ["render", "missing", "-o", "clip.mp4", "--renderer", "cycles"],
+        ["drop", "missing.obj", "-o", "frames", "--frame-format", "exr"],
+        ["batch", "missing.toml", "-o", "batch"],
+        ["atlas", "missing.obj", "--inside", "scan.nii"],
+    ],
+    ids=lambda argv: argv[0],
+)
+def test_a_missing_input_is_told_before_what_the_machine_lacks(tmp_path, monkeypatch, capsys, argv):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    for package in ("pyarrow", "OpenEXR", "nibabel"):
+        monkeypatch.setitem(sys.modules, package, None)
+    assert argv[1] in complaint(capsys, *argv)
 
 
 def test_atlas_prints_its_figures_as_json_and_saves(tmp_path, capsys, tetrahedron):

@@ -4,6 +4,7 @@ A small program stands in for Blender, which few machines that run the tests hav
 """
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from ripple_sim import VideoOptions, load_scene
 from ripple_sim.cycles.blender import PYTHON
 from ripple_sim.cycles.render_cycles import check_cycles, render_cycles
 from ripple_sim.cycles.tone_mapping import tone_mapped
-from ripple_sim.errors import RippleError, VideoError
+from ripple_sim.errors import RippleError, RippleWarning, VideoError
 from ripple_sim.render import Camera, Renderer
 from ripple_sim.solver.gl import shared_context
 
@@ -89,6 +90,21 @@ def test_the_stage_keeps_what_preview_surfaces_have_no_word_for(folder: Path) ->
     lamps = [prim for prim in stage.Traverse() if prim.HasAttribute("userProperties:power")]
     assert {prim.GetParent().GetName() for prim in lamps} == {"lights"}
     assert all(prim.GetAttribute("userProperties:power").Get() > 0 for prim in lamps)
+
+
+@pytest.mark.filterwarnings("ignore:MuJoCo. Insufficient arena memory")
+def test_what_mujoco_says_of_the_first_frame_is_ours(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ball = '<body pos="1 0 1"><freejoint/><geom size="0.1"/></body>'
+    (folder / "scene.xml").write_text(
+        MODEL.replace("<mujoco>", '<mujoco><size memory="300K"/>').replace("</worldbody>", f"{40 * ball}</worldbody>")
+    )
+    scene = load_scene(folder / "scene.toml")
+    mujoco.set_mju_user_warning(None)
+    monkeypatch.setenv(PYTHON, shutil.which("false") or "")
+    monkeypatch.chdir(folder)
+    with pytest.warns(RippleWarning, match="MuJoCo: Too many contacts"), pytest.raises(VideoError, match="frame 0"):
+        render_cycles(scene, folder / "frames", VideoOptions(size=(64, 36), fps=20, duration=0.05))
+    assert not (folder / "MUJOCO_LOG.TXT").exists()
 
 
 def test_a_blender_that_fails_leaves_no_video(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -71,7 +71,7 @@ class AmplitudeCheck:
         density = np.asarray(waves.material.density, dtype=np.float64)
         advice = f"{_rounded_up(factor * float(density)):g} kg/m^2 or more" if not density.ndim else "as much more"
         warnings.warn(
-            f"the waves on geom {self._names[geom]!r} are too {watch.what}; pictures show them limited. A density "
+            f"the waves on geom {self._names[geom]!r} are {watch.what}; pictures show them limited. A density "
             f"{factor:g} times as high would do: {advice}",
             RippleWarning,
             stacklevel=5,
@@ -119,13 +119,13 @@ class _Watch:
         excess, what = high, ""
         if steep_share > _STEEP_AREA:
             steep = float(slope_of_share(height, scales, _STEEP_AREA))
-            excess, what = max(excess, steep), f"steep: a slope of {steep:.2g} or more on {steep_share:.1%} of it"
+            excess, what = max(excess, steep), f"too steep: a slope of {steep:.2g} or more on {steep_share:.1%} of it"
         if excess > max(self.excess, 1.0):
             if high == excess:
                 where = ", ".join(f"{x:.3g}" for x in self._atlas.positions.reshape(-1, 3)[texel])
                 radius = 1 / (HIGH * float(scales.per_limit.reshape(-1)[texel]))
                 here = abs(float(height.reshape(-1)[texel]))
-                what = f"high: {here:.2g} m at ({where}) m, where the object's radius is {radius:.2g} m"
+                what = f"too high: {here:.2g} m at ({where}) m, where the object's radius is {radius:.2g} m"
             self.what = what
         self.excess = max(self.excess, excess)
         spread = _SPREAD * float(np.abs(height).max()) * scales.per_thinnest
