@@ -41,6 +41,7 @@ def tessellate(
     normal: slice,
     max_length: float,
     max_faces: int,
+    crease_length: float | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
     """Split edges until none is longer than `max_length` or the mesh has about `max_faces` triangles.
 
@@ -63,6 +64,9 @@ def tessellate(
         [m]
     max_faces : int
         The longest edges are split first; a mesh that is finer from the start stays as it is.
+    crease_length : float, optional
+        Creases and open edges are split further, to this length [m], for a quarter more triangles at most: both sides
+        of them contrast, so that corners of the displaced edge would show where those of other edges do not.
 
     Returns
     -------
@@ -71,10 +75,13 @@ def tessellate(
     """
     F, attributes = np.asarray(F, dtype=np.int64), np.asarray(attributes, dtype=np.float64)
     same = np.asarray(same, dtype=np.int64)
-    while len(F) < max_faces:
+    most = max_faces if crease_length is None else max(max_faces, len(F)) * 5 // 4
+    while len(F) < most:
         edges = edges_of(F, same)
         length = _length(attributes[edges.ends[:, 0], position] - attributes[edges.ends[:, 1], position])
         marked = _longest(length, max_length, max_faces - len(F))
+        if crease_length is not None and not marked.any():
+            marked = _longest(np.where(edges.inner, 0.0, length), crease_length, most - len(F))
         if not marked.any():
             break
         midpoint = np.full(len(marked), -1)
@@ -125,6 +132,8 @@ def _bulge(a: NDArray, b: NDArray, normal_a: NDArray, normal_b: NDArray) -> NDAr
 
 def _longest(length: NDArray, max_length: float, new_faces: int) -> NDArray[np.bool_]:
     """Mark the edges over the limit; a split edge makes two more triangles, so only the longest that fit."""
+    if new_faces <= 0:
+        return np.zeros(len(length), np.bool_)
     budget = max(new_faces // 2, 1)
     if budget < len(length):
         max_length = max(max_length, np.partition(length, len(length) - budget)[len(length) - budget])

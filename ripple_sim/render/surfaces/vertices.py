@@ -19,6 +19,8 @@ from .tessellation import Edges, edges_of, midpoints, tessellate
 from .vertex_order import in_memory_order
 
 _LEAST_FACES, _MOST_FACES = 8_000, 400_000
+# Creases are split down to half a texel, as heights have no finer detail, but to no less than a quarter of other edges.
+_CREASE, _CREASE_PARTS = 0.5, 4
 # columns of the vertex attributes: along DIRECTION, the smooth normal, a vertex is displaced; COORDINATES are for the
 # chart map
 POSITION, DIRECTION, COORDINATES, NORMAL, BAKED, UV = (
@@ -33,6 +35,7 @@ def tessellated(
     smooth: NDArray,
     max_length: float,
     max_faces: int,
+    crease_length: float | None = None,
     baked: NDArray | None = None,
     corner_uv: NDArray | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
@@ -44,7 +47,7 @@ def tessellated(
     charts : Charts
     smooth : array, shape [n, 3]
         Smooth normals of the vertices.
-    max_length, max_faces
+    max_length, max_faces, crease_length
         As for `tessellate`.
     baked : array, shape [n, 3], optional
         Ambient visibility, thickness and inner ambient visibility.
@@ -75,6 +78,7 @@ def tessellated(
         normal=NORMAL,
         max_length=max_length,
         max_faces=max_faces,
+        crease_length=crease_length,
     )
 
 
@@ -113,6 +117,7 @@ def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Sur
         smooth=smooth,
         max_length=max_length,
         max_faces=int(np.clip(max_faces, _LEAST_FACES, _MOST_FACES)),
+        crease_length=max(_CREASE * _texel_size(V, F, charts), max_length / _CREASE_PARTS),
         baked=np.stack(occlusion.bake(V, F, smooth), axis=1),
         corner_uv=uv[F] if uv.ndim == 2 else uv,
     )
@@ -127,6 +132,12 @@ def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Sur
     places = charts.page.places(chart, chart_uv)
     points = attributes[:, [*range(POSITION.start, DIRECTION.stop)]]
     return SurfaceVertices(faces, attributes, edges, places, shared_places(chart_uv, places, points))
+
+
+def _texel_size(V: NDArray, F: NDArray, charts: Charts) -> float:
+    """Mean distance of a surface's texels [m]."""
+    area = 0.5 * np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1).sum()
+    return float(np.sqrt(area / np.prod(charts.shape)))
 
 
 def mapped_coordinates(vertices: NDArray[np.float64], mapping: Mapping) -> NDArray[np.float64]:
