@@ -87,6 +87,11 @@ class DrawnScene:
         """
         return join(self._geoms.balls(data), *(target.ball() for target in self._targets))
 
+    @property
+    def transparent(self) -> bool:
+        """Whether anything is."""
+        return bool(self._geoms.transparent) or any(target.transparent for target in self._targets)
+
     def draw(self) -> None:
         """Draw everything opaque into the G-buffer."""
         for target in self._targets:
@@ -95,11 +100,18 @@ class DrawnScene:
         self._geoms.draw()
 
     def draw_shadow(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the depth of everything that casts a shadow, under a matrix of 16 numbers, column by column."""
+        """Draw the depth of everything opaque, which casts shadows, under a matrix of 16 numbers, column by column."""
         for target in self._targets:
-            if target.casts_shadow:
+            if not target.transparent:
                 target.draw_depth(view_projection)
         self._geoms.draw_depth(view_projection, sites=True)
+
+    def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
+        """Draw everything transparent into the transmission map of a light, likewise."""
+        for target in self._targets:
+            if target.transparent:
+                target.draw_transmission(view_projection, light)
+        self._geoms.draw_transmission(view_projection, light)
 
     def draw_occluders(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth of everything that occludes the sky, likewise."""

@@ -20,9 +20,11 @@ from .passes.mirror import Mirror
 from .passes.screen_bounds import boxes_of
 from .passes.shadow import ShadowMaps
 from .passes.surface_buffers import SurfaceBuffers, SurfaceImage
+from .passes.transmission import TransmissionMaps
 from .scene_light import SceneLight
 from .surfaces.height_maps import AnyHeightMap
 
+_TRANSMISSION_TEXEL = 4  # of the transmission maps, in texels of the shadow maps
 _SHADOW_REACH = 2.5  # casters further than that from the focus, in camera distances, cast no shadow
 
 
@@ -50,12 +52,17 @@ class FramePasses:
         self._scene, self._floor, self._light = scene, floor, light
         self._frame = FrameUniforms(resources)
         self._shadows = ShadowMaps(resources, light.shadows, frame_format.size[1])
-        self._occlusion = FloorOcclusion(resources, light.shadows, floor)
-        self._shading = DeferredShading(resources, frame_format, floor, light.options)
+        self._transmission = None
+        if scene.transparent:
+            size = self._shadows.size // _TRANSMISSION_TEXEL
+            self._transmission = TransmissionMaps(resources, light.shadows, size)
+        options = {**light.options, "TRANSMISSION": int(scene.transparent)}
+        self._occlusion = FloorOcclusion(resources, options, floor)
+        self._shading = DeferredShading(resources, frame_format, floor, options)
         self._buffers: SurfaceBuffers | None = None
         self._mirror = None
         if floor is not None and floor.reflects and not frame_format.alpha:
-            self._mirror = Mirror(resources, frame_format, floor, light.options)
+            self._mirror = Mirror(resources, frame_format, floor, options)
 
     def draw(
         self, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose, exposure: int
@@ -124,12 +131,17 @@ class FramePasses:
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.depth_func = "<="
         self._shadows.draw(ctx, self._scene.draw_shadow)
+        if self._transmission is not None:
+            self._transmission.draw(self._shadows.views, self._scene.draw_transmission)
+            self._transmission.bind()
         self._occlusion.draw(ctx, self._scene.draw_occluders, self._shadows)
 
     def _bind(self) -> None:
         """Bind what shading needs."""
         self._scene.bind()
         self._shadows.bind()
+        if self._transmission is not None:
+            self._transmission.bind()
         self._occlusion.bind()
         if self._floor is not None:
             self._floor.bind()

@@ -16,7 +16,7 @@ void main()
     vec2 corner = 4.0 * vec2(gl_VertexID == 1, gl_VertexID == 2);
     cast_ray(corner * span - 1.0);
     focus_local = along_floor(focus.xyz - floor_origin.xyz);
-    around = ambient(floor_normal.xyz, vec3(0.0), 0.0);
+    around = ambient(floor_normal.xyz, vec3(0.0), vec3(0.0));
     key_box = diffuse_box(0, floor_normal.xyz);
     gl_Position = vec4(corner / reach - 1.0, 2.0 * level - 1.0, 1.0);
 }

@@ -31,6 +31,7 @@ class Unit(IntEnum):
     MIRROR = 14
     COARSE_BACKGROUND = 15
     BLOCKERS = 16  # what the shadow maps hold, prefiltered
+    TRANSMISSION = 17  # what transparent objects take from the lights
 
 
 class Binding(IntEnum):

@@ -8,7 +8,7 @@
 #include "visuals/environment.glsl"
 #include "glsl/tone_mapping.glsl"
 #include "visuals/lights.glsl"
-#include "passes/shadow.glsl"
+#include "passes/transmission.glsl"
 
 layout(binding = FLAT_IMAGE_UNIT) uniform sampler2D floor_image;
 
@@ -81,9 +81,10 @@ void main()
     // Shadows are averaged where all four pixels of a block belong to this pass; derivatives across others are undefined.
     int solid = bitCount(covered(pixel, floor_depth()));
     bool whole = block_inside(pixel) && block_mean(solid > 0 || !met ? 1.0 : 0.0) == 0.0;
-    float shadow[SHADOWS], share = 1.0 - float(solid) / float(SAMPLES);
+    float share = 1.0 - float(solid) / float(SAMPLES);
+    vec3 shadow[SHADOWS];
     for (int i = 0; i < SHADOWS; ++i)
-        shadow[i] = light_visibility(i, world, floor_normal.xyz, 0.0, 0.0, bvec2(whole));
+        shadow[i] = light_arriving(i, world, floor_normal.xyz, 0.0, 0.0, bvec2(whole));
 #else
     const float share = 1.0;
     bool shaded = met && may_be_shaded(place, near);
@@ -98,7 +99,7 @@ void main()
         vec3 towards;
         vec3 arrives = incident(lights[i], world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
 #if SHADOW
-        light += arrives * (i < SHADOWS ? shadow[i] : 1.0);
+        light += arrives * (i < SHADOWS ? shadow[i] : vec3(1.0));
 #else
         light += arrives;
 #endif
@@ -113,7 +114,7 @@ void main()
     }
 #endif
 #endif
-    float key = 1.0;
+    vec3 key = vec3(1.0);
 #if SHADOW
     key = shadow[0];
 #endif

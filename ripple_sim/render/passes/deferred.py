@@ -34,7 +34,8 @@ class DeferredShading:
     frame_format : FrameFormat
     floor : Floor, optional
     light_options : mapping
-        SKYBOX and NEAR_LIGHTS, 0 or 1: whether there are any; SHADOWS: how many lights may cast shadows.
+        SKYBOX, NEAR_LIGHTS and TRANSMISSION (of transparent objects), 0 or 1: whether there are any; SHADOWS: how many
+        lights may cast shadows.
 
     Attributes
     ----------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import moderngl
 import numpy as np
@@ -26,18 +26,18 @@ class FloorOcclusion:
     Parameters
     ----------
     resources : Resources
-    shadows : int
-        How many lights may cast shadows.
+    options : mapping
+        Defines SHADOWS and TRANSMISSION as for `DeferredShading`.
     floor : Floor, optional
     """
 
-    def __init__(self, resources: Resources, shadows: int, floor: Floor | None) -> None:
+    def __init__(self, resources: Resources, options: Mapping[str, int], floor: Floor | None) -> None:
         self._floor = floor
         if floor is None:
             self._map = resources.texture((1, 1), 4, np.ones(4, dtype=np.float16).tobytes(), dtype="f2")
             return
         program = resources.program(
-            "glsl/screen_vertex", "passes/floor_occlusion_fragment", NEAR_LIGHTS=1, SHADOWS=shadows
+            "glsl/screen_vertex", "passes/floor_occlusion_fragment", **{**options, "NEAR_LIGHTS": 1}
         )
         self._pass = resources.vertex_array(program, [])
         self._ceiling = resources.depth_texture((_CEILING_SIZE, _CEILING_SIZE))

@@ -2,7 +2,7 @@
 // What light reaches a point of the floor. Its ambient visibility comes from the height of what hangs above it: the form
 // factor of horizontal patches at height h and horizontal distance d is h^2 / (pi (h^2 + d^2)^2) per unit area.
 #include "gpu/frame_uniforms.glsl"
-#include "passes/shadow.glsl"
+#include "passes/transmission.glsl"
 #include "visuals/lights.glsl"
 
 layout(binding = CEILING_UNIT) uniform sampler2D ceiling;  // 0 at the floor, 1 at the top
@@ -32,6 +32,11 @@ bool is_shaded(int light, vec3 world, float texel)
         float depth = textureLod(shadow_maps, in_maps(light, p.xy + offset * direction), 0.0).r;
         closest = depth < 1.0 ? min(closest, offset) : closest;
         widest = depth < 1.0 ? max(widest, penumbra_of(light, light_distance(light, depth), to_light)) : widest;
+#if TRANSMISSION
+        vec2 blocker = transparent_blocker(taken_about(light, p.xy + offset * direction, 0.0));
+        closest = blocker.x > 0.0 ? min(closest, offset) : closest;
+        widest = blocker.x > 0.0 ? max(widest, penumbra_of(light, blocker.y / blocker.x, to_light)) : widest;
+#endif
     }
     // something closer may lie between two points
     bool any = closest < widest + margin + 0.2 * reach;
@@ -67,7 +72,7 @@ void main()
         vec3 light = incident(lights[i], world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
         bool casts = i < SHADOWS;
         shaded = shaded || casts && is_shaded(i, world, size);
-        arrives += light * (casts ? light_visibility(i, world, floor_normal.xyz, 0.0, 0.0, bvec2(true)) : 1.0);
+        arrives += light * (casts ? light_arriving(i, world, floor_normal.xyz, 0.0, 0.0, bvec2(true)) : vec3(1.0));
         unshaded += light;
     }
     float share = dot(arrives, vec3(1.0)) / dot(unshaded, vec3(1.0));

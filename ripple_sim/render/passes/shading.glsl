@@ -2,7 +2,7 @@
 // a clear coat.
 #include "glsl/pixel_block.glsl"
 #include "passes/floor_map.glsl"
-#include "passes/shadow.glsl"
+#include "passes/transmission.glsl"
 #include "visuals/environment.glsl"
 #include "visuals/lights.glsl"
 #include "visuals/occluders.glsl"
@@ -77,14 +77,15 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     vec3 blurred = SOFTENED * m.translucency * reach, sharpness = 1.0 / mix(vec3(1.0), 0.3 + 0.7 * reach, m.translucency);
     // light that enters elsewhere and leaves here: more of it where the object is thin
     float thin = exp(-4.0 * m.thickness);
-    float shadow[SHADOWS];
+    vec3 shadow[SHADOWS];
     for (int i = 0; i < SHADOWS; ++i)
-        shadow[i] = light_visibility(i, position, flat_normal, m.shadow_bias, m.scatter, m.block);
+        shadow[i] = light_arriving(i, position, flat_normal, m.shadow_bias, m.scatter, m.block);
     vec3 direct = vec3(0.0), highlight = vec3(0.0), coated = vec3(0.0), glow = vec3(0.0);
     for (int i = 0; i < int(counts.y); ++i) {
         vec3 light;
         vec3 radiance = incident(lights[i], position, light);
-        float n_l = dot(normal, light), visible = i < SHADOWS ? shadow[i] : 1.0;
+        float n_l = dot(normal, light);
+        vec3 visible = i < SHADOWS ? shadow[i] : vec3(1.0);
         vec3 halfway = normalize(view + light);
         vec3 facing = mix(vec3(n_l), vec3(dot(flat_normal, light)), blurred);
         vec3 diffuse = max(facing + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap));

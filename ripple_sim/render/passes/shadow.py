@@ -33,12 +33,19 @@ class ShadowMaps:
         How many lights may cast shadows, 1 to MAX_SHADOWS.
     height : int
         Of the frame [pixels].
+
+    Attributes
+    ----------
+    size : int
+        Texels along a side.
+    views : list
+        Matrices of 16 numbers, column by column, of the lights that cast shadows in this frame.
     """
 
     def __init__(self, resources: Resources, count: int, height: int) -> None:
         self._count = count
-        self._size = size = int(np.clip(_STEP * round(_PER_PIXEL * height / _STEP), _LEAST, _MOST))
-        self._views: list[tuple[float, ...]] = []
+        self.size = size = int(np.clip(_STEP * round(_PER_PIXEL * height / _STEP), _LEAST, _MOST))
+        self.views: list[tuple[float, ...]] = []
         self._depth = resources.depth_texture((count * size, size))
         self._depth.compare_func = ""
         self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
@@ -62,19 +69,19 @@ class ShadowMaps:
     def fit(self, frame: FrameUniforms, lights: list[Light], centre: NDArray, radius: float) -> list[Light]:
         """Aim the maps at a ball [m] that contains all casters, set the frame's shadows, and return their lights."""
         casting = [light for light in lights if light.shadow][: self._count]
-        self._views = []
+        self.views = []
         for shadow, light in zip(frame.values["shadows"], casting, strict=False):
             aim = _fit_far if light.position is None else _fit_near
-            matrix = aim(shadow, light, self._size, centre, radius)
+            matrix = aim(shadow, light, self.size, centre, radius)
             to_map = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1]]) @ matrix
             shadow["matrix"], shadow["planes"] = to_map.T, np.linalg.inv(to_map)
-            self._views.append(tuple(matrix.T.ravel()))
+            self.views.append(tuple(matrix.T.ravel()))
         return casting
 
     def draw(self, ctx: moderngl.Context, draw_depth: Callable[[tuple[float, ...]], None]) -> None:
         """Draw all maps; `draw_depth` draws the casters' depth under a matrix of 16 numbers."""
-        for index, view in enumerate(self._views):
-            self._target.viewport = (index * self._size, 0, self._size, self._size)
+        for index, view in enumerate(self.views):
+            self._target.viewport = (index * self.size, 0, self.size, self.size)
             self._target.use()
             if index == 0:
                 self._target.clear(depth=1.0)

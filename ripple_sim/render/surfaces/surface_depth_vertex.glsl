@@ -1,9 +1,12 @@
 #version 430
 in vec4 in_moved;
 
-uniform mat4 view_projection;
+uniform mat4 matrix;
+
+out vec3 world;
 
 void main()
 {
-    gl_Position = view_projection * vec4(in_moved.xyz, 1.0);
+    world = in_moved.xyz;
+    gl_Position = matrix * vec4(world, 1.0);
 }

@@ -28,11 +28,14 @@ class Paint:
         Of its texture.
     color : tuple of 4 floats
         Linear colour under the texture; number in the table of objects.
+    transmission : float64 [3]
+        Linear colour of the light that passes through it.
     """
 
     surface: Surface
     mapping: Mapping
     color: tuple[float, ...]
+    transmission: NDArray[np.float64]
 
 
 class SurfaceDrawing:
@@ -67,6 +70,11 @@ class SurfaceDrawing:
         # what a program does not use is optimised away
         self._solid = resources.vertex_array(self._program, content, indices, skip_errors=True)
         self._depth = resources.vertex_array(depth, content[:1], indices)
+        transmission = resources.program(
+            "surfaces/surface_depth_vertex", "passes/transmission_fragment", SOLID=int(not surface.open), REFRACTING=1
+        )
+        transmission["transmission"] = tuple(paint.transmission)
+        self._transmission = resources.vertex_array(transmission, content[:1], indices)
         self._image: moderngl.Texture | moderngl.TextureCube | None = None
         if mapping.kind != MappingKind.NO_IMAGE:
             modelled = mapping.texture >= 0
@@ -109,8 +117,14 @@ class SurfaceDrawing:
 
     def draw_depth(self, view_projection: tuple[float, ...], count: int | moderngl.Buffer) -> None:
         """Draw the depth of the first `count` indices, under a matrix of 16 numbers, column by column."""
-        self._depth.program["view_projection"] = view_projection
+        self._depth.program["matrix"] = view_projection
         _render(self._depth, count)
+
+    def draw_transmission(self, view_projection: tuple[float, ...], light: int, count: int | moderngl.Buffer) -> None:
+        """Draw them into the transmission map of a light, likewise."""
+        program = self._transmission.program
+        program["matrix"], program["light"] = view_projection, light
+        _render(self._transmission, count)
 
 
 def _render(triangles: moderngl.VertexArray, count: int | moderngl.Buffer) -> None:

@@ -26,7 +26,6 @@ from .vertices import DIRECTION, NORMAL, POSITION
 
 _PIXELS_PER_FACE = 192  # of the frame: fewer than about eight pixels each cost more than they show
 _BALLS = 16  # that bound a mesh that moves
-_NO_SHADOW = 0.75  # transparency from which a target casts no shadow
 _HIGHEST_BIAS = 0.05  # of shadows, in radii
 
 
@@ -52,7 +51,7 @@ class SurfaceMesh:
     ----------
     number : int
         In the table of objects.
-    transparent, casts_shadow : bool
+    transparent : bool
     """
 
     def __init__(
@@ -72,7 +71,6 @@ class SurfaceMesh:
         self._radius = self._reach = float(np.linalg.norm(surface.V - self._middle, axis=1).max())
         look, rgb, mapping = appearance(assets.model, geom, surface)
         self.transparent = look.transparency > 0.0
-        self.casts_shadow = look.transparency < _NO_SHADOW
         self.number = assets.objects.add(
             look,
             geom,
@@ -84,7 +82,7 @@ class SurfaceMesh:
         vertices, self._balls = bounded_vertices(surface, pixel * PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
         self._triangles = SurfaceTriangles(assets.resources, vertices, surface.charts, index, pixel)
         self._displacement = Displacement(assets.resources, vertices, index)
-        paint = Paint(surface, mapping, (*rgb, float(self.number)))
+        paint = Paint(surface, mapping, (*rgb, float(self.number)), look.transparency * rgb)
         self._drawing = SurfaceDrawing(assets, paint, vertices, self._displacement.moved, self._triangles.indices)
         self._mesh, self._vertices = (surface.V, surface.F), vertices
         self._moving: MovingVertices | None = None
@@ -176,6 +174,11 @@ class SurfaceMesh:
         """Draw the depth only, under a matrix of 16 numbers, column by column."""
         with self._sides():
             self._drawing.draw_depth(view_projection, self._triangles.count)
+
+    def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
+        """Draw into the transmission map of a light, likewise."""
+        with self._sides():
+            self._drawing.draw_transmission(view_projection, light, self._triangles.count)
 
     @contextlib.contextmanager
     def _sides(self) -> Iterator[None]:

@@ -46,7 +46,7 @@ vec3 diffuse_box(int i, vec3 normal)
 
 // Ambient light on a diffuse surface, over pi. The first soft box stands where the key light does: `key` is the share of
 // that which arrives.
-vec3 ambient(vec3 normal, vec3 bounce, float key)
+vec3 ambient(vec3 normal, vec3 bounce, vec3 key)
 {
     vec3 radiance = mix(bounce, sky.rgb, 0.5 + 0.5 * normal.z) + key * diffuse_box(0, normal);
     for (int i = 1; i < SOFT_BOXES; ++i)

@@ -6,10 +6,10 @@ in vec3 in_origin;
 in vec3 in_core_size;
 in vec3 in_shell_size;
 
-uniform mat4 view_projection;
+uniform mat4 matrix;
 
 void main()
 {
     vec3 local = in_core * in_core_size + in_shell * in_shell_size;
-    gl_Position = view_projection * vec4(in_rotation * local + in_origin, 1.0);
+    gl_Position = matrix * vec4(in_rotation * local + in_origin, 1.0);
 }

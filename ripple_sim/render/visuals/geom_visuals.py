@@ -51,7 +51,10 @@ class GeomVisuals:
         self._assets, self._model = assets, assets.model
         self._shapes: dict[str, ShapeLevels] = {}
         self._programs: dict[tuple[int, bool], moderngl.Program] = {}
-        self._depth = assets.resources.program("visuals/geom_depth_vertex", "glsl/depth_fragment")
+        self._depth, self._transmission = (
+            assets.resources.program("visuals/geom_depth_vertex", fragment, REFRACTING=0)
+            for fragment in ("glsl/depth_fragment", "passes/transmission_fragment")
+        )
         model = assets.model
         visuals = [geom_visual(model, geom) for geom in geoms] + [site_visual(model, i) for i in visible_sites(model)]
         shaped = [(visual, shape) for visual in visuals if (shape := shape_of(model, visual)) is not None]
@@ -66,13 +69,14 @@ class GeomVisuals:
             number = assets.objects.add(look_of(model, visual), host, opacity=visual.opacity)
             self._hosts[number] = host
             if visual.opacity < 1.0:
-                self.transparent.append(TransparentVisual(visual, number, self._instances(shape, [(visual, number)])))
+                instances = self._instances(shape, [(visual, number)], self._transmission)
+                self.transparent.append(TransparentVisual(visual, number, instances))
             else:
                 key = visual.site, shape[0], mapping.kind, mapping.texture
                 groups.setdefault(key, (shape, []))[1].append((visual, number))
-        self._opaque = [self._instances(shape, members) for shape, members in groups.values()]
+        self._opaque = [self._instances(shape, members, self._depth) for shape, members in groups.values()]
         self._planes = [visual.index for visual, _ in shaped if not visual.site and visual.kind == _PLANE]
-        self._sites = [visual for visual, _ in shaped if visual.site and visual.opacity == 1.0]
+        self._sites = [visual for visual, _ in shaped if visual.site]
 
     def balls(self, data: Any) -> Balls:
         """Bounding balls of everything that may cast a shadow."""
@@ -102,7 +106,14 @@ class GeomVisuals:
             if sites or not instances.sites:
                 instances.draw_depth(view_projection)
 
-    def _instances(self, shape: NamedShape, members: list[tuple[Visual, int]]) -> Instances:
+    def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
+        """Draw the transparent visuals into the transmission map of a light, likewise."""
+        for each in self.transparent:
+            self._transmission["light"] = light
+            self._transmission["transmission"] = (1.0 - each.visual.opacity,) * 3
+            each.instances.draw_depth(view_projection)
+
+    def _instances(self, shape: NamedShape, members: list[tuple[Visual, int]], depth: moderngl.Program) -> Instances:
         """Visuals of one shape and texture, each with its number in the table of objects."""
         name, make = shape
         assets = self._assets
@@ -119,7 +130,7 @@ class GeomVisuals:
         return Instances(
             assets.resources,
             self._shapes[name],
-            (self._program(mapping.kind, mapping.own), self._depth),
+            (self._program(mapping.kind, mapping.own), depth),
             [visual for visual, _ in members],
             records,
             None if mapping.texture < 0 else (mapping.unit, assets.textures.get(mapping.texture)),

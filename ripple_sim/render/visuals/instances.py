@@ -129,7 +129,7 @@ class Instances:
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth only, under a matrix of 16 numbers, column by column."""
-        self._programs[1]["view_projection"] = view_projection
+        self._programs[1]["matrix"] = view_projection
         self._array()[1].render(instances=len(self._records))
 
     def _array(self) -> tuple[moderngl.VertexArray, moderngl.VertexArray]:

@@ -1,0 +1,59 @@
+// Shadows of what is transparent, in colour; with TRANSMISSION, otherwise there are none. Their maps lie side by side.
+#include "passes/shadow.glsl"
+
+#if TRANSMISSION
+// rgb: share of the light that is taken; a: the mean of that times the distance from the light [m]
+layout(binding = TRANSMISSION_UNIT) uniform sampler2D transmission_maps;
+
+const int SPIRAL_TAPS = 8;
+const float CLOSEST = 3.0;  // distance at which things begin to shade one another, in texels [m]
+
+// Mean of what is taken about a point of a light's map, as far as a radius, both in the map.
+vec4 taken_about(int light, vec2 point, float radius)
+{
+    float level = log2(max(2.0 * radius * float(textureSize(transmission_maps, 0).y), 1.0));
+    return textureLod(transmission_maps, in_maps(light, point), level);
+}
+
+// Mean share of the light that is taken, and that times its distance from the light [m].
+vec2 transparent_blocker(vec4 taken)
+{
+    return vec2(dot(taken.rgb, vec3(1.0 / 3.0)), taken.a);
+}
+
+// Share of a light that passes all that is transparent on its way to a point; the normal as for `light_visibility`.
+vec3 transmitted(int light, vec3 position, vec3 normal)
+{
+    vec4 clip = shadows[light].matrix * vec4(position, 1.0), place = lights[light].position;
+    vec3 p = clip.xyz / clip.w;
+    vec3 towards = place.w == 0.0 ? lights[light].direction.xyz : normalize(place.xyz - position);
+    float to_light = light_distance(light, p.z), slope = 1.0 / max(abs(dot(normal, towards)), 0.1);
+    vec4 width = shadows[light].width;
+    float texel = (width.x + width.y * to_light) / float(textureSize(transmission_maps, 0).y);
+    vec2 found = transparent_blocker(taken_about(light, p.xy, 0.5 * widest_penumbra(light, to_light)));
+    float penumbra = penumbra_of(light, min(found.y / max(found.x, 1e-4), to_light), to_light);
+    vec3 passes = vec3(0.0);
+    vec2 direction = vec2(1.0, 0.0);
+    for (int i = 0; i < SPIRAL_TAPS; ++i) {
+        vec2 offset = penumbra * sqrt((float(i) + 0.5) / float(SPIRAL_TAPS)) * direction;
+        direction = TURN * direction;
+        vec4 taken = taken_about(light, p.xy + offset, 0.35 * penumbra);
+        vec2 blocker = transparent_blocker(taken);
+        float before = to_light - blocker.y / max(blocker.x, 1e-4);
+        passes += 1.0 - taken.rgb * smoothstep(1.0, CLOSEST, before / (slope * texel));
+    }
+    bool inside = counts.w > float(light) && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
+    return inside ? passes / float(SPIRAL_TAPS) : vec3(1.0);
+}
+#else
+vec3 transmitted(int light, vec3 position, vec3 normal)
+{
+    return vec3(1.0);
+}
+#endif
+
+// Share of a light that arrives, through what is transparent and past all else; see `light_visibility`.
+vec3 light_arriving(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)
+{
+    return light_visibility(light, position, normal, bias, scatter, block) * transmitted(light, position, normal);
+}

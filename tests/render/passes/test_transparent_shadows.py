@@ -1,0 +1,51 @@
+"""Shadows of what is transparent: lighter, without a pattern, and with the shadows of what lies under it."""
+
+import numpy as np
+import pytest
+from drawn import FLOOR, SIZE, SUN, ball_surface, frame_of
+
+from ripple_sim.render.color import srgb_to_linear
+
+PIXELS = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))  # a metre, seen from above
+DARK_FLOOR = FLOOR.replace(".8 .8 .8", ".6 .6 .6")  # below the shoulder of the tone mapping
+PLATE = '<geom type="box" size=".3 .3 .01" pos="-1 0 1" rgba=".5 .5 .5 {}"/>'
+
+
+def floor_at(frame, x, y=0.0, half=2):
+    """Linear light of the floor about a point [m], [2 half, 2 half, 3]."""
+    column, row = int(SIZE[0] / 2 + x * PIXELS), int(SIZE[1] / 2 - y * PIXELS)
+    return srgb_to_linear(frame[row - half : row + half, column - half : column + half] / 255)
+
+
+@pytest.mark.parametrize("opacity", [0.2, 0.5, 0.8])
+def test_a_transparent_geom_takes_its_opacity_of_the_light(gl, opacity):
+    """A plate 1 m up throws its shadow 1 m to the right."""
+    shaded, full = (frame_of(gl, DARK_FLOOR + PLATE.format(each) + SUN.format(1.0, "true")) for each in (opacity, 1.0))
+    plain = frame_of(gl, DARK_FLOOR + PLATE.format(1.0) + SUN.format(1.0, "false"))
+    open_floor, under, dark = (floor_at(frame, 0.0) for frame in (plain, shaded, full))
+    share = (open_floor - under).mean() / (open_floor - dark).mean()
+    assert share == pytest.approx(opacity, abs=0.05)
+    assert np.ptp(under, axis=(0, 1)).max() < 0.02  # no pattern
+
+
+def test_a_body_under_glass_keeps_its_shadow(gl):
+    """A small plate under a large pane: its shadow is as dark as without the pane, the pane's lighter about it."""
+    body = '<geom type="box" size=".1 .3 .01" pos="-.2 0 .4" rgba=".5 .5 .5 1"/>'
+    bare, covered = (
+        frame_of(gl, DARK_FLOOR + body + pane + SUN.format(1.0, "true")) for pane in ("", PLATE.format(0.4))
+    )
+    np.testing.assert_allclose(floor_at(covered, 0.2, half=1), floor_at(bare, 0.2, half=1), atol=0.02)
+
+
+def test_water_is_a_lens(gl):
+    """Its shadow is dark towards the rim; the light in the middle has its colour."""
+    body = '<geom name="b" type="sphere" size=".5" pos="-1 0 1"/>' + DARK_FLOOR + SUN.format(1.0, "{}")
+    plain, water, clay = (
+        frame_of(gl, body.format(flag), targets={"b": ball_surface(look)})
+        for flag, look in (("false", "clay"), ("true", "water"), ("true", "clay"))
+    )
+    open_floor, middle, dark = (floor_at(frame, 0.0) for frame in (plain, water, clay))
+    rim = floor_at(water, 0.0, 0.4)
+    assert (rim - dark).max() < 0.3 * (open_floor - dark).max()
+    assert (middle[..., 1] - dark[..., 1]).min() > 0.5 * (open_floor - dark).max()
+    assert middle[..., 0].mean() < 0.7 * middle[..., 2].mean()
