@@ -7,17 +7,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from .surface import AB, BC, CA, A, B, C, Subdivision, Surface, Triangle
+from .surface import Subdivision, Surface
 
-# A straight line through a triangle: across one side and through the opposite corner, or across two sides.
-_CUTS: dict[int, tuple[Triangle, ...]] = {
-    1: ((A, AB, C), (AB, B, C)),
-    2: ((B, BC, A), (BC, C, A)),
-    4: ((C, CA, B), (CA, A, B)),
-    3: ((AB, B, BC), (A, AB, BC), (A, BC, C)),
-    6: ((BC, C, CA), (B, BC, CA), (B, CA, A)),
-    5: ((CA, A, AB), (C, CA, AB), (C, AB, B)),
-}
 _ON_RAY = 1e-9  # of the size of a polygon
 
 
@@ -87,7 +78,7 @@ def cut_ray(
     t = np.where(crossed, p / np.where(crossed, p - q, 1.0), np.nan)
     crossed &= (1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3] > 0
     forward = surface.edges.ends[:, 0] == surface.F[triangle, k]
-    finer = surface.subdivided(np.where(crossed, np.where(forward, t, 1 - t), np.nan), _CUTS)
+    finer = surface.subdivided(np.where(crossed, np.where(forward, t, 1 - t), np.nan))
     touched = np.flatnonzero(on_ray.any(axis=1))
     inner = np.stack([flat.part[touched].repeat(3), surface.F[touched].ravel(), reach[touched].ravel()])[
         :, on_ray[touched].ravel()

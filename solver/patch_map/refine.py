@@ -5,25 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .surface import AB, BC, CA, A, B, C, Subdivision, Surface, Triangle
+from .surface import Subdivision, Surface
 
-# each set of halved sides (see `Surface.subdivided`), with the triangles that take the place of the whole
-_HALVES: dict[int, tuple[Triangle, ...]] = {
-    1: ((A, AB, C), (AB, B, C)),
-    2: ((B, BC, A), (BC, C, A)),
-    4: ((C, CA, B), (CA, A, B)),
-    3: ((AB, B, BC), (A, AB, BC), (A, BC, C)),
-    6: ((BC, C, CA), (B, BC, CA), (B, CA, A)),
-    5: ((CA, A, AB), (C, CA, AB), (C, AB, B)),
-    7: ((A, AB, CA), (AB, B, BC), (CA, BC, C), (AB, BC, CA)),
-}
 _MOST_ROUNDS = 100
 _MOST_TRIANGLES, _MOST_GROWTH = 40_000, 3  # of a part; of one that has more to begin with, so many times as many
 
 
 def halved(surface: Surface, chosen: NDArray[np.bool_]) -> Subdivision:
     """Split chosen edges [e] in their middle."""
-    return surface.subdivided(np.where(chosen, 0.5, np.nan), _HALVES)
+    return surface.subdivided(np.where(chosen, 0.5, np.nan))
 
 
 def halved_chords(surface: Surface, part: NDArray[np.int64], on_border: NDArray[np.bool_]) -> Subdivision:

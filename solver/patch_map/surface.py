@@ -15,6 +15,17 @@ A, B, C, AB, BC, CA, MIDDLE = range(7)
 
 Triangle = tuple[int, int, int]
 
+# For each set of cut sides of a triangle (see `Surface.subdivided`), the triangles that take its place.
+_SPLITS: dict[int, tuple[Triangle, ...]] = {
+    1: ((A, AB, C), (AB, B, C)),
+    2: ((B, BC, A), (BC, C, A)),
+    4: ((C, CA, B), (CA, A, B)),
+    3: ((AB, B, BC), (A, AB, BC), (A, BC, C)),
+    6: ((BC, C, CA), (B, BC, CA), (B, CA, A)),
+    5: ((CA, A, AB), (C, CA, AB), (C, AB, B)),
+    7: ((A, AB, CA), (AB, B, BC), (CA, BC, C), (AB, BC, CA)),
+}
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Edges:
@@ -127,14 +138,16 @@ class Surface:
         at_rim[self.edges.ends[self.edges.rim]] = True
         return at_rim
 
-    def subdivided(self, places: NDArray[np.float64], patterns: dict[int, tuple[Triangle, ...]]) -> Subdivision:
+    def subdivided(
+        self, places: NDArray[np.float64], patterns: dict[int, tuple[Triangle, ...]] = _SPLITS
+    ) -> Subdivision:
         """Cut edges, and the triangles beside them.
 
         Parameters
         ----------
         places : float64 [e]
             Where each edge is cut, between 0 at its first end and 1; NaN where it is not.
-        patterns : dict
+        patterns : dict, optional
             For each set of cut sides of a triangle (1 for ab, 2 for bc, 4 for ca, added up) the triangles to put in
             its place, by the seven points named in this module.
         """
