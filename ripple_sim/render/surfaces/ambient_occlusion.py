@@ -1,4 +1,4 @@
-"""Ambient occlusion and thickness of a mesh, baked once with rays."""
+"""Ambient occlusion and thickness of a mesh, found with rays."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from ripple_sim.render.visuals.corners import normalized
 from ripple_sim.solver.mesh.topology import edges_of
 
 _RAYS = 1_000_000
@@ -35,14 +36,37 @@ class Baked(NamedTuple):
 def bake(V: NDArray, F: NDArray, normals: NDArray) -> Baked:
     """Cast cosine-distributed rays from every vertex, outwards and inwards."""
     count = int(np.clip(_RAYS // (2 * len(V)), 16, 64))
-    radius = np.linalg.norm(V - V.mean(axis=0), axis=1).max()
+    return cast(V, F, frames_about(normals), count, bounding_radius(V))
+
+
+def bounding_radius(V: NDArray) -> float:
+    """Of vertices [n, 3], about their mean [m]."""
+    return float(np.linalg.norm(V - V.mean(axis=0), axis=1).max())
+
+
+def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, start: float = 0.0) -> Baked:
+    """Cast rays from every vertex to either side.
+
+    Parameters
+    ----------
+    V, F : [n, 3], [m, 3]
+    frames : [n, 3, 3]
+        Tangent, bitangent and normal of every vertex as rows, about which the rays are spread.
+    count : int
+        Rays to each side of a vertex.
+    radius : float
+        Length that thickness is told in; walls further away than that hide no light [m].
+    start : float
+        Walls nearer than that are not seen [m].
+    """
     scene = EmbreeScene()
     TriangleMesh(scene, np.ascontiguousarray(V[F], dtype=np.float32))
 
     def distances(side: float) -> NDArray[np.float64]:
-        directions = side * _hemisphere(normals, count)
-        origins = np.repeat(V + side * 1e-3 * radius * normals, count, axis=0)
-        hits = scene.run(origins.astype(np.float32), directions.reshape(-1, 3).astype(np.float32), query="DISTANCE")
+        directions = side * _hemisphere(frames, count)
+        origins = (V + side * 1e-3 * radius * frames[:, 2])[:, None] + start * directions
+        rays = (each.reshape(-1, 3).astype(np.float32) for each in (origins, directions))
+        hits = start + scene.run(*rays, query="DISTANCE")
         return np.minimum(hits / radius, 4.0).reshape(len(V), count)
 
     # nearby walls hide the light, those further than a radius away reflect some themselves
@@ -51,22 +75,22 @@ def bake(V: NDArray, F: NDArray, normals: NDArray) -> Baked:
     return Baked(*(_smoothed(each.mean(axis=1), edges) for each in values))
 
 
-def _hemisphere(normals: NDArray, count: int) -> NDArray[np.float64]:
+def frames_about(normals: NDArray, along: NDArray | None = None) -> NDArray[np.float64]:
+    """Tangent, bitangent and normal as rows [n, 3, 3]; the bitangent is as near as may be to a direction, [n, 3]."""
+    if along is None:
+        along = np.where(np.abs(normals[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    tangent = normalized(np.cross(along, normals))  # a vertex without triangles has no normal
+    return np.stack([tangent, np.cross(normals, tangent), normals], axis=1)
+
+
+def _hemisphere(frames: NDArray, count: int) -> NDArray[np.float64]:
     """Cosine-distributed directions on a spiral about every normal, turned differently at every vertex."""
     index = np.arange(count) + 0.5
     golden = np.pi * (3 - np.sqrt(5))
-    turn = index * golden + (np.arange(len(normals)) * golden)[:, None]
+    turn = index * golden + (np.arange(len(frames)) * golden)[:, None]
     r, z = np.sqrt(index / count), np.sqrt(1 - index / count)
-    helper = np.where(np.abs(normals[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    tangent = np.cross(helper, normals)
-    length = np.linalg.norm(tangent, axis=1, keepdims=True)
-    tangent /= np.where(length > 0, length, 1.0)  # a vertex without triangles has no normal
-    bitangent = np.cross(normals, tangent)
-    return (
-        (r * np.cos(turn))[..., None] * tangent[:, None]
-        + (r * np.sin(turn))[..., None] * bitangent[:, None]
-        + z[:, None] * normals[:, None]
-    )
+    local = np.stack([r * np.cos(turn), r * np.sin(turn), np.broadcast_to(z, turn.shape)], axis=2)
+    return local @ frames
 
 
 def _smoothed(values: NDArray, edges: NDArray, rounds: int = 2) -> NDArray[np.float64]:

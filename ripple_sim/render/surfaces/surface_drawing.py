@@ -63,10 +63,14 @@ class SurfaceDrawing:
         attributes = vertices.attributes
         mapped = mapped_coordinates(attributes, mapping)
         self._normals = resources.buffer(attributes[:, NORMAL].astype("f4").tobytes())
-        columns = [vertices.places, attributes[:, BAKED], mapped]
-        still = resources.buffer(np.concatenate(columns, axis=1).astype("f4").tobytes())
-        names = ("in_place", "in_baked", "in_mapped")
-        content = [(moved, "4f", "in_moved"), (self._normals, "3f", "in_normal"), (still, "2f 3f 3f", *names)]
+        self._baked = resources.buffer(attributes[:, BAKED].astype("f4").tobytes())
+        still = resources.buffer(np.concatenate([vertices.places, mapped], axis=1).astype("f4").tobytes())
+        content = [
+            (moved, "4f", "in_moved"),
+            (self._normals, "3f", "in_normal"),
+            (self._baked, "3f", "in_baked"),
+            (still, "2f 3f", "in_place", "in_mapped"),
+        ]
         # what a program does not use is optimised away
         self._solid = resources.vertex_array(self._program, content, indices, skip_errors=True)
         self._depth = resources.vertex_array(depth, content[:1], indices)
@@ -98,9 +102,10 @@ class SurfaceDrawing:
         if self._heatmap is not None:
             self._heatmap.set(values, limit)
 
-    def move(self, normals: NDArray[np.float32]) -> None:
-        """Replace the vertices' normals, [n, 3]."""
+    def move(self, normals: NDArray[np.float32], baked: NDArray[np.float32]) -> None:
+        """Replace the vertices' normals and what is baked, [n, 3] each."""
         self._normals.write(normals)
+        self._baked.write(baked)
 
     def draw(self, rotation: NDArray[np.float64], count: int | moderngl.Buffer) -> None:
         """Draw the first `count` indices into the G-buffer; normals are turned by the rotation, [3, 3].

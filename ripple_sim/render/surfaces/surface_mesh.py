@@ -18,11 +18,12 @@ from ripple_sim.solver.errors import RippleError
 from .displacement import Displacement, Place
 from .height_maps import AnyHeightMap, HeightMapTextures, MovedHeightMap
 from .kept_vertices import bounded_vertices
+from .moving_occlusion import MovingOcclusion
 from .moving_vertices import MovingVertices
 from .surface import Surface, appearance
 from .surface_drawing import Paint, SurfaceDrawing
 from .surface_triangles import PIXELS, SurfaceTriangles
-from .vertices import DIRECTION, NORMAL, POSITION
+from .vertices import BAKED, DIRECTION, NORMAL, POSITION
 
 _PIXELS_PER_FACE = 192  # of the frame: fewer than about eight pixels each cost more than they show
 _BALLS = 16  # that bound a mesh that moves
@@ -85,7 +86,7 @@ class SurfaceMesh:
         paint = Paint(surface, mapping, (*rgb, float(self.number)), look.transparency * rgb)
         self._drawing = SurfaceDrawing(assets, paint, vertices, self._displacement.moved, self._triangles.indices)
         self._mesh, self._vertices = (surface.V, surface.F), vertices
-        self._moving: MovingVertices | None = None
+        self._moving: tuple[MovingVertices, MovingOcclusion] | None = None
 
     def ripple(self, ctx: moderngl.Context, height_map: AnyHeightMap | None) -> None:
         """Take in a height map [C, n + 2, n + 2, 4] (none: flat), and find the triangles for it.
@@ -131,12 +132,14 @@ class SurfaceMesh:
     def _move(self, V: NDArray[np.float64]) -> None:
         """Take the vertices along with those of the mesh, [n, 3] [m]."""
         if self._moving is None:
-            attributes = self._vertices.attributes
-            rest = (attributes[:, columns] for columns in (POSITION, DIRECTION, NORMAL))
-            self._moving = MovingVertices(*self._mesh, *rest)
-        moved = self._moving(V)
+            columns = (POSITION, DIRECTION, NORMAL, BAKED)
+            points, directions, normals, baked = (self._vertices.attributes[:, each] for each in columns)
+            vertices = MovingVertices(*self._mesh, points, directions, normals)
+            self._moving = vertices, MovingOcclusion(*self._mesh, points, directions, baked)
+        vertices, occlusion = self._moving
+        moved = vertices(V)
         self._displacement.move(moved.points, moved.directions)
-        self._drawing.move(moved.normals)
+        self._drawing.move(moved.normals, occlusion(V))
         self._balls = balls_about(V[self._mesh[1]], _BALLS)
         self._middle = (V.min(axis=0) + V.max(axis=0)) / 2
         # in steps, so that shadow maps stay as they are while the surface wobbles

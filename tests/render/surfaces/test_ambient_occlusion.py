@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.render.surfaces.ambient_occlusion import _hemisphere, _smoothed, bake
+from ripple_sim.render.surfaces.ambient_occlusion import _hemisphere, _smoothed, bake, frames_about
 from ripple_sim.render.visuals import primitives
 from ripple_sim.render.visuals.corners import smooth_normals
 from ripple_sim.solver.mesh.topology import edges_of
@@ -63,7 +63,7 @@ def test_directions_are_cosine_distributed_about_every_normal(count):
     normals = np.random.default_rng(0).normal(size=(300, 3))
     normals = np.concatenate([normals, np.eye(3), -np.eye(3)])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    directions = _hemisphere(normals, count)
+    directions = _hemisphere(frames_about(normals), count)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=2), 1.0, atol=1e-12)
     cosine = np.einsum("vki,vi->vk", directions, normals)
     assert cosine.min() > 0
