@@ -60,7 +60,7 @@ def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, sta
         Walls nearer than that are not seen [m].
     """
     scene = EmbreeScene()
-    TriangleMesh(scene, np.ascontiguousarray(V[F], dtype=np.float32))
+    TriangleMesh(scene, np.ascontiguousarray(V, np.float32), np.ascontiguousarray(F, np.int32))
 
     def distances(side: float) -> NDArray[np.float64]:
         directions = side * _hemisphere(frames, count)

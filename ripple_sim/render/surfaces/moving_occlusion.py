@@ -13,7 +13,7 @@ from .coarse_mesh import coarse_mesh
 from .moving_vertices import MovingVertices
 
 _SAMPLES = 1_000  # vertices that cast rays, at most
-_RAYS = 40_000  # a frame, about
+_RAYS = 32_000  # a frame, about
 _NEAR = 6  # samples about a point
 
 
