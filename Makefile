@@ -34,10 +34,11 @@ $(KERNELS): $(shell find solver ripple_sim/coupling -name "*.py")
 demo: setup $(KERNELS)
 	$(BIN)/ripple-sim render duck -o out/demo.mp4
 
-# two processes, each with OpenGL and kernels of its own: as many as the smallest machine has cores; compiled modules are
-# kept even where the environment says not to, since each of a hundred commands would compile them again
+# two processes, each with OpenGL and kernels of its own: as many as the smallest machine has cores, which threads of BLAS
+# would only fight for; compiled modules are kept even where the environment says not to, since each of a hundred
+# commands would compile them again
 test: $(ALL) $(KERNELS)
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal
+	OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal
 
 # much more of tests/fuzz, by chance; what it finds is kept in .hypothesis, and tried first the next time
 fuzz: $(ALL) $(KERNELS)
