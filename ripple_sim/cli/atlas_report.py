@@ -11,6 +11,24 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
 
+# By figure of `Atlas.quality`: what it is called in the text, and its unit.
+_FIGURES = {
+    "solid_angle": ("solid angle of the map", "sr"),
+    "flipped": ("folded triangles", ""),
+    "q001": ("stretch, 0.1 % of the area", ""),
+    "q01": ("stretch, 1 %", ""),
+    "q50": ("stretch, median", ""),
+    "q99": ("stretch, 99 %", ""),
+    "q999": ("stretch, 99.9 %", ""),
+    "starved": ("area starved (stretch over 4)", ""),
+    "edge_min": ("shortest texel edge", "m"),
+    "edge_max": ("longest texel edge", "m"),
+    "folded": ("folded texels", ""),
+    "coverage": ("texel area / mesh area", ""),
+    "spanned": ("area between texels / mesh area", ""),
+    "timestep": ("time step / even grid's", ""),
+}
+
 
 def atlas_report(
     path: Path, atlas: Atlas, method: str, seconds: dict[str, float], thickness: NDArray[np.float64] | None = None
@@ -66,6 +84,11 @@ def charts_text(shape: Sequence[int], method: str | None) -> str:
     return f"{' x '.join(map(str, shape))} texels, {'patches' if method is None else f'{method} sphere map'}"
 
 
+def _figure(name: str, value: float) -> tuple[str, str]:
+    label, unit = _FIGURES[name]
+    return label, f"{value:.6g} {unit}".rstrip()
+
+
 def report_text(report: dict[str, Any]) -> str:
     """Format a report as text."""
     rows = [
@@ -75,7 +98,7 @@ def report_text(report: dict[str, Any]) -> str:
         ("volume", f"{report['volume']:.6g} m^3"),
         *(("note", note) for note in report["notes"]),
         ("atlas", charts_text(report["charts"], report["method"])),
-        *((name, f"{value:.6g}") for name, value in report["quality"].items()),
+        *(_figure(name, value) for name, value in report["quality"].items()),
         *((f"thickness, {name}", f"{metres:.6g} m") for name, metres in report.get("thickness", {}).items()),
         *((f"{stage.replace('_', ' ')} time", f"{seconds:.3f} s") for stage, seconds in report["seconds"].items()),
     ]

@@ -38,7 +38,8 @@ def test_the_text_has_a_line_for_every_figure_with_values_in_one_column(box: Atl
     assert any(line.startswith("sphere map time") and line.endswith("0.250 s") for line in lines)
     assert any("6 x 8 x 8 texels, direct sphere map" in line for line in lines)
     assert len(lines) == 4 + 2 + 1 + len(report["quality"]) + 2
-    width = max(len(name) for name in (*report["quality"], "sphere map time"))
+    assert any(line.startswith("longest texel edge ") and line.endswith(" m") for line in lines)
+    width = min(line.rindex("  ") for line in lines if line.startswith("area starved"))
     assert all(line[width : width + 2] == "  " and line[width + 2] != " " for line in lines)
 
 

@@ -189,7 +189,7 @@ def test_atlas_prints_its_figures_for_reading(capsys, tetrahedron):
     assert cli.main(["atlas", str(tetrahedron), "--resolution", "8"]) == 0
     out = capsys.readouterr().out
     assert "4 vertices, 4 triangles" in out
-    assert re.search(r"^flipped +0$", out, re.MULTILINE)
+    assert re.search(r"^folded triangles +0$", out, re.MULTILINE)
 
 
 def test_atlas_refuses_an_unwritable_file_and_an_unknown_method(capsys, tetrahedron):

@@ -72,23 +72,13 @@ class Readback:
             buffer.read_into(self._pixels)
         self._free.append(buffer)
         frame = np.empty((*self._pixels.shape[:2], 4 if self._format.alpha else 3), self._pixels.dtype)
-        _flip(self._pixels, frame)
+        for channel in range(frame.shape[2]):  # all at once would be rows of three numbers, which are slow
+            frame[..., channel] = self._pixels[::-1, :, channel]
         if self._format.linear:
             return frame.view(np.float16)
         if self._format.alpha:
             _unpremultiply(frame)
         return frame
-
-
-@kernel
-def _flip(pixels: NDArray, frame: NDArray) -> None:
-    """Copy pixels [height, width, 4] to a frame [height, width, 3 or 4], the last row first."""
-    height, width, channels = frame.shape
-    for row in range(height):
-        source, target = pixels[height - 1 - row], frame[row]
-        for channel in range(channels):
-            for column in range(width):
-                target[column, channel] = source[column, channel]
 
 
 @kernel
