@@ -1,6 +1,6 @@
 #version 430
-// What may block a light: how much of the shadow map is covered, and that times the distance from the light [m]. Mipmaps
-// of it are means over as much as the search for blockers steps over.
+// What may block a light: how much of the shadow map is covered, and that times the distance from the light [m] and times
+// its square. Mipmaps of it are means over as much as the search for blockers steps over.
 #include "gpu/frame_uniforms.glsl"
 #include "passes/light_distance.glsl"
 
@@ -15,6 +15,10 @@ void main()
     int light = int(place.x * float(SHADOWS));
     vec4 depths = textureGather(shadow_maps, place);  // four of sixteen texels
     vec4 covers = 1.0 - step(1.0, depths);
-    float covered = dot(covers, vec4(0.25)), depth = dot(covers, depths) / max(4.0 * covered, 1.0);
-    fragment = vec4(covered, covered * light_distance(light, depth), 0.0, 1.0);
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < 4; ++i) {
+        float away = light_distance(light, depths[i]);
+        sum += covers[i] * vec3(1.0, away, away * away);
+    }
+    fragment = vec4(0.25 * sum, 1.0);
 }

@@ -75,10 +75,14 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
         // the mean over as much as lies between the points: single texels would come and go from pixel to pixel
         float footprint = widest * sqrt(TWO_PI * away / float(4 * SEARCH_TAPS));
         float level = log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
-        vec2 mean = textureLod(blockers, in_maps(light, p.xy + offset), level).rg;
-        float before = light_distance(light, p.z + dot(slope, offset)) - mean.y / max(mean.x, 1e-4);
-        float blocks = (1.0 - away) * mean.x * smoothstep(0.0, 0.5 * footprint * width + texel, before);
-        distances += blocks * mean.y / max(mean.x, 1e-4);
+        vec3 mean = textureLod(blockers, in_maps(light, p.xy + offset), level).rgb;
+        // a share of what covers the map there is this surface itself, the rest blocks: two distances with that mean and
+        // that variance (Yang et al., Variance Soft Shadow Mapping, 2010)
+        float usual = mean.y / max(mean.x, 1e-4), variance = max(mean.z / max(mean.x, 1e-4) - usual * usual, 0.0);
+        float before = max(light_distance(light, p.z + dot(slope, offset)) - usual, 1e-6);
+        float share = before * before / (before * before + variance);
+        float blocks = (1.0 - away) * mean.x * share * smoothstep(0.0, texel + 0.25 * footprint * width, before);
+        distances += blocks * (usual - variance / before);
         found += blocks;
     }
     distances = block_mean(distances, block);

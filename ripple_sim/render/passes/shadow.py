@@ -58,7 +58,7 @@ class ShadowMaps:
             repeat_y=False,
         )
         self._blockers = resources.texture(
-            (count * size // _TEXELS_PER_BLOCKER, size // _TEXELS_PER_BLOCKER), 2, dtype="f2"
+            (count * size // _TEXELS_PER_BLOCKER, size // _TEXELS_PER_BLOCKER), 4, dtype="f4"
         )
         self._blockers.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         self._blockers.repeat_x = self._blockers.repeat_y = False

@@ -10,6 +10,9 @@ from ripple_sim.render.passes.shadow import ShadowMaps
 from ripple_sim.render.visuals.lights import Light
 
 
+SLAB = '<geom type="box" size="3 3 .1" pos="0 0 -.1" rgba=".8 .8 .8 1"/>'
+
+
 @pytest.mark.parametrize("direction", [-1.0, 1.0])
 def test_a_shadow_falls_where_the_light_of_the_mjcf_casts_it(gl, direction):
     frame = frame_of(gl, FLOOR + BALL + SUN.format(direction, "true"))
@@ -74,11 +77,15 @@ def test_a_shadow_falls_far_below_its_caster(gl):
     assert frame[58:62, x - 2 : x + 2].mean() < frame[58:62, x + 20 : x + 30].mean() - 60
 
 
-def test_a_penumbra_is_as_wide_as_the_light_and_the_height_make_it(gl):
-    """A sun of tangent 0.05 shines past the edge of a plate 1.4 m up, under 45 degrees: the floor lies 2 m behind."""
+@pytest.mark.parametrize("below", [FLOOR, SLAB], ids=["floor", "solid"])
+def test_a_penumbra_is_as_wide_as_the_light_and_the_height_make_it(gl, below):
+    """A sun of tangent 0.05 shines past the edge of a plate 1.4 m up, under 45 degrees: what is below lies 2 m behind.
+
+    A solid casts shadows, too: it lies in the shadow map itself.
+    """
     plate = '<geom type="box" size=".5 .5 .01" pos="-1.4 0 1.4"/>'
     size = (320, 240)
-    frame = frame_of(gl, FLOOR + plate + SUN.format(1.0, "true"), size=size)
+    frame = frame_of(gl, below + plate + SUN.format(1.0, "true"), size=size)
     metre = size[1] / (2 * 4.0 * np.tan(np.radians(20)))
     across = srgb_to_linear(frame[: size[1] // 2, size[0] // 2, 1] / 255)  # from beyond the shadow to its middle
     share = (across - across.min()) / (across[0] - across.min())
