@@ -9,7 +9,6 @@ from ripple_sim.render.color import srgb_to_linear
 from ripple_sim.render.passes.shadow import ShadowMaps
 from ripple_sim.render.visuals.lights import Light
 
-
 SLAB = '<geom type="box" size="3 3 .1" pos="0 0 -.1" rgba=".8 .8 .8 1"/>'
 
 
