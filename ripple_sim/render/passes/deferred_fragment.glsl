@@ -8,7 +8,7 @@
 #include "glsl/tone_mapping.glsl"
 #include "passes/shading.glsl"
 #include "passes/visible_samples.glsl"
-#include "surfaces/height_maps.glsl"
+#include "surfaces/footprint.glsl"
 
 layout(binding = BEHIND_UNIT) uniform sampler2D frame_behind;  // without the transparent object
 
@@ -19,6 +19,8 @@ const float DARKEST = 0.45;
 const float NEUTRAL = 0.62;     // albedo under a heatmap
 const float SCATTER = 0.2;      // how far light gets under a translucent surface, in sizes of the object
 const float CREASE = 0.35;      // difference of the unit normals of two pixels: a radius of three pixels
+const float PIXEL_VARIANCE = 1.0 / 24.0;  // of normals in a pixel, over the squares of their steps to the pixels beside
+const float MOST_VARIANCE = 0.1;
 const vec3 INK = vec3(0.09, 0.11, 0.16);
 
 #if LAYER
@@ -41,6 +43,8 @@ struct SurfaceSample {
     vec3 color;    // square root of the albedo
     float ink;     // opacity of lines on top
     float visibility, thickness;
+    vec2 place;    // on the page of charts [texels]
+    bool inner;    // whether the object's inner side is seen
 };
 
 SurfaceSample surface_sample(ivec2 pixel, int s)
@@ -53,17 +57,11 @@ SurfaceSample surface_sample(ivec2 pixel, int s)
     vec2 red_green = unpack_unorm8(color.z), blue_ink = unpack_unorm8(color.w), baked = unpack_unorm8(normal.w);
     surface.color = vec3(red_green, blue_ink.x);
     surface.ink = blue_ink.y;
-    Object object = objects[surface.object];
-    vec2 place = color.xy * vec2(textureSize(height_maps, 0).xy);
-    vec4 ripple = vec4(0.0);
-    // a loop, not a branch: see light_visibility
-    int looks = int(object.height_map.y);
-    for (int i = 0; i < looks; ++i)
-        ripple = spline_at(height_maps, vec3(place, object.height_map.x)) * (unpack_inner(normal.z) ? -1.0 : 1.0);
-    surface.rippled = normalize(surface.normal - object.rotation * ripple.xyz);
-    // cavity occlusion: less light reaches the troughs
-    surface.visibility = baked.x * (1.0 - 0.4 * smoothstep(0.0, 0.03, -ripple.w / object.place.y));
+    surface.rippled = surface.normal;
+    surface.visibility = baked.x;
     surface.thickness = 2.0 * baked.y;
+    surface.place = color.xy * vec2(textureSize(height_maps, 0).xy);
+    surface.inner = unpack_inner(normal.z);
     return surface;
 }
 
@@ -74,14 +72,26 @@ bvec2 same_beside(SurfaceSample surface, float at)
     return bvec2(dFdx(object) == 0.0 && abs(dFdx(at)) < 0.02 * at, dFdy(object) == 0.0 && abs(dFdy(at)) < 0.02 * at);
 }
 
-// Variance of the normals in the pixel, which widens highlights (specular antialiasing). Creases do not count: both of
-// their sides are sharp.
-float spread_of(SurfaceSample surface, bvec2 same)
+// Adds the ripples to a surface; returns the variance of its normals in the pixel, as far as neighbours that are the
+// `same` tell, which widens highlights (geometric specular antialiasing: Kaplanyan, Hill, Patney and Lefohn, Filtering
+// distributions of normals for shading antialiasing, 2016). Creases do not count: both of their sides are sharp.
+float rippled(inout SurfaceSample surface, bvec2 same)
 {
-    vec3 across = dFdx(surface.rippled), up = dFdy(surface.rippled);
+    Object object = objects[surface.object];
+    vec2 chart = floor(surface.place / max(object.height_map.w, 1.0));
+    bvec2 near = bvec2(same.x && dFdx(chart) == vec2(0.0), same.y && dFdy(chart) == vec2(0.0));
+    vec2 across = near.x ? dFdx(surface.place) : vec2(0.0), up = near.y ? dFdy(surface.place) : vec2(0.0);
+    float variance;
+    vec4 ripple = seen_at(vec3(surface.place, object.height_map.x), across, up, vec3(chart, 1.0) * object.height_map.w,
+                          variance) * (surface.inner ? -1.0 : 1.0);
+    surface.rippled = normalize(surface.normal - object.rotation * ripple.xyz);
+    // cavity occlusion: less light reaches the troughs
+    surface.visibility *= 1.0 - 0.4 * smoothstep(0.0, 0.03, -ripple.w / object.place.y);
+    vec3 right = dFdx(surface.rippled), above = dFdy(surface.rippled);
     bool smooth_across = same.x && length(dFdx(surface.normal)) < CREASE;
     bool smooth_up = same.y && length(dFdy(surface.normal)) < CREASE;
-    return min(0.5 * ((smooth_across ? dot(across, across) : 0.0) + (smooth_up ? dot(up, up) : 0.0)), 0.2);
+    float between = (smooth_across ? dot(right, right) : 0.0) + (smooth_up ? dot(above, above) : 0.0);
+    return min(max(PIXEL_VARIANCE * between, variance), MOST_VARIANCE);
 }
 
 // Colour and opacity; `spread` is the variance of the normals in the pixel, `block` says which neighbours in the block of
@@ -118,7 +128,8 @@ void main()
         float at = eye_distance(texelFetch(depths, pixel, first).r);
         SurfaceSample surface = surface_sample(pixel, first);
         bvec2 same = same_beside(surface, left == 0 ? -1.0 : at);
-        spread = again ? spread : spread_of(surface, same);
+        float variance = rippled(surface, bvec2(same.x && !again, same.y && !again));
+        spread = again ? spread : variance;
         block = bvec2(block.x && same.x && !again, block.y && same.y && !again);
         // samples of the same surface share their light
         vec3 own = texelFetch(normals, pixel, first).xyz;

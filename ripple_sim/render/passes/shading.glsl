@@ -36,9 +36,11 @@ vec3 floor_radiance(vec3 position, float radius)
     return floor_origin.w > 0.0 ? lit : sky.rgb * 0.8;
 }
 
-float ggx(float n_h, float roughness)
+// Of a roughness, on a surface whose normals have a variance in the pixel.
+float ggx(float n_h, float roughness, float variance)
 {
-    float a2 = roughness * roughness * roughness * roughness;
+    // narrower highlights would flicker
+    float a2 = clamp(roughness * roughness * roughness * roughness + variance, 1.6e-5, 1.0);
     float d = n_h * n_h * (a2 - 1.0) + 1.0;
     return a2 / (d * d);
 }
@@ -66,8 +68,6 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     // a wall sees the floor before it, about as far away as it is high
     vec3 bounce = floor_radiance(position + 1.2 * height * normal, height);
     vec3 mirrored = floor_radiance(position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2), 0.3 * height);
-    // narrow highlights of distant ripples would flicker
-    float rough = sqrt(clamp(m.roughness * m.roughness + spread, 0.004, 1.0));
     vec3 f0 = mix(vec3(0.04), m.albedo, m.metallic);
 
     // in translucent objects light of their own colour wraps round the edges
@@ -93,8 +93,8 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
         direct += radiance * diffuse * mix(lit, vec3(1.0), 0.35 * m.translucency);
         vec3 arrives = 0.25 * radiance * visible * clamp(n_l * 4.0, 0.0, 1.0);
         float n_h = max(dot(normal, halfway), 0.0), v_h = max(dot(view, halfway), 0.0);
-        highlight += arrives * fresnel(f0, v_h) * ggx(n_h, rough);
-        coated += arrives * fresnel(vec3(0.04), v_h) * ggx(n_h, COAT_ROUGHNESS);
+        highlight += arrives * fresnel(f0, v_h) * ggx(n_h, m.roughness, spread);
+        coated += arrives * fresnel(vec3(0.04), v_h) * ggx(n_h, COAT_ROUGHNESS, spread);
         float behind = clamp(0.5 - 0.5 * n_l, 0.0, 1.0);
         glow += radiance * thin * (0.35 + 0.65 * behind * behind);
     }
@@ -111,9 +111,9 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     base += m.sheen * m.albedo * surround * ((1.0 - n_v) * (1.0 - n_v) * (1.0 - n_v));
 
     float hidden = clamp(open * open + 0.15, 0.0, 1.0);
-    vec3 at_edge = f0 + (max(vec3(1.0 - rough), f0) - f0) * fifth_power(1.0 - n_v);
-    vec3 gloss = environment(reflected, rough, mirrored) * at_edge * hidden + highlight;
+    vec3 at_edge = f0 + (max(vec3(1.0 - m.roughness), f0) - f0) * fifth_power(1.0 - n_v);
+    vec3 gloss = environment(reflected, roughened(m.roughness, spread), mirrored) * at_edge * hidden + highlight;
     float coat = m.coat * fresnel(vec3(0.04), n_v).x;
-    vec3 film = environment(reflected, 0.06, mirrored) * hidden;
+    vec3 film = environment(reflected, roughened(0.06, spread), mirrored) * hidden;
     return (base + gloss) * (1.0 - coat) + coat * film + m.coat * coated;
 }

@@ -79,6 +79,7 @@ class SurfaceMesh:
             heatmap=surface.heatmap_colors is not None,
             height_map=index,
         )
+        assets.objects.set_chart(self.number, surface.charts.page.block)
         pixel = 2 * self._radius / size[1]
         vertices, self._balls = bounded_vertices(surface, pixel * PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
         self._triangles = SurfaceTriangles(assets.resources, vertices, surface.charts, index, pixel)

@@ -26,10 +26,20 @@ float soft_box(vec3 direction, vec4 normal, vec4 tangent, float blur)
     return along > 0.0 ? inside.x * inside.y : 0.0;
 }
 
+const vec2 LOBE = vec2(0.04, 0.9);  // half width of a mirror's lobe, and more of it by roughness
+
+// Roughness whose lobe is that of the given one, spread by normals of a variance in the pixel: reflections turn twice as
+// far, and a smooth step's own variance is a fifth of the square of its half width.
+float roughened(float roughness, float variance)
+{
+    float width = LOBE.x + LOBE.y * roughness;
+    return (sqrt(width * width + 10.0 * variance) - LOBE.x) / LOBE.y;
+}
+
 // Radiance that a lobe about the direction, of the given roughness, collects; `bounce` comes from below.
 vec3 environment(vec3 direction, float roughness, vec3 bounce)
 {
-    float width = 0.04 + 0.9 * roughness;
+    float width = LOBE.x + LOBE.y * roughness;
     vec3 radiance = mix(bounce, 0.75 * sky_at(direction, roughness), smoothstep(-width, width, direction.z));
     for (int i = 0; i < SOFT_BOXES; ++i)
         radiance += soft_box_radiance[i].rgb * soft_box(direction, soft_box_normal[i], soft_box_tangent[i], width);

@@ -53,6 +53,10 @@ class ObjectTable:
         """Set which occluders darken an object, as bits; see `Occluders.near`."""
         self._rows[number]["height_map"][2] = near
 
+    def set_chart(self, number: int, side: int) -> None:
+        """Set the side of a chart with its halo in an object's height map [texels]."""
+        self._rows[number]["height_map"][3] = side
+
     def set_height_map(self, number: int, bias: float, rotation: NDArray[np.float64]) -> None:
         """Set an object's shadow bias [m], and the rotation of its height map into the world, shape [3, 3]."""
         self.set_shadow_bias(number, bias)

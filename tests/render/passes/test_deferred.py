@@ -4,9 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.render import Camera, Renderer
+from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.frame_format import FrameFormat
-from ripple_sim.solver import RippleError
+from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.solver import HeightMap, RippleError, sphere_atlas
 
 XML = '<mujoco><worldbody><geom type="sphere" size="1" rgba=".8 .2 .2 1"/></worldbody></mujoco>'
 CAMERA = Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0, 45.0)
@@ -66,3 +67,24 @@ def test_a_sharp_edge_of_polished_metal_is_no_brighter_than_its_sides(gl):
     assert above > below + 40
     assert beside.min() >= below - 4
     assert beside.max() <= above + 4
+
+
+@pytest.mark.parametrize(("look", "bound"), [("metal", 10.0), ("water", 4.0), ("rubber", 1.5)])
+def test_ripples_finer_than_a_pixel_look_as_in_a_large_frame_that_is_shrunk(gl, look, bound):
+    """Root mean square of the luminance's error, of 255, on the inner part of the ball."""
+    atlas = sphere_atlas(0.5, 64)
+    away = np.arccos(np.clip(atlas.positions @ [0.9, -0.9, 1.5], -1.0, 1.0)) / 2
+    height_map = HeightMap(atlas.texels)((0.0016 * np.cos(2 * np.pi * away / 0.04)).astype(np.float32))
+    surface = Surface(atlas.mesh.V, atlas.mesh.F, Charts.of(atlas), look)
+    model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom size=".5"/></worldbody></mujoco>')
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+
+    def luminance(size):
+        with Renderer(gl, model, {0: surface}, size=(size, size), samples=0) as renderer:
+            shown = renderer.render(data, {0: height_map}, Camera((0.0, 0.0, 0.0), 4.0, 90.0, -20.0, 15.0))
+        return (shown @ [0.2126, 0.7152, 0.0722]).reshape(24, size // 24, 24, size // 24).mean(axis=(1, 3))
+
+    x, y = np.meshgrid(*2 * [np.arange(24) - 11.5])
+    error = (luminance(24) - luminance(96))[np.hypot(x, y) < 7]
+    assert np.sqrt((error**2).mean()) < bound
