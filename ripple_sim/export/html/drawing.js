@@ -103,10 +103,13 @@ class Drawing {
       gl.enableVertexAttribArray(i);
       gl.vertexAttribPointer(i, size, gl.FLOAT, false, 0, 0);
     });
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    const [all, facing] = [gl.createBuffer(), gl.createBuffer()];
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, facing);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, part.target ? 4 * index.length : 0, gl.DYNAMIC_DRAW);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, all);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, index, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
-    return {...part, array, buffers, data, source, index, local: placed(part.position, part.quaternion)};
+    return {...part, array, buffers, data, source, index, all, facing, local: placed(part.position, part.quaternion)};
   }
 
   // Displaces a target from its rest by heights in steps [m]; normals are those of the triangles round a point, creases stay.
@@ -129,6 +132,24 @@ class Drawing {
     for (const i of [0, 1, 3]) { gl.bindBuffer(gl.ARRAY_BUFFER, part.buffers[i]); gl.bufferSubData(gl.ARRAY_BUFFER, 0, data[i]); }
   }
 
+  // Puts the triangles of a closed target that face the eye into a buffer, and returns how many indices they have: software
+  // would light the points of the others, too.
+  face(part, model, eye) {
+    const gl = this.gl, {index, data: [points]} = part, facing = new Uint32Array(index.length), off = add(eye, model.slice(12, 15), -1);
+    const [x, y, z] = [0, 4, 8].map(column => dot(model.slice(column, column + 3), off));
+    let count = 0;
+    for (let t = 0; t < index.length; t += 3) {
+      const a = 3 * index[t], b = 3 * index[t + 1], c = 3 * index[t + 2], px = points[a], py = points[a + 1], pz = points[a + 2];
+      const ux = points[b] - px, uy = points[b + 1] - py, uz = points[b + 2] - pz, vx = points[c] - px, vy = points[c + 1] - py, vz = points[c + 2] - pz;
+      if ((uy * vz - uz * vy) * (x - px) + (uz * vx - ux * vz) * (y - py) + (ux * vy - uy * vx) * (z - pz) > 0)
+        for (let k = 0; k < 3; k++) facing[count++] = index[t + k];
+    }
+    gl.bindVertexArray(part.array);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, part.facing);
+    gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, facing.subarray(0, count));
+    return count;
+  }
+
   draw(view, bodies, arrows, heat) {
     const gl = this.gl, {width, height} = this.canvas;
     const models = this.parts.map(part => times(bodies[part.body], part.local));
@@ -149,10 +170,11 @@ class Drawing {
     let solid = true;
     for (const [part, model, opacity] of order) {
       if (solid && opacity < 1) { solid = false; this.screen(view, bodies); this.blend(); }
-      const textured = part.texture in this.images, program = part.target && !textured ? this.fine : this.surface;
+      const textured = part.texture in this.images, fine = part.target && !textured, program = fine ? this.fine : this.surface;
+      const count = fine && this.software && !part.open ? this.face(part, model, view.eye) : 0;
       this.bind(1, this.images[part.texture] || this.blank);
       gl.useProgram(program.program);
-      this.mesh(program, part, {...lookOf(part), model, heat: heat && part.target ? 1 : 0, textured: Number(textured), open: Number(part.open)});
+      this.mesh(program, part, {...lookOf(part), model, heat: heat && part.target ? 1 : 0, textured: Number(textured), open: Number(part.open)}, count);
     }
     if (solid) this.screen(view, bodies);
     gl.useProgram(this.surface.program);
@@ -178,12 +200,14 @@ class Drawing {
     program.set(uniforms);
   }
 
-  mesh(program, part, uniforms) {
+  // Draws a part, or those of its triangles that face the eye: so many indices.
+  mesh(program, part, uniforms, facing = 0) {
     const gl = this.gl;
     part.open ? gl.disable(gl.CULL_FACE) : gl.enable(gl.CULL_FACE);
     program.set(uniforms);
     gl.bindVertexArray(part.array);
-    gl.drawElements(gl.TRIANGLES, part.index.length, gl.UNSIGNED_INT, 0);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, facing ? part.facing : part.all);
+    gl.drawElements(gl.TRIANGLES, facing || part.index.length, gl.UNSIGNED_INT, 0);
   }
 
   // The floor, which fades into the sky, and the sky.
