@@ -6,6 +6,7 @@
 layout(binding = TRANSMISSION_UNIT) uniform sampler2D transmission_maps;
 
 const int SPIRAL_TAPS = 8;
+const float LEAST = 1e-3;   // mean share taken that counts
 const float CLOSEST = 3.0;  // distance at which things begin to shade one another, in texels [m]
 
 // Mean of what is taken about a point of a light's map, as far as a radius, both in the map.
@@ -31,15 +32,17 @@ vec3 transmitted(int light, vec3 position, vec3 normal)
     vec4 width = shadows[light].width;
     float texel = (width.x + width.y * to_light) / float(textureSize(transmission_maps, 0).y);
     vec2 found = transparent_blocker(taken_about(light, p.xy, 0.5 * widest_penumbra(light, to_light)));
-    float penumbra = penumbra_of(light, min(found.y / max(found.x, 1e-4), to_light), to_light);
+    // a few texels of the rim say nothing of a distance, which would make penumbras wide beside the shadow
+    float blocker = found.x > LEAST ? min(found.y / found.x, to_light) : to_light;
+    float penumbra = penumbra_of(light, blocker, to_light);
     vec3 passes = vec3(0.0);
     vec2 direction = vec2(1.0, 0.0);
     for (int i = 0; i < SPIRAL_TAPS; ++i) {
         vec2 offset = penumbra * sqrt((float(i) + 0.5) / float(SPIRAL_TAPS)) * direction;
         direction = TURN * direction;
         vec4 taken = taken_about(light, p.xy + offset, 0.35 * penumbra);
-        vec2 blocker = transparent_blocker(taken);
-        float before = to_light - blocker.y / max(blocker.x, 1e-4);
+        vec2 there = transparent_blocker(taken);
+        float before = to_light - there.y / max(there.x, 1e-4);
         passes += 1.0 - taken.rgb * smoothstep(1.0, CLOSEST, before / (slope * texel));
     }
     bool inside = counts.w > float(light) && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from drawn import FLOOR, SIZE, SUN, ball_surface, frame_of
+from scipy.ndimage import distance_transform_edt
 
 from ripple_sim.render.color import srgb_to_linear
 
@@ -49,3 +50,13 @@ def test_water_is_a_lens(gl):
     assert (rim - dark).max() < 0.3 * (open_floor - dark).max()
     assert (middle[..., 1] - dark[..., 1]).min() > 0.5 * (open_floor - dark).max()
     assert middle[..., 0].mean() < 0.7 * middle[..., 2].mean()
+
+
+def test_no_light_is_taken_beside_a_penumbra(gl):
+    """Where a box's shadow shows, what is plainly shaded is a few pixels away."""
+    box = '<geom type="box" size=".5 .5 .5" pos="-.5 .2 .5" euler="0 0 40" rgba=".9 .1 .2 .4"/>'
+    shaded, plain = (
+        frame_of(gl, DARK_FLOOR + box + SUN.format(1.0, flag), size=(320, 240)) for flag in ("true", "false")
+    )
+    taken = (plain - shaded).max(axis=2)
+    assert distance_transform_edt(taken < 5)[taken >= 2].max() < 6
