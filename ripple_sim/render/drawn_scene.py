@@ -104,7 +104,7 @@ class DrawnScene:
         for target in self._targets:
             if not target.transparent:
                 target.draw_depth(view_projection)
-        self._geoms.draw_depth(view_projection, sites=True)
+        self._geoms.draw_depth(view_projection)
 
     def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
         """Draw everything transparent into the transmission map of a light, likewise."""
@@ -114,10 +114,10 @@ class DrawnScene:
         self._geoms.draw_transmission(view_projection, light)
 
     def draw_occluders(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the depth of everything that occludes the sky, likewise."""
+        """Draw everything that occludes the sky in its linear colour, likewise."""
         for target in self._targets:
-            target.draw_depth(view_projection)
-        self._geoms.draw_depth(view_projection, sites=False)
+            target.draw_albedo(view_projection)
+        self._geoms.draw_albedo(view_projection)
 
     def layers(self, data: Any, pose: Pose) -> list[Layer]:
         """Everything transparent, the furthest first."""

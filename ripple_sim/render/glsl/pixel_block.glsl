@@ -6,6 +6,13 @@ float block_mean(float value, bvec2 sides)
     return value + (sides.y ? 0.5 * side.y * dFdy(value) : 0.0);
 }
 
+vec3 block_mean(vec3 value)
+{
+    vec2 side = 0.5 - vec2(ivec2(gl_FragCoord.xy) & 1);
+    value += side.x * dFdx(value);
+    return value + side.y * dFdy(value);
+}
+
 float block_mean(float value)
 {
     return block_mean(value, bvec2(true));

@@ -31,7 +31,9 @@ class Unit(IntEnum):
     MIRROR = 14
     COARSE_BACKGROUND = 15
     BLOCKERS = 16  # what the shadow maps hold, prefiltered
-    TRANSMISSION = 17  # what transparent objects take from the lights
+    CEILING_COLORS = 17  # and of which colour those are
+    FLOOR_BOUNCE = 18  # light that objects throw on the floor
+    TRANSMISSION = 19  # what transparent objects take from the lights
 
 
 class Binding(IntEnum):

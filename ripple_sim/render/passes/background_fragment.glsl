@@ -74,8 +74,10 @@ void main()
     // in higher levels, texels at the map's edge, which stand for all beyond it, are as dark as what is far inside
     float level = min(textureQueryLod(floor_visibility, place).y + 1.0, HIGHEST_LEVEL);
     vec2 near = textureLod(floor_visibility, place, level).rg;
+    vec3 bounce = textureLod(floor_bounce, place, level).rgb;
 #else
     vec2 near = textureLod(floor_visibility, place, 1.0).rg;
+    vec3 bounce = textureLod(floor_bounce, place, 1.0).rgb;
 #endif
 #if SHADOW
     // Shadows are averaged where all four pixels of a block belong to this pass; derivatives across others are undefined.
@@ -84,7 +86,7 @@ void main()
     float share = 1.0 - float(solid) / float(SAMPLES);
     vec3 shadow[SHADOWS];
     for (int i = 0; i < SHADOWS; ++i)
-        shadow[i] = light_arriving(i, world, floor_normal.xyz, 0.0, 0.0, bvec2(whole));
+        shadow[i] = light_arriving(i, world, floor_normal.xyz, -1.0, 0.0, bvec2(whole));
 #else
     const float share = 1.0;
     bool shaded = met && may_be_shaded(place, near);
@@ -119,10 +121,10 @@ void main()
     key = shadow[0];
 #endif
     unshaded += around + key_box;
-    light += (around + key * key_box) * (0.15 + 0.85 * near.r);
+    light += (around + key * key_box) * (0.15 + 0.85 * near.r) + bounce;
 #if CUT_OUT
     // only the shadows are left of the floor
-    fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g, 1e-6)));
+    fragment = vec4(vec3(0.0), share * (1.0 - fade) * max(1.0 - light.g / max(unshaded.g, 1e-6), 0.0));
 #else
     vec3 direction = normalize(way);
     vec3 far = sky_at(met && edge == 0.0 ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);

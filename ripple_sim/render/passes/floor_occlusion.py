@@ -19,7 +19,7 @@ _INFLUENCE = 0.8  # radius, in half widths of the map
 
 
 class FloorOcclusion:
-    """The floor map: its ambient visibility (1 - occlusion), and where shadows may fall.
+    """The floor map: its ambient visibility (1 - occlusion), where shadows may fall, and the light of what occludes it.
 
     Without a floor the map is a single texel that nothing shades.
 
@@ -35,6 +35,7 @@ class FloorOcclusion:
         self._floor = floor
         if floor is None:
             self._map = resources.texture((1, 1), 4, np.ones(4, dtype=np.float16).tobytes(), dtype="f2")
+            self._bounce = resources.texture((1, 1), 4, bytes(8), dtype="f2")
             return
         program = resources.program(
             "glsl/screen_vertex", "passes/floor_occlusion_fragment", **{**options, "NEAR_LIGHTS": 1}
@@ -42,14 +43,18 @@ class FloorOcclusion:
         self._pass = resources.vertex_array(program, [])
         self._ceiling = resources.depth_texture((_CEILING_SIZE, _CEILING_SIZE))
         self._ceiling.compare_func = ""
-        self._ceiling_framebuffer = resources.framebuffer(depth_attachment=self._ceiling)
-        self._map = resources.texture((_MAP_SIZE, _MAP_SIZE), 4, dtype="f2")
-        self._map.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-        for texture in (self._ceiling, self._map):
+        self._colors = resources.texture((_CEILING_SIZE, _CEILING_SIZE), 4)
+        self._ceiling_framebuffer = resources.framebuffer([self._colors], self._ceiling)
+        self._map, self._bounce = (resources.texture((_MAP_SIZE, _MAP_SIZE), 4, dtype="f2") for _ in range(2))
+        for texture in (self._map, self._bounce):
+            texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        for texture in (self._ceiling, self._colors, self._map, self._bounce):
             texture.repeat_x = texture.repeat_y = False
-        self._map_framebuffer = resources.framebuffer([self._map])
+        self._map_framebuffer = resources.framebuffer([self._map, self._bounce])
 
-    def draw(self, ctx: moderngl.Context, draw_depth: Callable[[tuple[float, ...]], None], shadows: ShadowMaps) -> None:
+    def draw(
+        self, ctx: moderngl.Context, draw_albedo: Callable[[tuple[float, ...]], None], shadows: ShadowMaps
+    ) -> None:
         """Draw what is above the floor from below, and fill the map from its height."""
         floor = self._floor
         if floor is None:
@@ -64,16 +69,19 @@ class FloorOcclusion:
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face = "cw"
         self._ceiling_framebuffer.clear(depth=1.0)
-        draw_depth(tuple(matrix.T.ravel()))
+        draw_albedo(tuple(matrix.T.ravel()))
         ctx.front_face = "ccw"
         self._map_framebuffer.use()
         ctx.disable(moderngl.DEPTH_TEST)
         shadows.bind()
         self._ceiling.use(Unit.CEILING)
+        self._colors.use(Unit.CEILING_COLORS)
         self._pass.program["extent"] = (2 * floor.half_width, top, _INFLUENCE * floor.half_width)
         self._pass.render(moderngl.TRIANGLES, vertices=3)
         self._map.build_mipmaps()
+        self._bounce.build_mipmaps()
 
     def bind(self) -> None:
         """Bind the map for the shaders."""
         self._map.use(Unit.FLOOR_MAP)
+        self._bounce.use(Unit.FLOOR_BOUNCE)

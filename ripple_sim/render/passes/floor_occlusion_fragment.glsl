@@ -7,13 +7,18 @@
 
 layout(binding = CEILING_UNIT) uniform sampler2D ceiling;  // 0 at the floor, 1 at the top
 
+layout(binding = CEILING_COLORS_UNIT) uniform sampler2D ceiling_colors;  // linear
+
 uniform vec3 extent;  // width of the map [m], height of its top [m], radius of influence [m]
 
 in vec2 screen;
-out vec4 fragment;  // r: ambient visibility; g: 1 where a shadow may fall; b: share of the lights that arrives
+layout(location = 0) out vec4 fragment;  // see floor_map.glsl
+layout(location = 1) out vec4 bounced;
 
 const int TAPS = 14;
 const int SHADOW_TAPS = 16;
+const float SIDE = 0.2;   // of a light on what faces neither to it nor away from it
+const float UNDER = 0.35;   // of the floor's light on what hangs above it
 
 // Whether anything shades any of a texel of the floor, which is `texel` wide [m].
 bool is_shaded(int light, vec3 world, float texel)
@@ -48,6 +53,8 @@ void main()
     vec2 uv = 0.5 * screen + 0.5;
     float texel = extent.x / float(textureSize(ceiling, 0).x);
     float covered = 0.0;
+    // of what covers: its colours, and their moments along the axes of the floor
+    vec3 colors = vec3(0.0), across = vec3(0.0), along = vec3(0.0);
     float first = first_point();
     vec2 direction = spiral_direction(first);
     for (int i = 0; i < TAPS; ++i) {
@@ -57,24 +64,38 @@ void main()
         direction = FOURTH_TURN * direction;
         float height = textureLod(ceiling, uv + distance * direction / extent.x, 0.0).r;
         float h = max(height * extent.y, 0.6 * texel), r2 = h * h + distance * distance;
-        covered += height < 1.0 ? h * h * area / (3.14159265 * r2 * r2) : 0.0;
+        float share = height < 1.0 ? h * h * area / (3.14159265 * r2 * r2) : 0.0;
+        covered += share;
+        vec3 color = share * textureLod(ceiling_colors, uv + distance * direction / extent.x, 0.0).rgb;
+        colors += color;
+        across += color * direction.x;
+        along += color * direction.y;
     }
     // nothing is known beyond the map
     vec2 off = abs(screen);
-    covered = block_mean(covered) * (1.0 - smoothstep(0.7, 1.0, max(off.x, off.y)));
+    float known = 1.0 - smoothstep(0.7, 1.0, max(off.x, off.y));
+    covered = block_mean(covered) * known;
+    colors = block_mean(colors);
+    across = block_mean(across);
+    along = block_mean(along);
     vec2 local = floor_map.xy + screen * floor_map.z;
     vec3 world = floor_origin.xyz + local.x * floor_u.xyz + local.y * floor_v.xyz;
     float size = floor_map.z * dFdx(screen.x);
     bool shaded = false;
-    vec3 arrives = vec3(0.0), unshaded = vec3(1e-6);
+    vec3 arrives = vec3(0.0), unshaded = vec3(1e-6), bounce = vec3(0.0);
     for (int i = 0; i < int(counts.y); ++i) {
         vec3 towards;
-        vec3 light = incident(lights[i], world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
+        vec3 radiance = incident(lights[i], world, towards), light = radiance * max(dot(floor_normal.xyz, towards), 0.0);
+        // the sides that a point of the floor sees look towards it
+        vec2 sidewards = vec2(dot(floor_u.xyz, towards), dot(floor_v.xyz, towards));
+        bounce += radiance * max(SIDE * colors - across * sidewards.x - along * sidewards.y, 0.0);
         bool casts = i < SHADOWS;
         shaded = shaded || casts && is_shaded(i, world, size);
-        arrives += light * (casts ? light_arriving(i, world, floor_normal.xyz, 0.0, 0.0, bvec2(true)) : vec3(1.0));
+        arrives += light * (casts ? light_arriving(i, world, floor_normal.xyz, -1.0, 0.0, bvec2(true)) : vec3(1.0));
         unshaded += light;
     }
     float share = dot(arrives, vec3(1.0)) / dot(unshaded, vec3(1.0));
+    bounce += UNDER * colors * floor_albedo.rgb * (share * floor_light.rgb + sky.rgb);
+    bounced = vec4(known * bounce, 1.0);
     fragment = vec4(1.0 - min(covered, 1.0), shaded ? 1.0 : 0.0, share, 1.0);
 }

@@ -67,7 +67,10 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     float height = max(dot(position - floor_origin.xyz, floor_normal.xyz), 0.0);
     // a wall sees the floor before it, about as far away as it is high
     vec3 bounce = floor_radiance(position + 1.2 * height * normal, height);
-    vec3 mirrored = floor_radiance(position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2), 0.3 * height);
+    float rough = roughened(m.roughness, spread);
+    // what is reflected of the floor: where the coat is a mirror, the base is not, and sees much of it
+    vec3 met = position + reflected * height / max(-dot(reflected, floor_normal.xyz), 0.2);
+    vec3 mirrored = floor_radiance(met, 0.3 * height), blurred_floor = floor_radiance(met, (0.3 + 2.0 * rough) * height);
     vec3 f0 = mix(vec3(0.04), m.albedo, m.metallic);
 
     // in translucent objects light of their own colour wraps round the edges
@@ -112,7 +115,7 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
 
     float hidden = clamp(open * open + 0.15, 0.0, 1.0);
     vec3 at_edge = f0 + (max(vec3(1.0 - m.roughness), f0) - f0) * fifth_power(1.0 - n_v);
-    vec3 gloss = environment(reflected, roughened(m.roughness, spread), mirrored) * at_edge * hidden + highlight;
+    vec3 gloss = environment(reflected, rough, blurred_floor) * at_edge * hidden + highlight;
     float coat = m.coat * fresnel(vec3(0.04), n_v).x;
     vec3 film = environment(reflected, roughened(0.06, spread), mirrored) * hidden;
     return (base + gloss) * (1.0 - coat) + coat * film + m.coat * coated;

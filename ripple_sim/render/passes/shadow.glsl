@@ -38,7 +38,7 @@ float widest_penumbra(int light, float to_light)
 
 // Share of a light that arrives, as the mean over the part of the pixel's block of 2 x 2 that lies to the given sides.
 // The normal is that of the surface without ripples; `bias` [m] raises the position above bumps, which shall not shade
-// each other; `scatter` [m] is how far light gets under the surface.
+// each other, and is negative for what casts no shadow itself; `scatter` [m] is how far light gets under the surface.
 float light_visibility(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)
 {
     vec4 place = lights[light].position, of_depth = shadows[light].depth, of_width = shadows[light].width;
@@ -47,7 +47,8 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     float facing = dot(normal, towards);
     float away = far_away ? 0.0 : distance(place.xyz, position);
     float texel = (of_width.x + of_width.y * away) / of_width.z;
-    vec3 raised = position + (bias + (1.5 + 2.5 * (1.0 - facing)) * texel) * normal;
+    float raise = bias < 0.0 ? 0.0 : bias + (1.5 + 2.5 * (1.0 - facing)) * texel;
+    vec3 raised = position + raise * normal;
     vec4 clip = shadows[light].matrix * vec4(raised, 1.0);
     vec3 p = clip.xyz / clip.w;
     float to_light = light_distance(light, p.z), width = of_width.x + of_width.y * to_light;
@@ -97,5 +98,8 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
         direction = FOURTH_TURN * direction;
         lit += textureLod(shadow_test, vec3(in_maps(light, p.xy + offset), p.z + dot(slope, offset) - depth_bias), 0.0);
     }
-    return block_mean(taps > 0 ? lit / float(FILTER_TAPS) : 1.0, block);
+    lit = block_mean(taps > 0 ? lit / float(FILTER_TAPS) : 1.0, block);
+    // beyond the terminator a surface shades itself, whatever the map says of it
+    float own = smoothstep(-0.2, 0.15, facing), apart = bias < 0.0 ? 1.0 : smoothstep(0.0, 0.2, facing);
+    return mix(own, lit, apart);
 }

@@ -74,6 +74,9 @@ class SurfaceDrawing:
         # what a program does not use is optimised away
         self._solid = resources.vertex_array(self._program, content, indices, skip_errors=True)
         self._depth = resources.vertex_array(depth, content[:1], indices)
+        albedo = resources.program("surfaces/surface_depth_vertex", "glsl/albedo_fragment")
+        albedo["color"] = paint.color[:3]
+        self._albedo = resources.vertex_array(albedo, content[:1], indices)
         transmission = resources.program(
             "surfaces/surface_depth_vertex", "passes/transmission_fragment", SOLID=int(not surface.open), REFRACTING=1
         )
@@ -124,6 +127,11 @@ class SurfaceDrawing:
         """Draw the depth of the first `count` indices, under a matrix of 16 numbers, column by column."""
         self._depth.program["matrix"] = view_projection
         _render(self._depth, count)
+
+    def draw_albedo(self, view_projection: tuple[float, ...], count: int | moderngl.Buffer) -> None:
+        """Draw them in their linear colour, likewise."""
+        self._albedo.program["matrix"] = view_projection
+        _render(self._albedo, count)
 
     def draw_transmission(self, view_projection: tuple[float, ...], light: int, count: int | moderngl.Buffer) -> None:
         """Draw them into the transmission map of a light, likewise."""

@@ -27,7 +27,7 @@ from .vertices import BAKED, DIRECTION, NORMAL, POSITION
 
 _PIXELS_PER_FACE = 192  # of the frame: fewer than about eight pixels each cost more than they show
 _BALLS = 16  # that bound a mesh that moves
-_HIGHEST_BIAS = 0.05  # of shadows, in radii
+_HIGHEST_BIAS = 0.015  # of shadows, in radii
 
 
 class SurfaceMesh:
@@ -178,6 +178,11 @@ class SurfaceMesh:
         """Draw the depth only, under a matrix of 16 numbers, column by column."""
         with self._sides():
             self._drawing.draw_depth(view_projection, self._triangles.count)
+
+    def draw_albedo(self, view_projection: tuple[float, ...]) -> None:
+        """Draw in the linear colour, likewise."""
+        with self._sides():
+            self._drawing.draw_albedo(view_projection, self._triangles.count)
 
     def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
         """Draw into the transmission map of a light, likewise."""

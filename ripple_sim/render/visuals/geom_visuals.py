@@ -51,9 +51,9 @@ class GeomVisuals:
         self._assets, self._model = assets, assets.model
         self._shapes: dict[str, ShapeLevels] = {}
         self._programs: dict[tuple[int, bool], moderngl.Program] = {}
-        self._depth, self._transmission = (
+        self._depth, self._albedo, self._transmission = (
             assets.resources.program("visuals/geom_depth_vertex", fragment, REFRACTING=0)
-            for fragment in ("glsl/depth_fragment", "passes/transmission_fragment")
+            for fragment in ("glsl/depth_fragment", "glsl/albedo_fragment", "passes/transmission_fragment")
         )
         model = assets.model
         visuals = [geom_visual(model, geom) for geom in geoms] + [site_visual(model, i) for i in visible_sites(model)]
@@ -100,11 +100,16 @@ class GeomVisuals:
         for instances in self._opaque:
             instances.draw()
 
-    def draw_depth(self, view_projection: tuple[float, ...], *, sites: bool) -> None:
-        """Draw the opaque visuals' depth only, under a matrix of 16 numbers, column by column; sites on request."""
+    def draw_depth(self, view_projection: tuple[float, ...]) -> None:
+        """Draw the opaque visuals' depth only, under a matrix of 16 numbers, column by column."""
         for instances in self._opaque:
-            if sites or not instances.sites:
-                instances.draw_depth(view_projection)
+            instances.draw_depth(view_projection)
+
+    def draw_albedo(self, view_projection: tuple[float, ...]) -> None:
+        """Draw the opaque geoms in their linear colours, likewise."""
+        for instances in self._opaque:
+            if not instances.sites:
+                instances.draw_albedo(view_projection)
 
     def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
         """Draw the transparent visuals into the transmission map of a light, likewise."""
@@ -130,7 +135,7 @@ class GeomVisuals:
         return Instances(
             assets.resources,
             self._shapes[name],
-            (self._program(mapping.kind, mapping.own), depth),
+            (self._program(mapping.kind, mapping.own), depth, self._albedo),
             [visual for visual, _ in members],
             records,
             None if mapping.texture < 0 else (mapping.unit, assets.textures.get(mapping.texture)),

@@ -63,7 +63,7 @@ class Instances:
     resources : Resources
     shape : ShapeLevels
     programs : tuple
-        For the G-buffer and for depth only.
+        For the G-buffer, for depth only, and for the colour alone.
     visuals : list of Visual
         Either geoms or sites.
     records : array of INSTANCE
@@ -86,7 +86,7 @@ class Instances:
         self,
         resources: Resources,
         shape: ShapeLevels,
-        programs: tuple[moderngl.Program, moderngl.Program],
+        programs: tuple[moderngl.Program, moderngl.Program, moderngl.Program],
         visuals: list[Visual],
         records: NDArray,
         image: tuple[Unit, moderngl.Texture | moderngl.TextureCube] | None,
@@ -98,7 +98,7 @@ class Instances:
         self.numbers = [int(number) for number in records["color"][:, 3]]
         self._records, self._image = records, image
         self._buffer = resources.buffer(reserve=records.nbytes, dynamic=True)
-        self._arrays: dict[int, tuple[moderngl.VertexArray, moderngl.VertexArray]] = {}
+        self._arrays: dict[int, list[moderngl.VertexArray]] = {}
         self._segments = _LEVELS[-1]
         self.shadow_biases = np.zeros(len(visuals))
         self.balls = Balls(np.zeros((len(visuals), 3)), np.zeros(len(visuals)))
@@ -132,7 +132,12 @@ class Instances:
         self._programs[1]["matrix"] = view_projection
         self._array()[1].render(instances=len(self._records))
 
-    def _array(self) -> tuple[moderngl.VertexArray, moderngl.VertexArray]:
+    def draw_albedo(self, view_projection: tuple[float, ...]) -> None:
+        """Draw in the linear colour, likewise."""
+        self._programs[2]["matrix"] = view_projection
+        self._array()[2].render(instances=len(self._records))
+
+    def _array(self) -> list[moderngl.VertexArray]:
         if self._segments not in self._arrays:
             vertices, indices = self._shape.level(self._segments)
             content = [
@@ -140,8 +145,7 @@ class Instances:
                 (self._buffer, "9f 3f 3f 3f 4f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
             ]
             # what a program does not use is optimised away
-            first, second = (
+            self._arrays[self._segments] = [
                 self._resources.vertex_array(program, content, indices, skip_errors=True) for program in self._programs
-            )
-            self._arrays[self._segments] = first, second
+            ]
         return self._arrays[self._segments]

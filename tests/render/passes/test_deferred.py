@@ -1,10 +1,12 @@
-"""Deferred shading: which sizes a driver can draw, and that a frame is what its format says."""
+"""Deferred shading: which sizes a driver can draw, that a frame is what its format says, and what surfaces reflect."""
 
 import mujoco
 import numpy as np
 import pytest
+from drawn import FLOOR, FRONT, SUN, frame_of
 
 from ripple_sim.render import Camera, Renderer, Surface
+from ripple_sim.render.color import srgb_to_linear
 from ripple_sim.render.frame_format import FrameFormat
 from ripple_sim.render.surfaces.charts import Charts
 from ripple_sim.solver import HeightMap, RippleError, sphere_atlas
@@ -88,3 +90,19 @@ def test_ripples_finer_than_a_pixel_look_as_in_a_large_frame_that_is_shrunk(gl, 
     x, y = np.meshgrid(*2 * [np.arange(24) - 11.5])
     error = (luminance(24) - luminance(96))[np.hypot(x, y) < 7]
     assert np.sqrt((error**2).mean()) < bound
+
+
+def test_a_rough_surface_blurs_the_shadows_that_it_reflects(gl):
+    """A wall of metal over a floor with the shadow of a small plate: rough metal shows less of it than smooth metal."""
+    body = '<geom type="box" size="1 .1 .6" pos="0 .5 .6" material="m"/>'
+    body += '<geom type="box" size=".15 .15 .01" pos="-.6 -.1 .75"/>' + FLOOR
+    deepest = []
+    for roughness in (0.1, 0.6):
+        asset = f'<material name="m" rgba=".8 .8 .8 1" metallic="1" roughness="{roughness}"/>'
+        with_shadow, without = (
+            srgb_to_linear(frame_of(gl, body + SUN.format(1.0, flag), asset=asset, camera=FRONT, size=(320, 240)) / 255)
+            for flag in ("true", "false")
+        )
+        on_wall = np.s_[136:147, 140:200, 1]
+        deepest.append((1.0 - with_shadow / without)[on_wall].max())
+    assert deepest[1] < 0.355 * deepest[0]

@@ -133,3 +133,16 @@ def test_shadows_on_translucent_things_are_softer(gl):
         lit = (frames[0] / frames[1])[118:122, 140:180].mean(axis=0)
         steepest[look] = np.abs(np.diff(lit, axis=0)).max(axis=0) / np.ptp(lit, axis=0)  # whatever else lights it
     assert steepest["skin"][0] < 0.85 * steepest["clay"][0]
+
+
+def test_a_shadow_on_the_floor_has_the_size_that_geometry_gives_it(gl):
+    """Under 45 degrees, in a wide scene of coarse maps: half of the light arrives below the edge of a plate."""
+    plate = '<geom type="box" size=".5 .5 .01" pos="-1.4 0 1.4"/>'
+    far = "".join(f'<geom type="sphere" size=".1" pos="0 {y} .1"/>' for y in (-9, 9))
+    size = (320, 240)
+    frame = frame_of(gl, FLOOR + plate + far + SUN.format(1.0, "true"), size=size)
+    metre = size[1] / (2 * 4.0 * np.tan(np.radians(20)))
+    along = srgb_to_linear(frame[size[1] // 2, :, 1] / 255)[size[0] // 2 :]  # to the right of the shadow's middle
+    share = (along - along[0]) / (along[-20:].mean() - along[0])
+    edge = np.interp(0.5, share[:100], np.arange(100) + 0.5) / metre
+    assert edge == pytest.approx(0.5 + 0.01, abs=0.015)
