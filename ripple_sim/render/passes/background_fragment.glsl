@@ -28,6 +28,7 @@ uniform float reflectance;
 
 const float STEEPEST = 0.03;  // change from one block to the next up to which the background is smooth
 const float HIGHEST_LEVEL = 4.0;  // of the floor map
+const float BOUNCE_LEVEL = 2.3;   // where few points of the map's search are seen no longer
 
 // A skybox continues below the horizon, which the floor hides.
 #if SKYBOX
@@ -74,11 +75,10 @@ void main()
     // in higher levels, texels at the map's edge, which stand for all beyond it, are as dark as what is far inside
     float level = min(textureQueryLod(floor_visibility, place).y + 1.0, HIGHEST_LEVEL);
     vec2 near = textureLod(floor_visibility, place, level).rg;
-    vec3 bounce = textureLod(floor_bounce, place, level).rgb;
 #else
     vec2 near = textureLod(floor_visibility, place, 1.0).rg;
-    vec3 bounce = textureLod(floor_bounce, place, 1.0).rgb;
 #endif
+    vec3 bounce = textureLod(floor_bounce, place, BOUNCE_LEVEL).rgb;
 #if SHADOW
     // Shadows are averaged where all four pixels of a block belong to this pass; derivatives across others are undefined.
     int solid = bitCount(covered(pixel, floor_depth()));

@@ -17,8 +17,8 @@ layout(location = 1) out vec4 bounced;
 
 const int TAPS = 14;
 const int SHADOW_TAPS = 16;
-const float SIDE = 0.2;   // of a light on what faces neither to it nor away from it
-const float UNDER = 0.35;   // of the floor's light on what hangs above it
+const float SIDE = 0.25;   // of a light on what faces neither to it nor away from it
+const float UNDER = 0.5;   // of the floor's light on what hangs above it
 
 // Whether anything shades any of a texel of the floor, which is `texel` wide [m].
 bool is_shaded(int light, vec3 world, float texel)
