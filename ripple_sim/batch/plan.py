@@ -11,7 +11,7 @@ import msgspec
 import trimesh
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.load_scene import shipped_scenes
+from ripple_sim.scene.scene_path import shipped_scenes
 from ripple_sim.scene.toml_file import read_toml
 from ripple_sim.solver.checked import shown
 

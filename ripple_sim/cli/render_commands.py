@@ -99,7 +99,7 @@ class Render(_VideoCommand):
 
     def check_input(self) -> None:
         """Make sure that there is such a scene."""
-        from ripple_sim.scene.load_scene import scene_path
+        from ripple_sim.scene.scene_path import scene_path
 
         scene_path(self.scene)
 

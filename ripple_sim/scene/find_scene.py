@@ -7,8 +7,9 @@ from pathlib import Path
 from ripple_sim.errors import SceneError
 
 from .drop import drop_scene
-from .load_scene import load_scene, scene_path, shipped_scenes
+from .load_scene import load_scene
 from .scene import Scene
+from .scene_path import scene_path, shipped_scenes
 
 
 def find_scene(target: str | Path, *, seed: int | None = None) -> Scene:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.resources
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,7 +14,7 @@ import numpy as np
 from ripple_sim.coupling.model.geoms import find_target, target_name
 from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.checked import PATH, checked, shown
+from ripple_sim.solver.checked import PATH, checked
 
 from .check_scene import check_scene
 from .events import Events
@@ -24,17 +23,12 @@ from .motion import DropEntry, ThrowEntry
 from .randomize import RandomEntry, randomize
 from .scene import Scene
 from .scene_file import RippleEntry, SceneFile, parse_scene
+from .scene_path import scene_path
 from .toml_file import read_toml
 
 Moved = TypeVar("Moved", DropEntry, ThrowEntry)
 Edit = Callable[[mujoco.MjSpec], None]
 Change = Callable[[dict[str, Any]], None]
-
-
-def shipped_scenes() -> list[str]:
-    """Names of the scenes that come with ripple-sim."""
-    folder = importlib.resources.files("ripple_sim.scenes")
-    return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
 
 
 @checked(SceneError, name_or_path=PATH)
@@ -83,28 +77,6 @@ def load_scene(
     )
     check_scene(scene)
     return scene
-
-
-def scene_path(name_or_path: str | Path) -> Path:
-    """Path of a scene's TOML file, of a shipped scene's name or as it is given.
-
-    Raises
-    ------
-    SceneError
-        If there is no such scene or file.
-    """
-    name, shipped = str(name_or_path), shipped_scenes()
-    if name in shipped:
-        return Path(str(importlib.resources.files("ripple_sim.scenes") / f"{name}.toml"))
-    path = Path(name)
-    with contextlib.suppress(OSError):  # a name longer than the system's
-        if path.is_file():
-            return path
-        if path.exists() and not path.is_dir():
-            raise SceneError(f"scene {shown(name)} is not a regular file; give the path of a TOML file")
-    raise SceneError(
-        f"there is no scene {shown(name)}; shipped scenes are {', '.join(shipped)}, or give the path of a TOML file"
-    )
 
 
 def _seeded(path: Path, random: RandomEntry | None, seed: int) -> RandomEntry:

@@ -104,6 +104,13 @@ def test_a_file_that_is_no_toml_is_refused_by_its_name(tmp_path, broken: str) ->
         load_scene(path)
 
 
+@pytest.mark.parametrize(("name", "advice"), [("egg.OBJ", "`ripple-sim drop`"), ("scene.xml", "as its `model`")])
+def test_a_mesh_or_a_model_in_place_of_a_scene_is_told_as_such(tmp_path, name: str, advice: str) -> None:
+    (tmp_path / name).write_text("v 0 0 0")
+    with pytest.raises(SceneError, match=f"{name}.*, not a scene; .*{advice}"):
+        load_scene(tmp_path / name)
+
+
 def test_missing_scenes_and_models_are_told_apart_from_folders(tmp_path) -> None:
     with pytest.raises(SceneError, match=r"there is no scene .*; shipped scenes are .*duck.*path of a TOML file"):
         load_scene(tmp_path)

@@ -8,7 +8,8 @@ import pytest
 
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
-from ripple_sim.scene.load_scene import load_scene, shipped_scenes
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene_path import shipped_scenes
 from ripple_sim.scenes.shapes import peanut, write_obj
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError

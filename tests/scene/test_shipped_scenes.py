@@ -5,7 +5,8 @@ import warnings
 import numpy as np
 import pytest
 
-from ripple_sim.scene.load_scene import load_scene, shipped_scenes
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene_path import shipped_scenes
 from ripple_sim.scenes import shapes
 from ripple_sim.simulation import Simulation
 
