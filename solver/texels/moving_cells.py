@@ -79,7 +79,7 @@ class MovingCells:
             Coordinates of the texels with halo [m], see `SurfaceRide.around`.
         coefficient : CellCoefficient
         """
-        weights, areas = np.zeros(self._shape), np.zeros(self.topology.shape)
+        weights, areas = np.empty(self._shape), np.empty(self.topology.shape)
         quad_pass(around, coefficient.quads, weights, areas)
         links = self._add_special(around, coefficient, weights.reshape(-1), areas.reshape(-1))
         return Stencil(self.topology, weights, links), areas

@@ -23,8 +23,8 @@ _SLIGHTEST = np.float32(1e-12)  # in units of a quad at rest
 LEAST_RATIO = np.float32(1e-3)
 
 
-# Places that are worked on at once, in whole wide instructions; and about how many a band of rows has.
-_BLOCK, _BAND = 64, 1024
+# Places that are worked on at once, in whole rows: what is known of them stays in the fastest memory.
+_BAND = 1024
 
 
 class QuadCells(NamedTuple):
@@ -57,37 +57,25 @@ def quad_pass(around: Floats, cells: QuadCells, weights: Floats, areas: Floats) 
     """
     charts, width = cells.conductance.shape[:2]
     rows = max(_BAND // width, 1)
-    sides = np.zeros((7, max(rows * width, _BLOCK)), np.float32)
+    places, sides = around.reshape(3, -1), np.zeros((7, rows * width), np.float32)
     below = np.zeros((2, width - 1), np.float32)
+    coefficient = np.zeros(rows * width, np.float32)  # not one of the sides: loops over both would not be wide
     for first in range(0, charts * width, rows):
         begin, last = first * width, min(first + rows, charts * width)
-        _band(around.reshape(3, -1), cells, begin, min(last * width, charts * width**2 - width - 1), sides)
+        count = min(last * width, charts * width**2 - width - 1) - begin
+        _geometry(places, begin, count, cells, sides)
+        _scale(sides, cells, begin, count, coefficient)
         for row in range(first, last):
             chart, r = row // width, row % width
             if r == 0:
                 below[:] = 0
             if r < width - 1:
-                _add_row(sides, row * width - begin, below, weights[chart], areas[chart], r)
-    for chart in range(charts):
-        for r in range(width - 2):
-            for c in range(width - 2):
-                areas[chart, r, c] /= cells.scale**2
+                _add_row(sides, row * width - begin, below, weights[chart], areas[chart], r, cells.scale**2)
 
 
 @kernel
-def _band(places: Floats, cells: QuadCells, begin: int, end: int, sides: Floats32) -> None:
-    """What the quads of consecutive places give, from column 0 on: weights of the six links, a quarter of the area."""
-    block = np.zeros((7, _BLOCK), np.float32)
-    for start in range(begin, end, _BLOCK):
-        first = max(min(start, end - _BLOCK), begin)
-        count = min(_BLOCK, end - first)
-        _geometry(places, first, count, cells, block)
-        _scale(block, cells, first, sides, first - begin, count)
-
-
-@kernel
-def _geometry(places: Floats, first: int, count: int, cells: QuadCells, block: Floats32) -> None:
-    """Geometric weights of the six links of a block of quads, and their areas times scale squared."""
+def _geometry(places: Floats, first: int, count: int, cells: QuadCells, sides: Floats32) -> None:
+    """Geometric weights of the six links of the quads of consecutive places, and their areas times scale squared."""
     scale, above = cells.scale, first + cells.conductance.shape[1]
     x, y, z = places[0, first:], places[1, first:], places[2, first:]
     x_above, y_above, z_above = places[0, above:], places[1, above:], places[2, above:]
@@ -125,16 +113,16 @@ def _geometry(places: Floats, first: int, count: int, cells: QuadCells, block: F
         share = uneven / (uneven + _UNEVEN)
         a, b = min(max(share * a, -_ONE), _ONE), min(max(share * b, -_ONE), _ONE)
         hourglass, skew = _hourglass(pp, qq, pq, _HALF * half_area), pq / twice
-        block[0, c] = skew + hourglass * (_ONE + a) * (_ONE - b)
-        block[1, c] = skew + hourglass * (_ONE - a) * (_ONE + b)
-        block[2, c] = hourglass * (_ONE + a) * (_ONE + b) - skew
-        block[3, c] = hourglass * (_ONE - a) * (_ONE - b) - skew
-        block[4, c] = qq / twice - hourglass * (_ONE - a * a)
-        block[5, c] = pp / twice - hourglass * (_ONE - b * b)
+        sides[0, c] = skew + hourglass * (_ONE + a) * (_ONE - b)
+        sides[1, c] = skew + hourglass * (_ONE - a) * (_ONE + b)
+        sides[2, c] = hourglass * (_ONE + a) * (_ONE + b) - skew
+        sides[3, c] = hourglass * (_ONE - a) * (_ONE - b) - skew
+        sides[4, c] = qq / twice - hourglass * (_ONE - a * a)
+        sides[5, c] = pp / twice - hourglass * (_ONE - b * b)
         # the smaller triangulation; e, n and p are the other corners
         rising = _cross_length(ex, ey, ez, px, py, pz) + _cross_length(px, py, pz, nx, ny, nz)
         falling = _cross_length(ex, ey, ez, nx, ny, nz) + _cross_length(px - ex, py - ey, pz - ez, qx, qy, qz)
-        block[6, c] = min(rising, falling) / _TWO
+        sides[6, c] = min(rising, falling) / _TWO
 
 
 @kernel
@@ -155,23 +143,29 @@ def _hourglass(pp: np.float32, qq: np.float32, pq: np.float32, area: np.float32)
 
 
 @kernel
-def _scale(block: Floats32, cells: QuadCells, first: int, sides: Floats32, at: int, count: int) -> None:
-    """Multiply the weights of a block by what the coefficient has become, into columns; clear what is no quad."""
+def _scale(sides: Floats32, cells: QuadCells, first: int, count: int, coefficient: Floats32) -> None:
+    """Multiply the weights of a band by what the coefficient has become; leave a quarter of the areas.
+
+    Both are cleared where there is no quad.
+    """
     conductance, per_area = cells.conductance.reshape(-1)[first:], cells.per_area.reshape(-1)[first:]
-    coefficient, area, power = np.empty(_BLOCK, np.float32), sides[6, at : at + count], np.float32(cells.power)
+    area, power = sides[6], np.float32(cells.power)
     for c in range(count):
-        ratio = max(block[6, c] * per_area[c], LEAST_RATIO)
+        ratio = max(area[c] * per_area[c], LEAST_RATIO)
         coefficient[c] = conductance[c] / ratio if power == -_ONE else conductance[c] * ratio**power
-        area[c] = _QUARTER * block[6, c] if per_area[c] > 0 else _ZERO
+        area[c] = _QUARTER * area[c] if per_area[c] > 0 else _ZERO
     for k in range(6):
-        row = sides[k, at : at + count]
+        row = sides[k]
         for c in range(count):
-            row[c] = coefficient[c] * block[k, c] if conductance[c] > 0 else _ZERO
+            row[c] = coefficient[c] * row[c] if conductance[c] > 0 else _ZERO
 
 
 @kernel
-def _add_row(sides: Floats32, begin: int, below: Floats32, weights: Floats, areas: Floats, r: int) -> None:
-    """Give a chart's row of weights and areas to links and texels; `below` has north sides and areas of the last."""
+def _add_row(sides: Floats32, begin: int, below: Floats32, weights: Floats, areas: Floats, r: int, unit: float) -> None:
+    """Give a chart's row of weights and areas to links and texels; `below` has north sides and areas of the last.
+
+    Areas are in units of 1 / unit.
+    """
     size = below.shape[1]
     for c in range(size):
         i = begin + c
@@ -184,7 +178,7 @@ def _add_row(sides: Floats32, begin: int, below: Floats32, weights: Floats, area
     if r > 0:
         for c in range(1, size):
             i = begin + c
-            areas[r - 1, c - 1] = (below[1, c - 1] + below[1, c]) + (sides[6, i - 1] + sides[6, i])
+            areas[r - 1, c - 1] = ((below[1, c - 1] + below[1, c]) + (sides[6, i - 1] + sides[6, i])) / unit
     for c in range(size):
         i = begin + c
         below[0, c], below[1, c] = sides[1, i], sides[6, i]

@@ -76,10 +76,11 @@ class Motion:
             return None
         _square_lengths(self.V, self._edges, self._squares)
         self._now = self._operator.at(MovedPlaces(self._ride, self.V))
+        self.__dict__.pop("areas", None)
         self._warn_of_folds()
         return self._now
 
-    @property
+    @functools.cached_property
     def areas(self) -> NDArray[np.float64]:
         """Area of each texel [m^2], [C, n, n]."""
         return self._operator.areas(self._now.stencil)

@@ -41,7 +41,7 @@ class HighPass:
             return load
         forces = np.bincount(load.texels, load.forces, len(self._mass)).astype(np.float64)
         # sparse products, and einsum, stay off the threads of BLAS, which wait for one another on a busy machine
-        coarse = self._solve(_times(self._basis[load.texels].T, load.forces))
+        coarse = self._solve(_times(self._basis.T, forces))
         return Load(np.arange(len(forces)), forces - self._mass * _times(self._basis, coarse))
 
 
@@ -65,4 +65,5 @@ def coarse_motions(waves: WaveSolver, surface: SoftSurface) -> csr_array | NDArr
     x = 2 * (x - x.min(axis=0)) / np.ptp(x, axis=0) - 1
     powers = np.stack(np.meshgrid(*[np.arange(surface.degree + 1)] * 3), axis=-1).reshape(-1, 3)
     functions = np.prod(x[:, None] ** powers, axis=2)
-    return np.concatenate([functions * n[:, None] for n in atlas.normals.reshape(-1, 3).T], axis=1)
+    # motion by motion in memory: products with vectors are then sums along it
+    return np.concatenate([functions.T * n for n in atlas.normals.reshape(-1, 3).T]).T

@@ -89,18 +89,23 @@ def rest_filter(
     return MeanShares(room.texels[:end], room.shares[:end]), room.given[:end], over
 
 
-# Loops only: slices and expressions of arrays take many times longer to compile.
+# Loops only: slices and expressions of arrays take many times longer to compile. Arrays are taken out of their tuples
+# before a loop: in it that would cost more than all else.
 @kernel
 def _add_before(room: _Room, end: int, before: MeanShares, state: Any, part: float, scratch: Ints) -> int:
     """Add the mean shares of a geom so far, as a part of the new ones; where they end."""
-    total = 0.0
+    (texels, shares, given), (under, old), total = room, before, 0.0
     for i in range(state.first, state.last):
-        if before.shares[i] > _LEAST_SHARE:
-            total += before.shares[i]
+        if old[i] > _LEAST_SHARE:
+            total += old[i]
     fading = part / total
     for i in range(state.first, state.last):
-        if before.shares[i] > _LEAST_SHARE:
-            end = _add(room, end, before.texels[i], fading * before.shares[i], 0.0, scratch)
+        if old[i] > _LEAST_SHARE:
+            slot = _slot(scratch, under[i], end)
+            if slot == end:
+                texels[slot], shares[slot], given[slot] = under[i], 0.0, 0.0
+                end += 1
+            shares[slot] += fading * old[i]
     return end
 
 
@@ -109,22 +114,22 @@ def _add_present(
     room: _Room, begin: int, end: int, present: TexelForces, row: int, force: float, pace: float, scratch: Ints
 ) -> int:
     """Add the shares of this step, times the pace; where they end. All from `begin` on are the geom's."""
+    (texels, shares, given), under, forces = room, present.texels, present.forces
     for i in range(present.begins[row], present.begins[row + 1]):
-        share = present.forces[i] / force
-        end = _add(room, end, present.texels[i], pace * share, share, scratch)
+        share, slot = forces[i] / force, _slot(scratch, under[i], end)
+        if slot == end:
+            texels[slot], shares[slot], given[slot] = under[i], 0.0, 0.0
+            end += 1
+        shares[slot] += pace * share
+        given[slot] += share
     for i in range(begin, end):
-        scratch[room.texels[i]] = -1
+        scratch[texels[i]] = -1
     return end
 
 
 @kernel
-def _add(room: _Room, end: int, texel: int, mean: float, now: float, scratch: Ints) -> int:
-    """Add shares of a texel, which is told of once for each geom."""
-    slot = scratch[texel]
-    if slot < 0:
-        scratch[texel] = slot = end
-        room.texels[slot], room.shares[slot], room.given[slot] = texel, 0.0, 0.0
-        end += 1
-    room.shares[slot] += mean
-    room.given[slot] += now
-    return end
+def _slot(scratch: Ints, texel: int, end: int) -> int:
+    """Where the shares of a texel are, which is told of once for each geom: `end` if it is new."""
+    if scratch[texel] < 0:
+        scratch[texel] = end
+    return scratch[texel]
