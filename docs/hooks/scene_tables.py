@@ -149,6 +149,8 @@ def _kind(hint: Any) -> str:
         and issubclass(arguments[0], msgspec.Struct)
     ):
         return "tables"
+    if typing.get_origin(hint) is dict:
+        return "table"
     if typing.get_origin(hint) is typing.Literal:
         return ", ".join(f"`{each}`" for each in arguments)
     if arguments and typing.get_origin(hint) not in (tuple, list):

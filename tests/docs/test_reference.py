@@ -90,3 +90,9 @@ def test_the_page_on_scene_files_has_every_table_and_the_words_of_a_look() -> No
         if not name.startswith("ripple.material."):
             assert f"`[{name}]`" in text
     assert ", ".join(f"`{look}`" for look in LOOKS) in text
+
+
+def test_the_tables_of_a_plan_that_take_any_key_are_told_as_tables() -> None:
+    text = hook("scene_tables").plan_tables()
+    assert "| `vary` | table |" in text
+    assert "| `model` | table |" in text
