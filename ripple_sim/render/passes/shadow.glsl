@@ -47,7 +47,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     float facing = dot(normal, towards);
     float away = far_away ? 0.0 : distance(place.xyz, position);
     float texel = (of_width.x + of_width.y * away) / of_width.z;
-    float raise = bias < 0.0 ? 0.0 : bias + (1.5 + 2.5 * (1.0 - facing)) * texel;
+    float raise = bias < 0.0 ? 0.0 : bias + (1.0 + 1.5 * (1.0 - facing)) * texel;
     vec3 raised = position + raise * normal;
     vec4 clip = shadows[light].matrix * vec4(raised, 1.0);
     vec3 p = clip.xyz / clip.w;
@@ -100,6 +100,5 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     }
     lit = block_mean(taps > 0 ? lit / float(FILTER_TAPS) : 1.0, block);
     // beyond the terminator a surface shades itself, whatever the map says of it
-    float own = smoothstep(-0.2, 0.15, facing), apart = bias < 0.0 ? 1.0 : smoothstep(0.0, 0.2, facing);
-    return mix(own, lit, apart);
+    return bias < 0.0 ? lit : lit * smoothstep(-0.2, 0.15, facing);
 }

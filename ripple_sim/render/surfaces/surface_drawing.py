@@ -75,7 +75,7 @@ class SurfaceDrawing:
         self._solid = resources.vertex_array(self._program, content, indices, skip_errors=True)
         self._depth = resources.vertex_array(depth, content[:1], indices)
         albedo = resources.program("surfaces/surface_depth_vertex", "glsl/albedo_fragment")
-        albedo["color"] = paint.color[:3]
+        albedo["color"] = tuple(paint.color[:3] - paint.transmission)
         self._albedo = resources.vertex_array(albedo, content[:1], indices)
         transmission = resources.program(
             "surfaces/surface_depth_vertex", "passes/transmission_fragment", SOLID=int(not surface.open), REFRACTING=1
