@@ -6,6 +6,7 @@ each layer is improved by barycentres, and positions by least movement (Sugiyama
 
 import itertools
 from collections.abc import Iterable, Mapping
+from statistics import fmean
 
 import numpy as np
 
@@ -92,9 +93,12 @@ class Layout:
             for sweep in range(12):
                 for i in range(len(self.rows)) if sweep % 2 else reversed(range(len(self.rows))):
                     place = {node: k / max(len(row) - 1, 1) for row in self.rows for k, node in enumerate(row)}
-                    self.rows[i].sort(key=lambda node: np.mean([place[n] for n in self._neighbours[node]] or [0.5]))
+                    self.rows[i].sort(key=lambda node: fmean([place[n] for n in self._neighbours[node]] or [0.5]))
+                crossed = self.crossings()
+                if best is not None and crossed > best[0]:
+                    continue
                 x = self._positions(8)
-                cost = (self.crossings(), sum(abs(x[a] - x[b]) for a, b in self._segments))
+                cost = (crossed, sum(abs(x[a] - x[b]) for a, b in self._segments))
                 if best is None or cost < best:
                     best, found = cost, [list(row) for row in self.rows]
         self.rows = found or self.rows
@@ -117,7 +121,7 @@ class Layout:
         """Mean place of a node's neighbours; long arrows pull at their own passages, so that they run straight."""
         near = self._neighbours[node] or [node]
         pull = [8.0 if isinstance(node, tuple) and isinstance(each, tuple) else 1.0 for each in near]
-        return float(np.average([x[each] for each in near], weights=pull))
+        return fmean([x[each] for each in near], pull)
 
     def _gap(self, a: Node, b: Node) -> float:
         """Least distance of two nodes side by side."""
