@@ -16,7 +16,12 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class View:
-    """Open a scene or a mesh in an interactive window: click to poke it, drag to turn it, H for the list of keys."""
+    """Open a scene or a mesh in an interactive window.
+
+    Click: poke the surface. Drag: orbit; with shift: pan; wheel: zoom. Space: pause or resume. N: next frame. R: reset.
+    T: throw a ball at the pointer. O: next operator (fem, uncorrected, paper). C: heatmap on or off. S: screenshot.
+    V: start or stop a recording. H: list of keys. Q: quit. Sliders set the poke's impulse and the material.
+    """
 
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
     """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...)."""

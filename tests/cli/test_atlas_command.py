@@ -89,7 +89,8 @@ def test_a_picture_is_written_and_is_not_blank(tmp_path, capsys, ball_file):
 )
 def test_a_picture_that_cannot_be_written_is_refused_before_the_mesh_is_read(capsys, monkeypatch, tmp_path, path, said):
     monkeypatch.chdir(tmp_path)
-    assert re.search(said, refusal(capsys, "atlas", "missing.obj", "--plot", path))
+    (tmp_path / "mesh.obj").write_text("no mesh")
+    assert re.search(said, refusal(capsys, "atlas", "mesh.obj", "--plot", path))
 
 
 def test_the_axis_is_checked(capsys):
