@@ -20,7 +20,8 @@ SIZE = (320, 240)
 RADIUS, AMPLITUDE, LENGTH = 0.25, 0.0025, 0.06  # [m]
 LOOKAT, DISTANCE, AZIMUTH, ELEVATION = (0.0, 0.0, 0.28), 1.6, 60.0, -25.0
 SUN = '<light directional="true" pos="1 -1 3" dir="-.3 .4 -1"/>'
-GEOM = '<geom name="ball" pos="0 0 .28" rgba=".8 .5 .3 1" {}/><geom type="plane" size="4 4 .1" rgba=".8 .8 .8 1"/>'
+GEOM = '<geom name="ball" pos="0 0 .28" rgba=".8 .5 .3 1" {}/><geom type="plane" size="4 4 .1" rgba="{} 1"/>'
+BRIGHT, DARK = ".8 .8 .8", ".1 .1 .1"  # of the floor
 BALL = f'type="sphere" size="{RADIUS}"'
 MJCF = "<mujoco><visual>{}</visual><asset>{}</asset><worldbody>{}{}</worldbody></mujoco>"
 WEAK, OFF = '<headlight diffuse=".15 .15 .15"/>', '<headlight active="0"/>'
@@ -52,7 +53,7 @@ def theirs(headlight: str) -> float:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "ball.obj"
             trimesh.Trimesh(ball.vertices * (1 + height[:, None] / RADIUS), ball.faces, process=False).export(file)
-            asset, geom = f'<mesh name="ball" file="{file}"/>', GEOM.format('type="mesh" mesh="ball"')
+            asset, geom = f'<mesh name="ball" file="{file}"/>', GEOM.format('type="mesh" mesh="ball"', BRIGHT)
             model = mujoco.MjModel.from_xml_string(MJCF.format(headlight, asset, SUN, geom))
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
@@ -64,7 +65,7 @@ def theirs(headlight: str) -> float:
     return contrast(*frames)
 
 
-def ours(headlight: str, look: str, lighting: str = "model") -> float:
+def ours(headlight: str, look: str, lighting: str = "model", floor: str = BRIGHT) -> float:
     """By our renderer."""
     os.environ["MUJOCO_GL"] = "disable"
     import mujoco
@@ -74,7 +75,7 @@ def ours(headlight: str, look: str, lighting: str = "model") -> float:
     from ripple_sim.solver import HeightMap, sphere_atlas
     from ripple_sim.solver.gl import shared_context
 
-    model = mujoco.MjModel.from_xml_string(MJCF.format(headlight, "", SUN, GEOM.format(BALL)))
+    model = mujoco.MjModel.from_xml_string(MJCF.format(headlight, "", SUN, GEOM.format(BALL, floor)))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     atlas = sphere_atlas(RADIUS, 128)
@@ -92,6 +93,7 @@ def main() -> None:
             print(f"{name:24}  mujoco.Renderer {process.submit(theirs, headlight).result():.3f}", flush=True)
             for look in ("model", "rubber", "metal"):
                 print(f"{name:24}  {look:15} {ours(headlight, look):.3f}", flush=True)
+    print(f"{'dark floor':24}  {'model':15} {ours('', 'model', floor=DARK):.3f}", flush=True)
     for look in ("model", "rubber", "metal"):
         print(f"{'studio':24}  {look:15} {ours('', look, 'studio'):.3f}", flush=True)
 
