@@ -23,4 +23,5 @@ def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] |
         look=look,
         color=color,
         uv=mesh.uv if mesh.corner_uv is None else mesh.corner_uv,
+        moving=None if drawn is atlas else (atlas.mesh.V, atlas.mesh.F),
     )

@@ -47,6 +47,8 @@ class Surface:
         sRGB, from the least to the greatest value of a heatmap that replaces the look; see `Renderer.set_heatmap`.
     grid : int
         Texels between the lines of a grid on the surface; 0: no grid.
+    moving : (V, F), optional
+        The mesh on which the surface rides where it moves, if that is another one.
     """
 
     V: NDArray[np.float64]
@@ -58,6 +60,7 @@ class Surface:
     image: Path | str | None = None
     heatmap_colors: NDArray[np.uint8] | None = None
     grid: int = 0
+    moving: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None
 
     @property
     def open(self) -> bool:

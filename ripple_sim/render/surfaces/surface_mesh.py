@@ -86,7 +86,7 @@ class SurfaceMesh:
         self._displacement = Displacement(assets.resources, vertices, index)
         paint = Paint(surface, mapping, (*rgb, float(self.number)), look.transparency * rgb)
         self._drawing = SurfaceDrawing(assets, paint, vertices, self._displacement.moved, self._triangles.indices)
-        self._mesh, self._vertices = (surface.V, surface.F), vertices
+        self._mesh, self._vertices = surface.moving or (surface.V, surface.F), vertices
         self._moving: tuple[MovingVertices, MovingOcclusion] | None = None
 
     def ripple(self, ctx: moderngl.Context, height_map: AnyHeightMap | None) -> None:

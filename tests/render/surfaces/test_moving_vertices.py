@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 from ripple_sim import Camera, RippleRenderer, Ripples
@@ -39,14 +40,15 @@ def test_gradients_are_those_on_the_moved_surface():
     assert_allclose(moved[:, 1:-1, 1:-1, :3], still[:, 1:-1, 1:-1, :3] @ TURN.T / 2, atol=2e-3)
 
 
-def test_a_frame_shows_the_surface_where_it_is():
+@pytest.mark.parametrize("resolution", [8, 40])  # a sphere of more than 32 is drawn with another mesh than its own
+def test_a_frame_shows_the_surface_where_it_is(resolution):
     model = mujoco.MjModel.from_xml_string(
         """<mujoco><worldbody><light pos="0 0 3"/><geom name="target" type="sphere" size=".2" rgba="1 0 0 1"/>
         </worldbody></mujoco>"""
     )
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    ripples = Ripples(model, {"target": Material(speed=1.0, density=1.0)}, resolution=8)
+    ripples = Ripples(model, {"target": Material(speed=1.0, density=1.0)}, resolution=resolution)
     renderer = RippleRenderer(model, ripples, width=64, height=48)
     camera = Camera(lookat=(0.0, 0.0, 0.0), distance=1.5, azimuth=90.0, elevation=0.0)
 
@@ -54,6 +56,9 @@ def test_a_frame_shows_the_surface_where_it_is():
         frame = renderer.render(data, camera).astype(int)
         return float(np.nonzero(frame[..., 0] > frame[..., 1] + 30)[0].mean())
 
+    still = renderer.render(data, camera).astype(int)
+    ripples["target"].move(ripples["target"].rest.mesh.V.copy())
+    assert np.abs(renderer.render(data, camera) - still).mean() < 0.05
     before = middle()
     ripples["target"].move(ripples["target"].rest.mesh.V + np.array([0, 0, 0.2]))
     assert middle() < before - 4
