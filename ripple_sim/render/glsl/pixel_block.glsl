@@ -6,11 +6,9 @@ float block_mean(float value, bvec2 sides)
     return value + (sides.y ? 0.5 * side.y * dFdy(value) : 0.0);
 }
 
-vec3 block_mean(vec3 value)
+vec3 block_mean(vec3 value, bvec2 sides)
 {
-    vec2 side = 0.5 - vec2(ivec2(gl_FragCoord.xy) & 1);
-    value += side.x * dFdx(value);
-    return value + side.y * dFdy(value);
+    return vec3(block_mean(value.r, sides), block_mean(value.g, sides), block_mean(value.b, sides));
 }
 
 float block_mean(float value)

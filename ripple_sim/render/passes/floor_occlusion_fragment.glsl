@@ -75,9 +75,9 @@ void main()
     vec2 off = abs(screen);
     float known = 1.0 - smoothstep(0.7, 1.0, max(off.x, off.y));
     covered = block_mean(covered) * known;
-    colors = block_mean(colors);
-    across = block_mean(across);
-    along = block_mean(along);
+    colors = block_mean(colors, bvec2(true));
+    across = block_mean(across, bvec2(true));
+    along = block_mean(along, bvec2(true));
     vec2 local = floor_map.xy + screen * floor_map.z;
     vec3 world = floor_origin.xyz + local.x * floor_u.xyz + local.y * floor_v.xyz;
     float size = floor_map.z * dFdx(screen.x);

@@ -5,7 +5,7 @@
 // rgb: share of the light that is taken; a: the mean of that times the distance from the light [m]
 layout(binding = TRANSMISSION_UNIT) uniform sampler2D transmission_maps;
 
-const int SPIRAL_TAPS = 8;
+const int PASSING_TAPS = 3;  // for each pixel of a block, as in shadow.glsl
 const float LEAST = 1e-3;   // mean share taken that counts
 const float CLOSEST = 3.0;  // distance at which things begin to shade one another, in texels [m]
 
@@ -22,8 +22,8 @@ vec2 transparent_blocker(vec4 taken)
     return vec2(dot(taken.rgb, vec3(1.0 / 3.0)), taken.a);
 }
 
-// Share of a light that passes all that is transparent on its way to a point; the normal as for `light_visibility`.
-vec3 transmitted(int light, vec3 position, vec3 normal)
+// Share of a light that passes all that is transparent on its way to a point; the rest as for `light_visibility`.
+vec3 transmitted(int light, vec3 position, vec3 normal, bvec2 block)
 {
     vec4 clip = shadows[light].matrix * vec4(position, 1.0), place = lights[light].position;
     vec3 p = clip.xyz / clip.w;
@@ -31,25 +31,25 @@ vec3 transmitted(int light, vec3 position, vec3 normal)
     float to_light = light_distance(light, p.z), slope = 1.0 / max(abs(dot(normal, towards)), 0.1);
     vec4 width = shadows[light].width;
     float texel = (width.x + width.y * to_light) / float(textureSize(transmission_maps, 0).y);
-    vec2 found = transparent_blocker(taken_about(light, p.xy, 0.5 * widest_penumbra(light, to_light)));
-    // a few texels of the rim say nothing of a distance, which would make penumbras wide beside the shadow
-    float blocker = found.x > LEAST ? min(found.y / found.x, to_light) : to_light;
-    float penumbra = penumbra_of(light, blocker, to_light);
-    vec3 passes = vec3(0.0);
-    vec2 direction = vec2(1.0, 0.0);
-    for (int i = 0; i < SPIRAL_TAPS; ++i) {
-        vec2 offset = penumbra * sqrt((float(i) + 0.5) / float(SPIRAL_TAPS)) * direction;
-        direction = TURN * direction;
-        vec4 taken = taken_about(light, p.xy + offset, 0.35 * penumbra);
-        vec2 there = transparent_blocker(taken);
-        float before = to_light - there.y / max(there.x, 1e-4);
-        passes += 1.0 - taken.rgb * smoothstep(1.0, CLOSEST, before / (slope * texel));
-    }
     bool inside = counts.w > float(light) && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
-    return inside ? passes / float(SPIRAL_TAPS) : vec3(1.0);
+    vec2 found = transparent_blocker(taken_about(light, p.xy, 0.5 * widest_penumbra(light, to_light)));
+    float penumbra = penumbra_of(light, min(found.y / max(found.x, 1e-4), to_light), to_light);
+    vec3 taken = vec3(0.0);
+    float first = first_point();
+    vec2 direction = spiral_direction(first);
+    int taps = inside && found.x > 0.0 ? PASSING_TAPS : 0;
+    for (int i = 0; i < taps; ++i) {
+        vec2 offset = penumbra * sqrt((float(i) + 0.25 * first) / float(PASSING_TAPS)) * direction;
+        direction = FOURTH_TURN * direction;
+        vec4 here = taken_about(light, p.xy + offset, 0.35 * penumbra);
+        vec2 blocker = transparent_blocker(here);
+        float before = to_light - blocker.y / max(blocker.x, 1e-4);
+        taken += here.rgb * smoothstep(1.0, CLOSEST, before / (slope * texel));
+    }
+    return 1.0 - block_mean(taken / float(PASSING_TAPS), block);
 }
 #else
-vec3 transmitted(int light, vec3 position, vec3 normal)
+vec3 transmitted(int light, vec3 position, vec3 normal, bvec2 block)
 {
     return vec3(1.0);
 }
@@ -58,5 +58,5 @@ vec3 transmitted(int light, vec3 position, vec3 normal)
 // Share of a light that arrives, through what is transparent and past all else; see `light_visibility`.
 vec3 light_arriving(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)
 {
-    return light_visibility(light, position, normal, bias, scatter, block) * transmitted(light, position, normal);
+    return light_visibility(light, position, normal, bias, scatter, block) * transmitted(light, position, normal, block);
 }
