@@ -14,7 +14,7 @@ from .gpu.contract import Unit
 from .gpu.frame_uniforms import FrameUniforms
 from .passes.floor import Floor
 from .visuals.assets import Assets
-from .visuals.lights import Light, Lighting, count_casting_lights, has_near_lights, is_lit, model_lighting
+from .visuals.lights import Light, Lighting, count_casting_lights, count_lights, has_near_lights, is_lit, model_lighting
 from .visuals.studio import set_lighting, studio_lighting
 
 LIGHTING = ("auto", "model", "studio")
@@ -54,6 +54,7 @@ class SceneLight:
         return {
             "SKYBOX": int(self._sky is not None),
             "NEAR_LIGHTS": int(not self._studio and has_near_lights(self._model)),
+            "LIGHTS": 1 if self._studio else count_lights(self._model),
             "SHADOWS": self.shadows,
         }
 

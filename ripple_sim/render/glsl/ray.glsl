@@ -3,17 +3,18 @@ in vec2 screen;
 in vec3 way;
 in vec3 way_local;
 flat in vec3 eye_local;
+flat in vec4 limits;
 
 // Negative where the ray meets the floor's upper side; varies linearly across the edges.
 float beside_floor()
 {
-    vec2 beside = abs(way_local.z * eye_local.xy + eye_local.z * way_local.xy) - way_local.z * vec2(floor_u.w, floor_v.w);
+    vec2 beside = abs(way_local.z * eye_local.xy + eye_local.z * way_local.xy) - way_local.z * limits.xy;
     return max(max(beside.x, beside.y), 1e-6 * eye_local.z - way_local.z);
 }
 
 bool meets_floor()
 {
-    return floor_origin.w > 0.0 && eye_local.z > 0.0 && beside_floor() < 0.0;
+    return eye_local.z > 0.0 && beside_floor() < 0.0;
 }
 
 // How far along `way` the floor's plane lies.
@@ -25,12 +26,12 @@ float floor_distance()
 // Distance along the camera's axis of a depth in the buffer.
 float eye_distance(float depth)
 {
-    return ray.w * ray_right.w / (ray_right.w - depth * (ray_right.w - ray.w));
+    return limits.z * limits.w / (limits.w - depth * (limits.w - limits.z));
 }
 
 // Depth of the floor in the buffer; 1 where the ray misses it.
 float floor_depth()
 {
-    float met = (ray_right.w - ray.w * ray_right.w * way_local.z / eye_local.z) / (ray_right.w - ray.w);
+    float met = (limits.w - limits.z * limits.w * way_local.z / eye_local.z) / (limits.w - limits.z);
     return meets_floor() ? met : 1.0;
 }

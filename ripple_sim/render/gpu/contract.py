@@ -8,6 +8,7 @@ from ripple_sim.render import color
 from ripple_sim.solver.gl.contract import Struct, numbered
 
 MAX_LIGHTS, MAX_SHADOWS, MAX_OCCLUDERS, SOFT_BOXES = 8, 4, 16, 3
+HELD_LIGHTS = 2  # that come to fragments as varyings
 VERTEX_GROUP = 64  # vertices that a work group displaces
 
 
@@ -135,6 +136,7 @@ OBJECT = Struct(
 
 DEFINES: dict[str, object] = {
     "MAX_LIGHTS": MAX_LIGHTS,
+    "HELD_LIGHTS": HELD_LIGHTS,
     "SOFT_BOXES": SOFT_BOXES,
     "VERTEX_GROUP": VERTEX_GROUP,
     **numbered(Unit, "_UNIT"),

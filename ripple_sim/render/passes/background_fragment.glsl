@@ -1,7 +1,7 @@
 #version 430
 // The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW the marked
 // pixels, and those that show solids too. With COARSE every pixel stands for a block of them.
-#include "gpu/frame_uniforms.glsl"
+#include "gpu/held_uniforms.glsl"
 #include "glsl/ray.glsl"
 #include "gpu/g_buffer_read.glsl"
 #include "passes/floor_map.glsl"
@@ -44,7 +44,7 @@ bool may_be_shaded(vec2 place, vec2 near)
     vec2 off = abs(place - 0.5);
     bool boxed = false;
     for (int i = 0; i < SHADOWS; ++i) {
-        vec4 box = shadows[i].floor;
+        vec4 box = shadow_at(i).floor;
         boxed = boxed || counts.w > float(i) && all(greaterThan(place, box.xy)) && all(lessThan(place, box.zw));
     }
     return boxed && (max(off.x, off.y) > 0.5 || near.g > 0.0);
@@ -60,7 +60,7 @@ void main()
     // the lights are near: a pool of light about the focus, and the background's colour beyond
     float away = length(vec3(plane - focus_local.xy, focus_local.z));
     // antialiasing of the floor's own edges
-    vec2 inside = vec2(floor_u.w, floor_v.w) - abs(plane), filled = clamp(inside / fwidth(inside), 0.0, 1.0);
+    vec2 inside = limits.xy - abs(plane), filled = clamp(inside / fwidth(inside), 0.0, 1.0);
     float edge = 1.0 - min(filled.x, filled.y);
     float fade = met ? max(smoothstep(floor_fade.x, floor_fade.y, away / eye.w), edge) : 1.0;
 #if TILED
@@ -97,9 +97,9 @@ void main()
 #endif
 #if NEAR_LIGHTS
     vec3 light = vec3(0.0), unshaded = vec3(0.0);
-    for (int i = 0; i < int(counts.y); ++i) {
+    for (int i = 0; i < LIGHTS; ++i) {
         vec3 towards;
-        vec3 arrives = incident(lights[i], world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
+        vec3 arrives = incident(light_at(i), world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
 #if SHADOW
         light += arrives * (i < SHADOWS ? shadow[i] : vec3(1.0));
 #else
@@ -111,7 +111,8 @@ void main()
     vec3 unshaded = floor_light.rgb, light = unshaded;
 #if SHADOW
     for (int i = 0; i < SHADOWS; ++i) {
-        vec3 arrives = lights[i].radiance.rgb * max(dot(floor_normal.xyz, lights[i].direction.xyz), 0.0);
+        Light from = light_at(i);
+        vec3 arrives = from.radiance.rgb * max(dot(floor_normal.xyz, from.direction.xyz), 0.0);
         light -= (1.0 - shadow[i]) * arrives;
     }
 #endif

@@ -17,7 +17,7 @@ void main()
     vec4 covers = 1.0 - step(1.0, depths);
     vec3 sum = vec3(0.0);
     for (int i = 0; i < 4; ++i) {
-        float away = light_distance(light, depths[i]);
+        float away = light_distance(shadows[light].depth, depths[i]);
         sum += covers[i] * vec3(1.0, away, away * away);
     }
     fragment = vec4(0.25 * sum, 1.0);

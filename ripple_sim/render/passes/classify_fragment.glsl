@@ -1,7 +1,6 @@
 #version 430
 // Classifies pixels by what they show, as a depth, so that each of the next passes runs over its own pixels only: whether
 // all or some of the samples show solids; with LAYER, whether any shows the object.
-#include "gpu/frame_uniforms.glsl"
 #include "passes/visible_samples.glsl"
 
 out vec4 fragment;

@@ -34,8 +34,8 @@ class DeferredShading:
     frame_format : FrameFormat
     floor : Floor, optional
     light_options : mapping
-        SKYBOX, NEAR_LIGHTS and TRANSMISSION (of transparent objects), 0 or 1: whether there are any; SHADOWS: how many
-        lights may cast shadows.
+        SKYBOX, NEAR_LIGHTS and TRANSMISSION (of transparent objects), 0 or 1: whether there are any; LIGHTS: how many
+        there may be; SHADOWS: how many of them may cast shadows.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 #version 430
 // Deferred shading of the pixels that show solids, in all or some of their samples: every surface that is visible in a
 // pixel is lit once.
-#include "gpu/frame_uniforms.glsl"
+#include "gpu/held_uniforms.glsl"
 #include "gpu/g_buffer_read.glsl"
 #include "visuals/object_table.glsl"
 #include "glsl/ray.glsl"

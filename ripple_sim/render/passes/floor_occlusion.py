@@ -27,7 +27,7 @@ class FloorOcclusion:
     ----------
     resources : Resources
     options : mapping
-        Defines SHADOWS and TRANSMISSION as for `DeferredShading`.
+        Defines of the light as for `DeferredShading`.
     floor : Floor, optional
     """
 
@@ -37,9 +37,7 @@ class FloorOcclusion:
             self._map = resources.texture((1, 1), 4, np.ones(4, dtype=np.float16).tobytes(), dtype="f2")
             self._bounce = resources.texture((1, 1), 4, bytes(8), dtype="f2")
             return
-        program = resources.program(
-            "glsl/screen_vertex", "passes/floor_occlusion_fragment", **{**options, "NEAR_LIGHTS": 1}
-        )
+        program = resources.program("glsl/view_vertex", "passes/floor_occlusion_fragment", **options)
         self._pass = resources.vertex_array(program, [])
         self._ceiling = resources.depth_texture((_CEILING_SIZE, _CEILING_SIZE))
         self._ceiling.compare_func = ""

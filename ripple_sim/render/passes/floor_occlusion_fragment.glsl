@@ -1,7 +1,7 @@
 #version 430
 // What light reaches a point of the floor. Its ambient visibility comes from the height of what hangs above it: the form
 // factor of horizontal patches at height h and horizontal distance d is h^2 / (pi (h^2 + d^2)^2) per unit area.
-#include "gpu/frame_uniforms.glsl"
+#include "gpu/held_uniforms.glsl"
 #include "passes/transmission.glsl"
 #include "visuals/lights.glsl"
 
@@ -23,10 +23,11 @@ const float UNDER = 0.5;   // of the floor's light on what hangs above it
 // Whether anything shades any of a texel of the floor, which is `texel` wide [m].
 bool is_shaded(int light, vec3 world, float texel)
 {
-    vec4 clip = shadows[light].matrix * vec4(world, 1.0), width = shadows[light].width;
+    Shadow shadow = shadow_at(light);
+    vec4 clip = shadow.matrix * vec4(world, 1.0), width = shadow.width;
     vec3 p = clip.xyz / clip.w;
     vec2 off = abs(p.xy - 0.5);
-    float to_light = light_distance(light, p.z), margin = texel / (width.x + width.y * to_light);
+    float to_light = light_distance(shadow.depth, p.z), margin = texel / (width.x + width.y * to_light);
     float reach = widest_penumbra(light, to_light) + margin, closest = 1e9, widest = 0.0;
     float first = first_point();
     vec2 direction = spiral_direction(first);
@@ -36,7 +37,7 @@ bool is_shaded(int light, vec3 world, float texel)
         direction = FOURTH_TURN * direction;
         float depth = textureLod(shadow_maps, in_maps(light, p.xy + offset * direction), 0.0).r;
         closest = depth < 1.0 ? min(closest, offset) : closest;
-        widest = depth < 1.0 ? max(widest, penumbra_of(light, light_distance(light, depth), to_light)) : widest;
+        widest = depth < 1.0 ? max(widest, penumbra_of(light, light_distance(shadow.depth, depth), to_light)) : widest;
 #if TRANSMISSION
         vec2 blocker = transparent_blocker(taken_about(light, p.xy + offset * direction, 0.0));
         closest = blocker.x > 0.0 ? min(closest, offset) : closest;
@@ -83,9 +84,9 @@ void main()
     float size = floor_map.z * dFdx(screen.x);
     bool shaded = false;
     vec3 arrives = vec3(0.0), unshaded = vec3(1e-6), bounce = vec3(0.0);
-    for (int i = 0; i < int(counts.y); ++i) {
+    for (int i = 0; i < LIGHTS; ++i) {
         vec3 towards;
-        vec3 radiance = incident(lights[i], world, towards), light = radiance * max(dot(floor_normal.xyz, towards), 0.0);
+        vec3 radiance = incident(light_at(i), world, towards), light = radiance * max(dot(floor_normal.xyz, towards), 0.0);
         // the sides that a point of the floor sees look towards it
         vec2 sidewards = vec2(dot(floor_u.xyz, towards), dot(floor_v.xyz, towards));
         bounce += radiance * max(SIDE * colors - across * sidewards.x - along * sidewards.y, 0.0);

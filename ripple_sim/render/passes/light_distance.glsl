@@ -1,6 +1,5 @@
-// Distance from a light [m] of a depth in its shadow map; after the frame's uniforms.
-float light_distance(int light, float depth)
+// Distance from a light [m] of a depth in its shadow map; `d` is the shadow's `depth` of the frame's uniforms.
+float light_distance(vec4 d, float depth)
 {
-    vec4 d = shadows[light].depth;
     return (d.x * depth + d.y) / (d.z * depth + d.w);
 }

@@ -7,8 +7,7 @@
 #include "visuals/lights.glsl"
 #include "visuals/occluders.glsl"
 
-flat in vec3 around;   // ambient light on the open floor, without the soft box of the key light
-flat in vec3 key_box;  // and that
+flat in vec3 floor_lit, floor_surround;  // radiance of the open floor by the lights, and by what is around
 
 struct Material {
     vec3 albedo;
@@ -32,7 +31,7 @@ vec3 floor_radiance(vec3 position, float radius)
     vec2 place = floor_map_position(vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)));
     float texel = 2.0 * floor_map.z / float(textureSize(floor_visibility, 0).x);
     vec4 open = textureLod(floor_visibility, place, log2(max(radius / texel, 2.0)));
-    vec3 lit = floor_albedo.rgb * ((floor_light.rgb + key_box) * open.b + around * (0.15 + 0.85 * open.r));
+    vec3 lit = floor_lit * open.b + floor_surround * (0.15 + 0.85 * open.r);
     return floor_origin.w > 0.0 ? lit : sky.rgb * 0.8;
 }
 
@@ -84,9 +83,9 @@ vec3 shaded(Material m, vec3 position, vec3 normal, vec3 flat_normal, float own_
     for (int i = 0; i < SHADOWS; ++i)
         shadow[i] = light_arriving(i, position, flat_normal, m.shadow_bias, m.scatter, m.block);
     vec3 direct = vec3(0.0), highlight = vec3(0.0), coated = vec3(0.0), glow = vec3(0.0);
-    for (int i = 0; i < int(counts.y); ++i) {
+    for (int i = 0; i < LIGHTS; ++i) {
         vec3 light;
-        vec3 radiance = incident(lights[i], position, light);
+        vec3 radiance = incident(light_at(i), position, light);
         float n_l = dot(normal, light);
         vec3 visible = i < SHADOWS ? shadow[i] : vec3(1.0);
         vec3 halfway = normalize(view + light);

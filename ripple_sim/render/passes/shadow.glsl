@@ -1,5 +1,5 @@
 // Soft shadows: percentage-closer soft shadows (PCSS). SHADOWS lights may cast them; their maps lie side by side.
-#include "gpu/frame_uniforms.glsl"
+#include "gpu/held_uniforms.glsl"
 #include "glsl/disc.glsl"
 #include "glsl/pixel_block.glsl"
 #include "passes/light_distance.glsl"
@@ -16,7 +16,7 @@ const int FILTER_TAPS = 16;
 vec2 in_maps(int light, vec2 point)
 {
 #if SHADOWS > 1
-    float edge = 0.5 / shadows[light].width.z;  // keeps a neighbour's texels out
+    float edge = 0.5 / shadow_at(light).width.z;  // keeps a neighbour's texels out
     point.x = (clamp(point.x, edge, 1.0 - edge) + float(light)) / float(SHADOWS);
 #endif
     return point;
@@ -25,7 +25,7 @@ vec2 in_maps(int light, vec2 point)
 // Radius of the penumbra, in the map, of a blocker on what lies behind it; both by their distance from the light [m].
 float penumbra_of(int light, float blocker, float behind)
 {
-    vec4 penumbra = shadows[light].penumbra, width = shadows[light].width;
+    vec4 penumbra = shadow_at(light).penumbra, width = shadow_at(light).width;
     float blur = penumbra.x + penumbra.y / max(blocker, 1e-6);
     return min((behind - blocker) * blur / (width.x + width.y * behind), penumbra.z);
 }
@@ -33,7 +33,7 @@ float penumbra_of(int light, float blocker, float behind)
 // Radius, in the map, of what may shade a point at a distance from the light [m]: a penumbra of the nearest blocker.
 float widest_penumbra(int light, float to_light)
 {
-    return penumbra_of(light, light_distance(light, 0.0), to_light);
+    return penumbra_of(light, light_distance(shadow_at(light).depth, 0.0), to_light);
 }
 
 // Share of a light that arrives, as the mean over the part of the pixel's block of 2 x 2 that lies to the given sides.
@@ -41,21 +41,23 @@ float widest_penumbra(int light, float to_light)
 // each other, and is negative for what casts no shadow itself; `scatter` [m] is how far light gets under the surface.
 float light_visibility(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)
 {
-    vec4 place = lights[light].position, of_depth = shadows[light].depth, of_width = shadows[light].width;
+    Light from = light_at(light);
+    Shadow shadow = shadow_at(light);
+    vec4 place = from.position, of_depth = shadow.depth, of_width = shadow.width;
     bool far_away = NEAR_LIGHTS == 0 || place.w == 0.0;
-    vec3 towards = far_away ? lights[light].direction.xyz : normalize(place.xyz - position);
+    vec3 towards = far_away ? from.direction.xyz : normalize(place.xyz - position);
     float facing = dot(normal, towards);
     float away = far_away ? 0.0 : distance(place.xyz, position);
     float texel = (of_width.x + of_width.y * away) / of_width.z;
     float raise = bias < 0.0 ? 0.0 : bias + (1.0 + 1.5 * (1.0 - facing)) * texel;
     vec3 raised = position + raise * normal;
-    vec4 clip = shadows[light].matrix * vec4(raised, 1.0);
+    vec4 clip = shadow.matrix * vec4(raised, 1.0);
     vec3 p = clip.xyz / clip.w;
-    float to_light = light_distance(light, p.z), width = of_width.x + of_width.y * to_light;
+    float to_light = light_distance(of_depth, p.z), width = of_width.x + of_width.y * to_light;
     float stretch = of_depth.z * p.z + of_depth.w;
     float metre = stretch * stretch / (of_depth.x * of_depth.w - of_depth.y * of_depth.z);
     // receiver plane depth bias: with a wide filter the surface would shade itself
-    vec4 plane = shadows[light].planes * vec4(normal, -dot(normal, raised));
+    vec4 plane = shadow.planes * vec4(normal, -dot(normal, raised));
     float steepest = 10.0 * width * metre;
     vec2 slope = -plane.xy * (abs(plane.z) > 1e-9 ? 1.0 / plane.z : 1e9);
     slope = clamp(slope, -steepest, steepest);
@@ -80,7 +82,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
         // a share of what covers the map there is this surface itself, the rest blocks: two distances with that mean and
         // that variance (Yang et al., Variance Soft Shadow Mapping, 2010)
         float usual = mean.y / max(mean.x, 1e-4), variance = max(mean.z / max(mean.x, 1e-4) - usual * usual, 0.0);
-        float before = max(light_distance(light, p.z + dot(slope, offset)) - usual, 1e-6);
+        float before = max(light_distance(of_depth, p.z + dot(slope, offset)) - usual, 1e-6);
         float share = before * before / (before * before + variance);
         float blocks = (1.0 - away) * mean.x * share * smoothstep(0.0, texel + 0.25 * footprint * width, before);
         distances += blocks * (usual - variance / before);

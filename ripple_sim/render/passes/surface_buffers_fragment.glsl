@@ -1,6 +1,6 @@
 #version 430
 // What is seen at the middle of each pixel, without light: of solids, transparent or not, and of the floor.
-#include "gpu/frame_uniforms.glsl"
+#include "gpu/held_uniforms.glsl"
 #include "gpu/g_buffer_read.glsl"
 #include "visuals/object_table.glsl"
 #include "glsl/ray.glsl"

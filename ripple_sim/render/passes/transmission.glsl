@@ -25,11 +25,13 @@ vec2 transparent_blocker(vec4 taken)
 // Share of a light that passes all that is transparent on its way to a point; the rest as for `light_visibility`.
 vec3 transmitted(int light, vec3 position, vec3 normal, bvec2 block)
 {
-    vec4 clip = shadows[light].matrix * vec4(position, 1.0), place = lights[light].position;
+    Light from = light_at(light);
+    Shadow shadow = shadow_at(light);
+    vec4 clip = shadow.matrix * vec4(position, 1.0), place = from.position;
     vec3 p = clip.xyz / clip.w;
-    vec3 towards = place.w == 0.0 ? lights[light].direction.xyz : normalize(place.xyz - position);
-    float to_light = light_distance(light, p.z), slope = 1.0 / max(abs(dot(normal, towards)), 0.1);
-    vec4 width = shadows[light].width;
+    vec3 towards = NEAR_LIGHTS == 0 || place.w == 0.0 ? from.direction.xyz : normalize(place.xyz - position);
+    float to_light = light_distance(shadow.depth, p.z), slope = 1.0 / max(abs(dot(normal, towards)), 0.1);
+    vec4 width = shadow.width;
     float texel = (width.x + width.y * to_light) / float(textureSize(transmission_maps, 0).y);
     bool inside = counts.w > float(light) && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
     vec2 found = transparent_blocker(taken_about(light, p.xy, 0.5 * widest_penumbra(light, to_light)));

@@ -38,5 +38,5 @@ void main()
 #endif
 #endif
     vec3 taken = 1.0 - passes;
-    fragment = vec4(taken, dot(taken, vec3(1.0 / 3.0)) * light_distance(light, gl_FragCoord.z));
+    fragment = vec4(taken, dot(taken, vec3(1.0 / 3.0)) * light_distance(shadows[light].depth, gl_FragCoord.z));
 }

@@ -91,6 +91,11 @@ def has_near_lights(model: Any) -> bool:
     return bool(np.any(model.light_type != _KIND.mjLIGHT_DIRECTIONAL))
 
 
+def count_lights(model: Any) -> int:
+    """How many lights there may be, with the headlight: 1 to MAX_LIGHTS."""
+    return int(np.clip(model.nlight + 1, 1, MAX_LIGHTS))
+
+
 def count_casting_lights(model: Any) -> int:
     """How many lights of the MJCF may cast shadows: 1 to MAX_SHADOWS."""
     casting = model.light_castshadow.astype(bool) & (model.light_type != _KIND.mjLIGHT_IMAGE)

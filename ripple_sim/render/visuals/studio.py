@@ -66,6 +66,7 @@ def set_lighting(
     sky : array, optional
         Mean linear colour of a skybox.
     """
+    frame.values["lights"] = 0  # where there are fewer, the others are dark
     for index, light in enumerate(lighting.lights):
         record = frame.values["lights"][index]
         record["position"] = [0, 0, 0, 0] if light.position is None else [*light.position, 1]

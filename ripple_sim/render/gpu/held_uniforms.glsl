@@ -1,0 +1,57 @@
+// The frame's uniforms for fragment shaders, to be included before anything else. Software drivers read a uniform for
+// every pixel anew, which took half of the time of shading: most come as flat varyings, from hold_uniforms.glsl.
+#include "gpu/frame_uniforms.glsl"
+
+flat in vec4 held_eye, held_floor_origin, held_sky;
+flat in vec3 held_floor_u, held_floor_v, held_floor_normal, held_floor_albedo, held_floor_light, held_floor_map;
+flat in vec3 held_zenith, held_horizon;
+flat in vec2 held_floor_fade;
+flat in vec4 held_box_normal[SOFT_BOXES], held_box_tangent[SOFT_BOXES];
+flat in vec3 held_box_radiance[SOFT_BOXES];
+flat in vec3 held_light_direction[HELD_LIGHTS], held_light_radiance[HELD_LIGHTS];
+flat in mat4 held_shadow_matrix;
+flat in vec4 held_shadow_depth;
+flat in vec3 held_shadow_width, held_shadow_penumbra;
+flat in vec4 held_counts;
+
+#define eye held_eye
+#define floor_origin held_floor_origin
+#define sky held_sky
+#define floor_u held_floor_u
+#define floor_v held_floor_v
+#define floor_normal held_floor_normal
+#define floor_albedo held_floor_albedo
+#define floor_light held_floor_light
+#define floor_map held_floor_map
+#define zenith held_zenith
+#define horizon held_horizon
+#define floor_fade held_floor_fade
+#define soft_box_normal held_box_normal
+#define soft_box_tangent held_box_tangent
+#define soft_box_radiance held_box_radiance
+#define counts held_counts
+
+// Lights and shadows by numbers that are known when a shader is compiled: others are read from the block.
+Light light_at(int i)
+{
+    Light light = lights[i];
+#if !NEAR_LIGHTS
+    if (i < HELD_LIGHTS) {
+        light.direction.xyz = held_light_direction[min(i, HELD_LIGHTS - 1)];
+        light.radiance.rgb = held_light_radiance[min(i, HELD_LIGHTS - 1)];
+    }
+#endif
+    return light;
+}
+
+Shadow shadow_at(int i)
+{
+    Shadow shadow = shadows[i];
+    if (i == 0) {
+        shadow.matrix = held_shadow_matrix;
+        shadow.depth = held_shadow_depth;
+        shadow.width.xyz = held_shadow_width;
+        shadow.penumbra.xyz = held_shadow_penumbra;
+    }
+    return shadow;
+}
