@@ -29,6 +29,9 @@ uniform float reflectance;
 const float STEEPEST = 0.03;  // change from one block to the next up to which the background is smooth
 const float HIGHEST_LEVEL = 4.0;  // of the floor map
 const float BOUNCE_LEVEL = 2.3;   // where few points of the map's search are seen no longer
+const float UNSEEN = 0.001;       // share of a light that nobody misses
+const float NOWHERE = 1e9;        // [m]
+const float LARGEST = 0.04;       // of the floor map's half width: larger blocks would miss shadows, but not the map
 
 // A skybox continues below the horizon, which the floor hides.
 #if SKYBOX
@@ -73,7 +76,7 @@ void main()
     // the blocks of 2 x 2 that share their light are texels of the next level
 #if COARSE
     // in higher levels, texels at the map's edge, which stand for all beyond it, are as dark as what is far inside
-    float level = min(textureQueryLod(floor_visibility, place).y + 1.0, HIGHEST_LEVEL);
+    float level = clamp(textureQueryLod(floor_visibility, place).y + 1.0, 1.0, HIGHEST_LEVEL);
     vec2 near = textureLod(floor_visibility, place, level).rg;
 #else
     vec2 near = textureLod(floor_visibility, place, 1.0).rg;
@@ -90,7 +93,17 @@ void main()
 #else
     const float share = 1.0;
     bool shaded = met && may_be_shaded(place, near);
-#if !COARSE
+#if COARSE
+    // with edges as wide as a block at least, so that no shadow falls between blocks
+    float blur = length(fwidth(plane));
+    vec3 where = shaded ? world : vec3(NOWHERE);  // where nothing is looked up
+    bool partly = shaded && blur > LARGEST * floor_map.z;
+    vec3 shadow[SHADOWS];
+    for (int i = 0; i < SHADOWS; ++i) {
+        shadow[i] = light_arriving(i, where, floor_normal.xyz, -1.0, blur, bvec2(true));
+        partly = partly || any(lessThan(shadow[i], vec3(1.0 - UNSEEN)));
+    }
+#else
     // all four pixels of a block, so that their shadows can be averaged
     gl_FragDepth = block_mean(shaded ? 1.0 : 0.0) > 0.0 ? SHADED_LEVEL : OPEN_LEVEL;
 #endif
@@ -100,7 +113,7 @@ void main()
     for (int i = 0; i < LIGHTS; ++i) {
         vec3 towards;
         vec3 arrives = incident(light_at(i), world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
-#if SHADOW
+#if SHADOW || COARSE
         light += arrives * (i < SHADOWS ? shadow[i] : vec3(1.0));
 #else
         light += arrives;
@@ -109,7 +122,7 @@ void main()
     }
 #else
     vec3 unshaded = floor_light.rgb, light = unshaded;
-#if SHADOW
+#if SHADOW || COARSE
     for (int i = 0; i < SHADOWS; ++i) {
         Light from = light_at(i);
         vec3 arrives = from.radiance.rgb * max(dot(floor_normal.xyz, from.direction.xyz), 0.0);
@@ -118,7 +131,7 @@ void main()
 #endif
 #endif
     vec3 key = vec3(1.0);
-#if SHADOW
+#if SHADOW || COARSE
     key = shadow[0];
 #endif
     unshaded += around + key_box;
@@ -137,9 +150,8 @@ void main()
 #if COARSE
     float rim = beside_floor();
     bool steep = any(greaterThan(fwidth(shown), vec3(STEEPEST)));
-    // shadows are marked with a margin, so that leaving out the nearest blocks is enough
-    bool rough = steep || abs(rim) < 1.5 * fwidth(rim);
-    fragment = vec4(shown, rough ? 0.5 : shaded ? 1.0 - 2.0 * UNSURE : met ? 1.0 : 0.0);
+    bool rough = partly || steep || abs(rim) < 1.5 * fwidth(rim);
+    fragment = vec4(shown, rough ? 0.5 : met ? 1.0 : 0.0);
 #else
     fragment = share * vec4(dithered(shown), 1.0);
 #endif
