@@ -1,5 +1,5 @@
 // The frame's uniforms for fragment shaders, to be included before anything else. Software drivers read a uniform for
-// every pixel anew, which took half of the time of shading: most come as flat varyings, from hold_uniforms.glsl.
+// every pixel anew, which took a tenth of a frame: most come as flat varyings, from hold_uniforms.glsl.
 #include "gpu/frame_uniforms.glsl"
 
 flat in vec4 held_eye, held_floor_origin, held_sky;
