@@ -30,7 +30,7 @@ const float STEEPEST = 0.03;  // change from one block to the next up to which t
 const float HIGHEST_LEVEL = 4.0;  // of the floor map
 const float BOUNCE_LEVEL = 2.3;   // where few points of the map's search are seen no longer
 const float UNSEEN = 0.001;       // share of a light that nobody misses
-const float NOWHERE = 1e9;        // [m]
+const float OUTSIDE = 1e9;        // [m]
 const float LARGEST = 0.04;       // of the floor map's half width: larger blocks would miss shadows, but not the map
 
 // A skybox continues below the horizon, which the floor hides.
@@ -96,7 +96,7 @@ void main()
 #if COARSE
     // with edges as wide as a block at least, so that no shadow falls between blocks
     float blur = length(fwidth(plane));
-    vec3 where = shaded ? world : vec3(NOWHERE);  // where nothing is looked up
+    vec3 where = shaded ? world : vec3(OUTSIDE);  // of all shadow maps, where nothing is looked up
     bool partly = shaded && blur > LARGEST * floor_map.z;
     vec3 shadow[SHADOWS];
     for (int i = 0; i < SHADOWS; ++i) {
