@@ -1,7 +1,9 @@
 // The frame's uniforms for fragment shaders, to be included before anything else. Software drivers read a uniform for
-// every pixel anew, which took a tenth of a frame: most come as flat varyings, from hold_uniforms.glsl.
+// every pixel anew, which took a tenth of a frame: there most come as flat varyings, from hold_uniforms.glsl. A GPU has
+// room for few varyings.
 #include "gpu/frame_uniforms.glsl"
 
+#if HOLD_UNIFORMS
 flat in vec4 held_eye, held_floor_origin, held_sky;
 flat in vec3 held_floor_u, held_floor_v, held_floor_normal, held_floor_albedo, held_floor_light, held_floor_map;
 flat in vec3 held_zenith, held_horizon;
@@ -55,3 +57,14 @@ Shadow shadow_at(int i)
     }
     return shadow;
 }
+#else
+Light light_at(int i)
+{
+    return lights[i];
+}
+
+Shadow shadow_at(int i)
+{
+    return shadows[i];
+}
+#endif

@@ -1,6 +1,7 @@
 // Hands what every pixel needs of the frame's uniforms to the fragment shader, as flat varyings; see held_uniforms.glsl.
 #include "gpu/frame_uniforms.glsl"
 
+#if HOLD_UNIFORMS
 flat out vec4 held_eye, held_floor_origin, held_sky;
 flat out vec3 held_floor_u, held_floor_v, held_floor_normal, held_floor_albedo, held_floor_light, held_floor_map;
 flat out vec3 held_zenith, held_horizon;
@@ -41,3 +42,6 @@ void hold_uniforms()
     held_shadow_penumbra = shadows[0].penumbra.xyz;
     held_counts = counts;
 }
+#else
+void hold_uniforms() {}
+#endif

@@ -47,7 +47,8 @@ class Resources:
 
     def program(self, vertex: str, fragment: str, **options: object) -> moderngl.Program:
         """Program of two of the renderer's shaders, by their paths; `options` are defines beside the contract."""
-        return self._own(self.gl.program(_PACKAGE, vertex, fragment, **DEFINES, **options))
+        defines = {"HOLD_UNIFORMS": int(self.gl.software), **DEFINES, **options}
+        return self._own(self.gl.program(_PACKAGE, vertex, fragment, **defines))
 
     def compute_shader(self, name: str, **options: object) -> moderngl.ComputeShader:
         """One of the renderer's compute shaders, likewise."""

@@ -11,6 +11,8 @@ layout(binding = BLOCKERS_UNIT) uniform sampler2D blockers;  // see blockers_fra
 // Points of the discs, for each pixel of a block of 2 x 2: together they are four times as many points of one spiral.
 const int SEARCH_TAPS = 4;
 const int FILTER_TAPS = 16;
+const int MEAN_TAPS = 4;
+const vec2 BY_MEANS = vec2(0.4, 0.8);  // texels of `blockers` between those: from where on they are means
 
 // Texture coordinates of a point of one light's map.
 vec2 in_maps(int light, vec2 point)
@@ -34,6 +36,21 @@ float penumbra_of(int light, float blocker, float behind)
 float widest_penumbra(int light, float to_light)
 {
     return penumbra_of(light, light_distance(shadow_at(light).depth, 0.0), to_light);
+}
+
+// What covers a map about a point and lies before a surface: a share of the map, its distance from the light [m], and how
+// far before the surface the mean of all is [m].
+struct Blockers { float share, distance, before; };
+
+// What covers the map is in part the surface itself; the rest blocks: two distances with that mean and that variance
+// (Yang et al., Variance Soft Shadow Mapping, 2010).
+Blockers blockers_about(int light, vec2 point, float footprint, float behind)
+{
+    float level = log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
+    vec3 mean = textureLod(blockers, in_maps(light, point), level).rgb;
+    float usual = mean.y / max(mean.x, 1e-4), variance = max(mean.z / max(mean.x, 1e-4) - usual * usual, 0.0);
+    float before = max(behind - usual, 1e-6);
+    return Blockers(mean.x * before * before / (before * before + variance), usual - variance / before, before);
 }
 
 // Share of a light that arrives, as the mean over the part of the pixel's block of 2 x 2 that lies to the given sides.
@@ -77,30 +94,42 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
         direction = FOURTH_TURN * direction;
         // the mean over as much as lies between the points: single texels would come and go from pixel to pixel
         float footprint = widest * sqrt(TWO_PI * away / float(4 * SEARCH_TAPS));
-        float level = log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
-        vec3 mean = textureLod(blockers, in_maps(light, p.xy + offset), level).rgb;
-        // a share of what covers the map there is this surface itself, the rest blocks: two distances with that mean and
-        // that variance (Yang et al., Variance Soft Shadow Mapping, 2010)
-        float usual = mean.y / max(mean.x, 1e-4), variance = max(mean.z / max(mean.x, 1e-4) - usual * usual, 0.0);
-        float before = max(light_distance(of_depth, p.z + dot(slope, offset)) - usual, 1e-6);
-        float share = before * before / (before * before + variance);
-        float blocks = (1.0 - away) * mean.x * share * smoothstep(0.0, texel + 0.25 * footprint * width, before);
-        distances += blocks * (usual - variance / before);
+        float behind = light_distance(of_depth, p.z + dot(slope, offset));
+        Blockers seen = blockers_about(light, p.xy + offset, footprint, behind);
+        float blocks = (1.0 - away) * seen.share * smoothstep(0.0, texel + 0.25 * footprint * width, seen.before);
+        distances += blocks * seen.distance;
         found += blocks;
     }
     distances = block_mean(distances, block);
     found = block_mean(found, block);
     float blocker = distances / max(found, 1e-4);
     float penumbra = length(vec2(penumbra_of(light, blocker, to_light), least));
-    float lit = 0.0;
-    taps = inside && found > 1e-4 ? FILTER_TAPS : 0;
+    // where points would be seen as steps, means over what lies between them
+    float between = penumbra * sqrt(0.5 * TWO_PI / float(4 * MEAN_TAPS));
+    float side = float(textureSize(blockers, 0).y), wide = smoothstep(BY_MEANS.x, BY_MEANS.y, between * side);
+    between = max(between, 1.0 / side);
+    float disc = sqrt(max(penumbra * penumbra - between * between, 0.0));  // the means widen it to the penumbra's
+    float of_means = 0.0, of_points = 0.0;
+    bool shaded = inside && found > 1e-4;
+    taps = shaded && wide > 0.0 ? MEAN_TAPS : 0;
+    direction = start;
+    for (int i = 0; i < taps; ++i) {
+        vec2 offset = disc * sqrt((float(i) + 0.25 * first) / float(MEAN_TAPS)) * direction;
+        direction = FOURTH_TURN * direction;
+        float behind = light_distance(of_depth, p.z + dot(slope, offset));
+        Blockers seen = blockers_about(light, p.xy + offset, between, behind);
+        of_means += 1.0 - seen.share * smoothstep(0.0, texel + 0.25 * between * width, seen.before);
+    }
+    taps = shaded && wide < 1.0 ? FILTER_TAPS : 0;
     direction = start;
     for (int i = 0; i < taps; ++i) {
         vec2 offset = penumbra * sqrt((float(i) + 0.25 * first) / float(FILTER_TAPS)) * direction;
         direction = FOURTH_TURN * direction;
-        lit += textureLod(shadow_test, vec3(in_maps(light, p.xy + offset), p.z + dot(slope, offset) - depth_bias), 0.0);
+        vec3 point = vec3(in_maps(light, p.xy + offset), p.z + dot(slope, offset) - depth_bias);
+        of_points += textureLod(shadow_test, point, 0.0);
     }
-    lit = block_mean(taps > 0 ? lit / float(FILTER_TAPS) : 1.0, block);
+    float lit = mix(of_points / float(FILTER_TAPS), of_means / float(MEAN_TAPS), wide);
+    lit = block_mean(shaded ? lit : 1.0, block);
     // beyond the terminator a surface shades itself, whatever the map says of it
     return bias < 0.0 ? lit : lit * smoothstep(-0.2, 0.15, facing);
 }
