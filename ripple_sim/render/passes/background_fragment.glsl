@@ -135,14 +135,14 @@ void main()
     key = shadow[0];
 #endif
     unshaded += around + key_box;
-    light += (around + key * key_box) * (0.15 + 0.85 * near.r) + bounce;
+    light += (around + key * key_box) * (0.15 + 0.85 * near.r);
 #if CUT_OUT
     // only the shadows are left of the floor
-    fragment = vec4(vec3(0.0), share * (1.0 - fade) * max(1.0 - light.g / max(unshaded.g, 1e-6), 0.0));
+    fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g, 1e-6)));
 #else
     vec3 direction = normalize(way);
     vec3 far = sky_at(met && edge == 0.0 ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);
-    vec3 shown = tone_mapped(mix(albedo * light, far, fade));
+    vec3 shown = tone_mapped(mix(albedo * (light + bounce), far, fade));
 #if MIRROR
     // as in MuJoCo, the reflectance does not depend on the angle
     shown = mix(shown, textureLod(mirror, 0.5 + 0.5 * screen, 0.0).rgb, reflectance * (1.0 - fade));
