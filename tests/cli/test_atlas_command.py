@@ -11,6 +11,7 @@ import trimesh
 from PIL import Image
 
 from ripple_sim.cli import main as cli
+from ripple_sim.figures import atlas_painter, chart_images, view
 from ripple_sim.solver import AtlasError, build_atlas
 
 
@@ -21,6 +22,13 @@ def _left_as_found(tmp_path_factory, monkeypatch):
     handler = signal.getsignal(signal.SIGTERM)
     yield
     signal.signal(signal.SIGTERM, handler)
+
+
+@pytest.fixture
+def coarse_pictures(monkeypatch):
+    """Pictures that are not averaged from finer ones, which takes most of their time."""
+    for module in (view, atlas_painter, chart_images):
+        monkeypatch.setattr(module, "OVERSAMPLING", 1)
 
 
 @pytest.fixture
@@ -68,6 +76,7 @@ def test_the_plain_report_says_the_same(capsys, ball_file):
     assert re.search(r"^sphere map time +\d+\.\d{3} s$", out, re.MULTILINE)
 
 
+@pytest.mark.usefixtures("coarse_pictures")
 def test_a_picture_is_written_and_is_not_blank(tmp_path, capsys, ball_file):
     picture = tmp_path / "atlas.png"
     assert cli.main(["atlas", str(ball_file), "--resolution", "8", "--json", "--plot", str(picture)]) == 0
@@ -150,6 +159,7 @@ def test_a_wrong_method_is_refused(animal):
         build_atlas(animal.mesh, 8, method="mercator")
 
 
+@pytest.mark.usefixtures("coarse_pictures")
 def test_the_thickness_over_what_is_inside_is_told_and_drawn(tmp_path, capsys, ball_file):
     core, plot = tmp_path / "core.off", tmp_path / "thickness.png"
     trimesh.creation.icosphere(subdivisions=3, radius=1.5).export(core)
