@@ -12,10 +12,11 @@ from ripple_sim.solver.kernel import Floats, Ints, kernel
 
 from .cell_sums import conductances
 from .cells import quad_area
+from .fill_cells import Added
 from .irregular import IrregularLinks
 from .links import CrossingLinks, link_exists, ties_to_rim
 from .quad_pass import LEAST_RATIO, QuadCells, quad_pass
-from .special_cells import Added, special_cells, whole_quads
+from .special_cells import special_cells, whole_quads
 from .stencil import Stencil
 from .texel_mesh import TexelMesh
 from .topology import TexelTopology

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ripple_sim.solver.kernel import Floats, Ints
 
-from .cells import polygon, quad, quad_area, strip, triangle
+from .fill_cells import Added, fill_areas, fill_polygons, fill_quads, fill_strips, fill_triangles
 from .links import CrossingLinks
 from .topology import TRIANGLE, TexelTopology
 
@@ -24,14 +23,6 @@ _CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
 _LINKS = ((0, 0, 0), (0, 1, 0), (1, 0, 0), (1, 0, 1), (2, 0, 0), (3, 0, 0))
 # two corners of a strip on the surface, the two beyond the rim opposite to them, and the link of the first two
 _STRIPS = ((0, 1, 2, 3, 0), (2, 3, 0, 1, 1), (0, 2, 1, 3, 2), (1, 3, 0, 2, 3))
-
-
-class Added(NamedTuple):
-    """What cells add: geometric weights of their links [k, l], shares of the area [k, j] and areas [k] [m^2]."""
-
-    links: Floats
-    shares: Floats
-    areas: Floats
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -105,14 +96,14 @@ def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[Spec
     texels = _own_texels(topology, np.take_along_axis(corners, belongs, axis=1))
     shares = np.flatnonzero(texels.ravel() >= 0), texels.ravel()[texels.ravel() >= 0]
     if topology.fixed_rim:
-        yield SpecialCells(corners, _fill_quads, (6, 4), _link_places(topology, cell, _LINKS), shares)
+        yield SpecialCells(corners, fill_quads, (6, 4), _link_places(topology, cell, _LINKS), shares)
         return
     nothing = np.zeros(0, np.int64), np.zeros(0, np.int64)
-    yield SpecialCells(corners, _fill_areas, (0, 4), nothing, shares)
+    yield SpecialCells(corners, fill_areas, (0, 4), nothing, shares)
     for i, j, p, q, link in _STRIPS:
         here = ~at_rim[:, i] & ~at_rim[:, j] & at_rim[:, p] & at_rim[:, q]
         strips = corners[here][:, [i, j, p, q]]
-        yield SpecialCells(strips, _fill_strips, (1, 0), _link_places(topology, cell[here], (_LINKS[link],)), nothing)
+        yield SpecialCells(strips, fill_strips, (1, 0), _link_places(topology, cell[here], (_LINKS[link],)), nothing)
 
 
 def _triangles(topology: TexelTopology) -> Iterator[SpecialCells]:
@@ -127,7 +118,7 @@ def _triangles(topology: TexelTopology) -> Iterator[SpecialCells]:
         cell = np.stack([chart, np.full_like(chart, r), np.full_like(chart, c)], axis=1)
         links = _LINKS[2 + (c == 0)], _LINKS[r == 0]  # along the column and along the row
         own = np.arange(len(chart)), topology.halo.reshape(-1)[corners[:, 0]]
-        yield SpecialCells(corners, _fill_triangles, (2, 1), _link_places(topology, cell, links), own)
+        yield SpecialCells(corners, fill_triangles, (2, 1), _link_places(topology, cell, links), own)
 
 
 def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
@@ -147,7 +138,7 @@ def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
         beside = np.flatnonzero(copies == 0)
         yield SpecialCells(
             topology.addresses.texels[texels],
-            _fill_polygons,
+            fill_polygons,
             (count * (count - 1) // 2, count),
             (source, places[first[source] + nth]),
             (np.arange(texels.size), texels.ravel()),
@@ -173,75 +164,3 @@ def _link_places(topology: TexelTopology, cell: Ints, links: tuple[tuple[int, in
         for (link, _, _), (row, column) in zip(links, at, strict=True)
     ]
     return np.flatnonzero(stored.ravel()), np.stack(flat, axis=1)[stored]
-
-
-@kernel
-def _fill_quads(places: Floats, corners: Ints, added: Added) -> None:
-    """Whole quads: six links, and a quarter of the area each."""
-    for i in range(len(corners)):
-        a, b, c, d = _quad(places, corners[i])
-        south, north, west, east, rising, falling, area = quad(a, b, c, d)
-        links = added.links[i]
-        links[0], links[1], links[2], links[3], links[4], links[5] = south, north, west, east, rising, falling
-        added.shares[i] = area / 4
-        added.areas[i] = area
-
-
-@kernel
-def _fill_areas(places: Floats, corners: Ints, added: Added) -> None:
-    """Quads without links."""
-    for i in range(len(corners)):
-        a, b, c, d = _quad(places, corners[i])
-        area = quad_area(a, b, c, d)
-        added.shares[i] = area / 4
-        added.areas[i] = area
-
-
-@kernel
-def _fill_strips(places: Floats, corners: Ints, added: Added) -> None:
-    """Strips: the link of their first two corners."""
-    for i in range(len(corners)):
-        a, b, c, d = _quad(places, corners[i])
-        added.links[i, 0] = strip(a, b, c, d)
-        added.areas[i] = quad_area(a, b, c, d)
-
-
-@kernel
-def _fill_triangles(places: Floats, corners: Ints, added: Added) -> None:
-    """Triangles, as their first corner's chart sees them: two links, and its share."""
-    for i in range(len(corners)):
-        a, b, c = _at(places, corners[i, 0]), _at(places, corners[i, 1]), _at(places, corners[i, 2])
-        _, added.links[i, 0], added.links[i, 1], area = triangle(a, b, c)
-        added.shares[i, 0] = area / 3
-        added.areas[i] = area
-
-
-@kernel
-def _fill_polygons(places: Floats, corners: Ints, added: Added) -> None:
-    """Polygons: the links between all pairs of corners."""
-    count = corners.shape[1]
-    points = np.empty((count, 3))
-    for i in range(len(corners)):
-        for j in range(count):
-            for k in range(3):
-                points[j, k] = places[k, corners[i, j]]
-        weights, shares = polygon(points)
-        link = 0
-        for a in range(count):
-            for b in range(a + 1, count):
-                added.links[i, link] = weights[a, b]
-                link += 1
-        added.shares[i] = shares
-        added.areas[i] = shares.sum()
-
-
-@kernel
-def _at(places: Floats, i: int) -> tuple[float, float, float]:
-    """A place among coordinates [3, p]."""
-    return places[0, i], places[1, i], places[2, i]
-
-
-@kernel
-def _quad(places: Floats, corners: Ints) -> tuple[Any, Any, Any, Any]:
-    """The four corners of a quad."""
-    return _at(places, corners[0]), _at(places, corners[1]), _at(places, corners[2]), _at(places, corners[3])

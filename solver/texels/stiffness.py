@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cell_sums import Cells, assemble
-from .cells import polygon
 from .irregular import IrregularLinks
 from .links import CrossingLinks, mean_of_copies
+from .polygon_cell import polygon
 from .stencil import Stencil
 from .topology import TexelTopology
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.solver.texels import cells
 from ripple_sim.solver.texels.cells import quad
+from ripple_sim.solver.texels.polygon_cell import polygon
 
 
 @pytest.mark.parametrize(("long", "angle"), [(1.0, 30.0), (2.0, 35.0), (3.0, 20.0), (1.3, 150.0)])
@@ -57,7 +57,7 @@ def test_a_cell_with_many_corners_is_exact_for_linear_functions(corners: int) ->
     rng = np.random.default_rng(corners)
     angle = np.sort(rng.uniform(0, 2 * np.pi, corners))
     flat = np.stack([np.cos(angle), 0.6 * np.sin(angle), 0 * angle], axis=1)
-    links, areas = cells.polygon(flat)
+    links, areas = polygon(flat)
     slope = np.array([0.7, -1.3, 0.0])
     energy = (links * np.subtract.outer(flat @ slope, flat @ slope) ** 2).sum() / 4
     x, y, _ = flat.T
