@@ -83,11 +83,12 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     float depth_bias = 0.5 * texel * metre;
     float least = length(vec2(1.5 / of_width.z, scatter / width)), widest = widest_penumbra(light, to_light) + least;
 
-    // loops that run zero times instead of branches: software drivers execute both sides of a branch
+    // Loops of as many rounds as are needed in place of branches: software drivers execute both sides of a branch. They
+    // are tested at the end, since such drivers execute a loop's body once more than a test before it lets pass.
     bool inside = counts.w > float(light) && facing > -0.5 && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
     float distances = 0.0, found = 0.0;
-    int taps = inside ? SEARCH_TAPS : 0;
-    for (int i = 0; i < taps; ++i) {
+    int taps = inside ? SEARCH_TAPS : 0, i = 0;
+    do {
         // denser in the middle, where a near blocker must not be missed, and of no weight at the rim, where they come in
         float away = (float(i) + 0.25 * first) / float(SEARCH_TAPS);
         vec2 offset = widest * away * direction;
@@ -97,9 +98,9 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
         float behind = light_distance(of_depth, p.z + dot(slope, offset));
         Blockers seen = blockers_about(light, p.xy + offset, footprint, behind);
         float blocks = (1.0 - away) * seen.share * smoothstep(0.0, texel + 0.25 * footprint * width, seen.before);
-        distances += blocks * seen.distance;
-        found += blocks;
-    }
+        distances += inside ? blocks * seen.distance : 0.0;
+        found += inside ? blocks : 0.0;
+    } while (++i < taps);
     distances = block_mean(distances, block);
     found = block_mean(found, block);
     float blocker = distances / max(found, 1e-4);
@@ -113,21 +114,23 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     bool shaded = inside && found > 1e-4;
     taps = shaded && wide > 0.0 ? MEAN_TAPS : 0;
     direction = start;
-    for (int i = 0; i < taps; ++i) {
+    i = 0;
+    do {
         vec2 offset = disc * sqrt((float(i) + 0.25 * first) / float(MEAN_TAPS)) * direction;
         direction = FOURTH_TURN * direction;
         float behind = light_distance(of_depth, p.z + dot(slope, offset));
         Blockers seen = blockers_about(light, p.xy + offset, between, behind);
         of_means += 1.0 - seen.share * smoothstep(0.0, texel + 0.25 * between * width, seen.before);
-    }
+    } while (++i < taps);
     taps = shaded && wide < 1.0 ? FILTER_TAPS : 0;
     direction = start;
-    for (int i = 0; i < taps; ++i) {
+    i = 0;
+    do {
         vec2 offset = penumbra * sqrt((float(i) + 0.25 * first) / float(FILTER_TAPS)) * direction;
         direction = FOURTH_TURN * direction;
         vec3 point = vec3(in_maps(light, p.xy + offset), p.z + dot(slope, offset) - depth_bias);
         of_points += textureLod(shadow_test, point, 0.0);
-    }
+    } while (++i < taps);
     float lit = mix(of_points / float(FILTER_TAPS), of_means / float(MEAN_TAPS), wide);
     lit = block_mean(shaded ? lit : 1.0, block);
     // beyond the terminator a surface shades itself, whatever the map says of it

@@ -9,21 +9,25 @@ const vec2 WIDE = vec2(1.0, 2.0);  // pixels of so many texels begin to be, and 
 vec4 seen_at(vec3 place, vec2 across, vec2 up, vec3 chart, out float variance)
 {
     float wide = smoothstep(WIDE.x, WIDE.y, max(length(across), length(up)));
+    // four taps of the spline's, which move apart to the quarters of the pixel: with each into the quarter on its side
+    bool turned = abs(across.x) < abs(across.y);
+    vec2 side = turned ? up : across, top = turned ? across : up;
+    side *= side.x < 0.0 ? -0.25 : 0.25;
+    top *= top.y < 0.0 ? -0.25 : 0.25;
+    SplineTaps spline = spline_taps(place.xy);
+    vec2 size = vec2(textureSize(height_maps, 0).xy), share = mix(spline.share, vec2(0.5), wide);
     vec4 seen = vec4(0.0);
-    variance = 0.0;
-    // loops, not branches: see light_visibility
-    int narrow_looks = chart.z > 0.0 && wide < 1.0 ? 1 : 0, wide_looks = chart.z > 0.0 && wide > 0.0 ? 4 : 0;
-    for (int i = 0; i < narrow_looks; ++i)
-        seen = spline_at(height_maps, place);
-    vec4 mean = vec4(0.0);
     float square = 0.0;
-    for (int i = 0; i < wide_looks; ++i) {
-        vec2 corner = 0.25 * ((i & 1) == 0 ? across : -across) + 0.25 * ((i & 2) == 0 ? up : -up);
-        vec2 tap = clamp(place.xy + corner, chart.xy + 0.5, chart.xy + chart.z - 0.5);
-        vec4 there = textureLod(height_maps, vec3(tap / vec2(textureSize(height_maps, 0).xy), place.z), 0.0);
-        mean += 0.25 * there;
-        square += 0.25 * dot(there.xyz, there.xyz);
+    for (int i = 0; i < 4; ++i) {
+        bvec2 high = bvec2((i & 1) == 1, (i & 2) == 2);
+        vec2 quarter = place.xy + (high.x ? side : -side) + (high.y ? top : -top);
+        quarter = clamp(quarter, chart.xy + 0.5, chart.xy + chart.z - 0.5);
+        vec2 tap = mix(mix(spline.low, spline.high, high), quarter, wide), weight = mix(1.0 - share, share, high);
+        vec4 there = textureLod(height_maps, vec3(tap / size, place.z), 0.0);
+        seen += weight.x * weight.y * there;
+        square += weight.x * weight.y * dot(there.xyz, there.xyz);
     }
-    variance = wide * max(square - dot(mean.xyz, mean.xyz), 0.0);
-    return mix(seen, mean, wide);
+    bool any = chart.z > 0.0;
+    variance = any ? wide * max(square - dot(seen.xyz, seen.xyz), 0.0) : 0.0;
+    return any ? seen : vec4(0.0);
 }

@@ -6,14 +6,15 @@ layout(std430, binding = OCCLUDERS_BINDING) readonly buffer Occluders { vec4 occ
 float occluder_visibility(vec3 position, vec3 normal, int near)
 {
     float open = 1.0;
-    for (; near != 0; near &= near - 1) {
-        int i = findLSB(near);
+    do {  // see light_visibility
+        int i = max(findLSB(near), 0);
         vec4 a = occluders[2 * i], b = occluders[2 * i + 1];
         vec3 axis = b.xyz - a.xyz, to = a.xyz - position;
         vec3 nearest = to + axis * clamp(-dot(axis, to) / max(dot(axis, axis), 1e-12), 0.0, 1.0);
         float away = length(nearest), ratio = min(a.w / max(away, 1e-9), 1.0);
         float above = clamp((dot(normal, nearest) / max(away, 1e-9) + ratio) / (1.0 + ratio), 0.0, 1.0);
-        open *= 1.0 - 0.9 * ratio * ratio * above * above;
-    }
+        open *= near != 0 ? 1.0 - 0.9 * ratio * ratio * above * above : 1.0;
+        near &= near - 1;
+    } while (near != 0);
     return open;
 }
