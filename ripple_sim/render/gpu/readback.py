@@ -1,4 +1,4 @@
-"""Read-back: a ring of pixel buffers, so that a frame is copied to memory while later ones are drawn."""
+"""Read-back: a ring of buffers, so that a frame is copied to memory while later ones are drawn."""
 
 from __future__ import annotations
 
@@ -14,11 +14,14 @@ from ripple_sim.solver.kernel import kernel
 
 from .resources import Resources
 
+_PACKED = 4  # pixels of three bytes that are whole words
+
 
 class Readback:
     """Frames on their way from the GPU, first in, first out.
 
-    There are as many buffers as frames were ever on their way at a time.
+    There are as many buffers as frames were ever on their way at a time: pixel buffers of the GPU, or plain memory
+    where the driver draws in that itself.
 
     Parameters
     ----------
@@ -31,8 +34,8 @@ class Readback:
         width, height = frame_format.size
         # always four channels: drivers copy those as they are, and convert any other number on the processor
         self._pixels = np.empty((height, width, 4), np.uint16 if frame_format.linear else np.uint8)
-        self._free: list[moderngl.Buffer] = []
-        self._pending: deque[tuple[moderngl.Buffer, int]] = deque()
+        self._free: list[moderngl.Buffer | NDArray] = []
+        self._pending: deque[tuple[moderngl.Buffer | NDArray, int]] = deque()
 
     def submit(self, frame: moderngl.Framebuffer) -> None:
         """Copy a frame as soon as it is drawn; the next one may be drawn over it.
@@ -45,8 +48,7 @@ class Readback:
         with self._gl:
             if self._gl.software:  # which would draw the frame in the next call, holding the interpreter's lock
                 self._gl.wait()
-            size = self._pixels.nbytes
-            buffer = self._free.pop() if self._free else self._resources.buffer(reserve=size, dynamic=True)
+            buffer = self._free.pop() if self._free else self._new_buffer()
             frame.read_into(buffer, components=4, alignment=1, dtype=self._format.dtype)
             self._pending.append((buffer, self._gl.put_fence()))
 
@@ -68,17 +70,47 @@ class Readback:
             raise RippleError("no frame is on its way from the GPU; submit one before each that is fetched")
         buffer, fence = self._pending.popleft()
         self._gl.wait_for(fence)
-        with self._gl:
-            buffer.read_into(self._pixels)
+        if isinstance(buffer, np.ndarray):
+            pixels = buffer
+        else:
+            pixels = self._pixels
+            with self._gl:
+                buffer.read_into(pixels)
+        frame = np.empty((*pixels.shape[:2], 4 if self._format.alpha else 3), pixels.dtype)
+        _turn(pixels, frame)
         self._free.append(buffer)
-        frame = np.empty((*self._pixels.shape[:2], 4 if self._format.alpha else 3), self._pixels.dtype)
-        for channel in range(frame.shape[2]):  # all at once would be rows of three numbers, which are slow
-            frame[..., channel] = self._pixels[::-1, :, channel]
         if self._format.linear:
             return frame.view(np.float16)
         if self._format.alpha:
             _unpremultiply(frame)
         return frame
+
+    def _new_buffer(self) -> moderngl.Buffer | NDArray:
+        if self._gl.software:
+            return np.empty_like(self._pixels)
+        return self._resources.buffer(reserve=self._pixels.nbytes, dynamic=True)
+
+
+def _turn(pixels: NDArray, frame: NDArray) -> None:
+    """Copy pixels [height, width, 4], bottom row first, to a frame [height, width, 3 or 4], top row first."""
+    width, channels = frame.shape[1:]
+    if channels == 3 and width % _PACKED == 0 and frame.dtype == np.uint8:
+        words = frame.reshape(len(frame), -1).view(np.uint32)
+        return _pack(pixels.view(np.uint32)[::-1, :, 0], words)
+    for channel in range(channels):  # all at once would be rows of three numbers, which are slow
+        frame[..., channel] = pixels[::-1, :, channel]
+
+
+@kernel
+def _pack(pixels: NDArray[np.uint32], words: NDArray[np.uint32]) -> None:
+    """Drop the fourth bytes of pixels [height, width]: every four of them become three words [height, 3 width / 4]."""
+    for row in range(pixels.shape[0]):
+        for group in range(pixels.shape[1] // _PACKED):
+            a, b = pixels[row, 4 * group], pixels[row, 4 * group + 1]
+            c, d = pixels[row, 4 * group + 2], pixels[row, 4 * group + 3]
+            words[row, 3 * group] = (a & np.uint32(0xFFFFFF)) | (b << np.uint32(24))
+            words[row, 3 * group + 1] = ((b >> np.uint32(8)) & np.uint32(0xFFFF)) | (c << np.uint32(16))
+            words[row, 3 * group + 2] = ((c >> np.uint32(16)) & np.uint32(0xFF)) | (d << np.uint32(8))
 
 
 @kernel
