@@ -1,9 +1,10 @@
 #version 430
+// Linear colour and depth.
 in vec3 albedo;
 
 out vec4 fragment;
 
 void main()
 {
-    fragment = vec4(albedo, 1.0);
+    fragment = vec4(albedo, gl_FragCoord.z);
 }

@@ -19,7 +19,7 @@ class Unit(IntEnum):
     SHADOW_TEST = 1  # the shadow maps, compared with a depth
     SHADOW_MAPS = 2
     FLOOR_MAP = 3  # ambient visibility of the floor
-    CEILING = 4  # how high above the floor the lowest geoms hang
+    CEILING = 4  # how high above the floor the lowest geoms hang, and of which colour they are
     FLAT_IMAGE = 5
     CUBE_IMAGE = 6
     SKYBOX = 7
@@ -32,9 +32,8 @@ class Unit(IntEnum):
     MIRROR = 14
     COARSE_BACKGROUND = 15
     BLOCKERS = 16  # what the shadow maps hold, prefiltered
-    CEILING_COLORS = 17  # and of which colour those are
-    FLOOR_BOUNCE = 18  # light that objects throw on the floor
-    TRANSMISSION = 19  # what transparent objects take from the lights
+    FLOOR_BOUNCE = 17  # light that objects throw on the floor
+    TRANSMISSION = 18  # what transparent objects take from the lights
 
 
 class Binding(IntEnum):
@@ -136,6 +135,7 @@ OBJECT = Struct(
 
 DEFINES: dict[str, object] = {
     "MAX_LIGHTS": MAX_LIGHTS,
+    "MAX_OCCLUDERS": MAX_OCCLUDERS,
     "HELD_LIGHTS": HELD_LIGHTS,
     "SOFT_BOXES": SOFT_BOXES,
     "VERTEX_GROUP": VERTEX_GROUP,

@@ -15,6 +15,7 @@ from .floor import Floor
 from .shadow import ShadowMaps
 
 _CEILING_SIZE, _MAP_SIZE = 224, 112
+_LEVELS, _BOUNCE_LEVELS = 5, 3  # of mipmaps that are looked up
 _INFLUENCE = 0.8  # radius, in half widths of the map
 
 
@@ -39,14 +40,14 @@ class FloorOcclusion:
             return
         program = resources.program("glsl/view_vertex", "passes/floor_occlusion_fragment", **options)
         self._pass = resources.vertex_array(program, [])
-        self._ceiling = resources.depth_texture((_CEILING_SIZE, _CEILING_SIZE))
-        self._ceiling.compare_func = ""
-        self._colors = resources.texture((_CEILING_SIZE, _CEILING_SIZE), 4)
-        self._ceiling_framebuffer = resources.framebuffer([self._colors], self._ceiling)
+        ceiling = _CEILING_SIZE, _CEILING_SIZE
+        self._ceiling = resources.texture(ceiling, 4, dtype="nu2")
+        self._ceiling.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._ceiling_framebuffer = resources.framebuffer([self._ceiling], resources.depth_renderbuffer(ceiling))
         self._map, self._bounce = (resources.texture((_MAP_SIZE, _MAP_SIZE), 4, dtype="f2") for _ in range(2))
         for texture in (self._map, self._bounce):
             texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-        for texture in (self._ceiling, self._colors, self._map, self._bounce):
+        for texture in (self._ceiling, self._map, self._bounce):
             texture.repeat_x = texture.repeat_y = False
         self._map_framebuffer = resources.framebuffer([self._map, self._bounce])
 
@@ -66,18 +67,17 @@ class FloorOcclusion:
         self._ceiling_framebuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face = "cw"
-        self._ceiling_framebuffer.clear(depth=1.0)
+        self._ceiling_framebuffer.clear(alpha=1.0, depth=1.0)
         draw_albedo(tuple(matrix.T.ravel()))
         ctx.front_face = "ccw"
         self._map_framebuffer.use()
         ctx.disable(moderngl.DEPTH_TEST)
         shadows.bind()
         self._ceiling.use(Unit.CEILING)
-        self._colors.use(Unit.CEILING_COLORS)
         self._pass.program["extent"] = (2 * floor.half_width, top, _INFLUENCE * floor.half_width)
         self._pass.render(moderngl.TRIANGLES, vertices=3)
-        self._map.build_mipmaps()
-        self._bounce.build_mipmaps()
+        self._map.build_mipmaps(max_level=_LEVELS)
+        self._bounce.build_mipmaps(max_level=_BOUNCE_LEVELS)
 
     def bind(self) -> None:
         """Bind the map for the shaders."""

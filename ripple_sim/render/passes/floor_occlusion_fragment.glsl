@@ -5,9 +5,7 @@
 #include "passes/transmission.glsl"
 #include "visuals/lights.glsl"
 
-layout(binding = CEILING_UNIT) uniform sampler2D ceiling;  // 0 at the floor, 1 at the top
-
-layout(binding = CEILING_COLORS_UNIT) uniform sampler2D ceiling_colors;  // linear
+layout(binding = CEILING_UNIT) uniform sampler2D ceiling;  // linear colour; a: height, 0 at the floor, 1 at the top
 
 uniform vec3 extent;  // width of the map [m], height of its top [m], radius of influence [m]
 
@@ -20,8 +18,11 @@ const int SHADOW_TAPS = 16;
 const float SIDE = 0.25;   // of a light on what faces neither to it nor away from it
 const float UNDER = 0.5;   // of the floor's light on what hangs above it
 
-// Whether anything shades any of a texel of the floor, which is `texel` wide [m].
-bool is_shaded(int light, vec3 world, float texel)
+// What shades a texel of the floor: whether anything shades any of it, and the share of the light that passes that.
+struct Shade { bool any; float passes; };
+
+// The texel is `texel` wide [m].
+Shade shade_of(int light, vec3 world, float texel)
 {
     Shadow shadow = shadow_at(light);
     vec4 clip = shadow.matrix * vec4(world, 1.0), width = shadow.width;
@@ -29,9 +30,19 @@ bool is_shaded(int light, vec3 world, float texel)
     vec2 off = abs(p.xy - 0.5);
     float to_light = light_distance(shadow.depth, p.z), margin = texel / (width.x + width.y * to_light);
     float reach = widest_penumbra(light, to_light) + margin, closest = 1e9, widest = 0.0;
+    bool inside = counts.w > float(light) && clip.w > 0.0 && max(off.x, off.y) < 0.5 + reach;
+    // four texels of that level, which cover all within reach
+    vec2 about = blockers_mean(light, p.xy, 2.0 * reach).xy;
+    float penumbra = penumbra_of(light, about.y / max(about.x, 1e-6), to_light);
+    float passes = inside ? 1.0 - blockers_mean(light, p.xy, max(penumbra, margin)).x : 1.0;
     float first = first_point();
     vec2 direction = spiral_direction(first);
-    for (int i = 0; i < SHADOW_TAPS; ++i) {
+#if TRANSMISSION
+    int taps = inside ? SHADOW_TAPS : 0;
+#else
+    int taps = inside && about.x > 0.0 ? SHADOW_TAPS : 0;
+#endif
+    for (int i = 0; i < taps; ++i) {
         // denser in the middle: what is close casts narrow shadows
         float offset = reach * (float(i) + 0.25 * first) / float(SHADOW_TAPS);
         direction = FOURTH_TURN * direction;
@@ -45,8 +56,7 @@ bool is_shaded(int light, vec3 world, float texel)
 #endif
     }
     // something closer may lie between two points
-    bool any = closest < widest + margin + 0.2 * reach;
-    return counts.w > float(light) && clip.w > 0.0 && any && max(off.x, off.y) < 0.5 + reach;
+    return Shade(closest < widest + margin + 0.2 * reach, passes);
 }
 
 void main()
@@ -63,11 +73,11 @@ void main()
         float s = (float(i) + 0.25 * first) / float(TAPS);
         float distance = extent.z * s * s, area = TWO_PI * distance * 2.0 * extent.z * s / float(TAPS);
         direction = FOURTH_TURN * direction;
-        float height = textureLod(ceiling, uv + distance * direction / extent.x, 0.0).r;
-        float h = max(height * extent.y, 0.6 * texel), r2 = h * h + distance * distance;
-        float share = height < 1.0 ? h * h * area / (3.14159265 * r2 * r2) : 0.0;
+        vec4 above = textureLod(ceiling, uv + distance * direction / extent.x, 0.0);
+        float h = max(above.a * extent.y, 0.6 * texel), r2 = h * h + distance * distance;
+        float share = above.a < 1.0 ? h * h * area / (3.14159265 * r2 * r2) : 0.0;
         covered += share;
-        vec3 color = share * textureLod(ceiling_colors, uv + distance * direction / extent.x, 0.0).rgb;
+        vec3 color = share * above.rgb;
         colors += color;
         across += color * direction.x;
         along += color * direction.y;
@@ -90,10 +100,13 @@ void main()
         // the sides that a point of the floor sees look towards it
         vec2 sidewards = vec2(dot(floor_u.xyz, towards), dot(floor_v.xyz, towards));
         bounce += radiance * max(SIDE * colors - across * sidewards.x - along * sidewards.y, 0.0);
-        bool casts = i < SHADOWS;
-        shaded = shaded || casts && is_shaded(i, world, size);
-        arrives += light * (casts ? light_arriving(i, world, floor_normal.xyz, -1.0, 0.0, bvec2(true)) : vec3(1.0));
         unshaded += light;
+        if (i < SHADOWS) {
+            Shade shade = shade_of(i, world, size);
+            shaded = shaded || shade.any;
+            light *= shade.passes * transmitted(i, world, floor_normal.xyz, bvec2(true));
+        }
+        arrives += light;
     }
     float share = dot(arrives, vec3(1.0)) / dot(unshaded, vec3(1.0));
     bounce += UNDER * colors * floor_albedo.rgb * (share * floor_light.rgb + sky.rgb);

@@ -38,6 +38,13 @@ float widest_penumbra(int light, float to_light)
     return penumbra_of(light, light_distance(shadow_at(light).depth, 0.0), to_light);
 }
 
+// Mean of what covers a map about a point, over so much of the map: see blockers_fragment.glsl.
+vec3 blockers_mean(int light, vec2 point, float footprint)
+{
+    float level = log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
+    return textureLod(blockers, in_maps(light, point), level).rgb;
+}
+
 // What covers a map about a point and lies before a surface: a share of the map, its distance from the light [m], and how
 // far before the surface the mean of all is [m].
 struct Blockers { float share, distance, before; };
@@ -46,8 +53,7 @@ struct Blockers { float share, distance, before; };
 // (Yang et al., Variance Soft Shadow Mapping, 2010).
 Blockers blockers_about(int light, vec2 point, float footprint, float behind)
 {
-    float level = log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
-    vec3 mean = textureLod(blockers, in_maps(light, point), level).rgb;
+    vec3 mean = blockers_mean(light, point, footprint);
     float usual = mean.y / max(mean.x, 1e-4), variance = max(mean.z / max(mean.x, 1e-4) - usual * usual, 0.0);
     float before = max(behind - usual, 1e-6);
     return Blockers(mean.x * before * before / (before * before + variance), usual - variance / before, before);

@@ -21,6 +21,7 @@ _WIDEST = 0.15  # penumbra, as a share of the map
 _STEEPEST_FOV = 130.0  # [degrees]
 _REACH = 30.0  # how far behind the casters shadows fall, in radii of the casters' ball
 _TEXELS_PER_BLOCKER = 4
+_LEVELS = 7  # of mipmaps of the blockers: as wide as twice the widest penumbra
 
 
 class ShadowMaps:
@@ -91,7 +92,7 @@ class ShadowMaps:
         ctx.disable(moderngl.DEPTH_TEST)
         self._find_blockers.render(moderngl.TRIANGLES, vertices=3)
         ctx.enable(moderngl.DEPTH_TEST)
-        self._blockers.build_mipmaps()
+        self._blockers.build_mipmaps(max_level=_LEVELS)
 
     def bind(self) -> None:
         """Bind the maps for the shaders, once with and once without the depth test."""

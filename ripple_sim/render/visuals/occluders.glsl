@@ -1,5 +1,5 @@
 // Nearby geoms, approximated by capsules.
-layout(std430, binding = OCCLUDERS_BINDING) readonly buffer Occluders { vec4 occluders[]; };  // end a, radius; end b
+layout(std140, binding = OCCLUDERS_BINDING) uniform Occluders { vec4 occluders[2 * MAX_OCCLUDERS]; };  // end a, radius; end b
 
 // Ambient visibility about a normal: the share of the hemisphere that other geoms leave free. The bits of `near` are
 // those of the occluders that count.

@@ -50,7 +50,7 @@ class Occluders:
         packed[:, 1, :3] = (middle + axis)[nearest]
         packed[:, 0, 3] = self._radius[nearest] * fade
         self._buffer.write(packed.tobytes())
-        self._buffer.bind_to_storage_buffer(Binding.OCCLUDERS)
+        self._buffer.bind_to_uniform_block(Binding.OCCLUDERS)
         self._bound, self._bound_geoms = packed.astype(np.float64), self._geoms[nearest]
 
     def near(self, balls: Balls, geoms: NDArray[np.int64]) -> NDArray[np.int64]:
