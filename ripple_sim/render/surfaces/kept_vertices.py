@@ -5,23 +5,28 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.render.bounds import Balls, balls_about
 from ripple_sim.solver.cache import content_key
 from ripple_sim.solver.kept import Kept
 
+from .coarse_mesh import coarse_mesh
 from .surface import Surface
-from .vertices import POSITION, SurfaceVertices, surface_vertices
+from .vertices import DIRECTION, POSITION, SurfaceVertices, surface_vertices
 
 _BALLS = 16  # that bound the mesh
+_COARSE = 600  # vertices of what the floor sees: texels of its map are about as far apart
+_APART = 0.1  # of the bounding radius: how far from each other the two sides of a thin body are
 _MOST_FACES = 100_000  # of a surface that is kept: 30 MB
 
 
 class BoundedVertices(NamedTuple):
-    """The vertices of a surface, whose arrays cannot be written to, and balls that bound it."""
+    """The vertices of a surface, whose arrays cannot be written to, balls about it, and few triangles of its shape."""
 
     vertices: SurfaceVertices
     balls: Balls
+    coarse: NDArray[np.int64]
 
 
 _kept: Kept[BoundedVertices] = Kept(4, lambda each: len(each.vertices.F) <= _MOST_FACES)
@@ -42,4 +47,13 @@ def _bounded(vertices: SurfaceVertices) -> BoundedVertices:
             array.flags.writeable = False
     middle = len(vertices.attributes) - len(vertices.edges.ends) + vertices.edges.of_side
     corners = np.concatenate([vertices.F, middle])
-    return BoundedVertices(vertices, balls_about(vertices.attributes[:, POSITION][corners], _BALLS))
+    points = vertices.attributes[:, POSITION]
+    return BoundedVertices(vertices, balls_about(points[corners], _BALLS), _coarse(vertices, points))
+
+
+def _coarse(vertices: SurfaceVertices, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Triangles [m, 3] between few of the vertices."""
+    base = len(points) - len(vertices.edges.ends)
+    apart = _APART * np.ptp(points, axis=0).max() / 2 * vertices.attributes[:base, DIRECTION]
+    mesh = coarse_mesh(vertices.F, np.hstack([points[:base], apart]), _COARSE)
+    return mesh.vertices[mesh.F]

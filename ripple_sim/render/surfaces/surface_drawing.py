@@ -13,8 +13,9 @@ from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.render.visuals.texture_mapping import Mapping
 
 from .heatmap import HeatmapTexture
+from .kept_vertices import BoundedVertices
 from .surface import Surface, load_image
-from .vertices import BAKED, NORMAL, SurfaceVertices, mapped_coordinates
+from .vertices import BAKED, NORMAL, mapped_coordinates
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class SurfaceDrawing:
     ----------
     assets : Assets
     paint : Paint
-    vertices : SurfaceVertices
+    bounded : BoundedVertices
     moved : moderngl.Buffer
         The displaced vertices.
     indices : moderngl.Buffer
@@ -53,14 +54,14 @@ class SurfaceDrawing:
     """
 
     def __init__(
-        self, assets: Assets, paint: Paint, vertices: SurfaceVertices, moved: moderngl.Buffer, indices: moderngl.Buffer
+        self, assets: Assets, paint: Paint, bounded: BoundedVertices, moved: moderngl.Buffer, indices: moderngl.Buffer
     ) -> None:
         resources, surface, mapping = assets.resources, paint.surface, paint.mapping
         heatmap, self._paint = surface.heatmap_colors is not None, paint
         options = {"MAPPING": mapping.kind, "HEATMAP": int(heatmap), "GRID": int(surface.grid > 0)}
         self._program = resources.program("surfaces/surface_vertex", "surfaces/surface_fragment", **options)
         depth = resources.program("surfaces/surface_depth_vertex", "glsl/depth_fragment")
-        attributes = vertices.attributes
+        vertices, attributes = bounded.vertices, bounded.vertices.attributes
         mapped = mapped_coordinates(attributes, mapping)
         self._normals = resources.buffer(attributes[:, NORMAL].astype("f4").tobytes())
         self._baked = resources.buffer(attributes[:, BAKED].astype("f4").tobytes())
@@ -73,10 +74,12 @@ class SurfaceDrawing:
         ]
         # what a program does not use is optimised away
         self._solid = resources.vertex_array(self._program, content, indices, skip_errors=True)
-        self._depth = resources.vertex_array(depth, content[:1], indices)
+        # whoever looks from afar, or for shapes alone, need not see every wave split in its triangles
+        whole, coarse = (resources.buffer(each.astype("i4").tobytes()) for each in (vertices.F, bounded.coarse))
+        self._depth = resources.vertex_array(depth, content[:1], whole)
         albedo = resources.program("surfaces/surface_depth_vertex", "glsl/albedo_fragment")
         albedo["color"] = tuple(paint.color[:3] - paint.transmission)
-        self._albedo = resources.vertex_array(albedo, content[:1], indices)
+        self._albedo = resources.vertex_array(albedo, content[:1], coarse)
         transmission = resources.program(
             "surfaces/surface_depth_vertex", "passes/transmission_fragment", SOLID=int(not surface.open), REFRACTING=1
         )
@@ -123,18 +126,18 @@ class SurfaceDrawing:
         self._program["color"] = self._paint.color
         _render(self._solid, count)
 
-    def draw_depth(self, view_projection: tuple[float, ...], count: int | moderngl.Buffer) -> None:
-        """Draw the depth of the first `count` indices, under a matrix of 16 numbers, column by column."""
+    def draw_depth(self, view_projection: tuple[float, ...]) -> None:
+        """Draw the depth of the unsplit triangles, under a matrix of 16 numbers, column by column."""
         self._depth.program["matrix"] = view_projection
-        _render(self._depth, count)
+        self._depth.render()
 
-    def draw_albedo(self, view_projection: tuple[float, ...], count: int | moderngl.Buffer) -> None:
-        """Draw them in their linear colour, likewise."""
+    def draw_albedo(self, view_projection: tuple[float, ...]) -> None:
+        """Draw few triangles of the same shape in their linear colour, likewise."""
         self._albedo.program["matrix"] = view_projection
-        _render(self._albedo, count)
+        self._albedo.render()
 
     def draw_transmission(self, view_projection: tuple[float, ...], light: int, count: int | moderngl.Buffer) -> None:
-        """Draw them into the transmission map of a light, likewise."""
+        """Draw the first `count` indices into the transmission map of a light, likewise."""
         program = self._transmission.program
         program["matrix"], program["light"] = view_projection, light
         _render(self._transmission, count)

@@ -81,11 +81,12 @@ class SurfaceMesh:
         )
         assets.objects.set_chart(self.number, surface.charts.page.block)
         pixel = 2 * self._radius / size[1]
-        vertices, self._balls = bounded_vertices(surface, pixel * PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
+        bounded = bounded_vertices(surface, pixel * PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)
+        vertices, self._balls = bounded.vertices, bounded.balls
         self._triangles = SurfaceTriangles(assets.resources, vertices, surface.charts, index, pixel)
         self._displacement = Displacement(assets.resources, vertices, index)
         paint = Paint(surface, mapping, (*rgb, float(self.number)), look.transparency * rgb)
-        self._drawing = SurfaceDrawing(assets, paint, vertices, self._displacement.moved, self._triangles.indices)
+        self._drawing = SurfaceDrawing(assets, paint, bounded, self._displacement.moved, self._triangles.indices)
         self._mesh, self._vertices = surface.moving or (surface.V, surface.F), vertices
         self._moving: tuple[MovingVertices, MovingOcclusion] | None = None
 
@@ -177,12 +178,12 @@ class SurfaceMesh:
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth only, under a matrix of 16 numbers, column by column."""
         with self._sides():
-            self._drawing.draw_depth(view_projection, self._triangles.count)
+            self._drawing.draw_depth(view_projection)
 
     def draw_albedo(self, view_projection: tuple[float, ...]) -> None:
         """Draw in the linear colour, likewise."""
         with self._sides():
-            self._drawing.draw_albedo(view_projection, self._triangles.count)
+            self._drawing.draw_albedo(view_projection)
 
     def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
         """Draw into the transmission map of a light, likewise."""

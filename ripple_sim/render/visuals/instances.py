@@ -125,27 +125,27 @@ class Instances:
         if self._image is not None:
             unit, texture = self._image
             texture.use(unit)
-        self._array()[0].render(instances=len(self._records))
+        self._array(self._segments)[0].render(instances=len(self._records))
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth only, under a matrix of 16 numbers, column by column."""
         self._programs[1]["matrix"] = view_projection
-        self._array()[1].render(instances=len(self._records))
+        self._array(self._segments)[1].render(instances=len(self._records))
 
     def draw_albedo(self, view_projection: tuple[float, ...]) -> None:
-        """Draw in the linear colour, likewise."""
+        """Draw coarsely in the linear colour, likewise."""
         self._programs[2]["matrix"] = view_projection
-        self._array()[2].render(instances=len(self._records))
+        self._array(_LEVELS[0])[2].render(instances=len(self._records))
 
-    def _array(self) -> list[moderngl.VertexArray]:
-        if self._segments not in self._arrays:
-            vertices, indices = self._shape.level(self._segments)
+    def _array(self, segments: int) -> list[moderngl.VertexArray]:
+        if segments not in self._arrays:
+            vertices, indices = self._shape.level(segments)
             content = [
                 (vertices, "3f 3f 3f 2f", "in_core", "in_shell", "in_normal", "in_uv"),
                 (self._buffer, "9f 3f 3f 3f 4f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
             ]
             # what a program does not use is optimised away
-            self._arrays[self._segments] = [
+            self._arrays[segments] = [
                 self._resources.vertex_array(program, content, indices, skip_errors=True) for program in self._programs
             ]
-        return self._arrays[self._segments]
+        return self._arrays[segments]
