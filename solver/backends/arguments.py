@@ -6,7 +6,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Floats32, Ints, Ints32
+from ripple_sim.solver.kernel import Floats, Floats32, Ints
 
 Coefficient: TypeAlias = Floats32 | np.float32
 
@@ -51,17 +51,6 @@ class Weights(NamedTuple):
     irregular: Links
 
 
-class ByPart(NamedTuple):
-    """A number for each part of the surface: part of each texel, [C, n, n], and values [p]; see `floating_parts`."""
-
-    parts: Ints32
-    values: Floats32
-
-
-# one number, one for each chart, or one for each part
-Pressure: TypeAlias = ByPart | Floats32 | np.float32
-
-
 class Kick(NamedTuple):
     """v = decay v + gain (force + extra) - spring h + span acceleration; see `StepCoefficients`."""
 
@@ -71,7 +60,7 @@ class Kick(NamedTuple):
     spring: Coefficient
     span: Coefficient
     extra: Coefficient
-    acceleration: Pressure
+    acceleration: Coefficient
 
 
 class Drift(NamedTuple):
@@ -80,15 +69,25 @@ class Drift(NamedTuple):
     columns: int
 
     response: Coefficient
-    shift: Pressure
+    shift: Coefficient
     dt: np.float32
+
+
+class PartRuns(NamedTuple):
+    """Texels side by side in coefficients that belong to one part of the surface; see `floating_parts`.
+
+    Where each run begins, [k + 1], and its part, [k].
+    """
+
+    begins: Ints
+    parts: Ints
 
 
 class Balance(NamedTuple):
     """What keeps the volume, see `VolumeRate`: factors of texels that lie side by side in runs.
 
     Where the runs of each part begin, [p + 1], the address of each run, [r], and where its factors begin, [r + 1]; what
-    the load asks for and the sum, each [p]; the part of each chart.
+    the load asks for and the sum, each [p]; where the sums count.
     """
 
     begins: Ints
@@ -98,7 +97,7 @@ class Balance(NamedTuple):
     velocities: Floats32
     loaded: Floats32
     total: Floats32
-    chart_parts: Ints
+    spread: PartRuns
 
 
 class Loads(NamedTuple):
@@ -123,3 +122,34 @@ class Plasticity(NamedTuple):
 
     limit: Coefficient
     dent: Floats32
+
+
+class Features(NamedTuple):
+    """What few materials have, each empty where this one lacks it: viscous stencil, bending, yielding, volume kept.
+
+    Lengths tell which are empty, not types: with one of them for every set of features, dozens would be compiled.
+    """
+
+    viscous: Weights
+    bending: Bending
+    plasticity: Plasticity
+    balance: Balance
+
+
+_NO_INTS, _NO_FLOATS, _NO_FIELD = np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((0, 0, 0), np.float32)
+_NO_WEIGHTS = Weights(np.zeros((0, 4, 0, 0), np.float32), 0, Links(_NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS))
+NO_FEATURES = Features(
+    _NO_WEIGHTS,
+    Bending(_NO_WEIGHTS, _NO_FIELD, _NO_FIELD),
+    Plasticity(0, _NO_FIELD, _NO_FIELD),
+    Balance(
+        _NO_INTS,
+        _NO_INTS,
+        _NO_INTS,
+        _NO_FLOATS,
+        _NO_FLOATS,
+        _NO_FLOATS,
+        _NO_FLOATS,
+        PartRuns(_NO_INTS, _NO_INTS),
+    ),
+)

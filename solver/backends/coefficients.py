@@ -1,4 +1,4 @@
-"""Coefficients in compiled loops: a number, one for each chart or part, or a field; a number costs no read."""
+"""Coefficients in compiled loops: a number or a field; a number costs no read."""
 
 from __future__ import annotations
 
@@ -7,16 +7,14 @@ from numba.extending import overload
 
 
 def row_of(x, chart, r):
-    """x[chart, r] of a field, x[chart] of one number a chart, the row of a `ByPart`, or the number x itself."""
+    """x[chart, r] of a field, or the number x itself."""
     raise NotImplementedError("for compiled code only")
 
 
 @overload(row_of, inline="always")
 def _row_overload(x, chart, r):
     if isinstance(x, numba.types.Array):
-        return (lambda x, chart, r: x[chart]) if x.ndim == 1 else (lambda x, chart, r: x[chart, r])
-    if isinstance(x, numba.types.BaseTuple):
-        return lambda x, chart, r: (x.parts[chart, r], x.values)
+        return lambda x, chart, r: x[chart, r]
     return lambda x, chart, r: x
 
 
@@ -29,8 +27,6 @@ def cut(row, columns):
 def _cut_overload(row, columns):
     if isinstance(row, numba.types.Array):
         return lambda row, columns: row[columns]
-    if isinstance(row, numba.types.BaseTuple):
-        return lambda row, columns: (row[0][columns], row[1])
     return lambda row, columns: row
 
 
@@ -43,8 +39,6 @@ def value_in(x, c):
 def _in_overload(x, c):
     if isinstance(x, numba.types.Array):
         return lambda x, c: x[c]
-    if isinstance(x, numba.types.BaseTuple):
-        return lambda x, c: x[1][x[0][c]]
     return lambda x, c: x
 
 
@@ -60,18 +54,16 @@ def _texel_overload(x, i):
     return lambda x, i: x
 
 
-def spread(amplitudes, chart_parts, x):
-    """Write the amplitude of each part, [p], to one number a chart [C], or to a `ByPart`."""
+def spread(amplitudes, runs, x):
+    """Write the amplitude of each part, [p], to its texels in a field; a number is left alone."""
     raise NotImplementedError("for compiled code only")
 
 
 @overload(spread)
-def _spread_overload(amplitudes, chart_parts, x):
-    def to_charts(amplitudes, chart_parts, x):
-        for chart in range(len(x)):
-            x[chart] = amplitudes[chart_parts[chart]]
+def _spread_overload(amplitudes, runs, x):
+    def to_texels(amplitudes, runs, x):
+        flat = x.reshape(-1)
+        for i in range(len(runs.parts)):
+            flat[runs.begins[i] : runs.begins[i + 1]] = amplitudes[runs.parts[i]]
 
-    def to_parts(amplitudes, chart_parts, x):
-        x.values[:] = amplitudes
-
-    return to_parts if isinstance(x, numba.types.BaseTuple) else to_charts
+    return to_texels if isinstance(x, numba.types.Array) else lambda amplitudes, runs, x: None

@@ -10,11 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.operator.step_coefficients import StepCoefficients, number_or_field, step_coefficients
-from ripple_sim.solver.operator.volume_rate import volume_rate
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 
 from . import blocks, kernels, threads
-from .arguments import Amplitude, Balance, Bending, ByPart, Drift, Kick, Loads, Plasticity, Pressure, State
+from .arguments import (
+    NO_FEATURES,
+    Amplitude,
+    Balance,
+    Bending,
+    Coefficient,
+    Drift,
+    Features,
+    Kick,
+    Loads,
+    Plasticity,
+    State,
+    Weights,
+)
+from .cpu_coefficients import is_varied, laid_out, part_runs, pressure, volume_balance
 from .cpu_fields import LARGE, LINE, PAGE, FieldLayout
 
 
@@ -55,17 +68,20 @@ class CPUBackend:
             self._bending = Bending(fields.weights(operator.laplace_stencil), rigidity, fields.zeros())
         if operator.yield_height is not None:
             self._dent = fields.zeros()
-            limit = fields.coefficients(number_or_field(operator.yield_height))
+            limit = fields.coefficients(operator.yield_height.astype(np.float32))
             self._plasticity = Plasticity(fields.columns, limit, self._dent)
-        drags = self._bending is not None or self._viscous is not None
-        self._extra = fields.zeros() if drags else np.float32(0)
         self._most = blocks.block_length(fields.n, self._h.shape[2])
         self._response = fields.coefficients(number_or_field(operator.response))
-        self._chart_parts, self._parts = _parts_by_chart(operator.parts, fields)
+        self._part_runs = None if operator.parts is None else part_runs(operator.parts, fields)
         self._balance: Balance | None = None
+        self._extra: Coefficient = np.float32(0)
         self._shift: Amplitude = 0.0
         self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
+
+    @property
+    def _by_threads(self) -> bool:
+        return self._in_blocks and self._balance is None
 
     @property
     def thread_count(self) -> int:
@@ -131,14 +147,14 @@ class CPUBackend:
         state = State(self._h, self._v, self._h_next)
         kick = Kick(self._stencil, k.gain, k.decay, k.spring, k.span, self._extra, self._pressure(self._acceleration))
         length, step = np.float32(dt), (state, self._fields.halo, kick, self._loads)
-        if self._in_blocks and self._balance is None:
+        if self._by_threads:
             plan = threads.Plan(substeps, self._most, length)
             threads.advance(self._threads, plan, *step, self._start(dt / 2))
         else:
             self._drift(dt / 2)
             if self._plasticity is not None:
                 kernels.flow(self._h, self._plasticity)
-            kernels.advance(substeps, length, *step, self._viscous, (self._bending, self._plasticity, self._balance))
+            kernels.advance(substeps, length, *step, *self._beside())
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
 
@@ -173,23 +189,35 @@ class CPUBackend:
         self._shift = 0.0
         return drift
 
-    def _pressure(self, amplitude: Amplitude) -> Pressure:
+    def _pressure(self, amplitude: Amplitude) -> Coefficient:
         """An amplitude as the loops take it."""
-        if self._operator.parts is None and self._balance is None:
-            return np.float32(amplitude)
-        amplitudes = np.full(int(self._chart_parts.max()) + 1, amplitude, np.float32)
-        if self._parts is None:
-            return amplitudes[self._chart_parts]
-        return ByPart(self._parts, amplitudes)
+        return pressure(amplitude, self._part_runs if self._balance is None else self._balance.spread, self._fields)
+
+    def _beside(self) -> tuple[Weights | None, Features | None]:
+        """The last two arguments of `kernels.advance`."""
+        if not self._has_features:
+            return self._viscous, None
+        return None, Features(
+            self._viscous or NO_FEATURES.viscous,
+            self._bending or NO_FEATURES.bending,
+            self._plasticity or NO_FEATURES.plasticity,
+            self._balance or NO_FEATURES.balance,
+        )
 
     def _prepare(self, dt: float) -> StepCoefficients:
         """Coefficients of the kick, computed once a step length, and the load's, once a load as well."""
         new_length = self._prepared != (dt, self.keeps_volume)
         if new_length:
+            self._balance = None
+            if self.keeps_volume:
+                self._balance = volume_balance(self._operator, dt, self._fields, self._part_runs)
             k = step_coefficients(self._operator, dt)
-            laid_out = map(self._fields.coefficients, (k.gain, k.decay, k.spring, k.span))
-            self._coefficients = StepCoefficients(*laid_out)
-            self._balance = self._keep_volume(dt)
+            varied = is_varied(k) or self._part_runs is not None or self._balance is not None
+            self._coefficients = laid_out(k, self._fields, varied=varied)
+            self._has_features = varied or self._bending is not None or self._plasticity is not None
+            drags = self._viscous is not None or (self._has_features and not self._by_threads)
+            if drags != bool(np.ndim(self._extra)):
+                self._extra = self._fields.zeros() if drags else np.float32(0)
             self._prepared = (dt, self.keeps_volume)
         k = self._coefficients
         if new_length or self._load_is_new:
@@ -201,36 +229,3 @@ class CPUBackend:
                 self._balance.loaded[:] = self._acceleration
             self._load_is_new = False
         return k
-
-    def _keep_volume(self, dt: float) -> Balance | None:
-        rate = volume_rate(self._operator, dt) if self.keeps_volume else None
-        if rate is None:
-            return None
-        addresses = self._fields.addresses[rate.texels]
-        follows = np.append(False, np.diff(addresses) == 1)
-        follows[rate.begins[:-1][rate.begins[:-1] < len(follows)]] = False
-        runs = np.flatnonzero(~follows)
-        begins = np.searchsorted(runs, rate.begins)
-        loaded, total = np.zeros((2, len(rate.begins) - 1), np.float32)
-        return Balance(
-            begins,
-            addresses[runs],
-            np.append(runs, len(addresses)),
-            rate.heights,
-            rate.velocities,
-            loaded,
-            total,
-            self._chart_parts,
-        )
-
-
-def _parts_by_chart(
-    parts: NDArray[np.int32] | None, fields: FieldLayout
-) -> tuple[NDArray[np.int64], NDArray[np.int32] | None]:
-    """Part of each chart of the fields, and, where parts share a chart, that of each texel, as coefficients."""
-    count = len(fields.zeros())
-    if parts is None or not parts.any():
-        return np.zeros(count, np.int64), None
-    laid_out = fields.coefficients(parts)
-    greatest = laid_out.max(axis=(1, 2))
-    return greatest.astype(np.int64), None if (laid_out == greatest[:, None, None]).all() else laid_out

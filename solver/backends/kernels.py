@@ -8,13 +8,13 @@ from ripple_sim.solver.kernel import Floats32, kernel
 
 from .arguments import (
     Balance,
-    Bending,
+    Coefficient,
     Drift,
+    Features,
     Halo,
     Kick,
     Loads,
     Plasticity,
-    Pressure,
     State,
     Weights,
 )
@@ -72,39 +72,47 @@ def advance(
     kick: Kick,
     loads: Loads,
     viscous: Weights | None,
-    features: tuple[Bending | None, Plasticity | None, Balance | None],
+    features: Features | None,
 ) -> None:
     """Substeps of dt, from the first half drift to the last; the height ends in `h_next` where their number is odd.
 
-    Features that a material lacks are None, and compiled away.
+    What is None is compiled away: `features` where a material has no more than viscosity, which then is `viscous`.
     """
-    bending, plasticity, balance = features
     half = dt / np.float32(2)
     h, v, h_next = state
     for step in range(substeps):
         fill(h, halo)
-        _gather_extra(h, v, halo, kick, viscous, bending)
-        _balance(h, v, balance, kick.acceleration)
+        _drag(v, halo, viscous, kick.extra)
+        _act(h, v, halo, kick, features)
         drifted = dt if step < substeps - 1 else half
         kick_drift(State(h, v, h_next), kick, drifted, 0, len(h))
         kick_irregular(State(h, v, h_next), kick, drifted)
         h, h_next = h_next, h
         kick_texels(h, v, loads, drifted)
-        _flow(h, plasticity)
+        _flow(h, features)
 
 
 @kernel
-def _gather_extra(
-    h: Floats32, v: Floats32, halo: Halo, kick: Kick, viscous: Weights | None, bending: Bending | None
-) -> None:
-    """Forces beside tension and stiffness, into `kick.extra`: viscous, and of bending."""
+def _drag(v: Floats32, halo: Halo, viscous: Weights | None, out: Coefficient) -> None:
+    """Viscous forces."""
     if viscous is not None:
         fill(v, halo)
-        apply(viscous, v, np.float32(1), False, kick.extra)
-    if bending is not None:
-        apply(bending.laplace, h, bending.rigidity, False, bending.moment)
-        fill(bending.moment, halo)
-        apply(bending.laplace, bending.moment, np.float32(-1), viscous is not None, kick.extra)
+        apply(viscous, v, np.float32(1), False, out)
+
+
+@kernel
+def _act(h: Floats32, v: Floats32, halo: Halo, kick: Kick, features: Features | None) -> None:
+    """What a material's features add to a substep: forces in `kick.extra`, the pressure in `kick.acceleration`."""
+    if features is not None:
+        bending, drags = features.bending, len(features.viscous.rows) > 0
+        if drags:
+            _drag(v, halo, features.viscous, kick.extra)
+        if len(bending.moment):
+            apply(bending.laplace, h, bending.rigidity, False, bending.moment)
+            fill(bending.moment, halo)
+            apply(bending.laplace, bending.moment, np.float32(-1), drags, kick.extra)
+        if len(features.balance.loaded):
+            _balance(h, v, features.balance, kick.acceleration)
 
 
 @kernel(fastmath={"contract", "reassoc"})
@@ -117,23 +125,22 @@ def _weighed(factors: Floats32, field: Floats32) -> float:
 
 
 @kernel
-def _balance(h: Floats32, v: Floats32, balance: Balance | None, acceleration: Pressure) -> None:
+def _balance(h: Floats32, v: Floats32, balance: Balance, acceleration: Coefficient) -> None:
     """The pressure that keeps the volume of each part, where the density varies."""
-    if balance is not None:
-        heights, velocities = h.reshape(-1), v.reshape(-1)
-        for part in range(len(balance.loaded)):
-            total = 0.0
-            for run in range(balance.begins[part], balance.begins[part + 1]):
-                first, last, address = balance.runs[run], balance.runs[run + 1], balance.addresses[run]
-                total += _weighed(balance.heights[first:last], heights[address:])
-                if len(balance.velocities):
-                    total += _weighed(balance.velocities[first:last], velocities[address:])
-            balance.total[part] = balance.loaded[part] + np.float32(total)
-        spread(balance.total, balance.chart_parts, acceleration)
+    heights, velocities = h.reshape(-1), v.reshape(-1)
+    for part in range(len(balance.loaded)):
+        total = 0.0
+        for run in range(balance.begins[part], balance.begins[part + 1]):
+            first, last, address = balance.runs[run], balance.runs[run + 1], balance.addresses[run]
+            total += _weighed(balance.heights[first:last], heights[address:])
+            if len(balance.velocities):
+                total += _weighed(balance.velocities[first:last], velocities[address:])
+        balance.total[part] = balance.loaded[part] + np.float32(total)
+    spread(balance.total, balance.spread, acceleration)
 
 
 @kernel
-def _flow(h: Floats32, plasticity: Plasticity | None) -> None:
+def _flow(h: Floats32, features: Features | None) -> None:
     """`flow` where the material yields."""
-    if plasticity is not None:
-        flow(h, plasticity)
+    if features is not None and len(features.plasticity.dent):
+        flow(h, features.plasticity)

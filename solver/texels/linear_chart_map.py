@@ -63,7 +63,7 @@ class LinearChartMap:
 
     def compiled(self, mesh: Mesh, topology: TexelTopology) -> LinearCharts:
         """The triangles in space and on the charts."""
-        return LinearCharts(mesh.V[mesh.F], self.charts, self.corners, topology.shape[1])
+        return LinearCharts(mesh.V[mesh.F], self.charts, np.ascontiguousarray(self.corners), topology.shape[1])
 
     def linear_parts(self, mesh: Mesh) -> LinearParts:
         """The triangles, with chart, row and column of their corners."""

@@ -99,9 +99,9 @@ class TexelMesh:
     @functools.cached_property
     def grid(self) -> TexelGrid:
         """The texel mesh as compiled code reads it."""
-        return TexelGrid(
-            self.topology.halo, self.positions.reshape(-1, 3), self.normals.reshape(-1, 3), self.areas.reshape(-1)
-        )
+        halo = self.topology.halo.view()
+        halo.flags.writeable = False  # as `glue` makes it: for copies, which can be written, kernels were compiled anew
+        return TexelGrid(halo, self.positions.reshape(-1, 3), self.normals.reshape(-1, 3), self.areas.reshape(-1))
 
     def with_fixed_rim(self) -> TexelMesh:
         """The same with heights of 0 at its rims."""

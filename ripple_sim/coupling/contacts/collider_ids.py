@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.model.coupled_model import CoupledModel
 from ripple_sim.solver.kernel import Floats, Ints, Ints32, kernel
 
+from .target_contacts import contiguous
+
 
 class _Flexes(NamedTuple):
     """Where the flexes' vertices are, by flex: more as in MuJoCo's model.
@@ -72,7 +74,7 @@ class ColliderIds:
         contacts = data.contact
         if self._plain:
             return contacts.geom.astype(np.int64)
-        sides = _Sides(contacts.geom, contacts.flex, contacts.elem, contacts.vert, contacts.pos)
+        sides = _Sides(*contiguous(contacts.geom, contacts.flex, contacts.elem, contacts.vert, contacts.pos))
         found = _collider_ids(sides, self._whole, self._flexes, data.flexvert_xpos)
         if self._soft:
             found[found[:, 0] == found[:, 1]] = -1  # what is soft touches itself

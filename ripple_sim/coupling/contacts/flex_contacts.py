@@ -15,7 +15,7 @@ from ripple_sim.solver import Mesh
 
 from .flex_forces import FlexNormals, MujocoFlexContacts, summed_contacts
 from .geom_contacts import PYRAMIDAL
-from .target_contacts import TargetContacts
+from .target_contacts import TargetContacts, contiguous
 
 # Share of the forces on a target that may be pushes sideways; old ones count less with each step.
 _UNEXPLAINED, _MEMORY = 0.01, 0.99
@@ -61,7 +61,7 @@ class FlexContacts:
         if not data.ncon:
             return {}
         each = data.contact
-        contacts = MujocoFlexContacts(
+        fields = (
             each.efc_address,
             each.dim,
             each.friction,
@@ -74,6 +74,7 @@ class FlexContacts:
             data.efc_force,
             data.geom_xmat,
         )
+        contacts = MujocoFlexContacts(*contiguous(*fields))
         pyramidal = self._model.opt.cone == PYRAMIDAL
         found, amounts = summed_contacts(colliders, contacts, self._normals, extents, pyramidal)
         self._judge(amounts)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Bools, Floats, Ints, Ints32, kernel
 
-from .target_contacts import PairContacts, TargetContacts, close, group_by_pair, room_for, trimmed
+from .target_contacts import PairContacts, TargetContacts, close, contiguous, group_by_pair, room_for, trimmed
 
 PYRAMIDAL = int(mujoco.mjtCone.mjCONE_PYRAMIDAL)
 
@@ -60,10 +60,8 @@ def geom_contacts(
         return {}
     each = data.contact
     pulls = np.zeros(data.ncon) if pulls is None else pulls
-    # one contact alone is an array of another layout than several: kernels would be compiled for each
-    fields = (each.efc_address, each.dim, each.frame, each.pos, each.dist)
-    address, dim, frame, pos, dist = map(np.ascontiguousarray, fields)
-    contacts = _MujocoContacts(address, dim, frame, pos, dist, data.efc_force, pulls)
+    fields = (each.efc_address, each.dim, each.frame, each.pos, each.dist, data.efc_force, pulls)
+    contacts = _MujocoContacts(*contiguous(*fields))
     has_flex = np.zeros(len(is_target), dtype=np.bool_) if has_flex is None else has_flex
     pyramidal = model.opt.cone == PYRAMIDAL
     return trimmed(*_normal_contacts(colliders, contacts, is_target, has_flex, extents, pyramidal)).by_target()

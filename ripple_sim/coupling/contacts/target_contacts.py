@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Bools, Floats, Ints, Ints32, kernel
 
@@ -85,6 +87,14 @@ class Pairs(NamedTuple):
     begins: Ints
     contacts: Ints
     sides: Ints
+
+
+def contiguous(*fields: NDArray) -> Iterator[NDArray]:
+    """Arrays of MuJoCo's contacts as kernels take them.
+
+    One contact alone is an array of another layout than several: kernels would be compiled for each.
+    """
+    return map(np.ascontiguousarray, fields)
 
 
 @kernel

@@ -1,5 +1,7 @@
 """The CPU backend against whole matrices in double precision, and what it conserves."""
 
+import itertools
+
 import numpy as np
 import pytest
 from dense_waves import DenseWaves
@@ -7,6 +9,7 @@ from hand_made import flat_torus, polygon, square, two_squares
 
 from ripple_sim.solver import Material, TexelMesh, texel_atlas
 from ripple_sim.solver.backends.cpu import CPUBackend
+from ripple_sim.solver.backends.kernels import advance
 from ripple_sim.solver.operator.assembly import build_operator
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 
@@ -74,6 +77,17 @@ def test_waves_are_those_of_whole_matrices(mesh: str, material: str, substeps: i
     expected = [(dense.h + dense.dent), dense.v, dense.dent]
     for now, then in zip((backend.height(), backend.velocity(), backend.dent()), expected, strict=True):
         np.testing.assert_allclose(now.ravel(), then, atol=2e-5 * max(1.0, np.abs(then).max()))
+
+
+def test_few_loops_are_compiled_for_all_materials() -> None:
+    texels = MESHES["torus"]
+    maps = 0.0, 1.0, ramp(texels)
+    for damping, stiffness, density, bending in itertools.product(maps, maps, maps[1:], (0.0, 1e-3)):
+        material = Material(speed=1.0, damping=damping, stiffness=stiffness, density=density, bending=bending)
+        operator = operator_of(texels, material)
+        for keeps_volume in (False, True):
+            CPUBackend(operator, keeps_volume=keeps_volume).advance(1, step_of(operator))
+    assert len(advance.signatures) <= 5
 
 
 @pytest.mark.parametrize("mesh", ["square", "corner of five", "torus"])

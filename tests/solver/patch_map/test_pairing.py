@@ -12,7 +12,7 @@ from ripple_sim.solver.patch_map.pairing import Joints, chosen_joints
 def hull(points: int) -> tuple[Joints, int, np.ndarray]:
     """Triangles of the convex hull of random points, their sides, and how many meet in each point."""
     V = np.random.default_rng(points).normal(size=(points, 3))
-    F = ConvexHull(V / np.linalg.norm(V, axis=1, keepdims=True)).simplices
+    F = ConvexHull(V / np.linalg.norm(V, axis=1, keepdims=True)).simplices.astype(np.int64)
     pairs = [(i, j) for i, j in itertools.combinations(range(len(F)), 2) if len(set(F[i]) & set(F[j])) == 2]
     ends = [sorted(set(F[i]) & set(F[j])) for i, j in pairs]
     return Joints(np.array(pairs), np.array(ends), np.zeros(len(pairs))), len(F), np.bincount(F.ravel())

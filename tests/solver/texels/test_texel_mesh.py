@@ -1,5 +1,8 @@
 """Texel meshes of any topology: rims, irregular vertices, several parts, against what is known of their waves."""
 
+import copy
+
+import numba
 import numpy as np
 import pytest
 from hand_made import eigenvalues, flat_torus, polygon, square
@@ -96,3 +99,8 @@ def test_momentum_of_an_impulse_on_a_rim_and_an_irregular_vertex() -> None:
         waves.add_impulse(point, 0.7, 0.2)
         waves.step(0.3)
         assert waves.momentum() == pytest.approx(-0.7, rel=1e-5)
+
+
+def test_no_kernel_is_compiled_anew_for_a_copy() -> None:
+    texels = square(4)
+    assert numba.typeof(copy.deepcopy(texels).grid) == numba.typeof(texels.grid)
