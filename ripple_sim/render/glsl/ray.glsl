@@ -5,10 +5,16 @@ in vec3 way_local;
 flat in vec3 eye_local;
 flat in vec4 limits;
 
+// Negative where the ray meets the floor's plane between two of the floor's edges; varies linearly across them.
+vec2 beside_edges()
+{
+    return abs(way_local.z * eye_local.xy + eye_local.z * way_local.xy) - way_local.z * limits.xy;
+}
+
 // Negative where the ray meets the floor's upper side; varies linearly across the edges.
 float beside_floor()
 {
-    vec2 beside = abs(way_local.z * eye_local.xy + eye_local.z * way_local.xy) - way_local.z * limits.xy;
+    vec2 beside = beside_edges();
     return max(max(beside.x, beside.y), 1e-6 * eye_local.z - way_local.z);
 }
 

@@ -60,6 +60,13 @@ class Splitting(IntEnum):
     COMMAND = 7
 
 
+class BackgroundTiles(IntEnum):
+    """Bindings of the storage buffers of the background's tiles; `NAME_BINDING` in GLSL."""
+
+    TILES = 0
+    COMMANDS = 1
+
+
 class MappingKind(IntEnum):
     """How a texture lies on an object; the same names in GLSL."""
 
@@ -74,8 +81,8 @@ class MappingKind(IntEnum):
 
 # Depths that stand for what a pixel shows, exact in every depth buffer; `NAME_LEVEL` in GLSL.
 LEVELS = {
-    "OPEN": 1.0,  # background that no shadow reaches
-    "SHADED": 0.75,  # background that a shadow may reach
+    "OPEN": 1.0,  # background that is smooth
+    "SHADED": 0.75,  # background that a shadow may reach, or that is not smooth
     "MIXED": 0.5,  # solids in some of the samples
     "SOLID": 0.25,  # solids in all of them
     "LAYER": 0.125,  # the transparent object that is being drawn
@@ -142,6 +149,7 @@ DEFINES: dict[str, object] = {
     **numbered(Unit, "_UNIT"),
     **numbered(Binding, "_BINDING"),
     **numbered(Splitting, "_BINDING"),
+    **numbered(BackgroundTiles, "_BINDING"),
     **numbered(MappingKind),
     **{f"{name}_LEVEL": level for name, level in LEVELS.items()},
     **LIGHT.defines(),

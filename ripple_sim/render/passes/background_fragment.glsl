@@ -1,9 +1,9 @@
 #version 430
-// The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW the marked
-// pixels, and those that show solids too. With COARSE every pixel stands for a block of them.
+// The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW those pixels.
+// Each pixel stands for a block of BLOCK x BLOCK of the frame's.
+#define OWN_POINTS (BLOCK > 1)
 #include "gpu/held_uniforms.glsl"
 #include "glsl/ray.glsl"
-#include "gpu/g_buffer_read.glsl"
 #include "passes/floor_map.glsl"
 #include "visuals/environment.glsl"
 #include "glsl/tone_mapping.glsl"
@@ -27,9 +27,10 @@ uniform float reflectance;
 #endif
 
 const float STEEPEST = 0.03;  // change from one block to the next up to which the background is smooth
+const float RIM = 0.5;         // blocks on either side of the floor's edges that are not smooth
 const float HIGHEST_LEVEL = 4.0;  // of the floor map
 const float BOUNCE_LEVEL = 2.3;   // where few points of the map's search are seen no longer
-const float UNSEEN = 0.001;       // share of a light that nobody misses
+const float UNSEEN = 0.004;       // share of a light that nobody misses
 const float OUTSIDE = 1e9;        // [m]
 const float LARGEST = 0.04;       // of the floor map's half width: larger blocks would miss shadows, but not the map
 
@@ -63,7 +64,7 @@ void main()
     // the lights are near: a pool of light about the focus, and the background's colour beyond
     float away = length(vec3(plane - focus_local.xy, focus_local.z));
     // antialiasing of the floor's own edges
-    vec2 inside = limits.xy - abs(plane), filled = clamp(inside / fwidth(inside), 0.0, 1.0);
+    vec2 inside = limits.xy - abs(plane), filled = clamp(float(BLOCK) * inside / fwidth(inside), 0.0, 1.0);
     float edge = 1.0 - min(filled.x, filled.y);
     float fade = met ? max(smoothstep(floor_fade.x, floor_fade.y, away / eye.w), edge) : 1.0;
 #if TILED
@@ -74,7 +75,7 @@ void main()
     vec3 world = eye.xyz + at * way;
     vec2 place = floor_map_position(plane);
     // the blocks of 2 x 2 that share their light are texels of the next level
-#if COARSE
+#if BLOCK > 1
     // in higher levels, texels at the map's edge, which stand for all beyond it, are as dark as what is far inside
     float level = clamp(textureQueryLod(floor_visibility, place).y + 1.0, 1.0, HIGHEST_LEVEL);
     vec2 near = textureLod(floor_visibility, place, level).rg;
@@ -82,47 +83,38 @@ void main()
     vec2 near = textureLod(floor_visibility, place, 1.0).rg;
 #endif
     vec3 bounce = textureLod(floor_bounce, place, BOUNCE_LEVEL).rgb;
-#if SHADOW
-    // Shadows are averaged where all four pixels of a block belong to this pass; derivatives across others are undefined.
-    int solid = bitCount(covered(pixel, floor_depth()));
-    bool whole = block_inside(pixel) && block_mean(solid > 0 || !met ? 1.0 : 0.0) == 0.0;
-    float share = 1.0 - float(solid) / float(SAMPLES);
     vec3 shadow[SHADOWS];
     for (int i = 0; i < SHADOWS; ++i)
-        shadow[i] = light_arriving(i, world, floor_normal.xyz, -1.0, 0.0, bvec2(whole));
-#else
-    const float share = 1.0;
-    bool shaded = met && may_be_shaded(place, near);
-#if COARSE
-    // with edges as wide as a block at least, so that no shadow falls between blocks
-    float blur = length(fwidth(plane));
-    vec3 where = shaded ? world : vec3(OUTSIDE);  // of all shadow maps, where nothing is looked up
-    bool partly = shaded && blur > LARGEST * floor_map.z;
-    vec3 shadow[SHADOWS];
+        shadow[i] = vec3(1.0);
+    float blur = 0.0;
+#if SHADOW
+    // shadows are averaged where all four pixels of a block see the floor
+    bvec2 block = bvec2(BLOCK == 1 && block_mean(met ? 0.0 : 1.0) == 0.0);
+#if BLOCK > 1
+    // narrow penumbras are widened, so that none falls between blocks
+    blur = 0.5 * length(fwidth(plane));
+#endif
+    bool partly = false;
     for (int i = 0; i < SHADOWS; ++i) {
-        shadow[i] = light_arriving(i, where, floor_normal.xyz, -1.0, blur, bvec2(true));
-        partly = partly || any(lessThan(shadow[i], vec3(1.0 - UNSEEN)));
+        shadow[i] = light_arriving(i, world, floor_normal.xyz, -1.0, blur, block);
+        partly = partly || any(greaterThan(shadow[i] * (1.0 - shadow[i]), vec3(UNSEEN)));
     }
 #else
     // all four pixels of a block, so that their shadows can be averaged
+    bool shaded = met && may_be_shaded(place, near);
     gl_FragDepth = block_mean(shaded ? 1.0 : 0.0) > 0.0 ? SHADED_LEVEL : OPEN_LEVEL;
-#endif
 #endif
 #if NEAR_LIGHTS
     vec3 light = vec3(0.0), unshaded = vec3(0.0);
     for (int i = 0; i < LIGHTS; ++i) {
         vec3 towards;
         vec3 arrives = incident(light_at(i), world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
-#if SHADOW || COARSE
         light += arrives * (i < SHADOWS ? shadow[i] : vec3(1.0));
-#else
-        light += arrives;
-#endif
         unshaded += arrives;
     }
 #else
     vec3 unshaded = floor_light.rgb, light = unshaded;
-#if SHADOW || COARSE
+#if SHADOW
     for (int i = 0; i < SHADOWS; ++i) {
         Light from = light_at(i);
         vec3 arrives = from.radiance.rgb * max(dot(floor_normal.xyz, from.direction.xyz), 0.0);
@@ -130,15 +122,11 @@ void main()
     }
 #endif
 #endif
-    vec3 key = vec3(1.0);
-#if SHADOW || COARSE
-    key = shadow[0];
-#endif
     unshaded += around + key_box;
-    light += (around + key * key_box) * (0.15 + 0.85 * near.r);
+    light += (around + shadow[0] * key_box) * (0.15 + 0.85 * near.r);
 #if CUT_OUT
     // only the shadows are left of the floor
-    fragment = vec4(vec3(0.0), share * (1.0 - fade) * (1.0 - light.g / max(unshaded.g, 1e-6)));
+    fragment = vec4(vec3(0.0), (1.0 - fade) * (1.0 - light.g / max(unshaded.g, 1e-6)));
 #else
     vec3 direction = normalize(way);
     vec3 far = sky_at(met && edge == 0.0 ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);
@@ -147,13 +135,17 @@ void main()
     // as in MuJoCo, the reflectance does not depend on the angle
     shown = mix(shown, textureLod(mirror, 0.5 + 0.5 * screen, 0.0).rgb, reflectance * (1.0 - fade));
 #endif
-#if COARSE
-    float rim = beside_floor();
-    bool steep = any(greaterThan(fwidth(shown), vec3(STEEPEST)));
-    bool rough = partly || steep || abs(rim) < 1.5 * fwidth(rim);
+#if BLOCK > 1
+    vec2 margin = -beside_edges(), near_edge = RIM * fwidth(margin);
+    bool rough = all(greaterThan(margin, -near_edge)) && any(lessThan(margin, near_edge)), steep = any(greaterThan(fwidth(shown), vec3(STEEPEST)));
+#if SHADOW
+    rough = rough || (partly ? sharp : steep) || 2.0 * blur > LARGEST * floor_map.z;
+#else
+    rough = rough || steep;
+#endif
     fragment = vec4(shown, rough ? 0.5 : met ? 1.0 : 0.0);
 #else
-    fragment = share * vec4(dithered(shown), 1.0);
+    fragment = vec4(dithered(shown), 1.0);
 #endif
 #endif
 }

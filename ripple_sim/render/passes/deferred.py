@@ -14,7 +14,7 @@ from ripple_sim.render.gpu.g_buffer import GBuffer
 from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.solver.errors import RippleError
 
-from .background import CoarseBackground
+from .background import Background, CoarseBackground
 from .floor import Floor
 from .frame_pass import FramePass
 from .layers import TransparentLayers
@@ -67,14 +67,7 @@ class DeferredShading:
             "MIRROR": int(floor is not None and floor.reflects and not frame_format.alpha),
         }
         smooth = not any(options[name] for name in ("CUT_OUT", "TILED", "MIRROR", "SKYBOX"))
-        self._coarse = CoarseBackground(resources, size, options) if smooth else None
-        self._background, self._shaded_background = (
-            FramePass(resources, "passes/background_fragment", size, **options, SHADOW=shadow, COARSE=0)
-            for shadow in (0, 1)
-        )
-        if floor is not None:
-            for each in (self._background, self._shaded_background):
-                _set_floor(each.program, floor, options)
+        self._background = (CoarseBackground if smooth else Background)(resources, size, options, floor)
         self._solids = FramePass(resources, "passes/deferred_fragment", size, **options, LAYER=0)
         self.layers = TransparentLayers(resources, frame_format, self._g_buffer, self.frame, options)
         self._tiles = Tiles(resources, size)
@@ -99,35 +92,27 @@ class DeferredShading:
         """
         self._g_buffer.bind()
         self._tiles.cover(boxes)
-        if self._coarse is not None:
-            self._coarse.shade(ctx)
+        self._background.prepare(ctx)
         self.frame.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
         ctx.depth_func = "1"
         self.frame.clear(depth=LEVELS["OPEN"])
         if self._tiles.count:
             self._classify.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=self._tiles.count)
-        ctx.depth_func = "<="
-        if self._coarse is None:
-            self._background.run(self.frame, 0.0)
-        else:
-            self._coarse.fill()
-        ctx.depth_func = "=="
+        self._background.draw(ctx, self.frame)
         self.frame.depth_mask = False
-        self._shaded_background.run(self.frame, LEVELS["SHADED"])
         self._shade_solids(ctx, scissor_of(boxes))
         self.frame.depth_mask = True
         ctx.depth_func = "<="
 
     def _shade_solids(self, ctx: moderngl.Context, scissor: tuple[int, int, int, int] | None) -> None:
-        """Shade pixels with solids: first what the background contributes, where it shows too."""
+        """Shade pixels with solids, over the background."""
         if scissor is None:
             return
         # a software driver also takes its time over pixels that the depth test leaves out
         self.frame.scissor = scissor
-        self._shaded_background.run(self.frame, LEVELS["MIXED"])
         ctx.enable(moderngl.BLEND)
-        ctx.blend_func = moderngl.ONE, moderngl.ONE
+        ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         ctx.depth_func = ">="  # solids in some or all of the samples
         self._solids.run(self.frame, LEVELS["MIXED"])
         self.frame.scissor = (0, 0, *self.frame.size)
@@ -142,11 +127,3 @@ def _check_size(resources: Resources, size: tuple[int, int]) -> None:
             f"frame size is {width}x{height} pixels; valid with this driver are 1 to {limit} along each side: choose a "
             "size within that"
         )
-
-
-def _set_floor(program: moderngl.Program, floor: Floor, options: Mapping[str, int]) -> None:
-    if options["TILED"]:
-        program["tint"] = tuple(floor.tint)
-        program["tiling"] = floor.tiling
-    if options["MIRROR"]:
-        program["reflectance"] = floor.reflectance

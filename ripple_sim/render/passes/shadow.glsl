@@ -9,9 +9,17 @@ layout(binding = SHADOW_MAPS_UNIT) uniform sampler2D shadow_maps;
 layout(binding = BLOCKERS_UNIT) uniform sampler2D blockers;  // see blockers_fragment.glsl
 
 // Points of the discs, for each pixel of a block of 2 x 2: together they are four times as many points of one spiral.
-const int SEARCH_TAPS = 4;
-const int FILTER_TAPS = 16;
-const int MEAN_TAPS = 4;
+// With OWN_POINTS neighbours do not share them.
+#if OWN_POINTS
+const int SHARED = 1, SEARCH_TAPS = 8, FILTER_TAPS = 1, MEAN_TAPS = 10;
+const mat2 TURN = GOLDEN_TURN;
+const float NARROW = 1.5;  // penumbra, in those of `scatter`, up to which it is widened
+
+bool sharp = false;  // whether any penumbra has been as narrow, or too narrow for means
+#else
+const int SHARED = 4, SEARCH_TAPS = 4, FILTER_TAPS = 16, MEAN_TAPS = 4;
+const mat2 TURN = FOURTH_TURN;
+#endif
 const vec2 BY_MEANS = vec2(0.4, 0.8);  // texels of `blockers` between those: from where on they are means
 
 // Texture coordinates of a point of one light's map.
@@ -84,10 +92,11 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     float steepest = 10.0 * width * metre;
     vec2 slope = -plane.xy * (abs(plane.z) > 1e-9 ? 1.0 / plane.z : 1e9);
     slope = clamp(slope, -steepest, steepest);
-    float first = first_point();
+    float first = SHARED > 1 ? first_point() : 2.0;
     vec2 start = spiral_direction(first + counts.z), direction = start;  // another one in each exposure
     float depth_bias = 0.5 * texel * metre;
-    float least = length(vec2(1.5 / of_width.z, scatter / width)), widest = widest_penumbra(light, to_light) + least;
+    float least = SHARED > 1 ? length(vec2(1.5 / of_width.z, scatter / width)) : 1.5 / of_width.z;
+    float widest = widest_penumbra(light, to_light) + max(least, scatter / width);
 
     // Loops of as many rounds as are needed in place of branches: software drivers execute both sides of a branch. They
     // are tested at the end, since such drivers execute a loop's body once more than a test before it lets pass.
@@ -98,9 +107,9 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
         // denser in the middle, where a near blocker must not be missed, and of no weight at the rim, where they come in
         float away = (float(i) + 0.25 * first) / float(SEARCH_TAPS);
         vec2 offset = widest * away * direction;
-        direction = FOURTH_TURN * direction;
+        direction = TURN * direction;
         // the mean over as much as lies between the points: single texels would come and go from pixel to pixel
-        float footprint = widest * sqrt(TWO_PI * away / float(4 * SEARCH_TAPS));
+        float footprint = widest * sqrt(TWO_PI * away / float(SHARED * SEARCH_TAPS));
         float behind = light_distance(of_depth, p.z + dot(slope, offset));
         Blockers seen = blockers_about(light, p.xy + offset, footprint, behind);
         float blocks = (1.0 - away) * seen.share * smoothstep(0.0, texel + 0.25 * footprint * width, seen.before);
@@ -111,9 +120,14 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     found = block_mean(found, block);
     float blocker = distances / max(found, 1e-4);
     float penumbra = length(vec2(penumbra_of(light, blocker, to_light), least));
+    float side = float(textureSize(blockers, 0).y), spread = sqrt(0.5 * TWO_PI / float(SHARED * MEAN_TAPS));
+#if OWN_POINTS
+    bool narrow = penumbra < max(NARROW * scatter / width, BY_MEANS.y / (spread * side));
+    sharp = sharp || narrow && found > 1e-4;
+    penumbra += narrow ? scatter / width : 0.0;
+#endif
     // where points would be seen as steps, means over what lies between them
-    float between = penumbra * sqrt(0.5 * TWO_PI / float(4 * MEAN_TAPS));
-    float side = float(textureSize(blockers, 0).y), wide = smoothstep(BY_MEANS.x, BY_MEANS.y, between * side);
+    float between = penumbra * spread, wide = smoothstep(BY_MEANS.x, BY_MEANS.y, between * side);
     between = max(between, 1.0 / side);
     float disc = sqrt(max(penumbra * penumbra - between * between, 0.0));  // the means widen it to the penumbra's
     float of_means = 0.0, of_points = 0.0;
@@ -123,7 +137,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     i = 0;
     do {
         vec2 offset = disc * sqrt((float(i) + 0.25 * first) / float(MEAN_TAPS)) * direction;
-        direction = FOURTH_TURN * direction;
+        direction = TURN * direction;
         float behind = light_distance(of_depth, p.z + dot(slope, offset));
         Blockers seen = blockers_about(light, p.xy + offset, between, behind);
         of_means += 1.0 - seen.share * smoothstep(0.0, texel + 0.25 * between * width, seen.before);
@@ -133,7 +147,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     i = 0;
     do {
         vec2 offset = penumbra * sqrt((float(i) + 0.25 * first) / float(FILTER_TAPS)) * direction;
-        direction = FOURTH_TURN * direction;
+        direction = TURN * direction;
         vec3 point = vec3(in_maps(light, p.xy + offset), p.z + dot(slope, offset) - depth_bias);
         of_points += textureLod(shadow_test, point, 0.0);
     } while (++i < taps);
