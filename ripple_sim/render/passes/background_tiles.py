@@ -55,10 +55,12 @@ class SortedTiles:
             )
         )
         shade = resources.program("passes/view_tile_vertex", "passes/background_fragment", **options, SHADOW=1, BLOCK=1)
+        extent = 2.0 * edge / size[0], 2.0 * edge / size[1]
+        self._sort["extent"] = extent
+        for program in (plain, smooth, rough, shade):
+            program["extent"] = extent
         for program in (plain, smooth, rough):
             program["blocks"] = size[0] / block, size[1] / block
-        for program in (self._sort, plain, smooth, rough, shade):
-            program["extent"] = 2.0 * edge / size[0], 2.0 * edge / size[1]
         self._plain, self._smooth, self._rough, self._shade = (
             resources.vertex_array(program, [(self._corners, "2f/i", "in_corner")])
             for program in (plain, smooth, rough, shade)
