@@ -46,11 +46,16 @@ float widest_penumbra(int light, float to_light)
     return penumbra_of(light, light_distance(shadow_at(light).depth, 0.0), to_light);
 }
 
+// Level of `blockers` whose texels are so wide a share of the map, or the finest.
+float blockers_level(float footprint)
+{
+    return log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
+}
+
 // Mean of what covers a map about a point, over so much of the map: see blockers_fragment.glsl.
 vec3 blockers_mean(int light, vec2 point, float footprint)
 {
-    float level = log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
-    return textureLod(blockers, in_maps(light, point), level).rgb;
+    return textureLod(blockers, in_maps(light, point), blockers_level(footprint)).rgb;
 }
 
 // What covers a map about a point and lies before a surface: a share of the map, its distance from the light [m], and how
@@ -59,9 +64,9 @@ struct Blockers { float share, distance, before; };
 
 // What covers the map is in part the surface itself; the rest blocks: two distances with that mean and that variance
 // (Yang et al., Variance Soft Shadow Mapping, 2010).
-Blockers blockers_about(int light, vec2 point, float footprint, float behind)
+Blockers blockers_about(int light, vec2 point, float level, float behind)
 {
-    vec3 mean = blockers_mean(light, point, footprint);
+    vec3 mean = textureLod(blockers, in_maps(light, point), level).rgb;
     float usual = mean.y / max(mean.x, 1e-4), variance = max(mean.z / max(mean.x, 1e-4) - usual * usual, 0.0);
     float before = max(behind - usual, 1e-6);
     return Blockers(mean.x * before * before / (before * before + variance), usual - variance / before, before);
@@ -111,7 +116,9 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
         // the mean over as much as lies between the points: single texels would come and go from pixel to pixel
         float footprint = widest * sqrt(TWO_PI * away / float(SHARED * SEARCH_TAPS));
         float behind = light_distance(of_depth, p.z + dot(slope, offset));
-        Blockers seen = blockers_about(light, p.xy + offset, footprint, behind);
+        // one level a point, of which some take the next: between two, both are read. On the floor steps would be seen.
+        float level = blockers_level(footprint);
+        Blockers seen = blockers_about(light, p.xy + offset, bias < 0.0 ? level : floor(level + away), behind);
         float blocks = (1.0 - away) * seen.share * smoothstep(0.0, texel + 0.25 * footprint * width, seen.before);
         distances += inside ? blocks * seen.distance : 0.0;
         found += inside ? blocks : 0.0;
@@ -139,7 +146,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
         vec2 offset = disc * sqrt((float(i) + 0.25 * first) / float(MEAN_TAPS)) * direction;
         direction = TURN * direction;
         float behind = light_distance(of_depth, p.z + dot(slope, offset));
-        Blockers seen = blockers_about(light, p.xy + offset, between, behind);
+        Blockers seen = blockers_about(light, p.xy + offset, blockers_level(between), behind);
         of_means += 1.0 - seen.share * smoothstep(0.0, texel + 0.25 * between * width, seen.before);
     } while (++i < taps);
     taps = shaded && wide < 1.0 ? FILTER_TAPS : 0;
