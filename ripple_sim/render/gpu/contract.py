@@ -10,6 +10,7 @@ from ripple_sim.solver.gl.contract import Struct, numbered
 MAX_LIGHTS, MAX_SHADOWS, MAX_OCCLUDERS, SOFT_BOXES = 8, 4, 16, 3
 HELD_LIGHTS = 2  # that come to fragments as varyings
 VERTEX_GROUP = 64  # vertices that a work group displaces
+OBJECT_COLUMNS = 64  # objects in a row of their table; a power of two
 
 
 class Unit(IntEnum):
@@ -34,6 +35,7 @@ class Unit(IntEnum):
     BLOCKERS = 16  # what the shadow maps hold, prefiltered
     FLOOR_BOUNCE = 17  # light that objects throw on the floor
     TRANSMISSION = 18  # what transparent objects take from the lights
+    OBJECTS = 19  # the table of objects
 
 
 class Binding(IntEnum):
@@ -44,7 +46,6 @@ class Binding(IntEnum):
     MIDPOINTS = 2
     FRAME = 3
     OCCLUDERS = 4
-    OBJECTS = 5
 
 
 class Splitting(IntEnum):
@@ -156,6 +157,8 @@ DEFINES: dict[str, object] = {
     **SHADOW.defines(),
     **FRAME.defines(),
     **OBJECT.defines(),
+    "OBJECT_TEXELS": OBJECT.dtype.itemsize // 16,
+    "OBJECT_COLUMNS": OBJECT_COLUMNS,
     "SRGB_BREAK": color.BREAK,
     "SRGB_SLOPE": color.SLOPE,
     "SRGB_OFFSET": color.OFFSET,

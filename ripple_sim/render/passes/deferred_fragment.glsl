@@ -51,8 +51,7 @@ SurfaceSample surface_sample(ivec2 pixel, int s)
 {
     vec4 normal = texelFetch(normals, pixel, s), color = texelFetch(colors, pixel, s);
     SurfaceSample surface;
-    // a sample without a surface, which helper invocations may meet, holds any number
-    surface.object = min(unpack_object(normal.z), objects.length() - 1);
+    surface.object = unpack_object(normal.z);
     surface.normal = octahedral_decode(normal.xy);
     vec2 red_green = unpack_unorm8(color.z), blue_ink = unpack_unorm8(color.w), baked = unpack_unorm8(normal.w);
     surface.color = vec3(red_green, blue_ink.x);
@@ -77,7 +76,7 @@ bvec2 same_beside(SurfaceSample surface, float at)
 // distributions of normals for shading antialiasing, 2016). Creases do not count: both of their sides are sharp.
 float rippled(inout SurfaceSample surface, bvec2 same)
 {
-    Object object = objects[surface.object];
+    Object object = object_at(surface.object);
     vec2 chart = floor(surface.place / max(object.height_map.w, 1.0));
     bvec2 near = bvec2(same.x && dFdx(chart) == vec2(0.0), same.y && dFdy(chart) == vec2(0.0));
     vec2 across = near.x ? dFdx(surface.place) : vec2(0.0), up = near.y ? dFdy(surface.place) : vec2(0.0);
@@ -98,7 +97,7 @@ float rippled(inout SurfaceSample surface, bvec2 same)
 // 2 x 2 share their shadows with it.
 vec4 lit_solid(SurfaceSample surface, vec3 position, float spread, bvec2 block)
 {
-    Object object = objects[surface.object];
+    Object object = object_at(surface.object);
     vec3 behind = vec3(0.0);
     bool heatmap = object.place.w > 0.0;
 #if LAYER

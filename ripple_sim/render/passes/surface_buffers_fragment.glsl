@@ -20,7 +20,7 @@ void main()
     rippling = vec4(0.0, 0.0, -1.0, 0.0);
     if (depth < min(floor_depth(), 0.99999994)) {
         vec4 normal = texelFetch(normals, pixel, 0), color = texelFetch(colors, pixel, 0);
-        Object object = objects[unpack_object(normal.z)];
+        Object object = object_at(unpack_object(normal.z));
         vec2 place = color.xy * vec2(textureSize(height_maps, 0).xy);
         vec4 ripple = spline_at(height_maps, vec3(place, object.height_map.x)) * object.height_map.y;
         vec3 out_of = octahedral_decode(normal.xy);

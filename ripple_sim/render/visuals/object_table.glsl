@@ -1,4 +1,14 @@
-// The table of objects; contract.py says what each member of a row means.
+// The table of objects; contract.py says what each member of a row means. It is a texture, as software drivers read what
+// storage buffers hold number by number.
 struct Object { OBJECT_MEMBERS };
 
-layout(std430, binding = OBJECTS_BINDING) readonly buffer Objects { Object objects[]; };
+layout(binding = OBJECTS_UNIT) uniform sampler2D object_table;  // OBJECT_COLUMNS rows beside each other, a vector a texel
+
+Object object_at(int number)
+{
+    ivec2 first = ivec2((number & OBJECT_COLUMNS - 1) * OBJECT_TEXELS, number / OBJECT_COLUMNS);
+    vec4 row[OBJECT_TEXELS];
+    for (int i = 0; i < OBJECT_TEXELS; ++i)
+        row[i] = texelFetch(object_table, first + ivec2(i, 0), 0);
+    return Object(row[0], row[1], row[2], row[3], mat3(row[4].xyz, row[5].xyz, row[6].xyz));
+}

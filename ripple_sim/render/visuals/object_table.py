@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.contract import OBJECT, Binding
+from ripple_sim.render.gpu.contract import OBJECT, OBJECT_COLUMNS, Unit
 from ripple_sim.render.gpu.resources import Resources
 
 from .looks import Look
@@ -20,7 +20,7 @@ class ObjectTable:
     def __init__(self, resources: Resources) -> None:
         self._resources = resources
         self._rows: list[np.ndarray] = []
-        self._buffer: moderngl.Buffer | None = None
+        self._texture: moderngl.Texture | None = None
 
     def add(
         self,
@@ -64,8 +64,11 @@ class ObjectTable:
 
     def bind(self) -> None:
         """Upload the rows and bind them for the shaders."""
-        data = np.array(self._rows, dtype=_ROW).tobytes() or bytes(_ROW.itemsize)
-        if self._buffer is None or self._buffer.size != len(data):
-            self._buffer = self._resources.buffer(reserve=len(data), dynamic=True)
-        self._buffer.write(data)
-        self._buffer.bind_to_storage_buffer(Binding.OBJECTS)
+        rows = np.zeros((max(-(-len(self._rows) // OBJECT_COLUMNS), 1), OBJECT_COLUMNS), dtype=_ROW)
+        rows.ravel()[: len(self._rows)] = self._rows
+        size = rows[0].nbytes // 16, len(rows)
+        if self._texture is None or self._texture.size != size:
+            self._texture = self._resources.texture(size, 4, dtype="f4")
+            self._texture.filter = moderngl.NEAREST, moderngl.NEAREST
+        self._texture.write(rows.tobytes())
+        self._texture.use(Unit.OBJECTS)

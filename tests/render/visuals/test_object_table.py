@@ -17,7 +17,7 @@ def table(resources):
 
 
 def read(gl, table, expression, count=1) -> np.ndarray:
-    """An expression of an object `objects[int(x.x)]`, for all rows."""
+    """An expression of an object `object_at(int(x.x))`, for all rows."""
     with gl:
         table.bind()
     return evaluated(gl, "visuals/object_table.glsl", expression, np.arange(count)[:, None])
@@ -26,18 +26,18 @@ def read(gl, table, expression, count=1) -> np.ndarray:
 def test_shaders_find_a_look_in_its_row(gl, table):
     table.add(Look((0, 0, 0), 1.0), 3)
     number = table.add(LOOK, 17, opacity=0.25, size=2.5, heatmap=True, height_map=4)
-    row = f"objects[{number}]"
+    row = f"object_at({number})"
     np.testing.assert_allclose(read(gl, table, f"{row}.base")[0], [0.4, 0.5, 0.6, 0.7], rtol=1e-6)
     np.testing.assert_allclose(read(gl, table, f"{row}.volume")[0], [0.8, 0.9, 1.5, 0.25], rtol=1e-6)
     np.testing.assert_allclose(read(gl, table, f"{row}.place")[0], [17, 2.5, 0, 1])
     np.testing.assert_allclose(read(gl, table, f"{row}.height_map")[0, :2], [4, 1])
-    np.testing.assert_allclose(read(gl, table, "objects[0].height_map")[0, :2], [0, 0])
+    np.testing.assert_allclose(read(gl, table, "object_at(0).height_map")[0, :2], [0, 0])
 
 
 def test_numbers_count_up_and_rows_added_later_are_seen_too(gl, table):
     for number in range(5):
         assert table.add(LOOK, 10 * number) == number
-        geoms = read(gl, table, "vec4(objects[int(x.x)].place.x)", number + 1)[:, 0]
+        geoms = read(gl, table, "vec4(object_at(int(x.x)).place.x)", number + 1)[:, 0]
         np.testing.assert_array_equal(geoms, 10 * np.arange(number + 1))
 
 
@@ -47,13 +47,13 @@ def test_the_rotation_turns_gradients_into_the_world(gl, table):
     number = table.add(LOOK, 1)
     table.set_height_map(number, 0.125, rotation)
     for axis, unit in enumerate(("1, 0, 0", "0, 1, 0", "0, 0, 1")):
-        turned = read(gl, table, f"vec4(objects[{number}].rotation * vec3({unit}), 0.0)")[0, :3]
+        turned = read(gl, table, f"vec4(object_at({number}).rotation * vec3({unit}), 0.0)")[0, :3]
         np.testing.assert_allclose(turned, rotation[:, axis], atol=1e-6)
-    np.testing.assert_allclose(read(gl, table, "vec4(objects[int(x.x)].place.z)", 2)[:, 0], [0, 0.125])
+    np.testing.assert_allclose(read(gl, table, "vec4(object_at(int(x.x)).place.z)", 2)[:, 0], [0, 0.125])
 
 
 def test_an_empty_table_can_be_bound(gl, table):
-    assert not read(gl, table, "objects[0].base").any()
+    assert not read(gl, table, "object_at(0).base").any()
 
 
 @pytest.mark.parametrize("name", ["chrome", "", "Rubber"])
