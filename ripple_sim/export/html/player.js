@@ -1,7 +1,7 @@
 "use strict";
 // The player: time, camera and controls. Tests and other pages may use `ripplePlayer`.
 const ARROW_LENGTH = 0.25;  // of the strongest contact, in distances of the camera
-const SLOW = 32, COARSEST = 0.6;  // time of a frame from which fewer pixels are drawn while it plays [ms], and how few
+const RATE = 30, LATE = 1.1, COARSEST = 0.6;  // frames a second that it takes care to show, by how much they may be late before fewer pixels are drawn, and how few
 
 function arrowPart() {
   const points = [], normals = [], F = [], sides = 10;
@@ -43,6 +43,7 @@ class Player {
       const rest = V ? this.frames.motions.get(String(i)).at(V) : part;
       this.drawing.displace(part, rest, steps, this.meta.steps[i], 0.8 * this.limits[i] * this.meta.steps[i]);
     });
+    this.onCanvas = Math.floor(this.number);
     this.redraw();
     this.shown++;
   }
@@ -115,16 +116,21 @@ function control(player) {
   canvas.onwheel = event => { event.preventDefault(); player.free(); player.orbit.distance *= Math.exp(0.001 * event.deltaY); player.redraw(); };
   document.onkeydown = event => { if (event.key === " ") { event.preventDefault(); play(!player.playing); } };
   window.onresize = () => player.redraw();
-  let last = performance.now(), mean = 20;
+  let last = performance.now(), drawn = last, late = 1;
   const tick = async now => {
-    const passed = (now - last) / 1000;
+    const speed = Number(of("speed").value) * player.meta.fps, count = player.frames.count;
+    const next = player.number + (now - last) / 1000 * speed;
     last = now;
     if (player.playing) {
-      mean += 0.1 * (Math.min(1000 * passed, 300) - mean);
-      if (mean > SLOW && player.detail > COARSEST) { player.detail *= 0.8; mean = 20; }
-      const next = player.number + passed * player.meta.fps * Number(of("speed").value), count = player.frames.count;
-      await player.show(document.getElementById("end") && next >= count ? 0 : next);
-      follow();
+      player.number = document.getElementById("end") && next >= count ? 0 : next;
+      // a frame that is on the canvas already is not drawn again
+      if (Math.floor(player.number) !== player.onCanvas) {
+        late += 0.03 * (Math.min((now - drawn) / Math.max(1000 / speed, 1000 / RATE), 3) - late);
+        if (late > LATE && player.detail > COARSEST) { player.detail *= 0.8; late = 1; }
+        drawn = now;
+        await player.show(player.number);
+        follow();
+      }
     }
     requestAnimationFrame(tick);
   };

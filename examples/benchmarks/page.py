@@ -1,0 +1,75 @@
+"""How fast pages of exported runs play in headless Chromium without a GPU.
+
+    ripple-sim export duck -o duck.html --resolution 64 --fps 30 --duration 5
+    python examples/benchmarks/page.py duck.html [MORE.html ...]
+
+Plays the pages at 640x360 pixels, in turns, and prints for each the frames that it showed in a second, the processor time of
+all of Chromium's processes for each of them, and the share of the pixels each way that it drew. Linux tells the time.
+"""
+
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from playwright.sync_api import sync_playwright
+
+SIZE, ROUNDS, WARM_UP, SECONDS = (640, 360), 3, 3.0, 6.0
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
+TICK = os.sysconf("SC_CLK_TCK")
+
+
+def processor_time() -> float:
+    """Of all processes that descend from this one, but for the driver of the browser [s]."""
+    parents, times = {}, {}
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            name, fields = status.read_text().split("(", 1)[1].rsplit(")", 1)
+        except OSError:  # it has ended
+            continue
+        parent, *_, user, kernel = fields.split()[1:13]
+        parents[int(status.parent.name)] = int(parent)
+        times[int(status.parent.name)] = (int(user) + int(kernel)) / TICK if "chrom" in name else 0.0
+    ours = {os.getpid()}
+    for _ in range(8):  # generations
+        ours |= {process for process, parent in parents.items() if parent in ours}
+    return sum(times[process] for process in ours)
+
+
+def played(browser: Any, page: Path) -> tuple[float, float, float]:
+    """Frames a second, processor time a frame [s], and the share of the pixels each way."""
+    tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
+    tab.goto(page.resolve().as_uri())
+    tab.evaluate("ripplePlayer.ready.then(() => 0)")
+    time.sleep(WARM_UP)
+    before, start, spent = tab.evaluate("ripplePlayer.player.shown"), time.perf_counter(), processor_time()
+    time.sleep(SECONDS)
+    spent = processor_time() - spent
+    seconds = time.perf_counter() - start
+    shown, share = tab.evaluate("[ripplePlayer.player.shown, ripplePlayer.player.canvas.width / innerWidth]")
+    tab.close()
+    return (shown - before) / seconds, spent / (shown - before), share
+
+
+def main(pages: list[Path]) -> None:
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    results: dict[Path, list[tuple[float, float, float]]] = {page: [] for page in pages}
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
+        for _ in range(ROUNDS):
+            for page in pages:
+                results[page].append(played(browser, page))
+        browser.close()
+    for page, rounds in results.items():
+        rates, spent, shares = np.array(rounds).T
+        milliseconds = f"{1e3 * np.median(spent):.1f} ms of processor time each ({1e3 * spent.min():.1f} to {1e3 * spent.max():.1f})"
+        print(
+            f"{page.name}: {rates.min():.1f} to {rates.max():.1f} frames a second, {milliseconds}, at {shares.min():.2f}"
+        )
+
+
+if __name__ == "__main__":
+    main([Path(argument) for argument in sys.argv[1:]])

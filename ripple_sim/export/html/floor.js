@@ -1,0 +1,97 @@
+"use strict";
+// The floor in cells, of which only those are drawn that the camera sees. Only cells that a shadow may reach look into the
+// shadow map: where software draws, its samples take most of the time.
+const INNER = 20, OUTER = 8, HALF = INNER + OUTER;  // cells from the middle to a side: of one size up to the camera's distance, and growing
+const MARGIN = 3;  // by which shadows may be wider [texels of the shadow map]
+
+class Floor {
+  constructor(gl, floor, shaders, plain) {
+    const features = plain ? ["PLAIN"] : ["TEXTURED"];
+    Object.assign(this, {gl, floor, side: 2 * HALF, row: 2 * HALF + 1});
+    this.programs = [[], ["SHADOW"]].map(more => programOf(gl, ...shaders, [...features, ...more]));
+    this.plane = new Float32Array(2 * this.row ** 2);
+    this.outside = new Uint8Array(this.row ** 2);
+    this.shadowed = new Uint8Array(this.side ** 2);
+    this.triangles = [0, 1].map(() => new Uint16Array(6 * this.side ** 2));
+    this.array = gl.createVertexArray();
+    this.buffers = [0, 1].map(() => gl.createBuffer());
+    gl.bindVertexArray(this.array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[0]);
+    gl.bufferData(gl.ARRAY_BUFFER, this.plane, gl.DYNAMIC_DRAW);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 2, gl.FLOAT, false, 0, 0);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers[1]);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, 12 * this.side ** 2, gl.DYNAMIC_DRAW);
+    gl.bindVertexArray(null);
+  }
+
+  // Draws it with what `use` does to make a program the present one.
+  draw(use, {view, frame, light, casters, reach}) {
+    const gl = this.gl, axes = [frame.slice(0, 3), frame.slice(4, 7)], off = add(view.focus, frame.slice(12, 15), -1);
+    const middle = axes.map(axis => dot(off, axis));
+    this.place(middle, view.distance, reach, times(view.matrix, frame));
+    this.shade(frame, light, casters, middle, view.distance, reach);
+    const counts = this.list();
+    gl.bindVertexArray(this.array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[0]);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.plane);
+    let at = 0;
+    counts.forEach((count, shadow) => {
+      if (!count) return;
+      use(this.programs[shadow]);
+      gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, at, this.triangles[shadow].subarray(0, count));
+      gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_SHORT, at);
+      at += 2 * count;
+    });
+  }
+
+  // Places of the cells' corners, and outside which sides of the picture each lies.
+  place(middle, distance, reach, m) {
+    const {plane, outside, row} = this, half = this.floor.half.map(x => x || 1e9);
+    const edges = middle.map((at, i) => Array.from({length: row}, (_, k) => {
+      const steps = Math.abs(k - HALF), far = Math.max(steps - INNER, 0) / OUTER;
+      const off = Math.sign(k - HALF) * (Math.min(steps, INNER) / INNER * distance + far * far * (reach - distance));
+      return Math.max(-half[i], Math.min(half[i], at + off));
+    }));
+    for (let i = 0, k = 0; i < row; i++) for (let j = 0; j < row; j++, k++) {
+      const x = plane[2 * k] = edges[0][j], y = plane[2 * k + 1] = edges[1][i];
+      const u = m[0] * x + m[4] * y + m[12], v = m[1] * x + m[5] * y + m[13], w = m[3] * x + m[7] * y + m[15];
+      outside[k] = (u < -w) | (u > w) << 1 | (v < -w) << 2 | (v > w) << 3;
+    }
+  }
+
+  // Which cells the casters may darken: those about the points of their shadows, as wide as their triangles.
+  shade(frame, light, casters, middle, distance, reach) {
+    const {shadowed, side} = this, up = frame.slice(8, 11), way = light.lampWay[0], rise = dot(way, up);
+    const anywhere = light.lampShape[0][0] || rise < 0.05;
+    shadowed.fill(light.casts && anywhere ? 1 : 0);
+    if (!light.casts || anywhere) return;
+    const cell = x => {
+      const far = Math.abs(x) / distance, steps = far < 1 ? INNER * far : INNER + OUTER * Math.sqrt((far - 1) * distance / (reach - distance));
+      return Math.max(0, Math.min(side - 1, Math.floor(HALF + (x < 0 ? -steps : steps))));
+    };
+    // along the light on the floor's axes
+    const rows = [0, 4].map(i => add(frame.slice(i, i + 3), up, -dot(way, frame.slice(i, i + 3)) / rise));
+    for (const {part: {shadow: {reaches: {points, far}}, data: [places]}, model} of casters) {
+      const [[ax, bx, cx, dx], [ay, by, cy, dy]] = rows.map((row, i) =>
+        [...[0, 4, 8].map(k => dot(row, model.slice(k, k + 3))), dot(row, add(model.slice(12, 15), frame.slice(12, 15), -1)) - middle[i]]);
+      for (let k = 0; k < points.length; k++) {
+        const point = points[k], margin = (MARGIN * light.shadowTexel + far[k]) / rise, x = places[3 * point], y = places[3 * point + 1], z = places[3 * point + 2];
+        const u = ax * x + bx * y + cx * z + dx, v = ay * x + by * y + cy * z + dy, left = cell(u - margin), right = cell(u + margin);
+        for (let i = cell(v - margin), high = cell(v + margin); i <= high; i++) for (let j = left; j <= right; j++) shadowed[i * side + j] = 1;
+      }
+    }
+  }
+
+  // Lists the triangles of cells in light and in shadow, and returns how many indices these are.
+  list() {
+    const {outside, shadowed, triangles, side, row} = this, counts = [0, 0];
+    for (let cell = 0; cell < side * side; cell++) {
+      const k = cell + Math.floor(cell / side), shadow = shadowed[cell], list = triangles[shadow];
+      if (outside[k] & outside[k + 1] & outside[k + row] & outside[k + row + 1]) continue;
+      list[counts[shadow]++] = k; list[counts[shadow]++] = k + 1; list[counts[shadow]++] = k + row;
+      list[counts[shadow]++] = k + 1; list[counts[shadow]++] = k + row + 1; list[counts[shadow]++] = k + row;
+    }
+    return counts;
+  }
+}

@@ -1,0 +1,157 @@
+"use strict";
+// The renderer's light (render/visuals/environment.glsl, render/passes/shading.glsl) with a single shadow map and without its occlusion maps.
+// Loops are written out: in software an array at an index that changes takes longer than the sums.
+// With `lamps`: their number, `near`: whether any has a position, `taps`: of the shadow map, along each side, which has `shadowSize` texels.
+const lightShader = ({lamps, near, taps, shadowSize}) => `#version 300 es
+precision highp float;
+precision highp sampler2DShadow;
+uniform vec3 eye, horizon, zenith, sky, around, bounce;  // around: what lights the floor; bounce: what it sends back
+uniform vec2 turn;  // of the environment's maps
+uniform float casts, shadowTexel;
+uniform vec3 lampWay[4], lampRadiance[4], lampPosition[4], lampFalloff[4];
+uniform vec3 lampShape[4];  // 1 at a position; cosine of the beam's half angle; exponent
+uniform mat4 shadowMatrix;
+uniform sampler2DShadow shadowMap;
+
+vec3 inShadowMap(vec3 p, vec3 n) {
+  vec3 way = ${near ? "lampShape[0].x > 0.0 ? normalize(lampPosition[0] - p) : lampWay[0]" : "lampWay[0]"};
+  vec4 q = shadowMatrix * vec4(p + 1.5 * shadowTexel * (n + way), 1.0);
+  return q.xyz / q.w * 0.5 + 0.5;
+}
+
+float shadowOf(vec3 c) {
+  if (casts == 0.0 || any(lessThan(c, vec3(0.0))) || any(greaterThan(c, vec3(1.0)))) return 1.0;
+  float sum = 0.0;
+${offsets(taps, shadowSize).map(([x, y]) => `  sum += texture(shadowMap, vec3(c.x + ${x}, c.y + ${y}, c.z));`).join("\n")}
+  return sum * ${(1 / (taps * taps)).toFixed(9)};
+}
+
+${lampNumbers(lamps).map(i => incident(i, near)).join("\n")}
+
+vec3 skyAt(vec3 d, float r) { return mix(horizon, zenith, smoothstep(-0.1 - 0.2 * r, 0.8 + 0.2 * r, d.z)); }
+
+vec3 toneMapped(vec3 radiance) {
+  const float shoulder = 0.72;
+  float peak = max(radiance.r, max(radiance.g, radiance.b)), excess = max(peak - shoulder, 0.0);
+  float compressed = min(peak, shoulder) + (1.0 - shoulder) * excess / (excess + 1.0 - shoulder);
+  vec3 c = radiance * (compressed / max(peak, 1e-4));
+  c = mix(c, vec3(compressed), 1.0 - 1.0 / (1.0 + 0.18 * excess));
+  // sRGB to a thousandth, by square roots: software draws them ten times faster than powers
+  vec3 half_power = sqrt(max(c, 0.0)), fourth = sqrt(half_power), eighth = sqrt(fourth);
+  return mix(12.92 * c, 0.662002687 * half_power + 0.684122060 * fourth - 0.323583601 * eighth - 0.022541147 * c, step(0.0031308, c));
+}
+// its inverse to half a hundredth, for the same reason
+vec3 linear(vec3 c) { return c * (c * (c * 0.305 + 0.682) + 0.013); }
+`;
+
+const lampNumbers = lamps => Array.from({length: lamps}, (_, i) => i);
+
+// Radiance of a lamp at a point, and the way to it.
+const incident = (i, near) => `vec3 incident${i}(vec3 p, out vec3 way) {
+  way = lampWay[${i}];
+  ${near ? `if (lampShape[${i}].x > 0.0) {
+    vec3 off = lampPosition[${i}] - p;
+    float d = length(off);
+    way = off / d;
+    float along = dot(way, lampWay[${i}]);
+    float beam = along >= lampShape[${i}].y ? pow(max(along, 0.0), lampShape[${i}].z) : 0.0;
+    return lampRadiance[${i}] * beam / dot(lampFalloff[${i}], vec3(1.0, d, d * d));
+  }` : ""}
+  return lampRadiance[${i}];
+}`;
+
+// Places of the shadow map's samples round a point.
+function offsets(taps, size) {
+  const along = Array.from({length: taps}, (_, i) => ((i - 0.5 * (taps - 1)) / size).toFixed(9));
+  return along.flatMap(x => along.map(y => [x, y]));
+}
+
+// What a surface reflects, in linear light. Defined are COAT, METAL, SHEEN, TRANSLUCENT where a look has these, and what it has not costs nothing.
+const litShader = ({lamps}) => `
+uniform sampler2D ambientMap, mirrorMap, coatMap;
+uniform vec4 base, volume;  // roughness, metallic, sheen, coat; translucency, transparency, emission, opacity
+#ifdef METAL
+#define F0 vec3
+#else
+#define F0 float
+#endif
+F0 fresnel(F0 f0, float c) { float m = max(1.0 - c, 0.0), m2 = m * m; return f0 + (1.0 - f0) * (m2 * m2 * m); }
+float ggx(float nh, float r) { float a2 = r * r * r * r, d = nh * nh * (a2 - 1.0) + 1.0; return a2 / (d * d); }
+void reflected(vec3 radiance, vec3 way, float shadow, vec3 n, vec3 view, vec3 albedo, F0 f0, float rough, inout vec3 direct, inout vec3 highlight) {
+  vec3 halfway = normalize(view + way);
+  float nl = dot(n, way);
+#ifdef TRANSLUCENT
+  vec3 wrap = 0.6 * volume.x * albedo;
+  direct += radiance * max(nl + wrap, 0.0) / ((1.0 + wrap) * (1.0 + wrap)) * mix(shadow, 1.0, 0.35 * volume.x);
+#else
+  direct += radiance * (max(nl, 0.0) * shadow);
+#endif
+  highlight += radiance * (shadow * clamp(nl * 4.0, 0.0, 1.0) * ggx(max(dot(n, halfway), 0.0), rough) * 0.25) * fresnel(f0, max(dot(view, halfway), 0.0));
+}
+// A map of light by direction, the same for all that turn with the camera.
+vec4 from(sampler2D map, vec3 d) {
+  return texture(map, 0.5 + 0.5 * vec2(dot(d.xy, turn), turn.x * d.y - turn.y * d.x) * inversesqrt(max(2.0 + 2.0 * d.z, 2e-6)));
+}
+vec3 mirrored(sampler2D map, vec3 d, float roughness) {
+  vec4 boxes = from(map, d);
+  return boxes.rgb + mix(bounce, 0.75 * skyAt(d, roughness), boxes.a);
+}
+vec3 lit(vec3 point, vec3 normal, vec3 albedo) {
+  vec3 view = normalize(eye - point), n = normalize(normal);
+  n = normalize(n + max(0.1 - dot(n, view), 0.0) * view);
+  float nv = clamp(dot(n, view), 0.1, 1.0), rough = max(base.x, 0.0632), edge = 1.0 - nv, edge3 = edge * edge * edge;
+  vec3 mirror = reflect(-view, n);
+#ifdef METAL
+  vec3 f0 = mix(vec3(0.04), albedo, base.y);
+#else
+  float f0 = 0.04;
+#endif
+  vec3 direct = vec3(0.0), highlight = vec3(0.0);
+  vec3 way, radiance;
+${lampNumbers(lamps).map(i => `  radiance = incident${i}(point, way);
+  reflected(radiance, way, ${i ? "1.0" : "shadowOf(inShadowMap(point, n))"}, n, view, albedo, f0, rough, direct, highlight);`).join("\n")}
+  vec3 ambience = from(ambientMap, n).rgb + mix(bounce, sky, 0.5 + 0.5 * n.z), shade = albedo * (direct + ambience);
+#ifdef METAL
+  shade *= 1.0 - base.y;
+#endif
+#ifdef SHEEN
+  shade += base.z * edge3 * albedo * ambience;
+#endif
+  shade += volume.z * albedo + mirrored(mirrorMap, mirror, rough) * (f0 + (max(F0(1.0 - rough), f0) - f0) * (edge3 * edge * edge)) + highlight;
+#ifdef COAT
+  float edge5 = edge3 * edge * edge, coat = base.w * (0.04 + 0.96 * edge5);
+  shade = mix(shade, mirrored(coatMap, mirror, 0.06), coat);
+#endif
+  return shade;
+}
+float opacityAt(vec3 point, vec3 normal) { return volume.w * (1.0 - 0.6 * volume.y * clamp(dot(normalize(normal), normalize(eye - point)), 0.1, 1.0)); }
+
+#ifdef HEAT
+uniform sampler2D heatColors;
+vec3 heated(vec3 shown, float height) {
+  float light = clamp(dot(shown, vec3(0.2126, 0.7152, 0.0722)) / 0.70, 0.45, 1.0);
+  return texture(heatColors, vec2(0.5 + 0.5 * clamp(height, -1.0, 1.0), 0.5)).rgb * light;
+}
+#endif
+// What the screen shows of a point, times its opacity.
+vec4 shownAt(vec3 point, vec3 normal, vec3 albedo, float height) {
+#ifdef HEAT
+  vec3 shown = heated(toneMapped(lit(point, normal, vec3(0.62))), height);
+#else
+  vec3 shown = toneMapped(lit(point, normal, albedo));
+#endif
+  float opacity = opacityAt(point, normal);
+  return vec4(shown * opacity, opacity);
+}
+`;
+
+// What the screen shows of the floor, which fades into the sky.
+const floorShader = ({lamps}) => `
+uniform vec3 focus, floorColor, fade;
+vec3 floorAt(vec3 point, vec3 up, vec3 albedo, float shadow) {
+  vec3 light = around, way, radiance;
+${lampNumbers(lamps).map(i => `  radiance = incident${i}(point, way); light += radiance * max(dot(way, up), 0.0)${i ? "" : " * shadow"};`).join("\n")}
+  float share = smoothstep(fade.x, fade.y, distance(point, focus) / fade.z);
+  return toneMapped(mix(albedo * light, skyAt(normalize(point - eye), 0.0), share));
+}
+`;

@@ -1,0 +1,87 @@
+"use strict";
+// Meshes as buffers: a drawn vertex for each point, or for each point and place in the texture.
+const FEWEST_CELLS = 60;  // of a mesh that has fewer triangles in shadows
+
+// With fewer triangles for shadows: their points are at least about `cell` apart [m].
+function partOf(gl, part, cell) {
+  const {index, source, uv} = verticesOf(part), count = source.length;
+  const array = gl.createVertexArray(), buffers = [3, 3, 2, 1].map(() => gl.createBuffer());
+  const data = [new Float32Array(3 * count), new Float32Array(3 * count), uv || new Float32Array(2 * count), new Float32Array(count)];
+  source.forEach((point, i) => { for (let k = 0; k < 3; k++) { data[0][3 * i + k] = part.rest[3 * point + k]; data[1][3 * i + k] = part.directions[3 * point + k]; } });
+  gl.bindVertexArray(array);
+  [3, 3, 2, 1].forEach((size, i) => {
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers[i]);
+    gl.bufferData(gl.ARRAY_BUFFER, data[i], part.target && i !== 2 ? gl.DYNAMIC_DRAW : gl.STATIC_DRAW);
+    gl.enableVertexAttribArray(i);
+    gl.vertexAttribPointer(i, size, gl.FLOAT, false, 0, 0);
+  });
+  const coarse = clustered(data[0], index, cell), [all, shadow] = [index, coarse].map(triangles => {
+    const buffer = gl.createBuffer();
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.STATIC_DRAW);
+    return {buffer, count: triangles.length};
+  });
+  gl.bindVertexArray(null);
+  shadow.reaches = reachesOf(data[0], coarse);
+  return {...part, array, buffers, data, source, index, all, shadow, local: placed(part.position, part.quaternion)};
+}
+
+// Indices of the triangles' corners, the point of each vertex, and texture coordinates if there are any.
+function verticesOf({F, points, uv}) {
+  if (!uv) return {index: Uint32Array.from(F), source: Uint32Array.from({length: points}, (_, i) => i), uv: null};
+  const known = new Map(), source = [], places = [];
+  const index = Uint32Array.from(F, (point, corner) => {
+    const key = `${point} ${uv[2 * corner]} ${uv[2 * corner + 1]}`;
+    if (!known.has(key)) { known.set(key, source.length); source.push(point); places.push(uv[2 * corner], 1 - uv[2 * corner + 1]); }
+    return known.get(key);
+  });
+  return {index, source: Uint32Array.from(source), uv: Float32Array.from(places)};
+}
+
+// Triangles between the first points in the cells of a grid; all of them for a mesh of few cells.
+function clustered(points, index, cell) {
+  const first = new Map(), places = Array.from({length: points.length / 3}, (_, i) => {
+    const key = [0, 1, 2].map(k => Math.floor(points[3 * i + k] / cell)).join(" ");
+    if (!first.has(key)) first.set(key, i);
+    return first.get(key);
+  });
+  if (first.size < FEWEST_CELLS) return index;
+  const known = new Set(), kept = [];
+  for (let t = 0; t < index.length; t += 3) {
+    const [a, b, c] = [places[index[t]], places[index[t + 1]], places[index[t + 2]]];
+    if (a === b || b === c || c === a) continue;
+    const key = a < b && a < c ? `${a} ${b} ${c}` : b < c ? `${b} ${c} ${a}` : `${c} ${a} ${b}`;
+    if (!known.has(key)) { known.add(key); kept.push(a, b, c); }
+  }
+  return Uint32Array.from(kept);
+}
+
+// How far the triangles at a point reach that are closer to it than to their other corners [m], by the points.
+function reachesOf(points, index) {
+  const reaches = new Map();
+  for (let i = 0; i < index.length; i++) {
+    const a = index[i], b = index[i % 3 < 2 ? i + 1 : i - 2];
+    const side = Math.hypot(points[3 * a] - points[3 * b], points[3 * a + 1] - points[3 * b + 1], points[3 * a + 2] - points[3 * b + 2]);
+    for (const point of [a, b]) reaches.set(point, Math.max(reaches.get(point) || 0, 0.6 * side));
+  }
+  return {points: Uint32Array.from(reaches.keys()), far: Float32Array.from(reaches.values())};
+}
+
+// Displaces a target from its rest by heights in steps [m]; normals are those of the triangles round a point, creases stay.
+function displace(part, {rest, directions}, steps, step, limit) {
+  const {F, source, data} = part, count = part.points;
+  const points = new Float32Array(3 * count), normals = new Float32Array(3 * count);
+  for (let i = 0; i < count; i++) for (let k = 0; k < 3; k++) points[3 * i + k] = rest[3 * i + k] + steps[i] * step * directions[3 * i + k];
+  for (let t = 0; t < F.length; t += 3) {
+    const a = 3 * F[t], b = 3 * F[t + 1], c = 3 * F[t + 2];
+    const ux = points[b] - points[a], uy = points[b + 1] - points[a + 1], uz = points[b + 2] - points[a + 2];
+    const vx = points[c] - points[a], vy = points[c + 1] - points[a + 1], vz = points[c + 2] - points[a + 2];
+    const x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
+    for (const p of [a, b, c]) { normals[p] += x; normals[p + 1] += y; normals[p + 2] += z; }
+  }
+  for (let i = 0; i < source.length; i++) {
+    const p = 3 * source[i], size = Math.sqrt(normals[p] ** 2 + normals[p + 1] ** 2 + normals[p + 2] ** 2) || 1;
+    for (let k = 0; k < 3; k++) { data[0][3 * i + k] = points[p + k]; data[1][3 * i + k] = normals[p + k] / size; }
+    data[3][i] = steps[source[i]] * step / limit;
+  }
+}

@@ -1,0 +1,61 @@
+"use strict";
+// Programs and textures of WebGL 2.
+
+// Whether WebGL runs on the processor, where every pixel costs.
+function drawsInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2"), info = gl && gl.getExtension("WEBGL_debug_renderer_info");
+  return info ? /swiftshader|llvmpipe|software/i.test(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : false;
+}
+
+// A program with what is defined, and `set`, which takes its uniforms by their names.
+function programOf(gl, vertex, fragment, defined = []) {
+  const program = gl.createProgram(), lines = ["#version 300 es", ...defined.map(name => `#define ${name}`)].join("\n");
+  for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, source.replace("#version 300 es", lines));
+    gl.compileShader(shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+  return {program, set: settersOf(gl, program)};
+}
+
+function settersOf(gl, program) {
+  const setters = {}, kinds = {[gl.FLOAT]: "uniform1fv", [gl.FLOAT_VEC2]: "uniform2fv", [gl.FLOAT_VEC3]: "uniform3fv", [gl.FLOAT_VEC4]: "uniform4fv"};
+  for (let i = 0; i < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); i++) {
+    const {name, type} = gl.getActiveUniform(program, i), place = gl.getUniformLocation(program, name), kind = kinds[type];
+    setters[name.replace("[0]", "")] = type === gl.FLOAT_MAT4 ? value => gl.uniformMatrix4fv(place, false, value)
+      : kind ? value => gl[kind](place, [value].flat(2)) : value => gl.uniform1i(place, value);
+  }
+  return values => { for (const [name, value] of Object.entries(values)) if (name in setters) setters[name](value); };
+}
+
+// A texture of an image, or of a row of colours.
+function textureOf(gl, source, software) {
+  const texture = gl.createTexture(), row = Array.isArray(source);
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  if (row) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, source.length, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(source.flatMap(c => [...c, 255])));
+  else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, source);
+  gl.generateMipmap(gl.TEXTURE_2D);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, row ? gl.LINEAR : software ? gl.LINEAR_MIPMAP_NEAREST : gl.LINEAR_MIPMAP_LINEAR);
+  for (const side of ["S", "T"]) gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_WRAP_${side}`], row ? gl.CLAMP_TO_EDGE : gl.REPEAT);
+  return texture;
+}
+
+// A texture without filters, of a format such as RGBA8, and what draws into it.
+function tableOf(gl, format, width, height) {
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.texStorage2D(gl.TEXTURE_2D, 1, gl[format], width, height);
+  for (const side of ["MIN", "MAG"]) gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_${side}_FILTER`], gl.NEAREST);
+  return texture;
+}
+
+function framebufferOf(gl, attachment, texture) {
+  const framebuffer = gl.createFramebuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+  gl.framebufferTexture2D(gl.FRAMEBUFFER, gl[attachment], gl.TEXTURE_2D, texture, 0);
+  return framebuffer;
+}
