@@ -3,8 +3,9 @@
     ripple-sim export duck -o duck.html --resolution 64 --fps 30 --duration 5
     python examples/benchmarks/page.py duck.html [MORE.html ...]
 
-Plays the pages at 640x360 pixels, in turns, and prints for each the frames that it showed in a second, the processor time of
-all of Chromium's processes for each of them, and the share of the pixels each way that it drew. Linux tells the time.
+Plays the pages at 640x360 pixels, in turns, and prints for each the frames that it showed in a second, the processor
+time of all of Chromium's processes for each of them, and the share of the pixels each way that it drew. Linux tells the
+time.
 """
 
 import os
@@ -40,7 +41,7 @@ def processor_time() -> float:
 
 
 def played(browser: Any, page: Path) -> tuple[float, float, float]:
-    """Frames a second, processor time a frame [s], and the share of the pixels each way."""
+    """Frames a second, processor time a frame [ms], and the share of the pixels each way."""
     tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
     tab.goto(page.resolve().as_uri())
     tab.evaluate("ripplePlayer.ready.then(() => 0)")
@@ -51,7 +52,7 @@ def played(browser: Any, page: Path) -> tuple[float, float, float]:
     seconds = time.perf_counter() - start
     shown, share = tab.evaluate("[ripplePlayer.player.shown, ripplePlayer.player.canvas.width / innerWidth]")
     tab.close()
-    return (shown - before) / seconds, spent / (shown - before), share
+    return (shown - before) / seconds, 1e3 * spent / (shown - before), share
 
 
 def main(pages: list[Path]) -> None:
@@ -65,10 +66,9 @@ def main(pages: list[Path]) -> None:
         browser.close()
     for page, rounds in results.items():
         rates, spent, shares = np.array(rounds).T
-        milliseconds = f"{1e3 * np.median(spent):.1f} ms of processor time each ({1e3 * spent.min():.1f} to {1e3 * spent.max():.1f})"
-        print(
-            f"{page.name}: {rates.min():.1f} to {rates.max():.1f} frames a second, {milliseconds}, at {shares.min():.2f}"
-        )
+        print(f"{page.name}: {rates.min():.1f} to {rates.max():.1f} frames a second,", end=" ")
+        print(f"{np.median(spent):.1f} ({spent.min():.1f} to {spent.max():.1f}) ms of processor time a frame,", end=" ")
+        print(f"drawn with {shares.min():.2f} of the pixels each way")
 
 
 if __name__ == "__main__":

@@ -195,6 +195,31 @@ def test_the_browser_shows_what_our_renderer_shows(shown: Any, ours: tuple) -> N
 
 
 @browsing
+def test_the_studio_is_ours_and_no_shadow_ends_where_the_floor_looks_for_none(
+    browser: Any, soft_model: mujoco.MjModel, tmp_path: Path
+) -> None:
+    data = mujoco.MjData(soft_model)
+    mujoco.mj_forward(soft_model, data)
+    waves, looks = Material(speed=0.3, density=1500.0), {"egg": "rubber", "jelly": "jelly"}
+    ripples = Ripples(soft_model, {"egg": waves, "jelly": waves}, resolution=8, backend="cpu")
+    with Exporter(soft_model, ripples, tmp_path / "run.html", size=SIZE, looks=looks) as exporter:
+        exporter.write(data)
+    renderer = RippleRenderer(soft_model, ripples, width=SIZE[0], height=SIZE[1], looks=looks)
+    with opened(browser, tmp_path / "run.html") as tab:
+        tab.evaluate("ripplePlayer.ready.then(player => { player.playing = false; return player.show(0); })")
+        shown = pixels(tab)
+
+        assert np.abs(shown - renderer.render(data)).mean() < 6  # of 255
+        floor = "ripplePlayer.player.drawing.floor"
+        drawn = f"(ripplePlayer.player.redraw(), {floor}.shadowed.reduce((sum, each) => sum + each))"
+        assert 0 < tab.evaluate(drawn) < tab.evaluate(f"0.1 * {floor}.shadowed.length")
+        tab.evaluate(f"({floor}.shade = () => {{ {floor}.shadowed.fill(1); }}, ripplePlayer.player.redraw())")
+        assert np.abs(pixels(tab) - shown).max() <= 1
+        tab.evaluate(f"({floor}.shade = () => {{ {floor}.shadowed.fill(0); }}, ripplePlayer.player.redraw())")
+        assert (np.abs(pixels(tab) - shown).max(axis=2) > 30).sum() > 100
+
+
+@browsing
 def test_a_drag_turns_the_camera_and_the_button_brings_it_back(shown: Any) -> None:
     shown.evaluate(f"ripplePlayer.player.show({SEEN})")
     before = pixels(shown)
@@ -220,6 +245,13 @@ def test_it_plays_and_contacts_are_arrows(shown: Any) -> None:
     shown.evaluate("(ripplePlayer.player.contacts = false, ripplePlayer.player.show(0))")
     shown.click("#play")
     shown.wait_for_function("ripplePlayer.player.number > 2")
+    # at a tenth of the speed, frames that the screen shows several times are drawn once
+    shown.select_option("#speed", "0.1")
+    before = shown.evaluate("(ripplePlayer.player.number = 3, ripplePlayer.player.shown)")
+    shown.wait_for_function("ripplePlayer.player.number > 6")
+    drawn, number = shown.evaluate("[ripplePlayer.player.shown, ripplePlayer.player.number]")
+    assert drawn - before <= number - 3 + 2
+    shown.select_option("#speed", "1")
     shown.click("#play")
 
 

@@ -99,14 +99,13 @@ class Drawing {
     gl.viewport(0, 0, this.shadowSize, this.shadowSize);
     gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.useProgram(this.depth.program);
-    this.depth.set({viewProjection});
-    for (const {part, model} of casters) { this.depth.set({model}); this.mesh(part, part.shadow); }
+    for (const {part, model} of casters) { this.depth.set({modelProjection: times(viewProjection, model)}); this.mesh(part, part.shadow); }
   }
 
   drawPart({part, model}, heat) {
     const gl = this.gl;
     part.open ? gl.disable(gl.CULL_FACE) : gl.enable(gl.CULL_FACE);
-    if (part.lit) return part.lit.draw(this.use(this.triangles), {model});
+    if (part.lit) return part.lit.draw(this.triangles, times(this.shared.viewProjection, model));
     this.look("surface", part, model, heat);
     this.mesh(part, part.all);
   }

@@ -21,9 +21,7 @@ vec3 inShadowMap(vec3 p, vec3 n) {
 
 float shadowOf(vec3 c) {
   if (casts == 0.0 || any(lessThan(c, vec3(0.0))) || any(greaterThan(c, vec3(1.0)))) return 1.0;
-  float sum = 0.0;
-${offsets(taps, shadowSize).map(([x, y]) => `  sum += texture(shadowMap, vec3(c.x + ${x}, c.y + ${y}, c.z));`).join("\n")}
-  return sum * ${(1 / (taps * taps)).toFixed(9)};
+  return ${samples(taps, shadowSize)};
 }
 
 ${lampNumbers(lamps).map(i => incident(i, near)).join("\n")}
@@ -60,11 +58,20 @@ const incident = (i, near) => `vec3 incident${i}(vec3 p, out vec3 way) {
   return lampRadiance[${i}];
 }`;
 
-// Places of the shadow map's samples round a point.
-function offsets(taps, size) {
+// The mean of the shadow map's samples round a point.
+function samples(taps, size) {
   const along = Array.from({length: taps}, (_, i) => ((i - 0.5 * (taps - 1)) / size).toFixed(9));
-  return along.flatMap(x => along.map(y => [x, y]));
+  const all = along.flatMap(x => along.map(y => `texture(shadowMap, vec3(c.x + ${x}, c.y + ${y}, c.z))`));
+  return `(${all.join(" + ")}) / ${all.length.toFixed(1)}`;
 }
+
+// The first lamp casts shadows; what turns away from it is dark without a look into their map.
+const CASTS = `
+#ifndef TRANSLUCENT
+  if (dot(n, way) > 0.0)
+#endif
+  shadow = shadowOf(inShadowMap(point, n));
+`;
 
 // What a surface reflects, in linear light. Defined are COAT, METAL, SHEEN, TRANSLUCENT where a look has these, and what it has not costs nothing.
 const litShader = ({lamps}) => `
@@ -108,8 +115,9 @@ vec3 lit(vec3 point, vec3 normal, vec3 albedo) {
 #endif
   vec3 direct = vec3(0.0), highlight = vec3(0.0);
   vec3 way, radiance;
+  float shadow = 1.0;
 ${lampNumbers(lamps).map(i => `  radiance = incident${i}(point, way);
-  reflected(radiance, way, ${i ? "1.0" : "shadowOf(inShadowMap(point, n))"}, n, view, albedo, f0, rough, direct, highlight);`).join("\n")}
+${i ? "" : CASTS}  reflected(radiance, way, ${i ? "1.0" : "shadow"}, n, view, albedo, f0, rough, direct, highlight);`).join("\n")}
   vec3 ambience = from(ambientMap, n).rgb + mix(bounce, sky, 0.5 + 0.5 * n.z), shade = albedo * (direct + ambience);
 #ifdef METAL
   shade *= 1.0 - base.y;

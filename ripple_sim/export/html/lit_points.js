@@ -37,11 +37,11 @@ class LitPoints {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  draw(program, uniforms) {
+  draw(program, modelProjection) {
     const gl = this.gl;
     [this.places, this.colors].forEach((table, i) => { gl.activeTexture(gl.TEXTURE3 + i); gl.bindTexture(gl.TEXTURE_2D, table); });
     gl.useProgram(program.program);
-    program.set({...uniforms, places: 3, colors: 4});
+    program.set({modelProjection, places: 3, colors: 4});
     gl.bindVertexArray(this.array);
     gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_INT, 0);
   }

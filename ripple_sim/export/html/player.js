@@ -2,6 +2,7 @@
 // The player: time, camera and controls. Tests and other pages may use `ripplePlayer`.
 const ARROW_LENGTH = 0.25;  // of the strongest contact, in distances of the camera
 const RATE = 30, LATE = 1.1, COARSEST = 0.6;  // frames a second that it takes care to show, by how much they may be late before fewer pixels are drawn, and how few
+const REFRESH = 17;  // of the screen [ms]
 
 function arrowPart() {
   const points = [], normals = [], F = [], sides = 10;
@@ -132,7 +133,9 @@ function control(player) {
         follow();
       }
     }
-    requestAnimationFrame(tick);
+    // where the next frame is far off, the browser may rest
+    const rest = 1000 * (1 - player.number % 1) / speed - REFRESH;
+    setTimeout(() => requestAnimationFrame(tick), player.playing ? Math.max(Math.min(rest, 100), 0) : 0);
   };
   follow();
   requestAnimationFrame(tick);

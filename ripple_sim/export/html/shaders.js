@@ -40,12 +40,12 @@ void main() {
 }`;
 
 const LIT_POINTS_VERTEX = `#version 300 es
-uniform highp sampler2D places; uniform sampler2D colors; uniform mat4 model, viewProjection;
+uniform highp sampler2D places; uniform sampler2D colors; uniform mat4 modelProjection;
 out vec4 shown;
 void main() {
   ivec2 texel = ivec2(gl_VertexID & 255, gl_VertexID >> 8);
   shown = texelFetch(colors, texel, 0);
-  gl_Position = viewProjection * (model * vec4(texelFetch(places, texel, 0).xyz, 1.0));
+  gl_Position = modelProjection * vec4(texelFetch(places, texel, 0).xyz, 1.0);
 }`;
 
 const LIT_POINTS_FRAGMENT = `#version 300 es
@@ -124,8 +124,8 @@ void main() { fragment = vec4(toneMapped(skyAt(normalize(ray), 0.0)), 1.0); }`;
 
 const DEPTH_VERTEX = `#version 300 es
 layout(location = 0) in vec3 inPoint;
-uniform mat4 model, viewProjection;
-void main() { gl_Position = viewProjection * (model * vec4(inPoint, 1.0)); }`;
+uniform mat4 modelProjection;
+void main() { gl_Position = modelProjection * vec4(inPoint, 1.0); }`;
 
 const DEPTH_FRAGMENT = `#version 300 es
 precision highp float;
