@@ -36,6 +36,7 @@ class Unit(IntEnum):
     FLOOR_BOUNCE = 17  # light that objects throw on the floor
     TRANSMISSION = 18  # what transparent objects take from the lights
     OBJECTS = 19  # the table of objects
+    FLOOR_SEEN = 20  # the floor's light as solids see it
 
 
 class Binding(IntEnum):

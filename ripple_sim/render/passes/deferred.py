@@ -93,10 +93,13 @@ class DeferredShading:
         self._g_buffer.bind()
         self._tiles.cover(boxes)
         self._background.prepare(ctx)
+        # every pixel gets its colour from the background, or the classification
+        self.frame.color_mask = (False,) * 4
+        self.frame.clear(depth=LEVELS["OPEN"])
+        self.frame.color_mask = (True,) * 4
         self.frame.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
         ctx.depth_func = "1"
-        self.frame.clear(depth=LEVELS["OPEN"])
         if self._tiles.count:
             self._classify.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=self._tiles.count)
         self._background.draw(ctx, self.frame)

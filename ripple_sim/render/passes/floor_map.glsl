@@ -1,8 +1,10 @@
 // The floor map; see floor_occlusion_fragment.glsl.
 #include "gpu/frame_uniforms.glsl"
 
-// r: ambient visibility; g: 1 where shadows may fall; b: share of the lights that arrives
-layout(binding = FLOOR_MAP_UNIT) uniform sampler2D floor_visibility;
+layout(binding = FLOOR_MAP_UNIT) uniform sampler2D floor_visibility;  // r: ambient visibility; g: 1 where shadows may fall
+// r: ambient visibility; g: share of the lights that arrives. In 8 bits, which software drivers filter in half the time;
+// on the floor itself their steps would be seen.
+layout(binding = FLOOR_SEEN_UNIT) uniform sampler2D floor_seen;
 layout(binding = FLOOR_BOUNCE_UNIT) uniform sampler2D floor_bounce;  // light that objects throw on the floor, over pi
 
 // Texture coordinates in the floor map of a point given along the floor's axes.

@@ -35,7 +35,8 @@ class FloorOcclusion:
     def __init__(self, resources: Resources, options: Mapping[str, int], floor: Floor | None) -> None:
         self._floor = floor
         if floor is None:
-            self._map = resources.texture((1, 1), 4, np.ones(4, dtype=np.float16).tobytes(), dtype="f2")
+            self._map = resources.texture((1, 1), 2, np.ones(2, dtype=np.float16).tobytes(), dtype="f2")
+            self._seen = resources.texture((1, 1), 4, bytes([255] * 4))
             self._bounce = resources.texture((1, 1), 4, bytes(8), dtype="f2")
             return
         program = resources.program("glsl/view_vertex", "passes/floor_occlusion_fragment", **options)
@@ -44,12 +45,15 @@ class FloorOcclusion:
         self._ceiling = resources.texture(ceiling, 4, dtype="nu2")
         self._ceiling.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._ceiling_framebuffer = resources.framebuffer([self._ceiling], resources.depth_renderbuffer(ceiling))
-        self._map, self._bounce = (resources.texture((_MAP_SIZE, _MAP_SIZE), 4, dtype="f2") for _ in range(2))
-        for texture in (self._map, self._bounce):
+        self._map, self._bounce, self._seen = maps = [
+            resources.texture((_MAP_SIZE, _MAP_SIZE), components, dtype=dtype)
+            for components, dtype in ((2, "f2"), (4, "f2"), (4, "f1"))
+        ]
+        for texture in maps:
             texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-        for texture in (self._ceiling, self._map, self._bounce):
+        for texture in (self._ceiling, *maps):
             texture.repeat_x = texture.repeat_y = False
-        self._map_framebuffer = resources.framebuffer([self._map, self._bounce])
+        self._map_framebuffer = resources.framebuffer(maps)
 
     def draw(
         self, ctx: moderngl.Context, draw_albedo: Callable[[tuple[float, ...]], None], shadows: ShadowMaps
@@ -77,9 +81,11 @@ class FloorOcclusion:
         self._pass.program["extent"] = (2 * floor.half_width, top, _INFLUENCE * floor.half_width)
         self._pass.render(moderngl.TRIANGLES, vertices=3)
         self._map.build_mipmaps(max_level=_LEVELS)
+        self._seen.build_mipmaps()
         self._bounce.build_mipmaps(max_level=_BOUNCE_LEVELS)
 
     def bind(self) -> None:
         """Bind the map for the shaders."""
         self._map.use(Unit.FLOOR_MAP)
         self._bounce.use(Unit.FLOOR_BOUNCE)
+        self._seen.use(Unit.FLOOR_SEEN)

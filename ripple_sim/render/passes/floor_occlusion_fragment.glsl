@@ -12,6 +12,7 @@ uniform vec3 extent;  // width of the map [m], height of its top [m], radius of 
 in vec2 screen;
 layout(location = 0) out vec4 fragment;  // see floor_map.glsl
 layout(location = 1) out vec4 bounced;
+layout(location = 2) out vec4 seen;
 
 const int TAPS = 14;
 const int SHADOW_TAPS = 16;
@@ -111,5 +112,7 @@ void main()
     float share = dot(arrives, vec3(1.0)) / dot(unshaded, vec3(1.0));
     bounce += UNDER * colors * floor_albedo.rgb * (share * floor_light.rgb + sky.rgb);
     bounced = vec4(known * bounce, 1.0);
-    fragment = vec4(1.0 - min(covered, 1.0), shaded ? 1.0 : 0.0, share, 1.0);
+    float open = 1.0 - min(covered, 1.0);
+    fragment = vec4(open, shaded ? 1.0 : 0.0, 0.0, 1.0);
+    seen = vec4(open, share, 0.0, 1.0);
 }

@@ -29,9 +29,9 @@ vec3 floor_radiance(vec3 position, float radius)
 {
     vec3 local = position - floor_origin.xyz;
     vec2 place = floor_map_position(vec2(dot(local, floor_u.xyz), dot(local, floor_v.xyz)));
-    float texel = 2.0 * floor_map.z / float(textureSize(floor_visibility, 0).x);
-    vec4 open = textureLod(floor_visibility, place, log2(max(radius / texel, 2.0)));
-    vec3 lit = floor_lit * open.b + floor_surround * (0.15 + 0.85 * open.r);
+    float texel = 2.0 * floor_map.z / float(textureSize(floor_seen, 0).x);
+    vec2 open = textureLod(floor_seen, place, log2(max(radius / texel, 2.0))).rg;
+    vec3 lit = floor_lit * open.g + floor_surround * (0.15 + 0.85 * open.r);
     return floor_origin.w > 0.0 ? lit : sky.rgb * 0.8;
 }
 
