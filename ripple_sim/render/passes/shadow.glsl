@@ -20,6 +20,13 @@ bool sharp = false;  // whether any penumbra has been as narrow, or too narrow f
 const int SHARED = 4, SEARCH_TAPS = 4, FILTER_TAPS = 16, MEAN_TAPS = 4;
 const mat2 TURN = FOURTH_TURN;
 #endif
+
+// Number, and a half, of this pixel's first point, of whose points as many as share them take turns.
+float own_first_point()
+{
+    return SHARED > 1 ? first_point() : 2.0;
+}
+
 const vec2 BY_MEANS = vec2(0.4, 0.8);  // texels of `blockers` between those: from where on they are means
 
 // Texture coordinates of a point of one light's map.
@@ -97,7 +104,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     float steepest = 10.0 * width * metre;
     vec2 slope = -plane.xy * (abs(plane.z) > 1e-9 ? 1.0 / plane.z : 1e9);
     slope = clamp(slope, -steepest, steepest);
-    float first = SHARED > 1 ? first_point() : 2.0;
+    float first = own_first_point();
     vec2 start = spiral_direction(first + counts.z), direction = start;  // another one in each exposure
     float depth_bias = 0.5 * texel * metre;
     float least = SHARED > 1 ? length(vec2(1.5 / of_width.z, scatter / width)) : 1.5 / of_width.z;

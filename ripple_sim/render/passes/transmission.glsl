@@ -5,7 +5,7 @@
 // rgb: share of the light that is taken; a: the mean of that times the distance from the light [m]
 layout(binding = TRANSMISSION_UNIT) uniform sampler2D transmission_maps;
 
-const int PASSING_TAPS = 3;  // for each pixel of a block, as in shadow.glsl
+const int PASSING_TAPS = 12 / SHARED;  // for each pixel of a block, as in shadow.glsl
 const float LEAST = 1e-3;   // mean share taken that counts
 const float CLOSEST = 3.0;  // distance at which things begin to shade one another, in texels [m]
 
@@ -37,12 +37,12 @@ vec3 transmitted(int light, vec3 position, vec3 normal, bvec2 block)
     vec2 found = transparent_blocker(taken_about(light, p.xy, 0.5 * widest_penumbra(light, to_light)));
     float penumbra = penumbra_of(light, min(found.y / max(found.x, 1e-4), to_light), to_light);
     vec3 taken = vec3(0.0);
-    float first = first_point();
+    float first = own_first_point();
     vec2 direction = spiral_direction(first);
     int taps = inside && found.x > 0.0 ? PASSING_TAPS : 0;
     for (int i = 0; i < taps; ++i) {
         vec2 offset = penumbra * sqrt((float(i) + 0.25 * first) / float(PASSING_TAPS)) * direction;
-        direction = FOURTH_TURN * direction;
+        direction = TURN * direction;
         vec4 here = taken_about(light, p.xy + offset, 0.35 * penumbra);
         vec2 blocker = transparent_blocker(here);
         float before = to_light - blocker.y / max(blocker.x, 1e-4);
