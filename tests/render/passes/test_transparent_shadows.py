@@ -60,3 +60,11 @@ def test_no_light_is_taken_beside_a_penumbra(gl):
     )
     taken = (plain - shaded).max(axis=2)
     assert distance_transform_edt(taken < 5)[taken >= 2].max() < 6
+
+
+def test_a_wide_penumbra_has_no_pattern_where_blocks_of_the_floor_are_interpolated(gl):
+    body = '<geom name="b" type="sphere" size=".5" pos="0 0 1.5"/>' + DARK_FLOOR
+    frame = frame_of(gl, body, targets={"b": ball_surface("water")}, lighting="studio", size=(1280, 960))
+    across = frame[480, 920:1240, 1]
+    assert np.ptp(across) > 50
+    assert np.abs(np.diff(across, 2)).max() <= 2
