@@ -59,6 +59,14 @@ float blockers_level(float footprint)
     return log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
 }
 
+// The same for one of the points of a disc, by its place in their order, 0 to 1. `whole` levels cost half of those between,
+// of which two are read: in place of them some points take the lower and some the higher. On the floor it would be seen.
+float point_level(float footprint, float order, bool whole)
+{
+    float level = blockers_level(footprint);
+    return whole ? floor(level + order) : level;
+}
+
 // Mean of what covers a map about a point, over so much of the map: see blockers_fragment.glsl.
 vec3 blockers_mean(int light, vec2 point, float footprint)
 {
@@ -113,6 +121,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     // Loops of as many rounds as are needed in place of branches: software drivers execute both sides of a branch. They
     // are tested at the end, since such drivers execute a loop's body once more than a test before it lets pass.
     bool inside = counts.w > float(light) && facing > -0.5 && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
+    bool whole = bias >= 0.0;
     float distances = 0.0, found = 0.0;
     int taps = inside ? SEARCH_TAPS : 0, i = 0;
     do {
@@ -123,9 +132,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
         // the mean over as much as lies between the points: single texels would come and go from pixel to pixel
         float footprint = widest * sqrt(TWO_PI * away / float(SHARED * SEARCH_TAPS));
         float behind = light_distance(of_depth, p.z + dot(slope, offset));
-        // one level a point, of which some take the next: between two, both are read. On the floor steps would be seen.
-        float level = blockers_level(footprint);
-        Blockers seen = blockers_about(light, p.xy + offset, bias < 0.0 ? level : floor(level + away), behind);
+        Blockers seen = blockers_about(light, p.xy + offset, point_level(footprint, away, whole), behind);
         float blocks = (1.0 - away) * seen.share * smoothstep(0.0, texel + 0.25 * footprint * width, seen.before);
         distances += inside ? blocks * seen.distance : 0.0;
         found += inside ? blocks : 0.0;
@@ -150,10 +157,11 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     direction = start;
     i = 0;
     do {
-        vec2 offset = disc * sqrt((float(i) + 0.25 * first) / float(MEAN_TAPS)) * direction;
+        float away = (float(i) + 0.25 * first) / float(MEAN_TAPS);
+        vec2 offset = disc * sqrt(away) * direction;
         direction = TURN * direction;
         float behind = light_distance(of_depth, p.z + dot(slope, offset));
-        Blockers seen = blockers_about(light, p.xy + offset, blockers_level(between), behind);
+        Blockers seen = blockers_about(light, p.xy + offset, point_level(between, away, whole), behind);
         of_means += 1.0 - seen.share * smoothstep(0.0, texel + 0.25 * between * width, seen.before);
     } while (++i < taps);
     taps = shaded && wide < 1.0 ? FILTER_TAPS : 0;
