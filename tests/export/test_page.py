@@ -195,7 +195,7 @@ def test_the_browser_shows_what_our_renderer_shows(shown: Any, ours: tuple) -> N
 
 
 @browsing
-def test_the_studio_is_ours_and_no_shadow_ends_where_the_floor_looks_for_none(
+def test_the_studio_is_ours_and_the_floor_leaves_out_no_shadow_and_no_sky(
     browser: Any, soft_model: mujoco.MjModel, tmp_path: Path
 ) -> None:
     data = mujoco.MjData(soft_model)
@@ -208,14 +208,17 @@ def test_the_studio_is_ours_and_no_shadow_ends_where_the_floor_looks_for_none(
     with opened(browser, tmp_path / "run.html") as tab:
         tab.evaluate("ripplePlayer.ready.then(player => { player.playing = false; return player.show(0); })")
         shown = pixels(tab)
-
-        assert np.abs(shown - renderer.render(data)).mean() < 6  # of 255
+        assert np.abs(shown - renderer.render(data)).mean() < 3  # of 255
         floor = "ripplePlayer.player.drawing.floor"
         drawn = f"(ripplePlayer.player.redraw(), {floor}.shadowed.reduce((sum, each) => sum + each))"
         assert 0 < tab.evaluate(drawn) < tab.evaluate(f"0.1 * {floor}.shadowed.length")
-        tab.evaluate(f"({floor}.shade = () => {{ {floor}.shadowed.fill(1); }}, ripplePlayer.player.redraw())")
+        low, high = tab.evaluate(f"{floor}.bare")
+        assert (-1 < low < 1) and high == 1
+        tab.evaluate(f"({floor}.shade = () => {{ {floor}.shadowed.fill(1); }}, {floor}.leaves = () => [-1, 1])")
+        tab.evaluate("ripplePlayer.player.redraw()")
         assert np.abs(pixels(tab) - shown).max() <= 1
-        tab.evaluate(f"({floor}.shade = () => {{ {floor}.shadowed.fill(0); }}, ripplePlayer.player.redraw())")
+        tab.evaluate(f"({floor}.shade = () => {{ {floor}.shadowed.fill(0); }}, {floor}.leaves = () => null)")
+        tab.evaluate("ripplePlayer.player.redraw()")
         assert (np.abs(pixels(tab) - shown).max(axis=2) > 30).sum() > 100
 
 

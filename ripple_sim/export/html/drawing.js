@@ -17,6 +17,7 @@ class Drawing {
     this.environment = new Environment(gl, meta.light.boxes, meta.light.studio ? 1 : 0.5, meta.light.studio ? 1 : 0);
     const cell = SHADOW_CELL * SHADOW_WIDTH * meta.distance / this.shadowSize;
     this.parts = meta.parts.map(part => partOf(gl, part, cell));
+    this.drawn = grouped(gl, this.parts);
     this.arrow = partOf(gl, arrowPart(), cell);
     this.shadow = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, this.shadow);
@@ -66,31 +67,48 @@ class Drawing {
     for (const i of part.lit ? [0] : [0, 1, 3]) { gl.bindBuffer(gl.ARRAY_BUFFER, part.buffers[i]); gl.bufferSubData(gl.ARRAY_BUFFER, 0, part.data[i]); }
   }
 
-  // With what `view` and `bodies` say of the camera and the bodies' places; arrows are matrices.
+  // With what `view` and `bodies` say of the camera and the bodies' places; arrows are matrices. Everything is uploaded before
+  // anything is drawn, which would wait for it.
   draw(view, bodies, arrows, heat) {
-    const {gl, canvas: {width, height}} = this, light = lightOf(this.meta, view, this.environment.diffuse([0, 0, 1]), this.shadowSize);
-    const parts = this.parts.map(part => ({part, model: times(bodies[part.body], part.local), opacity: part.opacity * (1 - 0.6 * part.transparency)}));
+    const gl = this.gl, light = lightOf(this.meta, view, this.environment.diffuse([0, 0, 1]), this.shadowSize);
+    const parts = this.placed(bodies, view.eye), casters = parts.filter(({part}) => part.opacity === 1);
+    const floor = this.meta.floor && this.setFloor(view, bodies, light, casters);
     this.shared = {...light, eye: view.eye, viewProjection: view.matrix, shadowMap: 0, image: 1, heatColors: 2, places: 3, normals: 4, ambientMap: 5, coatMap: 6, mirrorMap: 7};
     this.ready = new Set();  // programs that have these
     gl.enable(gl.DEPTH_TEST); gl.enable(gl.CULL_FACE); gl.depthMask(true); gl.disable(gl.BLEND);
-    const casters = parts.filter(({part}) => part.opacity === 1);
     this.drawShadows(casters, light.shadowMatrix);
     this.bind(0, this.shadow); this.bind(2, this.heat); this.bind(5, this.environment.ambient); this.bind(6, this.environment.mirrored(COAT_ROUGHNESS));
     gl.disable(gl.DEPTH_TEST);
-    for (const {part, model} of parts) if (part.lit) part.lit.light(this.look("points", part, model, heat), model, view.eye);
+    for (const {part, model} of parts) if (part.lit) { this.look("points", part, model, heat); part.lit.light(); }
     gl.enable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.viewport(0, 0, width, height);
+    gl.viewport(0, 0, this.canvas.width, this.canvas.height);
     gl.clear(gl.DEPTH_BUFFER_BIT | gl.COLOR_BUFFER_BIT);
-    parts.sort((a, b) => b.opacity - a.opacity);
-    const solid = parts.filter(each => each.opacity === 1), clear = parts.filter(each => each.opacity < 1);
-    for (const each of solid) this.drawPart(each, heat);
-    this.screen(view, bodies, casters);
+    for (const each of parts) if (each.opacity === 1) this.drawPart(each, heat);
+    this.drawScreen(view, floor);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    for (const each of clear) this.drawPart(each, heat);
+    for (const each of parts) if (each.opacity < 1) this.drawPart(each, heat);
     gl.disable(gl.BLEND);
     for (const model of arrows) this.drawPart({part: this.arrow, model}, false);
+  }
+
+  // Parts with their places, the most opaque first.
+  placed(bodies, eye) {
+    return this.drawn.map(part => {
+      const model = part.parts ? IDENTITY : times(bodies[part.body], part.local);
+      if (part.parts) part.place(bodies, eye);
+      if (part.lit) part.lit.place(model, eye);
+      return {part, model, opacity: part.opacity * (1 - 0.6 * part.transparency)};
+    }).sort((a, b) => b.opacity - a.opacity);
+  }
+
+  // The floor's cells, and its uniforms.
+  setFloor(view, bodies, light, casters) {
+    const floor = this.meta.floor, fade = this.meta.light.studio ? [0.4, 3.4] : [1.5, 10];
+    const floorFrame = times(bodies[floor.body], placed(floor.position, floor.quaternion));
+    this.floor.set(view, floorFrame, light, casters, 1.5 * fade[1] * view.distance);
+    return {focus: view.focus, fade: [...fade, view.distance], floorFrame, floorColor: floor.color, floorTiling: floor.tiling};
   }
 
   drawShadows(casters, viewProjection) {
@@ -107,6 +125,7 @@ class Drawing {
     part.open ? gl.disable(gl.CULL_FACE) : gl.enable(gl.CULL_FACE);
     if (part.lit) return part.lit.draw(this.triangles, times(this.shared.viewProjection, model));
     this.look("surface", part, model, heat);
+    if (part.color) gl.vertexAttrib3fv(COLOR, part.color);
     this.mesh(part, part.all);
   }
 
@@ -114,7 +133,7 @@ class Drawing {
   look(kind, part, model, heat) {
     this.bind(1, this.imageOf(part) || this.blank);
     this.bind(7, this.environment.mirrored(Math.max(part.roughness, 0.0632)));
-    return this.use(this.lighting(kind, part, heat), {model, open: Number(part.open), color: part.color,
+    return this.use(this.lighting(kind, part, heat), {model, open: Number(part.open), ...(part.color && {color: part.color}),
       base: [part.roughness, part.metallic, part.sheen, part.coat], volume: [part.translucency, part.transparency, part.emission, part.opacity]});
   }
 
@@ -140,17 +159,21 @@ class Drawing {
   }
 
   // The floor, which fades into the sky, and the sky.
-  screen(view, bodies, casters) {
-    const gl = this.gl, floor = this.meta.floor, fade = this.meta.light.studio ? [0.4, 3.4] : [1.5, 10];
+  drawScreen(view, floor) {
+    const gl = this.gl;
     gl.disable(gl.CULL_FACE);
     if (floor) {
-      const frame = times(bodies[floor.body], placed(floor.position, floor.quaternion));
-      const uniforms = {focus: view.focus, fade: [...fade, view.distance], floorFrame: frame, floorColor: floor.color, floorTiling: floor.tiling};
-      this.bind(1, this.imageOf(floor) || this.blank);
-      this.floor.draw(program => this.use(program, uniforms), {view, frame, light: this.shared, casters, reach: 1.5 * fade[1] * view.distance});
+      this.bind(1, this.imageOf(this.meta.floor) || this.blank);
+      this.floor.draw(program => this.use(program, floor));
     }
+    const bare = floor ? this.floor.bare : [-1, 1], {width, height} = this.canvas;
+    if (!bare) return;
+    const [low, high] = bare.map(y => (y + 1) / 2 * height);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(0, Math.floor(low), width, Math.ceil(high) - Math.floor(low));
     this.use(this.sky, {rayMiddle: view.ray[0], rayRight: view.ray[1], rayUp: view.ray[2]});
     gl.bindVertexArray(this.empty);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.disable(gl.SCISSOR_TEST);
   }
 }

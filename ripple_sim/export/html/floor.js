@@ -3,6 +3,7 @@
 // shadow map: where software draws, its samples take most of the time.
 const INNER = 20, OUTER = 8, HALF = INNER + OUTER;  // cells from the middle to a side: of one size up to the camera's distance, and growing
 const MARGIN = 3;  // by which shadows may be wider [texels of the shadow map]
+const ROWS = 24;  // of the picture, each of which the sky is drawn in or not
 
 class Floor {
   constructor(gl, floor, shaders, plain) {
@@ -12,36 +13,36 @@ class Floor {
     this.plane = new Float32Array(2 * this.row ** 2);
     this.outside = new Uint8Array(this.row ** 2);
     this.shadowed = new Uint8Array(this.side ** 2);
-    this.triangles = [0, 1].map(() => new Uint16Array(6 * this.side ** 2));
+    this.triangles = new Uint16Array(6 * this.side ** 2);
     this.array = gl.createVertexArray();
-    this.buffers = [0, 1].map(() => gl.createBuffer());
     gl.bindVertexArray(this.array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[0]);
-    gl.bufferData(gl.ARRAY_BUFFER, this.plane, gl.DYNAMIC_DRAW);
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribPointer(0, 2, gl.FLOAT, false, 0, 0);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers[1]);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, 12 * this.side ** 2, gl.DYNAMIC_DRAW);
+    this.points = vertexBuffer(gl, 0, 2, this.plane, true);
+    indexBuffer(gl, this.triangles, true);
     gl.bindVertexArray(null);
   }
 
-  // Draws it with what `use` does to make a program the present one.
-  draw(use, {view, frame, light, casters, reach}) {
+  // Makes its cells for a frame.
+  set(view, frame, light, casters, reach) {
     const gl = this.gl, axes = [frame.slice(0, 3), frame.slice(4, 7)], off = add(view.focus, frame.slice(12, 15), -1);
     const middle = axes.map(axis => dot(off, axis));
     this.place(middle, view.distance, reach, times(view.matrix, frame));
+    this.bare = this.leaves(view, frame);
     this.shade(frame, light, casters, middle, view.distance, reach);
-    const counts = this.list();
+    this.list();
     gl.bindVertexArray(this.array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[0]);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.points);
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.plane);
-    let at = 0;
-    counts.forEach((count, shadow) => {
+    gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, this.triangles);
+  }
+
+  // Draws it with what `use` does to make a program the present one.
+  draw(use) {
+    const gl = this.gl;
+    gl.bindVertexArray(this.array);
+    this.counts.forEach((count, shadow) => {
       if (!count) return;
       use(this.programs[shadow]);
-      gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, at, this.triangles[shadow].subarray(0, count));
-      gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_SHORT, at);
-      at += 2 * count;
+      gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_SHORT, shadow ? 2 * (this.triangles.length - count) : 0);
     });
   }
 
@@ -58,6 +59,20 @@ class Floor {
       const u = m[0] * x + m[4] * y + m[12], v = m[1] * x + m[5] * y + m[13], w = m[3] * x + m[7] * y + m[15];
       outside[k] = (u < -w) | (u > w) << 1 | (v < -w) << 2 | (v > w) << 3;
     }
+  }
+
+  // From where to where in the picture's height, from -1 to 1, it may leave something to the sky: between rows whose ends lie on it,
+  // it covers everything.
+  leaves(view, frame) {
+    const {plane} = this, [axis, other, up, origin] = [0, 4, 8, 12].map(k => frame.slice(k, k + 3)), off = add(view.eye, origin, -1);
+    const inside = (x, i) => plane[i] <= x && x <= plane[plane.length - 2 + i];
+    const covered = y => [-1, 1].every(x => {
+      const ray = add(add(view.ray[0], view.ray[1], x), view.ray[2], y), depth = -dot(off, up) / dot(ray, up), hit = add(off, ray, depth);
+      return depth > 0.03 * view.distance && inside(dot(hit, axis), 0) && inside(dot(hit, other), 1);
+    });
+    const rows = Array.from({length: ROWS + 1}, (_, i) => 2 * i / ROWS - 1), ends = rows.map(covered);
+    const open = rows.slice(1).map((_, i) => i).filter(i => !(ends[i] && ends[i + 1]));
+    return open.length ? [rows[open[0]], rows[open[open.length - 1] + 1]] : null;
   }
 
   // Which cells the casters may darken: those about the points of their shadows, as wide as their triangles.
@@ -83,15 +98,17 @@ class Floor {
     }
   }
 
-  // Lists the triangles of cells in light and in shadow, and returns how many indices these are.
+  // Lists the triangles of cells in light from the beginning, and of those in shadow up to the end.
   list() {
-    const {outside, shadowed, triangles, side, row} = this, counts = [0, 0];
+    const {outside, shadowed, triangles, side, row} = this;
+    let first = 0, last = triangles.length;
     for (let cell = 0; cell < side * side; cell++) {
-      const k = cell + Math.floor(cell / side), shadow = shadowed[cell], list = triangles[shadow];
+      const k = cell + Math.floor(cell / side);
       if (outside[k] & outside[k + 1] & outside[k + row] & outside[k + row + 1]) continue;
-      list[counts[shadow]++] = k; list[counts[shadow]++] = k + 1; list[counts[shadow]++] = k + row;
-      list[counts[shadow]++] = k + 1; list[counts[shadow]++] = k + row + 1; list[counts[shadow]++] = k + row;
+      let at = shadowed[cell] ? last -= 6 : (first += 6) - 6;
+      triangles[at++] = k; triangles[at++] = k + 1; triangles[at++] = k + row;
+      triangles[at++] = k + 1; triangles[at++] = k + row + 1; triangles[at++] = k + row;
     }
-    return counts;
+    this.counts = [first, triangles.length - last];
   }
 }

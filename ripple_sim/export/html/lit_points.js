@@ -15,25 +15,28 @@ class LitPoints {
     this.triangles = new Uint32Array(part.index.length);
     this.array = gl.createVertexArray();
     gl.bindVertexArray(this.array);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.triangles, gl.DYNAMIC_DRAW);
+    indexBuffer(gl, this.triangles, true);
     gl.bindVertexArray(null);
   }
 
-  // Lights the points that are seen from the eye, with a program that has its uniforms but for the tables.
-  light(program, model, eye) {
-    const gl = this.gl, points = this.select(model, eye), rows = Math.ceil(points / COLUMNS);
+  // Takes the points that are seen from the eye into the tables.
+  place(model, eye) {
+    const gl = this.gl;
+    this.rows = Math.ceil(this.select(model, eye) / COLUMNS);
     [this.places, this.normals].forEach((table, i) => {
-      gl.activeTexture(gl.TEXTURE3 + i);
       gl.bindTexture(gl.TEXTURE_2D, table);
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, COLUMNS, rows, gl.RGBA, gl.FLOAT, this.data[i]);
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, COLUMNS, this.rows, gl.RGBA, gl.FLOAT, this.data[i]);
     });
     gl.bindVertexArray(this.array);
     gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, this.triangles.subarray(0, this.count));
+  }
+
+  // Lights them, with a program that is the present one and has its uniforms.
+  light() {
+    const gl = this.gl;
+    [this.places, this.normals].forEach((table, i) => { gl.activeTexture(gl.TEXTURE3 + i); gl.bindTexture(gl.TEXTURE_2D, table); });
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.target);
-    gl.viewport(0, 0, COLUMNS, rows);
-    gl.useProgram(program.program);
-    program.set({places: 3, normals: 4});
+    gl.viewport(0, 0, COLUMNS, this.rows);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
@@ -50,21 +53,18 @@ class LitPoints {
   select(model, eye) {
     const {part: {index, open, data: [points, normals, , heights]}, number, triangles, data: [places, ways]} = this;
     const off = add(eye, model.slice(12, 15), -1), [x, y, z] = [0, 4, 8].map(column => dot(model.slice(column, column + 3), off));
-    let count = 0, found = 0;
+    if (open) triangles.set(index);
+    const count = open ? index.length : facing(index, points, 0, [x, y, z], triangles, 0);
+    let found = 0;
     number.fill(-1);
-    for (let t = 0; t < index.length; t += 3) {
-      const a = 3 * index[t], b = 3 * index[t + 1], c = 3 * index[t + 2], px = points[a], py = points[a + 1], pz = points[a + 2];
-      const ux = points[b] - px, uy = points[b + 1] - py, uz = points[b + 2] - pz, vx = points[c] - px, vy = points[c + 1] - py, vz = points[c + 2] - pz;
-      if (!open && (uy * vz - uz * vy) * (x - px) + (uz * vx - ux * vz) * (y - py) + (ux * vy - uy * vx) * (z - pz) <= 0) continue;
-      for (let k = t; k < t + 3; k++) {
-        const i = index[k];
-        if (number[i] < 0) {
-          number[i] = found;
-          for (let axis = 0; axis < 3; axis++) { places[4 * found + axis] = points[3 * i + axis]; ways[4 * found + axis] = normals[3 * i + axis]; }
-          places[4 * found++ + 3] = heights[i];
-        }
-        triangles[count++] = number[i];
+    for (let k = 0; k < count; k++) {
+      const i = triangles[k];
+      if (number[i] < 0) {
+        number[i] = found;
+        for (let axis = 0; axis < 3; axis++) { places[4 * found + axis] = points[3 * i + axis]; ways[4 * found + axis] = normals[3 * i + axis]; }
+        places[4 * found++ + 3] = heights[i];
       }
+      triangles[k] = number[i];
     }
     this.count = count;
     return found;

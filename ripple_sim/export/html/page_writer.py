@@ -27,7 +27,7 @@ _CHUNK = 16  # frames that are decoded together
 _STEP = 5e-5  # of heights, in sizes of the object
 _SCRIPTS = (
     *("algebra.js", "decode.js", "motion.js", "light_shaders.js", "shaders.js", "environment.js", "light.js"),
-    *("programs.js", "parts.js", "lit_points.js", "floor.js", "drawing.js", "player.js"),
+    *("programs.js", "parts.js", "groups.js", "lit_points.js", "floor.js", "drawing.js", "player.js"),
 )
 
 

@@ -5,25 +5,32 @@ const FEWEST_CELLS = 60;  // of a mesh that has fewer triangles in shadows
 // With fewer triangles for shadows: their points are at least about `cell` apart [m].
 function partOf(gl, part, cell) {
   const {index, source, uv} = verticesOf(part), count = source.length;
-  const array = gl.createVertexArray(), buffers = [3, 3, 2, 1].map(() => gl.createBuffer());
+  const array = gl.createVertexArray();
   const data = [new Float32Array(3 * count), new Float32Array(3 * count), uv || new Float32Array(2 * count), new Float32Array(count)];
   source.forEach((point, i) => { for (let k = 0; k < 3; k++) { data[0][3 * i + k] = part.rest[3 * point + k]; data[1][3 * i + k] = part.directions[3 * point + k]; } });
   gl.bindVertexArray(array);
-  [3, 3, 2, 1].forEach((size, i) => {
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffers[i]);
-    gl.bufferData(gl.ARRAY_BUFFER, data[i], part.target && i !== 2 ? gl.DYNAMIC_DRAW : gl.STATIC_DRAW);
-    gl.enableVertexAttribArray(i);
-    gl.vertexAttribPointer(i, size, gl.FLOAT, false, 0, 0);
-  });
-  const coarse = clustered(data[0], index, cell), [all, shadow] = [index, coarse].map(triangles => {
-    const buffer = gl.createBuffer();
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.STATIC_DRAW);
-    return {buffer, count: triangles.length};
-  });
+  const buffers = [3, 3, 2, 1].map((size, i) => vertexBuffer(gl, i, size, data[i], part.target && i !== 2));
+  const coarse = clustered(data[0], index, cell), all = indexBuffer(gl, index);
+  const shadow = {...indexBuffer(gl, coarse), index: coarse, reaches: reachesOf(data[0], coarse)};
   gl.bindVertexArray(null);
-  shadow.reaches = reachesOf(data[0], coarse);
   return {...part, array, buffers, data, source, index, all, shadow, local: placed(part.position, part.quaternion)};
+}
+
+// Attributes of the vertices that are bound, `size` numbers each, and their triangles' indices; `moves` if they will change.
+function vertexBuffer(gl, attribute, size, data, moves) {
+  const buffer = gl.createBuffer();
+  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+  gl.bufferData(gl.ARRAY_BUFFER, data, moves ? gl.DYNAMIC_DRAW : gl.STATIC_DRAW);
+  gl.enableVertexAttribArray(attribute);
+  gl.vertexAttribPointer(attribute, size, gl.FLOAT, false, 0, 0);
+  return buffer;
+}
+
+function indexBuffer(gl, index, moves = false) {
+  const buffer = gl.createBuffer();
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, index, moves ? gl.DYNAMIC_DRAW : gl.STATIC_DRAW);
+  return {buffer, count: index.length};
 }
 
 // Indices of the triangles' corners, the point of each vertex, and texture coordinates if there are any.
@@ -84,4 +91,16 @@ function displace(part, {rest, directions}, steps, step, limit) {
     for (let k = 0; k < 3; k++) { data[0][3 * i + k] = points[p + k]; data[1][3 * i + k] = normals[p + k] / size; }
     data[3][i] = steps[source[i]] * step / limit;
   }
+}
+
+// Appends triangles that face the eye to a list, their vertices counted from `first`, and returns how long it is then.
+function facing(triangles, points, first, [x, y, z], list, count) {
+  for (let t = 0; t < triangles.length; t += 3) {
+    const i = triangles[t] + first, j = triangles[t + 1] + first, k = triangles[t + 2] + first, a = 3 * i, b = 3 * j, c = 3 * k;
+    const px = points[a], py = points[a + 1], pz = points[a + 2];
+    const ux = points[b] - px, uy = points[b + 1] - py, uz = points[b + 2] - pz, vx = points[c] - px, vy = points[c + 1] - py, vz = points[c + 2] - pz;
+    if ((uy * vz - uz * vy) * (x - px) + (uz * vx - ux * vz) * (y - py) + (ux * vy - uy * vx) * (z - pz) <= 0) continue;
+    list[count++] = i; list[count++] = j; list[count++] = k;
+  }
+  return count;
 }

@@ -5,20 +5,21 @@
 const EVERYWHERE_VERTEX = `#version 300 es
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.5, 1.0); }`;
 
+const COLOR = 4;  // the attribute of vertices with a colour of their own
 const SURFACE_VERTEX = `#version 300 es
 layout(location = 0) in vec3 inPoint; layout(location = 1) in vec3 inNormal;
-layout(location = 2) in vec2 inUv; layout(location = 3) in float inHeight;
+layout(location = 2) in vec2 inUv; layout(location = 3) in float inHeight; layout(location = ${COLOR}) in vec3 inColor;
 uniform mat4 model, viewProjection;
-out vec3 point, normal; out vec2 uv; out float height;
+out vec3 point, normal; flat out vec3 color; out vec2 uv; out float height;
 void main() {
   vec4 world = model * vec4(inPoint, 1.0);
-  point = world.xyz; normal = mat3(model) * inNormal; uv = inUv; height = inHeight;
+  point = world.xyz; normal = mat3(model) * inNormal; color = inColor; uv = inUv; height = inHeight;
   gl_Position = viewProjection * world;
 }`;
 
 const surfaceFragment = (light, lit) => light + lit + `
-in vec3 point, normal; in vec2 uv; in float height;
-uniform vec3 color; uniform sampler2D image;
+in vec3 point, normal; flat in vec3 color; in vec2 uv; in float height;
+uniform sampler2D image;
 out vec4 fragment;
 void main() {
   vec3 albedo = color;
