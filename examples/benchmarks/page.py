@@ -4,8 +4,8 @@
     python examples/benchmarks/page.py duck.html [MORE.html ...]
 
 Plays the pages at 640x360 pixels, in turns, and prints for each the frames that it showed in a second, the processor
-time of all of Chromium's processes for each of them, and the share of the pixels each way that it drew. Linux tells the
-time.
+time of all of Chromium's processes for each of them, the share of the pixels each way that it drew, and the processor
+time of drawing a frame with all pixels alone, without what the browser does to show it. Linux tells the time.
 """
 
 import os
@@ -20,6 +20,13 @@ from playwright.sync_api import sync_playwright
 
 SIZE, ROUNDS, WARM_UP, SECONDS = (640, 360), 3, 3.0, 6.0
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
+DRAWINGS = 40
+DRAW = f"""const player = ripplePlayer.player, gl = player.drawing.gl;
+player.playing = false;
+for (let i = 0; i < {DRAWINGS}; i++) {{
+  player.redraw();
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));  // waits for the drawing
+}}"""
 TICK = os.sysconf("SC_CLK_TCK")
 
 
@@ -40,8 +47,8 @@ def processor_time() -> float:
     return sum(times[process] for process in ours)
 
 
-def played(browser: Any, page: Path) -> tuple[float, float, float]:
-    """Frames a second, processor time a frame [ms], and the share of the pixels each way."""
+def played(browser: Any, page: Path) -> tuple[float, float, float, float]:
+    """Frames a second, processor time a frame [ms], the share of the pixels each way, and the time of drawing [ms]."""
     tab = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
     tab.goto(page.resolve().as_uri())
     tab.evaluate("ripplePlayer.ready.then(() => 0)")
@@ -51,13 +58,16 @@ def played(browser: Any, page: Path) -> tuple[float, float, float]:
     spent = processor_time() - spent
     seconds = time.perf_counter() - start
     shown, share = tab.evaluate("[ripplePlayer.player.shown, ripplePlayer.player.canvas.width / innerWidth]")
+    drawing = processor_time()
+    tab.evaluate(f"() => {{ {DRAW} }}")
+    drawing = 1e3 * (processor_time() - drawing) / DRAWINGS
     tab.close()
-    return (shown - before) / seconds, 1e3 * spent / (shown - before), share
+    return (shown - before) / seconds, 1e3 * spent / (shown - before), share, drawing
 
 
 def main(pages: list[Path]) -> None:
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    results: dict[Path, list[tuple[float, float, float]]] = {page: [] for page in pages}
+    results: dict[Path, list[tuple[float, ...]]] = {page: [] for page in pages}
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=chromium, args=FLAGS)
         for _ in range(ROUNDS):
@@ -65,10 +75,11 @@ def main(pages: list[Path]) -> None:
                 results[page].append(played(browser, page))
         browser.close()
     for page, rounds in results.items():
-        rates, spent, shares = np.array(rounds).T
+        rates, spent, shares, drawing = np.array(rounds).T
         print(f"{page.name}: {rates.min():.1f} to {rates.max():.1f} frames a second,", end=" ")
         print(f"{np.median(spent):.1f} ({spent.min():.1f} to {spent.max():.1f}) ms of processor time a frame,", end=" ")
-        print(f"drawn with {shares.min():.2f} of the pixels each way")
+        print(f"drawn with {shares.min():.2f} of the pixels each way;", end=" ")
+        print(f"drawing alone {np.median(drawing):.1f} ms")
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ class LitPoints {
     this.triangles = new Uint32Array(part.index.length);
     this.array = gl.createVertexArray();
     gl.bindVertexArray(this.array);
+    this.points = vertexBuffer(gl, 0, 4, this.data[0], true);
     indexBuffer(gl, this.triangles, true);
     gl.bindVertexArray(null);
   }
@@ -27,6 +28,8 @@ class LitPoints {
       gl.bindTexture(gl.TEXTURE_2D, table);
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, COLUMNS, this.rows, gl.RGBA, gl.FLOAT, this.data[i]);
     });
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.points);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.data[0], 0, 4 * COLUMNS * this.rows);
     gl.bindVertexArray(this.array);
     gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, this.triangles.subarray(0, this.count));
   }
@@ -42,9 +45,10 @@ class LitPoints {
 
   draw(program, modelProjection) {
     const gl = this.gl;
-    [this.places, this.colors].forEach((table, i) => { gl.activeTexture(gl.TEXTURE3 + i); gl.bindTexture(gl.TEXTURE_2D, table); });
+    gl.activeTexture(gl.TEXTURE3);
+    gl.bindTexture(gl.TEXTURE_2D, this.colors);
     gl.useProgram(program.program);
-    program.set({modelProjection, places: 3, colors: 4});
+    program.set({modelProjection, colors: 3});
     gl.bindVertexArray(this.array);
     gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_INT, 0);
   }

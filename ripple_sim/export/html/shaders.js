@@ -41,12 +41,12 @@ void main() {
 }`;
 
 const LIT_POINTS_VERTEX = `#version 300 es
-uniform highp sampler2D places; uniform sampler2D colors; uniform mat4 modelProjection;
+layout(location = 0) in vec3 inPoint;
+uniform sampler2D colors; uniform mat4 modelProjection;
 out vec4 shown;
 void main() {
-  ivec2 texel = ivec2(gl_VertexID & 255, gl_VertexID >> 8);
-  shown = texelFetch(colors, texel, 0);
-  gl_Position = modelProjection * vec4(texelFetch(places, texel, 0).xyz, 1.0);
+  shown = texelFetch(colors, ivec2(gl_VertexID & 255, gl_VertexID >> 8), 0);
+  gl_Position = modelProjection * vec4(inPoint, 1.0);
 }`;
 
 const LIT_POINTS_FRAGMENT = `#version 300 es
