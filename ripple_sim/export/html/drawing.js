@@ -122,7 +122,6 @@ class Drawing {
 
   drawPart({part, model}, heat) {
     const gl = this.gl;
-    part.open ? gl.disable(gl.CULL_FACE) : gl.enable(gl.CULL_FACE);
     if (part.lit) return part.lit.draw(this.triangles, times(this.shared.viewProjection, model));
     this.look("surface", part, model, heat);
     if (part.color) gl.vertexAttrib3fv(COLOR, part.color);

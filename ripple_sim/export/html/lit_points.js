@@ -49,6 +49,7 @@ class LitPoints {
     gl.bindTexture(gl.TEXTURE_2D, this.colors);
     gl.useProgram(program.program);
     program.set({modelProjection, colors: 3});
+    this.part.open ? gl.disable(gl.CULL_FACE) : gl.enable(gl.CULL_FACE);
     gl.bindVertexArray(this.array);
     gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_INT, 0);
   }

@@ -45,14 +45,14 @@ function verticesOf({F, points, uv}) {
   return {index, source: Uint32Array.from(source), uv: Float32Array.from(places)};
 }
 
-// Triangles between the first points in the cells of a grid; all of them for a mesh of few cells.
+// Triangles between one point in each cell of a grid, the farthest from the middle, so that edges stay; all for a mesh of few cells.
 function clustered(points, index, cell) {
-  const first = new Map(), places = Array.from({length: points.length / 3}, (_, i) => {
-    const key = [0, 1, 2].map(k => Math.floor(points[3 * i + k] / cell)).join(" ");
-    if (!first.has(key)) first.set(key, i);
-    return first.get(key);
-  });
-  if (first.size < FEWEST_CELLS) return index;
+  const count = points.length / 3, middle = [0, 1, 2].map(k => points.reduce((sum, x, i) => i % 3 === k ? sum + x : sum, 0) / count);
+  const chosen = new Map(), far = i => Math.hypot(...middle.map((x, k) => points[3 * i + k] - x));
+  const keys = Array.from({length: count}, (_, i) => [0, 1, 2].map(k => Math.floor(points[3 * i + k] / cell)).join(" "));
+  keys.forEach((key, i) => { if (!chosen.has(key) || far(i) > far(chosen.get(key))) chosen.set(key, i); });
+  if (chosen.size < FEWEST_CELLS) return index;
+  const places = keys.map(key => chosen.get(key));
   const known = new Set(), kept = [];
   for (let t = 0; t < index.length; t += 3) {
     const [a, b, c] = [places[index[t]], places[index[t + 1]], places[index[t + 2]]];

@@ -44,7 +44,7 @@ function textureOf(gl, source, software) {
   return texture;
 }
 
-// A texture without filters, of a format such as RGBA8, and what draws into it.
+// A texture without filters, of a format such as RGBA8.
 function tableOf(gl, format, width, height) {
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -53,6 +53,7 @@ function tableOf(gl, format, width, height) {
   return texture;
 }
 
+// What draws into a texture, as an attachment such as COLOR_ATTACHMENT0.
 function framebufferOf(gl, attachment, texture) {
   const framebuffer = gl.createFramebuffer();
   gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
