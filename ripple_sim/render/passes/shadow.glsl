@@ -149,6 +149,9 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
 #endif
     // where points would be seen as steps, means over what lies between them
     float between = penumbra * spread, wide = smoothstep(BY_MEANS.x, BY_MEANS.y, between * side);
+#if OWN_POINTS
+    wide = 1.0;  // a single point would move the edges of shadows
+#endif
     between = max(between, 1.0 / side);
     float disc = sqrt(max(penumbra * penumbra - between * between, 0.0));  // the means widen it to the penumbra's
     float of_means = 0.0, of_points = 0.0;
