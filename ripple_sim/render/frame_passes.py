@@ -70,17 +70,21 @@ class FramePasses:
         """Draw a frame and leave it on the GPU; see `Renderer.draw`."""
         scene, shading = self._scene, self._shading
         with self._gl as ctx:
-            self._update(ctx, data, height_maps, pose, exposure)
+            scene.update(ctx, data, height_maps, pose)
+            shading.clear(ctx)  # which a software driver does during what follows
+            self._update(data, pose, exposure)
             self._draw_maps(ctx)
-            balls = scene.balls(data)
-            if self._mirror is not None:
-                self._mirror.draw(ctx, self._frame, pose, balls, scene.draw, self._bind)
             shading.begin(ctx)
             scene.draw()
-            self._bind()
+            balls = scene.balls(data)
+            boxes = boxes_of(balls, pose, self._format.size)
             if self._gl.software:  # which would draw all this in the next call, holding the interpreter's lock
                 self._gl.wait()
-            shading.shade(ctx, boxes_of(balls, pose, self._format.size))
+            self._occlusion.average()
+            if self._mirror is not None:
+                self._mirror.draw(ctx, self._frame, pose, balls, scene.draw, self._bind)
+            self._bind()
+            shading.shade(ctx, boxes)
             for layer in scene.layers(data, pose):
                 shading.layers.add(ctx, layer.number, layer.draw, boxes_of(layer.balls, pose, self._format.size))
         return shading.frame
@@ -94,7 +98,8 @@ class FramePasses:
             if self._buffers is None or self._buffers.size != size:
                 floor_geom = -1 if self._floor is None else self._floor.geom
                 self._buffers = SurfaceBuffers(self._resources, size, floor_geom)
-            self._update(ctx, data, height_maps, pose, 0)
+            scene.update(ctx, data, height_maps, pose)
+            self._update(data, pose, 0)
             scene.bind()
 
             def draw() -> None:
@@ -104,17 +109,9 @@ class FramePasses:
 
             return self._buffers.draw(ctx, draw)
 
-    def _update(
-        self,
-        ctx: moderngl.Context,
-        data: Any,
-        height_maps: Mapping[int, AnyHeightMap],
-        pose: Pose,
-        exposure: int,
-    ) -> None:
-        """Bring everything on the GPU up to date."""
+    def _update(self, data: Any, pose: Pose, exposure: int) -> None:
+        """Bring the frame's uniforms up to date."""
         frame, floor = self._frame, self._floor
-        self._scene.update(ctx, data, height_maps, pose)
         frame.set_camera(pose, self._format.aspect)
         casters = within(self._scene.casters(data), pose.focus, _SHADOW_REACH * pose.distance)
         centre, radius = enclosing(casters) if len(casters.radii) else (pose.focus, pose.distance)
@@ -128,13 +125,17 @@ class FramePasses:
         frame.bind()
 
     def _draw_maps(self, ctx: moderngl.Context) -> None:
+        """Draw what shading looks up. A software driver stops for each texture that it is still drawing to."""
+        scene, shadows = self._scene, self._shadows
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.depth_func = "<="
-        self._shadows.draw(ctx, self._scene.draw_shadow)
+        shadows.draw(scene.draw_shadow)
+        self._occlusion.look_up(ctx, scene.draw_occluders)
+        shadows.find_blockers(ctx)
         if self._transmission is not None:
-            self._transmission.draw(self._shadows.views, self._scene.draw_transmission)
+            self._transmission.draw(shadows.views, scene.draw_transmission)
             self._transmission.bind()
-        self._occlusion.draw(ctx, self._scene.draw_occluders, self._shadows)
+        self._occlusion.shade(ctx, shadows)
 
     def _bind(self) -> None:
         """Bind what shading needs."""

@@ -75,11 +75,16 @@ class DeferredShading:
         classify["extent"] = self._tiles.extent
         self._classify = resources.vertex_array(classify, [(self._tiles.buffer, "2f/i", "in_corner")])
 
-    def begin(self, ctx: moderngl.Context) -> None:
-        """Clear the G-buffer and draw into it from now on."""
-        ctx.depth_func = "<="
+    def clear(self, ctx: moderngl.Context) -> None:
+        """Forget the last frame."""
         self._g_buffer.use(ctx)
         self._g_buffer.clear()
+        self.frame.clear(depth=LEVELS["OPEN"])
+
+    def begin(self, ctx: moderngl.Context) -> None:
+        """Draw into the cleared G-buffer from now on."""
+        ctx.depth_func = "<="
+        self._g_buffer.use(ctx)
 
     def shade(self, ctx: moderngl.Context, boxes: NDArray[np.int64]) -> None:
         """Shade what was drawn, with the floor and the background.

@@ -55,34 +55,41 @@ class FloorOcclusion:
             texture.repeat_x = texture.repeat_y = False
         self._map_framebuffer = resources.framebuffer(maps)
 
-    def draw(
-        self, ctx: moderngl.Context, draw_albedo: Callable[[tuple[float, ...]], None], shadows: ShadowMaps
-    ) -> None:
-        """Draw what is above the floor from below, and fill the map from its height."""
+    def look_up(self, ctx: moderngl.Context, draw_albedo: Callable[[tuple[float, ...]], None]) -> None:
+        """Draw what is above the floor from below."""
         floor = self._floor
         if floor is None:
             return
-        top = floor.half_width
         # height above the floor becomes depth; this mirrors the scene: what faces the floor goes clockwise
         view = np.eye(4)
         view[:3, :3] = np.diag([1.0, 1.0, -1.0]) @ floor.rotation.T
         view[:3, 3] = -view[:3, :3] @ (floor.origin + floor.rotation[:, :2] @ floor.centre[:2])
-        matrix = orthographic(floor.half_width, top) @ view
+        matrix = orthographic(floor.half_width, floor.half_width) @ view
         self._ceiling_framebuffer.use()
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face = "cw"
         self._ceiling_framebuffer.clear(alpha=1.0, depth=1.0)
         draw_albedo(tuple(matrix.T.ravel()))
         ctx.front_face = "ccw"
+
+    def shade(self, ctx: moderngl.Context, shadows: ShadowMaps) -> None:
+        """Fill the map from the height of what is above, and from the shadows."""
+        floor = self._floor
+        if floor is None:
+            return
         self._map_framebuffer.use()
         ctx.disable(moderngl.DEPTH_TEST)
         shadows.bind()
         self._ceiling.use(Unit.CEILING)
-        self._pass.program["extent"] = (2 * floor.half_width, top, _INFLUENCE * floor.half_width)
+        self._pass.program["extent"] = (2 * floor.half_width, floor.half_width, _INFLUENCE * floor.half_width)
         self._pass.render(moderngl.TRIANGLES, vertices=3)
-        self._map.build_mipmaps(max_level=_LEVELS)
-        self._seen.build_mipmaps()
-        self._bounce.build_mipmaps(max_level=_BOUNCE_LEVELS)
+
+    def average(self) -> None:
+        """Bring the map's mipmaps up to date."""
+        if self._floor is not None:
+            self._map.build_mipmaps(max_level=_LEVELS)
+            self._seen.build_mipmaps()
+            self._bounce.build_mipmaps(max_level=_BOUNCE_LEVELS)
 
     def bind(self) -> None:
         """Bind the map for the shaders."""

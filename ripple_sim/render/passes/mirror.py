@@ -77,6 +77,7 @@ class Mirror:
         self._frame.set_vector("floor_origin", floor.origin, 0.0)
         self._frame.bind()
         ctx.front_face = "cw"
+        self._shading.clear(ctx)
         self._shading.begin(ctx)
         draw_solids()
         ctx.front_face = "ccw"

@@ -79,7 +79,7 @@ class ShadowMaps:
             self.views.append(tuple(matrix.T.ravel()))
         return casting
 
-    def draw(self, ctx: moderngl.Context, draw_depth: Callable[[tuple[float, ...]], None]) -> None:
+    def draw(self, draw_depth: Callable[[tuple[float, ...]], None]) -> None:
         """Draw all maps; `draw_depth` draws the casters' depth under a matrix of 16 numbers."""
         for index, view in enumerate(self.views):
             self._target.viewport = (index * self.size, 0, self.size, self.size)
@@ -87,6 +87,9 @@ class ShadowMaps:
             if index == 0:
                 self._target.clear(depth=1.0)
             draw_depth(view)
+
+    def find_blockers(self, ctx: moderngl.Context) -> None:
+        """Prefilter the maps for the search for blockers."""
         self._blockers_target.use()
         self._depth.use(Unit.SHADOW_MAPS)
         ctx.disable(moderngl.DEPTH_TEST)
