@@ -13,9 +13,6 @@ layout(binding = BLOCKERS_UNIT) uniform sampler2D blockers;  // see blockers_fra
 #if OWN_POINTS
 const int SHARED = 1, SEARCH_TAPS = 8, FILTER_TAPS = 1, MEAN_TAPS = 10;
 const mat2 TURN = GOLDEN_TURN;
-const float NARROW = 1.5;  // penumbra, in those of `scatter`, up to which it is widened
-
-bool sharp = false;  // whether any penumbra has been as narrow, or too narrow for means
 #else
 const int SHARED = 4, SEARCH_TAPS = 4, FILTER_TAPS = 16, MEAN_TAPS = 4;
 const mat2 TURN = FOURTH_TURN;
@@ -143,9 +140,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     float penumbra = length(vec2(penumbra_of(light, blocker, to_light), least));
     float side = float(textureSize(blockers, 0).y), spread = sqrt(0.5 * TWO_PI / float(SHARED * MEAN_TAPS));
 #if OWN_POINTS
-    bool narrow = penumbra < max(NARROW * scatter / width, BY_MEANS.y / (spread * side));
-    sharp = sharp || narrow && found > 1e-4;
-    penumbra += narrow ? scatter / width : 0.0;
+    penumbra += scatter / width;  // so that none falls between
 #endif
     // where points would be seen as steps, means over what lies between them
     float between = penumbra * spread, wide = smoothstep(BY_MEANS.x, BY_MEANS.y, between * side);
