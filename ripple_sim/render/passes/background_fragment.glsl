@@ -30,7 +30,6 @@ const float STEEPEST = 0.03;  // change from one block to the next up to which t
 const float RIM = 0.5;         // blocks on either side of the floor's edges that are not smooth
 const float HIGHEST_LEVEL = 4.0;  // of the floor map
 const float BOUNCE_LEVEL = 2.3;   // where few points of the map's search are seen no longer
-const float UNSEEN = 0.004;       // share of a light that nobody misses
 const float OUTSIDE = 1e9;        // [m]
 const float LARGEST = 0.04;       // of the floor map's half width: larger blocks would miss shadows, but not the map
 
@@ -97,7 +96,9 @@ void main()
     bool partly = false;
     for (int i = 0; i < SHADOWS; ++i) {
         shadow[i] = light_arriving(i, world, floor_normal.xyz, -1.0, blur, block);
+#if OWN_POINTS
         partly = partly || any(greaterThan(shadow[i] * (1.0 - shadow[i]), vec3(UNSEEN)));
+#endif
     }
 #else
     // all four pixels of a block, so that their shadows can be averaged
@@ -139,7 +140,7 @@ void main()
     vec2 margin = -beside_edges(), near_edge = RIM * fwidth(margin);
     bool rough = all(greaterThan(margin, -near_edge)) && any(lessThan(margin, near_edge)), steep = any(greaterThan(fwidth(shown), vec3(STEEPEST)));
 #if SHADOW
-    rough = rough || partly || steep || 2.0 * blur > LARGEST * floor_map.z;
+    rough = rough || (partly ? in_penumbra : steep) || 2.0 * blur > LARGEST * floor_map.z;
 #else
     rough = rough || steep;
 #endif

@@ -13,6 +13,9 @@ layout(binding = BLOCKERS_UNIT) uniform sampler2D blockers;  // see blockers_fra
 #if OWN_POINTS
 const int SHARED = 1, SEARCH_TAPS = 8, FILTER_TAPS = 1, MEAN_TAPS = 10;
 const mat2 TURN = GOLDEN_TURN;
+const float UNSEEN = 0.004;  // share of a light that nobody misses
+
+bool in_penumbra = false;  // of anything that is not transparent
 #else
 const int SHARED = 4, SEARCH_TAPS = 4, FILTER_TAPS = 16, MEAN_TAPS = 4;
 const mat2 TURN = FOURTH_TURN;
@@ -173,6 +176,9 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     } while (++i < taps);
     float lit = mix(of_points / float(FILTER_TAPS), of_means / float(MEAN_TAPS), wide);
     lit = block_mean(shaded ? lit : 1.0, block);
+#if OWN_POINTS
+    in_penumbra = in_penumbra || lit * (1.0 - lit) > UNSEEN;
+#endif
     // beyond the terminator a surface shades itself, whatever the map says of it
     return bias < 0.0 ? lit : lit * smoothstep(-0.2, 0.15, facing);
 }
