@@ -1,9 +1,9 @@
-"""Many geoms of one shape in few draw calls, each as finely tessellated as the frame needs."""
+"""Many geoms of one shape in one draw call, as finely tessellated as the frame needs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import moderngl
 import mujoco
@@ -30,9 +30,7 @@ INSTANCE = np.dtype(
 )
 _GEOM = mujoco.mjtGeom
 _ROUND = (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_CAPSULE, _GEOM.mjGEOM_CYLINDER)
-_ALIKE = (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF, _GEOM.mjGEOM_HFIELD, _GEOM.mjGEOM_PLANE)  # with any segments
-_LEVELS = np.array([3, 4, 5, 6, 8, 10, 13, 17, 22])  # segments to a right angle
-_COARSE = 4  # of what the floor's map sees
+_LEVELS = (4, 6, 8, 11, 15, 22)  # segments to a right angle
 _BIAS = 3.0  # of shadows, in sagittas of the edges: where light grazes, one is not enough
 _FLATNESS = 0.25  # how far the edges of a round shape may be off its surface [pixels]
 
@@ -55,13 +53,6 @@ class ShapeLevels:
                 self._resources.buffer(shape.faces.astype("i4").tobytes()),
             )
         return self._uploaded[segments]
-
-
-class Level(NamedTuple):
-    """Instances with the same number of segments: their records, and what draws them with each program."""
-
-    records: moderngl.Buffer
-    arrays: list[moderngl.VertexArray]
 
 
 class Instances:
@@ -87,8 +78,6 @@ class Instances:
         In the table of objects.
     balls : Balls
         That contain them.
-    segments : int64 [k]
-        To a right angle.
     shadow_biases : float64 [k]
         How far above the surface shadows must be looked up so that its edges do not shade it [m].
     """
@@ -104,15 +93,13 @@ class Instances:
     ) -> None:
         self._resources, self._shape, self._programs = resources, shape, programs
         self.sites = visuals[0].site
-        kind = visuals[0].kind
-        self._round, self._alike = kind in _ROUND, kind in _ALIKE
+        self._round = visuals[0].kind in _ROUND
         self._indices = np.array([visual.index for visual in visuals], dtype=np.int64)
         self.numbers = [int(number) for number in records["color"][:, 3]]
         self._records, self._image = records, image
-        self._levels: dict[int, Level] = {}
-        self._drawn: list[tuple[Level, int]] = []  # and how many of each
-        self._coarse = self._new_level(int(_LEVELS[-1]) if self._alike else _COARSE)
-        self.segments = np.full(len(visuals), _LEVELS[-1])
+        self._buffer = resources.buffer(reserve=records.nbytes, dynamic=True)
+        self._arrays: dict[int, list[moderngl.VertexArray]] = {}
+        self._segments = _LEVELS[-1]
         self.shadow_biases = np.zeros(len(visuals))
         self.balls = Balls(np.zeros((len(visuals), 3)), np.zeros(len(visuals)))
 
@@ -122,50 +109,43 @@ class Instances:
         position, rotation = (pose[self._indices] for pose in poses)
         self._records["rotation"] = rotation.reshape(-1, 3, 3).transpose(0, 2, 1)
         self._records["origin"] = position
+        self._buffer.write(self._records.tobytes())
         half = self._records["core_size"] + self._records["shell_size"]
         self.balls, radius = Balls(position, np.linalg.norm(half, axis=1)), half.max(axis=1)
         away = np.maximum(np.linalg.norm(position - eye, axis=1) - radius, 0.1 * radius)
+        largest = float((radius / away).max()) * pixels
         # the sagitta of a chord over a right angle's nth part: r (1 - cos(pi / 4n))
-        needed = np.pi / 4 / np.sqrt(2 * np.minimum(_FLATNESS * away / np.maximum(radius * pixels, 1e-9), 1.0))
-        if not self._alike:
-            self.segments = _LEVELS[np.minimum(np.searchsorted(_LEVELS, needed), len(_LEVELS) - 1)]
+        needed = np.pi / 4 / np.sqrt(2 * min(_FLATNESS / max(largest, 1e-9), 1.0))
+        self._segments = next((n for n in _LEVELS if n >= needed), _LEVELS[-1])
         if self._round:
-            self.shadow_biases = _BIAS * radius * (1.0 - np.cos(np.pi / 4 / self.segments))
-        self._drawn = []
-        for segments in np.unique(self.segments).tolist():
-            if segments not in self._levels:
-                self._levels[segments] = self._new_level(segments)
-            chosen = self._records[self.segments == segments]
-            self._levels[segments].records.write(chosen.tobytes())
-            self._drawn.append((self._levels[segments], len(chosen)))
-        self._coarse.records.write(self._records.tobytes())
+            self.shadow_biases = _BIAS * radius * (1.0 - np.cos(np.pi / 4 / self._segments))
 
     def draw(self) -> None:
         """Draw into the G-buffer."""
         if self._image is not None:
             unit, texture = self._image
             texture.use(unit)
-        for level, count in self._drawn:
-            level.arrays[0].render(instances=count)
+        self._array(self._segments)[0].render(instances=len(self._records))
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth only, under a matrix of 16 numbers, column by column."""
         self._programs[1]["matrix"] = view_projection
-        for level, count in self._drawn:
-            level.arrays[1].render(instances=count)
+        self._array(self._segments)[1].render(instances=len(self._records))
 
     def draw_albedo(self, view_projection: tuple[float, ...]) -> None:
         """Draw coarsely in the linear colour, likewise."""
         self._programs[2]["matrix"] = view_projection
-        self._coarse.arrays[2].render(instances=len(self._records))
+        self._array(_LEVELS[0])[2].render(instances=len(self._records))
 
-    def _new_level(self, segments: int) -> Level:
-        vertices, indices = self._shape.level(segments)
-        records = self._resources.buffer(reserve=self._records.nbytes, dynamic=True)
-        content = [
-            (vertices, "3f 3f 3f 2f", "in_core", "in_shell", "in_normal", "in_uv"),
-            (records, "9f 3f 3f 3f 4f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
-        ]
-        # what a program does not use is optimised away
-        arrays = [self._resources.vertex_array(each, content, indices, skip_errors=True) for each in self._programs]
-        return Level(records, arrays)
+    def _array(self, segments: int) -> list[moderngl.VertexArray]:
+        if segments not in self._arrays:
+            vertices, indices = self._shape.level(segments)
+            content = [
+                (vertices, "3f 3f 3f 2f", "in_core", "in_shell", "in_normal", "in_uv"),
+                (self._buffer, "9f 3f 3f 3f 4f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
+            ]
+            # what a program does not use is optimised away
+            self._arrays[segments] = [
+                self._resources.vertex_array(program, content, indices, skip_errors=True) for program in self._programs
+            ]
+        return self._arrays[segments]

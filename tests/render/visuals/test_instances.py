@@ -48,21 +48,21 @@ def test_nearer_and_larger_frames_need_more_segments_and_then_edges_are_within_a
     eye, segments = np.array([1.0, -4.0, 3.0]), []
     for pixels in (1.0, 30.0, 100.0, 300.0, 1000.0):
         drawn.update(data, eye, pixels)
-        segments.append(both.segments[0])
+        segments.append(both._segments)
         away = np.linalg.norm(data.geom_xpos[0] - eye) - 0.3
-        sagitta = 0.3 * (1 - np.cos(np.pi / 4 / both.segments[0])) / away * pixels
+        sagitta = 0.3 * (1 - np.cos(np.pi / 4 / both._segments)) / away * pixels
         assert sagitta <= 0.26
     assert segments == sorted(segments)
     assert segments[-1] > segments[0]
     drawn.update(data, data.geom_xpos[0], 1e6)  # from within a ball: the finest there is
-    assert both.segments[0] >= segments[-1]
+    assert both._segments >= segments[-1]
 
 
 def test_the_shadow_bias_covers_the_gap_between_chord_and_arc_and_flat_geoms_have_none(visuals):
     drawn, data = visuals
     drawn.update(data, np.array([0.0, -5.0, 0.0]), 500.0)
     both = next(each for each in drawn._opaque if len(each.numbers) == 2)
-    sagitta = np.array([0.3, 0.3]) * (1 - np.cos(np.pi / 4 / both.segments))
+    sagitta = np.array([0.3, 0.3]) * (1 - np.cos(np.pi / 4 / both._segments))
     assert (both.shadow_biases > sagitta).all()
     assert (both.shadow_biases < 0.05).all()
     box = next(each for each in drawn._opaque if len(each.numbers) == 1 and not each.sites)
