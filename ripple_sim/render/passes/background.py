@@ -70,7 +70,7 @@ class CoarseBackground:
     """Floor and sky at a fraction of the frame's resolution, from which the frame is filled.
 
     Tiles that are plain are interpolated from their corners. In the others, pixels are interpolated from blocks, or
-    shaded one by one near an edge, a sharp shadow or anything else that is not smooth.
+    shaded one by one near an edge, a narrow penumbra or anything else that is not smooth.
 
     Parameters as for `Background`.
     """

@@ -90,7 +90,7 @@ void main()
     // shadows are averaged where all four pixels of a block see the floor
     bvec2 block = bvec2(BLOCK == 1 && block_mean(met ? 0.0 : 1.0) == 0.0);
 #if BLOCK > 1
-    // penumbras are widened, so that none falls between blocks; they themselves are left to pixels
+    // narrow penumbras are widened, so that none falls between blocks, and left to pixels
     blur = 0.5 * length(fwidth(plane));
 #endif
     bool partly = false;
@@ -140,7 +140,7 @@ void main()
     vec2 margin = -beside_edges(), near_edge = RIM * fwidth(margin);
     bool rough = all(greaterThan(margin, -near_edge)) && any(lessThan(margin, near_edge)), steep = any(greaterThan(fwidth(shown), vec3(STEEPEST)));
 #if SHADOW
-    rough = rough || (partly ? in_penumbra : steep) || 2.0 * blur > LARGEST * floor_map.z;
+    rough = rough || (partly ? in_narrow : steep) || 2.0 * blur > LARGEST * floor_map.z;
 #else
     rough = rough || steep;
 #endif

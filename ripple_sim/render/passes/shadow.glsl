@@ -8,23 +8,31 @@ layout(binding = SHADOW_TEST_UNIT) uniform sampler2DShadow shadow_test;
 layout(binding = SHADOW_MAPS_UNIT) uniform sampler2D shadow_maps;
 layout(binding = BLOCKERS_UNIT) uniform sampler2D blockers;  // see blockers_fragment.glsl
 
-// Points of the discs, for each pixel of a block of 2 x 2: together they are four times as many points of one spiral.
-// With OWN_POINTS neighbours do not share them.
+// The pixels of a block of 2 x 2 share the points of a disc, of which each takes a fourth. With OWN_POINTS they do not.
 #if OWN_POINTS
-const int SHARED = 1, SEARCH_TAPS = 8, FILTER_TAPS = 1, MEAN_TAPS = 10;
-const mat2 TURN = GOLDEN_TURN;
+const int SHARED = 1;
+const mat2 TURN = GOLDEN_TURN, MEAN_TURN = RING_TURN;
 const float UNSEEN = 0.004;  // share of a light that nobody misses
 
-bool in_penumbra = false;  // of anything that is not transparent
-#else
-const int SHARED = 4, SEARCH_TAPS = 4, FILTER_TAPS = 16, MEAN_TAPS = 4;
-const mat2 TURN = FOURTH_TURN;
-#endif
+const float NARROW = 6.0;  // radius of a penumbra, in those of `scatter`, from which what is between may be interpolated
 
-// Number, and a half, of this pixel's first point, of whose points as many as share them take turns.
+bool in_narrow = false;  // whether a point is in a penumbra that is too narrow for that; those of transparent things are not
+#else
+const int SHARED = 4;
+const mat2 TURN = FOURTH_TURN, MEAN_TURN = FOURTH_RING_TURN;
+#endif
+const int SEARCH_TAPS = 16 / SHARED, FILTER_TAPS = 64 / SHARED, MEAN_TAPS = MEANS / SHARED;
+
+// Number, and a half, of this pixel's first point.
 float own_first_point()
 {
-    return SHARED > 1 ? first_point() : 2.0;
+    return SHARED > 1 ? first_point() : 0.5;
+}
+
+// Place of one of a pixel's points among all, from 0 to 1.
+float order_of(int tap, float first, int taps)
+{
+    return (float(tap) + first / float(SHARED)) / float(taps);
 }
 
 const vec2 BY_MEANS = vec2(0.4, 0.8);  // texels of `blockers` between those: from where on they are means
@@ -126,7 +134,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     int taps = inside ? SEARCH_TAPS : 0, i = 0;
     do {
         // denser in the middle, where a near blocker must not be missed, and of no weight at the rim, where they come in
-        float away = (float(i) + 0.25 * first) / float(SEARCH_TAPS);
+        float away = order_of(i, first, SEARCH_TAPS);
         vec2 offset = widest * away * direction;
         direction = TURN * direction;
         // the mean over as much as lies between the points: single texels would come and go from pixel to pixel
@@ -141,12 +149,13 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     found = block_mean(found, block);
     float blocker = distances / max(found, 1e-4);
     float penumbra = length(vec2(penumbra_of(light, blocker, to_light), least));
-    float side = float(textureSize(blockers, 0).y), spread = sqrt(0.5 * TWO_PI / float(SHARED * MEAN_TAPS));
+    float side = float(textureSize(blockers, 0).y);
 #if OWN_POINTS
-    penumbra += scatter / width;  // so that none falls between
+    bool narrow = penumbra < max(NARROW * scatter / width, BY_MEANS.y / (MEAN_WIDTH * side));
+    penumbra += narrow ? scatter / width : 0.0;  // so that none falls between
 #endif
     // where points would be seen as steps, means over what lies between them
-    float between = penumbra * spread, wide = smoothstep(BY_MEANS.x, BY_MEANS.y, between * side);
+    float between = penumbra * MEAN_WIDTH, wide = smoothstep(BY_MEANS.x, BY_MEANS.y, between * side);
 #if OWN_POINTS
     wide = 1.0;  // a single point would move the edges of shadows
 #endif
@@ -155,21 +164,22 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     float of_means = 0.0, of_points = 0.0;
     bool shaded = inside && found > 1e-4;
     taps = shaded && wide > 0.0 ? MEAN_TAPS : 0;
-    direction = start;
+    float turned = RING_ANGLE * (first - 0.5) + GOLDEN_ANGLE * counts.z;
+    direction = vec2(cos(turned), sin(turned));
     i = 0;
     do {
-        float away = (float(i) + 0.25 * first) / float(MEAN_TAPS);
-        vec2 offset = disc * sqrt(away) * direction;
-        direction = TURN * direction;
+        float away = float(i) + first < 1.0 ? 0.0 : RING_RADIUS;
+        vec2 offset = disc * away * direction;
+        direction = MEAN_TURN * direction;
         float behind = light_distance(of_depth, p.z + dot(slope, offset));
-        Blockers seen = blockers_about(light, p.xy + offset, point_level(between, away, whole), behind);
+        Blockers seen = blockers_about(light, p.xy + offset, point_level(between, order_of(i, first, MEAN_TAPS), whole), behind);
         of_means += 1.0 - seen.share * smoothstep(0.0, texel + 0.25 * between * width, seen.before);
     } while (++i < taps);
     taps = shaded && wide < 1.0 ? FILTER_TAPS : 0;
     direction = start;
     i = 0;
     do {
-        vec2 offset = penumbra * sqrt((float(i) + 0.25 * first) / float(FILTER_TAPS)) * direction;
+        vec2 offset = penumbra * sqrt(order_of(i, first, FILTER_TAPS)) * direction;
         direction = TURN * direction;
         vec3 point = vec3(in_maps(light, p.xy + offset), p.z + dot(slope, offset) - depth_bias);
         of_points += textureLod(shadow_test, point, 0.0);
@@ -177,7 +187,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     float lit = mix(of_points / float(FILTER_TAPS), of_means / float(MEAN_TAPS), wide);
     lit = block_mean(shaded ? lit : 1.0, block);
 #if OWN_POINTS
-    in_penumbra = in_penumbra || lit * (1.0 - lit) > UNSEEN;
+    in_narrow = in_narrow || narrow && lit * (1.0 - lit) > UNSEEN;
 #endif
     // beyond the terminator a surface shades itself, whatever the map says of it
     return bias < 0.0 ? lit : lit * smoothstep(-0.2, 0.15, facing);

@@ -41,7 +41,7 @@ vec3 transmitted(int light, vec3 position, vec3 normal, bvec2 block)
     vec2 direction = spiral_direction(first);
     int taps = inside && found.x > 0.0 ? PASSING_TAPS : 0;
     for (int i = 0; i < taps; ++i) {
-        vec2 offset = penumbra * sqrt((float(i) + 0.25 * first) / float(PASSING_TAPS)) * direction;
+        vec2 offset = penumbra * sqrt(order_of(i, first, PASSING_TAPS)) * direction;
         direction = TURN * direction;
         vec4 here = taken_about(light, p.xy + offset, 0.35 * penumbra);
         vec2 blocker = transparent_blocker(here);
