@@ -14,9 +14,9 @@ const int SHARED = 1;
 const mat2 TURN = GOLDEN_TURN, MEAN_TURN = RING_TURN;
 const float UNSEEN = 0.004;  // share of a light that nobody misses
 
-const float NARROW = 6.0;  // radius of a penumbra, in those of `scatter`, from which what is between may be interpolated
+const float NARROW = 3.0;  // radius of a penumbra, in those of `scatter`, from which what is between may be interpolated
 
-bool in_narrow = false;  // whether a point is in a penumbra that is too narrow for that; those of transparent things are not
+bool in_narrow = false;  // whether a point is in a penumbra that is too narrow for that
 #else
 const int SHARED = 4;
 const mat2 TURN = FOURTH_TURN, MEAN_TURN = FOURTH_RING_TURN;
@@ -95,100 +95,138 @@ Blockers blockers_about(int light, vec2 point, float level, float behind)
     return Blockers(mean.x * before * before / (before * before + variance), usual - variance / before, before);
 }
 
-// Share of a light that arrives, as the mean over the part of the pixel's block of 2 x 2 that lies to the given sides.
-// The normal is that of the surface without ripples; `bias` [m] raises the position above bumps, which shall not shade
-// each other, and is negative for what casts no shadow itself; `scatter` [m] is how far light gets under the surface.
-float light_visibility(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)
+// A point of a surface, as a light sees it.
+struct Receiver {
+    vec3 place;             // in the light's map, and the depth there
+    vec2 slope;             // of the surface's depth along the map
+    float distance;         // from the light [m]
+    float width, texel;     // of the map and of one of its texels, at that distance [m]
+    float depth_bias;
+    bool inside;            // whether the map reaches as far
+    bool casts;             // whether the surface casts shadows itself
+};
+
+// The normal is that of the surface without ripples, `facing` its cosine to the light; `bias` as for `light_visibility`.
+Receiver receiver(int light, vec3 position, vec3 normal, float facing, float bias)
 {
-    Light from = light_at(light);
     Shadow shadow = shadow_at(light);
-    vec4 place = from.position, of_depth = shadow.depth, of_width = shadow.width;
-    bool far_away = NEAR_LIGHTS == 0 || place.w == 0.0;
-    vec3 towards = far_away ? from.direction.xyz : normalize(place.xyz - position);
-    float facing = dot(normal, towards);
-    float away = far_away ? 0.0 : distance(place.xyz, position);
-    float texel = (of_width.x + of_width.y * away) / of_width.z;
-    float raise = bias < 0.0 ? 0.0 : bias + (1.0 + 1.5 * (1.0 - facing)) * texel;
-    vec3 raised = position + raise * normal;
+    vec4 source = light_at(light).position, of_depth = shadow.depth, of_width = shadow.width;
+    float away = NEAR_LIGHTS == 0 || source.w == 0.0 ? 0.0 : distance(source.xyz, position);
+    Receiver at;
+    at.casts = bias >= 0.0;
+    at.texel = (of_width.x + of_width.y * away) / of_width.z;
+    vec3 raised = position + (at.casts ? bias + (1.0 + 1.5 * (1.0 - facing)) * at.texel : 0.0) * normal;
     vec4 clip = shadow.matrix * vec4(raised, 1.0);
-    vec3 p = clip.xyz / clip.w;
-    float to_light = light_distance(of_depth, p.z), width = of_width.x + of_width.y * to_light;
-    float stretch = of_depth.z * p.z + of_depth.w;
+    at.place = clip.xyz / clip.w;
+    at.distance = light_distance(of_depth, at.place.z);
+    at.width = of_width.x + of_width.y * at.distance;
+    float stretch = of_depth.z * at.place.z + of_depth.w;
     float metre = stretch * stretch / (of_depth.x * of_depth.w - of_depth.y * of_depth.z);
     // receiver plane depth bias: with a wide filter the surface would shade itself
     vec4 plane = shadow.planes * vec4(normal, -dot(normal, raised));
-    float steepest = 10.0 * width * metre;
+    float steepest = 10.0 * at.width * metre;
     vec2 slope = -plane.xy * (abs(plane.z) > 1e-9 ? 1.0 / plane.z : 1e9);
-    slope = clamp(slope, -steepest, steepest);
-    float first = own_first_point();
-    vec2 start = spiral_direction(first + counts.z), direction = start;  // another one in each exposure
-    float depth_bias = 0.5 * texel * metre;
-    float least = SHARED > 1 ? length(vec2(1.5 / of_width.z, scatter / width)) : 1.5 / of_width.z;
-    float widest = widest_penumbra(light, to_light) + max(least, scatter / width);
+    at.slope = clamp(slope, -steepest, steepest);
+    at.depth_bias = 0.5 * at.texel * metre;
+    bool in_map = clip.w > 0.0 && all(lessThan(abs(at.place - 0.5), vec3(0.5)));
+    at.inside = counts.w > float(light) && facing > -0.5 && in_map;
+    return at;
+}
 
-    // Loops of as many rounds as are needed in place of branches: software drivers execute both sides of a branch. They
-    // are tested at the end, since such drivers execute a loop's body once more than a test before it lets pass.
-    bool inside = counts.w > float(light) && facing > -0.5 && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
-    bool whole = bias >= 0.0;
-    float distances = 0.0, found = 0.0;
-    int taps = inside ? SEARCH_TAPS : 0, i = 0;
+// What covers the map about a point beside the receiver, over a footprint, by the point's place in the order of all.
+Blockers blockers_beside(int light, Receiver at, vec2 offset, float footprint, float order)
+{
+    float behind = light_distance(shadow_at(light).depth, at.place.z + dot(at.slope, offset));
+    Blockers seen = blockers_about(light, at.place.xy + offset, point_level(footprint, order, at.casts), behind);
+    seen.share *= smoothstep(0.0, at.texel + 0.25 * footprint * at.width, seen.before);
+    return seen;
+}
+
+// The following take as many rounds of their loops as are needed in place of branches: software drivers execute both sides
+// of a branch. They are tested at the end, since such drivers execute a loop's body once more than a test before it lets
+// pass. Each exposure has other points, which `counts.z` turns.
+
+// How much blocks the light within a radius in the map, and that times its mean distance from the light [m].
+vec2 find_blockers(int light, Receiver at, float radius)
+{
+    float first = own_first_point();
+    vec2 direction = spiral_direction(first + counts.z), found = vec2(0.0);
+    int taps = at.inside ? SEARCH_TAPS : 0, i = 0;
     do {
         // denser in the middle, where a near blocker must not be missed, and of no weight at the rim, where they come in
         float away = order_of(i, first, SEARCH_TAPS);
-        vec2 offset = widest * away * direction;
-        direction = TURN * direction;
         // the mean over as much as lies between the points: single texels would come and go from pixel to pixel
-        float footprint = widest * sqrt(TWO_PI * away / float(SHARED * SEARCH_TAPS));
-        float behind = light_distance(of_depth, p.z + dot(slope, offset));
-        Blockers seen = blockers_about(light, p.xy + offset, point_level(footprint, away, whole), behind);
-        float blocks = (1.0 - away) * seen.share * smoothstep(0.0, texel + 0.25 * footprint * width, seen.before);
-        distances += inside ? blocks * seen.distance : 0.0;
-        found += inside ? blocks : 0.0;
+        float footprint = radius * sqrt(TWO_PI * away / float(SHARED * SEARCH_TAPS));
+        Blockers seen = blockers_beside(light, at, radius * away * direction, footprint, away);
+        found += at.inside ? (1.0 - away) * seen.share * vec2(1.0, seen.distance) : vec2(0.0);
+        direction = TURN * direction;
     } while (++i < taps);
-    distances = block_mean(distances, block);
-    found = block_mean(found, block);
-    float blocker = distances / max(found, 1e-4);
-    float penumbra = length(vec2(penumbra_of(light, blocker, to_light), least));
-    float side = float(textureSize(blockers, 0).y);
-#if OWN_POINTS
-    bool narrow = penumbra < max(NARROW * scatter / width, BY_MEANS.y / (MEAN_WIDTH * side));
-    penumbra += narrow ? scatter / width : 0.0;  // so that none falls between
-#endif
-    // where points would be seen as steps, means over what lies between them
-    float between = penumbra * MEAN_WIDTH, wide = smoothstep(BY_MEANS.x, BY_MEANS.y, between * side);
-#if OWN_POINTS
-    wide = 1.0;  // a single point would move the edges of shadows
-#endif
-    between = max(between, 1.0 / side);
+    return found;
+}
+
+// Share of the light past blockers whose penumbra has a radius in the map: means over parts of that; or 1 where not `needed`.
+float light_by_means(int light, Receiver at, float penumbra, bool needed)
+{
+    float between = max(penumbra * MEAN_WIDTH, 1.0 / float(textureSize(blockers, 0).y));
     float disc = sqrt(max(penumbra * penumbra - between * between, 0.0));  // the means widen it to the penumbra's
-    float of_means = 0.0, of_points = 0.0;
-    bool shaded = inside && found > 1e-4;
-    taps = shaded && wide > 0.0 ? MEAN_TAPS : 0;
-    float turned = RING_ANGLE * (first - 0.5) + GOLDEN_ANGLE * counts.z;
-    direction = vec2(cos(turned), sin(turned));
-    i = 0;
+    float first = own_first_point(), turned = RING_ANGLE * (first - 0.5) + GOLDEN_ANGLE * counts.z, sum = 0.0;
+    vec2 direction = vec2(cos(turned), sin(turned));
+    int taps = needed ? MEAN_TAPS : 0, i = 0;
     do {
         float away = float(i) + first < 1.0 ? 0.0 : RING_RADIUS;
-        vec2 offset = disc * away * direction;
+        sum += 1.0 - blockers_beside(light, at, disc * away * direction, between, order_of(i, first, MEAN_TAPS)).share;
         direction = MEAN_TURN * direction;
-        float behind = light_distance(of_depth, p.z + dot(slope, offset));
-        Blockers seen = blockers_about(light, p.xy + offset, point_level(between, order_of(i, first, MEAN_TAPS), whole), behind);
-        of_means += 1.0 - seen.share * smoothstep(0.0, texel + 0.25 * between * width, seen.before);
     } while (++i < taps);
-    taps = shaded && wide < 1.0 ? FILTER_TAPS : 0;
-    direction = start;
-    i = 0;
+    return sum / float(MEAN_TAPS);
+}
+
+#if !OWN_POINTS
+// The same by points of the map, for narrow penumbras.
+float light_by_points(int light, Receiver at, float penumbra, bool needed)
+{
+    float first = own_first_point(), sum = 0.0;
+    vec2 direction = spiral_direction(first + counts.z);
+    int taps = needed ? FILTER_TAPS : 0, i = 0;
     do {
         vec2 offset = penumbra * sqrt(order_of(i, first, FILTER_TAPS)) * direction;
+        float depth = at.place.z + dot(at.slope, offset) - at.depth_bias;
+        sum += textureLod(shadow_test, vec3(in_maps(light, at.place.xy + offset), depth), 0.0);
         direction = TURN * direction;
-        vec3 point = vec3(in_maps(light, p.xy + offset), p.z + dot(slope, offset) - depth_bias);
-        of_points += textureLod(shadow_test, point, 0.0);
     } while (++i < taps);
-    float lit = mix(of_points / float(FILTER_TAPS), of_means / float(MEAN_TAPS), wide);
+    return sum / float(FILTER_TAPS);
+}
+#endif
+
+// Share of a light that arrives, as the mean over the part of the pixel's block of 2 x 2 that lies to the given sides.
+// The normal is that of the surface without ripples; `bias` [m] raises the position above bumps, which shall not shade
+// each other, and is negative for what casts no shadow itself; `scatter` [m] is how far light gets under the surface, or
+// with OWN_POINTS how far such points are apart.
+float light_visibility(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)
+{
+    Light from = light_at(light);
+    bool far_away = NEAR_LIGHTS == 0 || from.position.w == 0.0;
+    float facing = dot(normal, far_away ? from.direction.xyz : normalize(from.position.xyz - position));
+    Receiver at = receiver(light, position, normal, facing, bias);
+    float scattered = scatter / at.width, sharpest = 1.5 / shadow_at(light).width.z;
+    float least = SHARED == 1 ? sharpest : length(vec2(sharpest, scattered));
+    vec2 found = find_blockers(light, at, widest_penumbra(light, at.distance) + max(least, scattered));
+    found = vec2(block_mean(found.x, block), block_mean(found.y, block));
+    float penumbra = length(vec2(penumbra_of(light, found.y / max(found.x, 1e-4), at.distance), least));
+    bool shaded = at.inside && found.x > 1e-4;
+    float texels = penumbra * MEAN_WIDTH * float(textureSize(blockers, 0).y);
+#if OWN_POINTS
+    // narrow ones are widened, so that none falls between
+    bool narrow = penumbra < NARROW * scattered || texels < BY_MEANS.y;
+    float lit = light_by_means(light, at, penumbra + (narrow ? scattered : 0.0), shaded);
+#else
+    float wide = smoothstep(BY_MEANS.x, BY_MEANS.y, texels);
+    float by_points = light_by_points(light, at, penumbra, shaded && wide < 1.0);
+    float lit = mix(by_points, light_by_means(light, at, penumbra, shaded && wide > 0.0), wide);
+#endif
     lit = block_mean(shaded ? lit : 1.0, block);
 #if OWN_POINTS
     in_narrow = in_narrow || narrow && lit * (1.0 - lit) > UNSEEN;
 #endif
     // beyond the terminator a surface shades itself, whatever the map says of it
-    return bias < 0.0 ? lit : lit * smoothstep(-0.2, 0.15, facing);
+    return at.casts ? lit * smoothstep(-0.2, 0.15, facing) : lit;
 }

@@ -23,7 +23,7 @@ vec2 transparent_blocker(vec4 taken)
 }
 
 // Share of a light that passes all that is transparent on its way to a point; the rest as for `light_visibility`.
-vec3 transmitted(int light, vec3 position, vec3 normal, bvec2 block)
+vec3 transmitted(int light, vec3 position, vec3 normal, float scatter, bvec2 block)
 {
     Light from = light_at(light);
     Shadow shadow = shadow_at(light);
@@ -31,8 +31,7 @@ vec3 transmitted(int light, vec3 position, vec3 normal, bvec2 block)
     vec3 p = clip.xyz / clip.w;
     vec3 towards = NEAR_LIGHTS == 0 || place.w == 0.0 ? from.direction.xyz : normalize(place.xyz - position);
     float to_light = light_distance(shadow.depth, p.z), slope = 1.0 / max(abs(dot(normal, towards)), 0.1);
-    vec4 width = shadow.width;
-    float texel = (width.x + width.y * to_light) / float(textureSize(transmission_maps, 0).y);
+    float width = shadow.width.x + shadow.width.y * to_light, texel = width / float(textureSize(transmission_maps, 0).y);
     bool inside = counts.w > float(light) && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
     vec2 found = transparent_blocker(taken_about(light, p.xy, 0.5 * widest_penumbra(light, to_light)));
     float penumbra = penumbra_of(light, min(found.y / max(found.x, 1e-4), to_light), to_light);
@@ -48,10 +47,14 @@ vec3 transmitted(int light, vec3 position, vec3 normal, bvec2 block)
         float before = to_light - blocker.y / max(blocker.x, 1e-4);
         taken += here.rgb * smoothstep(1.0, CLOSEST, before / (slope * texel));
     }
-    return 1.0 - block_mean(taken / float(PASSING_TAPS), block);
+    taken = block_mean(taken / float(PASSING_TAPS), block);
+#if OWN_POINTS
+    in_narrow = in_narrow || penumbra < NARROW * scatter / width && any(greaterThan(taken, vec3(UNSEEN)));
+#endif
+    return 1.0 - taken;
 }
 #else
-vec3 transmitted(int light, vec3 position, vec3 normal, bvec2 block)
+vec3 transmitted(int light, vec3 position, vec3 normal, float scatter, bvec2 block)
 {
     return vec3(1.0);
 }
@@ -60,5 +63,6 @@ vec3 transmitted(int light, vec3 position, vec3 normal, bvec2 block)
 // Share of a light that arrives, through what is transparent and past all else; see `light_visibility`.
 vec3 light_arriving(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)
 {
-    return light_visibility(light, position, normal, bias, scatter, block) * transmitted(light, position, normal, block);
+    return light_visibility(light, position, normal, bias, scatter, block) *
+           transmitted(light, position, normal, scatter, block);
 }
