@@ -158,3 +158,23 @@ def test_a_shadow_on_the_floor_has_the_size_that_geometry_gives_it(gl):
     share = (along - along[0]) / (along[-20:].mean() - along[0])
     edge = np.interp(0.5, share[:100], np.arange(100) + 0.5) / metre
     assert edge == pytest.approx(0.5 + 0.01, abs=0.015)
+
+
+def test_blockers_are_means_over_all_texels_of_the_map(gl, resources, frame):
+    """Coverage, and its first two moments of the distance from the light, to the coarsest level."""
+    sun = Light(np.array([0.0, 0.0, 1.0]), np.ones(3), None, 0.02, np.pi, shadow=True)
+    maps = ShadowMaps(resources, 1, 360)
+    maps.fit(frame, [sun], np.zeros(3), 1.0)
+    frame.bind()
+    rng = np.random.default_rng(5)
+    depth = np.where(rng.random((maps.size, maps.size)) < 0.6, rng.random((maps.size, maps.size)), 1.0).astype("f4")
+    with gl as ctx:
+        maps._depth.write(depth)
+        maps.find_blockers(ctx)
+        levels = [np.frombuffer(maps._blockers.read(level=level), "f4") for level in (0, 3)]
+    away = depth * frame.values["shadows"][0]["depth"][0]
+    exact = (depth < 1.0)[..., None] * np.stack([np.ones_like(away), away, away**2], axis=-1)
+    for level, texels in zip(levels, (4, 32), strict=True):
+        side = maps.size // texels
+        means = exact.reshape(side, texels, side, texels, 3).mean(axis=(1, 3))
+        np.testing.assert_allclose(level.reshape(side, side, 4)[..., :3], means, rtol=1e-4)
