@@ -19,11 +19,11 @@ vec2 spiral_direction(float point)
     return vec2(cos(GOLDEN_ANGLE * point), sin(GOLDEN_ANGLE * point));
 }
 
-// Means over parts of a disc, in place of points of it: one in the middle and the rest on a ring about it, each over so
+// Means over parts of a disc, in place of points of it: one in the middle and the rest on a circle about it, each over so
 // much. They show the edge of what covers half of the disc within 0.018 of its share, and what is small evenly; as many on
 // a spiral, which do not balance about the middle, miss the edge by 0.06.
 const int MEANS = 8;
-const float RING_RADIUS = 0.8, MEAN_WIDTH = 0.5;  // in radii of the disc
-const float RING_ANGLE = TWO_PI / float(MEANS - 1);
-const mat2 RING_TURN = mat2(0.62348980, 0.78183148, -0.78183148, 0.62348980);
-const mat2 FOURTH_RING_TURN = mat2(-0.90096887, -0.43388374, 0.43388374, -0.90096887);  // by four times that
+const float CIRCLE_RADIUS = 0.8, MEAN_WIDTH = 0.5;  // in radii of the disc
+const float CIRCLE_ANGLE = TWO_PI / float(MEANS - 1);
+const mat2 CIRCLE_TURN = mat2(0.62348980, 0.78183148, -0.78183148, 0.62348980);
+const mat2 FOURTH_CIRCLE_TURN = mat2(-0.90096887, -0.43388374, 0.43388374, -0.90096887);  // by four times that

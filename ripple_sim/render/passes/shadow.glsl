@@ -11,7 +11,7 @@ layout(binding = BLOCKERS_UNIT) uniform sampler2D blockers;  // see blockers_fra
 // The pixels of a block of 2 x 2 share the points of a disc, of which each takes a fourth. With OWN_POINTS they do not.
 #if OWN_POINTS
 const int SHARED = 1;
-const mat2 TURN = GOLDEN_TURN, MEAN_TURN = RING_TURN;
+const mat2 TURN = GOLDEN_TURN, MEAN_TURN = CIRCLE_TURN;
 const float UNSEEN = 0.004;  // share of a light that nobody misses
 
 const float NARROW = 3.0;  // radius of a penumbra, in those of `scatter`, from which what is between may be interpolated
@@ -19,7 +19,7 @@ const float NARROW = 3.0;  // radius of a penumbra, in those of `scatter`, from 
 bool in_narrow = false;  // whether a point is in a penumbra that is too narrow for that
 #else
 const int SHARED = 4;
-const mat2 TURN = FOURTH_TURN, MEAN_TURN = FOURTH_RING_TURN;
+const mat2 TURN = FOURTH_TURN, MEAN_TURN = FOURTH_CIRCLE_TURN;
 #endif
 const int SEARCH_TAPS = 16 / SHARED, FILTER_TAPS = 64 / SHARED, MEAN_TAPS = MEANS / SHARED;
 
@@ -169,11 +169,11 @@ float light_by_means(int light, Receiver at, float penumbra, bool needed)
 {
     float between = max(penumbra * MEAN_WIDTH, 1.0 / float(textureSize(blockers, 0).y));
     float disc = sqrt(max(penumbra * penumbra - between * between, 0.0));  // the means widen it to the penumbra's
-    float first = own_first_point(), turned = RING_ANGLE * (first - 0.5) + GOLDEN_ANGLE * counts.z, sum = 0.0;
+    float first = own_first_point(), turned = CIRCLE_ANGLE * (first - 0.5) + GOLDEN_ANGLE * counts.z, sum = 0.0;
     vec2 direction = vec2(cos(turned), sin(turned));
     int taps = needed ? MEAN_TAPS : 0, i = 0;
     do {
-        float away = float(i) + first < 1.0 ? 0.0 : RING_RADIUS;
+        float away = float(i) + first < 1.0 ? 0.0 : CIRCLE_RADIUS;
         sum += 1.0 - blockers_beside(light, at, disc * away * direction, between, order_of(i, first, MEAN_TAPS)).share;
         direction = MEAN_TURN * direction;
     } while (++i < taps);
