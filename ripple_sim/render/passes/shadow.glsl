@@ -10,7 +10,7 @@ layout(binding = BLOCKERS_UNIT) uniform sampler2D blockers;  // see blockers_fra
 
 // The pixels of a block of 2 x 2 share the points of a disc, of which each takes a fourth. With OWN_POINTS they do not.
 #if OWN_POINTS
-const int SHARED = 1;
+const int SHARED = 1, SEARCH_TAPS = 8;
 const mat2 TURN = GOLDEN_TURN, MEAN_TURN = CIRCLE_TURN;
 const float UNSEEN = 0.004;  // share of a light that nobody misses
 
@@ -18,10 +18,10 @@ const float NARROW = 3.0;  // radius of a penumbra, in those of `scatter`, from 
 
 bool in_narrow = false;  // whether a point is in a penumbra that is too narrow for that
 #else
-const int SHARED = 4;
+const int SHARED = 4, SEARCH_TAPS = 4;
 const mat2 TURN = FOURTH_TURN, MEAN_TURN = FOURTH_CIRCLE_TURN;
 #endif
-const int SEARCH_TAPS = 16 / SHARED, FILTER_TAPS = 64 / SHARED, MEAN_TAPS = MEANS / SHARED;
+const int FILTER_TAPS = 64 / SHARED, MEAN_TAPS = MEANS / SHARED;
 
 // Number, and a half, of this pixel's first point.
 float own_first_point()
