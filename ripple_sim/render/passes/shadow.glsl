@@ -18,7 +18,7 @@ const float NARROW = 3.0;  // radius of a penumbra, in those of `scatter`, from 
 
 bool in_narrow = false;  // whether a point is in a penumbra that is too narrow for that
 #else
-const int SHARED = 4, SEARCH_TAPS = 4;
+const int SHARED = 4, SEARCH_TAPS = 3;
 const mat2 TURN = FOURTH_TURN, MEAN_TURN = FOURTH_CIRCLE_TURN;
 #endif
 const int FILTER_TAPS = 64 / SHARED, MEAN_TAPS = MEANS / SHARED;
@@ -129,7 +129,7 @@ Receiver receiver(int light, vec3 position, vec3 normal, float facing, float bia
     at.slope = clamp(slope, -steepest, steepest);
     at.depth_bias = 0.5 * at.texel * metre;
     bool in_map = clip.w > 0.0 && all(lessThan(abs(at.place - 0.5), vec3(0.5)));
-    at.inside = counts.w > float(light) && facing > -0.5 && in_map;
+    at.inside = counts.w > float(light) && facing > -0.2 && in_map;
     return at;
 }
 
