@@ -14,7 +14,7 @@ from .device_tessellation import DeviceTessellation
 from .vertices import POSITION, SurfaceVertices
 
 PIXELS = 5.6  # length of an edge where the target fills the frame's height
-_TOLERANCE = 0.15  # [pixels], likewise: edges from which the waves depart further are split
+_TOLERANCE = 0.25  # [pixels], likewise: edges from which the waves depart further are split
 
 
 class SurfaceTriangles:
