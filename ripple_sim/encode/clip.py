@@ -53,7 +53,7 @@ class Codec:
 
 # What browsers play. mbtree reads beyond its arrays where a row is not a multiple of 8 macroblocks: the same frames
 # would then give another file every time.
-H264 = Codec("mp4", "libx264", "yuv420p", {"crf": "18", "preset": "fast", "x264-params": "mbtree=0"})
+H264 = Codec("mp4", "libx264", "yuv420p", {"crf": "17", "preset": "veryfast", "x264-params": "mbtree=0"})
 VP9 = Codec(
     "webm", "libvpx-vp9", "yuv420p", {"crf": "24", "b": "0", "deadline": "good", "cpu-used": "5", "row-mt": "1"}
 )
