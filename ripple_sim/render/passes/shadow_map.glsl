@@ -1,0 +1,67 @@
+// The shadow maps of the lights, and what a point of a surface is in them.
+#include "gpu/held_uniforms.glsl"
+#include "passes/light_distance.glsl"
+
+layout(binding = SHADOW_MAPS_UNIT) uniform sampler2D shadow_maps;
+
+// Texture coordinates of a point of one light's map.
+vec2 in_maps(int light, vec2 point)
+{
+#if SHADOWS > 1
+    float edge = 0.5 / shadow_at(light).width.z;  // keeps a neighbour's texels out
+    point.x = (clamp(point.x, edge, 1.0 - edge) + float(light)) / float(SHADOWS);
+#endif
+    return point;
+}
+
+// Radius of the penumbra, in the map, of a blocker on what lies behind it; both by their distance from the light [m].
+float penumbra_of(int light, float blocker, float behind)
+{
+    vec4 penumbra = shadow_at(light).penumbra, width = shadow_at(light).width;
+    float blur = penumbra.x + penumbra.y / max(blocker, 1e-6);
+    return min((behind - blocker) * blur / (width.x + width.y * behind), penumbra.z);
+}
+
+// Radius, in the map, of what may shade a point at a distance from the light [m]: a penumbra of the nearest blocker.
+float widest_penumbra(int light, float to_light)
+{
+    return penumbra_of(light, light_distance(shadow_at(light).depth, 0.0), to_light);
+}
+
+// A point of a surface, as a light sees it.
+struct Receiver {
+    vec3 place;             // in the light's map, and the depth there
+    vec2 slope;             // of the surface's depth along the map
+    float distance;         // from the light [m]
+    float width, texel;     // of the map and of one of its texels, at that distance [m]
+    float depth_bias;
+    bool inside;            // whether the map reaches as far
+    bool casts;             // whether the surface casts shadows itself
+};
+
+// The normal is that of the surface without ripples, `facing` its cosine to the light; `bias` as for `light_visibility`.
+Receiver receiver(int light, vec3 position, vec3 normal, float facing, float bias)
+{
+    Shadow shadow = shadow_at(light);
+    vec4 source = light_at(light).position, of_depth = shadow.depth, of_width = shadow.width;
+    float away = NEAR_LIGHTS == 0 || source.w == 0.0 ? 0.0 : distance(source.xyz, position);
+    Receiver at;
+    at.casts = bias >= 0.0;
+    at.texel = (of_width.x + of_width.y * away) / of_width.z;
+    vec3 raised = position + (at.casts ? bias + (1.0 + 1.5 * (1.0 - facing)) * at.texel : 0.0) * normal;
+    vec4 clip = shadow.matrix * vec4(raised, 1.0);
+    at.place = clip.xyz / clip.w;
+    at.distance = light_distance(of_depth, at.place.z);
+    at.width = of_width.x + of_width.y * at.distance;
+    float stretch = of_depth.z * at.place.z + of_depth.w;
+    float metre = stretch * stretch / (of_depth.x * of_depth.w - of_depth.y * of_depth.z);
+    // receiver plane depth bias: with a wide filter the surface would shade itself
+    vec4 plane = shadow.planes * vec4(normal, -dot(normal, raised));
+    float steepest = 10.0 * at.width * metre;
+    vec2 slope = -plane.xy * (abs(plane.z) > 1e-9 ? 1.0 / plane.z : 1e9);
+    at.slope = clamp(slope, -steepest, steepest);
+    at.depth_bias = 0.5 * at.texel * metre;
+    bool in_map = clip.w > 0.0 && all(lessThan(abs(at.place - 0.5), vec3(0.5)));
+    at.inside = counts.w > float(light) && facing > -0.2 && in_map;
+    return at;
+}
