@@ -13,6 +13,6 @@ void main()
 {
     vec4 shown = textureLod(coarse, in_coarse, 0.0);
     fragment = vec4(dithered(shown.rgb), 1.0);
-    // all four pixels of a block, so that their shadows can be averaged
+    // all four pixels of a block, so that they can share their search for what shades them
     gl_FragDepth = block_mean(min(shown.a, 1.0 - shown.a)) > UNSURE ? SHADED_LEVEL : OPEN_LEVEL;
 }

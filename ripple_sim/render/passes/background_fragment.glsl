@@ -2,6 +2,7 @@
 // The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW those pixels.
 // Each pixel stands for a block of BLOCK x BLOCK of the frame's.
 #define OWN_POINTS (BLOCK > 1)
+#define OWN_FILTER 1
 #include "gpu/held_uniforms.glsl"
 #include "glsl/ray.glsl"
 #include "passes/floor_map.glsl"
@@ -87,7 +88,7 @@ void main()
         shadow[i] = vec3(1.0);
     float blur = 0.0;
 #if SHADOW
-    // shadows are averaged where all four pixels of a block see the floor
+    // the search for what shades is shared where all four pixels of a block see the floor
     bvec2 block = bvec2(BLOCK == 1 && block_mean(met ? 0.0 : 1.0) == 0.0);
 #if BLOCK > 1
     // narrow penumbras are widened, so that none falls between blocks, and left to pixels
@@ -101,7 +102,7 @@ void main()
 #endif
     }
 #else
-    // all four pixels of a block, so that their shadows can be averaged
+    // all four pixels of a block, so that they can share their search for what shades them
     bool shaded = met && may_be_shaded(place, near);
     gl_FragDepth = block_mean(shaded ? 1.0 : 0.0) > 0.0 ? SHADED_LEVEL : OPEN_LEVEL;
 #endif
