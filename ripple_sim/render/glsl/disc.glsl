@@ -24,6 +24,10 @@ vec2 spiral_direction(float point)
 // a spiral, which do not balance about the middle, miss the edge by 0.06.
 const int MEANS = 8;
 const float CIRCLE_RADIUS = 0.8, MEAN_WIDTH = 0.5;  // in radii of the disc
-const float CIRCLE_ANGLE = TWO_PI / float(MEANS - 1);
-const mat2 CIRCLE_TURN = mat2(0.62348980, 0.78183148, -0.78183148, 0.62348980);
-const mat2 FOURTH_CIRCLE_TURN = mat2(-0.90096887, -0.43388374, 0.43388374, -0.90096887);  // by four times that
+const mat2 CIRCLE_TURN = mat2(0.62348980, 0.78183148, -0.78183148, 0.62348980);  // by a seventh
+
+// How far from the middle of the disc one of the means is.
+float mean_radius(int number)
+{
+    return number == 0 ? 0.0 : CIRCLE_RADIUS;
+}

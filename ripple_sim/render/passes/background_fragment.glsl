@@ -2,7 +2,6 @@
 // The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW those pixels.
 // Each pixel stands for a block of BLOCK x BLOCK of the frame's.
 #define OWN_POINTS (BLOCK > 1)
-#define OWN_FILTER 1
 #include "gpu/held_uniforms.glsl"
 #include "glsl/ray.glsl"
 #include "passes/floor_map.glsl"

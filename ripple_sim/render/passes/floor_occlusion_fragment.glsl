@@ -105,7 +105,7 @@ void main()
         if (i < SHADOWS) {
             Shade shade = shade_of(i, world, size);
             shaded = shaded || shade.any;
-            light *= shade.passes * transmitted(i, world, floor_normal.xyz, 0.0, bvec2(true));
+            light *= shade.passes * transmitted(i, world, floor_normal.xyz, 0.0);
         }
         arrives += light;
     }

@@ -6,45 +6,20 @@
 
 layout(binding = SHADOW_TEST_UNIT) uniform sampler2DShadow shadow_test;
 
-// The pixels of a block of 2 x 2 share the points of a disc, of which each takes a fourth; with OWN_POINTS they do not, nor
-// with OWN_FILTER those of the filter: steps of two pixels would be seen on a floor.
+// The pixels of a block of 2 x 2 share their search for blockers, of whose points each takes a fourth; with OWN_POINTS they
+// do not. Each filters for itself: steps of two pixels would be seen.
 #if OWN_POINTS
-const int SEARCHERS = 1, SEARCH_TAPS = 8;
-const mat2 SEARCH_TURN = GOLDEN_TURN;
+const int SHARED = 1, SEARCH_TAPS = 8;
+const mat2 TURN = GOLDEN_TURN;
 const float UNSEEN = 0.004;  // share of a light that nobody misses
 const float NARROW = 3.0;  // radius of a penumbra, in those of `scatter`, from which what is between may be interpolated
 
 bool in_narrow = false;  // whether a point is in a penumbra that is too narrow for that
 #else
-const int SEARCHERS = 4, SEARCH_TAPS = 3;
-const mat2 SEARCH_TURN = FOURTH_TURN;
+const int SHARED = 4, SEARCH_TAPS = 3;
+const mat2 TURN = FOURTH_TURN;
 #endif
-#if OWN_FILTER
-const int SHARED = 1;
-const mat2 TURN = GOLDEN_TURN, MEAN_TURN = CIRCLE_TURN;
-#else
-const int SHARED = 4;
-const mat2 TURN = FOURTH_TURN, MEAN_TURN = FOURTH_CIRCLE_TURN;
-#endif
-const int FILTER_TAPS = 16, MEAN_TAPS = MEANS / SHARED;
-
-// Number, and a half, of this pixel's first point, of whose points so many pixels take turns.
-float first_of(int pixels)
-{
-    return pixels > 1 ? first_point() : 0.5;
-}
-
-// Place of one of a pixel's points among all, from 0 to 1.
-float order_of(int tap, int pixels, int taps)
-{
-    return (float(tap) + first_of(pixels) / float(pixels)) / float(taps);
-}
-
-// Neighbours in the block that share the points of the filter, of those that share others.
-bvec2 filter_block(bvec2 block)
-{
-    return SHARED > 1 ? block : bvec2(false);
-}
+const int FILTER_TAPS = 16;
 
 const vec2 BY_MEANS = vec2(0.4, 0.8);  // texels of `blockers` between those: from where on they are means
 
@@ -64,16 +39,17 @@ Blockers blockers_beside(int light, Receiver at, vec2 offset, float footprint, f
 // How much blocks the light within a radius in the map, and that times its mean distance from the light [m].
 vec2 find_blockers(int light, Receiver at, float radius)
 {
-    vec2 direction = spiral_direction(first_of(SEARCHERS) + counts.z), found = vec2(0.0);
+    float first = SHARED > 1 ? first_point() : 0.5;
+    vec2 direction = spiral_direction(first + counts.z), found = vec2(0.0);
     int taps = at.inside ? SEARCH_TAPS : 0, i = 0;
     do {
         // denser in the middle, where a near blocker must not be missed, and of no weight at the rim, where they come in
-        float away = order_of(i, SEARCHERS, SEARCH_TAPS);
+        float away = (float(i) + first / float(SHARED)) / float(SEARCH_TAPS);
         // the mean over as much as lies between the points: single texels would come and go from pixel to pixel
-        float footprint = radius * sqrt(TWO_PI * away / float(SEARCHERS * SEARCH_TAPS));
+        float footprint = radius * sqrt(TWO_PI * away / float(SHARED * SEARCH_TAPS));
         Blockers seen = blockers_beside(light, at, radius * away * direction, footprint, away);
         found += at.inside ? (1.0 - away) * seen.share * vec2(1.0, seen.distance) : vec2(0.0);
-        direction = SEARCH_TURN * direction;
+        direction = TURN * direction;
     } while (++i < taps);
     return found;
 }
@@ -83,15 +59,15 @@ float light_by_means(int light, Receiver at, float penumbra, bool needed)
 {
     float between = max(penumbra * MEAN_WIDTH, 1.0 / float(textureSize(blockers, 0).y));
     float disc = sqrt(max(penumbra * penumbra - between * between, 0.0));  // the means widen it to the penumbra's
-    float first = first_of(SHARED), turned = CIRCLE_ANGLE * (first - 0.5) + GOLDEN_ANGLE * counts.z, sum = 0.0;
-    vec2 direction = vec2(cos(turned), sin(turned));
-    int taps = needed ? MEAN_TAPS : 0, i = 0;
+    vec2 direction = spiral_direction(counts.z);
+    float sum = 0.0;
+    int taps = needed ? MEANS : 0, i = 0;
     do {
-        float away = float(i) + first < 1.0 ? 0.0 : CIRCLE_RADIUS;
-        sum += 1.0 - blockers_beside(light, at, disc * away * direction, between, order_of(i, SHARED, MEAN_TAPS)).share;
-        direction = MEAN_TURN * direction;
+        vec2 offset = disc * mean_radius(i) * direction;
+        sum += 1.0 - blockers_beside(light, at, offset, between, (float(i) + 0.5) / float(MEANS)).share;
+        direction = CIRCLE_TURN * direction;
     } while (++i < taps);
-    return sum / float(MEAN_TAPS);
+    return sum / float(MEANS);
 }
 
 #if !OWN_POINTS
@@ -99,20 +75,19 @@ float light_by_means(int light, Receiver at, float penumbra, bool needed)
 float light_by_points(int light, Receiver at, float penumbra, bool needed)
 {
     float sum = 0.0;
-    vec2 direction = spiral_direction(first_of(SHARED) + counts.z);
+    vec2 direction = spiral_direction(0.5 + counts.z);
     int taps = needed ? FILTER_TAPS : 0, i = 0;
     do {
-        vec2 offset = penumbra * sqrt(order_of(i, SHARED, FILTER_TAPS)) * direction;
+        vec2 offset = penumbra * sqrt((float(i) + 0.5) / float(FILTER_TAPS)) * direction;
         float depth = at.place.z + dot(at.slope, offset) - at.depth_bias;
         sum += textureLod(shadow_test, vec3(in_maps(light, at.place.xy + offset), depth), 0.0);
-        direction = TURN * direction;
+        direction = GOLDEN_TURN * direction;
     } while (++i < taps);
     return sum / float(FILTER_TAPS);
 }
 #endif
 
-// Share of a light that arrives; with points that are shared, as the mean over the part of the pixel's block of 2 x 2 that
-// lies to the given sides.
+// Share of a light that arrives. The part of the pixel's block of 2 x 2 that lies to the given sides shares the search.
 // The normal is that of the surface without ripples; `bias` [m] raises the position above bumps, which shall not shade
 // each other, and is negative for what casts no shadow itself; `scatter` [m] is how far light gets under the surface, or
 // with OWN_POINTS how far such points are apart.
@@ -123,7 +98,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     float facing = dot(normal, far_away ? from.direction.xyz : normalize(from.position.xyz - position));
     Receiver at = receiver(light, position, normal, facing, bias);
     float scattered = scatter / at.width, sharpest = 1.5 / shadow_at(light).width.z;
-    float least = SEARCHERS == 1 ? sharpest : length(vec2(sharpest, scattered));
+    float least = SHARED == 1 ? sharpest : length(vec2(sharpest, scattered));
     vec2 found = find_blockers(light, at, widest_penumbra(light, at.distance) + max(least, scattered));
     found = vec2(block_mean(found.x, block), block_mean(found.y, block));
     float penumbra = length(vec2(penumbra_of(light, found.y / max(found.x, 1e-4), at.distance), least));
@@ -138,7 +113,7 @@ float light_visibility(int light, vec3 position, vec3 normal, float bias, float 
     float by_points = light_by_points(light, at, penumbra, shaded && wide < 1.0);
     float lit = mix(by_points, light_by_means(light, at, penumbra, shaded && wide > 0.0), wide);
 #endif
-    lit = block_mean(shaded ? lit : 1.0, filter_block(block));
+    lit = shaded ? lit : 1.0;
 #if OWN_POINTS
     in_narrow = in_narrow || narrow && lit * (1.0 - lit) > UNSEEN;
 #endif

@@ -5,7 +5,6 @@
 // rgb: share of the light that is taken; a: the mean of that times the distance from the light [m]
 layout(binding = TRANSMISSION_UNIT) uniform sampler2D transmission_maps;
 
-const int PASSING_TAPS = 12 / SHARED;
 const float LEAST = 1e-3;   // mean share taken that counts
 const float CLOSEST = 3.0;  // distance at which things begin to shade one another, in texels [m]
 
@@ -23,7 +22,7 @@ vec2 transparent_blocker(vec4 taken)
 }
 
 // Share of a light that passes all that is transparent on its way to a point; the rest as for `light_visibility`.
-vec3 transmitted(int light, vec3 position, vec3 normal, float scatter, bvec2 block)
+vec3 transmitted(int light, vec3 position, vec3 normal, float scatter)
 {
     Light from = light_at(light);
     Shadow shadow = shadow_at(light);
@@ -36,24 +35,25 @@ vec3 transmitted(int light, vec3 position, vec3 normal, float scatter, bvec2 blo
     vec2 found = transparent_blocker(taken_about(light, p.xy, 0.5 * widest_penumbra(light, to_light)));
     float penumbra = penumbra_of(light, min(found.y / max(found.x, 1e-4), to_light), to_light);
     vec3 taken = vec3(0.0);
-    vec2 direction = spiral_direction(first_of(SHARED));
-    int taps = inside && found.x > 0.0 ? PASSING_TAPS : 0;
+    float disc = penumbra * sqrt(1.0 - MEAN_WIDTH * MEAN_WIDTH);  // as in light_by_means
+    vec2 direction = spiral_direction(counts.z);
+    int taps = inside && found.x > 0.0 ? MEANS : 0;
     for (int i = 0; i < taps; ++i) {
-        vec2 offset = penumbra * sqrt(order_of(i, SHARED, PASSING_TAPS)) * direction;
-        direction = TURN * direction;
-        vec4 here = taken_about(light, p.xy + offset, 0.35 * penumbra);
+        vec2 offset = disc * mean_radius(i) * direction;
+        direction = CIRCLE_TURN * direction;
+        vec4 here = taken_about(light, p.xy + offset, 0.5 * MEAN_WIDTH * penumbra);
         vec2 blocker = transparent_blocker(here);
         float before = to_light - blocker.y / max(blocker.x, 1e-4);
         taken += here.rgb * smoothstep(1.0, CLOSEST, before / (slope * texel));
     }
-    taken = block_mean(taken / float(PASSING_TAPS), filter_block(block));
+    taken /= float(MEANS);
 #if OWN_POINTS
     in_narrow = in_narrow || penumbra < NARROW * scatter / width && any(greaterThan(taken, vec3(UNSEEN)));
 #endif
     return 1.0 - taken;
 }
 #else
-vec3 transmitted(int light, vec3 position, vec3 normal, float scatter, bvec2 block)
+vec3 transmitted(int light, vec3 position, vec3 normal, float scatter)
 {
     return vec3(1.0);
 }
@@ -63,5 +63,5 @@ vec3 transmitted(int light, vec3 position, vec3 normal, float scatter, bvec2 blo
 vec3 light_arriving(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)
 {
     return light_visibility(light, position, normal, bias, scatter, block) *
-           transmitted(light, position, normal, scatter, block);
+           transmitted(light, position, normal, scatter);
 }
