@@ -107,6 +107,15 @@ def test_penumbras_have_neither_noise_nor_hatching(gl):
     assert edge.std(axis=1).max() < 1.5
 
 
+@pytest.mark.parametrize("below", [FLOOR, SLAB], ids=["floor", "solid"])
+def test_shadows_have_the_resolution_of_the_frame(gl, below):
+    """Across the edge of a plate's shadow, pixels differ as much from the one before as from the one behind."""
+    plate = '<geom type="box" size=".9 .5 .01" pos="-1.4 0 1.4"/>'
+    rows = frame_of(gl, below + plate + SUN.format(1.0, "true"), size=(320, 240))[40:120, 150:170, 1].mean(axis=1)
+    steps = np.abs(np.diff(rows))
+    assert steps[::2].sum() == pytest.approx(steps[1::2].sum(), rel=0.2)
+
+
 def test_a_wide_penumbra_has_no_steps(gl):
     """Between light and shadow of a ball on the studio's floor brightness bends little over any eight pixels."""
     floor = frame_of(gl, FLOOR + BALL, size=(640, 480))[160:320, 400:570].mean(axis=2)
