@@ -7,8 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
-
 
 class CoarseMesh(NamedTuple):
     """Some of the vertices of a mesh.
@@ -37,7 +35,7 @@ def coarse_mesh(F: NDArray[np.int64], features: NDArray[np.float64], count: int)
     """
     if len(features) <= count:
         return CoarseMesh(np.arange(len(features)), np.asarray(F))
-    chosen, owner = _spread(np.ascontiguousarray(features), count)
+    chosen, owner = _spread(features, count)
     merged = owner[F]
     merged = merged[(merged != np.roll(merged, 1, axis=1)).all(axis=1)]
     # each begins with its least vertex, so that the same triangle is the same row
@@ -45,21 +43,22 @@ def coarse_mesh(F: NDArray[np.int64], features: NDArray[np.float64], count: int)
     return CoarseMesh(chosen, np.unique(np.take_along_axis(merged, (first + np.arange(3)) % 3, axis=1), axis=0))
 
 
-@kernel
-def _spread(features: Floats, count: int) -> tuple[Ints, Ints]:
-    """Rows [count], each the farthest from those before, and the number among them of the nearest to every row [n]."""
+def _spread(features: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows [count], each the farthest from those before, and the number among them of the nearest to every row [n].
+
+    In plain numpy, column by column: it takes twice the time of a compiled loop, and less than to compile that.
+    """
+    columns = np.ascontiguousarray(features.T)
     chosen, owner = np.zeros(count, np.int64), np.zeros(len(features), np.int64)
     square = np.full(len(features), np.inf)
     latest = 0
     for k in range(count):
-        chosen[k], farthest = latest, 0
-        for i in range(len(features)):
-            distance = 0.0
-            for j in range(features.shape[1]):
-                distance += (features[i, j] - features[latest, j]) ** 2
-            if distance < square[i]:
-                square[i], owner[i] = distance, k
-            if square[i] > square[farthest]:
-                farthest = i
-        latest = farthest
+        chosen[k] = latest
+        distance = np.zeros(len(features))
+        for column in columns:
+            distance += np.square(column - column[latest])
+        nearer = distance < square
+        np.copyto(square, distance, where=nearer)
+        owner[nearer] = k
+        latest = int(square.argmax())
     return chosen, owner
