@@ -76,10 +76,9 @@ class DeferredShading:
         self._classify = resources.vertex_array(classify, [(self._tiles.buffer, "2f/i", "in_corner")])
 
     def clear(self, ctx: moderngl.Context) -> None:
-        """Forget the last frame."""
+        """Forget the last frame's surfaces."""
         self._g_buffer.use(ctx)
         self._g_buffer.clear()
-        self.frame.clear(depth=LEVELS["OPEN"])
 
     def begin(self, ctx: moderngl.Context) -> None:
         """Draw into the cleared G-buffer from now on."""
