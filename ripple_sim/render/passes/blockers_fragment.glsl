@@ -19,7 +19,7 @@ void main()
         textureGatherOffset(shadow_maps, place, ivec2(-1, 1)), textureGatherOffset(shadow_maps, place, ivec2(1, 1)));
     vec3 sum = vec3(0.0);
     for (int i = 0; i < 4; ++i) {
-        vec4 covers = 1.0 - step(1.0, depths[i]), away = light_distances(shadows[light].depth, depths[i]);
+        vec4 covers = 1.0 - step(1.0, depths[i]), away = light_distance(shadows[light].depth, depths[i]);
         sum += vec3(dot(covers, vec4(1.0)), dot(covers, away), dot(covers, away * away));
     }
     fragment = vec4(sum / 16.0, 1.0);

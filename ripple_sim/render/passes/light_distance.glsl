@@ -4,7 +4,7 @@ float light_distance(vec4 d, float depth)
     return (d.x * depth + d.y) / (d.z * depth + d.w);
 }
 
-vec4 light_distances(vec4 d, vec4 depths)
+vec4 light_distance(vec4 d, vec4 depths)
 {
     return (d.x * depths + d.y) / (d.z * depths + d.w);
 }

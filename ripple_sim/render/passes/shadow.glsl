@@ -54,7 +54,8 @@ vec2 find_blockers(int light, Receiver at, float radius)
     return found;
 }
 
-// Share of the light past blockers whose penumbra has a radius in the map: means over parts of that; or 1 where not `needed`.
+// Share of the light past blockers whose penumbra has a radius in the map: means over parts of that; any number where not
+// `needed`.
 float light_by_means(int light, Receiver at, float penumbra, bool needed)
 {
     float between = max(penumbra * MEAN_WIDTH, 1.0 / float(textureSize(blockers, 0).y));
@@ -93,9 +94,7 @@ float light_by_points(int light, Receiver at, float penumbra, bool needed)
 // with OWN_POINTS how far such points are apart.
 float light_visibility(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)
 {
-    Light from = light_at(light);
-    bool far_away = NEAR_LIGHTS == 0 || from.position.w == 0.0;
-    float facing = dot(normal, far_away ? from.direction.xyz : normalize(from.position.xyz - position));
+    float facing = dot(normal, towards_light(light, position));
     Receiver at = receiver(light, position, normal, facing, bias);
     float scattered = scatter / at.width, sharpest = 1.5 / shadow_at(light).width.z;
     float least = SHARED == 1 ? sharpest : length(vec2(sharpest, scattered));

@@ -28,6 +28,17 @@ float widest_penumbra(int light, float to_light)
     return penumbra_of(light, light_distance(shadow_at(light).depth, 0.0), to_light);
 }
 
+bool is_far(int light)
+{
+    return NEAR_LIGHTS == 0 || light_at(light).position.w == 0.0;
+}
+
+vec3 towards_light(int light, vec3 position)
+{
+    Light from = light_at(light);
+    return is_far(light) ? from.direction.xyz : normalize(from.position.xyz - position);
+}
+
 // A point of a surface, as a light sees it.
 struct Receiver {
     vec3 place;             // in the light's map, and the depth there
@@ -43,8 +54,8 @@ struct Receiver {
 Receiver receiver(int light, vec3 position, vec3 normal, float facing, float bias)
 {
     Shadow shadow = shadow_at(light);
-    vec4 source = light_at(light).position, of_depth = shadow.depth, of_width = shadow.width;
-    float away = NEAR_LIGHTS == 0 || source.w == 0.0 ? 0.0 : distance(source.xyz, position);
+    vec4 of_depth = shadow.depth, of_width = shadow.width;
+    float away = is_far(light) ? 0.0 : distance(light_at(light).position.xyz, position);
     Receiver at;
     at.casts = bias >= 0.0;
     at.texel = (of_width.x + of_width.y * away) / of_width.z;

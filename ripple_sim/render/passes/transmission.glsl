@@ -5,7 +5,6 @@
 // rgb: share of the light that is taken; a: the mean of that times the distance from the light [m]
 layout(binding = TRANSMISSION_UNIT) uniform sampler2D transmission_maps;
 
-const float LEAST = 1e-3;   // mean share taken that counts
 const float CLOSEST = 3.0;  // distance at which things begin to shade one another, in texels [m]
 
 // Mean of what is taken about a point of a light's map, as far as a radius, both in the map.
@@ -24,12 +23,11 @@ vec2 transparent_blocker(vec4 taken)
 // Share of a light that passes all that is transparent on its way to a point; the rest as for `light_visibility`.
 vec3 transmitted(int light, vec3 position, vec3 normal, float scatter)
 {
-    Light from = light_at(light);
     Shadow shadow = shadow_at(light);
-    vec4 clip = shadow.matrix * vec4(position, 1.0), place = from.position;
+    vec4 clip = shadow.matrix * vec4(position, 1.0);
     vec3 p = clip.xyz / clip.w;
-    vec3 towards = NEAR_LIGHTS == 0 || place.w == 0.0 ? from.direction.xyz : normalize(place.xyz - position);
-    float to_light = light_distance(shadow.depth, p.z), slope = 1.0 / max(abs(dot(normal, towards)), 0.1);
+    float to_light = light_distance(shadow.depth, p.z);
+    float slope = 1.0 / max(abs(dot(normal, towards_light(light, position))), 0.1);
     float width = shadow.width.x + shadow.width.y * to_light, texel = width / float(textureSize(transmission_maps, 0).y);
     bool inside = counts.w > float(light) && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
     vec2 found = transparent_blocker(taken_about(light, p.xy, 0.5 * widest_penumbra(light, to_light)));

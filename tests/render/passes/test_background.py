@@ -10,8 +10,6 @@ from ripple_sim.solver.gl import GLContext
 
 SUN = '<light directional="true" dir="-.3 .4 -1"/>'
 SPOT = '<light pos="1 -1 2" dir="-.5 .5 -1" cutoff="25" castshadow="true"/>'
-
-
 SOLIDS = '<geom type="sphere" size=".2" pos="0 0 .2"/><geom type="capsule" size=".05 .3" pos=".6 .2 .5"/>'
 
 
