@@ -97,6 +97,7 @@ class DeferredShading:
         self._g_buffer.bind()
         self._tiles.cover(boxes)
         self._background.prepare(ctx)
+        self.frame.use()  # clearing keeps within the scissor in use, which the reflection's frame may have left
         # every pixel gets its colour from the background, or the classification
         self.frame.color_mask = (False,) * 4
         self.frame.clear(depth=LEVELS["OPEN"])
@@ -122,7 +123,7 @@ class DeferredShading:
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         ctx.depth_func = ">="  # solids in some or all of the samples
         self._solids.run(self.frame, LEVELS["MIXED"])
-        self.frame.scissor = (0, 0, *self.frame.size)
+        self.frame.scissor = None
 
 
 def _check_size(resources: Resources, size: tuple[int, int]) -> None:

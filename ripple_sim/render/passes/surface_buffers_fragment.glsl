@@ -22,12 +22,13 @@ void main()
         vec4 normal = texelFetch(normals, pixel, 0), color = texelFetch(colors, pixel, 0);
         Object object = object_at(unpack_object(normal.z));
         vec2 place = color.xy * vec2(textureSize(height_maps, 0).xy);
-        vec4 ripple = spline_at(height_maps, vec3(place, object.height_map.x)) * object.height_map.y;
+        bool flat_surface = object.height_map.y == 0.0;  // its layer may never have been written
+        vec4 ripple = flat_surface ? vec4(0.0) : spline_at(height_maps, vec3(place, object.height_map.x));
         vec3 out_of = octahedral_decode(normal.xy);
         float side = unpack_inner(normal.z) ? -1.0 : 1.0;
         shown = vec4(normalize(out_of - side * object.rotation * ripple.xyz), eye_distance(depth));
         smooth_surface = vec4(side * out_of, object.place.x + 1.0);
-        if (object.height_map.y > 0.0)
+        if (!flat_surface)
             rippling = vec4(place, object.height_map.x, ripple.w);
     } else if (meets_floor()) {
         shown = vec4(floor_normal.xyz, floor_distance());
