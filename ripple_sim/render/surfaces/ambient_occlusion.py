@@ -66,8 +66,8 @@ def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, sta
         directions = side * _hemisphere(frames, count)
         origins = (V + side * 1e-3 * radius * frames[:, 2])[:, None] + start * directions
         rays = (each.reshape(-1, 3).astype(np.float32) for each in (origins, directions))
-        hits = start + scene.run(*rays, query="DISTANCE")
-        return np.minimum(hits / radius, 4.0).reshape(len(V), count)
+        hits = start + scene.run(*rays, query="DISTANCE")  # 1e37 where nothing was hit
+        return (np.minimum(hits, 4.0 * radius) / radius).reshape(len(V), count)
 
     # nearby walls hide the light, those further than a radius away reflect some themselves
     outer, inner = distances(1.0), distances(-1.0)

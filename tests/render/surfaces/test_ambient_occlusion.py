@@ -25,6 +25,13 @@ def test_the_size_of_a_mesh_changes_nothing():
     np.testing.assert_allclose(first, second, atol=5e-3)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_tiny_body_is_like_any_other():
+    ball = primitives.ball(6)
+    first, second = (bake(radius * ball.shell, ball.faces, ball.shell) for radius in (1.0, 1e-3))
+    np.testing.assert_allclose(first, second, atol=5e-3)
+
+
 def test_a_flat_body_is_thin_and_a_round_one_thick():
     ball = primitives.ball(8)
     mean = [
