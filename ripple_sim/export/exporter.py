@@ -11,7 +11,7 @@ from typing import Self, Unpack
 
 import mujoco
 
-from ripple_sim.coupling.arguments import own_data, own_model
+from ripple_sim.coupling.arguments import check_targets, own_data, own_model, posed
 from ripple_sim.coupling.model.geoms import ByGeom, by_name
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.errors import EncodingError, ExportError
@@ -60,7 +60,7 @@ class Exporter:
     ------
     RippleError
         If the ending is unknown or needs a package that is not installed, something foreign stands in the output's
-        place, or an argument is invalid.
+        place, the ripples belong to another model, or an argument is invalid.
 
     Attributes
     ----------
@@ -86,6 +86,7 @@ class Exporter:
     ) -> None:
         written = WRITE_OPTIONS | options
         model = own_model(model)
+        check_targets(model, ripples.model, ripples.geom_ids)
         named = by_name(model, looks or {}, "looks")
         check_write_options(written)
         for look in named.values():
@@ -129,7 +130,7 @@ class Exporter:
         Parameters
         ----------
         data : mujoco.MjData
-            After `mj_step` or `mj_forward`.
+            After `mj_step` or `mj_forward`. Where no poses were ever computed, those of its `qpos` are written.
         impulses : sequence of Impulse, optional
             All since the frame before; by default those of the latest step.
 
@@ -144,7 +145,8 @@ class Exporter:
             raise ExportError(f"the export {self.output} is closed; make another Exporter")
         given = self._source.ripples.last_impulses if impulses is None else impulses
         with self._reported():
-            self._writer.write(Moment(self.frames, own_data(self._source.model, data), list(given)))
+            model = self._source.model
+            self._writer.write(Moment(self.frames, posed(model, own_data(model, data, drawn=True)), list(given)))
         self.frames += 1
 
     def close(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import tempfile
 from pathlib import Path
+from typing import TypeAlias
 
 import mujoco
 import numpy as np
@@ -12,16 +13,18 @@ from numpy.typing import NDArray
 
 from ripple_sim.capture.drawn_heights import DrawnHeights
 from ripple_sim.capture.target_surface import surface_of
-from ripple_sim.capture.viewpoint import viewpoint
-from ripple_sim.coupling.arguments import own_data, own_model
+from ripple_sim.coupling.arguments import check_targets, own_data, own_model, posed
 from ripple_sim.coupling.model.geoms import ByGeom, by_name
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.render import Camera, FixedCamera, Renderer
+from ripple_sim.render.camera import Viewpoint, find_viewpoint
 from ripple_sim.scene.camera import CameraEntry
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .exporter import Exporter, camera_entry
 from .html.notebook import framed
+
+AnyCamera: TypeAlias = Camera | FixedCamera | str | int | mujoco.MjvCamera
 
 
 class RippleRenderer:
@@ -30,7 +33,8 @@ class RippleRenderer:
     Parameters
     ----------
     model : mujoco.MjModel
-        Or dm_control's wrapper of one; likewise the data of each frame.
+        That of the ripples, or one that differs in its looks alone; or dm_control's wrapper of one, likewise the data
+        of each frame.
     ripples : Ripples
         Whose targets are drawn with their ripples.
     width : int
@@ -49,7 +53,8 @@ class RippleRenderer:
     Raises
     ------
     RippleError
-        For an unknown look or geom, or if the driver cannot render frames of this size.
+        If the ripples belong to another model, for an unknown look or geom, or if the driver cannot render frames of
+        this size.
     """
 
     def __init__(
@@ -64,6 +69,7 @@ class RippleRenderer:
         limit: bool = True,
     ) -> None:
         self._model, self._ripples = own_model(model), ripples
+        check_targets(self._model, ripples.model, ripples.geom_ids)
         self._height_maps = {name: DrawnHeights(ripples, name, limit) for name in ripples}
         named = by_name(self._model, looks or {}, "looks")
         surfaces = {
@@ -73,28 +79,32 @@ class RippleRenderer:
         self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
         self._renderer = Renderer(gl or shared_context(), self._model, surfaces, size=(width, height))
 
-    def render(self, data: mujoco.MjData, camera: Camera | FixedCamera | str | None = None) -> NDArray[np.uint8]:
+    def render(self, data: mujoco.MjData, camera: AnyCamera | None = None) -> NDArray[np.uint8]:
         """Render the present state to pixels, uint8 [height, width, 3].
 
         Parameters
         ----------
         data : mujoco.MjData
-            After `mj_step` or `mj_forward`.
-        camera : Camera, FixedCamera or str, optional
-            A camera, or the name of one in the MJCF; by default MuJoCo's free camera, aimed at the model's middle.
+            After `mj_step` or `mj_forward`. Where no poses were ever computed, those of its `qpos` are drawn.
+        camera : Camera, FixedCamera, str, int or mujoco.MjvCamera, optional
+            A camera, or the name or the id of one in the MJCF, or one of MuJoCo's that is free, tracks a body or is
+            fixed; by default, and with -1, MuJoCo's free camera, aimed at the model's middle.
+
+        Raises
+        ------
+        SceneError
+            If the data belongs to another model, or the camera is none of these or not in the model.
         """
-        data = own_data(self._model, data)
-        entry = self._entry(camera)
-        self._seen = data, entry
-        if camera is None or isinstance(camera, str):
-            camera = viewpoint(self._model, data, entry, data.time)
+        data = posed(self._model, own_data(self._model, data, drawn=True))
+        seen = find_viewpoint(self._model, data, -1 if camera is None else camera)
+        self._seen = data, self._entry(camera if isinstance(camera, str) else seen)
         height_maps = {
             self._ripples.geom_ids[name]: height_map(self._ripples[name].snapshot(), data)
             for name, height_map in self._height_maps.items()
         }
-        return self._renderer.render(data, height_maps, camera)
+        return self._renderer.render(data, height_maps, seen)
 
-    def _entry(self, camera: Camera | FixedCamera | str | None) -> CameraEntry:
+    def _entry(self, camera: Viewpoint | str) -> CameraEntry:
         """What `[camera]` of a scene file would say; MuJoCo's free camera where it has no words for it."""
         if isinstance(camera, Camera):
             return CameraEntry(**dataclasses.asdict(camera))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import numbers
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -10,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import RippleError
 
 
@@ -85,18 +87,18 @@ class Camera:
         return Pose(np.asarray(self.lookat) - self.distance * forward, rotation, self.distance, self.fovy)
 
     @staticmethod
-    def from_mjcf(model: Any, data: Any, name: str) -> FixedCamera:
-        """Return the camera called `name` of a MuJoCo model, as posed in `data`.
+    def from_mjcf(model: Any, data: Any, name: str | int) -> FixedCamera:
+        """Return a camera of a MuJoCo model, by its name or its id, as posed in `data`.
 
         Raises
         ------
-        RippleError
+        SceneError
             If the model has no such camera.
         """
-        index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, name)
-        if index < 0:
-            names = ", ".join(repr(model.camera(i).name) for i in range(model.ncam)) or "none"
-            raise RippleError(f"the model has no camera {name!r}; it has: {names}")
+        index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, name) if isinstance(name, str) else name
+        if not 0 <= index < model.ncam:
+            names = ", ".join(f"{model.camera(i).name!r} (id {i})" for i in range(model.ncam)) or "none"
+            raise SceneError(f"the model has no camera {name!r}; it has: {names}")
         return FixedCamera(
             position=np.array(data.cam_xpos[index]),
             rotation=np.array(data.cam_xmat[index]).reshape(3, 3),
@@ -130,3 +132,64 @@ class ThroughLens:
     def pose(self) -> Pose:
         """Return position and axes in the world."""
         return dataclasses.replace(self.camera.pose(), lens=self.lens, focal_distance=self.focal_distance)
+
+
+def find_viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: Any) -> Viewpoint:
+    """The viewpoint of whatever stands for a camera, as posed in `data`.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    data : mujoco.MjData
+    camera : Viewpoint, str, int or mujoco.MjvCamera
+        A viewpoint itself; the name or the id of a camera in the MJCF; -1 for MuJoCo's free camera, aimed at the
+        model's middle; or a camera of MuJoCo's that is free, tracks a body or is fixed.
+
+    Raises
+    ------
+    SceneError
+        If it is anything else, or names what the model does not have.
+    """
+    if callable(getattr(camera, "pose", None)):
+        return camera
+    if isinstance(camera, numbers.Integral):
+        if camera != -1:
+            return Camera.from_mjcf(model, data, int(camera))
+        free = mujoco.MjvCamera()
+        mujoco.mjv_defaultFreeCamera(model, free)
+        free.orthographic = 0
+        return _placed(model, data, free)
+    if isinstance(camera, str):
+        return Camera.from_mjcf(model, data, camera)
+    if isinstance(camera, mujoco.MjvCamera):
+        return _placed(model, data, camera)
+    raise SceneError(
+        f"camera is {type(camera).__name__}; valid are a Camera, a FixedCamera, the name or the id of a camera in the "
+        "model, -1 for the free camera, and a mujoco.MjvCamera"
+    )
+
+
+def _placed(model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera) -> Viewpoint:
+    """A camera of MuJoCo's where `mjv_updateCamera` places it."""
+    kinds = mujoco.mjtCamera
+    if camera.type == kinds.mjCAMERA_FIXED:
+        return Camera.from_mjcf(model, data, camera.fixedcamid)
+    if camera.orthographic:
+        raise SceneError("the MjvCamera is orthographic; valid is one in perspective: set its orthographic to 0")
+    lookat = camera.lookat
+    if camera.type == kinds.mjCAMERA_TRACKING:
+        if not 0 <= camera.trackbodyid < model.nbody:
+            raise SceneError(
+                f"the MjvCamera's trackbodyid is {camera.trackbodyid}; valid are 0 to {model.nbody - 1}, the model's "
+                "bodies"
+            )
+        lookat = data.subtree_com[camera.trackbodyid]
+    elif camera.type != kinds.mjCAMERA_FREE:
+        raise SceneError(
+            f"the MjvCamera's type is {camera.type}; valid are mjCAMERA_FREE ({int(kinds.mjCAMERA_FREE)}), "
+            f"mjCAMERA_TRACKING ({int(kinds.mjCAMERA_TRACKING)}) and mjCAMERA_FIXED ({int(kinds.mjCAMERA_FIXED)})"
+        )
+    x, y, z = (float(each) for each in lookat)
+    return Camera(
+        (x, y, z), float(camera.distance), float(camera.azimuth), float(camera.elevation), model.vis.global_.fovy
+    )

@@ -1,5 +1,7 @@
 """Frames of a model with ripples in somebody's own loop."""
 
+import copy
+
 import mujoco
 import numpy as np
 import pytest
@@ -55,3 +57,45 @@ def test_an_unknown_look_or_camera_is_refused_by_name(egg):
         RippleRenderer(model, ripples, looks={"egg": "glass"})
     with pytest.raises(RippleError, match="above"):
         RippleRenderer(model, ripples, width=96, height=72).render(data, "above")
+
+
+def test_cameras_are_given_as_to_mujocos_renderer(egg):
+    model, data, ripples = egg
+    renderer = RippleRenderer(model, ripples, width=96, height=72)
+    free = mujoco.MjvCamera()
+    mujoco.mjv_defaultFreeCamera(model, free)
+    for camera, same in ((0, "side"), (-1, None), (free, None)):
+        assert np.array_equal(renderer.render(data, camera), renderer.render(data, same))
+    with pytest.raises(RippleError, match="camera is list; valid are"):
+        renderer.render(data, [0.0, 0.0, 1.0])
+
+
+@pytest.mark.filterwarnings("error")
+def test_data_without_poses_is_drawn_as_forwarded(egg):
+    """As it comes from `MjData(model)`; it stays as it is."""
+    model, data, ripples = egg
+    renderer = RippleRenderer(model, ripples, width=96, height=72)
+    new = mujoco.MjData(model)
+    assert np.array_equal(renderer.render(new, "side"), renderer.render(data, "side"))
+    assert not new.xquat.any()
+
+
+def test_a_model_in_which_another_geom_would_ripple_is_refused(egg):
+    _, _, ripples = egg
+    egg_geom = '<geom name="egg" type="ellipsoid" size="0.4 0.3 0.3" rgba="0.9 0.1 0.1 1"/>'
+    for changed, what in (
+        ('<geom name="box" type="box" size="1 1 1"/>' + egg_geom, "another body_parentid|another geom_"),
+        (egg_geom.replace("0.4", "0.5"), "another geom_size"),
+        (egg_geom.replace('"egg"', '"other"'), "another names of geoms"),
+    ):
+        other = mujoco.MjModel.from_xml_string(MODEL.replace(egg_geom, changed))
+        with pytest.raises(RippleError, match=what):
+            RippleRenderer(other, ripples, width=96, height=72)
+
+
+def test_a_copy_of_the_model_in_other_colours_is_drawn_in_them(egg):
+    model, data, ripples = egg
+    blue = copy.copy(model)
+    blue.geom_rgba[0], blue.body_mass[0] = [0.1, 0.1, 0.9, 1.0], 2.0
+    red, _, blue_light = RippleRenderer(blue, ripples, width=96, height=72).render(data)[30:42, 42:54].mean(axis=(0, 1))
+    assert blue_light > 1.5 * red

@@ -4,13 +4,16 @@ import mujoco
 import numpy as np
 import pytest
 
+from ripple_sim.errors import SceneError
 from ripple_sim.render import Camera
+from ripple_sim.render.camera import find_viewpoint
 from ripple_sim.render.projection import perspective, view_matrix
 from ripple_sim.solver import RippleError
 
 MJCF = """<mujoco><worldbody>
 <geom size="1"/><camera name="side" pos="0 -5 1" xyaxes="1 0 0 0 .2 1"/>
-</worldbody></mujoco>"""
+<body name="moving" pos="1 2 3"><freejoint/><geom size=".1" pos=".2 0 0"/><camera pos="0 -2 0" fovy="30"/></body>
+</worldbody><visual><global fovy="35" azimuth="20" elevation="-10"/></visual></mujoco>"""
 
 
 def test_camera_follows_mujocos_convention():
@@ -29,15 +32,72 @@ def test_camera_agrees_with_mujocos_own():
     model = mujoco.MjModel.from_xml_string(MJCF)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    free = mujoco.MjvCamera()
-    free.lookat[:], free.distance, free.azimuth, free.elevation = (0.3, -0.2, 0.1), 2.5, 37.0, -28.0
+    free = mujoco_camera(lookat=(0.3, -0.2, 0.1), distance=2.5, azimuth=37.0, elevation=-28.0)
+    assert_seen_alike(model, data, Camera((0.3, -0.2, 0.1), 2.5, 37.0, -28.0, 35.0), free)
+
+
+def mujoco_camera(kind: str = "FREE", **attributes: object) -> mujoco.MjvCamera:
+    camera = mujoco.MjvCamera()
+    camera.type = getattr(mujoco.mjtCamera, f"mjCAMERA_{kind}")
+    for name, value in attributes.items():
+        setattr(camera, name, value)
+    return camera
+
+
+def assert_seen_alike(model, data, ours, theirs: mujoco.MjvCamera) -> None:
+    """A camera of ours stands, looks and opens as one of MuJoCo's."""
     scene = mujoco.MjvScene(model, maxgeom=50)
-    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, free, mujoco.mjtCatBit.mjCAT_ALL, scene)
-    eyes = [np.array(eye.pos, dtype=float) for eye in scene.camera]
-    pose = Camera((0.3, -0.2, 0.1), 2.5, 37.0, -28.0).pose()
+    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, theirs, mujoco.mjtCatBit.mjCAT_ALL, scene)
+    eyes, seen = [np.array(eye.pos, dtype=float) for eye in scene.camera], scene.camera[0]
+    pose = ours.pose()
     np.testing.assert_allclose(pose.position, np.mean(eyes, axis=0), atol=1e-6)
-    np.testing.assert_allclose(-pose.rotation[:, 2], scene.camera[0].forward, atol=1e-6)
-    np.testing.assert_allclose(pose.rotation[:, 1], scene.camera[0].up, atol=1e-6)
+    np.testing.assert_allclose(-pose.rotation[:, 2], seen.forward, atol=1e-6)
+    np.testing.assert_allclose(pose.rotation[:, 1], seen.up, atol=1e-6)
+    assert np.tan(np.radians(pose.fovy / 2)) == pytest.approx(seen.frustum_top / seen.frustum_near, rel=1e-5)
+
+
+def default_camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
+    camera = mujoco.MjvCamera()
+    mujoco.mjv_defaultFreeCamera(model, camera)
+    return camera
+
+
+@pytest.mark.parametrize(
+    ("given", "theirs"),
+    [
+        (-1, default_camera),
+        (1, lambda model: mujoco_camera("FIXED", fixedcamid=1)),
+        ("side", lambda model: mujoco_camera("FIXED", fixedcamid=0)),
+        (mujoco_camera(), lambda model: mujoco_camera()),
+        (mujoco_camera("TRACKING", trackbodyid=1), lambda model: mujoco_camera("TRACKING", trackbodyid=1)),
+        (mujoco_camera("FIXED", fixedcamid=1), lambda model: mujoco_camera("FIXED", fixedcamid=1)),
+    ],
+    ids=["-1", "id", "name", "free", "tracking", "fixed"],
+)
+def test_whatever_mujocos_renderer_takes_for_a_camera_shows_the_same(given, theirs):
+    model = mujoco.MjModel.from_xml_string(MJCF)
+    data = mujoco.MjData(model)
+    data.qpos[:] = [0.5, 0.4, 2.0, 0.8, 0.0, 0.6, 0.0]
+    mujoco.mj_forward(model, data)
+    assert_seen_alike(model, data, find_viewpoint(model, data, given), theirs(model))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (2, r"no camera 2; it has: 'side' \(id 0\), '' \(id 1\)"),
+        (-2, "no camera -2"),
+        ((0.0, 1.0, 2.0), "camera is tuple; valid are a Camera"),
+        (mujoco_camera("USER"), "type is 3; valid are mjCAMERA_FREE"),
+        (mujoco_camera("TRACKING"), "trackbodyid is -1; valid are 0 to 1"),
+        (mujoco_camera("FIXED"), "no camera -1"),
+        (mujoco_camera(orthographic=1), "orthographic"),
+    ],
+)
+def test_what_is_no_camera_is_refused(given, message: str):
+    model = mujoco.MjModel.from_xml_string(MJCF)
+    with pytest.raises(SceneError, match=message):
+        find_viewpoint(model, mujoco.MjData(model), given)
 
 
 def test_named_camera_and_the_error_for_an_unknown_one():

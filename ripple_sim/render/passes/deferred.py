@@ -123,7 +123,7 @@ class DeferredShading:
         ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         ctx.depth_func = ">="  # solids in some or all of the samples
         self._solids.run(self.frame, LEVELS["MIXED"])
-        self.frame.scissor = None
+        self.frame.scissor = (0, 0, *self.frame.size)
 
 
 def _check_size(resources: Resources, size: tuple[int, int]) -> None:
