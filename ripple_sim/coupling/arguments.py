@@ -55,8 +55,8 @@ def own_model(model: Any) -> mujoco.MjModel:
 def own_data(model: mujoco.MjModel, data: Any, *, drawn: bool = False) -> mujoco.MjData:
     """MuJoCo's data itself, also of dm_control's wrapper.
 
-    Its model is `model`, whatever was changed there since, or a copy in which bodies move and collide alike. Where it is
-    only `drawn`, they need not: shapes and places have to do.
+    Its model is `model`, whatever was changed there since, or a copy in which bodies move and collide alike. Where it
+    is only `drawn`, they need not: shapes and places have to do.
 
     Raises
     ------

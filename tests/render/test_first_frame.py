@@ -1,4 +1,4 @@
-"""The first frame is as good as any: nothing is read from the GPU before it is drawn."""
+"""The first frame is as good as any, and any as the first: nothing is read from the GPU before it is drawn."""
 
 from collections.abc import Callable
 from typing import Any
@@ -71,6 +71,18 @@ def test_the_first_frame_of_a_still_scene_is_like_the_second(gl, name: str, draw
     with renderer:
         first = draw(renderer, data)
         np.testing.assert_array_equal(first, draw(renderer, data))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_nothing_is_left_of_the_last_frame(gl, name: str):
+    """Where the ball was, what is behind it shows as if it had never been there."""
+    renderer, data = renderer_of(gl, name)
+    with renderer:
+        expected = shown(renderer, data)
+        data.geom_xpos[0] += [0.7, 0.0, 0.3]
+        assert (shown(renderer, data) != expected).any()
+        data.geom_xpos[0] -= [0.7, 0.0, 0.3]
+        np.testing.assert_array_equal(shown(renderer, data), expected)
 
 
 @pytest.mark.parametrize(("name", "draw"), DRAWN)
