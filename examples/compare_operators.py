@@ -60,7 +60,7 @@ def view(operator: str) -> Image.Image:
 
 
 def main() -> None:
-    modes, times = sphere_modes((16, 32, 64)), arrivals({}, sources=1)["limbed"]
+    modes, times = sphere_modes((16, 32, 64)), arrivals({}, RESOLUTION, sources=1)["limbed"]
     picture = Image.new("RGB", (SIZE * len(OPERATORS), SIZE + CAPTION), "white")
     draw = ImageDraw.Draw(picture)
     print("               mode of the sphere, relative error       wave front on a body with limbs, late or early by")

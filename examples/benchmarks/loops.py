@@ -120,10 +120,12 @@ def dm_control_loop() -> tuple[str, float, mujoco.MjData]:
 
 def main() -> None:
     os.environ.setdefault("MUJOCO_GL", "disable")  # read by dm_control and gymnasium, which have nothing to draw
-    rows = list(own_loops())
-    for package, loop in (("gymnasium", gymnasium_loop), ("dm_control", dm_control_loop)):
-        if importlib.util.find_spec(package) is not None:
-            rows.append(loop())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RippleWarning)
+        rows = list(own_loops())
+        for package, loop in (("gymnasium", gymnasium_loop), ("dm_control", dm_control_loop)):
+            if importlib.util.find_spec(package) is not None:
+                rows.append(loop())
     print("| loop | impulses over gain of momentum |\n| --- | --- |")
     for name, total, data in rows:
         gained = MASS * (data.qvel[2] + GRAVITY * data.time)
@@ -131,6 +133,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RippleWarning)
-        main()
+    main()

@@ -16,8 +16,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ripple_sim import Camera
-
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "limbed.obj"
 LOOKAT, DISTANCE, AZIMUTH, ELEVATION = (0.0, 0.0, 0.35), 2.0, 130.0, -22.0
 
@@ -67,6 +65,7 @@ def rippled(width: int, height: int, resolution: int, look: str) -> tuple[Callab
     os.environ["MUJOCO_GL"] = "disable"
     import mujoco
 
+    from ripple_sim import Camera
     from ripple_sim.render import Renderer, Surface
     from ripple_sim.render.surfaces.charts import Charts
     from ripple_sim.solver import HeightMap, Mesh, build_atlas

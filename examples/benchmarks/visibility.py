@@ -16,8 +16,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim import Camera
-
 SIZE = (320, 240)
 RADIUS, AMPLITUDE, LENGTH = 0.25, 0.0025, 0.06  # [m]
 LOOKAT, DISTANCE, AZIMUTH, ELEVATION = (0.0, 0.0, 0.28), 1.6, 60.0, -25.0
@@ -72,6 +70,7 @@ def ours(headlight: str, look: str, lighting: str = "model", floor: str = BRIGHT
     os.environ["MUJOCO_GL"] = "disable"
     import mujoco
 
+    from ripple_sim import Camera
     from ripple_sim.render import Renderer, Surface
     from ripple_sim.render.surfaces.charts import Charts
     from ripple_sim.solver import HeightMap, sphere_atlas
