@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.resources
 import importlib.util
 import json
@@ -48,6 +49,7 @@ def python_with_bpy() -> str:
     return python
 
 
+@functools.cache  # asking takes most of a second
 def _version_of_bpy(python: str) -> tuple[int, ...]:
     code = "import bpy; print(*bpy.app.version)"
     asked = subprocess.run([python, "-c", code], capture_output=True, text=True, errors="replace", check=False)
