@@ -1,4 +1,4 @@
-"""A batch of random scenes, and what their target underwent, read back with `load_batch` and pandas.
+"""A batch of random scenes, and what their target underwent, read back with `load_batch`.
 
     python examples/batch_impulses.py [--scenes 20] [--seconds 1.5] [--workers 2]
 
@@ -11,7 +11,6 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from matplotlib.figure import Figure
 
 from ripple_sim import load_batch
@@ -56,19 +55,20 @@ heights = true
 """
 
 
-def touches(folder: Path) -> pd.DataFrame:
+def touches(folder: Path) -> np.ndarray:
     """Each touch of each scene, from first to last contact: place [m], impulse [N s], highest ripple meanwhile [m]."""
     found = []
     for scene in load_batch(folder):
         highest = np.abs(scene.heights()["egg"]).max(axis=(1, 2, 3))
-        hits = pd.DataFrame(scene.impulses())
-        for _, of_body in hits.groupby("other"):
-            touch = (of_body["frame"].diff() > 1).cumsum()
-            for _, each in of_body.groupby(touch):
-                during = highest[each["frame"].min() : each["frame"].max() + 1]
-                x, y = each[["x", "y"]].iloc[0]
-                found.append((scene.number, x, y, each["impulse"].sum(), during.max()))
-    return pd.DataFrame(found, columns=["scene", "x", "y", "impulse", "ripple"])
+        hits = scene.impulses()
+        for other in np.unique(hits["other"]):
+            of_body = hits[hits["other"] == other]
+            apart = np.flatnonzero(np.diff(of_body["frame"]) > 1) + 1
+            for touch in np.split(of_body, apart):
+                during = highest[touch["frame"][0] : touch["frame"][-1] + 1]
+                x, y = touch[["x", "y"]][0]
+                found.append((scene.number, x, y, touch["impulse"].sum(), during.max()))
+    return np.array(found, [("scene", int), *((name, float) for name in ("x", "y", "impulse", "ripple"))])
 
 
 def main() -> None:
@@ -84,7 +84,9 @@ def main() -> None:
     run_batch(read_plan(folder / "plan" / "plan.toml"), folder / "scenes", RunOptions(workers=options.workers))
     found = touches(folder / "scenes")
     print(f"{options.scenes} scenes, {len(found)} touches")
-    print(found.describe().loc[["min", "mean", "max"], ["impulse", "ripple"]])
+    for name, unit in (("impulse", "N s"), ("ripple", "m")):
+        least, mean, most = found[name].min(), found[name].mean(), found[name].max()
+        print(f"{name}: {least:.3g} to {most:.3g} {unit}, mean {mean:.3g} {unit}")
     figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
     left, right = figure.subplots(1, 2)
     left.scatter(found["impulse"], 1000 * found["ripple"], s=30, c="#1f6f8b", alpha=0.7, linewidths=0)

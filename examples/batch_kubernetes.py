@@ -10,14 +10,14 @@ pods can write to and that is mounted at /data, where PLAN.toml and DIR lie, als
 import argparse
 from pathlib import Path
 
-from dask_kubernetes.operator import KubeCluster, make_cluster_spec
-
 from ripple_sim.batch.plan import read_plan
 from ripple_sim.batch.run_batch import run_batch
 from ripple_sim.batch.run_options import RunOptions
 
 
 def main() -> None:
+    from dask_kubernetes.operator import KubeCluster, make_cluster_spec
+
     parser = argparse.ArgumentParser(description="Makes a batch on a Kubernetes cluster.")
     parser.add_argument("plan", type=Path)
     parser.add_argument("folder", type=Path)

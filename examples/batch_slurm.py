@@ -10,14 +10,14 @@ its time limit gives way to the next one: scenes that were not finished are made
 import argparse
 from pathlib import Path
 
-from dask_jobqueue import SLURMCluster
-
 from ripple_sim.batch.plan import read_plan
 from ripple_sim.batch.run_batch import run_batch
 from ripple_sim.batch.run_options import RunOptions
 
 
 def main() -> None:
+    from dask_jobqueue import SLURMCluster
+
     parser = argparse.ArgumentParser(description="Makes a batch on a Slurm cluster.")
     parser.add_argument("plan", type=Path)
     parser.add_argument("folder", type=Path)

@@ -14,15 +14,15 @@ import json
 from pathlib import Path
 
 import numpy as np
-import torch
-import webdataset
-from torch.utils.data import DataLoader, Dataset
 
 from ripple_sim import load_batch
 
 
-class Scenes(Dataset):
-    """One scene at a time: frames [frames, height, width, 3], heights [frames, C, n, n], impulse [frames] in N s."""
+class Scenes:
+    """One scene at a time: frames [frames, height, width, 3], heights [frames, C, n, n], impulse [frames] in N s.
+
+    A `DataLoader` takes whatever has these three methods, and makes tensors of the arrays.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.batch = load_batch(folder)
@@ -30,13 +30,13 @@ class Scenes(Dataset):
     def __len__(self) -> int:
         return len(self.batch)
 
-    def __getitem__(self, number: int) -> dict[str, torch.Tensor]:
+    def __getitem__(self, number: int) -> dict[str, np.ndarray]:
         scene = self.batch[number]
         frames = np.stack(list(scene.frames()))
         impulses = scene.impulses()
         each = np.bincount(impulses["frame"], impulses["impulse"], minlength=len(frames))
         heights = next(iter(scene.heights().values()))
-        return {name: torch.from_numpy(a) for name, a in (("frames", frames), ("heights", heights), ("impulse", each))}
+        return {"frames": frames, "heights": heights, "impulse": each}
 
 
 def label(sample: dict[str, bytes]) -> tuple[int, float, int]:
@@ -46,6 +46,9 @@ def label(sample: dict[str, bytes]) -> tuple[int, float, int]:
 
 
 def main() -> None:
+    import webdataset
+    from torch.utils.data import DataLoader
+
     parser = argparse.ArgumentParser(description="Reads a batch with PyTorch.")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--workers", type=int, default=2)

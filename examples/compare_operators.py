@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from ripple_sim.bench.accuracy import arrivals, sphere_modes
-from ripple_sim.bench.arrival import plane_arrival
+from ripple_sim.bench.accuracy import sphere_modes
+from ripple_sim.bench.arrival_table import arrivals
+from ripple_sim.bench.plane_wave import plane_arrival
 from ripple_sim.solver import WaveSolver, sphere_atlas
 from ripple_sim.solver.operator.assembly import OPERATORS
 
@@ -59,7 +60,7 @@ def view(operator: str) -> Image.Image:
 
 
 def main() -> None:
-    modes, times = sphere_modes((16, 32, 64)), arrivals({}, sources=1)["limbed"]
+    modes, times = sphere_modes((16, 32, 64)), arrivals({}, RESOLUTION, sources=1)["limbed"]
     picture = Image.new("RGB", (SIZE * len(OPERATORS), SIZE + CAPTION), "white")
     draw = ImageDraw.Draw(picture)
     print("               mode of the sphere, relative error       wave front on a body with limbs, late or early by")

@@ -6,10 +6,7 @@ mocap bodies, and the ripples, to press on surfaces.
 
 import numpy as np
 
-from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.simulation import Simulation
-from ripple_sim.video.options import VideoOptions
-from ripple_sim.video.render_video import render_video
+from ripple_sim import Simulation, VideoOptions, load_scene, render_video
 
 FORCE = 12.0  # N
 TURNS = 0.4  # 1/s
@@ -24,6 +21,10 @@ def stir(simulation: Simulation) -> None:
     simulation.ripples.poke("sphere", point, FORCE * timestep, radius=0.04)
 
 
-if __name__ == "__main__":
-    summary = render_video(load_scene("sphere"), "out/step_hook.mp4", VideoOptions(duration=3.0), on_step=stir)
+def main(duration: float = 3.0) -> None:
+    summary = render_video(load_scene("sphere"), "out/step_hook.mp4", VideoOptions(duration=duration), on_step=stir)
     print(f"{summary.frames} frames in {summary.output}")
+
+
+if __name__ == "__main__":
+    main()

@@ -14,9 +14,9 @@ import argparse
 import heapq
 import time
 from pathlib import Path
+from statistics import fmean
 
 import numpy as np
-from distributed import LocalCluster
 from numpy.typing import NDArray
 
 from ripple_sim import load_batch
@@ -30,6 +30,8 @@ FIRST = 60.0  # of the first scene on a machine, which the others wait for: the 
 
 def handed_out(count: int = 2000) -> float:
     """Seconds that the scheduler and the program take for a scene, at most, by scenes that take no time."""
+    from distributed import LocalCluster
+
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         executor = DaskExecutor(cluster.scheduler_address)
         row = {"values": {f"key {k}": 0.5 for k in range(20)}}
@@ -63,16 +65,16 @@ def main() -> None:
     parser.add_argument("--cpu", action="store_true", help="take processor times")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    table = load_batch(options.folder).table().to_pandas()
-    table = table[table["status"] == "finished"]
-    measured, frames = table["cpu_seconds" if options.cpu else "seconds"].to_numpy(), int(table["frames"].iloc[0])
+    scenes = [row for row in load_batch(options.folder).table().to_pylist() if row["status"] == "finished"]
+    measured = np.array([row["cpu_seconds" if options.cpu else "seconds"] for row in scenes])
+    frames, size = scenes[0]["frames"], fmean(row["bytes"] for row in scenes)
     measured = measured[measured < 5 * np.median(measured)]  # without the first ones, which compile kernels
     rng = np.random.default_rng(options.seed)
     seconds = rng.choice(measured, SCENES) * FRAMES / frames
     work, books = seconds.sum(), handed_out()
     print(f"measured: {len(measured)} scenes of {frames} frames, median {np.median(measured):.2f} s a scene and worker")
     print(f"a scene takes the scheduler and the program {1000 * books:.2f} ms")
-    print(f"{SCENES} scenes of {FRAMES} frames, {table['bytes'].mean() * SCENES / 1e9:.1f} GB:")
+    print(f"{SCENES} scenes of {FRAMES} frames, {size * SCENES / 1e9:.1f} GB:")
     for workers in (1, 2, options.workers):
         total = makespan(seconds, workers, books)
         print(f"  {workers} workers: {total / 3600:.2f} h, efficiency {100 * work / workers / total:.0f} %")

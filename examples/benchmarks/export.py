@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ripple_sim import Exporter, load_scene
-from ripple_sim.simulation import Simulation
+from ripple_sim import Exporter, Simulation, load_scene
 
 RESOLUTION, TRIANGLES, WARM_UP = 144, 200_000, 25
 

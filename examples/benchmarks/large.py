@@ -9,7 +9,6 @@ the most that was resident so far (ru_maxrss).
 
 import argparse
 import multiprocessing
-import os
 import resource
 import tempfile
 import time
@@ -20,20 +19,16 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from ripple_sim import Simulation, load_scene, make_collidable
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
-from ripple_sim.coupling.colliders.collidable import make_collidable
 from ripple_sim.scene.camera import CameraEntry
 from ripple_sim.scene.drop import drop_scene
-from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.material_entry import MaterialEntry
 from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import RippleEntry
 from ripple_sim.scenes.shapes import duck
-from ripple_sim.simulation import Simulation
 from ripple_sim.solver import build_atlas, load_mesh
-
-os.environ.setdefault("MUJOCO_GL", "disable")
 
 TRIANGLES, RESOLUTION, TARGETS, BODIES = 1_000_000, 1024, 100, 500
 SIZE, STEPS = (1280, 720), 10

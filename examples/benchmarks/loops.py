@@ -18,8 +18,6 @@ import numpy as np
 
 from ripple_sim import Material, Ripples, RippleWarning
 
-os.environ.setdefault("MUJOCO_GL", "disable")
-
 STEPS, AT_ONCE = 100, 5
 MASS, GRAVITY = 0.3, 9.81
 MODEL = f"""<mujoco><option timestep="0.002"/><worldbody>
@@ -121,10 +119,13 @@ def dm_control_loop() -> tuple[str, float, mujoco.MjData]:
 
 
 def main() -> None:
-    rows = list(own_loops())
-    for package, loop in (("gymnasium", gymnasium_loop), ("dm_control", dm_control_loop)):
-        if importlib.util.find_spec(package) is not None:
-            rows.append(loop())
+    os.environ.setdefault("MUJOCO_GL", "disable")  # read by dm_control and gymnasium, which have nothing to draw
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RippleWarning)
+        rows = list(own_loops())
+        for package, loop in (("gymnasium", gymnasium_loop), ("dm_control", dm_control_loop)):
+            if importlib.util.find_spec(package) is not None:
+                rows.append(loop())
     print("| loop | impulses over gain of momentum |\n| --- | --- |")
     for name, total, data in rows:
         gained = MASS * (data.qvel[2] + GRAVITY * data.time)
@@ -132,6 +133,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RippleWarning)
-        main()
+    main()

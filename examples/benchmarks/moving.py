@@ -14,9 +14,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from ripple_sim import Camera, Material, RippleRenderer, Ripples, load_scene
+from ripple_sim import Camera, Material, RippleRenderer, Ripples, Simulation, load_scene
 from ripple_sim.coupling.load.high_pass import coarse_motions
-from ripple_sim.simulation import Simulation
 from ripple_sim.solver import WaveSolver, build_atlas, sphere_atlas
 from ripple_sim.solver.operator.moving import MovingOperator
 from ripple_sim.solver.texels.moved_stencil import MovedPlaces

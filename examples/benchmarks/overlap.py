@@ -15,15 +15,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-os.environ.setdefault("MUJOCO_GL", "disable")
-
+from ripple_sim import Simulation, VideoOptions, load_scene, render_video
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.encode import open_writer
-from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.simulation import Simulation
-from ripple_sim.video.options import VideoOptions
-from ripple_sim.video.render_video import render_video
 
 Result = TypeVar("Result")
 FPS = 60

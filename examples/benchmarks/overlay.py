@@ -6,22 +6,17 @@ The simulation is not counted, but for what the overlays ask of it (energy, cont
 """
 
 import argparse
-import os
 import time
 from collections.abc import Callable
 from itertools import islice
 
-os.environ.setdefault("MUJOCO_GL", "disable")
-
 import numpy as np
 
+from ripple_sim import Simulation, VideoOptions, load_scene
 from ripple_sim.overlay.notes import Notebook
-from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.overlays import parse_request
-from ripple_sim.simulation import Simulation
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.video.film import Film
-from ripple_sim.video.options import VideoOptions
 
 KINDS = ([], ["height"], ["grid"], ["contacts"], ["time"], ["energy"], ["height", "contacts", "grid", "time", "energy"])
 RATE, START = 30, 1.0

@@ -8,7 +8,7 @@ from pathlib import Path
 from page import Part
 from stills import strip
 
-from ripple_sim.scene.load_scene import load_scene
+from ripple_sim import load_scene
 
 
 def make(folder: Path) -> Part:

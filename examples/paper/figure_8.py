@@ -12,7 +12,7 @@ from page import Part
 from PIL import Image
 from stills import strip
 
-from ripple_sim.scene.load_scene import load_scene
+from ripple_sim import load_scene
 from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import MapEntry, MaterialEntry
 

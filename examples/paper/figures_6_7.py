@@ -11,14 +11,14 @@ import msgspec
 from page import Part
 from stills import strip
 
-from ripple_sim.bench.accuracy import arrivals
+from ripple_sim.bench.arrival_table import arrivals
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.events import Events, PokeEntry
 from ripple_sim.scenes.shapes import LIMBED_FILE
 from ripple_sim.solver import Material, build_atlas, load_mesh
 from ripple_sim.solver.operator.assembly import build_operator
 
-TIMES, SIZE = [0.25, 0.5], (1000, 420)
+TIMES, SIZE, RESOLUTION = [0.25, 0.5], (1000, 420), 96
 BASELINES = {"uncorrected": "figure_6", "paper": "figure_7"}
 
 
@@ -35,9 +35,9 @@ def make(folder: Path) -> Part:
     for baseline, name in BASELINES.items():
         file = strip(scene, TIMES, folder / f"{name}.png", SIZE, compare=baseline, overlay=["height"], columns=1)
         pictures.append((file, f"Ours and {baseline}, {' and '.join(f'{t:g} s' for t in TIMES)} after a poke."))
-    errors = arrivals({}, sources=2)["limbed"]
+    errors = arrivals({}, RESOLUTION, sources=2)["limbed"]
     rows = [["operator", "arrival of the front: median error", "90 %", "under 3 %", "set-up"]]
-    atlas = build_atlas(load_mesh(LIMBED_FILE), 96)
+    atlas = build_atlas(load_mesh(LIMBED_FILE), RESOLUTION)
     for operator in ("fem", *BASELINES):
         start = time.perf_counter()
         build_operator(atlas, Material(), operator)

@@ -7,9 +7,8 @@ from typing import Any
 
 from PIL import Image
 
+from ripple_sim import VideoOptions, render_video
 from ripple_sim.scene.scene import Scene
-from ripple_sim.video.options import VideoOptions
-from ripple_sim.video.render_video import render_video
 
 RATE = 20  # frames a second, the grid of times to choose from
 

@@ -43,7 +43,7 @@ class Batch(Sequence):
         return iter(self._scenes)
 
     def table(self) -> Any:
-        """The Parquet index as a table of pyarrow; `.to_pandas()` makes a data frame of it."""
+        """The Parquet index as a table of pyarrow; where pandas is installed, its `to_pandas` makes a data frame."""
         return parquet().read_table(BatchFolder(self.path).index)
 
 

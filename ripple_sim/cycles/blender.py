@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.resources
 import importlib.util
 import json
@@ -18,7 +19,12 @@ from numpy.typing import NDArray
 from ripple_sim.errors import VideoError
 
 PYTHON = "RIPPLE_SIM_BPY_PYTHON"
+OLDEST = (5, 0)  # bpy before it has other names for what the importer of USD is told
 _LAST = 300  # characters of what a process said last
+_ADVICE = (
+    "on Python 3.13 install it with: pip install 'ripple-sim[cycles]'; otherwise give it an environment of its own "
+    f"(python3.11 -m venv blender; blender/bin/pip install 'bpy>=5.0') and set {PYTHON}=blender/bin/python"
+)
 
 
 def python_with_bpy() -> str:
@@ -27,20 +33,32 @@ def python_with_bpy() -> str:
     Raises
     ------
     VideoError
-        If there is none.
+        If there is none, its bpy is too old, or cannot be imported.
     """
     named = os.environ.get(PYTHON)
     if named:
         if not os.access(named, os.X_OK):
             raise VideoError(f"{PYTHON} is {named!r}, which cannot be run; name a Python that has bpy")
-        return named
-    if importlib.util.find_spec("bpy") is None:
-        raise VideoError(
-            "the renderer cycles needs bpy, which is not installed; install it with: pip install 'ripple-sim[cycles]'. "
-            f"bpy has wheels for few versions of Python: where there is none for this one, {PYTHON} may name another "
-            "Python that has it"
-        )
-    return sys.executable
+    elif importlib.util.find_spec("bpy") is None:
+        raise VideoError(f"the renderer cycles needs bpy, which is not installed; {_ADVICE}")
+    python = named or sys.executable
+    version = _version_of_bpy(python)
+    if version < OLDEST:
+        found, oldest = (".".join(map(str, each)) for each in (version, OLDEST))
+        raise VideoError(f"{python} has bpy {found}; valid is {oldest} or later: {_ADVICE}")
+    return python
+
+
+@functools.cache  # asking takes most of a second
+def _version_of_bpy(python: str) -> tuple[int, ...]:
+    code = "import bpy; print(*bpy.app.version)"
+    asked = subprocess.run([python, "-c", code], capture_output=True, text=True, errors="replace", check=False)
+    last = (asked.stdout if asked.returncode == 0 else asked.stderr).strip().splitlines()[-1:]
+    try:
+        return tuple(map(int, last[0].split()))
+    except (IndexError, ValueError):
+        reason = "".join(last)[:_LAST] or f"status {asked.returncode}"
+        raise VideoError(f"{python} cannot import bpy: {reason}; {_ADVICE}") from None
 
 
 def frames_of_cycles(python: str, settings: dict[str, Any], folder: Path) -> Iterator[NDArray[np.float32]]:

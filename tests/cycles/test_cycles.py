@@ -4,13 +4,14 @@ A small program stands in for Blender, which few machines that run the tests hav
 """
 
 import json
-import shutil
 import sys
+import tomllib
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+from packaging.requirements import Requirement
 from PIL import Image
 
 from ripple_sim import VideoOptions, load_scene
@@ -31,6 +32,8 @@ MODEL = """<mujoco><worldbody><light pos="1 0 2" dir="-1 0 -2" diffuse="1 1 1"/>
 # makes frames of its settings: as bright as their numbers, of the size that is asked for
 STAND_IN = """#!{python}
 import json, sys, tempfile
+if sys.argv[1] == "-c":  # which bpy?
+    sys.exit(print({version!r}))
 from pathlib import Path
 import numpy as np
 settings = json.loads(Path(sys.argv[2]).read_text())
@@ -57,9 +60,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, fails: int = -1) -> None:
+def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, fails: int = -1, version: str = "5 0 1") -> None:
     program = folder / "blender"
-    program.write_text(STAND_IN.format(python=sys.executable, told=str(folder / "told.json"), fails=fails))
+    told = str(folder / "told.json")
+    program.write_text(STAND_IN.format(python=sys.executable, told=told, fails=fails, version=version))
     program.chmod(0o755)
     monkeypatch.setenv(PYTHON, str(program))
 
@@ -100,7 +104,7 @@ def test_what_mujoco_says_of_the_first_frame_is_ours(folder: Path, monkeypatch: 
     )
     scene = load_scene(folder / "scene.toml")
     mujoco.set_mju_user_warning(None)
-    monkeypatch.setenv(PYTHON, shutil.which("false") or "")
+    stand_in(folder, monkeypatch, fails=0)
     monkeypatch.chdir(folder)
     with pytest.warns(RippleWarning, match="MuJoCo: Too many contacts"), pytest.raises(VideoError, match="frame 0"):
         render_cycles(scene, folder / "frames", VideoOptions(size=(64, 36), fps=20, duration=0.05))
@@ -141,6 +145,32 @@ def test_a_python_that_cannot_be_run_is_named(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setenv(PYTHON, str(tmp_path / "none"))
     with pytest.raises(VideoError, match="cannot be run"):
         check_cycles(VideoOptions(), tmp_path / "a.mp4")
+
+
+def test_a_bpy_that_is_too_old_is_refused_before_anything_is_simulated(tmp_path, monkeypatch) -> None:
+    stand_in(tmp_path, monkeypatch, version="4 4 0")
+    with pytest.raises(VideoError, match=r"has bpy 4\.4\.0; valid is 5\.0 or later: .*'bpy>=5\.0'") as refusal:
+        check_cycles(VideoOptions(), tmp_path / "a.mp4")
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_bpy_that_cannot_be_imported_is_told_with_its_reason(tmp_path: Path, monkeypatch) -> None:
+    program = tmp_path / "python"
+    program.write_text(f"#!{sys.executable}\nraise ImportError('libSM.so.6: no such file')\n")
+    program.chmod(0o755)
+    monkeypatch.setenv(PYTHON, str(program))
+    with pytest.raises(VideoError, match=r"cannot import bpy: ImportError: libSM\.so\.6"):
+        check_cycles(VideoOptions(), tmp_path / "a.mp4")
+
+
+@pytest.mark.parametrize("python", ["3.11", "3.12", "3.13", "3.14"])
+def test_the_extra_names_bpy_only_where_it_goes_with_our_numpy(python: str) -> None:
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    needs = [Requirement(each) for each in project["optional-dependencies"]["cycles"]]
+    asked = {each.name: each for each in needs if not each.marker or each.marker.evaluate({"python_version": python})}
+    assert "usd-core" in asked
+    assert ("bpy" in asked) == (python == "3.13")  # those for 3.11 from 5.0 on ask for numpy < 2, others do not exist
+    assert all(not each.specifier.contains("4.5.15") for name, each in asked.items() if name == "bpy")
 
 
 def test_tone_mapping_is_the_shaders(opengl: None) -> None:

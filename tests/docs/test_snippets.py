@@ -32,7 +32,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 SMALL = {"--size": "64x48", "--duration": "0.1", "--resolution": "16", "--fps": "10"}
 CLIPS = ("render", "drop", "export")  # commands that take a size
 WINDOWS = ("view", "bench")  # commands that would stay open
-OTHERS = ("ssh",)  # programs that are not ours
+OTHERS = ("ssh", "python3.11", "export")  # programs that are not ours
 
 # What the pages call a model of one's own: the geoms of their examples.
 MODEL = """<mujoco><worldbody>
@@ -141,7 +141,7 @@ class Reader:
         program, *rest = words
         if program == "make":
             assert re.search(rf"^{rest[0]}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
-        elif program == "pip":
+        elif Path(program).name == "pip":
             extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
             assert set(re.findall(r"\[(\w+)\]", rest[-1])) <= set(extras)
         elif Path(program).name == "python":
