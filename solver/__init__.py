@@ -9,18 +9,18 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .atlas.build import build_atlas
-    from .atlas.load import load_atlas
-    from .cube_map.sphere_atlas import SphereAtlas, sphere_atlas
     from .errors import AtlasError, GLError, MeshError, RippleError, SolverError, SphereMapError
+    from .layouts.build import build_atlas
+    from .layouts.cube.atlas import SphereAtlas, sphere_atlas
+    from .layouts.load import load_atlas
+    from .mesh.files import load_mesh
     from .mesh.mesh import Mesh
-    from .mesh.mesh_file import load_mesh
     from .mesh.volume import Volume
     from .mesh.volume_file import load_volume
     from .mesh.wrap import Wrap, wrap
     from .operator.absorbing import absorbing_damping
-    from .operator.holding import hold
     from .operator.material import Material
+    from .operator.regions import hold
     from .texels.atlas import Atlas
     from .texels.glue import glue
     from .texels.maps import texture_map, vertex_map
@@ -45,7 +45,7 @@ _HOME = {
     "HeightMap": "waves.height_map",
     "RippleError": "errors",
     "SolverError": "errors",
-    "SphereAtlas": "cube_map.sphere_atlas",
+    "SphereAtlas": "layouts.cube.atlas",
     "SphereMapError": "errors",
     "TexelMesh": "texels.texel_mesh",
     "TexelTopology": "texels.topology",
@@ -53,13 +53,13 @@ _HOME = {
     "WaveSolver": "waves.wave_solver",
     "Wrap": "mesh.wrap",
     "absorbing_damping": "operator.absorbing",
-    "build_atlas": "atlas.build",
+    "build_atlas": "layouts.build",
     "glue": "texels.glue",
-    "hold": "operator.holding",
-    "load_atlas": "atlas.load",
-    "load_mesh": "mesh.mesh_file",
+    "hold": "operator.regions",
+    "load_atlas": "layouts.load",
+    "load_mesh": "mesh.files",
     "load_volume": "mesh.volume_file",
-    "sphere_atlas": "cube_map.sphere_atlas",
+    "sphere_atlas": "layouts.cube.atlas",
     "texel_atlas": "texels.texel_atlas",
     "texture_map": "texels.maps",
     "thickness_map": "texels.thickness_map",

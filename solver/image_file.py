@@ -12,7 +12,7 @@ from PIL import Image
 
 from .checked import shown
 from .errors import RippleError
-from .memory import require_memory
+from .files import require_memory
 
 # Of a pixel while an image is decoded, converted and uploaded [bytes].
 _PIXEL = 12

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from ripple_sim.solver import Material, Mesh, build_atlas
-from ripple_sim.solver.atlas.build import atlas_from_sphere_map
 from ripple_sim.solver.backends.backend import make_backend
+from ripple_sim.solver.layouts.build import atlas_from_sphere_map
 from ripple_sim.solver.operator.assembly import build_operator
 
 RESOLUTIONS = (20, 28, 40, 56, 128, 256, 512)

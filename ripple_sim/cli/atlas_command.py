@@ -87,7 +87,7 @@ class Atlas:
     def _check(self) -> None:
         """Refuse, before anything that takes time, what cannot be written or makes no sense."""
         from ripple_sim.solver import AtlasError
-        from ripple_sim.solver.mesh.mesh_file import check_mesh_file
+        from ripple_sim.solver.mesh.files import check_mesh_file
         from ripple_sim.solver.texels.atlas_file import check_atlas_place
 
         check_mesh_file(self.mesh)

@@ -17,8 +17,8 @@ Report = Callable[[int, int], None]
 
 # What the kernels of a package do, in a user's words; the longest name that fits counts.
 _STAGES = {
-    "ripple_sim.solver.sphere_map": "the sphere map",
-    "ripple_sim.solver.patch_map": "the charts",
+    "ripple_sim.solver.layouts.sphere_map": "the sphere map",
+    "ripple_sim.solver.layouts.patches": "the charts",
     "ripple_sim.solver": "the atlas",
     "ripple_sim.solver.operator": "the wave operator",
     "ripple_sim.solver.backends": "the wave step",

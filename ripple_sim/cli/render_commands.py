@@ -131,7 +131,7 @@ class Drop(_VideoCommand):
 
     def check_input(self) -> None:
         """Make sure that there is such a file."""
-        from ripple_sim.solver.mesh.mesh_file import check_mesh_file
+        from ripple_sim.solver.mesh.files import check_mesh_file
 
         check_mesh_file(self.mesh)
 

@@ -20,17 +20,17 @@ from ripple_sim.coupling.load.high_pass import HighPass
 from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
 from ripple_sim.coupling.model.coupled_model import CoupledModel
 from ripple_sim.coupling.model.geoms import ByGeom, GeomKey, target_name
+from ripple_sim.coupling.stepping.clock import StepClock, missed_warning
+from ripple_sim.coupling.stepping.divergence import divergence_warning, goes_on_broken
+from ripple_sim.coupling.stepping.followed import followed
+from ripple_sim.coupling.stepping.physics_messages import adopt_warnings, physics_errors
+from ripple_sim.coupling.stepping.solved import UNSOLVED_WARNING, SolvedForces
 from ripple_sim.coupling.two_way.push_back import PushBack
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Load, Material
 from ripple_sim.solver.checked import checked, whole
 
 from .arguments import for_each, integrator_warning, own_data, own_model
-from .stepping.clock import StepClock, missed_warning
-from .stepping.divergence import divergence_warning, goes_on_broken
-from .stepping.followed import followed
-from .stepping.physics_messages import adopt_warnings, physics_errors
-from .stepping.solved import UNSOLVED_WARNING, SolvedForces
 from .targets import Targets
 
 __all__ = ["Impulse", "Ripples"]

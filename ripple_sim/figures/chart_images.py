@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.cube_map.convention import cube_chart_points
+from ripple_sim.solver.layouts.cube.convention import cube_chart_points
 
 from .atlas_painter import AtlasPainter
 from .view import OVERSAMPLING, View, antialiased, lit, screen

@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.model.soft_ids import target_pose
+from ripple_sim.render.surfaces.height_maps import AnyHeightMap, HeightMapTextures
+from ripple_sim.render.surfaces.surface import Surface
+from ripple_sim.render.surfaces.surface_mesh import SurfaceMesh
+from ripple_sim.render.visuals.assets import Assets
+from ripple_sim.render.visuals.geom_visuals import GeomVisuals
+from ripple_sim.render.visuals.visual import ball_of
 from ripple_sim.solver.errors import RippleError
 
 from .bounds import Balls, join
 from .camera import Pose
-from .surfaces.height_maps import AnyHeightMap, HeightMapTextures
-from .surfaces.surface import Surface
-from .surfaces.surface_mesh import SurfaceMesh
-from .visuals.assets import Assets
-from .visuals.geom_visuals import GeomVisuals
-from .visuals.visual import ball_of
 
 
 class Layer(NamedTuple):

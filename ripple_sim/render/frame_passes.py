@@ -7,22 +7,23 @@ from typing import Any
 
 import moderngl
 
+from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
+from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.passes.deferred import DeferredShading
+from ripple_sim.render.passes.floor import Floor
+from ripple_sim.render.passes.floor_occlusion import FloorOcclusion
+from ripple_sim.render.passes.mirror import Mirror
+from ripple_sim.render.passes.screen_bounds import boxes_of
+from ripple_sim.render.passes.shadow import ShadowMaps
+from ripple_sim.render.passes.surface_buffers import SurfaceBuffers, SurfaceImage
+from ripple_sim.render.passes.transmission import TransmissionMaps
+from ripple_sim.render.surfaces.height_maps import AnyHeightMap
+
 from .bounds import enclosing, within
 from .camera import Pose
 from .drawn_scene import DrawnScene
 from .frame_format import FrameFormat
-from .gpu.frame_uniforms import FrameUniforms
-from .gpu.resources import Resources
-from .passes.deferred import DeferredShading
-from .passes.floor import Floor
-from .passes.floor_occlusion import FloorOcclusion
-from .passes.mirror import Mirror
-from .passes.screen_bounds import boxes_of
-from .passes.shadow import ShadowMaps
-from .passes.surface_buffers import SurfaceBuffers, SurfaceImage
-from .passes.transmission import TransmissionMaps
 from .scene_light import SceneLight
-from .surfaces.height_maps import AnyHeightMap
 
 _TRANSMISSION_TEXEL = 4  # of the transmission maps, in texels of the shadow maps
 _SHADOW_REACH = 2.5  # casters further than that from the focus, in camera distances, cast no shadow

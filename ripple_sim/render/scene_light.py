@@ -7,15 +7,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.gpu.contract import Unit
+from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
+from ripple_sim.render.passes.floor import Floor
+from ripple_sim.render.visuals.assets import Assets
+from ripple_sim.render.visuals.lights import (
+    Light,
+    Lighting,
+    count_casting_lights,
+    count_lights,
+    has_near_lights,
+    is_lit,
+    model_lighting,
+)
+from ripple_sim.render.visuals.studio import set_lighting, studio_lighting
 from ripple_sim.solver.errors import RippleError
 
 from .camera import Pose
-from .gpu.contract import Unit
-from .gpu.frame_uniforms import FrameUniforms
-from .passes.floor import Floor
-from .visuals.assets import Assets
-from .visuals.lights import Light, Lighting, count_casting_lights, count_lights, has_near_lights, is_lit, model_lighting
-from .visuals.studio import set_lighting, studio_lighting
 
 LIGHTING = ("auto", "model", "studio")
 

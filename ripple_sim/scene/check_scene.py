@@ -11,7 +11,7 @@ from ripple_sim.coupling.arguments import own_model
 from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
 from ripple_sim.coupling.model.geoms import find_target
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.atlas.layouts import LAYOUTS
+from ripple_sim.solver.layouts.layouts import LAYOUTS
 
 from .camera import check_camera
 from .events import Script

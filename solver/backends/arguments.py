@@ -6,7 +6,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Floats32, Ints
+from ..kernel import Floats, Floats32, Ints
 
 Coefficient: TypeAlias = Floats32 | np.float32
 

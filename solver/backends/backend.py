@@ -7,10 +7,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.errors import GLError, SolverError
-from ripple_sim.solver.operator.fluid_operator import FluidOperator
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-
+from ..errors import GLError, SolverError
+from ..operator.fluid_operator import FluidOperator
+from ..operator.wave_operator import WaveOperator
 from .arguments import Amplitude
 from .device_field import DeviceField
 
@@ -78,7 +77,7 @@ def auto_backend(texels: int = _TYPICAL) -> str:
     On a hardware driver the faster one, measured once; a software driver runs on the processor's own cores, where the
     CPU's loops are many times faster.
     """
-    from ripple_sim.solver.gl import shared_context
+    from ..gl import shared_context
 
     try:
         gl = shared_context()

@@ -16,9 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ripple_sim.solver.kernel import kernel
-from ripple_sim.solver.texels.irregular import IrregularLinks
-
+from ..kernel import kernel
+from ..texels.irregular import IrregularLinks
 from .arguments import Drift, Halo, Kick, Loads, State
 from .kernels import drift_row, fill
 from .kicks import kick_drift_row, kick_drift_sides, kick_irregular

@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.operator.step_coefficients import StepCoefficients, number_or_field, step_coefficients
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-
+from ..operator.step_coefficients import StepCoefficients, number_or_field, step_coefficients
+from ..operator.wave_operator import WaveOperator
 from . import blocks, kernels, threads
 from .arguments import (
     NO_FEATURES,

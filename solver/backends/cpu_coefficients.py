@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.operator.step_coefficients import StepCoefficients
-from ripple_sim.solver.operator.volume_rate import volume_rate
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-
+from ..operator.step_coefficients import StepCoefficients
+from ..operator.volume import volume_rate
+from ..operator.wave_operator import WaveOperator
 from .arguments import Amplitude, Balance, Coefficient, PartRuns
 from .cpu_fields import FieldLayout
 

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ripple_sim.solver.texels.irregular import NO_LINKS
-from ripple_sim.solver.texels.stencil import Stencil
-from ripple_sim.solver.texels.topology import TexelTopology
-
+from ..texels.irregular import NO_LINKS
+from ..texels.stencil import Stencil
+from ..texels.topology import TexelTopology
 from .arguments import Halo, Links, Weights
 
 # From this resolution on memory is what takes time, milliseconds a substep: several threads share out the charts, and

@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.gl import GLContext
+from ..gl import GLContext
 
 _GROUP = 256
 _SHADERS = "ripple_sim.solver"

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.operator.fluid_operator import FluidOperator
-from ripple_sim.solver.operator.step_coefficients import damped_step
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-
+from ..operator.fluid_operator import FluidOperator
+from ..operator.step_coefficients import damped_step
+from ..operator.wave_operator import WaveOperator
 from .arguments import Amplitude
 
 

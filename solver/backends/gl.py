@@ -6,11 +6,10 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.gl import GLContext, shared_context
-from ripple_sim.solver.operator.step_coefficients import step_coefficients
-from ripple_sim.solver.operator.volume_rate import volume_rate
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-
+from ..gl import GLContext, shared_context
+from ..operator.step_coefficients import step_coefficients
+from ..operator.volume import volume_rate
+from ..operator.wave_operator import WaveOperator
 from .arguments import Amplitude
 from .device_field import DeviceField
 from .gl_dispatch import Dispatch

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import moderngl
 
-from ripple_sim.solver.gl import GLContext
-
+from ..gl import GLContext
 from .gl_fields import EIGHT, FieldLayout
 
 # Rows that one thread walks up, and threads of a group, in eights of columns and in blocks of rows (block.glsl). A

@@ -8,11 +8,11 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.kernel import Floats, Floats32, Ints, kernel
-from ripple_sim.solver.texels.irregular import NO_LINKS, IrregularLinks
-from ripple_sim.solver.texels.stencil import Stencil
-from ripple_sim.solver.texels.topology import TexelTopology
+from ..gl import GLContext
+from ..kernel import Floats, Floats32, Ints, kernel
+from ..texels.irregular import NO_LINKS, IrregularLinks
+from ..texels.stencil import Stencil
+from ..texels.topology import TexelTopology
 
 # Floats that a thread reads at once. A strip's texels begin at this column, so that their eights are aligned; the halo
 # is left of it.

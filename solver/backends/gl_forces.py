@@ -5,9 +5,8 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-
+from ..gl import GLContext
+from ..operator.wave_operator import WaveOperator
 from .gl_dispatch import Dispatch
 from .gl_fields import FieldLayout, LinkBuffers
 from .gl_stencil import StencilBuffer

@@ -8,10 +8,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.operator.volume_rate import VolumeRate
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-
+from ..gl import GLContext
+from ..operator.volume import VolumeRate
+from ..operator.wave_operator import WaveOperator
 from .arguments import Amplitude
 from .gl_dispatch import Dispatch
 from .gl_fields import FieldLayout

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.texels.moved_stencil import MovedStencil
-from ripple_sim.solver.texels.stencil import Stencil
-
+from ..gl import GLContext
+from ..texels.moved_stencil import MovedStencil
+from ..texels.stencil import Stencil
 from .gl_dispatch import Dispatch
 from .gl_fields import FieldLayout
 from .gl_stiffness import DeviceStiffness

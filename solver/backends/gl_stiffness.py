@@ -6,16 +6,15 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.kernel import Ints
-from ripple_sim.solver.texels.cells import HOURGLASS, LEAST_AREA, SHARE, UNEVEN
-from ripple_sim.solver.texels.irregular import NO_LINKS, IrregularLinks
-from ripple_sim.solver.texels.moved_stencil import MovedStencil
-from ripple_sim.solver.texels.quad_pass import LEAST_RATIO
-from ripple_sim.solver.texels.riding import Ride
-from ripple_sim.solver.texels.stencil import Stencil
-from ripple_sim.solver.texels.topology import TexelTopology
-
+from ..gl import GLContext
+from ..kernel import Ints
+from ..texels.assembly import LEAST_RATIO
+from ..texels.cells import HOURGLASS, LEAST_AREA, SHARE, UNEVEN
+from ..texels.irregular import NO_LINKS, IrregularLinks
+from ..texels.moved_stencil import MovedStencil
+from ..texels.riding import Ride
+from ..texels.stencil import Stencil
+from ..texels.topology import TexelTopology
 from .gl_dispatch import Dispatch
 from .gl_fields import FieldLayout
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats32, kernel
-
+from ..kernel import Floats32, kernel
 from .arguments import (
     Balance,
     Coefficient,

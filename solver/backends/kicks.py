@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats32, kernel
-
+from ..kernel import Floats32, kernel
 from .arguments import Kick, Loads, State
 from .coefficients import cut, row_of, value_in
 from .stencil_loops import Rows, force_at, irregular_force, links_of

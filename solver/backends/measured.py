@@ -12,13 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ripple_sim.solver.atomic_file import atomic_write
-from ripple_sim.solver.cache import cache_limit, cache_path, mark_used
-from ripple_sim.solver.cube_map.convention import cube_topology
-from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-from ripple_sim.solver.texels.stencil import Stencil
-
+from ..atomic_file import atomic_write
+from ..cache import cache_limit, cache_path, mark_used
+from ..gl import GLContext
+from ..layouts.cube.convention import cube_topology
+from ..operator.wave_operator import WaveOperator
+from ..texels.stencil import Stencil
 from .cpu import CPUBackend
 from .gl import GLBackend
 

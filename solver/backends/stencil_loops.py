@@ -11,8 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats32, kernel
-
+from ..kernel import Floats32, kernel
 from .arguments import Coefficient, Links, Weights
 from .coefficients import row_of, value_at, value_in
 

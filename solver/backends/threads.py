@@ -11,8 +11,7 @@ import numba
 import numpy as np
 from numba.extending import intrinsic
 
-from ripple_sim.solver.kernel import Ints, kernel
-
+from ..kernel import Ints, kernel
 from .arguments import Drift, Halo, Kick, Loads, State
 from .blocks import Pace, climb, close, passes
 

@@ -10,8 +10,7 @@ from typing import Any
 
 import moderngl
 
-from ripple_sim.solver.errors import GLError
-
+from ..errors import GLError
 from .drivers import is_software
 from .egl import create_context, current_context, load_egl, release_current
 from .fence import Fences

@@ -9,7 +9,7 @@ from typing import Any
 
 import moderngl
 
-from ripple_sim.solver.errors import GLError
+from ..errors import GLError
 
 # The plain sonames first; the versioned ones are what runtime packages without -dev symlinks install.
 _LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 
-from ripple_sim.solver.errors import GLError
+from ..errors import GLError
 
 _COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
 _FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT

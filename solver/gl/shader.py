@@ -6,7 +6,7 @@ import functools
 import importlib.resources
 from importlib.resources.abc import Traversable
 
-from ripple_sim.solver.errors import GLError
+from ..errors import GLError
 
 
 def load_shader(package: str, name: str, **defines: object) -> str:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
-
+from ..kernel import Bools, Floats, Ints, kernel
 from .topology import sides_of
 
 # A triangle with less than this share of its area at rest counts as crushed.

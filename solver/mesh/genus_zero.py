@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ripple_sim.solver.errors import MeshError
-
+from ..errors import MeshError
 from .counting import counted, place
 from .mesh import Mesh
 

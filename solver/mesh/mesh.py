@@ -8,9 +8,8 @@ import functools
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.errors import MeshError
-
-from .cleaning import cleaned
+from ..errors import MeshError
+from .clean import cleaned
 from .normals import vertex_normals
 from .orientation import part_volumes
 from .topology import distinct, genera, rims_of, sides_of

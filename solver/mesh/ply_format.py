@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.errors import MeshError
-
-from .ply_rows import Element, read_binary, read_text
+from ..errors import MeshError
+from .ply import Element, read_binary, read_text
 from .polygons import Soup, too_small, triangulate
 
 _TYPES = {

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ripple_sim.solver.errors import MeshError
-
+from ..errors import MeshError
 from .counting import counted, place
 from .mesh import Mesh
 from .polygons import Soup

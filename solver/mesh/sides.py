@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .corners import Corners
-from .matching import matched
+from .sheets import matched
 from .topology import undirected
 from .winding import labels, turned
 

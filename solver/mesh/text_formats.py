@@ -13,8 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.errors import MeshError
-
+from ..errors import MeshError
 from .polygons import Soup, too_small, triangulate
 
 _CORNER = re.compile(r"(-?\d{1,15})(?:/(-?\d{1,15})?(?:/(?:-?\d+)?)?)?", flags=re.ASCII)

@@ -7,9 +7,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.checked import is_finite, shown
-from ripple_sim.solver.errors import MeshError
-
+from ..checked import is_finite, shown
+from ..errors import MeshError
 from .isosurface import zero_surface
 
 

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.checked import PATH, checked
-from ripple_sim.solver.errors import MeshError
-
+from ..checked import PATH, checked
+from ..errors import MeshError
 from .volume import Volume
 
 VOLUME_ENDINGS = (".npy", ".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".dcm")

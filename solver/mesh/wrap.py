@@ -12,8 +12,7 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.errors import MeshError
-
+from ..errors import MeshError
 from .counting import counted
 from .distance_grid import distance_grid, filled
 from .isosurface import zero_surface

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.texels.distance import depth_in_region
+from ..errors import SolverError
+from ..texels.atlas import Atlas
+from ..texels.distance import depth_in_region
 
 
 def absorbing_damping(

@@ -7,13 +7,12 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.texels.links import EAST, LINK_ENDS, NORTH, link_lengths, mean_of_copies
-from ripple_sim.solver.texels.softening import softening
-from ripple_sim.solver.texels.stencil import Stencil
-from ripple_sim.solver.texels.texel_mesh import TexelMesh
-
+from ..errors import SolverError
+from ..texels.atlas import Atlas
+from ..texels.links import EAST, LINK_ENDS, NORTH, link_lengths, mean_of_copies
+from ..texels.softening import softening
+from ..texels.stencil import Stencil
+from ..texels.texel_mesh import TexelMesh
 from .coefficients import LIMITS
 from .fluid_operator import over_fluid
 from .material import Material

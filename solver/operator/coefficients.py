@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.checked import POSITIVE, shown
-from ripple_sim.solver.errors import SolverError
+from ..checked import POSITIVE, shown
+from ..errors import SolverError
 
 # name: unit, least value, whether the least value itself is excluded, whether infinity is allowed
 LIMITS = {

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
-from ripple_sim.solver.texels.links import EAST, NORTH, link_exists
-from ripple_sim.solver.texels.stencil import Stencil
-from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
-from ripple_sim.solver.texels.topology import TexelTopology
+from ..texels.links import EAST, NORTH, link_exists
+from ..texels.stencil import Stencil
+from ..texels.stiffness_matrix import stiffness_matrix
+from ..texels.topology import TexelTopology
 
 
 class Ties(NamedTuple):

@@ -8,11 +8,10 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.texels.spectrum import largest_eigenvalue
-from ripple_sim.solver.texels.stencil import Stencil
-
-from .half_laplacian import HalfLaplacian
+from ..errors import SolverError
+from ..texels.spectrum import largest_eigenvalue
+from ..texels.stencil import Stencil
+from .deep_water import HalfLaplacian
 from .wave_operator import SAFETY, WaveOperator
 
 

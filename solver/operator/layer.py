@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.checked import POSITIVE, is_finite, shown
-from ripple_sim.solver.errors import SolverError
-
+from ..checked import POSITIVE, is_finite, shown
+from ..errors import SolverError
 from .coefficients import require_positive
 
 # omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2 is the even fit, for 1.3 <= q d <= 8, to the lowest normal mode of an

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Self
 
-from ripple_sim.solver.errors import SolverError
-
+from ..errors import SolverError
 from .material_laws import MaterialLaws
 from .presets import preset_named
 from .suited import suited_coefficients

@@ -6,9 +6,8 @@ from typing import Self
 
 from numpy.typing import ArrayLike
 
-from ripple_sim.solver.checked import is_finite, shown
-from ripple_sim.solver.errors import SolverError
-
+from ..checked import is_finite, shown
+from ..errors import SolverError
 from .coefficients import require_positive
 from .layer import layer_coefficients, layer_wavelengths
 from .material_fields import MaterialFields

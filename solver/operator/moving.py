@@ -7,13 +7,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.texels.moved_stencil import MovedPlaces, MovedStencil
-from ripple_sim.solver.texels.moving_cells import MovingCells
-from ripple_sim.solver.texels.softening import softening
-from ripple_sim.solver.texels.stencil import Stencil
-
+from ..errors import SolverError
+from ..texels.atlas import Atlas
+from ..texels.moved_stencil import MovedPlaces, MovedStencil
+from ..texels.moving import MovingCells
+from ..texels.softening import softening
+from ..texels.stencil import Stencil
 from .assembly import texel_fields
 from .fluid_operator import FluidOperator
 from .material import Material

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from ripple_sim.solver.checked import shown
-from ripple_sim.solver.errors import SolverError
+from ..checked import shown
+from ..errors import SolverError
 
 _GELATINE = (
     "Nguyen et al. 2014, Ultrasound in Medicine and Biology 40, 168 (shear wave elastography, Voigt model; "

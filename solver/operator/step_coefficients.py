@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.errors import SolverError
-
+from ..errors import SolverError
 from .wave_operator import WaveOperator
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ripple_sim.solver.errors import SolverError
-
+from ..errors import SolverError
 from .coefficients import require_positive
 from .response import density_for, stiffness_under
 

@@ -9,10 +9,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.texels.spectrum import largest_eigenvalue
-from ripple_sim.solver.texels.stencil import Stencil
-from ripple_sim.solver.texels.topology import TexelTopology
-
+from ..texels.spectrum import largest_eigenvalue
+from ..texels.stencil import Stencil
+from ..texels.topology import TexelTopology
 from .components import Ties, floating_parts
 
 # Share of the theoretical stability limit that is used: round-off in float32 must not cross it.

@@ -6,9 +6,8 @@ import warnings
 
 import numpy as np
 
-from ripple_sim.solver.errors import RippleWarning
-from ripple_sim.solver.texels.atlas import Atlas
-
+from ..errors import RippleWarning
+from ..texels.atlas import Atlas
 from .material import Material
 
 # A wave of fewer texels is slower than it should be by more than a twentieth.

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.checked import PATH, checked, shown
-from ripple_sim.solver.errors import AtlasError
-from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.mesh.triangle_tree import TriangleTree, closest_points, triangle_tree
-
+from ..checked import PATH, checked, shown
+from ..errors import AtlasError
+from ..mesh.closest import TriangleTree, closest_points, triangle_tree
+from ..mesh.mesh import Mesh
 from .atlas_file import check_atlas_place, write_atlas_file
 from .chart_map import ChartMap, TextureCoordinates, texture_coordinates
 from .nearest import MeshPlaces, nearest_places

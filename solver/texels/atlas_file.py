@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.atomic_file import atomic_write, final_path
-from ripple_sim.solver.errors import AtlasError
-
+from ..atomic_file import atomic_write, final_path
+from ..errors import AtlasError
 from .array_file import read_arrays, write_arrays
 
 # Raise it when a layout's map or the file's contents change: older files are rebuilt.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, kernel
+from ..kernel import Floats, kernel
 
 
 def barycentrics_in(corners: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ripple_sim.solver.kernel import shared
-
+from ..kernel import shared
 from .vectors import Numbers, Points, between, cross_length, dot, or_one
 
 # Stiffness of a square against the hourglass. At 1 waves lag along its sides as much as they lead along its diagonals,

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.mesh.mesh import Mesh
-
+from ..mesh.mesh import Mesh
 from .topology import TexelTopology
 
 

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
-
+from ..kernel import Floats, Ints, kernel
 from .cells import quad, quad_area, strip, triangle
 from .polygon_cell import polygon
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.errors import AtlasError
-
+from ..errors import AtlasError
 from .corners import close_corners
 from .topology import TexelTopology
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ..kernel import Floats, Ints, kernel
 
 
 class IrregularLinks(NamedTuple):

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, Ints, variant
-from ripple_sim.solver.mesh.mesh import Mesh
-
+from ..kernel import Floats, Ints, variant
+from ..mesh.mesh import Mesh
 from .barycentrics import barycentrics_at, barycentrics_in
 from .chart_map import ChartPieces, LinearParts
 from .nearest import texel_on

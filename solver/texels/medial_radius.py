@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ripple_sim.solver.kept import kept_with
-
+from ..kept import kept_with
 from .atlas import Atlas
 from .smoothing import smoothed
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .irregular import IrregularLinks
-from .moving_cells import CellCoefficient, MovingCells
+from .moving import CellCoefficient, MovingCells
 from .riding import SurfaceRide
 from .stencil import Stencil
 

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel, variant
-from ripple_sim.solver.mesh.triangle_tree import TriangleTree, closest_point
+from ..kernel import Floats, Ints, kernel, variant
+from ..mesh.closest import TriangleTree, closest_point
 
 
 class MeshPlaces(NamedTuple):

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.mesh.mesh import Mesh
-
+from ..mesh.mesh import Mesh
 from .chart_map import ChartMap
 
 _BITS = 34  # of coordinates in which copies of a point agree

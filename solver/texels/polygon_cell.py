@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, kernel
-
+from ..kernel import Floats, kernel
 from .cells import triangle
 from .vectors import Points, between, dot
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ripple_sim.solver.mesh.mesh import Mesh
-
+from ..mesh.mesh import Mesh
 from .links import EAST, NORTH, link_lengths
 from .softening import softening
 from .spectrum import EVEN_RATE, largest_eigenvalue

@@ -12,8 +12,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, Ints
-
+from ..kernel import Floats, Ints
 from .fill_cells import Added, fill_areas, fill_polygons, fill_quads, fill_strips, fill_triangles
 from .links import CrossingLinks
 from .topology import TRIANGLE, TexelTopology

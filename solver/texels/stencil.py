@@ -13,8 +13,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, kernel
-
+from ..kernel import Floats, kernel
 from .irregular import IrregularLinks, gather_links
 from .links import rim_ties
 from .topology import TexelTopology

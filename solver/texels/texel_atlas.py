@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.mesh.mesh import Mesh
-
+from ..mesh.mesh import Mesh
 from .atlas import Atlas
 from .linear_chart_map import LinearChartMap
 from .texel_mesh import TexelMesh

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
-from ripple_sim.solver.checked import shown
-from ripple_sim.solver.errors import AtlasError
-from ripple_sim.solver.kernel import Floats, Ints
-
+from ..checked import shown
+from ..errors import AtlasError
+from ..kernel import Floats, Ints
 from .stencil import Stencil
 from .stiffness import lumped_areas, stiffness_stencil
 from .stiffness_matrix import stiffness_matrix

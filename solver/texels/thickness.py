@@ -7,8 +7,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from ripple_sim.solver.mesh.mesh import Mesh
-
+from ..mesh.mesh import Mesh
 from .atlas import Atlas
 from .smoothing import smoothed
 

@@ -11,11 +11,10 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from ripple_sim.solver.checked import Valid, checked, instance
-from ripple_sim.solver.errors import AtlasError, RippleWarning
-from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.mesh.volume import Volume
-
+from ..checked import Valid, checked, instance
+from ..errors import AtlasError, RippleWarning
+from ..mesh.mesh import Mesh
+from ..mesh.volume import Volume
 from .atlas import Atlas
 from .smoothing import smoothed
 

@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ripple_sim.solver.kernel import shared
+from ..kernel import shared
 
 Numbers: TypeAlias = Any  # a float, or an array of them
 Points: TypeAlias = Any  # coordinates [3] of a point, or [3, ...] of many

@@ -9,12 +9,11 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.backends.device_field import DeviceField
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.texels.chart_page import ChartPage
-from ripple_sim.solver.texels.topology import TexelTopology
-
+from ..backends.device_field import DeviceField
+from ..errors import SolverError
+from ..gl import GLContext
+from ..texels.chart_page import ChartPage
+from ..texels.topology import TexelTopology
 from .displacement_limit import FREE, MOST, DisplacementLimit
 
 _GROUP = 256

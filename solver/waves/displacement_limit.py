@@ -7,8 +7,8 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.texels.medial_radius import LEAST, medial_radius
+from ..texels.atlas import Atlas
+from ..texels.medial_radius import LEAST, medial_radius
 
 # Of the medial radius: heights up to the first share are drawn as they are, and none beyond the second.
 FREE, MOST = 0.25, 0.6

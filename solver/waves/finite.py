@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.checked import is_finite, shown
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.texels.atlas import Atlas
+from ..checked import is_finite, shown
+from ..errors import SolverError
+from ..texels.atlas import Atlas
 
 
 def where_not_finite(atlas: Atlas, field: NDArray) -> str | None:

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.texels.atlas import Atlas
-
+from ..errors import SolverError
+from ..texels.atlas import Atlas
 from .finite import where_not_finite
 
 # A look at all heights takes a fifth of a substep: one in so many substeps is less than a hundredth. Nobody sees the

@@ -7,11 +7,10 @@ import dataclasses
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.checked import is_finite, shown
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.texels.atlas import Atlas, check_points
-from ripple_sim.solver.texels.distance import distance_scratch
-
+from ..checked import is_finite, shown
+from ..errors import SolverError
+from ..texels.atlas import Atlas, check_points
+from ..texels.distance import distance_scratch
 from .footprint_weights import weigh
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
-from ripple_sim.solver.texels.distance import distance_to, march_from_point, taken
-from ripple_sim.solver.texels.texel_mesh import TexelGrid
+from ..kernel import Floats, Ints, kernel
+from ..texels.distance import distance_to, march_from_point, taken
+from ..texels.texel_mesh import TexelGrid
 
 # Fewer texels across than this and the source would excite waves that the grid cannot resolve.
 MIN_TEXELS = 2.0

@@ -7,17 +7,16 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.backends.device_field import DeviceField
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.kept import kept_with
-from ripple_sim.solver.kernel import Floats32, kernel
-from ripple_sim.solver.memory import require_memory
-from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.texels.halo import fill_halo
-from ripple_sim.solver.texels.texel_mesh import TexelMesh
-from ripple_sim.solver.texels.topology import TexelTopology
-
+from ..backends.device_field import DeviceField
+from ..errors import SolverError
+from ..files import require_memory
+from ..gl import GLContext
+from ..kept import kept_with
+from ..kernel import Floats32, kernel
+from ..texels.atlas import Atlas
+from ..texels.halo import fill_halo
+from ..texels.texel_mesh import TexelMesh
+from ..texels.topology import TexelTopology
 from .device_height_map import DeviceHeightMap, HeightMapShaders
 from .displacement_limit import DisplacementLimit
 

@@ -8,9 +8,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.backends.backend import Backend
-from ripple_sim.solver.errors import SolverError
-
+from ..backends.backend import Backend
+from ..errors import SolverError
 from .load import Load
 
 Counterpart: TypeAlias = Callable[[NDArray[np.int64], NDArray[np.float64]], "float | NDArray[np.float64]"]

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.kernel import Floats, Ints, kernel
+from ..errors import SolverError
+from ..kernel import Floats, Ints, kernel
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -8,19 +8,19 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.checked import shown
-from ripple_sim.solver.errors import RippleWarning, SolverError
-from ripple_sim.solver.kernel import Floats, Ints, kernel
-from ripple_sim.solver.mesh.folds import Folds
-from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.mesh.triangle_tree import refitted
-from ripple_sim.solver.operator.material import Material
-from ripple_sim.solver.operator.moving import MovingOperator
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.texels.moved_stencil import MovedPlaces
-from ripple_sim.solver.texels.riding import SurfaceRide
-from ripple_sim.solver.texels.texel_mesh import TexelMesh
+from ..checked import shown
+from ..errors import RippleWarning, SolverError
+from ..kernel import Floats, Ints, kernel
+from ..mesh.closest import refitted
+from ..mesh.folds import Folds
+from ..mesh.mesh import Mesh
+from ..operator.material import Material
+from ..operator.moving import MovingOperator
+from ..operator.wave_operator import WaveOperator
+from ..texels.atlas import Atlas
+from ..texels.moved_stencil import MovedPlaces
+from ..texels.riding import SurfaceRide
+from ..texels.texel_mesh import TexelMesh
 
 # The stiffness is made anew once the square of an edge's length has changed by this share since it was made.
 _CHANGED = 2e-3

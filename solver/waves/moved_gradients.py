@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, Floats32, kernel
-from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.texels.halo import fill_halo
-from ripple_sim.solver.texels.riding import SurfaceRide
-
+from ..kernel import Floats, Floats32, kernel
+from ..texels.atlas import Atlas
+from ..texels.halo import fill_halo
+from ..texels.riding import SurfaceRide
 from .height_map import mirror_at_rim
 
 

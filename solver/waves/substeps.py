@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ripple_sim.solver.checked import shown, whole
-from ripple_sim.solver.errors import SolverError
+from ..checked import shown, whole
+from ..errors import SolverError
 
 # A step that needs more is a mistake in a unit, and would run for ever.
 _MOST = 1_000_000

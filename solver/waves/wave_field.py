@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.backends.backend import Backend
-from ripple_sim.solver.backends.device_field import DeviceField
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-from ripple_sim.solver.texels.atlas import Atlas
-
+from ..backends.backend import Backend
+from ..backends.device_field import DeviceField
+from ..operator.wave_operator import WaveOperator
+from ..texels.atlas import Atlas
 from .finite import as_field
 from .finite_guard import FiniteGuard, Source
 from .motion import Motion

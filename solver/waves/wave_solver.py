@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ripple_sim.solver.backends.backend import make_backend
-from ripple_sim.solver.checked import checked, instance
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.memory import require_memory
-from ripple_sim.solver.operator.assembly import build_operator
-from ripple_sim.solver.operator.material import Material
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-from ripple_sim.solver.operator.wavelengths import warn_of_wavelengths
-from ripple_sim.solver.texels.atlas import Atlas
-
+from ..backends.backend import make_backend
+from ..checked import checked, instance
+from ..errors import SolverError
+from ..files import require_memory
+from ..operator.assembly import build_operator
+from ..operator.material import Material
+from ..operator.wave_operator import WaveOperator
+from ..operator.wavelengths import warn_of_wavelengths
+from ..texels.atlas import Atlas
 from .finite import require_finite
 from .finite_guard import Source
 from .load import Load

@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.backends.backend import Backend
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-from ripple_sim.solver.texels.atlas import Atlas
-
+from ..backends.backend import Backend
+from ..operator.volume_balance import VolumeBalance
+from ..operator.wave_operator import WaveOperator
+from ..texels.atlas import Atlas
 from .finite import as_field, require_finite
 from .finite_guard import Source, check_kick
 from .footprint import Footprint, footprint
 from .held_load import HeldLoad
 from .load import Load
-from .volume_balance import VolumeBalance
 from .wave_field import WaveField
 
 

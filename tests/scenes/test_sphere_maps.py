@@ -12,7 +12,7 @@ from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.scene_path import shipped_scenes
 from ripple_sim.scenes.sphere_maps import FOLDER, shipped_sphere_map, sphere_map_path
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.sphere_map import certify
+from ripple_sim.solver.layouts.sphere_map import certify
 
 
 @pytest.fixture(scope="module")

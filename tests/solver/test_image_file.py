@@ -73,10 +73,10 @@ def test_a_decompression_bomb_is_refused_wherever_images_are_read(reader: str, t
 
 
 def test_an_image_that_does_not_fit_into_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from ripple_sim.solver import memory
+    from ripple_sim.solver import files
 
     (tmp_path / "large.png").write_bytes(png(10_000, 10_000))
-    monkeypatch.setattr(memory, "rooms", lambda: iter([memory.Room(5e8, "a small machine")]))
+    monkeypatch.setattr(files, "rooms", lambda: iter([files.Room(5e8, "a small machine")]))
     with pytest.raises(SolverError, match=r"large\.png' of 10000x10000 pixels takes 1\.20 GB .* leaves 0\.50"):
         read_image(SolverError, tmp_path / "large.png", "image", lambda mode: "RGB")
 

@@ -18,7 +18,7 @@ from ripple_sim.solver import (
     build_atlas,
     sphere_atlas,
 )
-from ripple_sim.solver.memory import require_memory, rooms
+from ripple_sim.solver.files import require_memory, rooms
 
 
 @contextlib.contextmanager
@@ -118,10 +118,10 @@ def test_the_limits_of_cgroups_and_of_those_above_count(version: str, tmp_path: 
 
 def test_where_nothing_is_known_nothing_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert list(rooms(tmp_path)) == []
-    monkeypatch.setattr("ripple_sim.solver.memory.rooms", lambda: iter(()))
+    monkeypatch.setattr("ripple_sim.solver.files.rooms", lambda: iter(()))
     require_memory(SolverError, 1e15, "this", "do that")
 
 
 def test_what_is_small_costs_no_look(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ripple_sim.solver.memory.rooms", lambda: pytest.fail("looked"))
+    monkeypatch.setattr("ripple_sim.solver.files.rooms", lambda: pytest.fail("looked"))
     require_memory(SolverError, 1e6, "this", "do that")

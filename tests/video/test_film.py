@@ -27,8 +27,8 @@ from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.overlays import NAMES, parse_request
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.cube_map.convention import cube_topology, texel_directions
 from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.layouts.cube.convention import cube_topology, texel_directions
 from ripple_sim.solver.texels.halo import with_filled_halo
 from ripple_sim.video.film import Film
 from ripple_sim.video.options import VideoOptions

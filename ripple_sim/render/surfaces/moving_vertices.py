@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Floats, Floats32, Ints, kernel
-from ripple_sim.solver.mesh.triangle_tree import closest_points, triangle_tree
+from ripple_sim.solver.mesh.closest import closest_points, triangle_tree
 from ripple_sim.solver.texels.barycentrics import barycentrics_in
 
 

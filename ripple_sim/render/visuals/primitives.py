@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.cube_map.convention import CHART_NORMALS, CHART_U, CHART_V
+from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS, CHART_U, CHART_V
 
 from .corners import normalized
 

@@ -7,7 +7,7 @@ from sphere_height_maps import N, constant_height_map, height_map_of
 from ripple_sim.render.surfaces.adaptive_tessellation import AdaptiveTessellation
 from ripple_sim.render.surfaces.tessellation import edges_of, midpoints
 from ripple_sim.render.visuals import primitives as meshes
-from ripple_sim.solver.cube_map.convention import cube_chart_points
+from ripple_sim.solver.layouts.cube.convention import cube_chart_points
 from ripple_sim.solver.texels.chart_page import ChartPage
 
 POSITION, NORMAL, SPHERE = slice(0, 3), slice(3, 6), slice(6, 9)

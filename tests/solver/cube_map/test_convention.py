@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import AtlasError
-from ripple_sim.solver.cube_map.convention import (
+from ripple_sim.solver.layouts.cube.convention import (
     check_resolution,
     cube_chart_points,
     cube_rotations,

@@ -6,9 +6,9 @@ import trimesh
 from genus_zero import bipyramid, icosphere, spiky
 
 from ripple_sim.solver import AtlasError, Mesh
-from ripple_sim.solver.cube_map import cube_atlas
-from ripple_sim.solver.cube_map.convention import cube_rotations, permute_texels, texel_directions
-from ripple_sim.solver.cube_map.cube_atlas import _interpolate, atlas_from_sphere_map
+from ripple_sim.solver.layouts.cube import cube_atlas
+from ripple_sim.solver.layouts.cube.convention import cube_rotations, permute_texels, texel_directions
+from ripple_sim.solver.layouts.cube.cube_atlas import _interpolate, atlas_from_sphere_map
 
 BALL = Mesh(*icosphere(2))
 

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from ripple_sim.solver import Atlas, Mesh, build_atlas
-from ripple_sim.solver.atlas.build import atlas_from_sphere_map
-from ripple_sim.solver.cube_map.convention import CHART_NORMALS, CHART_U, CHART_V, cube_topology, texel_directions
+from ripple_sim.solver.layouts.build import atlas_from_sphere_map
+from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS, CHART_U, CHART_V, cube_topology, texel_directions
 
 
 def ball(subdivisions: int, resolution: int) -> Atlas:

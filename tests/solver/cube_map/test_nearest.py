@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import Atlas
-from ripple_sim.solver.cube_map.convention import cube_chart_points, cube_rotations, texel_directions
-from ripple_sim.solver.cube_map.nearest import sphere_directions, texel_at
+from ripple_sim.solver.layouts.cube.convention import cube_chart_points, cube_rotations, texel_directions
+from ripple_sim.solver.layouts.cube.nearest import sphere_directions, texel_at
 
 
 @pytest.mark.parametrize("n", [4, 7, 32])

@@ -5,7 +5,7 @@ import pytest
 from genus_zero import TETRAHEDRON, icosphere
 
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.cube_map.quality import sphere_map_quality
+from ripple_sim.solver.layouts.cube.quality import sphere_map_quality
 from ripple_sim.solver.texels.stretch import QUANTILES
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver.errors import MeshError
-from ripple_sim.solver.mesh.ply_rows import Element, read_binary, read_text
+from ripple_sim.solver.mesh.ply import Element, read_binary, read_text
 
 CODES = {"u1": "B", "i2": "h", "i4": "i", "f4": "f", "f8": "d"}
 REST = b"what follows"

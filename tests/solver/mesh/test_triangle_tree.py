@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver.mesh.triangle_tree import TriangleTree, closest_points, refitted, triangle_tree
+from ripple_sim.solver.mesh.closest import TriangleTree, closest_points, refitted, triangle_tree
 from ripple_sim.solver.texels.barycentrics import barycentrics_in
 
 

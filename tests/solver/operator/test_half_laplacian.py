@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import eigh
 
 from ripple_sim.solver import Atlas, sphere_atlas
-from ripple_sim.solver.operator.half_laplacian import HalfLaplacian
+from ripple_sim.solver.operator.deep_water import HalfLaplacian
 from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
 
 

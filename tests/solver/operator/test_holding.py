@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, sphere_atlas
-from ripple_sim.solver.operator.holding import hold
+from ripple_sim.solver.operator.regions import hold
 
 
 def after_one_period(n: int, material: Material, mode: np.ndarray, eigenvalue: float, backend: str = "cpu") -> float:

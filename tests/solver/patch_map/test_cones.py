@@ -3,16 +3,16 @@
 import numpy as np
 from surfaces import torus
 
-from ripple_sim.solver.patch_map.cells import centred_cells, spread_seeds
-from ripple_sim.solver.patch_map.cones import move_tips
-from ripple_sim.solver.patch_map.disks import disk_cells
-from ripple_sim.solver.patch_map.distances import Metric
-from ripple_sim.solver.patch_map.energy import reference_of, total_energy
-from ripple_sim.solver.patch_map.flatten import signed_areas
-from ripple_sim.solver.patch_map.quads import cut_into_quads
-from ripple_sim.solver.patch_map.seamless import FIXED, FREE, corner_places, seamless_map, transitions
-from ripple_sim.solver.patch_map.surface import Surface
-from ripple_sim.solver.patches.located import locate_texels
+from ripple_sim.solver.layouts.patches.cells import centred_cells, spread_seeds
+from ripple_sim.solver.layouts.patches.cones import move_tips
+from ripple_sim.solver.layouts.patches.disks import disk_cells
+from ripple_sim.solver.layouts.patches.distances import Metric
+from ripple_sim.solver.layouts.patches.energy import reference_of, total_energy
+from ripple_sim.solver.layouts.patches.flatten import signed_areas
+from ripple_sim.solver.layouts.patches.located import locate_texels
+from ripple_sim.solver.layouts.patches.quads import cut_into_quads
+from ripple_sim.solver.layouts.patches.seamless import FIXED, FREE, corner_places, seamless_map, transitions
+from ripple_sim.solver.layouts.patches.surface import Surface
 
 
 def test_moved_tips_lower_the_energy_and_leave_the_map_one_to_one() -> None:

@@ -5,13 +5,13 @@ import pytest
 from surfaces import disk, sphere, torus
 
 from ripple_sim.solver import glue
-from ripple_sim.solver.patch_map.borders import BorderedCells
-from ripple_sim.solver.patch_map.cells import centred_cells, spread_seeds
-from ripple_sim.solver.patch_map.disks import disk_cells
-from ripple_sim.solver.patch_map.distances import Metric
-from ripple_sim.solver.patch_map.flatten import signed_areas
-from ripple_sim.solver.patch_map.quads import Quads, cut_into_large_quads, cut_into_quads
-from ripple_sim.solver.patch_map.surface import Surface
+from ripple_sim.solver.layouts.patches.borders import BorderedCells
+from ripple_sim.solver.layouts.patches.cells import centred_cells, spread_seeds
+from ripple_sim.solver.layouts.patches.disks import disk_cells
+from ripple_sim.solver.layouts.patches.distances import Metric
+from ripple_sim.solver.layouts.patches.flatten import signed_areas
+from ripple_sim.solver.layouts.patches.quads import Quads, cut_into_large_quads, cut_into_quads
+from ripple_sim.solver.layouts.patches.surface import Surface
 
 MESHES = {"sphere": lambda: sphere(3), "torus": lambda: torus(24), "disk": lambda: disk(14)}
 EULER = {"sphere": 2, "torus": 0, "disk": 1}

@@ -4,10 +4,10 @@ import numpy as np
 from surfaces import sphere
 
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.patch_map.distances import Metric
-from ripple_sim.solver.patch_map.sizes import cell_sizes
-from ripple_sim.solver.patch_map.surface import Surface
-from ripple_sim.solver.patches.patch_atlas import patch_atlas
+from ripple_sim.solver.layouts.patches.distances import Metric
+from ripple_sim.solver.layouts.patches.patch_atlas import patch_atlas
+from ripple_sim.solver.layouts.patches.sizes import cell_sizes
+from ripple_sim.solver.layouts.patches.surface import Surface
 
 TIPS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 

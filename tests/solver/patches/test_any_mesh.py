@@ -8,7 +8,7 @@ import trimesh
 from surfaces import grid, sphere
 
 from ripple_sim.solver import Atlas, Material, Mesh, WaveSolver, build_atlas
-from ripple_sim.solver.patch_map import layout
+from ripple_sim.solver.layouts.patches import layout
 
 
 def thick_graph(genus: int) -> Mesh:

@@ -7,8 +7,8 @@ from limbs import sphere, thin_limb
 from scipy.spatial.transform import Rotation
 
 from ripple_sim.solver import Mesh, WaveSolver, build_atlas
-from ripple_sim.solver.atlas.build import atlas_from_sphere_map
-from ripple_sim.solver.sphere_map import alignment, progressive_sphere_map
+from ripple_sim.solver.layouts.build import atlas_from_sphere_map
+from ripple_sim.solver.layouts.sphere_map import alignment, progressive_sphere_map
 
 
 def test_candidate_rotations_are_rotations_and_leave_no_gap():

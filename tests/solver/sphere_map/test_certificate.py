@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 from genus_zero import icosphere
 
-from ripple_sim.solver.sphere_map import (
-    certify,
-    stretch,
-    stretch_quantiles,
-)
+from ripple_sim.solver.layouts.sphere_map import certify, stretch, stretch_quantiles
 
 
 def test_certificate_catches_a_planted_fold():

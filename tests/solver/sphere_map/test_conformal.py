@@ -5,11 +5,7 @@ import pytest
 from genus_zero import SHAPES, crumpled, icosphere
 
 from ripple_sim.solver.errors import SphereMapError
-from ripple_sim.solver.sphere_map import (
-    certify,
-    conformal_sphere_map,
-    progressive_sphere_map,
-)
+from ripple_sim.solver.layouts.sphere_map import certify, conformal_sphere_map, progressive_sphere_map
 
 
 def bumpy_sphere():

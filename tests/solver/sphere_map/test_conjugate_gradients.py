@@ -3,7 +3,7 @@
 import numpy as np
 from levels import assembled, crumpled, icosphere, whole_level
 
-from ripple_sim.solver.sphere_map.conjugate_gradients import solve
+from ripple_sim.solver.layouts.conjugate_gradients import solve
 
 
 def test_conjugate_gradients_solve_the_newton_system():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from levels import crumpled, icosphere, whole_level
 
-from ripple_sim.solver.sphere_map.energy import density, density_derivatives, total_energy
+from ripple_sim.solver.layouts.sphere_map.energy import density, density_derivatives, total_energy
 
 # Dirichlet energy and area ratio of maps that shrink, keep and stretch, evenly and not
 STRETCHES = [(2.0, 1.0), (2.5, 1.0), (0.7, 0.3), (0.5, 0.25), (1.2, 0.1), (9.0, 4.0)]

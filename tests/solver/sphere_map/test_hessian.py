@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from levels import assembled, crumpled, icosphere, whole_level
 
-from ripple_sim.solver.sphere_map.energy import total_energy
+from ripple_sim.solver.layouts.sphere_map.energy import total_energy
 
 
 def test_newton_gradient_is_the_slope_of_the_energy():

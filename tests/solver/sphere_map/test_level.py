@@ -5,9 +5,9 @@ import pytest
 from genus_zero import TETRAHEDRON, bipyramid, icosphere
 from levels import whole_level
 
-from ripple_sim.solver.sphere_map.corner_table import collapse, corner_table
-from ripple_sim.solver.sphere_map.decimation import decimate
-from ripple_sim.solver.sphere_map.level import build_level, star_shapes
+from ripple_sim.solver.layouts.sphere_map.corner_table import collapse, corner_table
+from ripple_sim.solver.layouts.sphere_map.decimation import decimate
+from ripple_sim.solver.layouts.sphere_map.level import build_level, star_shapes
 
 
 def partial_level(V, F, count):

@@ -9,12 +9,7 @@ from hypothesis import strategies as st
 from known_meshes import known_mesh
 
 from ripple_sim.solver.errors import SphereMapError
-from ripple_sim.solver.sphere_map import (
-    certify,
-    progressive,
-    progressive_sphere_map,
-    stretch_quantiles,
-)
+from ripple_sim.solver.layouts.sphere_map import certify, progressive, progressive_sphere_map, stretch_quantiles
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -9,8 +9,8 @@ from limbs import arrays, sphere, thin_limb
 from scipy.spatial.transform import Rotation
 
 from ripple_sim.solver import Mesh, WaveSolver
-from ripple_sim.solver.atlas.build import atlas_from_sphere_map
-from ripple_sim.solver.sphere_map import certify, progressive_sphere_map, stretch_quantiles
+from ripple_sim.solver.layouts.build import atlas_from_sphere_map
+from ripple_sim.solver.layouts.sphere_map import certify, progressive_sphere_map, stretch_quantiles
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from levels import crumpled, icosphere, whole_level
 
-from ripple_sim.solver.sphere_map.energy import total_energy
-from ripple_sim.solver.sphere_map.level import star_shapes
-from ripple_sim.solver.sphere_map.relaxation import sweep
+from ripple_sim.solver.layouts.sphere_map.energy import total_energy
+from ripple_sim.solver.layouts.sphere_map.level import star_shapes
+from ripple_sim.solver.layouts.sphere_map.relaxation import sweep
 
 
 @pytest.mark.parametrize("backwards", [False, True])

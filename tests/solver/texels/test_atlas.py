@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from solids import BALL
 
 from ripple_sim.solver import Atlas, Mesh, sphere_atlas
-from ripple_sim.solver.atlas.build import atlas_from_sphere_map
-from ripple_sim.solver.cube_map.convention import CHART_NORMALS, CHART_U, CHART_V
+from ripple_sim.solver.layouts.build import atlas_from_sphere_map
+from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS, CHART_U, CHART_V
 
 quick = settings(derandomize=True, max_examples=60, deadline=None, database=None)
 

@@ -6,8 +6,8 @@ from genus_zero import icosphere
 from hand_made import square, two_squares
 
 from ripple_sim.solver import Mesh, texel_atlas
-from ripple_sim.solver.cube_map.convention import cube_topology
-from ripple_sim.solver.cube_map.cube_chart_map import CubeChartMap
+from ripple_sim.solver.layouts.cube.convention import cube_topology
+from ripple_sim.solver.layouts.cube.cube_chart_map import CubeChartMap
 from ripple_sim.solver.texels.chart_map import texture_coordinates
 from ripple_sim.solver.texels.halo import with_filled_halo
 from ripple_sim.solver.texels.sampling import sampling_matrix

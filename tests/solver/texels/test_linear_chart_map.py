@@ -5,7 +5,7 @@ import pytest
 from hand_made import polygon, square, two_squares
 
 from ripple_sim.solver import Mesh, texel_atlas
-from ripple_sim.solver.mesh.triangle_tree import triangle_tree
+from ripple_sim.solver.mesh.closest import triangle_tree
 from ripple_sim.solver.texels.linear_chart_map import LinearChartMap
 from ripple_sim.solver.texels.nearest import MeshPlaces, nearest_places
 

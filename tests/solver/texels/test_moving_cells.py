@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ripple_sim.solver import build_atlas, texel_atlas
-from ripple_sim.solver.cube_map.sphere_atlas import sphere_atlas
-from ripple_sim.solver.texels.moving_cells import MovingCells
+from ripple_sim.solver.layouts.cube.atlas import sphere_atlas
+from ripple_sim.solver.texels.moving import MovingCells
 from ripple_sim.solver.texels.riding import SurfaceRide
 from ripple_sim.solver.texels.stiffness import lumped_areas, stiffness_stencil
 from tests.support.hand_made import disk, polygon, square

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hand_made import flat_torus, polygon, square
 
-from ripple_sim.solver.cube_map.convention import cube_topology
+from ripple_sim.solver.layouts.cube.convention import cube_topology
 from ripple_sim.solver.texels.sampling import sampling_matrix
 
 

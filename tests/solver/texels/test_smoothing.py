@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hand_made import flat_torus, polygon, square
 
-from ripple_sim.solver.cube_map.convention import cube_rotations, cube_topology, permute_texels
+from ripple_sim.solver.layouts.cube.convention import cube_rotations, cube_topology, permute_texels
 from ripple_sim.solver.texels.smoothing import smoothed
 
 

@@ -5,7 +5,7 @@ import pytest
 from hand_made import RIM, flat_torus, polygon, square
 
 from ripple_sim.solver import TexelTopology, glue
-from ripple_sim.solver.cube_map.convention import cube_topology
+from ripple_sim.solver.layouts.cube.convention import cube_topology
 
 TOPOLOGIES = {
     "cube": lambda: cube_topology(4),
