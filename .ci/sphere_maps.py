@@ -9,7 +9,7 @@ from ripple_sim.scene.scene_path import shipped_scenes
 from ripple_sim.scenes.sphere_maps import FOLDER, sphere_map_path
 from ripple_sim.solver.errors import MeshError
 from ripple_sim.solver.layouts.sphere_map import progressive_sphere_map
-from ripple_sim.solver.mesh.genus_zero import check_genus_zero
+from ripple_sim.solver.mesh.mesh import check_genus_zero
 
 needed = set()
 for name in shipped_scenes():

@@ -17,7 +17,7 @@ from ripple_sim.errors import SceneError, SimulationError
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.target_maps import apply_maps, uniform_material
-from ripple_sim.solver.compilation import work_clock
+from ripple_sim.solver.kernel import work_clock
 
 # More is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000

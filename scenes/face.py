@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ripple_sim.solver.atomic_file import atomic_write
+from ripple_sim.solver.files import atomic_write
 
 from .implicit import (
     Array,

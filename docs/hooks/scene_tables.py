@@ -22,7 +22,7 @@ from ripple_sim.scene.body_shapes import BODY_SHAPES
 from ripple_sim.scene.material_entry import LAWS
 from ripple_sim.scene.overlays import NAMES as OVERLAYS
 from ripple_sim.solver import Material
-from ripple_sim.solver.layouts.layouts import LAYOUTS
+from ripple_sim.solver.layouts.build import LAYOUTS
 from ripple_sim.solver.operator.assembly import RIMS
 from ripple_sim.solver.operator.presets import PRESETS
 from ripple_sim.solver.texels.maps import CHANNELS

@@ -23,7 +23,7 @@ from scipy.special import jn_zeros, jnp_zeros
 
 from ripple_sim.solver import Atlas, Material, Mesh, build_atlas
 from ripple_sim.solver.operator.assembly import build_operator
-from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
+from ripple_sim.solver.texels.stencil import stiffness_matrix
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
 COUNT = 20

@@ -18,8 +18,8 @@ from ripple_sim import Camera, Material, RippleRenderer, Ripples, load_scene
 from ripple_sim.coupling.load.high_pass import coarse_motions
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import WaveSolver, build_atlas, sphere_atlas
-from ripple_sim.solver.operator.moving import MovingOperator
-from ripple_sim.solver.texels.moved_stencil import MovedPlaces
+from ripple_sim.solver.operator.assembly import MovingOperator
+from ripple_sim.solver.texels.moving import MovedPlaces
 from ripple_sim.solver.texels.riding import SurfaceRide
 
 SPEED = Material(speed=1.0)

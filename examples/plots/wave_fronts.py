@@ -21,7 +21,7 @@ from ripple_sim.figures.view import View
 from ripple_sim.overlay.colormap import color_table, colors
 from ripple_sim.scene.up_axis import usual_up
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
-from ripple_sim.solver.texels.sampling import sampling_matrix
+from ripple_sim.solver.texels.topology import sampling_matrix
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
 VIEW = {"azimuth": 38.0, "elevation": 24.0}

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import msgspec
 
 from ripple_sim.errors import BatchError
-from ripple_sim.solver.atomic_file import atomic_write
+from ripple_sim.solver.files import atomic_write
 
 from .tars import NUMBER, packed
 

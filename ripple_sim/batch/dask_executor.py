@@ -9,7 +9,7 @@ from concurrent.futures import Executor, Future
 from typing import Any
 
 from ripple_sim.errors import BatchError
-from ripple_sim.solver.checked import shown
+from ripple_sim.solver.errors import shown
 
 _PER_THREAD = 2  # tasks a thread, so that none waits for the next one
 _COUNTED = 2.0  # between looks at how many threads there are [s]

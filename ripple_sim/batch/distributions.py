@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.checked import shown
+from ripple_sim.solver.errors import shown
 
 Numbers = float | list[float]
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ripple_sim.errors import BatchError
-from ripple_sim.solver.atomic_file import atomic_write
+from ripple_sim.solver.files import atomic_write
 
 from .batch_folder import BatchFolder
 from .finished_scenes import finished_scenes

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ripple_sim.errors import BatchError
-from ripple_sim.solver.checked import PATH, checked
+from ripple_sim.solver.errors import PATH, checked
 
 from .batch_folder import BatchFolder
 from .finished_scene import FinishedScene

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from ripple_sim.solver.atomic_file import atomic_write
+from ripple_sim.solver.files import atomic_write
 
 from .batch_folder import BatchFolder
 from .finished_scene import FinishedScene, FolderFiles, scenes_in_tar

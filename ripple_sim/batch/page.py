@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 from typing import Any
 
-from ripple_sim.solver.atomic_file import atomic_write
+from ripple_sim.solver.files import atomic_write
 
 from .batch_folder import BatchFolder
 

@@ -13,7 +13,7 @@ import trimesh
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.scene_path import shipped_scenes
 from ripple_sim.scene.toml_file import read_toml
-from ripple_sim.solver.checked import shown
+from ripple_sim.solver.errors import shown
 
 from .distributions import KINDS, Distribution
 from .key_path import parse_key

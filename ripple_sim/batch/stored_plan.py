@@ -12,8 +12,8 @@ import msgspec
 
 from ripple_sim.errors import BatchError
 from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.solver.atomic_file import atomic_write
-from ripple_sim.solver.checked import shown
+from ripple_sim.solver.errors import shown
+from ripple_sim.solver.files import atomic_write
 from ripple_sim.video.provenance import scene_digest
 
 from .batch_folder import BatchFolder

@@ -7,7 +7,7 @@ from pathlib import Path
 import av
 from PIL import Image
 
-from ripple_sim.solver.atomic_file import atomic_write
+from ripple_sim.solver.files import atomic_write
 
 _SIZE = 160  # its longer edge [pixels]
 

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from ripple_sim.errors import BatchError
-from ripple_sim.solver.compilation import compile_times
+from ripple_sim.solver.kernel import compile_times
 
 from .batch_folder import BatchFolder
 from .local_executor import usual_workers

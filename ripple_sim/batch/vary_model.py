@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.checked import shown
+from ripple_sim.solver.errors import shown
 
 from .distributions import Distribution
 from .key_path import choose, parse_key

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas, Material, WaveSolver
 from ripple_sim.solver.texels.distance import distance_from_point
-from ripple_sim.solver.texels.sampling import sampling_matrix
+from ripple_sim.solver.texels.topology import sampling_matrix
 
 from .first_crest import front_and_crest
 from .geodesics import geodesic_distance

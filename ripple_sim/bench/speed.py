@@ -14,7 +14,7 @@ from ripple_sim.bench.rivals.naive_loop import NaiveLoop
 from ripple_sim.bench.rivals.plain_shader import PlainShader
 from ripple_sim.bench.rivals.sparse_leapfrog import SparseLeapfrog
 from ripple_sim.solver import GLError, Material, sphere_atlas
-from ripple_sim.solver.backends import threads
+from ripple_sim.solver.backends import blocks
 from ripple_sim.solver.backends.backend import Backend, make_backend
 from ripple_sim.solver.backends.cpu import CPUBackend
 from ripple_sim.solver.operator.assembly import build_operator
@@ -99,7 +99,7 @@ def cpu_speed(resolution: int) -> dict[str, float | int]:
     contestants: dict[str, Advances] = {
         "cpu": backend,
         "cpu 1": CPUBackend(operator, 1),
-        "cpu all": CPUBackend(operator, threads.available()),
+        "cpu all": CPUBackend(operator, blocks.available()),
         "naive 1": NaiveLoop(operator),
         "naive prange": NaiveLoop(operator, parallel=True),
         "stream": MemoryStream(texels, backend.thread_count),

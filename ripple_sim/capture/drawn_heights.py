@@ -8,7 +8,7 @@ import numpy as np
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.render.surfaces.height_maps import AnyHeightMap, MovedHeightMap
 from ripple_sim.solver import HeightMap
-from ripple_sim.solver.waves.moved_gradients import MovedGradients
+from ripple_sim.solver.waves.motion import MovedGradients
 
 from .shutter import Field
 

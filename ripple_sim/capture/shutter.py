@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.backends.device_field import DeviceField
+from ripple_sim.solver.backends.gl_fields import DeviceField
 
 Field: TypeAlias = NDArray[np.float32] | DeviceField
 Heights = dict[str, Field]

@@ -12,9 +12,9 @@ from tyro.constructors import PrimitiveConstructorSpec
 
 from ripple_sim.overlay.comparison import BASELINES
 from ripple_sim.scene.up_axis import UP_AXES
-from ripple_sim.solver.checked import shown
-from ripple_sim.solver.layouts.layouts import LAYOUTS
-from ripple_sim.solver.operator.rims import RIMS
+from ripple_sim.solver.errors import shown
+from ripple_sim.solver.layouts.build import LAYOUTS
+from ripple_sim.solver.operator.assembly import RIMS
 
 
 def parse_size(word: str) -> tuple[int, int]:

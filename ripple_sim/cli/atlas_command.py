@@ -88,7 +88,7 @@ class Atlas:
         """Refuse, before anything that takes time, what cannot be written or makes no sense."""
         from ripple_sim.solver import AtlasError
         from ripple_sim.solver.mesh.files import check_mesh_file
-        from ripple_sim.solver.texels.atlas_file import check_atlas_place
+        from ripple_sim.solver.texels.atlas import check_atlas_place
 
         check_mesh_file(self.mesh)
         for path in (self.output, self.plot):

@@ -37,7 +37,7 @@ class Materials:
 
 def _told(name: str) -> dict[str, Any]:
     from ripple_sim.solver import Material
-    from ripple_sim.solver.operator.dispersion import decay_time, phase_speed
+    from ripple_sim.solver.operator.material import decay_time, phase_speed
     from ripple_sim.solver.operator.presets import PRESETS
 
     material, q = Material.preset(name), 2 * math.pi / _WAVELENGTH

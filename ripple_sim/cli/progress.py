@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from ripple_sim.solver.compilation import compile_times, compiling
+from ripple_sim.solver.kernel import compile_times, compiling
 
 Report = Callable[[int, int], None]
 

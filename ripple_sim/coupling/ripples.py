@@ -28,7 +28,7 @@ from ripple_sim.coupling.stepping.solved import UNSOLVED_WARNING, SolvedForces
 from ripple_sim.coupling.two_way.push_back import PushBack
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Load, Material
-from ripple_sim.solver.checked import checked, whole
+from ripple_sim.solver.errors import checked, whole
 
 from .arguments import for_each, integrator_warning, own_data, own_model
 from .targets import Targets

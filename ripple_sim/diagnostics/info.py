@@ -7,8 +7,7 @@ import importlib.metadata
 import os
 import platform
 
-from ripple_sim.solver.backends.backend import auto_backend
-from ripple_sim.solver.backends.measured import measured
+from ripple_sim.solver.backends.backend import auto_backend, measured
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import shared_context
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ripple_sim.errors import EncodingError
-from ripple_sim.solver.atomic_file import final_path
+from ripple_sim.solver.files import final_path
 
 from .clip import Stream
 from .formats import FORMATS

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from ripple_sim.errors import EncodingError, VideoError
-from ripple_sim.solver.atomic_file import NO_NAME, final_path
+from ripple_sim.solver.files import NO_NAME, final_path
 
 from .exr import check_exr
 from .mark import MARK, made_here

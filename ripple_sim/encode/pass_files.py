@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import EncodingError, VideoError
-from ripple_sim.solver.atomic_file import final_path
+from ripple_sim.solver.files import final_path
 
 from .exr import check_exr
 from .mark import MARK, made_here

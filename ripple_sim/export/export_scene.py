@@ -11,7 +11,7 @@ from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
 from ripple_sim.errors import ExportError
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.checked import PATH, checked, instance
+from ripple_sim.solver.errors import PATH, checked, instance
 from ripple_sim.video.provenance import origin
 
 from .endings import check_export

@@ -18,7 +18,7 @@ from ripple_sim.errors import EncodingError, ExportError
 from ripple_sim.export.html.notebook import framed
 from ripple_sim.render.visuals.looks import find_look
 from ripple_sim.scene.camera import CameraEntry, check_camera
-from ripple_sim.solver.checked import PATH, POSITIVE, checked, instance
+from ripple_sim.solver.errors import PATH, POSITIVE, checked, instance
 
 from .endings import check_export
 from .options import WRITE_OPTIONS, WriteOptions

@@ -10,7 +10,7 @@ from pathlib import Path
 from ripple_sim.encode.mark import MARK, made_here
 from ripple_sim.encode.move import move
 from ripple_sim.errors import EncodingError, ExportError
-from ripple_sim.solver.atomic_file import NO_NAME, final_path
+from ripple_sim.solver.files import NO_NAME, final_path
 
 Recognised = Callable[[Path], bool]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ripple_sim.encode.output import check_size
 from ripple_sim.errors import ExportError, SceneError
 from ripple_sim.scene.scene import MAX_DURATION, Scene
-from ripple_sim.solver.checked import shown
+from ripple_sim.solver.errors import shown
 
 from .options import TESSELLATIONS, WRITE_OPTIONS, ExportOptions, WriteOptions
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.encode.mark import MARK, made_here
 from ripple_sim.solver import AtlasError
-from ripple_sim.solver.atomic_file import final_path
+from ripple_sim.solver.files import final_path
 
 TEXT, FAINT = "#1b2432", "#6b7685"
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.scene.overlays import Request
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.texels.halo import with_filled_halo
+from ripple_sim.solver.texels.topology import with_filled_halo
 
 from .contact_marks import ContactMarks, Mark
 from .heatmap import magnitude

@@ -11,7 +11,7 @@ from ripple_sim.coupling.arguments import own_model
 from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
 from ripple_sim.coupling.model.geoms import find_target
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.layouts.layouts import LAYOUTS
+from ripple_sim.solver.layouts.build import LAYOUTS
 
 from .camera import check_camera
 from .events import Script
@@ -52,7 +52,7 @@ def check_scene(scene: Scene) -> None:
 
 def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
     from ripple_sim.render import LOOKS
-    from ripple_sim.solver.operator.rims import RIMS
+    from ripple_sim.solver.operator.assembly import RIMS
 
     find_target(model, entry.geom)
     for what, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS), ("rim", entry.rim, RIMS)):

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.mesh.vertical_rays import downward_hits
+from ripple_sim.solver.mesh.closest import downward_hits
 
 from .body_shapes import BODY_SHAPES
 from .motion import DropEntry

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.checked import shown
+from ripple_sim.solver.errors import shown
 
 # name: function and how many arguments it takes
 FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {

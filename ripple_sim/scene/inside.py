@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Atlas, Mesh, Volume, load_mesh, load_volume, thickness_map
-from ripple_sim.solver.mesh.volume_file import is_volume
+from ripple_sim.solver.mesh.volume import is_volume
 
 from .motion import Vector
 

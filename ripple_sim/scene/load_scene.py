@@ -14,7 +14,7 @@ import numpy as np
 from ripple_sim.coupling.model.geoms import find_target, target_name
 from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.checked import PATH, checked
+from ripple_sim.solver.errors import PATH, checked
 
 from .check_scene import check_scene
 from .events import Events

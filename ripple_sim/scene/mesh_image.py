@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.solver.image_file import read_image
+from ripple_sim.solver.files import read_image
 
 _SUFFIXES = (".png", ".jpg", ".jpeg")
 _SCENES = (".glb", ".gltf")

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.image_file import open_image
+from ripple_sim.solver.files import open_image
 
 # Attributes of <compiler> that name folders, and those that name files.
 _FOLDERS = ("meshdir", "texturedir", "assetdir")

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.checked import shown
+from ripple_sim.solver.errors import shown
 
 from .camera import CameraEntry
 from .events import ChangeEntry, ControlEntry, PokeEntry

@@ -7,7 +7,7 @@ import importlib.resources
 from pathlib import Path
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.checked import shown
+from ripple_sim.solver.errors import shown
 
 # By ending: what a file is that is taken for a scene file, and what to do with it.
 _A_MESH = "a mesh, not a scene; `ripple-sim drop` drops bodies on it, and a scene file (TOML) may name a model with it"

@@ -24,7 +24,7 @@ from ripple_sim.overlay.projection import Projection
 from ripple_sim.render import Surface
 from ripple_sim.scene.overlays import parse_request
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.compilation import work_clock
+from ripple_sim.solver.kernel import work_clock
 
 from .options import VideoOptions
 from .pass_writer import PassWriter, segmented

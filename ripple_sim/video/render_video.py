@@ -13,7 +13,7 @@ from ripple_sim.overlay.comparison import compared_operators
 from ripple_sim.scene.camera_override import with_exposure
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.checked import PATH, checked, instance
+from ripple_sim.solver.errors import PATH, checked, instance
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .film import Film

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ripple_sim.encode import FrameWriter
-from ripple_sim.solver.compilation import compile_times, work_clock
 from ripple_sim.solver.gl import GLContext
+from ripple_sim.solver.kernel import compile_times, work_clock
 
 from .film import Film
 

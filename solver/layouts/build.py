@@ -1,4 +1,9 @@
-"""From a mesh to its atlas, by way of the cache."""
+"""From a mesh to its atlas, by way of the cache.
+
+The names of the layouts: how a mesh gets its charts.
+
+Atlases from files.
+"""
 
 from __future__ import annotations
 
@@ -12,18 +17,55 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cache import cache_path, make_room, mark_used
-from ..checked import checked, instance
-from ..errors import AtlasError, MeshError, SphereMapError
-from ..mesh.genus_zero import check_genus_zero
-from ..mesh.mesh import Mesh
-from ..texels.atlas import Atlas
-from ..texels.atlas_file import FORMAT
+from ..errors import PATH, AtlasError, MeshError, SphereMapError, checked, instance
+from ..mesh.mesh import Mesh, check_genus_zero
+from ..texels.atlas import ADVICE, FORMAT, Atlas, read_atlas_file
+from ..texels.chart_map import ChartMap, LinearChartMap
+from ..texels.texel_mesh import TexelMesh
+from ..texels.topology import glue
+from .cube.atlas import CubeChartMap, SphereAtlas, atlas_from_sphere_map
 from .cube.convention import check_memory, check_resolution
-from .cube.cube_atlas import atlas_from_sphere_map
-from .layouts import LAYOUTS
-from .load import load_atlas
-from .patches.patch_atlas import patch_atlas
+from .patches.atlas import PatchChartMap, patch_atlas
+from .patches.pieces import Pieces
 from .sphere_map import certify, conformal_sphere_map, progressive_sphere_map
+
+# "auto" takes the first of the others that fits a mesh.
+LAYOUTS = ("auto", "cube", "patches")
+
+
+Arrays = dict[str, NDArray]
+
+_CHART_MAPS: dict[str, Callable[[Arrays], ChartMap]] = {
+    "cube": lambda arrays: CubeChartMap(arrays["sphere"]),
+    "patches": lambda arrays: PatchChartMap(Pieces(*(arrays[f"piece_{name}"] for name in Pieces._fields))),
+    "given": lambda arrays: LinearChartMap(arrays["charts"], arrays["corners"], arrays["positions"].shape[1]),
+}
+
+
+@checked(AtlasError, path=PATH)
+def load_atlas(path: str | Path) -> Atlas:
+    """Read an atlas written by `Atlas.save`.
+
+    Raises
+    ------
+    AtlasError
+        If the file is missing, truncated, changed, or not an atlas of this version.
+    """
+    arrays = read_atlas_file(Path(path))
+    kind, layout = arrays["kind"].tolist()
+    try:
+        chart_map = _CHART_MAPS[layout](arrays)
+    except KeyError as error:
+        raise AtlasError(f"atlas file {str(path)!r} lacks {error} or is of another layout; {ADVICE}") from error
+    topology = glue(arrays["glued"], arrays["positions"].shape[1])
+    return (SphereAtlas if kind == SphereAtlas.__name__ else Atlas)(
+        mesh=Mesh(arrays["V"], arrays["F"], arrays.get("uv"), arrays.get("corner_uv")),
+        texels=TexelMesh(topology, arrays["positions"], arrays["normals"], arrays["areas"], arrays.get("beyond")),
+        chart_map=chart_map,
+        triangles=arrays["triangles"],
+        barycentrics=arrays["barycentrics"],
+    )
+
 
 SPHERE_MAPS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {
     "progressive": progressive_sphere_map,

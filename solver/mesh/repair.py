@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import MeshError
-from .counting import counted, place
+from .corners import counted, place
 from .mesh import Mesh
-from .polygons import Soup
+from .ply import Soup
 
 _INSTALL = "pip install 'ripple-sim[repair]' (it adds the package pymeshfix, which is under the GPL)"
 _TIME_LIMIT = 120  # [s]; a hundred thousand triangles take a few, hopeless cases hours

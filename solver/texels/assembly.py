@@ -2,16 +2,109 @@
 
 The formulas are those of `cells.quad`, in single precision: a moving surface needs them anew in every step. Differences
 of positions are taken in double precision first, so that a surface far from the origin loses nothing.
+
+What special cells add where their corners lie: one compiled loop for all cells of a kind.
+
+The few cells of a texel mesh that are no plain quads: strips at rims, triangles and polygons in corners.
+
+Where they lie and what they add to is worked out once; for a surface that moves, one compiled loop then does all of a
+kind together.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import dataclasses
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..kernel import Floats, Floats32, kernel
-from .cells import HOURGLASS, LEAST_AREA, SHARE, UNEVEN
+from ..kernel import Floats, Floats32, Ints, kernel
+from .cells import HOURGLASS, LEAST_AREA, SHARE, UNEVEN, polygon, quad, quad_area, strip, triangle
+from .stencil import CrossingLinks
+from .topology import TRIANGLE, TexelTopology
+
+
+class Added(NamedTuple):
+    """What cells add: geometric weights of their links [k, l], shares of the area [k, j] and areas [k] [m^2]."""
+
+    links: Floats
+    shares: Floats
+    areas: Floats
+
+
+@kernel
+def fill_quads(places: Floats, corners: Ints, added: Added) -> None:
+    """Whole quads: six links, and a quarter of the area each."""
+    for i in range(len(corners)):
+        a, b, c, d = _quad(places, corners[i])
+        south, north, west, east, rising, falling, area = quad(a, b, c, d)
+        links = added.links[i]
+        links[0], links[1], links[2], links[3], links[4], links[5] = south, north, west, east, rising, falling
+        added.shares[i] = area / 4
+        added.areas[i] = area
+
+
+@kernel
+def fill_areas(places: Floats, corners: Ints, added: Added) -> None:
+    """Quads without links."""
+    for i in range(len(corners)):
+        a, b, c, d = _quad(places, corners[i])
+        area = quad_area(a, b, c, d)
+        added.shares[i] = area / 4
+        added.areas[i] = area
+
+
+@kernel
+def fill_strips(places: Floats, corners: Ints, added: Added) -> None:
+    """Strips: the link of their first two corners."""
+    for i in range(len(corners)):
+        a, b, c, d = _quad(places, corners[i])
+        added.links[i, 0] = strip(a, b, c, d)
+        added.areas[i] = quad_area(a, b, c, d)
+
+
+@kernel
+def fill_triangles(places: Floats, corners: Ints, added: Added) -> None:
+    """Triangles, as their first corner's chart sees them: two links, and its share."""
+    for i in range(len(corners)):
+        a, b, c = _at(places, corners[i, 0]), _at(places, corners[i, 1]), _at(places, corners[i, 2])
+        _, added.links[i, 0], added.links[i, 1], area = triangle(a, b, c)
+        added.shares[i, 0] = area / 3
+        added.areas[i] = area
+
+
+@kernel
+def fill_polygons(places: Floats, corners: Ints, added: Added) -> None:
+    """Polygons: the links between all pairs of corners."""
+    count = corners.shape[1]
+    points = np.empty((count, 3))
+    for i in range(len(corners)):
+        for j in range(count):
+            for k in range(3):
+                points[j, k] = places[k, corners[i, j]]
+        weights, shares = polygon(points)
+        link = 0
+        for a in range(count):
+            for b in range(a + 1, count):
+                added.links[i, link] = weights[a, b]
+                link += 1
+        added.shares[i] = shares
+        added.areas[i] = shares.sum()
+
+
+@kernel
+def _at(places: Floats, i: int) -> tuple[float, float, float]:
+    """A place among coordinates [3, p]."""
+    return places[0, i], places[1, i], places[2, i]
+
+
+@kernel
+def _quad(places: Floats, corners: Ints) -> tuple[Any, Any, Any, Any]:
+    """The four corners of a quad."""
+    return _at(places, corners[0]), _at(places, corners[1]), _at(places, corners[2]), _at(places, corners[3])
+
 
 _HALF, _QUARTER, _TWO = np.float32(0.5), np.float32(0.25), np.float32(2)
 _ZERO, _ONE, _THREE, _FOUR = np.float32(0), np.float32(1), np.float32(3), np.float32(4)
@@ -181,3 +274,151 @@ def _add_row(sides: Floats32, begin: int, below: Floats32, weights: Floats, area
     for c in range(size):
         i = begin + c
         below[0, c], below[1, c] = sides[1, i], sides[6, i]
+
+
+_CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
+# the links of a cell at (r, c), in the order of `quad`: link, and the place where it is stored
+_LINKS = ((0, 0, 0), (0, 1, 0), (1, 0, 0), (1, 0, 1), (2, 0, 0), (3, 0, 0))
+# two corners of a strip on the surface, the two beyond the rim opposite to them, and the link of the first two
+_STRIPS = ((0, 1, 2, 3, 0), (2, 3, 0, 1, 1), (0, 2, 1, 3, 2), (1, 3, 0, 2, 3))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SpecialCells:
+    """Cells of one kind.
+
+    Attributes
+    ----------
+    corners : int64 [k, j]
+        Flat places of their corners in a field with halo.
+    fill : kernel
+        Fills in what they add, from coordinates [3, p] of all places [m] and the corners.
+    counts : (int, int)
+        How many links, and shares, a cell has.
+    links : (int64 [m], int64 [m])
+        Of their weights [k, l], flat, those that are added, and the flat places among a stencil's weights.
+    shares : (int64 [s], int64 [s])
+        Likewise of the shares, and flat texels.
+    irregular : (int64 [i], int64 [i, 2])
+        Likewise weights of links beyond the nine points, and the texels at both ends.
+    on_all_copies : bool
+        Whether what they add to a link that crosses a glued side is listed for each of its copies.
+    """
+
+    corners: Ints
+    fill: Callable[[Floats, Ints, Added], None]
+    counts: tuple[int, int]
+    links: tuple[Ints, Ints]
+    shares: tuple[Ints, Ints]
+    irregular: tuple[Ints, Ints] = (np.zeros(0, np.int64), np.zeros((0, 2), np.int64))
+    on_all_copies: bool = False
+
+    def weigh(self, places: Floats) -> Added:
+        """What they add where the places of a field with halo lie at coordinates [3, p] [m]."""
+        count, (links, shares) = len(self.corners), self.counts
+        added = Added(np.empty((count, links)), np.empty((count, shares)), np.empty(count))
+        self.fill(places, self.corners, added)
+        return added
+
+
+def special_cells(topology: TexelTopology, halo_positions: Floats) -> list[SpecialCells]:
+    """All cells of a texel mesh but the quads between four texels."""
+    return [
+        each
+        for kind in (_rim_cells(topology, halo_positions), _triangles(topology), _polygons(topology))
+        for each in kind
+        if len(each.corners)
+    ]
+
+
+def whole_quads(topology: TexelTopology) -> NDArray[np.bool_]:
+    """The quads between four texels, none of them beyond a rim, [C, n + 1, n + 1]."""
+    there = (topology.halo >= 0) & ~topology.rim
+    return there[:, :-1, :-1] & there[:, :-1, 1:] & there[:, 1:, :-1] & there[:, 1:, 1:]
+
+
+def _rim_cells(topology: TexelTopology, halo_positions: Floats) -> Iterator[SpecialCells]:
+    """Strips of half a texel between the last texels and a rim; see `cell_sums`."""
+    halo, rim, width = topology.halo, topology.rim, topology.halo.shape[1]
+    places = np.arange(halo.size).reshape(halo.shape)
+    corners = np.stack([places[:, r : width - 1 + r, c : width - 1 + c] for r, c in _CORNERS], axis=-1)
+    exists = (halo.reshape(-1)[corners] >= 0).all(-1) & rim.reshape(-1)[corners].any(-1)
+    exists &= np.isfinite(halo_positions.reshape(-1, 3)[corners]).all((-1, -2))
+    cell = np.argwhere(exists)
+    corners = corners[exists]
+    at_rim, shown = rim.reshape(-1)[corners], halo.reshape(-1)[corners]
+    belongs = np.broadcast_to(np.arange(4), corners.shape).copy()
+    for i in range(4):
+        for j in range(4):
+            belongs[at_rim[:, i] & ~at_rim[:, j] & (shown[:, i] == shown[:, j]), i] = j
+    texels = _own_texels(topology, np.take_along_axis(corners, belongs, axis=1))
+    shares = np.flatnonzero(texels.ravel() >= 0), texels.ravel()[texels.ravel() >= 0]
+    if topology.fixed_rim:
+        yield SpecialCells(corners, fill_quads, (6, 4), _link_places(topology, cell, _LINKS), shares)
+        return
+    nothing = np.zeros(0, np.int64), np.zeros(0, np.int64)
+    yield SpecialCells(corners, fill_areas, (0, 4), nothing, shares)
+    for i, j, p, q, link in _STRIPS:
+        here = ~at_rim[:, i] & ~at_rim[:, j] & at_rim[:, p] & at_rim[:, q]
+        strips = corners[here][:, [i, j, p, q]]
+        yield SpecialCells(strips, fill_strips, (1, 0), _link_places(topology, cell[here], (_LINKS[link],)), nothing)
+
+
+def _triangles(topology: TexelTopology) -> Iterator[SpecialCells]:
+    """The cells in corners of three charts; each chart adds what its own texel there has of it."""
+    n = topology.shape[1]
+    places = np.arange(topology.halo.size).reshape(topology.halo.shape)
+    for corner, (r, c) in enumerate(((0, 0), (0, n), (n, n), (n, 0))):
+        chart = np.flatnonzero(topology.valence[:, corner] == TRIANGLE)
+        r0, r1 = (1, 0) if r == 0 else (r, r + 1)
+        c0, c1 = (1, 0) if c == 0 else (c, c + 1)
+        corners = np.stack([places[chart, r0, c0], places[chart, r0, c1], places[chart, r1, c0]], axis=1)
+        cell = np.stack([chart, np.full_like(chart, r), np.full_like(chart, c)], axis=1)
+        links = _LINKS[2 + (c == 0)], _LINKS[r == 0]  # along the column and along the row
+        own = np.arange(len(chart)), topology.halo.reshape(-1)[corners[:, 0]]
+        yield SpecialCells(corners, fill_triangles, (2, 1), _link_places(topology, cell, links), own)
+
+
+def _polygons(topology: TexelTopology) -> Iterator[SpecialCells]:
+    """Polygons by their number of corners: their sides belong to the nine points, their diagonals do not."""
+    crossing = CrossingLinks.of(topology)
+    order = np.argsort(crossing.keys, kind="stable")
+    keys, n = crossing.keys[order], topology.shape[1]
+    places = np.ravel_multi_index(crossing.places, (topology.shape[0], 4, n + 1, n + 1))[order]
+    for count in sorted({len(each) for each in topology.polygons}):
+        texels = np.stack([each for each in topology.polygons if len(each) == count])
+        pairs = np.stack([texels[:, each] for each in np.triu_indices(count, 1)], axis=-1).reshape(-1, 2)
+        wanted = pairs.min(axis=1) * crossing.size + pairs.max(axis=1)
+        first, last = np.searchsorted(keys, wanted), np.searchsorted(keys, wanted, side="right")
+        copies = last - first
+        source = np.repeat(np.arange(len(pairs)), copies)
+        nth = np.arange(len(source)) - np.repeat(np.cumsum(copies) - copies, copies)
+        beside = np.flatnonzero(copies == 0)
+        yield SpecialCells(
+            topology.addresses.texels[texels],
+            fill_polygons,
+            (count * (count - 1) // 2, count),
+            (source, places[first[source] + nth]),
+            (np.arange(texels.size), texels.ravel()),
+            (beside, pairs[beside]),
+            on_all_copies=True,
+        )
+
+
+def _own_texels(topology: TexelTopology, places: Ints) -> Ints:
+    """Flat texels at places that are a chart's own, -1 elsewhere."""
+    return np.where(topology.own.reshape(-1)[places], topology.halo.reshape(-1)[places], -1)
+
+
+def _link_places(topology: TexelTopology, cell: Ints, links: tuple[tuple[int, int, int], ...]) -> tuple[Ints, Ints]:
+    """Of links of cells [k, 3] (chart, row, column), flat, those that are stored, and where in a stencil's weights."""
+    charts, n, _ = topology.shape
+    chart, r, c = cell.T
+    at = [(r + down, c + right) for _, down, right in links]
+    stored = np.stack([(row <= n) & (column <= n) for row, column in at], axis=1)
+    shape = charts, 4, n + 1, n + 1
+    flat = [
+        np.ravel_multi_index((chart, np.full_like(chart, link), row, column), shape, mode="clip")
+        for (link, _, _), (row, column) in zip(links, at, strict=True)
+    ]
+    return np.flatnonzero(stored.ravel()), np.stack(flat, axis=1)[stored]

@@ -1,4 +1,7 @@
-"""Stiffness of a texel mesh whose texels move: what stays is worked out once, the rest is filled in anew."""
+"""Stiffness of a texel mesh whose texels move: what stays is worked out once, the rest is filled in anew.
+
+The stiffness of texels that have moved, worked out when somebody asks for it.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel import Floats, Ints, kernel
-from .assembly import LEAST_RATIO, QuadCells, quad_pass
-from .cell_sums import conductances
+from .assembly import LEAST_RATIO, Added, QuadCells, quad_pass, special_cells, whole_quads
 from .cells import quad_area
-from .fill_cells import Added
-from .irregular import IrregularLinks
-from .links import CrossingLinks, link_exists, ties_to_rim
-from .special_cells import special_cells, whole_quads
-from .stencil import Stencil
+from .riding import SurfaceRide
+from .stencil import CrossingLinks, IrregularLinks, Stencil, link_exists, ties_to_rim
+from .stiffness import conductances
 from .texel_mesh import TexelMesh
 from .topology import TexelTopology
 
@@ -203,3 +203,80 @@ def _close(weights: Floats, borders: Borders) -> None:
             total += weights[borders.copies[i]]
         for i in range(begin, end):
             weights[borders.copies[i]] = total / (end - begin)
+
+
+class MovedPlaces:
+    """Where the places of an atlas are.
+
+    Attributes
+    ----------
+    ride : SurfaceRide
+    V : float64 [n, 3]
+        Vertices [m].
+    """
+
+    def __init__(self, ride: SurfaceRide, V: NDArray[np.float64]) -> None:
+        self.ride, self.V = ride, V
+
+    @functools.cached_property
+    def around(self) -> NDArray[np.float64]:
+        """Coordinates of the texels with halo [m], [3, C, n + 2, n + 2]."""
+        return self.ride.around(self.V)
+
+
+class MovedStencil(Stencil):
+    """A stencil of cells and where they are. A GPU makes its own of it, so that nobody may ever ask for the weights.
+
+    Parameters
+    ----------
+    cells : MovingCells
+    coefficient : CellCoefficient
+    places : MovedPlaces
+    like : (MovedStencil, float), optional
+        One of which this is a multiple, and by how much.
+    """
+
+    def __init__(
+        self,
+        cells: MovingCells,
+        coefficient: CellCoefficient,
+        places: MovedPlaces,
+        like: tuple[MovedStencil, float] | None = None,
+    ) -> None:
+        self.__dict__.update(topology=cells.topology, cells=cells, coefficient=coefficient, places=places)
+        self.__dict__.update(_like=like, _fastest=None)
+
+    cells: MovingCells
+    coefficient: CellCoefficient
+    places: MovedPlaces
+    _like: tuple[MovedStencil, float] | None
+    _fastest: float | None
+
+    @functools.cached_property
+    def _made(self) -> tuple[Stencil, NDArray[np.float64]]:
+        if self._like is not None:
+            return self._like[0].scaled(self._like[1]), self._like[0].areas
+        return self.cells.assemble(self.places.around, self.coefficient)
+
+    @functools.cached_property
+    def weights(self) -> NDArray[np.float64]:
+        """Of the nine-point stencil, [C, 4, n + 1, n + 1]."""
+        return self._made[0].weights
+
+    @functools.cached_property
+    def irregular(self) -> IrregularLinks | None:
+        """The links beyond the nine points."""
+        return self._made[0].irregular
+
+    @property
+    def areas(self) -> NDArray[np.float64]:
+        """Area of the texel mesh that belongs to each texel [m^2], [C, n, n]."""
+        return self._made[1]
+
+    def note_fastest(self, rate: float) -> None:
+        """Take over what `fastest` gives from whoever knows it."""
+        self.__dict__["_fastest"] = rate
+
+    def fastest(self, mass: NDArray[np.float64]) -> float:
+        """As for any stencil, or as noted."""
+        return super().fastest(mass) if self._fastest is None else self._fastest

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..kernel import Floats, Ints, Ints32, kernel
 from ..mesh.closest import closest_points
 from .atlas import Atlas
-from .barycentrics import barycentrics_in
+from .chart_map import barycentrics_in
 
 # Rest positions further off their triangles than this, in units of the surface's size, keep that distance.
 _OFF = 1e-9

@@ -11,7 +11,7 @@ from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import Snapshot, snapshots
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import HeightMap
-from ripple_sim.solver.backends.device_field import DeviceField
+from ripple_sim.solver.backends.gl_fields import DeviceField
 from ripple_sim.solver.gl import GLContext
 
 POKE = '[[poke]]\ngeom = "egg"\ntime = 0.01\npoint = [0.0, 0.0, 0.05]\nimpulse = 1e-4\nradius = 0.02\n'

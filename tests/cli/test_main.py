@@ -123,7 +123,7 @@ def test_a_place_that_cannot_be_written_is_a_failure_in_one_line(capsys):
 
 
 def test_a_device_that_is_not_there_is_a_failure_in_one_line(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("ripple_sim.solver.gl.shared._selected", None)  # put back after the test
+    monkeypatch.setattr("ripple_sim.solver.gl.context._selected", None)  # put back after the test
     assert cli.main(["render", "sphere", "-o", str(tmp_path / "clip.mp4"), "--device", "77"]) == 1
     assert re.fullmatch(r"ripple-sim: no OpenGL .* on EGL device 77 .*\n", capsys.readouterr().err)
     assert list(tmp_path.iterdir()) == []

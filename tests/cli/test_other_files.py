@@ -14,7 +14,7 @@ from ripple_sim.errors import EncodingError, ExportError, VideoError
 from ripple_sim.export.endings import check_export
 from ripple_sim.figures.plot_page import check_plot_path
 from ripple_sim.solver import AtlasError, RippleError, load_atlas, sphere_atlas
-from ripple_sim.solver.texels.atlas_file import check_atlas_place
+from ripple_sim.solver.texels.atlas import check_atlas_place
 
 SIZE = {"width": 32, "height": 16, "fps": 25}
 FRAME = np.full((16, 32, 3), 90, np.uint8)

@@ -8,15 +8,15 @@ from ripple_sim.cli import main as cli
 from ripple_sim.diagnostics import info
 from ripple_sim.solver.backends import backend
 from ripple_sim.solver.errors import GLError
-from ripple_sim.solver.gl import egl
-from ripple_sim.solver.gl import shared as gl
+from ripple_sim.solver.gl import context
+from ripple_sim.solver.gl import context as gl
 
 
 @pytest.fixture
 def no_egl(monkeypatch):
     """Let every EGL library be missing, as on a machine without Mesa."""
     monkeypatch.setattr(gl, "_shared", {})
-    monkeypatch.setattr(egl, "_LIBRARIES", ({"libegl": "libEGL-missing.so", "libgl": "libGL-missing.so"},))
+    monkeypatch.setattr(context, "_LIBRARIES", ({"libegl": "libEGL-missing.so", "libgl": "libGL-missing.so"},))
 
 
 def report(capsys) -> dict:

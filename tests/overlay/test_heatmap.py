@@ -5,7 +5,7 @@ import pytest
 
 from ripple_sim.overlay.heatmap import grid_spacing, magnitude
 from ripple_sim.solver import HeightMap, sphere_atlas
-from ripple_sim.solver.texels.halo import with_filled_halo
+from ripple_sim.solver.texels.topology import with_filled_halo
 
 
 def test_padding_is_that_of_a_height_map() -> None:

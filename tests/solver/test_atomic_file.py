@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from ripple_sim.solver.atomic_file import OF_THE_NAME, atomic_write, final_path
+from ripple_sim.solver.files import OF_THE_NAME, atomic_write, final_path
 
 
 def names(folder: Path) -> list[str]:

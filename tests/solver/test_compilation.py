@@ -4,7 +4,7 @@ import time
 
 import numba
 
-from ripple_sim.solver.compilation import compile_times, compiling, work_clock
+from ripple_sim.solver.kernel import compile_times, compiling, work_clock
 
 
 def test_the_first_call_is_compilation_and_the_second_is_work() -> None:

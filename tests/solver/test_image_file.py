@@ -14,7 +14,7 @@ from PIL import Image
 from ripple_sim.scene.mesh_image import load_image, mesh_image
 from ripple_sim.scene.model_files import check_files
 from ripple_sim.solver import RippleError, SolverError, load_mesh, sphere_atlas
-from ripple_sim.solver.image_file import read_image
+from ripple_sim.solver.files import read_image
 from ripple_sim.solver.texels.maps import texture_map
 
 

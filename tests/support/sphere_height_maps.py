@@ -3,8 +3,8 @@
 import numpy as np
 
 from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.solver.layouts.cube.atlas import CubeChartMap
 from ripple_sim.solver.layouts.cube.convention import cube_topology, texel_directions
-from ripple_sim.solver.layouts.cube.cube_chart_map import CubeChartMap
 
 N = 24
 

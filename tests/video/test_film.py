@@ -29,7 +29,7 @@ from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.layouts.cube.convention import cube_topology, texel_directions
-from ripple_sim.solver.texels.halo import with_filled_halo
+from ripple_sim.solver.texels.topology import with_filled_halo
 from ripple_sim.video.film import Film
 from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import Progress, render_video

@@ -7,7 +7,7 @@ from scipy.sparse import diags_array
 
 from ripple_sim.solver.kernel import Floats32
 from ripple_sim.solver.operator.wave_operator import WaveOperator
-from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
+from ripple_sim.solver.texels.stencil import stiffness_matrix
 
 
 class SparseLeapfrog:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.atomic_file import atomic_write
 from ripple_sim.solver.cache import cache_path, make_room, mark_used
-from ripple_sim.solver.texels.array_file import read_arrays, write_arrays
+from ripple_sim.solver.files import atomic_write
+from ripple_sim.solver.texels.atlas import read_arrays, write_arrays
 
 # CoACD's own threshold of concavity: parts then lie up to 2.5 % of a mesh's size off the surface. With a third of its
 # usual iterations it finds as good cuts in half the time.

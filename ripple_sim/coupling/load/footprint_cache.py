@@ -10,7 +10,7 @@ from ripple_sim.coupling.patches.clusters import squared_distance
 from ripple_sim.coupling.patches.contact_patches import LoadPoints
 from ripple_sim.solver.kernel import Floats, Ints, kernel
 from ripple_sim.solver.texels.texel_mesh import TexelGrid
-from ripple_sim.solver.waves.footprint_weights import weigh
+from ripple_sim.solver.waves.footprint import weigh
 
 # A footprint is reused while its point moves by less than this share of a texel.
 _SAME_PLACE = 0.3

@@ -12,8 +12,8 @@ from ripple_sim.coupling.patches.contact_patches import LoadPoints, Patches, fin
 from ripple_sim.coupling.patches.pose import Pose, in_world
 from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
+from ripple_sim.solver.texels.chart_map import nearest_place, nearest_places
 from ripple_sim.solver.texels.distance import distance_scratch
-from ripple_sim.solver.texels.nearest import nearest_place, nearest_places
 from ripple_sim.solver.texels.texel_mesh import TexelGrid
 from ripple_sim.solver.waves.load import slot_scratch
 

@@ -9,8 +9,7 @@ import mujoco
 import numpy as np
 
 from ripple_sim.solver import Material, Mesh
-from ripple_sim.solver.operator.response import stiffness_after, stiffness_under
-from ripple_sim.solver.operator.suited import BOUNCE, damping_for, narrow_stiffness
+from ripple_sim.solver.operator.presets import BOUNCE, damping_for, narrow_stiffness, stiffness_after, stiffness_under
 
 from .coupled_model import CoupledModel
 

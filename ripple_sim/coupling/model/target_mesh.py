@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.scenes.sphere_maps import shipped_sphere_map
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
-from ripple_sim.solver.cache import content_key
-from ripple_sim.solver.kept import Kept
+from ripple_sim.solver.cache import Kept, content_key
 
 from .geoms import TARGET_TYPES, geom_name
 from .height_fields import height_field_triangles

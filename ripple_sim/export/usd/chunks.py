@@ -11,7 +11,7 @@ from ripple_sim.capture.snapshot import state_digest
 from ripple_sim.encode.mark import MARK
 from ripple_sim.encode.part import Part
 from ripple_sim.export.source import Chunking, Moment, Source
-from ripple_sim.solver.atomic_file import final_path
+from ripple_sim.solver.files import final_path
 
 from .saving import save
 

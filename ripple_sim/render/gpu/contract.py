@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 from ripple_sim.render import color
-from ripple_sim.solver.gl.contract import Struct, numbered
+from ripple_sim.solver.gl.shader import Struct, numbered
 
 MAX_LIGHTS, MAX_SHADOWS, MAX_OCCLUDERS, SOFT_BOXES = 8, 4, 16, 3
 HELD_LIGHTS = 2  # that come to fragments as varyings

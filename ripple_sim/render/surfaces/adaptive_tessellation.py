@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Bools, Floats, Floats32, Ints32, kernel
-from ripple_sim.solver.texels.chart_page import ChartPage
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 from .spline_heights import spline_heights, spline_samples
 from .tessellation import Edges

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.texels.chart_map import ChartMap
-from ripple_sim.solver.texels.chart_page import ChartPage
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 _ON_BORDER = 1e-9  # of a chart
 _BITS = 36  # of the attributes of cut points: round-off is within their last one

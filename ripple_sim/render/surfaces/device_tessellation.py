@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.render.gpu.contract import Splitting
 from ripple_sim.render.gpu.resources import Resources
-from ripple_sim.solver.texels.chart_page import ChartPage
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 from .adaptive_tessellation import AdaptiveTessellation
 

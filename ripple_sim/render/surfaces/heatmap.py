@@ -10,7 +10,7 @@ from ripple_sim.render.gpu.contract import Unit
 from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.visuals.looks import Look
 from ripple_sim.solver.errors import RippleError
-from ripple_sim.solver.texels.chart_page import ChartPage
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 from .height_maps import write_page
 

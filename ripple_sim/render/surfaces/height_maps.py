@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ripple_sim.render.gpu.contract import Unit
 from ripple_sim.render.gpu.resources import Resources
-from ripple_sim.solver.texels.chart_page import ChartPage
-from ripple_sim.solver.waves.device_height_map import DeviceHeightMap
+from ripple_sim.solver.texels.texel_atlas import ChartPage
+from ripple_sim.solver.waves.height_map import DeviceHeightMap
 
 
 class MovedHeightMap(NamedTuple):

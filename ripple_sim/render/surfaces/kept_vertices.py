@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.bounds import Balls, balls_about
-from ripple_sim.solver.cache import content_key
-from ripple_sim.solver.kept import Kept
+from ripple_sim.solver.cache import Kept, content_key
 
 from .coarse_mesh import coarse_mesh
 from .surface import Surface

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
-from ripple_sim.solver.waves.moved_gradients import MovedGradients
+from ripple_sim.solver.waves.motion import MovedGradients
 
 from .moving_vertices import Moved, MovingVertices
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Floats, Floats32, Ints, kernel
 from ripple_sim.solver.mesh.closest import closest_points, triangle_tree
-from ripple_sim.solver.texels.barycentrics import barycentrics_in
+from ripple_sim.solver.texels.chart_map import barycentrics_in
 
 
 class Moved(NamedTuple):

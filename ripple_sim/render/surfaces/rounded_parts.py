@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.render.visuals.corners import corner_normals, normalized, split_corners
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.texels.chart_map import ChartMap
-from ripple_sim.solver.texels.parts_mesh import PartsMesh, parts_mesh
+from ripple_sim.solver.texels.chart_map import ChartMap, PartsMesh, parts_mesh
 
 from .tessellation import bulges, edges_of
 

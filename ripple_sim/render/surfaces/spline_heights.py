@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver.kernel import Floats32, Ints32, kernel
-from ripple_sim.solver.texels.chart_page import ChartPage
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 
 def spline_samples(page: ChartPage, places: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

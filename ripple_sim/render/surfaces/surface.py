@@ -19,7 +19,7 @@ from ripple_sim.render.visuals.materials import look_of
 from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of
 from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.solver.errors import RippleError
-from ripple_sim.solver.image_file import read_image
+from ripple_sim.solver.files import read_image
 
 from .charts import Charts
 from .heatmap import UNDER_HEATMAP

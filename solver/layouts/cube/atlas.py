@@ -1,21 +1,142 @@
-"""The analytic atlas of a sphere: the reference on which symmetry and accuracy are tested."""
+"""The analytic atlas of a sphere: the reference on which symmetry and accuracy are tested.
+
+How good a sphere map is: folds, stretch, starved area.
+
+The cube layout's chart map: map coordinates are directions from the cube's centre.
+
+The atlas of a closed genus-0 mesh: rays through the cube map's texels onto its sphere map.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
 
-from ...checked import POSITIVE, checked
-from ...errors import AtlasError
+from ...errors import POSITIVE, AtlasError, checked
+from ...kernel import Floats, Ints
 from ...mesh.mesh import Mesh
 from ...texels.atlas import Atlas, check_points
-from ...texels.nearest import nearest_places
+from ...texels.chart_map import ChartPieces, LinearParts, nearest_places
 from ...texels.texel_mesh import TexelMesh
-from .convention import check_memory, check_resolution, cube_topology, texel_directions
-from .cube_chart_map import CubeChartMap
-from .nearest import Ball
+from ...texels.topology import TexelTopology, stretch_summary
+from ..sphere_map import certify, stretch
+from .convention import (
+    chart_uv,
+    check_memory,
+    check_resolution,
+    cube_chart_points,
+    cube_topology,
+    split_at_edges,
+    texel_areas,
+    texel_directions,
+)
+from .rays import Ball, SphereCharts, cast_rays, sphere_directions
+
+
+def sphere_map_quality(mesh: Mesh, sphere: NDArray[np.float64]) -> dict[str, float]:
+    """Flipped triangles, solid angle, quantiles of the stretch, starved share of the area; see `Atlas.quality`."""
+    certificate = certify(mesh.F, sphere)
+    return {
+        "flipped": certificate.flipped,
+        "solid_angle": certificate.solid_angle,
+        **stretch_summary(stretch(mesh.V, mesh.F, sphere), mesh.triangle_areas),
+    }
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CubeChartMap:
+    """A closed genus-0 mesh on the six charts of the cube; see `ChartMap`.
+
+    Attributes
+    ----------
+    sphere : float64 [vertex_count, 3]
+        Sphere map: one unit vector a vertex.
+    """
+
+    sphere: NDArray[np.float64]
+
+    @property
+    def layout(self) -> str:
+        """Name of the layout."""
+        return "cube"
+
+    def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Directions [k, 3] of points [k, 3] [m] that lie on triangles [k], unit vectors."""
+        return sphere_directions(mesh.V, mesh.F, self.sphere, triangles, points)
+
+    def chart_points(
+        self, coordinates: NDArray[np.float64], resolution: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Chart, row and column of directions, each [k]."""
+        return cube_chart_points(coordinates, resolution)
+
+    def compiled(self, mesh: Mesh, topology: TexelTopology) -> SphereCharts:
+        """Mesh and sphere map."""
+        return SphereCharts(mesh.V, mesh.F, self.sphere, topology.shape[1])
+
+    def linear_parts(self, mesh: Mesh) -> LinearParts:
+        """The triangles, with the directions of their corners."""
+        return LinearParts.whole(self.sphere[mesh.F])
+
+    def split(self, corners: NDArray[np.float64]) -> ChartPieces:
+        """Cut triangles with the directions [m, 3, 3] at their corners along the edges of the cube."""
+        return split_at_edges(corners)
+
+    def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Place [k, ..., 2] in charts [k], 0 to 1, of directions [k, ..., 3] that belong to them."""
+        return chart_uv(coordinates, chart)
+
+    def quality(self, mesh: Mesh) -> dict[str, float]:
+        """Folds, stretch and starved area of the sphere map."""
+        return sphere_map_quality(mesh, self.sphere)
+
+    def arrays(self) -> dict[str, NDArray]:
+        """The sphere map."""
+        return {"sphere": self.sphere}
+
+
+STRIDE = 16  # texels from one that is found by a ray to the next
+
+
+def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: int) -> Atlas:
+    """Atlas of a mesh for a given fold-free sphere map [vertex_count, 3] (unit vectors)."""
+    directions = texel_directions(check_resolution(resolution))
+    # few texels lie far apart; else a divisor of the resolution, so that every row of texels begins with a ray
+    stride = math.gcd(resolution, STRIDE) if directions.size > 3 * len(mesh.F) else 1
+    triangles, barycentrics = cast_rays(sphere, mesh.F, directions.reshape(-1, 3), stride)
+    positions, normals = _interpolate((mesh.V, mesh.vertex_normals), mesh.F, triangles, barycentrics)
+    shape = directions.shape[:3]
+    triangles, barycentrics = triangles.reshape(shape), barycentrics.reshape(*shape, 3)
+    topology = cube_topology(resolution)
+    spanned = TexelMesh.of(topology, positions.reshape(*shape, 3), normals=normals.reshape(*shape, 3))
+    areas = texel_areas(mesh, sphere, topology, spanned.areas, triangles, barycentrics)
+    return Atlas(
+        mesh=mesh,
+        texels=TexelMesh(topology, spanned.positions, spanned.normals, areas),
+        chart_map=CubeChartMap(sphere),
+        triangles=triangles,
+        barycentrics=barycentrics,
+    )
+
+
+def _interpolate(
+    at_vertices: tuple[Floats, Floats], F: Ints, triangles: Ints, barycentrics: Floats
+) -> tuple[Floats, Floats]:
+    """Positions and unit normals, [n, 3] at the vertices, at barycentric coordinates in triangles, [k, 3]."""
+    (V, vertex_normals), corners = at_vertices, F[triangles]
+    begins = np.arange(0, corners.size + 1, 3)
+    weights = csr_array((barycentrics.reshape(-1), corners.reshape(-1), begins), (len(corners), len(V)))
+    normals = weights @ vertex_normals
+    lengths = np.linalg.norm(normals, axis=1)
+    cancelled = lengths <= 1e-9  # opposite normals: any corner's will do
+    normals[cancelled], lengths[cancelled] = vertex_normals[corners[cancelled, 0]], 1.0
+    normals /= lengths[:, None]
+    return weights @ V, normals
 
 
 class SphereAtlas(Atlas):

@@ -1,9 +1,17 @@
-"""The patch layout's chart map: the mesh's triangles cut into pieces, on each of which it is linear."""
+"""The patch layout's chart map: the mesh's triangles cut into pieces, on each of which it is linear.
+
+How evenly a map onto charts spreads area.
+
+The points of a rim beside the texels of charts that end there.
+
+The atlas of any mesh in the patch layout.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+import time
 from typing import NamedTuple
 
 import numpy as np
@@ -11,12 +19,30 @@ from numpy.typing import NDArray
 
 from ...kernel import Floats, Ints, kernel, variant
 from ...mesh.mesh import Mesh
-from ...texels.barycentrics import barycentrics_at, barycentrics_in
-from ...texels.chart_map import ChartPieces, LinearParts
-from ...texels.nearest import texel_on
-from ...texels.topology import TexelTopology
-from .pieces import Pieces
-from .quality import map_quality
+from ...texels.atlas import Atlas
+from ...texels.chart_map import ChartPieces, LinearParts, barycentrics_at, barycentrics_in, texel_on
+from ...texels.texel_mesh import TexelMesh, levelled_areas
+from ...texels.topology import TexelTopology, glue, stretch_summary
+from .layout import PatchMap, patch_map
+from .pieces import Pieces, chart_pieces, warped
+from .quads import CELLS
+from .samples import Sampler, corners_in_frame_of, untangled
+from .seamless import COLUMN, FIXED, SeamlessMap, Transitions, corner_places, follow, transitions
+
+
+def map_quality(mesh: Mesh, pieces: Pieces) -> dict[str, float]:
+    """Flipped pieces, quantiles of the stretch, starved share of the area; see `Atlas.quality`."""
+    u, v = pieces.places[:, 1] - pieces.places[:, 0], pieces.places[:, 2] - pieces.places[:, 0]
+    flat = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+    real = mesh.triangle_areas[pieces.triangle] * _shares(pieces.barycentrics)
+    even = flat * mesh.area / (int(pieces.chart.max()) + 1)
+    stretch = np.sqrt(real / np.maximum(even, np.finfo(np.float64).tiny))
+    return {"flipped": int((flat <= 0).sum()), **stretch_summary(stretch, real)}
+
+
+def _shares(barycentrics: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of its triangle that each piece has."""
+    return np.abs(np.linalg.det(barycentrics))
 
 
 class PatchCharts(NamedTuple):
@@ -131,3 +157,131 @@ def _texel_on_patches(charts: PatchCharts, triangle: int, x: float, y: float, z:
         place += s * pieces.places[piece, 1, k] + t * pieces.places[piece, 2, k]
         texel = texel * n + min(max(int(np.rint(place * n - 0.5)), 0), n - 1)
     return texel
+
+
+def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDArray) -> NDArray[np.float64] | None:
+    """Positions with halo [C, n + 2, n + 2, 3] [m]; beyond a rim lies its point opposite to each texel.
+
+    None if there is no rim. At the end of a rim, where that turns, lies its corner.
+    """
+    if not topology.rim.any():
+        return None
+    beyond = topology.with_halo(positions)
+    beyond[(topology.halo < 0) | topology.rim] = np.nan
+    sides = patches.surface.edges.sides[patches.surface.edges.rim, 0]
+    seamless = patches.seamless
+    _draw_rims(seamless, patches.surface.V, sides, transitions(seamless.glued), beyond)
+    n = topology.shape[1]
+    for chart, corner in np.argwhere(topology.valence == 0):
+        row, column = ((0, 0), (0, n + 1), (n + 1, n + 1), (n + 1, 0))[corner]
+        if not topology.rim[chart, row, column]:
+            continue
+        other, r, c = np.unravel_index(topology.halo[chart, row, column], topology.shape)
+        if other != chart:
+            out_r, out_c = (0 if x == 0 else n + 1 for x in (r, c))
+            along_rows = topology.rim[other, out_r, c + 1]
+            beyond[chart, row, column] = beyond[other, out_r, c + 1] if along_rows else beyond[other, r + 1, out_c]
+    _place_corners(patches, topology, beyond)
+    return beyond
+
+
+def _place_corners(patches: PatchMap, topology: TexelTopology, beyond: NDArray[np.float64]) -> None:
+    """Put the points in which a single chart ends at a rim into the corners of its halo."""
+    seamless, surface = patches.seamless, patches.surface
+    held = np.zeros(len(surface.V), bool)
+    held[surface.edges.ends[surface.edges.rim]] = True
+    held &= seamless.freedom == FIXED
+    triangle, k = np.nonzero(held[surface.F])
+    column, row = seamless.shift[triangle, k].T * (beyond.shape[1] - 1)
+    chart = seamless.frame[triangle]
+    alone = topology.rim[chart, row, column]
+    beyond[chart[alone], row[alone], column[alone]] = surface.V[surface.F[triangle, k]][alone]
+
+
+@kernel
+def _draw_rims(seamless: SeamlessMap, V: Floats, sides: Ints, across: Transitions, beyond: Floats) -> None:
+    n = beyond.shape[1] - 2
+    p = np.empty((3, 2))
+    for h in sides:
+        f, k = h // 3, h % 3
+        a, b = seamless.F[f, k], seamless.F[f, (k + 1) % 3]
+        anchor = k if seamless.freedom[a] != FIXED else (k + 1) % 3
+        v = seamless.F[f, anchor]
+        corners_in_frame_of(seamless, f, anchor, p)
+        axis = 0 if seamless.freedom[v] == COLUMN else 1
+        low, high = p[k, axis], p[(k + 1) % 3, axis]
+        first = int(np.ceil(min(low, high) * n - 0.5 - 1e-9))
+        last = int(np.floor(max(low, high) * n - 0.5 + 1e-9))
+        for i in range(first, last + 1):
+            along = (i + 0.5) / n
+            t = min(max((along - low) / (high - low), 0.0), 1.0)
+            qx, qy = (along, p[anchor, 1]) if axis == 0 else (p[anchor, 0], along)
+            chart, _, _, _, x, y = follow(seamless.chart[v], p[anchor, 0], p[anchor, 1], qx, qy, seamless.glued, across)
+            row, column = int(np.floor(y * n)) + 1, int(np.floor(x * n)) + 1
+            if abs(y) < 1e-9:
+                row = 0
+            elif abs(y - 1) < 1e-9:
+                row = n + 1
+            elif abs(x) < 1e-9:
+                column = 0
+            else:
+                column = n + 1
+            for j in range(3):
+                beyond[chart, row, column, j] = (1 - t) * V[a, j] + t * V[b, j]
+
+
+_LEAST_TEXELS = 4  # along a chart's side
+
+# Texels of a cell that is worth having: five charts of 7 x 7. A coarse atlas has fewer cells, but not below the least.
+_TEXELS_OF_CELL, _LEAST_CELLS = 245, 24
+
+
+def patch_atlas(mesh: Mesh, resolution: int) -> Atlas:
+    """Atlas of about 6 N^2 texels, for a resolution N.
+
+    Raises
+    ------
+    AtlasError
+        If the mesh cannot be laid out.
+    """
+    start = time.perf_counter()
+    patches = patch_map(mesh.V, mesh.F, cells_for(resolution))
+    mapped = time.perf_counter()
+    atlas = atlas_from_patch_map(mesh, patches, resolution)
+    atlas.timings.update(patch_map=mapped - start, texels=time.perf_counter() - mapped)
+    return atlas
+
+
+def cells_for(resolution: int) -> int:
+    """How many cells a mesh is cut into."""
+    return int(np.clip(6 * resolution**2 / _TEXELS_OF_CELL, _LEAST_CELLS, CELLS))
+
+
+def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atlas:
+    """Put texels on a mesh that is laid out on charts."""
+    glued = patches.seamless.glued
+    n = max(round(resolution * np.sqrt(6 / len(glued))), _LEAST_TEXELS)
+    sampler = Sampler(mesh, patches)
+    samples = sampler.everywhere(n)
+    topology = glue(glued, n)
+    beyond = positions_beyond(patches, topology, samples.positions)
+    samples, offsets = untangled(sampler, topology, samples, beyond)
+    pieces = chart_pieces(patches)
+    if offsets.any():
+        pieces, beyond = warped(pieces, offsets), positions_beyond(patches, topology, samples.positions)
+    spanned = TexelMesh.of(topology, samples.positions, normals=samples.normals, beyond=beyond)
+    areas = levelled_areas(topology, spanned.areas, _map_ratios(patches)[samples.small] / n**2)
+    return Atlas(
+        mesh=mesh,
+        texels=TexelMesh(topology, samples.positions, samples.normals, areas, beyond),
+        chart_map=PatchChartMap(pieces),
+        triangles=samples.triangles,
+        barycentrics=samples.barycentrics,
+    )
+
+
+def _map_ratios(patches: PatchMap) -> NDArray[np.float64]:
+    """Real area of each triangle for each unit of its area on the charts [m^2], [m]."""
+    places = corner_places(patches.seamless)
+    u, v = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
+    return patches.surface.areas / ((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2)

@@ -10,9 +10,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from .collapse import without_cuts
-from .part import CELLS, Part
-from .quads import Quads
-from .relax import relax
+from .quads import CELLS, Part, Quads
+from .relaxation import relax
 from .seamless import SeamlessMap, seamless_map
 from .surface import Surface
 

@@ -2,6 +2,12 @@
 
 In the family of Praun and Hoppe (2003) and of Hu, Fu and Liu (2017). What is new here is the carried area
 (`reference`), and a triple-product barrier with Newton steps on every level (`energy`, `newton`).
+
+Bringing one level to the minimum of its energy: sweeps first, then Newton steps.
+
+Far from the minimum a Newton step is cut short by the steepest of the energy's walls, wherever it stands, and an exact
+direction is wasted. So conjugate gradients start with few steps, and get more once whole Newton steps succeed, and
+after a step cut short a sweep clears the spots that were in the way.
 """
 
 from __future__ import annotations
@@ -11,15 +17,54 @@ from numpy.typing import NDArray
 
 from ...errors import SphereMapError
 from ...kernel import Floats
-from .alignment import align
-from .certificate import certify
-from .corner_table import CornerTable, corner_table, following, preceding
-from .decimation import decimate
-from .energy import Reference
-from .insertion import insert_vertices
-from .level import build_level
-from .reference import Source, carry, update_level
-from .relax_level import relax_level
+from .certificate import align, certify
+from .decimation import CornerTable, corner_table, decimate, following, preceding
+from .energy import Reference, total_energy
+from .hessian import newton_step
+from .level import Level, Source, build_level, carry, star_shapes, update_level
+from .relaxation import insert_vertices, sweep
+
+MOST_SWEEPS, TIRED_SWEEP = 5, 0.1  # stop when a sweep lowers the energy by less than this share
+MOST_NEWTON_STEPS, TIRED_NEWTON = 20, 5e-3  # stop when two steps in a row do
+LARGE, TIRED_LARGE = 8000, 1.5e-2  # vertices of a level that is content with less
+LEAST_CG_STEPS, MOST_CG_STEPS = 10, 60
+SHORT_STEP = 0.3  # a Newton step cut to less than this asks for fewer steps of conjugate gradients
+EXPLODED = 1e5 * 4 * np.pi  # energy of a level that is stuck: start over from the sweeps
+MOST_ROUNDS = 4
+
+
+def relax_level(level: Level, S: Floats, reference: Reference) -> None:
+    """Lower the energy of a level in place: sweeps until they tire, then Newton steps."""
+    shapes = star_shapes(level.star, reference)
+    for _ in range(MOST_ROUNDS):
+        _sweep_until_tired(level, S, reference, shapes)
+        _newton_until_tired(level, S, reference, shapes)
+        if total_energy(level.tail, S, reference) < EXPLODED:
+            return
+
+
+def _sweep_until_tired(level: Level, S: Floats, reference: Reference, shapes: Floats) -> None:
+    for i in range(MOST_SWEEPS):
+        fall = sweep(level, S, shapes, i % 2 == 0)
+        if fall < TIRED_SWEEP * total_energy(level.tail, S, reference):
+            return
+
+
+def _newton_until_tired(level: Level, S: Floats, reference: Reference, shapes: Floats) -> None:
+    tired = TIRED_NEWTON if len(S) < LARGE else TIRED_LARGE
+    cg_steps, slow = LEAST_CG_STEPS, 0
+    for i in range(MOST_NEWTON_STEPS):
+        fall, step = newton_step(level, S, reference, cg_steps)
+        if step < 1.0:
+            fall += sweep(level, S, shapes, i % 2 == 0)
+        slow = slow + 1 if fall < tired * total_energy(level.tail, S, reference) else 0
+        if slow == 2:
+            return
+        if step >= 1.0:
+            cg_steps = min(2 * cg_steps, MOST_CG_STEPS)
+        elif step < SHORT_STEP:
+            cg_steps = max(cg_steps // 2, LEAST_CG_STEPS)
+
 
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 GRID = 2.0**32  # the normalised mesh is rounded to multiples of 1 / GRID

@@ -8,7 +8,7 @@ from ripple_sim.render.surfaces.adaptive_tessellation import AdaptiveTessellatio
 from ripple_sim.render.surfaces.tessellation import edges_of, midpoints
 from ripple_sim.render.visuals import primitives as meshes
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points
-from ripple_sim.solver.texels.chart_page import ChartPage
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 POSITION, NORMAL, SPHERE = slice(0, 3), slice(3, 6), slice(6, 9)
 

@@ -7,7 +7,7 @@ from sphere_height_maps import cube_charts
 from ripple_sim.render.surfaces.charts import Charts, VertexColumns, shared_places, split_at_charts
 from ripple_sim.render.visuals import primitives
 from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS
-from ripple_sim.solver.texels.chart_page import ChartPage
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 COLUMNS = VertexColumns(slice(0, 3), slice(3, 6), slice(6, 9))
 

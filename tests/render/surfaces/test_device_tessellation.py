@@ -9,7 +9,7 @@ from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.surfaces import device_tessellation
 from ripple_sim.render.visuals import primitives
 from ripple_sim.solver import HeightMap, sphere_atlas
-from ripple_sim.solver.backends.device_field import DeviceField
+from ripple_sim.solver.backends.gl_fields import DeviceField
 
 N, SIZE = 16, (120, 480)  # so high that there are edges to be split
 

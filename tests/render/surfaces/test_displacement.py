@@ -10,7 +10,7 @@ from ripple_sim.render.surfaces.spline_heights import spline_heights
 from ripple_sim.render.surfaces.tessellation import Edges
 from ripple_sim.render.surfaces.vertices import DIRECTION, POSITION, UV, SurfaceVertices
 from ripple_sim.render.visuals.occluders import Occluders
-from ripple_sim.solver.texels.chart_page import ChartPage
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 N = 8
 PAGE = ChartPage(6, N)

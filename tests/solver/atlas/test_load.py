@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import Atlas, AtlasError, SphereAtlas, load_atlas, sphere_atlas
-from ripple_sim.solver.texels.atlas_file import FORMAT
+from ripple_sim.solver.texels.atlas import FORMAT
 
 
 def test_save_and_load(animal: Atlas, tmp_path: Path) -> None:
@@ -36,7 +36,7 @@ def test_damaged_files_are_refused(tmp_path: Path) -> None:
 
 def test_files_of_another_version_are_refused(animal: Atlas, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     animal.save(tmp_path / "atlas.npz")
-    monkeypatch.setattr("ripple_sim.solver.texels.atlas_file.FORMAT", FORMAT + 1)
+    monkeypatch.setattr("ripple_sim.solver.texels.atlas.FORMAT", FORMAT + 1)
     with pytest.raises(AtlasError, match="another version"):
         load_atlas(tmp_path / "atlas.npz")
     with pytest.raises(AtlasError, match="does not exist"):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.solver.backends.coefficients import row_of, value_at, value_in
+from ripple_sim.solver.backends.stencil_loops import row_of, value_at, value_in
 from ripple_sim.solver.kernel import kernel
 
 

@@ -5,8 +5,7 @@ import pytest
 import trimesh
 
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
-from ripple_sim.solver.layouts.cube.areas import solid_angles
-from ripple_sim.solver.layouts.cube.convention import cube_rotations, permute_texels
+from ripple_sim.solver.layouts.cube.convention import cube_rotations, permute_texels, solid_angles
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
 

@@ -6,9 +6,9 @@ import trimesh
 from genus_zero import bipyramid, icosphere, spiky
 
 from ripple_sim.solver import AtlasError, Mesh
-from ripple_sim.solver.layouts.cube import cube_atlas
+from ripple_sim.solver.layouts.cube import atlas
+from ripple_sim.solver.layouts.cube.atlas import _interpolate, atlas_from_sphere_map
 from ripple_sim.solver.layouts.cube.convention import cube_rotations, permute_texels, texel_directions
-from ripple_sim.solver.layouts.cube.cube_atlas import _interpolate, atlas_from_sphere_map
 
 BALL = Mesh(*icosphere(2))
 
@@ -54,7 +54,7 @@ def test_casting_a_few_rays_or_all_gives_the_same_atlas(monkeypatch: pytest.Monk
     sphere = icosphere(3)[0]
     few = atlas_from_sphere_map(Mesh(V, F), sphere, 16)
     assert texel_directions(16).size > 3 * len(F)
-    monkeypatch.setattr(cube_atlas, "STRIDE", 1)
+    monkeypatch.setattr(atlas, "STRIDE", 1)
     every = atlas_from_sphere_map(Mesh(V, F), sphere, 16)
     np.testing.assert_allclose(few.positions, every.positions, atol=1e-12)
     np.testing.assert_allclose(few.areas, every.areas, rtol=1e-9)

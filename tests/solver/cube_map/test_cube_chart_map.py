@@ -5,9 +5,9 @@ import pytest
 from genus_zero import icosphere
 
 from ripple_sim.solver import Mesh
+from ripple_sim.solver.layouts.cube.atlas import CubeChartMap
 from ripple_sim.solver.layouts.cube.convention import texel_directions
-from ripple_sim.solver.layouts.cube.cube_chart_map import CubeChartMap
-from ripple_sim.solver.layouts.cube.nearest import texel_at
+from ripple_sim.solver.layouts.cube.rays import texel_at
 
 
 @pytest.fixture(scope="module")

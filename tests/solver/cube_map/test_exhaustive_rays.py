@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from genus_zero import bipyramid, icosphere
 
-from ripple_sim.solver.layouts.cube.exhaustive_rays import cast_rays_exhaustively
+from ripple_sim.solver.layouts.cube.rays import cast_rays_exhaustively
 
 V, F = bipyramid(4)
 

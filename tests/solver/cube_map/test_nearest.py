@@ -5,7 +5,7 @@ import pytest
 
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points, cube_rotations, texel_directions
-from ripple_sim.solver.layouts.cube.nearest import sphere_directions, texel_at
+from ripple_sim.solver.layouts.cube.rays import sphere_directions, texel_at
 
 
 @pytest.mark.parametrize("n", [4, 7, 32])

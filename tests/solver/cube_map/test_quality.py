@@ -5,8 +5,8 @@ import pytest
 from genus_zero import TETRAHEDRON, icosphere
 
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.layouts.cube.quality import sphere_map_quality
-from ripple_sim.solver.texels.stretch import QUANTILES
+from ripple_sim.solver.layouts.cube.atlas import sphere_map_quality
+from ripple_sim.solver.texels.topology import QUANTILES
 
 
 def unit(V: np.ndarray) -> np.ndarray:

@@ -10,8 +10,7 @@ import trimesh
 
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.layouts.cube.convention import texel_directions
-from ripple_sim.solver.layouts.cube.exhaustive_rays import cast_rays_exhaustively
-from ripple_sim.solver.layouts.cube.rays import cast_rays
+from ripple_sim.solver.layouts.cube.rays import cast_rays, cast_rays_exhaustively
 
 
 def surface_points(atlas: Atlas, triangles: np.ndarray, barycentrics: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.gl.contract import Struct, numbered
+from ripple_sim.solver.gl.shader import Struct, numbered
 
 INNER = Struct("Inner", direction="vec4", planes="mat4")
 OUTER = Struct("Outer", first="vec4", many=("vec4", 3), rotation="mat3", inner=(INNER, 2), matrix="mat4", last="vec4")

@@ -6,7 +6,7 @@ import pytest
 
 from ripple_sim.solver import GLError
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.gl.egl import create_context, current_context, load_egl
+from ripple_sim.solver.gl.context import create_context, current_context, load_egl
 
 
 @pytest.mark.parametrize("device", [99, 1000])

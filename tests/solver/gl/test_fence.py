@@ -5,7 +5,7 @@ import ctypes
 import pytest
 
 from ripple_sim.solver import GLError
-from ripple_sim.solver.gl.fence import Fences
+from ripple_sim.solver.gl.context import Fences
 
 ALREADY, EXPIRED, SATISFIED, FAILED = 0x911A, 0x911B, 0x911C, 0x911D
 

@@ -2,7 +2,7 @@ import sys
 
 import pytest
 
-from ripple_sim.solver.gl import program_pool, shared_context
+from ripple_sim.solver.gl import context, shared_context
 
 _SHADER = """#version 430
 layout(local_size_x = 1) in;
@@ -45,8 +45,8 @@ class Compiled:
 
 def test_a_full_pool_lets_go_of_what_has_been_idle_for_longest(monkeypatch):
     """It refused what came later, so that what was used now was compiled each time."""
-    monkeypatch.setattr(program_pool, "_MOST", 2)
-    pool, programs = program_pool.ProgramPool(), [Compiled(number) for number in range(4)]
+    monkeypatch.setattr(context, "_MOST", 2)
+    pool, programs = context.ProgramPool(), [Compiled(number) for number in range(4)]
     new = Compiled(4)
     for program in programs[:3]:
         assert pool.take((f"source {program.glo}",), lambda program=program: program) is program

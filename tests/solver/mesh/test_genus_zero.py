@@ -5,7 +5,7 @@ import pytest
 from solids import cube, torus
 
 from ripple_sim.solver import Mesh, MeshError, build_atlas
-from ripple_sim.solver.mesh.genus_zero import check_genus_zero
+from ripple_sim.solver.mesh.mesh import check_genus_zero
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from sound import assert_sound, assert_unchanged_when_read_again
 
 from ripple_sim.solver import MeshError, load_mesh
-from ripple_sim.solver.mesh.genus_zero import check_genus_zero
+from ripple_sim.solver.mesh.mesh import check_genus_zero
 
 
 def test_files_of_every_format_give_the_same_surface(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 from surfaces import sphere
 
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.mesh.normals import vertex_normals
+from ripple_sim.solver.mesh.mesh import vertex_normals
 
 
 def least_cosine(mesh: Mesh) -> float:

@@ -9,7 +9,7 @@ import pytest
 from mesh_text import CORNERS, L_SHAPE, QUADS, obj, off, prism, written
 
 from ripple_sim.solver import load_mesh
-from ripple_sim.solver.mesh.polygons import triangulate
+from ripple_sim.solver.mesh.ply import triangulate
 
 HEXAGON = [(np.cos(a), np.sin(a)) for a in np.arange(6) * np.pi / 3]
 

@@ -6,7 +6,7 @@ import pytest
 
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver.mesh.closest import TriangleTree, closest_points, refitted, triangle_tree
-from ripple_sim.solver.texels.barycentrics import barycentrics_in
+from ripple_sim.solver.texels.chart_map import barycentrics_in
 
 
 def by_igl(V: np.ndarray, F: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

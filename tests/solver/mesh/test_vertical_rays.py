@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from ripple_sim.solver.mesh.vertical_rays import downward_hits
+from ripple_sim.solver.mesh.closest import downward_hits
 
 
 def hits(solid: trimesh.Trimesh, xy: list) -> np.ndarray:

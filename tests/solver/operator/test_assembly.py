@@ -10,7 +10,7 @@ from scipy.special import erf
 
 from ripple_sim.solver import Material, SolverError, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
 from ripple_sim.solver.operator.assembly import source_grip
-from ripple_sim.solver.texels.softening import softening
+from ripple_sim.solver.texels.texel_mesh import softening
 
 
 def test_baselines_do_not_converge() -> None:

@@ -6,7 +6,7 @@ from scipy.linalg import eigh
 
 from ripple_sim.solver import Atlas, sphere_atlas
 from ripple_sim.solver.operator.deep_water import HalfLaplacian
-from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
+from ripple_sim.solver.texels.stencil import stiffness_matrix
 
 
 @pytest.fixture(scope="module")

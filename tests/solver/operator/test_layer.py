@@ -8,7 +8,7 @@ from hand_made import flat_torus
 
 from ripple_sim import RippleWarning
 from ripple_sim.solver import Material, SolverError, WaveSolver, sphere_atlas, texel_atlas
-from ripple_sim.solver.operator.layer_mode import lowest_square
+from ripple_sim.solver.operator.material import lowest_square
 
 MODULUS, VISCOSITY, DENSITY = 3000.0, 0.5, 1100.0
 SQUARE, RELAXATION = MODULUS / DENSITY, VISCOSITY / MODULUS  # c_T^2 [m^2/s^2], eta / G [s]

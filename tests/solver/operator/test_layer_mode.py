@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.solver.operator.layer_mode import lowest_square
+from ripple_sim.solver.operator.material import lowest_square
 
 
 def test_short_waves_do_not_feel_the_base_and_run_as_rayleigh_s() -> None:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from hand_made import square
 
-from ripple_sim.solver.operator.step_coefficients import number_or_field, step_coefficients
-from ripple_sim.solver.operator.wave_operator import WaveOperator
+from ripple_sim.solver.operator.wave_operator import WaveOperator, number_or_field, step_coefficients
 
 SHAPE = (1, 4, 4)
 

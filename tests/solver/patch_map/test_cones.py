@@ -3,14 +3,12 @@
 import numpy as np
 from surfaces import torus
 
-from ripple_sim.solver.layouts.patches.cells import centred_cells, spread_seeds
+from ripple_sim.solver.layouts.patches.cells import Metric, centred_cells, spread_seeds
 from ripple_sim.solver.layouts.patches.cones import move_tips
-from ripple_sim.solver.layouts.patches.disks import disk_cells
-from ripple_sim.solver.layouts.patches.distances import Metric
+from ripple_sim.solver.layouts.patches.disks import disk_cells, signed_areas
 from ripple_sim.solver.layouts.patches.energy import reference_of, total_energy
-from ripple_sim.solver.layouts.patches.flatten import signed_areas
-from ripple_sim.solver.layouts.patches.located import locate_texels
 from ripple_sim.solver.layouts.patches.quads import cut_into_quads
+from ripple_sim.solver.layouts.patches.samples import locate_texels
 from ripple_sim.solver.layouts.patches.seamless import FIXED, FREE, corner_places, seamless_map, transitions
 from ripple_sim.solver.layouts.patches.surface import Surface
 

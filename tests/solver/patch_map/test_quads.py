@@ -5,11 +5,8 @@ import pytest
 from surfaces import disk, sphere, torus
 
 from ripple_sim.solver import glue
-from ripple_sim.solver.layouts.patches.borders import BorderedCells
-from ripple_sim.solver.layouts.patches.cells import centred_cells, spread_seeds
-from ripple_sim.solver.layouts.patches.disks import disk_cells
-from ripple_sim.solver.layouts.patches.distances import Metric
-from ripple_sim.solver.layouts.patches.flatten import signed_areas
+from ripple_sim.solver.layouts.patches.cells import BorderedCells, Metric, centred_cells, spread_seeds
+from ripple_sim.solver.layouts.patches.disks import disk_cells, signed_areas
 from ripple_sim.solver.layouts.patches.quads import Quads, cut_into_large_quads, cut_into_quads
 from ripple_sim.solver.layouts.patches.surface import Surface
 

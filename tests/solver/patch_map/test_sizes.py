@@ -4,9 +4,8 @@ import numpy as np
 from surfaces import sphere
 
 from ripple_sim.solver import Mesh
-from ripple_sim.solver.layouts.patches.distances import Metric
-from ripple_sim.solver.layouts.patches.patch_atlas import patch_atlas
-from ripple_sim.solver.layouts.patches.sizes import cell_sizes
+from ripple_sim.solver.layouts.patches.atlas import patch_atlas
+from ripple_sim.solver.layouts.patches.cells import Metric, cell_sizes
 from ripple_sim.solver.layouts.patches.surface import Surface
 
 TIPS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)

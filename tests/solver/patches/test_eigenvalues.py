@@ -8,8 +8,8 @@ from hand_made import eigenvalues
 from surfaces import disk, sphere, square
 
 from ripple_sim.solver import Mesh, TexelMesh
+from ripple_sim.solver.layouts.patches.atlas import atlas_from_patch_map
 from ripple_sim.solver.layouts.patches.layout import patch_map
-from ripple_sim.solver.layouts.patches.patch_atlas import atlas_from_patch_map
 
 MODES = 10
 

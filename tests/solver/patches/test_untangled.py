@@ -5,11 +5,10 @@ import pytest
 from surfaces import sphere
 
 from ripple_sim.solver import Atlas, Mesh, glue
+from ripple_sim.solver.layouts.patches.atlas import atlas_from_patch_map
 from ripple_sim.solver.layouts.patches.layout import patch_map
-from ripple_sim.solver.layouts.patches.patch_atlas import atlas_from_patch_map
 from ripple_sim.solver.layouts.patches.samples import Sampler
-from ripple_sim.solver.texels.quality import folded_texels
-from ripple_sim.solver.texels.texel_mesh import TexelMesh
+from ripple_sim.solver.texels.texel_mesh import TexelMesh, folded_texels
 
 N = 24
 

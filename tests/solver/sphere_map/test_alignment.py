@@ -8,11 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from ripple_sim.solver import Mesh, WaveSolver, build_atlas
 from ripple_sim.solver.layouts.build import atlas_from_sphere_map
-from ripple_sim.solver.layouts.sphere_map import alignment, progressive_sphere_map
+from ripple_sim.solver.layouts.sphere_map import certificate, progressive_sphere_map
 
 
 def test_candidate_rotations_are_rotations_and_leave_no_gap():
-    rotations = alignment.spread_rotations(2000)
+    rotations = certificate.spread_rotations(2000)
     np.testing.assert_allclose(
         rotations @ rotations.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (2000, 3, 3)), atol=1e-12
     )
@@ -33,21 +33,21 @@ def test_turning_the_cube_lengthens_the_time_step():
     others = [step(S @ rotation.T) for rotation in Rotation.random(12, random_state=1).as_matrix()]
     assert step(S) > np.median(others)
     # wherever the map starts from
-    again = alignment.align(V, F, S @ Rotation.random(random_state=7).as_matrix().T)
+    again = certificate.align(V, F, S @ Rotation.random(random_state=7).as_matrix().T)
     assert step(again) > np.median(others)
 
 
 def test_narrow_texels_are_found_where_they_are():
     """On the round sphere the narrowest texel is pi/4 cos(45 deg) of two, in every alignment."""
     V, F = sphere(5)
-    metric, area = alignment._vertex_metrics(F.astype(np.int32), V, V)
+    metric, area = certificate._vertex_metrics(F.astype(np.int32), V, V)
     np.testing.assert_allclose(area.sum(), 4 * np.pi, rtol=0.01)
     one = np.array([1.0])
     for direction, width in (([0, 0, 1], 1), ([0, 1, 1], np.sqrt(0.5)), ([1, 0, 1], np.sqrt(0.5))):
         p = np.array([direction]) / np.linalg.norm(direction)
         tangent = np.eye(3) - p.T @ p
         pure = np.array([[*np.diag(tangent), tangent[0, 1], tangent[0, 2], tangent[1, 2]]])
-        found = alignment._narrowness(np.eye(3), p, pure, one, np.inf) ** (-1 / (2 * alignment.SHARPNESS))
+        found = certificate._narrowness(np.eye(3), p, pure, one, np.inf) ** (-1 / (2 * certificate.SHARPNESS))
         assert found == pytest.approx(width)
     nearest = np.argmax(V @ [0.6, 0, 0.8])
     tangent = np.eye(3) - np.outer(V[nearest], V[nearest])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from genus_zero import TETRAHEDRON, bipyramid, icosphere
 
-from ripple_sim.solver.layouts.sphere_map.corner_table import (
+from ripple_sim.solver.layouts.sphere_map.decimation import (
     collapse,
     corner_table,
     following,

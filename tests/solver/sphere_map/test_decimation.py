@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from genus_zero import SHAPES, TETRAHEDRON, crumpled, icosphere
 
-from ripple_sim.solver.layouts.sphere_map.corner_table import corner_table, undo_collapse
-from ripple_sim.solver.layouts.sphere_map.decimation import decimate
+from ripple_sim.solver.layouts.sphere_map.decimation import corner_table, decimate, undo_collapse
 
 
 def decimated(V, F):

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.solver.layouts.sphere_map.density_hessian import projected_hessian
-from ripple_sim.solver.layouts.sphere_map.energy import density_derivatives
+from ripple_sim.solver.layouts.sphere_map.energy import density_derivatives, projected_hessian
 
 # det of the 2 x 2 map (p, q; r, s) is p s - q r: its second derivative
 SECOND_OF_J = np.array([[0, 0, 0, 1], [0, 0, -1, 0], [0, -1, 0, 0], [1, 0, 0, 0]], dtype=float)

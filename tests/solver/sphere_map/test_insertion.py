@@ -5,11 +5,10 @@ import pytest
 from genus_zero import bipyramid, crumpled, icosphere, spiky, stretched
 
 from ripple_sim.solver.layouts.sphere_map.certificate import certify
-from ripple_sim.solver.layouts.sphere_map.corner_table import corner_table, following, preceding
-from ripple_sim.solver.layouts.sphere_map.decimation import decimate
+from ripple_sim.solver.layouts.sphere_map.decimation import corner_table, decimate, following, preceding
 from ripple_sim.solver.layouts.sphere_map.energy import Reference, total_energy
-from ripple_sim.solver.layouts.sphere_map.insertion import insert_vertices
-from ripple_sim.solver.layouts.sphere_map.reference import Source, carry, update_level
+from ripple_sim.solver.layouts.sphere_map.level import Source, carry, update_level
+from ripple_sim.solver.layouts.sphere_map.relaxation import insert_vertices
 
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 SHAPES = {

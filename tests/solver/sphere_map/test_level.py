@@ -5,8 +5,7 @@ import pytest
 from genus_zero import TETRAHEDRON, bipyramid, icosphere
 from levels import whole_level
 
-from ripple_sim.solver.layouts.sphere_map.corner_table import collapse, corner_table
-from ripple_sim.solver.layouts.sphere_map.decimation import decimate
+from ripple_sim.solver.layouts.sphere_map.decimation import collapse, corner_table, decimate
 from ripple_sim.solver.layouts.sphere_map.level import build_level, star_shapes
 
 

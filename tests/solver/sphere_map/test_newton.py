@@ -4,7 +4,7 @@ import numpy as np
 from levels import icosphere, whole_level
 
 from ripple_sim.solver.layouts.sphere_map.energy import total_energy
-from ripple_sim.solver.layouts.sphere_map.newton import newton_step
+from ripple_sim.solver.layouts.sphere_map.hessian import newton_step
 
 
 def test_newton_steps_reach_the_minimum_of_a_perturbed_sphere():

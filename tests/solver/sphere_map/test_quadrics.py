@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from genus_zero import bipyramid, crumpled
 
-from ripple_sim.solver.layouts.sphere_map.quadrics import quadric_error, vertex_quadrics
+from ripple_sim.solver.layouts.sphere_map.decimation import quadric_error, vertex_quadrics
 
 
 def quadrics_of(V, F):

@@ -5,10 +5,9 @@ import pytest
 from genus_zero import crumpled, icosphere, stretched
 from levels import whole_level
 
-from ripple_sim.solver.layouts.sphere_map.corner_table import corner_table, gather_star
-from ripple_sim.solver.layouts.sphere_map.decimation import decimate
+from ripple_sim.solver.layouts.sphere_map.decimation import corner_table, decimate, gather_star
 from ripple_sim.solver.layouts.sphere_map.energy import Reference
-from ripple_sim.solver.layouts.sphere_map.reference import Source, carry, update_level, update_load, update_triangle
+from ripple_sim.solver.layouts.sphere_map.level import Source, carry, update_level, update_load, update_triangle
 
 EQUILATERAL = 1 / np.sqrt(3)
 

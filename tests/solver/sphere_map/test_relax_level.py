@@ -6,7 +6,7 @@ from levels import crumpled, icosphere, whole_level
 
 from ripple_sim.solver.layouts.sphere_map.certificate import certify
 from ripple_sim.solver.layouts.sphere_map.energy import total_energy
-from ripple_sim.solver.layouts.sphere_map.relax_level import relax_level
+from ripple_sim.solver.layouts.sphere_map.progressive import relax_level
 
 
 def perturbed(V):

@@ -5,9 +5,9 @@ import pytest
 from levels import crumpled, icosphere, whole_level
 
 from ripple_sim.solver.layouts.sphere_map.energy import total_energy
+from ripple_sim.solver.layouts.sphere_map.hessian import tangents
 from ripple_sim.solver.layouts.sphere_map.level import star_shapes
-from ripple_sim.solver.layouts.sphere_map.newton import tangents
-from ripple_sim.solver.layouts.sphere_map.star import TERMS, energy_after, expand, slopes, tangent_move
+from ripple_sim.solver.layouts.sphere_map.relaxation import TERMS, energy_after, expand, slopes, tangent_move
 
 
 def star_terms(level, S, reference, v):

@@ -3,16 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.solver.layouts.sphere_map.vectors import (
-    combine,
-    cross,
-    dot,
-    row,
-    set_row,
-    subtract,
-    tangent_frame,
-    unit,
-)
+from ripple_sim.solver.layouts.sphere_map.energy import combine, cross, dot, row, set_row, subtract, tangent_frame, unit
 
 AXES = [tuple(sign * each) for each in np.eye(3) for sign in (1.0, -1.0)]
 # the frame changes its recipe where |x| = 0.6

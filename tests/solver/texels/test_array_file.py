@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ripple_sim.solver.texels.array_file import read_arrays, write_arrays
+from ripple_sim.solver.texels.atlas import read_arrays, write_arrays
 
 
 @pytest.fixture

@@ -6,11 +6,10 @@ from genus_zero import icosphere
 from hand_made import square, two_squares
 
 from ripple_sim.solver import Mesh, texel_atlas
+from ripple_sim.solver.layouts.cube.atlas import CubeChartMap
 from ripple_sim.solver.layouts.cube.convention import cube_topology
-from ripple_sim.solver.layouts.cube.cube_chart_map import CubeChartMap
 from ripple_sim.solver.texels.chart_map import texture_coordinates
-from ripple_sim.solver.texels.halo import with_filled_halo
-from ripple_sim.solver.texels.sampling import sampling_matrix
+from ripple_sim.solver.texels.topology import sampling_matrix, with_filled_halo
 
 
 def test_on_a_flat_square_texture_coordinates_are_the_points_themselves() -> None:

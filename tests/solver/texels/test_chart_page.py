@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.solver.texels.chart_page import ChartPage
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 PAGES = [ChartPage(1, 4), ChartPage(2, 4), ChartPage(5, 3), ChartPage(6, 8), ChartPage(17, 5)]
 

@@ -5,7 +5,7 @@ import pytest
 from hand_made import flat_torus, polygon, square
 
 from ripple_sim.solver.layouts.cube.convention import cube_topology
-from ripple_sim.solver.texels.halo import fill_halo, with_filled_halo
+from ripple_sim.solver.texels.topology import fill_halo, with_filled_halo
 
 
 def noise(*shape: int) -> np.ndarray:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.solver.texels.irregular import NO_LINKS, IrregularLinks, gather_links
+from ripple_sim.solver.texels.stencil import NO_LINKS, IrregularLinks, gather_links
 
 
 def random_links(size: int, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -6,8 +6,7 @@ from hand_made import polygon, square, two_squares
 
 from ripple_sim.solver import Mesh, texel_atlas
 from ripple_sim.solver.mesh.closest import triangle_tree
-from ripple_sim.solver.texels.linear_chart_map import LinearChartMap
-from ripple_sim.solver.texels.nearest import MeshPlaces, nearest_places
+from ripple_sim.solver.texels.chart_map import LinearChartMap, MeshPlaces, nearest_places
 
 # two triangles far apart and skewed, each on a chart of its own
 V = np.array([[0.0, 0, 0], [2, 0, 1], [0, 3, 0], [5, 5, 5], [6, 5, 5], [5, 5, 9]])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ripple_sim.solver import sphere_atlas
-from ripple_sim.solver.texels.links import link_lengths
+from ripple_sim.solver.texels.stencil import link_lengths
 
 
 def test_link_lengths_are_distances_between_neighbours() -> None:

@@ -8,7 +8,7 @@ from hand_made import polygon
 
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas, texel_atlas
-from ripple_sim.solver.texels.nearest import nearest_places
+from ripple_sim.solver.texels.chart_map import nearest_places
 
 
 def limbed_atlas(layout: str) -> Atlas:

@@ -7,7 +7,7 @@ import pytest
 from hand_made import disk, flat_charts, flat_torus, square
 
 from ripple_sim.solver import TexelMesh, WaveSolver, sphere_atlas, texel_atlas
-from ripple_sim.solver.texels.quality import texel_quality
+from ripple_sim.solver.texels.texel_mesh import texel_quality
 
 RIMS = [[(-1, -1)] * 4]
 

@@ -5,7 +5,7 @@ import pytest
 from hand_made import flat_torus, polygon, square
 
 from ripple_sim.solver.layouts.cube.convention import cube_topology
-from ripple_sim.solver.texels.sampling import sampling_matrix
+from ripple_sim.solver.texels.topology import sampling_matrix
 
 
 def at_side(side: int, along: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:

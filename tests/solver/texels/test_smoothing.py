@@ -5,7 +5,7 @@ import pytest
 from hand_made import flat_torus, polygon, square
 
 from ripple_sim.solver.layouts.cube.convention import cube_rotations, cube_topology, permute_texels
-from ripple_sim.solver.texels.smoothing import smoothed
+from ripple_sim.solver.texels.texel_mesh import smoothed
 
 
 @pytest.mark.parametrize(("k", "m"), [(0, 0), (1, 0), (2, 3), (6, 6)])

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from ripple_sim.solver.layouts.cube.convention import cube_topology
-from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
+from ripple_sim.solver.texels.stencil import stiffness_matrix
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
 

@@ -7,10 +7,10 @@ import pytest
 from hand_made import disk, polygon
 
 from ripple_sim.solver import HeightMap, Material, SolverError, WaveSolver, sphere_atlas
-from ripple_sim.solver.backends.device_field import DeviceField
+from ripple_sim.solver.backends.gl_fields import DeviceField
 from ripple_sim.solver.gl import GLContext, shared_context
-from ripple_sim.solver.texels.chart_page import ChartPage
-from ripple_sim.solver.waves.displacement_limit import DisplacementLimit
+from ripple_sim.solver.texels.texel_atlas import ChartPage
+from ripple_sim.solver.waves.height_map import DisplacementLimit
 
 N = 8
 

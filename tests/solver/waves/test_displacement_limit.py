@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import HeightMap, sphere_atlas
-from ripple_sim.solver.waves.displacement_limit import FREE, MOST, DisplacementLimit
+from ripple_sim.solver.waves.height_map import FREE, MOST, DisplacementLimit
 
 ATLAS = sphere_atlas(2.0, 12)
 SHAPE = ATLAS.areas.shape
