@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ripple_sim.coupling.model.geoms import TARGET_TYPES, find_geom
-from ripple_sim.coupling.model.target_mesh import target_mesh
+from ripple_sim.coupling.geoms import TARGET_TYPES, find_geom
+from ripple_sim.coupling.target_mesh import target_mesh
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.scene_path import shipped_scenes
 from ripple_sim.scenes.sphere_maps import FOLDER, sphere_map_path

@@ -20,9 +20,9 @@ from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.cycles.blender import frames_of_cycles, python_with_bpy
 from ripple_sim.cycles.settings import blender_settings
 from ripple_sim.cycles.tone_mapping import tone_mapped
-from ripple_sim.export.export_scene import scene_source
 from ripple_sim.export.exporter import Exporter
 from ripple_sim.export.options import ExportOptions
+from ripple_sim.export.scene import scene_source
 from ripple_sim.simulation import Simulation
 
 WIDTH, HEIGHT, FPS = 480, 270, 20

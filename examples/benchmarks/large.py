@@ -22,7 +22,7 @@ import numpy as np
 
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
-from ripple_sim.coupling.colliders.collidable import make_collidable
+from ripple_sim.coupling.colliders import make_collidable
 from ripple_sim.scene.camera import CameraEntry
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.load_scene import load_scene

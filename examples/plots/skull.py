@@ -15,9 +15,9 @@ import msgspec
 import numpy as np
 from figure import FAINT, FOLDER, TEXT, plain, save, sheet
 
-from ripple_sim.scene.inside import InsideEntry
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.scene import Scene
+from ripple_sim.scene.target_maps import InsideEntry
 from ripple_sim.scenes.skull import BONE_THRESHOLD, head_volume
 from ripple_sim.simulation import Simulation
 

@@ -16,7 +16,7 @@ from matplotlib.colors import ListedColormap
 from ripple_sim.bench.arrival import arrival_times, ideal_width
 from ripple_sim.bench.geodesics import geodesic_distance
 from ripple_sim.bench.plane_wave import NEAREST, plane_arrival
-from ripple_sim.figures.atlas_painter import AtlasPainter
+from ripple_sim.figures.atlas_view import AtlasPainter
 from ripple_sim.figures.view import View
 from ripple_sim.overlay.colormap import color_table, colors
 from ripple_sim.scene.up_axis import usual_up

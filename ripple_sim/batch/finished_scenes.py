@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator
 
-from .batch_folder import BatchFolder
-from .finished_scene import FinishedScene, FolderFiles, scenes_in_tar
+from .finished import FinishedScene, FolderFiles, scenes_in_tar
+from .folder import BatchFolder
 
 
 def finished_scenes(batch: BatchFolder, known: Container[int] = ()) -> Iterator[FinishedScene]:

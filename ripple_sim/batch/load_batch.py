@@ -9,10 +9,10 @@ from typing import Any
 from ripple_sim.errors import BatchError
 from ripple_sim.solver.errors import PATH, checked
 
-from .batch_folder import BatchFolder
-from .finished_scene import FinishedScene
+from .finished import FinishedScene
 from .finished_scenes import finished_scenes
-from .index import parquet
+from .folder import BatchFolder
+from .report import parquet
 
 
 class Batch(Sequence):

@@ -20,10 +20,10 @@ from ripple_sim.simulation import Simulation
 from ripple_sim.video.render_video import render_video
 from ripple_sim.video.settings import frame_count, settled
 
-from .batch_folder import BatchFolder, Claim, clear
-from .finished_scene import FACTS, TIMES
-from .frame_record import FrameRecord
+from .finished import FACTS, TIMES
+from .folder import BatchFolder, Claim, clear
 from .plan import Plan
+from .records import FrameRecord
 from .store_entry import StoreEntry, options_of, video_name
 from .stored_plan import load_plan
 from .thumbnail import write_thumbnail

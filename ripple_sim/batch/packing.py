@@ -12,8 +12,8 @@ import msgspec
 
 from ripple_sim.solver.files import atomic_write
 
-from .batch_folder import BatchFolder
-from .finished_scene import FinishedScene, FolderFiles, scenes_in_tar
+from .finished import FinishedScene, FolderFiles, scenes_in_tar
+from .folder import BatchFolder
 from .tars import member_name, times_of, write_tar
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from ripple_sim.solver.files import atomic_write
 
-from .batch_folder import BatchFolder
+from .folder import BatchFolder
 
 _MOST = 5_000  # scenes on the page
 

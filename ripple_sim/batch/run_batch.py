@@ -8,11 +8,11 @@ from pathlib import Path
 
 from ripple_sim.errors import BatchError
 
-from .batch_folder import BatchFolder
-from .batch_run import BatchRun
 from .dask_executor import DaskExecutor
-from .local_executor import LocalExecutor, usual_workers
+from .executors import LocalExecutor, usual_workers
+from .folder import BatchFolder
 from .plan import Plan
+from .run import BatchRun
 from .run_options import Progress, RunOptions
 from .stored_plan import keep_plan, load_stored, stored
 from .variation import Variation

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .batch_folder import BatchFolder
+from .folder import BatchFolder
 from .stored_plan import load_stored
 
 _LISTED = 5  # failures

@@ -16,7 +16,7 @@ from ripple_sim.solver.errors import shown
 from ripple_sim.solver.files import atomic_write
 from ripple_sim.video.provenance import scene_digest
 
-from .batch_folder import BatchFolder
+from .folder import BatchFolder
 from .plan import Plan
 
 _PACKAGES = ("ripple-sim", "mujoco", "numpy", "numba", "moderngl", "av", "pillow")

@@ -10,8 +10,8 @@ from pathlib import Path
 from ripple_sim.errors import BatchError
 from ripple_sim.solver.kernel import compile_times
 
-from .batch_folder import BatchFolder
-from .local_executor import usual_workers
+from .executors import usual_workers
+from .folder import BatchFolder
 from .make_scene import make_scene
 from .plan import Plan
 from .stored_plan import keep_plan, load_stored, stored

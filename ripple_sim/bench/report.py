@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ripple_sim.diagnostics.info import Info, collect
+from ripple_sim.info import Info, collect
 from ripple_sim.solver import load_mesh
 
 from .accuracy import energy_drift, sphere_modes

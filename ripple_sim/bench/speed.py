@@ -9,16 +9,17 @@ from typing import Protocol
 
 import numpy as np
 
-from ripple_sim.bench.rivals.memory_stream import MemoryStream
-from ripple_sim.bench.rivals.naive_loop import NaiveLoop
-from ripple_sim.bench.rivals.plain_shader import PlainShader
-from ripple_sim.bench.rivals.sparse_leapfrog import SparseLeapfrog
 from ripple_sim.solver import GLError, Material, sphere_atlas
 from ripple_sim.solver.backends import blocks
 from ripple_sim.solver.backends.backend import Backend, make_backend
 from ripple_sim.solver.backends.cpu import CPUBackend
 from ripple_sim.solver.operator.assembly import build_operator
 from ripple_sim.solver.operator.wave_operator import WaveOperator
+
+from .memory_stream import MemoryStream
+from .plain_shader import PlainShader
+from .rivals import NaiveLoop
+from .sparse_leapfrog import SparseLeapfrog
 
 SUBSTEPS = 9  # of a frame: what backends and rivals are asked for at once
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.render.surfaces.height_maps import AnyHeightMap, MovedHeightMap
+from ripple_sim.render.height_maps import AnyHeightMap, MovedHeightMap
 from ripple_sim.solver import HeightMap
 from ripple_sim.solver.waves.motion import MovedGradients
 

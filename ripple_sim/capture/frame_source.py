@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
 from ripple_sim.render.camera import ThroughLens, Viewpoint
-from ripple_sim.render.surfaces.height_maps import AnyHeightMap, MovedHeightMap
+from ripple_sim.render.height_maps import AnyHeightMap, MovedHeightMap
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.gl import shared_context
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.ripples import Impulse
-from ripple_sim.render.surfaces.height_maps import AnyHeightMap
+from ripple_sim.render.height_maps import AnyHeightMap
 from ripple_sim.simulation import Simulation
 
 from .drawn_heights import DrawnHeights

@@ -60,7 +60,7 @@ class Export(_ExportFields):
         check_options(options)  # before anything that takes time
         check_export(self.output, options.overwrite)
 
-        from ripple_sim.export.export_scene import export_scene
+        from ripple_sim.export.scene import export_scene
         from ripple_sim.export.settings import frame_count
         from ripple_sim.scene.camera_override import through_camera
 

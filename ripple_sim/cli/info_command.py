@@ -15,7 +15,7 @@ class Info:
 
     def run(self) -> None:
         """Print the report."""
-        from ripple_sim.diagnostics.info import as_text, collect
+        from ripple_sim.info import as_text, collect
 
         info = collect()
         print(json_format.dumps(dataclasses.asdict(info), indent=2) if self.json else as_text(info))

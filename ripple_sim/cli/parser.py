@@ -15,15 +15,15 @@ from typing import Any
 import tyro.conf
 import tyro.extras
 
-from .atlas_command import Atlas
-from .batch_command import Batch
+from .atlas import Atlas
+from .batch import Batch
 from .bench_command import Bench
 from .cache_command import Cache
 from .completion_command import Completion
 from .export_command import Export
+from .info import Materials
 from .info_command import Info
-from .materials_command import Materials
-from .render_commands import Drop, Render
+from .render import Drop, Render
 from .view_command import View
 
 COMMANDS: dict[str, Callable[..., Any]] = {

@@ -7,9 +7,10 @@ from typing import Any
 
 import mujoco
 
-from ripple_sim.coupling.model.geoms import ByGeom, Value, by_name, find_target
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
+
+from .geoms import ByGeom, Value, by_name, find_target
 
 # Numbers that two models of one signature share.
 _SIZES = ("nq", "nv", "nu", "nbody", "ngeom")

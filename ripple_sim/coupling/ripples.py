@@ -11,27 +11,27 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.amplitude.amplitude_check import AmplitudeCheck
-from ripple_sim.coupling.colliders.collision_warnings import collision_warnings
-from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
-from ripple_sim.coupling.load.contact_loads import ContactLoads
-from ripple_sim.coupling.load.contact_record import Impulse
-from ripple_sim.coupling.load.high_pass import HighPass
-from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
-from ripple_sim.coupling.model.coupled_model import CoupledModel
-from ripple_sim.coupling.model.geoms import ByGeom, GeomKey, target_name
-from ripple_sim.coupling.stepping.clock import StepClock, missed_warning
-from ripple_sim.coupling.stepping.divergence import divergence_warning, goes_on_broken
-from ripple_sim.coupling.stepping.followed import followed
-from ripple_sim.coupling.stepping.physics_messages import adopt_warnings, physics_errors
-from ripple_sim.coupling.stepping.solved import UNSOLVED_WARNING, SolvedForces
-from ripple_sim.coupling.two_way.push_back import PushBack
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Load, Material
 from ripple_sim.solver.errors import checked, whole
 
+from .amplitude import AmplitudeCheck
 from .arguments import for_each, integrator_warning, own_data, own_model
+from .clock import StepClock, missed_warning
+from .collision_geoms import named_collision_geoms
+from .collision_warnings import collision_warnings
+from .contact_loads import ContactLoads
+from .contact_record import Impulse
+from .divergence import divergence_warning, goes_on_broken
+from .followed import followed
+from .geoms import ByGeom, GeomKey, target_name
+from .high_pass import HighPass
+from .model import CoupledModel
+from .physics_messages import adopt_warnings, physics_errors
+from .stepping import UNSOLVED_WARNING, SolvedForces
 from .targets import Targets
+from .tunnelling import TunnellingCheck
+from .two_way import PushBack
 
 __all__ = ["Impulse", "Ripples"]
 

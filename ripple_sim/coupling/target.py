@@ -10,11 +10,12 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.coupling.model.soft_ids import is_soft
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver
 from ripple_sim.solver.operator.regions import hold
 from ripple_sim.solver.texels.atlas import check_points
 from ripple_sim.solver.waves.footprint import footprint
+
+from .soft_ids import is_soft
 
 
 class Target:

@@ -9,15 +9,15 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.coupling.model.geoms import ByGeom, GeomKey, find_any, find_target, target_name
-from ripple_sim.coupling.model.suited_target import suited_targets
-from ripple_sim.coupling.model.target_mesh import target_atlas
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, WaveSolver
 from ripple_sim.solver.waves.footprint import Footprint
 
 from .arguments import checked_materials, for_each
+from .geoms import ByGeom, GeomKey, find_any, find_target, target_name
+from .suited_target import suited_targets
 from .target import Target
+from .target_mesh import target_atlas
 
 
 class Targets:

@@ -19,7 +19,7 @@ from ripple_sim.errors import VideoError
 from .mark import made_here
 from .move import move
 from .output import check_replaceable
-from .record import SETTINGS, STATES, Record
+from .replace import SETTINGS, STATES, Record
 
 _FRAMES, _WHOLE = "frames", "whole"
 _SEGMENT = re.compile(r"frames?_(\d+)(?:-(\d+))?")

@@ -41,13 +41,13 @@ class Ending:
         return importlib.import_module(self.home, __package__).made_here(path)
 
 
-_LAYER = Ending(".usd.usd_file", package="pxr", extra="usd", chunks=True)
+_LAYER = Ending(".usd_file", package="pxr", extra="usd", chunks=True)
 ENDINGS = {
     ".usdc": _LAYER,
     ".usda": _LAYER,
     ".usdz": dataclasses.replace(_LAYER, chunks=False),
     ".zarr": Ending(".fields", package="zarr", extra="zarr"),
-    ".html": Ending(".html.page_writer"),
+    ".html": Ending(".page"),
     ".csv": Ending(".tables"),
     ".parquet": Ending(".tables", package="pyarrow", extra="parquet"),
 }

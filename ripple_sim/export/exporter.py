@@ -12,15 +12,15 @@ from typing import Self, Unpack
 import mujoco
 
 from ripple_sim.coupling.arguments import own_data, own_model
-from ripple_sim.coupling.model.geoms import ByGeom, by_name
+from ripple_sim.coupling.geoms import ByGeom, by_name
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.errors import EncodingError, ExportError
-from ripple_sim.export.html.notebook import framed
 from ripple_sim.render.visuals.looks import find_look
 from ripple_sim.scene.camera import CameraEntry, check_camera
 from ripple_sim.solver.errors import PATH, POSITIVE, checked, instance
 
 from .endings import check_export
+from .notebook import framed
 from .options import WRITE_OPTIONS, WriteOptions
 from .place import Unfinished
 from .settings import check_write_options

@@ -14,14 +14,14 @@ from ripple_sim.capture.drawn_heights import DrawnHeights
 from ripple_sim.capture.target_surface import surface_of
 from ripple_sim.capture.viewpoint import viewpoint
 from ripple_sim.coupling.arguments import own_data, own_model
-from ripple_sim.coupling.model.geoms import ByGeom, by_name
+from ripple_sim.coupling.geoms import ByGeom, by_name
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.export.html.notebook import framed
 from ripple_sim.render import Camera, FixedCamera, Renderer
 from ripple_sim.scene.camera import CameraEntry
 from ripple_sim.solver.gl import GLContext, shared_context
 
 from .exporter import Exporter, camera_entry
+from .notebook import framed
 
 
 class RippleRenderer:

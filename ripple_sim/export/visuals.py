@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.gpu.contract import MappingKind
+from ripple_sim.render.contract import MappingKind
 from ripple_sim.render.visuals.looks import MODEL_LOOK, Look, find_look
 from ripple_sim.render.visuals.materials import look_of, texture_pixels
 from ripple_sim.render.visuals.shapes import shape_of, sizes

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
 
-from .atlas_painter import AtlasPainter
+from .atlas_view import AtlasPainter
 from .chart_images import cross, sphere_image, squares
 from .plot_page import FAINT, TEXT, check_plot_path, dressed, save_plot, show
 from .texel_colors import STRETCH_COLORS, STRETCH_RANGE, chart_colors, stretch_colors, stretch_shade, texel_stretch

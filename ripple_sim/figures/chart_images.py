@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points
 
-from .atlas_painter import AtlasPainter
+from .atlas_view import AtlasPainter
 from .view import OVERSAMPLING, View, antialiased, lit, screen
 
 # The belt of four charts from left to right, the second in the middle of the cross, and those above and below it.

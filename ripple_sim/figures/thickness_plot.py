@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
 
-from .atlas_painter import AtlasPainter
+from .atlas_view import AtlasPainter
 from .plot_page import check_plot_path, dressed, save_plot, show
 from .view import View
 

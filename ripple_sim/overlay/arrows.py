@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .sprite import INK, PAPER, Sprite
+from .marks import INK, PAPER, Sprite
 
 HEAD_LENGTH, HEAD_WIDTH, DOT, RIM = 6.0, 2.2, 1.5, 0.7  # in thicknesses of the shaft
 

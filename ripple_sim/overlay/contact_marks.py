@@ -8,8 +8,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.model.soft_ids import target_pose
 from ripple_sim.coupling.ripples import Impulse
+from ripple_sim.coupling.soft_ids import target_pose
 from ripple_sim.simulation import Simulation
 
 MEMORY = 0.25  # time in which a mark fades to 1/e [s]; it holds the impulse of about this time

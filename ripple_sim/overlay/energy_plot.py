@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .layout import Layout
+from .marks import FAINT, INK, Color, Sprite, text_width
 from .panels import panel
 from .scale import number, readable, round_up
-from .sprite import FAINT, INK, Color, Sprite, text_width
 
 Curve = tuple[NDArray[np.float64], NDArray[np.float64]]  # times [s], values
 

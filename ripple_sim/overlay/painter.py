@@ -12,9 +12,9 @@ from ripple_sim.scene.overlays import HEATMAPS, Request
 
 from .energy_plot import COLORS, EnergyPlot
 from .layout import Layout
+from .marks import Sprite
 from .notes import Notes
 from .panels import arrow_key, color_bar, label
-from .sprite import Sprite
 
 
 class Painter:

@@ -7,8 +7,8 @@ import numpy as np
 from .arrows import draw_arrow
 from .colormap import colors
 from .layout import Layout
+from .marks import FAINT, INK, Color, Sprite, text_width
 from .scale import number, readable
-from .sprite import FAINT, INK, Color, Sprite, text_width
 
 PANEL_OPACITY = 0.86
 _PADDING = 0.75  # in ems, as all measures below

@@ -7,8 +7,6 @@ from typing import Any
 
 import moderngl
 
-from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
-from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.passes.deferred import DeferredShading
 from ripple_sim.render.passes.floor import Floor
 from ripple_sim.render.passes.floor_occlusion import FloorOcclusion
@@ -17,12 +15,14 @@ from ripple_sim.render.passes.screen_bounds import boxes_of
 from ripple_sim.render.passes.shadow import ShadowMaps
 from ripple_sim.render.passes.surface_buffers import SurfaceBuffers, SurfaceImage
 from ripple_sim.render.passes.transmission import TransmissionMaps
-from ripple_sim.render.surfaces.height_maps import AnyHeightMap
 
 from .bounds import enclosing, within
 from .camera import Pose
-from .drawn_scene import DrawnScene
 from .frame_format import FrameFormat
+from .frame_uniforms import FrameUniforms
+from .height_maps import AnyHeightMap
+from .resources import Resources
+from .scene import DrawnScene
 from .scene_light import SceneLight
 
 _TRANSMISSION_TEXEL = 4  # of the transmission maps, in texels of the shadow maps

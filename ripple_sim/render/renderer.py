@@ -10,11 +10,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.readback import Readback
-from ripple_sim.render.gpu.resources import Resources
 from ripple_sim.render.passes.floor import Floor, find_floor
 from ripple_sim.render.passes.surface_buffers import SurfaceImage
-from ripple_sim.render.surfaces.height_maps import AnyHeightMap
 from ripple_sim.render.surfaces.surface import Surface
 from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.render.visuals.unsupported import warn_of_unsupported
@@ -24,10 +21,13 @@ from ripple_sim.solver.files import require_memory
 from ripple_sim.solver.gl import GLContext
 
 from .camera import Viewpoint
-from .drawn_scene import DrawnScene
 from .frame_format import FrameFormat
 from .frame_passes import FramePasses
+from .height_maps import AnyHeightMap
+from .resources import Resources
+from .scene import DrawnScene
 from .scene_light import SceneLight
+from .targets import Readback
 
 # Memory for a pixel and for each of its samples, at least [bytes].
 _PIXEL, _SAMPLE = 8, 20

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.contract import Unit
-from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
 from ripple_sim.render.passes.floor import Floor
 from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.render.visuals.lights import (
@@ -24,6 +22,8 @@ from ripple_sim.render.visuals.studio import set_lighting, studio_lighting
 from ripple_sim.solver.errors import RippleError
 
 from .camera import Pose
+from .contract import Unit
+from .frame_uniforms import FrameUniforms
 
 LIGHTING = ("auto", "model", "studio")
 

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 
 from ripple_sim.coupling.arguments import own_model
-from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
-from ripple_sim.coupling.model.geoms import find_target
+from ripple_sim.coupling.collision_geoms import named_collision_geoms
+from ripple_sim.coupling.geoms import find_target
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.layouts.build import LAYOUTS
 

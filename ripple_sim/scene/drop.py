@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.colliders.collidable import make_collidable
+from ripple_sim.coupling.colliders import make_collidable
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material, Mesh, load_mesh
 from ripple_sim.solver.texels.thickness import half_thickness_at

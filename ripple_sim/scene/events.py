@@ -9,7 +9,7 @@ import msgspec
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.model.geoms import find_any, target_name
+from ripple_sim.coupling.geoms import find_any, target_name
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
 

@@ -11,8 +11,8 @@ import msgspec
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.model.geoms import find_target, target_name
-from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
+from ripple_sim.coupling.geoms import find_target, target_name
+from ripple_sim.coupling.physics_messages import adopt_warnings
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import PATH, checked
 

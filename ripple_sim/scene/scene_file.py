@@ -14,10 +14,10 @@ from ripple_sim.solver.errors import shown
 from .camera import CameraEntry
 from .events import ChangeEntry, ControlEntry, PokeEntry
 from .height_entry import HeightEntry
-from .inside import InsideEntry
 from .material_entry import MapEntry, MaterialChange, MaterialEntry, PresetEntry
 from .motion import DropEntry, PlaceEntry, ThrowEntry, Vector
 from .randomize import RandomEntry
+from .target_maps import InsideEntry
 
 Color = tuple[float, float, float]
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
-from ripple_sim.encode.pass_files import PassFiles
+from ripple_sim.encode.images import PassFiles
 from ripple_sim.overlay.colormap import color_table
 from ripple_sim.overlay.comparison import TITLES, compared_operators
 from ripple_sim.overlay.heatmap import grid_spacing
 from ripple_sim.overlay.layout import Layout
-from ripple_sim.overlay.marks import PlacedMark, draw_marks, place_marks
+from ripple_sim.overlay.marks_overlay import PlacedMark, draw_marks, place_marks
 from ripple_sim.overlay.notes import Notebook
 from ripple_sim.overlay.painter import Painter
 from ripple_sim.overlay.projection import Projection

@@ -5,8 +5,8 @@ from __future__ import annotations
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.passes import Sighting, passes_of
 from ripple_sim.capture.snapshot import Snapshot
-from ripple_sim.coupling.model.geoms import geom_name
-from ripple_sim.encode.pass_files import PassFiles
+from ripple_sim.coupling.geoms import geom_name
+from ripple_sim.encode.images import PassFiles
 from ripple_sim.simulation import Simulation
 
 

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
+from ripple_sim.coupling.physics_messages import adopt_warnings
 from ripple_sim.encode import FrameWriter
 from ripple_sim.errors import VideoError
 from ripple_sim.overlay.comparison import compared_operators

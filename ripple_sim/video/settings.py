@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import cast
 
 from ripple_sim.encode import check_output, default_fps
-from ripple_sim.encode.pass_files import check_passes
+from ripple_sim.encode.images import check_passes
 from ripple_sim.errors import SceneError, VideoError
 from ripple_sim.overlay.comparison import compared_operators
 from ripple_sim.scene.overlays import parse_request

@@ -10,10 +10,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.model.geoms import find_target
-from ripple_sim.coupling.model.soft_ids import is_soft
-from ripple_sim.coupling.model.soft_surfaces import SoftSurface
-from ripple_sim.coupling.model.suited_target import suited_targets
+from ripple_sim.coupling.geoms import find_target
+from ripple_sim.coupling.soft import SoftSurface
+from ripple_sim.coupling.soft_ids import is_soft
+from ripple_sim.coupling.suited_target import suited_targets
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.find_scene import is_scene
 from ripple_sim.scene.load_scene import load_scene

@@ -9,7 +9,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.coupling.model.soft_ids import target_pose
+from ripple_sim.coupling.soft_ids import target_pose
 from ripple_sim.simulation import Simulation
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
+from ripple_sim.coupling.physics_messages import adopt_warnings
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError

@@ -7,7 +7,7 @@ import math
 import pyvista as pv
 
 from ripple_sim.capture.viewpoint import viewpoint
-from ripple_sim.coupling.model.soft_ids import is_soft, target_pose
+from ripple_sim.coupling.soft_ids import is_soft, target_pose
 from ripple_sim.render.surfaces.surface import target_color
 
 from .actors import HEIGHT, BodyActors, SkinActor

@@ -6,9 +6,9 @@ import pytest
 from small_batch import PLAN, files, new_batch, small_plan
 
 from ripple_sim import load_batch
-from ripple_sim.batch.batch_run import in_shard
 from ripple_sim.batch.make_scene import make_scene
 from ripple_sim.batch.packing import pack
+from ripple_sim.batch.run import in_shard
 from ripple_sim.errors import BatchError
 
 PACKED = 'heights = true\nformat = "webdataset"\nscenes_per_tar = 3\npasses = ["depth", "flow"]\n'

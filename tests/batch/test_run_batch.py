@@ -11,9 +11,9 @@ import pyarrow.parquet
 import pytest
 from small_batch import PLAN, files, new_batch, small_plan
 
-from ripple_sim.batch import batch_run
+from ripple_sim.batch import run
 from ripple_sim.batch import run_batch as command
-from ripple_sim.batch.batch_folder import BatchFolder
+from ripple_sim.batch.folder import BatchFolder
 from ripple_sim.batch.make_scene import Outcome, make_scene
 from ripple_sim.batch.run_batch import run_batch
 from ripple_sim.batch.run_options import RunOptions
@@ -43,7 +43,7 @@ class Here(Executor):
 @pytest.fixture
 def here(monkeypatch):
     monkeypatch.setattr(command, "LocalExecutor", Here)
-    monkeypatch.setattr(batch_run, "_PATIENCE", 0.01)
+    monkeypatch.setattr(run, "_PATIENCE", 0.01)
 
 
 def same_scenes(batch, reference, numbers=range(5)):
@@ -90,7 +90,7 @@ def test_a_scene_that_fails_three_times_is_put_aside_and_can_be_tried_again(here
             return Outcome(number, "failed", error="stone too soft", log="Traceback of it")
         return make_scene(folder, number)
 
-    monkeypatch.setattr(batch_run, "make_scene", make)
+    monkeypatch.setattr(run, "make_scene", make)
     folder = tmp_path / "out"
     progress = run_batch(small_plan(tmp_path, DATA), folder)
     assert (progress.made, progress.aside, progress.failures) == (4, 1, 1)
@@ -115,7 +115,7 @@ def test_a_scene_whose_worker_dies_is_tried_nine_times(here, tmp_path, monkeypat
         tried.append(number)
         raise RuntimeError("terminated abruptly")
 
-    monkeypatch.setattr(batch_run, "make_scene", die)
+    monkeypatch.setattr(run, "make_scene", die)
     plan = small_plan(tmp_path, DATA, PLAN.replace("count = 5", "count = 1"))
     assert run_batch(plan, tmp_path / "out").aside == 1
     assert len(tried) == 9
@@ -124,7 +124,7 @@ def test_a_scene_whose_worker_dies_is_tried_nine_times(here, tmp_path, monkeypat
 
 def test_a_scene_that_another_process_makes_is_waited_for(here, tmp_path, monkeypatch):
     answers = iter(["busy", "busy", "there"])
-    monkeypatch.setattr(batch_run, "make_scene", lambda folder, number: Outcome(number, next(answers)))
+    monkeypatch.setattr(run, "make_scene", lambda folder, number: Outcome(number, next(answers)))
     plan = small_plan(tmp_path, DATA, PLAN.replace("count = 5", "count = 1"))
     progress = run_batch(plan, tmp_path / "out")
     assert (progress.made, progress.finished) == (0, 1)
@@ -135,7 +135,7 @@ def test_a_full_disk_stops_the_batch_and_counts_as_no_failure(here, tmp_path, mo
     plan = small_plan(tmp_path, DATA)
     with pytest.raises(BatchError, match="GB left, less than the 1e\\+06 GB to be kept free; make room"):
         run_batch(plan, tmp_path / "out", RunOptions(keep_free=1e15))
-    monkeypatch.setattr(batch_run, "make_scene", lambda folder, number: Outcome(number, "full", error="No space left"))
+    monkeypatch.setattr(run, "make_scene", lambda folder, number: Outcome(number, "full", error="No space left"))
     with pytest.raises(BatchError, match="the disk is full: No space left"):
         run_batch(plan, tmp_path / "out")
     assert BatchFolder(tmp_path / "out").failures() == {}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ripple_sim.cli.parser import UsageError, parse
-from ripple_sim.cli.render_commands import Drop, Render
+from ripple_sim.cli.render import Drop, Render
 from ripple_sim.cli.view_command import View
 from ripple_sim.video.options import VideoOptions
 

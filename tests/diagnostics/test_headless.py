@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from ripple_sim.diagnostics.headless import find_problems
+from ripple_sim.diagnostics import find_problems
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.gl import shared_context
 
@@ -95,7 +95,7 @@ def test_a_broken_library(tmp_path: Path, library: str) -> None:
 
 
 def test_a_missing_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ripple_sim.diagnostics.headless._LIBRARIES", {"libEGL-gone.so.1": "libegl1"})
+    monkeypatch.setattr("ripple_sim.diagnostics._LIBRARIES", {"libEGL-gone.so.1": "libegl1"})
     [finding] = find_problems(None)
     assert str(finding) == "the library libEGL-gone.so.1 is missing: apt-get install libegl1"
 
@@ -123,7 +123,7 @@ def test_no_permission_on_the_render_node(devices: Path, plain_user: None) -> No
 def test_an_nvidia_gpu_without_its_egl_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "nvidia0").touch()
     (tmp_path / "version").write_text("NVRM version: NVIDIA UNIX x86_64 Kernel Module  550.54.15  Tue Mar 5\n")
-    monkeypatch.setattr("ripple_sim.diagnostics.headless._NVIDIA_VERSION", tmp_path / "version")
+    monkeypatch.setattr("ripple_sim.diagnostics._NVIDIA_VERSION", tmp_path / "version")
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", str(tmp_path))
     (tmp_path / "50_mesa.json").write_text('{"ICD": {"library_path": "libEGL_mesa.so.0"}}')
     [finding] = find_problems(True, tmp_path)

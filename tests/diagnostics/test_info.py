@@ -4,8 +4,8 @@ import json
 
 import pytest
 
+from ripple_sim import info
 from ripple_sim.cli import main as cli
-from ripple_sim.diagnostics import info
 from ripple_sim.solver.backends import backend
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import context

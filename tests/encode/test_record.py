@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from ripple_sim.encode.record import SETTINGS, STATES, Record
+from ripple_sim.encode.replace import SETTINGS, STATES, Record
 from ripple_sim.errors import VideoError
 
 VIDEO = Path("clip.mp4")

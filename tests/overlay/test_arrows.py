@@ -3,7 +3,7 @@
 import numpy as np
 
 from ripple_sim.overlay.arrows import draw_arrow
-from ripple_sim.overlay.sprite import Sprite
+from ripple_sim.overlay.marks import Sprite
 
 
 def test_arrow_has_its_length_and_fades() -> None:

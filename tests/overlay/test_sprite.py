@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ripple_sim.overlay import sprite as patch_module
+from ripple_sim.overlay import marks as patch_module
+from ripple_sim.overlay.marks import Sprite
 from ripple_sim.overlay.scale import number
-from ripple_sim.overlay.sprite import Sprite
 
 
 def test_sprite_covers_in_proportion() -> None:

@@ -6,8 +6,8 @@ import pytest
 from drawn import ball_surface
 
 from ripple_sim.render.camera import Camera
-from ripple_sim.render.drawn_scene import DrawnScene
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.resources import Resources
+from ripple_sim.render.scene import DrawnScene
 from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.solver import RippleError
 

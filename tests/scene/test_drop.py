@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from ripple_sim.coupling.model.target_mesh import target_mesh
+from ripple_sim.coupling.target_mesh import target_mesh
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.check_scene import check_scene
 from ripple_sim.scene.drop import drop_scene

@@ -8,8 +8,8 @@ import pytest
 import trimesh
 
 from ripple_sim import RippleError
-from ripple_sim.scene.inside import InsideEntry, load_inside
 from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.target_maps import InsideEntry, load_inside
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.operator.coefficients import STIFF
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from unfinished_videos import contents
 
-from ripple_sim.batch.batch_folder import BatchFolder
+from ripple_sim.batch.folder import BatchFolder
 from ripple_sim.batch.plan import Plan, read_plan
 from ripple_sim.batch.stored_plan import keep_plan, stored
 

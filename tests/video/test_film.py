@@ -17,7 +17,7 @@ from ripple_sim.overlay.colormap import color_table, colors
 from ripple_sim.overlay.comparison import compared_operators
 from ripple_sim.overlay.contact_marks import MEMORY, ContactMarks, Mark
 from ripple_sim.overlay.layout import Layout
-from ripple_sim.overlay.marks import draw_marks, place_marks
+from ripple_sim.overlay.marks_overlay import draw_marks, place_marks
 from ripple_sim.overlay.notes import Notebook
 from ripple_sim.overlay.projection import Projection
 from ripple_sim.render import Camera, Renderer, Surface

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.capture.snapshot import Snapshot
-from ripple_sim.cli.render_commands import _summary_text
+from ripple_sim.cli.render import _summary_text
 from ripple_sim.video.shot import Shot
 from ripple_sim.video.summary import Summary, Times
 

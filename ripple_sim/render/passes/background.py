@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import moderngl
 
-from ripple_sim.render.gpu.contract import LEVELS, Unit
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import LEVELS, Unit
+from ripple_sim.render.resources import Resources
 
 from .background_tiles import SortedTiles
 from .floor import Floor

@@ -8,8 +8,8 @@ from enum import IntEnum
 import moderngl
 import numpy as np
 
-from ripple_sim.render.gpu.contract import LEVELS, BackgroundTiles
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import LEVELS, BackgroundTiles
+from ripple_sim.render.resources import Resources
 
 _BLOCKS = 8  # along an edge of a tile
 _GROUP = 64

@@ -8,10 +8,10 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.contract import LEVELS
 from ripple_sim.render.frame_format import FrameFormat
-from ripple_sim.render.gpu.contract import LEVELS
-from ripple_sim.render.gpu.g_buffer import GBuffer
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.g_buffer import GBuffer
+from ripple_sim.render.resources import Resources
 from ripple_sim.solver.errors import RippleError
 
 from .background import Background, CoarseBackground

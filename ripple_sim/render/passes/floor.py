@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ripple_sim.render.bounds import Balls
 from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.gpu.contract import MappingKind, Unit
-from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
+from ripple_sim.render.contract import MappingKind, Unit
+from ripple_sim.render.frame_uniforms import FrameUniforms
 from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.render.visuals.lights import Light
 from ripple_sim.render.visuals.materials import texture_pixels

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 import moderngl
 import numpy as np
 
-from ripple_sim.render.gpu.contract import Unit
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import Unit
 from ripple_sim.render.projection import orthographic
+from ripple_sim.render.resources import Resources
 
 from .floor import Floor
 from .shadow import ShadowMaps

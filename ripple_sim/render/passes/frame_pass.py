@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import moderngl
 
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.resources import Resources
 
 
 class FramePass:

@@ -9,11 +9,11 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.contract import LEVELS, Unit
 from ripple_sim.render.frame_format import FrameFormat
-from ripple_sim.render.gpu.contract import LEVELS, Unit
-from ripple_sim.render.gpu.g_buffer import GBuffer
-from ripple_sim.render.gpu.resources import Resources
-from ripple_sim.render.gpu.textures import SRGB8_ALPHA8
+from ripple_sim.render.g_buffer import GBuffer
+from ripple_sim.render.resources import Resources
+from ripple_sim.render.textures import SRGB8_ALPHA8
 
 from .frame_pass import FramePass
 from .screen_bounds import scissor_of

@@ -10,10 +10,10 @@ import numpy as np
 
 from ripple_sim.render.bounds import Balls
 from ripple_sim.render.camera import Pose
+from ripple_sim.render.contract import Unit
 from ripple_sim.render.frame_format import FrameFormat
-from ripple_sim.render.gpu.contract import Unit
-from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.frame_uniforms import FrameUniforms
+from ripple_sim.render.resources import Resources
 
 from .deferred import DeferredShading
 from .floor import Floor

@@ -9,10 +9,10 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.contract import Unit
-from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import Unit
+from ripple_sim.render.frame_uniforms import FrameUniforms
 from ripple_sim.render.projection import orthographic, perspective
+from ripple_sim.render.resources import Resources
 from ripple_sim.render.visuals.lights import Light
 
 # Texels along a side: as many as make one about as wide as a pixel, where the casters fill the frame.

@@ -9,8 +9,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.g_buffer import GBuffer
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.g_buffer import GBuffer
+from ripple_sim.render.resources import Resources
 
 from .frame_pass import FramePass
 

@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.resources import Resources
 
 _TILE = 32  # [pixels]
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 import moderngl
 
-from ripple_sim.render.gpu.contract import Unit
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import Unit
+from ripple_sim.render.resources import Resources
 
 Matrix = tuple[float, ...]
 

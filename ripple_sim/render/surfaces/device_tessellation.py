@@ -6,11 +6,11 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.contract import Splitting
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import Splitting
+from ripple_sim.render.resources import Resources
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 
-from .adaptive_tessellation import AdaptiveTessellation
+from .adaptive import AdaptiveTessellation
 
 _GROUP = 256
 

@@ -6,13 +6,12 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.contract import Unit
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import Unit
+from ripple_sim.render.height_maps import write_page
+from ripple_sim.render.resources import Resources
 from ripple_sim.render.visuals.looks import Look
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.texels.texel_atlas import ChartPage
-
-from .height_maps import write_page
 
 # What is lit under the colours: only its shadows are kept.
 UNDER_HEATMAP = Look(color=(0.81, 0.81, 0.81), roughness=0.8)

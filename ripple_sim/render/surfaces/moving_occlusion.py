@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ripple_sim.render.visuals.ambient_occlusion import bounding_radius, cast, frames_about
 from ripple_sim.render.visuals.corners import smooth_normals
 
-from .ambient_occlusion import bounding_radius, cast, frames_about
 from .coarse_mesh import coarse_mesh
-from .moving_vertices import MovingVertices
+from .moving import MovingVertices
 
 _SAMPLES = 1_000  # vertices that cast rays, at most
 _RAYS = 32_000  # a frame, about

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.waves.motion import MovedGradients
 
-from .moving_vertices import Moved, MovingVertices
+from .moving import Moved, MovingVertices
 
 
 class MovingSurface:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.gpu.contract import MappingKind
-from ripple_sim.render.gpu.resources import Resources
-from ripple_sim.render.gpu.textures import srgb_texture
+from ripple_sim.render.contract import MappingKind
+from ripple_sim.render.resources import Resources
+from ripple_sim.render.textures import srgb_texture
 from ripple_sim.render.visuals.looks import MODEL_LOOK, Look, find_look
 from ripple_sim.render.visuals.materials import look_of
 from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of

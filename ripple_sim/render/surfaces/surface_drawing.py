@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.contract import MappingKind
+from ripple_sim.render.contract import MappingKind
 from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.render.visuals.texture_mapping import Mapping
 

@@ -9,17 +9,17 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.model.soft_ids import is_soft
+from ripple_sim.coupling.soft_ids import is_soft
 from ripple_sim.render.bounds import Balls, balls_about
+from ripple_sim.render.height_maps import AnyHeightMap, HeightMapTextures, MovedHeightMap
 from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.render.visuals.occluders import Occluders
 from ripple_sim.solver.errors import RippleError
 
 from .displacement import Displacement, Place
-from .height_maps import AnyHeightMap, HeightMapTextures, MovedHeightMap
 from .kept_vertices import bounded_vertices
+from .moving import MovingVertices
 from .moving_occlusion import MovingOcclusion
-from .moving_vertices import MovingVertices
 from .surface import Surface, appearance
 from .surface_drawing import Paint, SurfaceDrawing
 from .surface_triangles import PIXELS, SurfaceTriangles

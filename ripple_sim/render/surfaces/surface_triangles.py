@@ -6,9 +6,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.resources import Resources
 
-from .adaptive_tessellation import AdaptiveTessellation
+from .adaptive import AdaptiveTessellation
 from .charts import Charts
 from .device_tessellation import DeviceTessellation
 from .vertices import POSITION, SurfaceVertices

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.visuals import ambient_occlusion as occlusion
 from ripple_sim.render.visuals.corners import normalized, smooth_normals, split_corners
 from ripple_sim.render.visuals.texture_mapping import Mapping
 from ripple_sim.solver import Mesh
 
-from . import ambient_occlusion as occlusion
 from .charts import Charts, VertexColumns, shared_places, split_at_charts
 from .rounded_parts import rounded_parts
 from .surface import Surface

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.resources import Resources
 
 from .materials import Textures
 from .object_table import ObjectTable

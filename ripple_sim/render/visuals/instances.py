@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.bounds import Balls
-from ripple_sim.render.gpu.contract import Unit
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import Unit
+from ripple_sim.render.resources import Resources
 
 from .primitives import Shape
 from .visual import Visual

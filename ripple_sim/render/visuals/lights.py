@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.render.camera import Pose
 from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.gpu.contract import MAX_LIGHTS, MAX_SHADOWS
+from ripple_sim.render.contract import MAX_LIGHTS, MAX_SHADOWS
 
 _KIND = mujoco.mjtLightType
 _SUN_TANGENT = 0.05  # of the angular radius of a directional light, which MJCF does not give

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.gpu.resources import Resources
-from ripple_sim.render.gpu.textures import srgb_cube, srgb_texture
+from ripple_sim.render.resources import Resources
+from ripple_sim.render.textures import srgb_cube, srgb_texture
 
 from .looks import Look
 from .visual import Visual

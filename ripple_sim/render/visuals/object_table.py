@@ -6,8 +6,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.contract import OBJECT, OBJECT_COLUMNS, Unit
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import OBJECT, OBJECT_COLUMNS, Unit
+from ripple_sim.render.resources import Resources
 
 from .looks import Look
 

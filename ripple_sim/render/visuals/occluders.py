@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.bounds import Balls
-from ripple_sim.render.gpu.contract import MAX_OCCLUDERS, Binding
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import MAX_OCCLUDERS, Binding
+from ripple_sim.render.resources import Resources
 
 _REACH = 9.5  # in radii: what is further hides less than a hundredth of the sky
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.camera import Pose
-from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
+from ripple_sim.render.frame_uniforms import FrameUniforms
 
 from .lights import Light, Lighting
 

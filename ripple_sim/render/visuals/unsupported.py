@@ -8,8 +8,8 @@ from typing import Any
 
 import mujoco
 
-from ripple_sim.coupling.model.flex_colliders import find_flex_colliders
-from ripple_sim.coupling.model.soft_ids import first_skin, is_soft
+from ripple_sim.coupling.flex_colliders import find_flex_colliders
+from ripple_sim.coupling.soft_ids import first_skin, is_soft
 from ripple_sim.errors import RippleWarning
 
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.model.soft_ids import first_flex, first_skin, is_soft
+from ripple_sim.coupling.soft_ids import first_flex, first_skin, is_soft
 from ripple_sim.render.bounds import Balls
 from ripple_sim.render.color import srgb_to_linear
 

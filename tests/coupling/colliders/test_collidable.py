@@ -6,7 +6,7 @@ import pytest
 from mujoco_models import add_ball, mesh_spec
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling.colliders import collidable
+from ripple_sim.coupling import colliders
 from ripple_sim.errors import SceneError
 from ripple_sim.scenes.shapes import limbed, peanut
 
@@ -108,7 +108,7 @@ def test_primitives_are_left_alone() -> None:
 
 
 def test_fast_bodies_are_stopped_by_speculative_contacts_where_there_are_any(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(collidable, "SPECULATIVE", 1 << 20)
+    monkeypatch.setattr(colliders, "SPECULATIVE", 1 << 20)
     for geom, route, enabled in (("target", "sdf", False), ("target", "hull", True), ("knob", "sdf", True)):
         spec = spec_of(*peanut(0.05))
         make_collidable(spec, geom, route)

@@ -9,9 +9,9 @@ import trimesh
 from mujoco_models import add_ball, mesh_spec
 
 from ripple_sim import Material, RippleError, Ripples, make_collidable
-from ripple_sim.coupling.colliders import convex_decomposition
-from ripple_sim.coupling.colliders.convex_decomposition import convex_parts
-from ripple_sim.coupling.model.coupled_model import CoupledModel
+from ripple_sim.coupling import convex_decomposition
+from ripple_sim.coupling.convex_decomposition import convex_parts
+from ripple_sim.coupling.model import CoupledModel
 from ripple_sim.scenes.shapes import peanut
 from ripple_sim.solver import Mesh
 

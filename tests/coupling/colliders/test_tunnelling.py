@@ -9,9 +9,9 @@ import trimesh
 from mujoco_models import BALL, mesh_asset, model_of
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling.colliders import tunnelling
-from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
-from ripple_sim.coupling.model.coupled_model import CoupledModel
+from ripple_sim.coupling import tunnelling
+from ripple_sim.coupling.model import CoupledModel
+from ripple_sim.coupling.tunnelling import TunnellingCheck
 from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import peanut
 

@@ -7,11 +7,11 @@ import trimesh
 from mujoco_models import BALL, mesh_asset, model_of
 
 from ripple_sim import make_collidable
-from ripple_sim.coupling.contacts.contact_reader import ContactReader
-from ripple_sim.coupling.contacts.geom_contacts import geom_contacts
-from ripple_sim.coupling.contacts.target_contacts import TargetContacts
-from ripple_sim.coupling.model.coupled_model import CoupledModel
-from ripple_sim.coupling.model.target_mesh import target_atlas
+from ripple_sim.coupling.contact_reader import ContactReader
+from ripple_sim.coupling.contacts import TargetContacts
+from ripple_sim.coupling.geom_contacts import geom_contacts
+from ripple_sim.coupling.model import CoupledModel
+from ripple_sim.coupling.target_mesh import target_atlas
 
 PLANK = """<body name="plank" pos="0.3 0 0.232"><freejoint/>
 <geom name="plank" type="box" size="0.3 0.1 0.03" mass="2"/></body>"""

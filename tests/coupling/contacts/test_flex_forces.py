@@ -7,12 +7,12 @@ import trimesh
 from mujoco_models import mesh_asset
 
 from ripple_sim import make_collidable
-from ripple_sim.coupling.contacts.collider_ids import ColliderIds
-from ripple_sim.coupling.contacts.flex_contacts import FlexContacts
-from ripple_sim.coupling.contacts.flex_forces import FlexNormals, MujocoFlexContacts, summed_contacts
-from ripple_sim.coupling.contacts.target_contacts import PairContacts
-from ripple_sim.coupling.model.coupled_model import CoupledModel
-from ripple_sim.coupling.model.target_mesh import target_mesh
+from ripple_sim.coupling.collider_ids import ColliderIds
+from ripple_sim.coupling.contacts import PairContacts
+from ripple_sim.coupling.flex_contacts import FlexContacts
+from ripple_sim.coupling.flex_forces import FlexNormals, MujocoFlexContacts, summed_contacts
+from ripple_sim.coupling.model import CoupledModel
+from ripple_sim.coupling.target_mesh import target_mesh
 
 UP, ASIDE = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 EXTENTS = np.array([0.5, 0.03])

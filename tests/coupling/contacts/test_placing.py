@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from ripple_sim.coupling.contacts.placing import places
+from ripple_sim.coupling.placing import places
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
 
 

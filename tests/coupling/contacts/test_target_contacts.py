@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.contacts.target_contacts import group_by_pair
+from ripple_sim.coupling.contacts import group_by_pair
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sphere_contacts import CONVEX, RADII, contacts_on, sphere_load, tilted
 
-from ripple_sim.coupling.load.target_load import TargetLoad
+from ripple_sim.coupling.load import TargetLoad
 from ripple_sim.solver import Material, WaveSolver, sphere_atlas
 
 DT = 0.002

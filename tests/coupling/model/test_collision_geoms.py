@@ -6,9 +6,9 @@ import pytest
 from mujoco_models import model_of
 
 from ripple_sim import Material, RippleError, Ripples
-from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
-from ripple_sim.coupling.model.coupled_model import CoupledModel
-from ripple_sim.coupling.model.geoms import find_geom
+from ripple_sim.coupling.collision_geoms import named_collision_geoms
+from ripple_sim.coupling.geoms import find_geom
+from ripple_sim.coupling.model import CoupledModel
 
 SEEN = 'contype="0" conaffinity="0"'
 ROBOT = f"""<geom name="floor" type="plane" size="1 1 1"/>

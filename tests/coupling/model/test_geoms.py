@@ -6,7 +6,7 @@ import pytest
 from mujoco_models import BALL, model_of
 
 from ripple_sim import Material, RippleError, Ripples
-from ripple_sim.coupling.model.geoms import by_name, find_geom, geom_name
+from ripple_sim.coupling.geoms import by_name, find_geom, geom_name
 
 NAMELESS = """<geom type="plane" size="1 1 1"/>
 <body name="torso" pos="0 0 2"><geom name="chest" size="0.1"/><geom size="0.1"/><geom name="torso/3" size="0.1"/>

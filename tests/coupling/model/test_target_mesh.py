@@ -5,7 +5,7 @@ import pytest
 from mujoco_models import BALL, model_of
 
 from ripple_sim import Material, Ripples
-from ripple_sim.coupling.model.target_mesh import target_atlas
+from ripple_sim.coupling.target_mesh import target_atlas
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ import pytest
 
 from ripple_sim.render import Camera, Renderer
 from ripple_sim.render.frame_format import FrameFormat
-from ripple_sim.render.gpu.readback import Readback
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.resources import Resources
+from ripple_sim.render.targets import Readback
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import GLContext, shared_context

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.render.surfaces.ambient_occlusion import _hemisphere, _smoothed, bake, frames_about
 from ripple_sim.render.visuals import primitives
+from ripple_sim.render.visuals.ambient_occlusion import _hemisphere, _smoothed, bake, frames_about
 from ripple_sim.render.visuals.corners import smooth_normals
 from ripple_sim.solver.mesh.topology import edges_of
 

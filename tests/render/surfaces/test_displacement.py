@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from sphere_height_maps import cube_charts, height_map_of
 
+from ripple_sim.render.height_maps import HeightMapTextures
 from ripple_sim.render.surfaces.displacement import Displacement, Place
-from ripple_sim.render.surfaces.height_maps import HeightMapTextures
 from ripple_sim.render.surfaces.spline_heights import spline_heights
 from ripple_sim.render.surfaces.tessellation import Edges
 from ripple_sim.render.surfaces.vertices import DIRECTION, POSITION, UV, SurfaceVertices

@@ -7,10 +7,10 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from ripple_sim import Camera, Material, RippleRenderer, Ripples
-from ripple_sim.render.surfaces.ambient_occlusion import bake, bounding_radius, cast, frames_about
 from ripple_sim.render.surfaces.coarse_mesh import coarse_mesh
 from ripple_sim.render.surfaces.moving_occlusion import MovingOcclusion
 from ripple_sim.render.visuals import primitives
+from ripple_sim.render.visuals.ambient_occlusion import bake, bounding_radius, cast, frames_about
 from ripple_sim.render.visuals.corners import smooth_normals, triangle_normals
 
 TURN = Rotation.from_rotvec([0.4, -1.1, 0.7])

@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ripple_sim import Camera, RippleRenderer, Ripples
-from ripple_sim.render.surfaces.moving_vertices import MovingVertices
+from ripple_sim.render.surfaces.moving import MovingVertices
 from ripple_sim.solver import HeightMap, Material, sphere_atlas
 from ripple_sim.solver.waves.motion import MovedGradients
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from drawn import ball_surface
 
-from ripple_sim.coupling.model.target_mesh import target_atlas
+from ripple_sim.coupling.target_mesh import target_atlas
 from ripple_sim.render.surfaces.charts import Charts
 from ripple_sim.render.surfaces.surface import Surface
 from ripple_sim.render.surfaces.vertices import (

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.render.visuals.assets import Assets
-from ripple_sim.render.visuals.geom_visuals import GeomVisuals
+from ripple_sim.render.visuals.geoms import GeomVisuals
 
 XML = """<mujoco><worldbody>
 <geom type="sphere" size=".3" pos="1 2 3" euler="10 20 30"/><geom type="ellipsoid" size=".3 .2 .1" pos="0 1 0"/>

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 from textured import textured_model
 
-from ripple_sim.render.gpu.contract import MappingKind
+from ripple_sim.render.contract import MappingKind
 from ripple_sim.render.visuals import meshes
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual

@@ -6,7 +6,7 @@ import pytest
 from shader_functions import evaluated
 
 from ripple_sim.render.bounds import Balls
-from ripple_sim.render.gpu.contract import MAX_OCCLUDERS
+from ripple_sim.render.contract import MAX_OCCLUDERS
 from ripple_sim.render.visuals.occluders import Occluders, _capsules
 
 
