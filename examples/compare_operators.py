@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from ripple_sim.bench.accuracy import arrivals, sphere_modes
 from ripple_sim.bench.arrival import plane_arrival
+from ripple_sim.bench.report import arrivals, sphere_modes
 from ripple_sim.solver import WaveSolver, sphere_atlas
 from ripple_sim.solver.operator.assembly import OPERATORS
 

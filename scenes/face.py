@@ -13,7 +13,7 @@ from PIL import Image
 
 from ripple_sim.solver.files import atomic_write
 
-from .implicit import (
+from .shapes import (
     Array,
     Sdf,
     capsule,

@@ -17,9 +17,7 @@ from PIL import Image
 from ripple_sim import load_scene
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
-from ripple_sim.cycles.blender import frames_of_cycles, python_with_bpy
-from ripple_sim.cycles.settings import blender_settings
-from ripple_sim.cycles.tone_mapping import tone_mapped
+from ripple_sim.cycles.render import blender_settings, frames_of_cycles, python_with_bpy, tone_mapped
 from ripple_sim.export.exporter import Exporter
 from ripple_sim.export.options import ExportOptions
 from ripple_sim.export.scene import scene_source

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from ripple_sim import Camera, Material, RippleRenderer, Ripples, load_scene
-from ripple_sim.coupling.high_pass import coarse_motions
+from ripple_sim.coupling.soft import coarse_motions
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import WaveSolver, build_atlas, sphere_atlas
 from ripple_sim.solver.operator.assembly import MovingOperator

@@ -1,32 +1,98 @@
-"""A finished scene and its files, in a folder or in a tar file."""
+"""A finished scene and its files, in a folder or in a tar file.
+
+Frames and passes of a finished scene, read back.
+
+All finished scenes of a batch.
+
+Finished scenes put into tar files.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import fcntl
 import io
-from collections.abc import Iterator
+import shutil
+from collections.abc import Container, Iterator
 from pathlib import Path
 from tarfile import TarInfo
 from typing import Any, Protocol
 
+import av
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageSequence
 
 from ripple_sim.errors import BatchError
 from ripple_sim.export.tables import COLUMNS
+from ripple_sim.solver.files import atomic_write
 
-from .height_store import HEIGHTS, read_heights
-from .records import IMPULSES, POSITIONS
-from .stored_frames import stored_frames, stored_passes
-from .tars import members, times_of
+from .folder import BatchFolder, member_name, members, times_of, write_tar
+from .records import HEIGHTS, IMPULSES, POSITIONS, read_heights
+
+
+class Files(Protocol):
+    """The files of a scene."""
+
+    number: int
+
+    def names(self) -> list[str]:
+        """Their names."""
+
+    def read(self, name: str) -> bytes:
+        """Content of one of them."""
+
+
+def stored_frames(scene: Files) -> Iterator[NDArray[np.uint8]]:
+    """The frames of a scene's video or folder of PNG frames, [height, width, 3].
+
+    Raises
+    ------
+    BatchError
+        If there are none.
+    """
+    images = [name for name in scene.names() if name.startswith("frames") and name.endswith(".png")]
+    for name in images:
+        yield np.asarray(Image.open(io.BytesIO(scene.read(name))).convert("RGB"))
+    if images:
+        return
+    video = next((name for name in scene.names() if name.startswith("video.") and name.count(".") == 1), None)
+    if video is None:
+        raise BatchError(f"scene {scene.number} has no video and no PNG frames; it has {', '.join(scene.names())}")
+    content = io.BytesIO(scene.read(video))
+    if video.endswith((".gif", ".webp")):
+        for frame in ImageSequence.Iterator(Image.open(content)):
+            yield np.asarray(frame.convert("RGB"))
+        return
+    with av.open(content) as container:
+        for decoded in container.decode(video=0):
+            yield decoded.to_ndarray(format="rgb24")
+
+
+def stored_passes(scene: Files) -> Iterator[dict[str, NDArray]]:
+    """The passes of each frame of a scene by their names.
+
+    Raises
+    ------
+    BatchError
+        If there are none.
+    """
+    names = [name for name in scene.names() if "passes" in name and name.endswith(".npz")]
+    if not names:
+        raise BatchError(f"scene {scene.number} has no passes in .npz files; it has {', '.join(scene.names())}")
+    for name in names:
+        with np.load(io.BytesIO(scene.read(name))) as arrays:
+            yield {each: arrays[each] for each in arrays.files}
+
 
 FACTS, TIMES = "scene.json", "times.json"
 
 _KINDS = {"int64": "i8", "float64": "f8", "bool": "?", "string": "U64"}
 
 
-class Files(Protocol):
+class SceneFiles(Protocol):
     """Where the files of a scene are."""
 
     def names(self) -> list[str]:
@@ -89,7 +155,7 @@ class FinishedScene:
     number : int
     """
 
-    def __init__(self, number: int, files: Files) -> None:
+    def __init__(self, number: int, files: SceneFiles) -> None:
         self.number, self._files = number, files
 
     def __repr__(self) -> str:
@@ -141,3 +207,59 @@ def scenes_in_tar(tar: Path) -> Iterator[FinishedScene]:
     """The scenes in a tar file, in the order of their numbers."""
     for number, found in sorted(members(tar).items()):
         yield FinishedScene(number, TarFiles(tar, number, found))
+
+
+def finished_scenes(batch: BatchFolder, known: Container[int] = ()) -> Iterator[FinishedScene]:
+    """The scenes that are there, each once, but for those that are known."""
+    loose = [int(folder.name) for folder in sorted(batch.scenes.iterdir()) if folder.name.isdecimal()]
+    packed: set[int] = set()
+    for tar in batch.tar_files():  # looked at later than the folders, so that no scene is missed on its way into one
+        for scene in scenes_in_tar(tar):
+            packed.add(scene.number)
+            if scene.number not in known:
+                yield scene
+    for number in loose:
+        if number not in packed and number not in known:
+            yield FinishedScene(number, FolderFiles(batch.scene(number)))
+
+
+def pack(batch: BatchFolder, first: int, end: int) -> None:
+    """Move the finished scenes from `first` to before `end` into one tar file, beside those that are there already.
+
+    Killed at any time and called again, it loses and doubles nothing: folders go when the tar file is there.
+    """
+    with _locked(batch.work / f"tar-{first:06d}"):
+        loose = [number for number in range(first, end) if batch.scene(number).is_dir()]
+        if not loose:
+            return
+        tar = batch.tar(first)
+        before = {each.number: each for each in scenes_in_tar(tar)} if tar.exists() else {}
+        now = {number: FinishedScene(number, FolderFiles(batch.scene(number))) for number in loose}
+        scenes = dict(sorted((before | now).items()))
+        times = {str(number): scene.times() for number, scene in scenes.items()}
+        with atomic_write(times_of(tar)) as path:
+            path.write_bytes(msgspec.json.encode(times))
+        write_tar(tar, _files(scenes))
+        for number in loose:
+            _remove_whole(batch.scene(number), batch.work / f"packed-{number:06d}")
+
+
+def _files(scenes: dict[int, FinishedScene]) -> Iterator[tuple[str, bytes]]:
+    for number, scene in scenes.items():
+        for name in scene.names():
+            yield member_name(number, name), scene.read(name)
+
+
+def _remove_whole(folder: Path, hidden: Path) -> None:
+    """Remove a folder of which others shall see everything or nothing."""
+    shutil.rmtree(hidden, ignore_errors=True)  # of a process that was killed
+    folder.rename(hidden)
+    shutil.rmtree(hidden)
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """One process at a time."""
+    with path.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield

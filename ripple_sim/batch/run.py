@@ -1,25 +1,77 @@
-"""One run of a batch: what is to be made is given out, and what comes back is noted."""
+"""One run of a batch: what is to be made is given out, and what comes back is noted.
+
+How a batch is run, and how far a run is.
+
+`run_batch`: makes the scenes of a plan that are not there yet, whoever works on them.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import queue
 import shutil
 import time
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
 
-from .dask_executor import DaskExecutor
-from .executors import LocalExecutor, first_alone
-from .folder import BatchFolder, Failure
+from ripple_sim.errors import BatchError
+
+from .executors import DaskExecutor, LocalExecutor, first_alone, usual_workers
+from .finished import pack
+from .folder import BatchFolder, Failure, keep_plan, load_plan, load_stored, stored
 from .make_scene import Outcome, make_scene
-from .packing import pack
 from .plan import Plan
 from .report import Index
-from .run_options import Progress, RunOptions
-from .stored_plan import load_plan
+from .variation import Variation
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """How a batch is run; none of it changes a byte of the scenes."""
+
+    workers: int | None = None
+    """Processes of this machine; by default one for every two cores, at least two where there are two."""
+    shard: tuple[int, int] = (1, 1)
+    """Which part of the scenes to make, of how many."""
+    limit: int | None = None
+    """At most so many scenes in this run."""
+    dask: str | None = None
+    """Address of a Dask scheduler whose workers make the scenes."""
+    retry_failed: bool = False
+    """Try the scenes again that were put aside."""
+    keep_free: float = 1e9
+    """Stop when the disk has no more room than this [bytes]."""
+
+
+@dataclasses.dataclass
+class Progress:
+    """How far a batch is.
+
+    Attributes
+    ----------
+    scenes, finished, aside : int
+        Of this run's share: all, those that are there, those that have been put aside.
+    made, frames, bytes, failures : int
+        By this run: scenes, their frames and size on the disk, and scenes that failed once or more.
+    seconds : float
+        That this run has taken so far [s].
+    free : int
+        Room left on the disk [bytes].
+    """
+
+    scenes: int
+    finished: int
+    aside: int
+    made: int = 0
+    frames: int = 0
+    bytes: int = 0
+    failures: int = 0
+    seconds: float = 0.0
+    free: int = 0
+
 
 _PATIENCE = 1.0  # between looks at scenes that another process makes [s]
 _INDEXED = 30.0  # between versions of the index while scenes are made [s]
@@ -154,3 +206,66 @@ def _outcome(number: int, future: Future) -> Outcome:
         return future.result()
     except Exception as error:  # the worker died
         return Outcome(number, "died", error=f"its worker died: {' '.join(str(error).split())}")
+
+
+_TRIED = 3  # scenes whose values are drawn before the batch begins
+
+
+def run_batch(
+    plan: Plan | None,
+    output: str | Path,
+    options: RunOptions = RunOptions(),
+    *,
+    progress: Callable[[Progress], None] | None = None,
+) -> Progress:
+    """Make the scenes of a batch that are not there yet.
+
+    It may be killed at any time and started again, also while others make scenes of the same batch.
+
+    Parameters
+    ----------
+    plan : Plan or None
+        From `read_plan`; None goes on with the plan in the folder.
+    output : path
+        Folder of the batch.
+    options : RunOptions
+    progress : callable, optional
+        Called with the progress, about once a second.
+
+    Raises
+    ------
+    RippleError
+        If the plan is another than the folder's, a key of it fits nothing, or the disk is nearly full.
+    """
+    batch = BatchFolder(Path(output).absolute())
+    if plan is None:
+        batch.check()
+        plan = load_stored(batch.plan).plan
+    for number in range(min(len(plan.sources), plan.count, _TRIED)):
+        Variation(plan, number).load()  # a key that fits nothing is told before anything is made
+    keep_plan(batch, stored(plan))
+    if options.retry_failed:
+        for number in batch.failures():
+            batch.forget_failure(number)
+    run = BatchRun(batch, plan, options)
+    with _executor(options, run) as executor:
+        run.work(executor, progress)
+    run.index.write()
+    if run.full is not None:
+        raise BatchError(f"{run.full}; make room, or lower --keep-free, and run the same command again to go on")
+    return run.progress
+
+
+@contextlib.contextmanager
+def _executor(options: RunOptions, run: BatchRun) -> Iterator[LocalExecutor | DaskExecutor]:
+    executor: LocalExecutor | DaskExecutor
+    if options.dask is not None:
+        executor = DaskExecutor(options.dask)
+    else:
+        executor = LocalExecutor(min(options.workers or usual_workers(), max(1, len(run.pending))))
+    try:
+        yield executor
+    except BaseException:  # such as Ctrl-C: what is unfinished goes on next time
+        executor.shutdown(wait=False, cancel_futures=True)
+        raise
+    executor.shutdown()

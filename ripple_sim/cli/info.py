@@ -1,11 +1,90 @@
-"""`ripple-sim materials`."""
+"""`ripple-sim materials`.
+
+`ripple-sim bench`.
+
+`ripple-sim cache`.
+
+`ripple-sim completion`.
+
+`ripple-sim info`.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import json
+import json as json_format
 import math
-from typing import Any
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from tyro.conf import Positional, arg
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Bench:
+    """Measure the wave solver: speed against rivals and the bound of memory, accuracy against exact solutions."""
+
+    meshes: Annotated[Positional[tuple[Path, ...]], arg(metavar="[MESH ...]", help_behavior_hint="(optional)")] = ()
+    """Meshes on which to measure arrival times, in addition to the built-in one."""
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Measure and print; the stages are announced on stderr."""
+        from ripple_sim.bench.report import as_text, measure
+
+        report = measure(list(self.meshes), lambda stage: print(f"measuring {stage} ...", file=sys.stderr))
+        print(json_format.dumps(report, indent=2) if self.json else as_text(report))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Cache:
+    """Show where atlases are kept, and how much room they take: at most RIPPLE_SIM_CACHE_LIMIT megabytes, or 500."""
+
+    clear: bool = False
+    """Remove them."""
+
+    def run(self) -> None:
+        """Clear the cache if asked to, and print what is in it."""
+        from ripple_sim.solver.cache import cache_folder, cache_limit, cached_files, remove
+
+        limit, files = cache_limit(), cached_files()
+        if self.clear:
+            freed = sum(remove(file) for file in files)
+            print(f"removed {len(files)} files, {_megabytes(freed)} MB")
+            files = cached_files()
+        size = sum(file.size for file in files)
+        print(f"{cache_folder()}: {len(files)} files, {_megabytes(size)} of {_megabytes(limit)} MB")
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:.0f}"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Completion:
+    """Print a shell completion script. To use it: source <(ripple-sim completion bash)."""
+
+    shell: Annotated[Positional[Literal["bash", "zsh"]], arg(metavar="SHELL")]
+    """Shell to complete in: bash or zsh."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Info:
+    """Show versions, the OpenGL driver and the wave solver, and what to install if rendering is not possible."""
+
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Print the report."""
+        from ripple_sim.diagnostics import as_text, collect
+
+        info = collect()
+        print(json_format.dumps(dataclasses.asdict(info), indent=2) if self.json else as_text(info))
+
 
 # Of the wave whose speed and decay are told [m].
 _WAVELENGTH = 0.05

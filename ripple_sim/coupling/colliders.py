@@ -6,10 +6,9 @@ import mujoco
 
 from ripple_sim.errors import SceneError
 
-from .convex_collider import add_convex_collider, convex_parts_of, remove_convex_collider
+from .collision_warnings import SPECULATIVE
+from .convex_collider import add_convex_collider, convex_parts_of, is_closed, remove_convex_collider
 from .flex_collider import add_flex_collider, flex_core, remove_flex_collider
-from .mesh_in_spec import is_closed
-from .tunnelling import SPECULATIVE
 
 _GEOM = mujoco.mjtGeom
 ROUTES = ("auto", "sdf", "flex", "convex", "hull")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.solver import Mesh
 
-from .mesh_in_spec import LISTS, SETTINGS, mesh_on_body
+from .convex_collider import LISTS, SETTINGS, mesh_on_body
 
 # A collision surface off the true one by this share of the target's size shows: bodies stop in mid-air.
 GAP_TOLERANCE = 0.02

@@ -16,21 +16,32 @@ from ripple_sim.solver import Load, Material
 from ripple_sim.solver.errors import checked, whole
 
 from .amplitude import AmplitudeCheck
-from .arguments import for_each, integrator_warning, own_data, own_model
-from .clock import StepClock, missed_warning
-from .collision_geoms import named_collision_geoms
-from .collision_warnings import collision_warnings
-from .contact_loads import ContactLoads
-from .contact_record import Impulse
-from .divergence import divergence_warning, goes_on_broken
-from .followed import followed
-from .geoms import ByGeom, GeomKey, target_name
-from .high_pass import HighPass
+from .collision_warnings import TunnellingCheck, collision_warnings
+from .geoms import (
+    ByGeom,
+    GeomKey,
+    for_each,
+    integrator_warning,
+    named_collision_geoms,
+    own_data,
+    own_model,
+    target_name,
+)
+from .load import ContactLoads, Impulse
 from .model import CoupledModel
-from .physics_messages import adopt_warnings, physics_errors
-from .stepping import UNSOLVED_WARNING, SolvedForces
+from .soft import HighPass
+from .stepping import (
+    UNSOLVED_WARNING,
+    SolvedForces,
+    StepClock,
+    adopt_warnings,
+    divergence_warning,
+    followed,
+    goes_on_broken,
+    missed_warning,
+    physics_errors,
+)
 from .targets import Targets
-from .tunnelling import TunnellingCheck
 from .two_way import PushBack
 
 __all__ = ["Impulse", "Ripples"]

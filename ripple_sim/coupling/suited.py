@@ -1,8 +1,14 @@
-"""What suits a target where the user does not say: the material's coefficients, and the resolution."""
+"""What suits a target where the user does not say: the material's coefficients, and the resolution.
+
+The resolution that suits a target: fine enough for what touches it, coarse enough for the time step.
+
+The materials and resolutions of all targets, with what is not given chosen by the model.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import mujoco
@@ -11,7 +17,10 @@ import numpy as np
 from ripple_sim.solver import Material, Mesh
 from ripple_sim.solver.operator.presets import BOUNCE, damping_for, narrow_stiffness, stiffness_after, stiffness_under
 
+from .geoms import find_target
 from .model import CoupledModel
+from .soft import SoftSurface, is_soft
+from .target_mesh import target_mesh
 
 # Waves cross the target in the first time and fall to a tenth in the second [s].
 _CROSSING, _DECAY = 0.25, 1.5
@@ -146,3 +155,73 @@ def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
 
 def _greatest(coefficient: object) -> float:
     return float(np.max(np.asarray(coefficient, dtype=np.float64)))
+
+
+LEAST, USUAL, MOST = 32, 96, 256
+_STEP = 16
+
+# A footprint's radius is to hold so many texels, and a physics step is to take at most so many substeps.
+_TEXELS, _SUBSTEPS = 4.0, 4.0
+
+# Stable time step over the time that a wave takes from texel to texel, on meshes with limbs (0.29 to 0.65 on the meshes
+# tried), by which the operator's largest eigenvalue is (2 c / (0.35 d))^2 at a mean spacing d.
+_STABLE = 0.35
+
+
+def suited_resolution(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> int:
+    """Texels along a chart's side, a multiple of 16 from 32 to 256.
+
+    From 96 on, as many as put four texels into the footprint of what touches the target; but no more than can be
+    stepped in four substeps to a physics step, as far as that can be told before the atlas is there.
+    """
+    spacing = np.sqrt(extent.area / 6)  # times resolution
+    _, footprint = heaviest(coupled, geom)
+    resolved = _TEXELS * spacing / footprint if 0 < footprint < np.inf else 0.0
+    n = int(np.clip(_STEP * np.ceil(resolved / _STEP), USUAL, MOST))
+    while n > LEAST and _substeps(material, spacing / n, coupled.model.opt.timestep) > _SUBSTEPS:
+        n -= _STEP
+    return n
+
+
+def _substeps(material: Material, spacing: float, timestep: float) -> float:
+    """Substeps of a physics step at a spacing of the texels [m]."""
+    speed, bending, viscosity, stiffness = (
+        float(np.max(np.asarray(getattr(material, name), dtype=np.float64)))
+        for name in ("speed", "bending", "viscosity", "stiffness")
+    )
+    eigenvalue = (2 / (_STABLE * spacing)) ** 2
+    wave = speed**2 * eigenvalue + bending * eigenvalue**2 + stiffness
+    viscous = viscosity * eigenvalue
+    return timestep * (viscous + np.sqrt(viscous**2 + 4 * wave)) / 4
+
+
+_SOFT = 64  # resolution of flexes and skins
+
+
+def suited_targets(
+    model: mujoco.MjModel, materials: Mapping[str, Material], resolutions: Mapping[str, int | None]
+) -> tuple[dict[str, Material], dict[str, int]]:
+    """Materials without unset coefficients, and resolutions, by the names of the targets.
+
+    Raises
+    ------
+    MeshError
+        If a target's mesh cannot ripple.
+    """
+    suited, texels = dict(materials), {name: n for name, n in resolutions.items() if n is not None}
+    geoms = {name: find_target(model, name) for name in materials}
+    for name, target in list(geoms.items()):
+        if is_soft(model, target):
+            surface = SoftSurface(model, geoms.pop(name))
+            suited[name] = suited_soft_material(model, Extent.of(surface.mesh), surface.mass, materials[name])
+            texels.setdefault(name, _SOFT)
+    left = [name for name in geoms if materials[name].unset or name not in texels]
+    if not left:
+        return suited, texels
+    coupled = CoupledModel(model, geoms.values())
+    for name in left:
+        extent = Extent.of(target_mesh(model, geoms[name]))
+        suited[name] = suited_material(coupled, geoms[name], extent, materials[name])
+        if name not in texels:
+            texels[name] = suited_resolution(coupled, geoms[name], extent, suited[name])
+    return suited, texels

@@ -1,31 +1,186 @@
-"""`render_cycles`: a scene simulated, written as USD, and rendered by Cycles."""
+"""`render_cycles`: a scene simulated, written as USD, and rendered by Cycles.
+
+The process of Blender: which Python runs it, and frames as they come from it.
+
+What Blender is told beside the stage: frames, sky, soft boxes, and the floor that fades into the sky.
+
+Linear radiance to the colours of a frame, as the renderer's shader makes them (render/glsl/tone_mapping.glsl).
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import importlib.resources
+import importlib.util
+import json
+import os
+import subprocess
+import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
+import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
-from ripple_sim.coupling.physics_messages import adopt_warnings
+from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.errors import ExportError, VideoError
-from ripple_sim.export.endings import ending_of
 from ripple_sim.export.exporter import Exporter
 from ripple_sim.export.options import ExportOptions
+from ripple_sim.export.place import ending_of
 from ripple_sim.export.scene import scene_source
-from ripple_sim.scene.camera_override import with_exposure
-from ripple_sim.scene.scene import Scene
+from ripple_sim.export.source import Source
+from ripple_sim.export.visuals import mean_color
+from ripple_sim.render.passes.floor import find_floor
+from ripple_sim.render.visuals.lights import (
+    BESIDE_LIGHTS,
+    FADE,
+    SOFT_BOX_LIGHTS,
+    STUDIO_FADE,
+    is_lit,
+    model_lighting,
+    sky_colors,
+    studio_lighting,
+)
+from ripple_sim.render.visuals.texture_mapping import mapping_of
+from ripple_sim.render.visuals.visual import geom_visual, visible_geoms
+from ripple_sim.scene.scene import Scene, with_exposure
 from ripple_sim.simulation import Simulation
-from ripple_sim.video.open_video import open_video
-from ripple_sim.video.options import VideoOptions
-from ripple_sim.video.settings import EXPOSURE, check_options, frame_count, settled
+from ripple_sim.video.options import EXPOSURE, VideoOptions, check_options, frame_count, settled
+from ripple_sim.video.render_video import open_video
 
-from .blender import frames_of_cycles, python_with_bpy
-from .settings import blender_settings
-from .tone_mapping import tone_mapped
+PYTHON = "RIPPLE_SIM_BPY_PYTHON"
+_LAST = 300  # characters of what a process said last
+
+
+def python_with_bpy() -> str:
+    """Python that can import bpy: the one that the environment names, or this one.
+
+    Raises
+    ------
+    VideoError
+        If there is none.
+    """
+    named = os.environ.get(PYTHON)
+    if named:
+        if not os.access(named, os.X_OK):
+            raise VideoError(f"{PYTHON} is {named!r}, which cannot be run; name a Python that has bpy")
+        return named
+    if importlib.util.find_spec("bpy") is None:
+        raise VideoError(
+            "the renderer cycles needs bpy, which is not installed; install it with: pip install 'ripple-sim[cycles]'. "
+            f"bpy has wheels for few versions of Python: where there is none for this one, {PYTHON} may name another "
+            "Python that has it"
+        )
+    return sys.executable
+
+
+def frames_of_cycles(python: str, settings: dict[str, Any], folder: Path) -> Iterator[NDArray[np.float32]]:
+    """Linear frames [height, width, 3], in their order, from a process of Blender's own.
+
+    Parameters
+    ----------
+    python : str
+        From `python_with_bpy`.
+    settings : dict
+        What blender_process.py reads.
+    folder : Path
+        For the files that pass between the processes.
+
+    Raises
+    ------
+    VideoError
+        If the process ends before the last frame.
+    """
+    told, errors = folder / "settings.json", folder / "blender.log"
+    told.write_text(json.dumps({**settings, "folder": str(folder)}), encoding="utf-8")
+    place = {**os.environ, "TMPDIR": str(folder)}  # Blender leaves folders behind where temporary files go
+    script = importlib.resources.files(__package__).joinpath("blender_process.py")
+    with (
+        importlib.resources.as_file(script) as path,
+        errors.open("wb") as log,
+        subprocess.Popen([python, str(path), str(told)], stdout=subprocess.PIPE, stderr=log, env=place) as process,
+    ):
+        try:
+            assert process.stdout is not None
+            for number in range(settings["frames"]):
+                _wait_for(number, process, errors)
+                file = folder / f"{number}.npy"
+                yield np.load(file)
+                file.unlink()
+        finally:
+            process.terminate()
+
+
+def _wait_for(number: int, process: subprocess.Popen, errors: Path) -> None:
+    """Read what the process says until it has made a frame; the rest is Blender's own."""
+    last = ""
+    for line in process.stdout or ():
+        text = line.decode(errors="replace").strip()
+        if text == f"frame {number}":
+            return
+        last = text or last
+    said = errors.read_text(errors="replace").strip().splitlines()
+    reason = (said[-1] if said else last)[:_LAST] or "without a word"
+    raise VideoError(f"Blender ended before frame {number} with status {process.wait()}: {reason}")
+
+
+# what the renderer's soft boxes give to diffuse surfaces, over what lights of their size and radiance would
+_DIFFUSE_SHARE = 0.13 * np.pi / 4
+
+
+def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
+    """Light and background of a source at its first frame, and its camera's shutter and size, as JSON has them."""
+    model = source.model
+    pose, _ = source.pose(data)
+    studio = source.lighting == "studio" or (source.lighting == "auto" and not is_lit(model))
+    lighting = studio_lighting(pose) if studio else model_lighting(model, data, pose)
+    floor = find_floor(model, [geom for geom in visible_geoms(model) if geom not in source.ripples.geom_ids.values()])
+    albedo = None
+    if floor is not None:
+        visual = geom_visual(model, floor)
+        albedo = visual.color * mean_color(model, mapping_of(model, visual))
+    sky = sky_colors(lighting, pose, albedo, None)
+    strength = 1.0 if studio else BESIDE_LIGHTS
+    return {
+        "size": list(source.size),
+        "fps": source.fps,
+        "shutter": source.camera.shutter / 360,
+        "distance": pose.distance,
+        "horizon": sky.horizon.tolist(),
+        "zenith": sky.zenith.tolist(),
+        "sky": sky.light.tolist(),
+        "floor": None
+        if floor is None
+        else mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, floor) or f"geom_{floor}",
+        "fade": list(STUDIO_FADE if studio else FADE),
+        "boxes_reflected": strength,
+        "boxes_diffuse": _DIFFUSE_SHARE * strength if studio else 0.0,
+        "boxes": [
+            {"azimuth": azimuth, "elevation": elevation, "half": [width, height], "radiance": list(radiance)}
+            for azimuth, elevation, width, height, radiance in SOFT_BOX_LIGHTS
+        ],
+    }
+
+
+_SHOULDER = 0.72  # radiance from which on brightness rolls off
+_BLEACHING = 0.18
+
+
+def tone_mapped(radiance: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Colours, sRGB [height, width, 3], of linear radiance of the same shape."""
+    radiance = np.maximum(radiance, 0.0)
+    peak = radiance.max(axis=-1, keepdims=True)
+    excess = np.maximum(peak - _SHOULDER, 0.0)
+    compressed = np.minimum(peak, _SHOULDER) + (1 - _SHOULDER) * excess / (excess + 1 - _SHOULDER)
+    color = radiance * (compressed / np.maximum(peak, 1e-4))
+    color += (compressed - color) * (1 - 1 / (1 + _BLEACHING * excess))
+    coded = np.where(color <= 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)
+    return np.rint(255 * np.clip(coded, 0.0, 1.0)).astype(np.uint8)
+
 
 Progress = Callable[[int, int], None]
 

@@ -7,17 +7,16 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from ripple_sim.coupling.physics_messages import adopt_warnings
+from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.errors import ExportError
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import PATH, checked, instance
-from ripple_sim.video.provenance import origin
+from ripple_sim.video.options import origin
 
-from .endings import check_export
 from .exporter import Exporter
-from .options import ExportOptions
-from .settings import check_options, frame_count
+from .options import ExportOptions, check_options, frame_count
+from .place import check_export
 from .source import Chunking, Paint, Source
 
 Progress = Callable[[int, int], None]

@@ -1,4 +1,9 @@
-"""`UsdWriter`: a run as a stage of Universal Scene Description."""
+"""`UsdWriter`: a run as a stage of Universal Scene Description.
+
+The camera of a run, with its motion, lens and shutter.
+
+Files of Universal Scene Description, and how one from here is known again.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +12,60 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Usd, UsdGeom, UsdUtils
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdUtils
 
 from ripple_sim.coupling.geoms import target_name
-from ripple_sim.coupling.soft_ids import is_soft
-from ripple_sim.encode.mark import MARK
+from ripple_sim.coupling.soft import is_soft
+from ripple_sim.encode.replace import MARK
 
-from .camera import MovingCamera
-from .lamps import Lamps
-from .meshes import child, define_mesh, extent, place, placing, vectors
 from .moving_mesh import MovingMesh, Shape
-from .saving import save, succeed
 from .source import Moment, Source
-from .usd_chunks import Chunks
-from .usd_looks import Materials
+from .usd_chunks import Chunks, save, succeed
+from .usd_looks import Lamps, Materials, child, define_mesh, extent, place, placing, vectors
 from .visuals import solid_finish, solids, target_finish, target_uv
+
+_SENSOR = 0.024  # height [m], that of 35 mm film; the angle of view and the depth of field do not depend on it
+_TENTHS = 10.0  # USD gives lengths in a camera in tenths of a unit
+_NEAR, _FAR = 0.01, 1000.0  # of the camera's distance
+
+
+class MovingCamera:
+    """A camera in a stage, with the motion of the source's.
+
+    Parameters
+    ----------
+    stage : Usd.Stage
+    path : Sdf.Path
+    source : Source
+    """
+
+    def __init__(self, stage: Usd.Stage, path: Sdf.Path, source: Source) -> None:
+        self._source = source
+        self._camera = UsdGeom.Camera.Define(stage, path)
+        width, height = source.size
+        self._camera.CreateVerticalApertureAttr(_TENTHS * _SENSOR)
+        self._camera.CreateHorizontalApertureAttr(_TENTHS * _SENSOR * width / height)
+        self._camera.CreateShutterOpenAttr(0.0)
+        self._camera.CreateShutterCloseAttr(source.camera.shutter / 360)
+
+    def begin(self, data: mujoco.MjData) -> None:
+        """Define what stays as it is at the first frame."""
+        pose, _ = self._source.pose(data)
+        focal, aperture = _SENSOR / 2 / np.tan(np.radians(pose.fovy) / 2), self._source.camera.aperture
+        placing(self._camera)
+        self._camera.CreateFocalLengthAttr(_TENTHS * focal)
+        self._camera.CreateFStopAttr(focal / aperture if aperture else 0.0)  # 0: all is sharp
+        self._camera.CreateClippingRangeAttr(Gf.Vec2f(_NEAR * pose.distance, _FAR * pose.distance))
+        self._camera.CreateFocusDistanceAttr()
+
+    def write(self, data: mujoco.MjData, time: float) -> None:
+        """Add a frame."""
+        pose, focus = self._source.pose(data)
+        quaternion = np.zeros(4)
+        mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
+        place(self._camera, pose.position, quaternion, time)
+        self._camera.GetFocusDistanceAttr().Set(float(focus), Usd.TimeCode(time))
+
 
 # Frames are kept in memory until so many are there, and then appended to the file.
 _KEPT = 8
@@ -186,3 +230,19 @@ def _stands(model: mujoco.MjModel, body: int) -> bool:
     """Whether a body is fixed to the world."""
     root = int(model.body_weldid[body])
     return root == 0 and int(model.body_mocapid[int(model.body_rootid[body])]) < 0
+
+
+def writer(source: Source, path: Path) -> UsdWriter:
+    """Begin a file."""
+    return UsdWriter(source, path)
+
+
+def made_here(path: Path) -> bool:
+    """Whether a layer has the mark as its comment."""
+    if not path.is_file():
+        return False
+    try:
+        layer = Sdf.Layer.OpenAsAnonymous(str(path), metadataOnly=True)
+    except Tf.ErrorException:
+        return False
+    return layer is not None and layer.comment == MARK

@@ -1,19 +1,45 @@
-"""The frames of a long run in files of their own: value clips of USD, which a root layer joins."""
+"""The frames of a long run in files of their own: value clips of USD, which a root layer joins.
+
+Saving layers, with USD's errors as those of the operating system.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
-from pxr import Sdf, Usd, Vt
+from pxr import Sdf, Tf, Usd, Vt
 
 from ripple_sim.capture.snapshot import state_digest
-from ripple_sim.encode.mark import MARK
 from ripple_sim.encode.part import Part
+from ripple_sim.encode.replace import MARK
 from ripple_sim.solver.files import final_path
 
-from .saving import save
 from .source import Chunking, Moment, Source
+
+
+def save(layer: Sdf.Layer) -> None:
+    """Write a layer to its file.
+
+    Raises
+    ------
+    OSError
+    """
+    succeed(layer.Save)
+
+
+def succeed(work: Callable[..., bool], *arguments: object) -> None:
+    """Do what says whether it could write, and raise OSError if it could not."""
+    try:
+        if work(*arguments):
+            return
+        reason = "it could not be written"
+    except Tf.ErrorException as error:
+        text = " ".join(str(error).split())
+        reason = first[1] if (first := re.search(r"line \d+ in file \S+ : '(.*?)'(?= Error in |$)", text)) else text
+    raise OSError(reason)
+
 
 _CHECKED = 16  # at least every so many frames the simulation's state is fingerprinted, to be compared on resuming
 _MANIFEST = "manifest.usdc"

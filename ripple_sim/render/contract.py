@@ -6,7 +6,7 @@ from enum import IntEnum
 
 from ripple_sim.solver.gl.shader import Struct, numbered
 
-from . import color
+from . import camera
 
 MAX_LIGHTS, MAX_SHADOWS, MAX_OCCLUDERS, SOFT_BOXES = 8, 4, 16, 3
 HELD_LIGHTS = 2  # that come to fragments as varyings
@@ -161,8 +161,8 @@ DEFINES: dict[str, object] = {
     **OBJECT.defines(),
     "OBJECT_TEXELS": OBJECT.dtype.itemsize // 16,
     "OBJECT_COLUMNS": OBJECT_COLUMNS,
-    "SRGB_BREAK": color.BREAK,
-    "SRGB_SLOPE": color.SLOPE,
-    "SRGB_OFFSET": color.OFFSET,
-    "SRGB_EXPONENT": color.EXPONENT,
+    "SRGB_BREAK": camera.BREAK,
+    "SRGB_SLOPE": camera.SLOPE,
+    "SRGB_OFFSET": camera.OFFSET,
+    "SRGB_EXPONENT": camera.EXPONENT,
 }

@@ -1,8 +1,14 @@
-"""Read-back: a ring of buffers, so that a frame is copied to memory while later ones are drawn."""
+"""Read-back: a ring of buffers, so that a frame is copied to memory while later ones are drawn.
+
+What kind of frames a renderer draws.
+
+The G-buffer: what is left of the visible surfaces, sample by sample, for deferred shading.
+"""
 
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 
 import moderngl
 import numpy as np
@@ -11,8 +17,90 @@ from numpy.typing import NDArray
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.kernel import kernel
 
-from .frame_format import FrameFormat
+from .contract import Unit
 from .resources import Resources
+
+
+@dataclass(frozen=True)
+class FrameFormat:
+    """Size and kind of a frame.
+
+    Attributes
+    ----------
+    size : (width, height)
+        [pixels].
+    samples : int
+        Samples a pixel for smooth edges; at most as many as the driver has. 0 or 1: none.
+    alpha : bool
+        Whether there is an alpha channel: the background is transparent, and only the shadows are left of the floor.
+    linear : bool
+        Whether colours are linear light in half floats, without tone mapping, in place of sRGB in bytes.
+    """
+
+    size: tuple[int, int]
+    samples: int = 4
+    alpha: bool = False
+    linear: bool = False
+
+    @property
+    def aspect(self) -> float:
+        """Width over height."""
+        return self.size[0] / self.size[1]
+
+    @property
+    def dtype(self) -> str:
+        """Of a channel on the GPU, as moderngl names it."""
+        return "f2" if self.linear else "f1"
+
+
+class GBuffer:
+    """Depths, normals and colours; g_buffer.glsl encodes them.
+
+    Parameters
+    ----------
+    resources : Resources
+    size : (width, height)
+        [pixels].
+    samples : int
+        A pixel; at most as many as the driver has.
+
+    Attributes
+    ----------
+    samples : int
+        1 or more.
+    """
+
+    def __init__(self, resources: Resources, size: tuple[int, int], samples: int) -> None:
+        with resources.gl as ctx:
+            samples = min(samples, ctx.max_samples)
+        many = samples if samples > 1 else 0
+        self.samples = max(many, 1)
+        depths = resources.depth_texture(size, samples=many)
+        normals, colors = (resources.texture(size, 4, samples=many, dtype="nu2") for _ in range(2))
+        self._textures = {Unit.DEPTHS: depths, Unit.NORMALS: normals, Unit.COLORS: colors}
+        if not many:
+            depths.compare_func = ""
+            for texture in self._textures.values():
+                texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._framebuffer = resources.framebuffer([normals, colors], depths)
+
+    def use(self, ctx: moderngl.Context) -> None:
+        """Draw into it from now on."""
+        self._framebuffer.use()
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+
+    def clear(self) -> None:
+        """Forget all surfaces."""
+        # the colours of samples without a surface are never read
+        self._framebuffer.color_mask = [(False,) * 4] * 2
+        self._framebuffer.clear(depth=1.0)
+        self._framebuffer.color_mask = [(True,) * 4] * 2
+
+    def bind(self) -> None:
+        """Bind the textures for the shaders."""
+        for unit, texture in self._textures.items():
+            texture.use(unit)
+
 
 _PACKED = 4  # pixels of three bytes that are whole words
 

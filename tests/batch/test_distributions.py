@@ -2,7 +2,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from ripple_sim.batch.distributions import Distribution
+from ripple_sim.batch.plan import Distribution
 from ripple_sim.errors import SceneError
 
 

@@ -6,8 +6,8 @@ import pytest
 from small_batch import PLAN, files, new_batch, small_plan
 
 from ripple_sim import load_batch
+from ripple_sim.batch.finished import pack
 from ripple_sim.batch.make_scene import make_scene
-from ripple_sim.batch.packing import pack
 from ripple_sim.batch.run import in_shard
 from ripple_sim.errors import BatchError
 
@@ -79,7 +79,7 @@ def test_a_kill_between_tar_file_and_folders_doubles_nothing(packed, tmp_path, m
         make_scene(str(batch.path), number)
     kept = {number: files(batch.scene(number)) for number in range(3)}
     with monkeypatch.context() as patch:
-        patch.setattr("ripple_sim.batch.packing._remove_whole", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        patch.setattr("ripple_sim.batch.finished._remove_whole", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             pack(batch, 0, 3)
     assert {number: files(batch.scene(number)) for number in range(3)} == kept

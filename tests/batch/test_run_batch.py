@@ -12,12 +12,11 @@ import pytest
 from small_batch import PLAN, files, new_batch, small_plan
 
 from ripple_sim.batch import run
-from ripple_sim.batch import run_batch as command
+from ripple_sim.batch import run as command
 from ripple_sim.batch.folder import BatchFolder
 from ripple_sim.batch.make_scene import Outcome, make_scene
-from ripple_sim.batch.run_batch import run_batch
-from ripple_sim.batch.run_options import RunOptions
-from ripple_sim.batch.status import status_text
+from ripple_sim.batch.report import status_text
+from ripple_sim.batch.run import RunOptions, run_batch
 from ripple_sim.errors import BatchError, SceneError
 
 DATA = 'video = "none"\nheights = true\n'

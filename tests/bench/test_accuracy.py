@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from modes import mode_error
 
-from ripple_sim.bench.accuracy import energy_drift, sphere_mode_error, sphere_modes
+from ripple_sim.bench.report import energy_drift, sphere_mode_error, sphere_modes
 from ripple_sim.solver.operator.assembly import OPERATORS
 
 

@@ -6,10 +6,15 @@ import trimesh
 from known_meshes import known_mesh
 from surfaces import disk, joined, moved, torus
 
-from ripple_sim.bench.arrival import arrival, arrival_error, arrival_times, ideal_width
-from ripple_sim.bench.geodesics import geodesic_distance
-from ripple_sim.bench.plane_wave import plane_arrival
-from ripple_sim.bench.sources import spread_sources
+from ripple_sim.bench.arrival import (
+    arrival,
+    arrival_error,
+    arrival_times,
+    geodesic_distance,
+    ideal_width,
+    plane_arrival,
+    spread_sources,
+)
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas, load_mesh, sphere_atlas
 

@@ -7,9 +7,16 @@ import pytest
 import trimesh
 from surfaces import torus
 
-from ripple_sim.bench.arrival import Arrival, arrival
-from ripple_sim.bench.arrival_table import CALIBRATED, CONFORMAL, arrivals, mean_error, speed_factor
-from ripple_sim.bench.sources import spread_sources
+from ripple_sim.bench.arrival import (
+    CALIBRATED,
+    CONFORMAL,
+    Arrival,
+    arrival,
+    arrivals,
+    mean_error,
+    speed_factor,
+    spread_sources,
+)
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas, load_mesh
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.bench.first_crest import front_and_crest
+from ripple_sim.bench.arrival import front_and_crest
 
 TIMES = np.linspace(0, 4, 401)
 

@@ -5,8 +5,7 @@ import pytest
 from scipy.integrate import simpson
 from scipy.special import i0e
 
-from ripple_sim.bench.first_crest import front_and_crest
-from ripple_sim.bench.plane_wave import NEAREST, plane_arrival
+from ripple_sim.bench.arrival import NEAREST, front_and_crest, plane_arrival
 
 FARTHEST = 20.0
 SLANTS = np.linspace(0, np.pi / 2, 2001)

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from ripple_sim.bench.speed import Race, race
+from ripple_sim.bench.report import Race, race
 
 
 class Counts:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ripple_sim.bench.table import POLYGONS, knobbly_body
+from ripple_sim.bench.report import POLYGONS, knobbly_body
 
 
 @pytest.mark.parametrize("count", POLYGONS)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.capture.exposure import Exposures, disc_points
-from ripple_sim.scene.camera import CameraEntry
+from ripple_sim.capture.snapshot import Exposures, disc_points
+from ripple_sim.scene.scene_file import CameraEntry
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 32, 100])

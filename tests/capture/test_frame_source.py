@@ -10,8 +10,7 @@ from PIL import Image
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.errors import SceneError, VideoError
-from ripple_sim.scene.camera_override import with_exposure
-from ripple_sim.scene.scene import Scene
+from ripple_sim.scene.scene import Scene, with_exposure
 from ripple_sim.simulation import Simulation
 from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import Progress, render_video

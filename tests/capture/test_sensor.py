@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from exposed_scene import linear
 
-from ripple_sim.capture.sensor import Sensor
+from ripple_sim.capture.frame_source import Sensor
 
 
 def shrink(picture: np.ndarray, factor: int) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from exposed_scene import FPS, SPEED, THROW
 
-from ripple_sim.capture.shutter import ShutterTimes
+from ripple_sim.capture.snapshot import ShutterTimes
 from ripple_sim.simulation import Simulation
 
 

@@ -4,12 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.capture.viewpoint import focal_distance, viewpoint
+from ripple_sim.capture.frame_source import focal_distance, viewpoint
 from ripple_sim.errors import SceneError
 from ripple_sim.render import Camera
-from ripple_sim.render.camera import ThroughLens
-from ripple_sim.render.projection import perspective, view_matrix
-from ripple_sim.scene.camera import CameraEntry, check_camera
+from ripple_sim.render.camera import ThroughLens, perspective, view_matrix
+from ripple_sim.scene.scene_file import CameraEntry, check_camera
 
 MJCF = """<mujoco><worldbody>
 <geom name="lamp" size="0.1" pos="1 0.5 3"/>

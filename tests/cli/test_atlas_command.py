@@ -11,7 +11,7 @@ import trimesh
 from PIL import Image
 
 from ripple_sim.cli import main as cli
-from ripple_sim.figures import atlas_view, chart_images, view
+from ripple_sim.figures import atlas_view
 from ripple_sim.solver import AtlasError, build_atlas
 
 
@@ -27,7 +27,7 @@ def _left_as_found(tmp_path_factory, monkeypatch):
 @pytest.fixture
 def coarse_pictures(monkeypatch):
     """Pictures that are not averaged from finer ones, which takes most of their time."""
-    for module in (view, atlas_view, chart_images):
+    for module in (atlas_view, atlas_view, atlas_view):
         monkeypatch.setattr(module, "OVERSAMPLING", 1)
 
 

@@ -10,7 +10,7 @@ import warnings
 
 import pytest
 
-from ripple_sim.cli import info_command
+from ripple_sim.cli import info
 from ripple_sim.cli import main as cli
 from ripple_sim.errors import EncodingError, RippleWarning, SceneError
 from ripple_sim.solver.errors import GLError
@@ -212,7 +212,7 @@ def test_the_exit_status_tells_what_kind_of_error_it_was(monkeypatch, capsys, er
     def run(self):
         raise error
 
-    monkeypatch.setattr(info_command.Info, "run", run)
+    monkeypatch.setattr(info.Info, "run", run)
     assert cli.main(["info"]) == status
     line = capsys.readouterr().err
     assert line.startswith("ripple-sim: ")
@@ -223,7 +223,7 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
     def run(self):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(info_command.Info, "run", run)
+    monkeypatch.setattr(info.Info, "run", run)
     with pytest.raises(ZeroDivisionError):
         cli.main(["info"])
 
@@ -256,7 +256,7 @@ def test_an_interrupted_command_says_what_is_left(monkeypatch, capsys):
         ending.add_note("48 frames are kept")
         raise ending
 
-    monkeypatch.setattr(info_command.Info, "run", run)
+    monkeypatch.setattr(info.Info, "run", run)
     assert cli.main(["info"]) == 130
     assert capsys.readouterr().err == "ripple-sim: interrupted; 48 frames are kept\n"
 
@@ -266,7 +266,7 @@ def test_a_warning_is_one_line_and_the_handler_is_given_back(monkeypatch, capsys
         warnings.warn("the hull is\noff the surface", RippleWarning, stacklevel=1)
 
     before = warnings.showwarning
-    monkeypatch.setattr(info_command.Info, "run", run)
+    monkeypatch.setattr(info.Info, "run", run)
     assert cli.main(["info"]) == 0
     assert capsys.readouterr().err == "ripple-sim: warning: the hull is off the surface\n"
     assert warnings.showwarning is before

@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from ripple_sim.cli import progress
-from ripple_sim.cli.progress import frame_progress
+from ripple_sim.cli import render
+from ripple_sim.cli.render import frame_progress
 
 
 class Terminal(io.StringIO):
@@ -43,8 +43,8 @@ def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.Mon
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setattr(sys, "stderr", Terminal())
     kernels = "ripple_sim.solver.backends.kernels"
-    monkeypatch.setattr(progress, "compiling", lambda: kernels)
-    monkeypatch.setattr(progress, "compile_times", lambda: {kernels: 11.6, "ripple_sim.solver.texels.stencil": 3.0})
+    monkeypatch.setattr(render, "compiling", lambda: kernels)
+    monkeypatch.setattr(render, "compile_times", lambda: {kernels: 11.6, "ripple_sim.solver.texels.stencil": 3.0})
     with frame_progress("renderer", 120):
         pass
     text = sys.stderr.getvalue()
@@ -57,12 +57,12 @@ def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.Mon
     [
         ("ripple_sim.solver.waves.load", "loads and height maps"),
         ("ripple_sim.solver.texels.stencil", "the atlas"),
-        ("ripple_sim.coupling.texel_forces", "the contacts"),
+        ("ripple_sim.coupling.footprints", "the contacts"),
         ("my_kernels", "my_kernels"),
     ],
 )
 def test_kernels_are_told_by_what_they_do(module: str, stage: str) -> None:
-    assert progress._stage(module) == stage
+    assert render._stage(module) == stage
 
 
 def test_an_error_goes_on_through_the_progress(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from ripple_sim.cli.parser import UsageError, parse
+from ripple_sim.cli.parser import UsageError, View, parse
 from ripple_sim.cli.render import Drop, Render
-from ripple_sim.cli.view_command import View
 from ripple_sim.video.options import VideoOptions
 
 WORDS = {

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from ripple_sim import info
+from ripple_sim import diagnostics
 from ripple_sim.cli import main as cli
 from ripple_sim.solver.backends import backend
 from ripple_sim.solver.errors import GLError
@@ -56,7 +56,7 @@ def test_without_egl_the_text_says_so_too(capsys, no_egl):
 
 
 def test_a_missing_package_is_reported(monkeypatch):
-    monkeypatch.setattr(info, "PACKAGES", ("ripple-sim", "no-such-package"))
-    got = info.collect()
+    monkeypatch.setattr(diagnostics, "PACKAGES", ("ripple-sim", "no-such-package"))
+    got = diagnostics.collect()
     assert got.versions["no-such-package"] is None
-    assert "not installed" in info.as_text(got)
+    assert "not installed" in diagnostics.as_text(got)

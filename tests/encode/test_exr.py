@@ -15,9 +15,9 @@ from sphere_height_maps import cube_charts
 from ripple_sim.cli import main as cli
 from ripple_sim.encode import check_output, open_writer
 from ripple_sim.errors import VideoError
-from ripple_sim.overlay.colormap import color_table
+from ripple_sim.overlay.notes import color_table
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.visuals import primitives as meshes
+from ripple_sim.render.visuals import shapes as meshes
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.scene import Scene
 from ripple_sim.solver import RippleError

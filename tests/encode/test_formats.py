@@ -8,8 +8,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from ripple_sim.encode.clip import Stream
-from ripple_sim.encode.formats import FORMATS, Format
-from ripple_sim.encode.output import ENDINGS, FRAME_FORMATS
+from ripple_sim.encode.output import ENDINGS, FORMATS, FRAME_FORMATS, Format
 
 STREAM = Stream(32, 16, 25)
 LEVELS = [10, 60, 110, 160, 210]

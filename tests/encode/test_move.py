@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from ripple_sim.encode.move import move
+from ripple_sim.encode.replace import move
 
 
 def test_a_moved_file_replaces_the_one_in_its_place(tmp_path: Path) -> None:

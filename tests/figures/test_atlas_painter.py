@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from hand_made import polygon, square
 
-from ripple_sim.figures.atlas_view import AtlasPainter
-from ripple_sim.figures.chart_images import cross, squares
-from ripple_sim.figures.texel_colors import chart_colors, texel_stretch
-from ripple_sim.figures.view import View
+from ripple_sim.figures.atlas_plot import chart_colors, texel_stretch
+from ripple_sim.figures.atlas_view import AtlasPainter, View, cross, squares
 from ripple_sim.solver import sphere_atlas, texel_atlas
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.figures.view import View
-from ripple_sim.scene.up_axis import usual_up
+from ripple_sim.figures.atlas_view import View
+from ripple_sim.scene.drop import usual_up
 
 
 @pytest.mark.parametrize("up", ["y", "z"])

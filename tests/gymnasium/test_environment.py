@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("gymnasium")
-from ripple_sim.environment import EnvironmentCamera, frame_size, model_and_data
+from ripple_sim.gymnasium import EnvironmentCamera, frame_size, model_and_data
 
 MODEL = """<mujoco><visual><global fovy="38"/></visual><worldbody><geom type="plane" size="2 2 1"/>
 <body pos="0.3 -0.2 1"><freejoint/><geom size="0.1"/><geom size="0.1" pos="0.2 0 0"/>

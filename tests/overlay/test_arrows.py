@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from ripple_sim.overlay.arrows import draw_arrow
-from ripple_sim.overlay.marks import Sprite
+from ripple_sim.overlay.marks import Sprite, draw_arrow
 
 
 def test_arrow_has_its_length_and_fades() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.overlay.colormap import SIZE, color_table, colors, lab_to_srgb
+from ripple_sim.overlay.notes import SIZE, color_table, colors, lab_to_srgb
 
 # Machado, Oliveira and Fernandes 2009, complete deuteranopia and protanopia, on linear RGB
 DEUTAN = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])

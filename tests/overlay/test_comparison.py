@@ -3,7 +3,7 @@
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.overlay.comparison import compared_operators
+from ripple_sim.overlay.notes import compared_operators
 
 
 def test_comparison_names_its_baselines() -> None:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.overlay.energy_plot import EnergyPlot
-from ripple_sim.overlay.layout import Layout
+from ripple_sim.overlay.painter import EnergyPlot
+from ripple_sim.overlay.panels import Layout
 
 
 def test_energy_plot_draws_values_at_their_height() -> None:

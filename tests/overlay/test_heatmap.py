@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.overlay.heatmap import grid_spacing, magnitude
+from ripple_sim.overlay.notes import grid_spacing, magnitude
 from ripple_sim.solver import HeightMap, sphere_atlas
 from ripple_sim.solver.texels.topology import with_filled_halo
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.overlay.history import MOST_POINTS, History
+from ripple_sim.overlay.notes import MOST_POINTS, History
 
 
 @pytest.mark.parametrize("frames", [1, 7, MOST_POINTS, MOST_POINTS + 1, 50 * MOST_POINTS + 3])

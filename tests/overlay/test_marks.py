@@ -7,12 +7,8 @@ import numpy as np
 import pytest
 
 from ripple_sim.coupling.ripples import Impulse
-from ripple_sim.overlay.arrows import draw_arrow
-from ripple_sim.overlay.contact_marks import MEMORY, ContactMarks, Mark
-from ripple_sim.overlay.layout import Layout
-from ripple_sim.overlay.marks import Sprite
-from ripple_sim.overlay.marks_overlay import PlacedMark, draw_marks, place_marks
-from ripple_sim.overlay.projection import Projection
+from ripple_sim.overlay.marks import MEMORY, ContactMarks, Mark, Sprite, draw_arrow
+from ripple_sim.overlay.panels import Layout, PlacedMark, Projection, draw_marks, place_marks
 from ripple_sim.render import Camera
 from ripple_sim.solver import sphere_atlas
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from ripple_sim.overlay.layout import Layout
 from ripple_sim.overlay.notes import Notes, Scale
 from ripple_sim.overlay.painter import Painter
-from ripple_sim.scene.overlays import parse_request
+from ripple_sim.overlay.panels import Layout
+from ripple_sim.scene.scene import parse_request
 
 SIZE = (640, 360)
 CURVE = (np.linspace(0, 1, 9), np.ones(9))

@@ -5,15 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from ripple_sim.overlay.colormap import colors
-from ripple_sim.overlay.comparison import TITLES
-from ripple_sim.overlay.energy_plot import EnergyPlot
-from ripple_sim.overlay.layout import Layout
 from ripple_sim.overlay.marks import Sprite, text_width
-from ripple_sim.overlay.notes import Notes, Scale
-from ripple_sim.overlay.painter import Painter
-from ripple_sim.overlay.panels import arrow_key, color_bar, label
-from ripple_sim.scene.overlays import NAMES, parse_request
+from ripple_sim.overlay.notes import TITLES, Notes, Scale, colors
+from ripple_sim.overlay.painter import EnergyPlot, Painter
+from ripple_sim.overlay.panels import Layout, arrow_key, color_bar, label
+from ripple_sim.scene.scene import NAMES, parse_request
 
 SIZES = [(320, 180), (640, 360), (720, 1280), (1280, 720), (3840, 2160)]
 

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.overlay.projection import Projection
+from ripple_sim.overlay.panels import Projection
 from ripple_sim.render import Camera
 from ripple_sim.render.camera import Pose
 

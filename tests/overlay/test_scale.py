@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.overlay.scale import Limit, number, readable, round_up
+from ripple_sim.overlay.notes import Limit, number, readable, round_up
 
 
 def test_limit_grows_to_round_numbers_and_never_shrinks() -> None:

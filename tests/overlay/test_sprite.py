@@ -7,7 +7,7 @@ import pytest
 
 from ripple_sim.overlay import marks as patch_module
 from ripple_sim.overlay.marks import Sprite
-from ripple_sim.overlay.scale import number
+from ripple_sim.overlay.notes import number
 
 
 def test_sprite_covers_in_proportion() -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ripple_sim.render.bounds import Balls, balls_about, enclosing, join, within
+from ripple_sim.render.camera import Balls, balls_about, enclosing, join, within
 
 
 def test_balls_about_triangles_hold_each_and_are_small() -> None:

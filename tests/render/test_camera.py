@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.render import Camera
-from ripple_sim.render.projection import perspective, view_matrix
+from ripple_sim.render.camera import perspective, view_matrix
 from ripple_sim.solver import RippleError
 
 MJCF = """<mujoco><worldbody>

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ripple_sim.render.color import linear_to_srgb, srgb_to_linear
+from ripple_sim.render.camera import linear_to_srgb, srgb_to_linear
 
 
 def test_the_curves_are_inverse_to_one_another() -> None:

@@ -8,7 +8,7 @@ from drawn import ball_surface
 from ripple_sim.render.camera import Camera
 from ripple_sim.render.resources import Resources
 from ripple_sim.render.scene import DrawnScene
-from ripple_sim.render.visuals.assets import Assets
+from ripple_sim.render.visuals.instances import Assets
 from ripple_sim.solver import RippleError
 
 XML = """<mujoco><worldbody>

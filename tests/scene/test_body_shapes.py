@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.scene.body_shapes import BODY_SHAPES
+from ripple_sim.scene.drop_model import BODY_SHAPES
 
 
 @pytest.mark.parametrize("shape", BODY_SHAPES)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.camera import MAX_EXPOSURES, CameraEntry, check_camera
+from ripple_sim.scene.scene_file import MAX_EXPOSURES, CameraEntry, check_camera
 
 MODEL = mujoco.MjModel.from_xml_string(
     """<mujoco><worldbody><camera name="eye" pos="0 -3 1"/><camera pos="0 -3 1"/><camera name="side" pos="3 0 1"/>

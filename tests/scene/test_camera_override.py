@@ -6,10 +6,8 @@ import mujoco
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.camera import CameraEntry
-from ripple_sim.scene.camera_override import through_camera, with_exposure
-from ripple_sim.scene.scene import Scene
-from ripple_sim.scene.scene_file import RippleEntry
+from ripple_sim.scene.scene import Scene, through_camera, with_exposure
+from ripple_sim.scene.scene_file import CameraEntry, RippleEntry
 
 MODEL = mujoco.MjModel.from_xml_string(
     """<mujoco><worldbody><camera name="eye" pos="0 -3 1"/><camera name="side" pos="3 0 1"/>

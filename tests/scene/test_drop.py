@@ -7,8 +7,8 @@ import trimesh
 
 from ripple_sim.coupling.target_mesh import target_mesh
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.check_scene import check_scene
 from ripple_sim.scene.drop import drop_scene
+from ripple_sim.scene.load_scene import check_scene
 from ripple_sim.scene.scene import Scene
 
 

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from ripple_sim.scene.body_shapes import BODY_SHAPES
-from ripple_sim.scene.drop_model import drop_model
-from ripple_sim.scene.motion import DropEntry
+from ripple_sim.scene.drop_model import BODY_SHAPES, drop_model
+from ripple_sim.scene.events import DropEntry
 
 
 def table() -> tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.expression import evaluate
+from ripple_sim.scene.target_maps import evaluate
 
 X, Y = np.linspace(-1, 1, 12).reshape(3, 4), np.linspace(0, 2, 12).reshape(3, 4)
 NAMES = {"x": X, "y": Y, "z": 0 * X}

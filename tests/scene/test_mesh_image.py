@@ -11,8 +11,7 @@ from PIL import Image
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.scene.drop import drop_scene
-from ripple_sim.scene.mesh_image import mesh_image
+from ripple_sim.scene.drop import drop_scene, mesh_image
 from ripple_sim.scenes.shapes import peanut, write_obj
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import GLError

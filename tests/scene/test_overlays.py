@@ -6,7 +6,7 @@ import pytest
 
 from ripple_sim.cli.main import main
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.overlays import NAMES, Request, parse_request
+from ripple_sim.scene.scene import NAMES, Request, parse_request
 
 
 def test_request_takes_every_name_and_ranges() -> None:

@@ -7,7 +7,7 @@ import trimesh
 from PIL import Image
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.paint import paint_target
+from ripple_sim.scene.drop import paint_target
 from ripple_sim.solver import Mesh, load_mesh
 
 PIXELS = np.random.default_rng(0).integers(0, 256, (3, 5, 3), dtype=np.uint8)

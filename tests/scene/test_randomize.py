@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.body_shapes import BODY_SHAPES
-from ripple_sim.scene.randomize import RandomEntry, randomize
+from ripple_sim.scene.drop_model import BODY_SHAPES, RandomEntry, randomize
 
 MJCF = """<mujoco><worldbody><geom name="table" type="box" size="1 1 0.1"/>
 <body name="post" pos="0 0 1"><joint type="slide"/><geom name="post" size="0.1"/></body>

@@ -9,7 +9,7 @@ import pytest
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.scene.scene_path import shipped_scenes
+from ripple_sim.scene.scene import shipped_scenes
 from ripple_sim.scenes.shapes import peanut, write_obj
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError

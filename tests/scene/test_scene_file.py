@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.camera import CameraEntry
-from ripple_sim.scene.scene_file import RippleEntry, parse_scene
+from ripple_sim.scene.scene_file import CameraEntry, RippleEntry, parse_scene
 
 LEAST = {"model": "scene.xml", "ripple": [{"geom": "egg"}]}
 

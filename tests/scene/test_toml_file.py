@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.toml_file import read_toml
+from ripple_sim.scene.scene import read_toml
 
 
 @pytest.mark.parametrize(

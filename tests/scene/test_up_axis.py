@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from ripple_sim.scene.up_axis import UP_AXES, usual_up
+from ripple_sim.scene.drop import UP_AXES, usual_up
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,8 @@ import pytest
 import trimesh
 from PIL import Image
 
-from ripple_sim.scene.mesh_image import load_image, mesh_image
-from ripple_sim.scene.model_files import check_files
+from ripple_sim.scene.drop import load_image, mesh_image
+from ripple_sim.scene.load_scene import check_files
 from ripple_sim.solver import RippleError, SolverError, load_mesh, sphere_atlas
 from ripple_sim.solver.files import read_image
 from ripple_sim.solver.texels.maps import texture_map

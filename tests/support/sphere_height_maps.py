@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.solver.layouts.cube.atlas import CubeChartMap
 from ripple_sim.solver.layouts.cube.convention import cube_topology, texel_directions
 

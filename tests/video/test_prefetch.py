@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from ripple_sim.video.prefetch import Prefetch
+from ripple_sim.video.render_video import Prefetch
 
 
 def test_items_come_in_order_from_another_thread():

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from unfinished_videos import MJCF, contents
 
-from ripple_sim.encode.formats import FRAMES_IN_CLIP
+from ripple_sim.encode.output import FRAMES_IN_CLIP
 from ripple_sim.errors import VideoError
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.scene import Scene

@@ -8,12 +8,9 @@ import mujoco
 import pytest
 
 from ripple_sim.errors import RippleError, SceneError
-from ripple_sim.scene.camera import CameraEntry
 from ripple_sim.scene.scene import MAX_DURATION, Scene
-from ripple_sim.scene.scene_file import MapEntry, MaterialEntry, RippleEntry
-from ripple_sim.video.options import VideoOptions
-from ripple_sim.video.provenance import scene_digest
-from ripple_sim.video.settings import MAX_SLOW_MOTION, check_options, frame_count, settled
+from ripple_sim.scene.scene_file import CameraEntry, MapEntry, MaterialEntry, RippleEntry
+from ripple_sim.video.options import MAX_SLOW_MOTION, VideoOptions, check_options, frame_count, scene_digest, settled
 
 MJCF = '<mujoco><worldbody><geom name="egg" size="{}"/></worldbody></mujoco>'
 

@@ -7,8 +7,7 @@ import numpy as np
 from played import MIDDLE, RADIUS
 
 from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.viewer.balls import Balls, add_balls
-from ripple_sim.viewer.opening import BALLS, FLIGHT, open_scene
+from ripple_sim.viewer.opening import BALLS, FLIGHT, Balls, add_balls, open_scene
 from ripple_sim.viewer.session import Session
 
 

@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from ripple_sim.viewer.actors import geom_mesh
-from ripple_sim.viewer.floor import BACKGROUND, add_floor, find_floor, is_endless
-from ripple_sim.viewer.stage import _round_up
+from ripple_sim.viewer.stage import BACKGROUND, _round_up, add_floor, find_floor, geom_mesh, is_endless
 
 
 def state(body: str) -> tuple[mujoco.MjModel, mujoco.MjData]:

@@ -5,12 +5,9 @@ from types import SimpleNamespace
 import pytest
 
 from ripple_sim.errors import DisplayError
-from ripple_sim.viewer.actions import Actions
-from ripple_sim.viewer.controls import CONTROLS, MOUSE, help_text
-from ripple_sim.viewer.display import check_display, display_problem
-from ripple_sim.viewer.input import Input
+from ripple_sim.viewer.canvas import CONTROLS, MOUSE, add_sliders, help_text
 from ripple_sim.viewer.session import OPERATORS, SLIDERS
-from ripple_sim.viewer.sliders import add_sliders
+from ripple_sim.viewer.window import Actions, Input, check_display, display_problem
 
 
 class Interactor:

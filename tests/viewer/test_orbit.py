@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from ripple_sim.viewer.orbit import level
+from ripple_sim.viewer.canvas import level
 
 FOCUS = np.array([0.3, -0.1, 0.5])
 

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from ripple_sim.errors import EncodingError, VideoError
-from ripple_sim.viewer.recorder import Recorder
+from ripple_sim.viewer.canvas import Recorder
 
 
 def frame(level: int, height: int = 32, width: int = 48) -> np.ndarray:

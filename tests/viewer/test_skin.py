@@ -4,8 +4,7 @@ import numpy as np
 from played import RADIUS
 
 from ripple_sim.solver import sphere_atlas
-from ripple_sim.viewer.session import Session
-from ripple_sim.viewer.skin import Skin
+from ripple_sim.viewer.session import Session, Skin
 
 
 def test_a_skin_is_the_surface_while_nothing_moves(session: Session) -> None:

@@ -1,15 +1,68 @@
-"""Adaptive tessellation: for each frame, triangles are split at the edges from which the waves depart."""
+"""Adaptive tessellation: for each frame, triangles are split at the edges from which the waves depart.
+
+Heights between the texels on the processor, by the quadratic B-spline of spline.glsl.
+
+Adaptive tessellation on the GPU: the triangles of `AdaptiveTessellation`, in its order, from a texture's heights.
+
+The triangles of a target in one frame: fine where its waves are sharp.
+"""
 
 from __future__ import annotations
 
+import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.contract import Splitting
+from ripple_sim.render.resources import Resources
 from ripple_sim.solver.kernel import Bools, Floats, Floats32, Ints32, kernel
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 
-from .spline_heights import spline_heights, spline_samples
+from .surface import Charts
 from .tessellation import Edges
+from .vertices import POSITION, SurfaceVertices
+
+
+def spline_samples(page: ChartPage, places: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Where places [k, 2] on a page of charts [texels] lie between the texels.
+
+    Returns
+    -------
+    texel : int32 [k, 3]
+        Chart, row and column, in a chart with its halo, of the first of the 3 x 3 texels about each place.
+    offset : float32 [k, 2]
+        How far off the middle one's centre it is [texels].
+    """
+    chart, row, column = page.locate(places)
+    place = np.stack([row, column], axis=1)
+    nearest = np.clip(np.floor(place + 0.5), 0, page.resolution - 1)
+    return np.column_stack([chart, nearest]).astype(np.int32), (place - nearest).astype(np.float32)
+
+
+@kernel
+def spline_heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Floats32:
+    """Heights [k] of a height map [C, n + 2, n + 2, 4] at offsets [k, 2] in texels [k, 3]; see `spline_samples`."""
+    height = np.empty(len(texel), np.float32)
+    half, most = np.float32(0.5), np.float32(0.75)
+    for i in range(len(texel)):
+        # number by number: unpacking rows takes longer than all the rest
+        chart, row, column = texel[i, 0], texel[i, 1], texel[i, 2]
+        s, t = offset[i, 0], offset[i, 1]
+        left, right = half * (half - t) * (half - t), half * (half + t) * (half + t)
+        middle = most - t * t
+        low, mean, high = height_map[chart, row], height_map[chart, row + 1], height_map[chart, row + 2]
+        height[i] = (
+            half * (half - s) * (half - s) * _across(low, column, left, middle, right)
+            + (most - s * s) * _across(mean, column, left, middle, right)
+            + half * (half + s) * (half + s) * _across(high, column, left, middle, right)
+        )
+    return height
+
+
+@kernel(inline="always")
+def _across(texels: Floats32, column: int, left: np.float32, middle: np.float32, right: np.float32) -> np.float32:
+    """Weighted height of three texels of a row [n + 2, 4], from a column on."""
+    return left * texels[column, 3] + middle * texels[column + 1, 3] + right * texels[column + 2, 3]
 
 
 class AdaptiveTessellation:
@@ -137,3 +190,147 @@ def _triangles(faces: Ints32, sides: Ints32, midpoint: Ints32, length: Floats) -
             triangles[count + 3] = m, n, o
         count += splits + 1
     return triangles[:count]
+
+
+_GROUP = 256
+
+
+class DeviceTessellation:
+    """Decides which edges are split, and writes triangles and the draw call's size, without asking the host.
+
+    How many triangles come before each face's is a sum over all faces before it: within groups of faces first, and then
+    over the groups. So their order is always the same.
+
+    Parameters
+    ----------
+    resources : Resources
+    adaptive : AdaptiveTessellation
+    page : ChartPage
+    layer : int
+        Of the height map.
+    indices : moderngl.Buffer
+        Where the triangles go, room for four a face.
+
+    Attributes
+    ----------
+    split : moderngl.Buffer
+        int32 an edge: whether its midpoint is used.
+    command : moderngl.Buffer
+        Of an indirect draw call.
+    """
+
+    def __init__(
+        self,
+        resources: Resources,
+        adaptive: AdaptiveTessellation,
+        page: ChartPage,
+        layer: int,
+        indices: moderngl.Buffer,
+    ) -> None:
+        self._layer, self._tolerance = layer, float(adaptive.tolerance)
+        self._counts = len(adaptive.long), len(adaptive.faces)
+        _, rank = np.unique(adaptive.length, return_inverse=True)
+        first = np.array([page.corner(chart) for chart in range(page.charts)])[adaptive.texel[:, 0]]
+        places = np.concatenate([first + adaptive.texel[:, :0:-1], adaptive.offset], axis=1)
+        middles = len(adaptive.texel) - len(adaptive.long) + np.arange(len(adaptive.long))
+        groups = -(-len(adaptive.faces) // _GROUP)
+
+        def buffer(content: NDArray, dtype: str = "i4") -> moderngl.Buffer:
+            return resources.buffer(content.astype(dtype).tobytes() or bytes(16))
+
+        self.split, self.command = buffer(np.zeros(len(rank))), buffer(np.array([0, 1, 0, 0, 0]))
+        sides = adaptive.sides
+        faces = np.concatenate([adaptive.faces, adaptive.base_count + sides, rank.ravel()[sides]], axis=1)
+        self._buffers = {
+            Splitting.SPLIT: self.split,
+            Splitting.LONG_EDGES: buffer(np.column_stack([adaptive.long, adaptive.ends, middles])),
+            Splitting.LOOKUPS: buffer(places, "f4"),
+            Splitting.FACES: buffer(faces),
+            Splitting.BEFORE: buffer(np.zeros(len(faces))),
+            Splitting.TOTALS: buffer(np.zeros(groups)),
+            Splitting.INDICES: indices,
+            Splitting.COMMAND: self.command,
+        }
+        self._split_edges, self._count, self._add, self._write = (
+            resources.compute_shader(f"surfaces/{name}", GROUP=_GROUP, FIRST_MIDPOINT=adaptive.base_count)
+            for name in ("split_edges", "count_triangles", "add_counts", "write_triangles")
+        )
+
+    def run(self, ctx: moderngl.Context) -> None:
+        """Write the triangles for the height map that is bound."""
+        edges, faces = self._counts
+        for binding, buffer in self._buffers.items():
+            buffer.bind_to_storage_buffer(binding)
+        if edges:
+            self._split_edges["layer"], self._split_edges["tolerance"] = self._layer, self._tolerance
+        for shader, count in ((self._split_edges, edges), (self._count, faces), (self._add, 1), (self._write, faces)):
+            if count:
+                if shader is not self._add:
+                    shader["count"] = count
+                shader.run(-(-count // _GROUP))
+                ctx.memory_barrier()
+
+
+PIXELS = 5.6  # length of an edge where the target fills the frame's height
+_TOLERANCE = 0.25  # [pixels], likewise: edges from which the waves depart further are split
+
+
+class SurfaceTriangles:
+    """Triangles of a target on the GPU, found by the host from its copy of the heights, or by the device from its own.
+
+    Parameters
+    ----------
+    resources : Resources
+    vertices : SurfaceVertices
+    charts : Charts
+    layer : int
+        Of the height map.
+    pixel : float
+        Size of a pixel on the target where it fills the frame's height [m].
+
+    Attributes
+    ----------
+    indices : moderngl.Buffer
+        Three vertices a triangle.
+    count : int or moderngl.Buffer
+        Of the indices in use; the device's is an indirect draw call.
+    midpoints : int32 array or moderngl.Buffer
+        Edges whose midpoints are in use; the device's has a flag for every edge.
+    """
+
+    count: int | moderngl.Buffer
+    midpoints: NDArray[np.int32] | moderngl.Buffer
+
+    def __init__(
+        self, resources: Resources, vertices: SurfaceVertices, charts: Charts, layer: int, pixel: float
+    ) -> None:
+        self._resources, self._page, self._layer = resources, charts.page, layer
+        self._tessellation = AdaptiveTessellation(
+            vertices.F,
+            vertices.edges,
+            vertices.attributes[:, POSITION],
+            vertices.lookups,
+            charts.page,
+            tolerance=_TOLERANCE * pixel,
+            min_length=1.5 * PIXELS * pixel,
+        )
+        self.indices = resources.buffer(reserve=4 * 12 * len(vertices.F), dynamic=True)
+        self._written: NDArray[np.int32] | None = None
+        self._on_device: DeviceTessellation | None = None
+
+    def find(self, height_map: NDArray[np.float32]) -> None:
+        """Find the triangles for heights, [C, n + 2, n + 2, 4], and write those that are not there yet."""
+        triangles, self.midpoints = self._tessellation(height_map)
+        if triangles is not self._written:
+            self.indices.write(triangles)
+            self._written = triangles
+        self.count = triangles.size
+
+    def find_on_device(self, ctx: moderngl.Context) -> None:
+        """Have the device find the triangles for the heights that are bound; storage buffers are bound for that."""
+        if self._on_device is None:
+            self._on_device = DeviceTessellation(
+                self._resources, self._tessellation, self._page, self._layer, self.indices
+            )
+        self._on_device.run(ctx)
+        self.midpoints, self.count, self._written = self._on_device.split, self._on_device.command, None

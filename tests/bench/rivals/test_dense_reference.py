@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ripple_sim.bench.plain_shader import PlainShader
-from ripple_sim.bench.rivals import NaiveLoop
-from ripple_sim.bench.sparse_leapfrog import SparseLeapfrog
+from ripple_sim.bench.rivals import NaiveLoop, PlainShader, SparseLeapfrog
 from ripple_sim.solver import GLError, Material, sphere_atlas
 from ripple_sim.solver.operator.assembly import build_operator
 from ripple_sim.solver.operator.wave_operator import WaveOperator

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.bench.memory_stream import READS, WRITES, MemoryStream
+from ripple_sim.bench.rivals import READS, WRITES, MemoryStream
 from ripple_sim.solver import Material, sphere_atlas
 from ripple_sim.solver.operator.assembly import build_operator
 

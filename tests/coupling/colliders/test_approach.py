@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.approach import APPROACH, too_fast
+from ripple_sim.coupling.collision_warnings import APPROACH, too_fast
 
 TIMESTEP = 0.001
 TREES = """<mujoco><option gravity="0 0 0"/><worldbody><geom name="still" size="0.1"/>

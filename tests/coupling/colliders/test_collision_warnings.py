@@ -8,7 +8,7 @@ import pytest
 from mujoco_models import BALL, add_ball, mesh_spec, model_of
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling.surface_gap import hull_gap
+from ripple_sim.coupling.collision_warnings import hull_gap
 from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import limbed, peanut
 from ripple_sim.solver import Mesh, build_atlas

@@ -9,9 +9,9 @@ import trimesh
 from mujoco_models import BALL, mesh_asset, model_of
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling import tunnelling
+from ripple_sim.coupling import collision_warnings
+from ripple_sim.coupling.collision_warnings import TunnellingCheck
 from ripple_sim.coupling.model import CoupledModel
-from ripple_sim.coupling.tunnelling import TunnellingCheck
 from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import peanut
 
@@ -144,8 +144,8 @@ def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(kind: s
 
 def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: pytest.MonkeyPatch) -> None:
     flags = [flag for name, flag in mujoco.mjtEnableBit.__members__.items() if "SPECULATIVE" in name]
-    assert sum(int(flag) for flag in flags) == tunnelling.SPECULATIVE
-    monkeypatch.setattr(tunnelling, "SPECULATIVE", 1 << 20)
+    assert sum(int(flag) for flag in flags) == collision_warnings.SPECULATIVE
+    monkeypatch.setattr(collision_warnings, "SPECULATIVE", 1 << 20)
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><option gravity="0 0 0"/><worldbody>{PLATE}<body name="ball" pos="0 0 0.2"><freejoint/>
         <geom size="0.03"/></body></worldbody></mujoco>"""

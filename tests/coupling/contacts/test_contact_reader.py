@@ -8,8 +8,7 @@ from mujoco_models import BALL, mesh_asset, model_of
 
 from ripple_sim import make_collidable
 from ripple_sim.coupling.contact_reader import ContactReader
-from ripple_sim.coupling.contacts import TargetContacts
-from ripple_sim.coupling.geom_contacts import geom_contacts
+from ripple_sim.coupling.contacts import TargetContacts, geom_contacts
 from ripple_sim.coupling.model import CoupledModel
 from ripple_sim.coupling.target_mesh import target_atlas
 

@@ -7,10 +7,9 @@ import trimesh
 from mujoco_models import mesh_asset
 
 from ripple_sim import make_collidable
-from ripple_sim.coupling.collider_ids import ColliderIds
+from ripple_sim.coupling.contact_reader import ColliderIds
 from ripple_sim.coupling.contacts import PairContacts
-from ripple_sim.coupling.flex_contacts import FlexContacts
-from ripple_sim.coupling.flex_forces import FlexNormals, MujocoFlexContacts, summed_contacts
+from ripple_sim.coupling.flex_contacts import FlexContacts, FlexNormals, MujocoFlexContacts, summed_contacts
 from ripple_sim.coupling.model import CoupledModel
 from ripple_sim.coupling.target_mesh import target_mesh
 

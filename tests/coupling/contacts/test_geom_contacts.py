@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from mujoco_models import BALL, model_of
 
-from ripple_sim.coupling.contacts import TargetContacts
-from ripple_sim.coupling.geom_contacts import geom_contacts
+from ripple_sim.coupling.contacts import TargetContacts, geom_contacts
 from ripple_sim.coupling.model import CoupledModel
 
 SHAPES = ('type="box" size="0.2 0.2 0.1"', 'type="sphere" size="0.15"', 'type="capsule" size="0.08 0.1"')

@@ -8,7 +8,7 @@ from mujoco_models import add_ball
 
 from ripple_sim import Material, Ripples, make_collidable
 from ripple_sim.scene.drop import drop_scene
-from ripple_sim.scenes.implicit import polygonise, sphere
+from ripple_sim.scenes.shapes import polygonise, sphere
 from ripple_sim.scenes.vessels import opened
 
 MASS, SPEED = 0.2, 1.5

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from sphere_contacts import contacts_on, sphere_load, tilted
 
-from ripple_sim.coupling.contact_record import ContactRecord
-from ripple_sim.coupling.pose import Pose, in_frame
+from ripple_sim.coupling.load import ContactRecord
+from ripple_sim.coupling.patches import Pose, in_frame
 from ripple_sim.solver import sphere_atlas
 
 DT = 0.002

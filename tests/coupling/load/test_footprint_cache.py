@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.contact_state import CONTACT_STATE
 from ripple_sim.coupling.footprints import EMPTY_CACHE, FootprintCache, rebuild, reusable
 from ripple_sim.coupling.patches import LoadPoints
+from ripple_sim.coupling.rest_filter import CONTACT_STATE
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas
 from ripple_sim.solver.texels.distance import distance_scratch

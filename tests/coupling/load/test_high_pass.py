@@ -5,9 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import Ripples
-from ripple_sim.coupling.high_pass import HighPass, coarse_motions
-from ripple_sim.coupling.soft import SoftSurface
-from ripple_sim.coupling.soft_ids import first_flex
+from ripple_sim.coupling.soft import HighPass, SoftSurface, coarse_motions, first_flex
 from ripple_sim.solver import Load, Material
 
 

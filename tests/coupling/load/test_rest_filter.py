@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.contact_state import CONTACT_STATE
-from ripple_sim.coupling.rest_filter import rest_filter
-from ripple_sim.coupling.texel_forces import NO_FORCES, NO_SHARES, TexelForces
+from ripple_sim.coupling.footprints import NO_FORCES, NO_SHARES, TexelForces
+from ripple_sim.coupling.rest_filter import CONTACT_STATE, rest_filter
 from ripple_sim.solver import Load, sphere_atlas
 from ripple_sim.solver.waves.footprint import footprint
 from ripple_sim.solver.waves.load import slot_scratch

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.footprints import FootprintCache
+from ripple_sim.coupling.footprints import NO_FORCES, NO_SHARES, FootprintCache, texel_forces
 from ripple_sim.coupling.patches import LoadPoints, Patches
-from ripple_sim.coupling.texel_forces import NO_FORCES, NO_SHARES, texel_forces
 
 
 def made_up(points_of: list[int], kept: int, seed: int) -> tuple[Patches, LoadPoints, FootprintCache]:

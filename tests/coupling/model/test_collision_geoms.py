@@ -6,8 +6,7 @@ import pytest
 from mujoco_models import model_of
 
 from ripple_sim import Material, RippleError, Ripples
-from ripple_sim.coupling.collision_geoms import named_collision_geoms
-from ripple_sim.coupling.geoms import find_geom
+from ripple_sim.coupling.geoms import find_geom, named_collision_geoms
 from ripple_sim.coupling.model import CoupledModel
 
 SEEN = 'contype="0" conaffinity="0"'

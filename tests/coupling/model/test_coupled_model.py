@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from mujoco_models import add_ball, mesh_spec
 
-from ripple_sim.coupling.flex_colliders import flex_thickness
-from ripple_sim.coupling.model import CoupledModel
+from ripple_sim.coupling.model import CoupledModel, flex_thickness
 from ripple_sim.scenes.shapes import peanut
 
 

@@ -5,9 +5,9 @@ import warnings
 import pytest
 from mujoco_models import mesh_spec
 
-from ripple_sim.coupling.flex_colliders import find_flex_colliders
+from ripple_sim.coupling.model import find_flex_colliders
 from ripple_sim.errors import RippleWarning
-from ripple_sim.render.visuals.unsupported import warn_of_unsupported
+from ripple_sim.render.visuals.geoms import warn_of_unsupported
 from ripple_sim.scenes.shapes import peanut
 
 

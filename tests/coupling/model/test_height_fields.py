@@ -6,7 +6,7 @@ import pytest
 from mujoco_models import add_ball
 
 from ripple_sim import Material, Ripples
-from ripple_sim.coupling.height_fields import height_field_triangles
+from ripple_sim.coupling.target_mesh import height_field_triangles
 
 
 def land(rows: int, columns: int) -> mujoco.MjSpec:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from ripple_sim.coupling.primitives import primitive_triangles
+from ripple_sim.coupling.target_mesh import primitive_triangles
 
 SOLIDS = [
     ("sphere", (0.2,)),

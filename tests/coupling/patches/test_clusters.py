@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ripple_sim.coupling.clusters import MAX_CLUSTERS, cluster
+from ripple_sim.coupling.patches import MAX_CLUSTERS, cluster
 
 
 def test_far_contacts_of_one_pair_stay_apart_and_add_up() -> None:

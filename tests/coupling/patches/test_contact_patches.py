@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.coupling.contacts import TargetContacts
-from ripple_sim.coupling.load_points import find_probes, spread
-from ripple_sim.coupling.patches import find_load_points, find_patches
-from ripple_sim.coupling.pose import Pose
+from ripple_sim.coupling.patches import Pose, find_load_points, find_patches, find_probes, spread
 from ripple_sim.solver import Atlas
 
 RADII, CONVEX = np.array([0.5, 0.04, 0.06, 0.03, 0.05]), np.array([True, True, False, True, True])

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.clusters import MAX_CLUSTERS
-from ripple_sim.coupling.load_points import find_probes, spread
+from ripple_sim.coupling.patches import MAX_CLUSTERS, find_probes, spread
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas
 

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.pose import Pose, in_frame, in_world
+from ripple_sim.coupling.patches import Pose, in_frame, in_world
 
 
 def random_pose(seed: int) -> tuple[Pose, np.ndarray]:

@@ -3,7 +3,7 @@
 import mujoco
 import pytest
 
-from ripple_sim.coupling.clock import Passed, StepClock, missed_warning
+from ripple_sim.coupling.stepping import Passed, StepClock, missed_warning
 
 DT = 0.002
 

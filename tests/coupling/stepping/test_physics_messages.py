@@ -5,8 +5,8 @@ import warnings
 import mujoco
 import pytest
 
-from ripple_sim.coupling.physics_messages import adopt_warnings, physics_errors
 from ripple_sim.coupling.ripples import Ripples
+from ripple_sim.coupling.stepping import adopt_warnings, physics_errors
 from ripple_sim.errors import RippleWarning, SimulationError
 from ripple_sim.solver import Material
 

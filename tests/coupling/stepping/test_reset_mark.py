@@ -6,7 +6,7 @@ import pickle
 import mujoco
 import pytest
 
-from ripple_sim.coupling.reset_mark import ResetMark
+from ripple_sim.coupling.stepping import ResetMark
 
 MODEL = """<mujoco><option integrator="{}"><flag fwdinv="{}"/></option><worldbody><geom type="plane" size="1 1 1"/>
 <body pos="0 0 0.1"><freejoint/><geom size="0.1"/></body></worldbody>

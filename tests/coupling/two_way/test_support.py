@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.support import support_point
+from ripple_sim.coupling.two_way import support_point
 
 GEOMS = {
     "sphere": 'type="sphere" size="0.3"',

@@ -7,7 +7,7 @@ import numpy as np
 
 from ripple_sim.render.contract import DEFINES, FRAME, LEVELS, Binding, Unit
 from ripple_sim.render.resources import Resources
-from ripple_sim.render.visuals.studio import SOFT_BOX_LIGHTS
+from ripple_sim.render.visuals.lights import SOFT_BOX_LIGHTS
 
 RENDER = Path(__file__).parents[3] / "ripple_sim" / "render"
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from shader_functions import evaluated
 
-from ripple_sim.render.g_buffer import GBuffer
+from ripple_sim.render.targets import GBuffer
 
 FILE = "gpu/g_buffer.glsl"
 BITS = 65535

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from ripple_sim.render import Camera, Renderer
-from ripple_sim.render.frame_format import FrameFormat
 from ripple_sim.render.resources import Resources
-from ripple_sim.render.targets import Readback
+from ripple_sim.render.targets import FrameFormat, Readback
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import GLContext, shared_context

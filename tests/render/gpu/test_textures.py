@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import RippleWarning
-from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.textures import fitted, srgb_cube, srgb_texture
+from ripple_sim.render.camera import srgb_to_linear
+from ripple_sim.render.resources import fitted, srgb_cube, srgb_texture
 
 SAMPLE = """#version 430
 layout(local_size_x = 1) in;

@@ -6,9 +6,9 @@ import pytest
 from drawn import FLOOR, FRONT, SUN, frame_of
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.frame_format import FrameFormat
-from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.render.camera import srgb_to_linear
+from ripple_sim.render.surfaces.surface import Charts
+from ripple_sim.render.targets import FrameFormat
 from ripple_sim.solver import HeightMap, RippleError, sphere_atlas
 
 XML = '<mujoco><worldbody><geom type="sphere" size="1" rgba=".8 .2 .2 1"/></worldbody></mujoco>'

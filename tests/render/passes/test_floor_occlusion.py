@@ -5,7 +5,7 @@ import pytest
 from drawn import FLOOR, FRONT, SIZE, SUN, frame_of
 
 from ripple_sim.render import Camera
-from ripple_sim.render.color import srgb_to_linear
+from ripple_sim.render.camera import srgb_to_linear
 
 
 def test_sites_hide_no_sky(gl):

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.render.bounds import Balls
-from ripple_sim.render.camera import Pose
-from ripple_sim.render.passes.screen_bounds import boxes_of
-from ripple_sim.render.projection import perspective, view_matrix
+from ripple_sim.render.camera import Balls, Pose, perspective, view_matrix
+from ripple_sim.render.passes.layers import boxes_of
 
 SIZE = (200, 120)
 

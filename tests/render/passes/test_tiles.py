@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ripple_sim.render.passes.tiles import Tiles
+from ripple_sim.render.passes.deferred import Tiles
 
 SIZE = (200, 120)
 

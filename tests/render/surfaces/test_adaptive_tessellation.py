@@ -6,7 +6,7 @@ from sphere_height_maps import N, constant_height_map, height_map_of
 
 from ripple_sim.render.surfaces.adaptive import AdaptiveTessellation
 from ripple_sim.render.surfaces.tessellation import edges_of, midpoints
-from ripple_sim.render.visuals import primitives as meshes
+from ripple_sim.render.visuals import shapes as meshes
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from ripple_sim.render.visuals import primitives
-from ripple_sim.render.visuals.ambient_occlusion import _hemisphere, _smoothed, bake, frames_about
-from ripple_sim.render.visuals.corners import smooth_normals
+from ripple_sim.render.visuals import shapes
+from ripple_sim.render.visuals.corners import _hemisphere, _smoothed, bake, frames_about, smooth_normals
 from ripple_sim.solver.mesh.topology import edges_of
 
 
 def test_nothing_hides_the_sky_from_a_ball():
-    ball = primitives.ball(8)
+    ball = shapes.ball(8)
     visibility, thickness, _ = bake(3.0 * ball.shell, ball.faces, ball.shell)
     np.testing.assert_allclose(visibility, 1.0, atol=1e-6)
     # the mean chord of cosine-distributed rays into a ball is 4/3 of its radius
@@ -18,7 +17,7 @@ def test_nothing_hides_the_sky_from_a_ball():
 
 
 def test_the_size_of_a_mesh_changes_nothing():
-    ball = primitives.ball(6)
+    ball = shapes.ball(6)
     V = ball.shell * [1.0, 0.6, 0.3]
     normals = smooth_normals(V, ball.faces)
     first, second = (bake(scale * V + offset, ball.faces, normals) for scale, offset in ((1, 0), (1e-3, 5e-3)))
@@ -26,7 +25,7 @@ def test_the_size_of_a_mesh_changes_nothing():
 
 
 def test_a_flat_body_is_thin_and_a_round_one_thick():
-    ball = primitives.ball(8)
+    ball = shapes.ball(8)
     mean = [
         bake(V, ball.faces, smooth_normals(V, ball.faces))[1].mean() for V in (ball.shell, ball.shell * [1, 1, 0.1])
     ]
@@ -35,7 +34,7 @@ def test_a_flat_body_is_thin_and_a_round_one_thick():
 
 def test_a_wall_close_above_hides_the_sky_and_one_further_than_the_radius_does_not():
     """Two slabs over each other: their inner sides face one another."""
-    slab = primitives.box(1)
+    slab = shapes.box(1)
     V = slab.positions(np.array([1.0, 1.0, 0.04]), np.full(3, 0.01))
     F = np.concatenate([slab.faces, slab.faces + len(V)])
     normals = np.concatenate([slab.shell, slab.shell])
@@ -50,7 +49,7 @@ def test_a_wall_close_above_hides_the_sky_and_one_further_than_the_radius_does_n
 
 
 def test_the_inner_side_of_an_open_surface_sees_what_the_outer_side_of_the_turned_one_sees():
-    ball = primitives.ball(8)
+    ball = shapes.ball(8)
     bowl = ball.faces[(ball.shell[ball.faces][:, :, 2] < 0.1).all(axis=1)]
     one, turned = bake(ball.shell, bowl, ball.shell), bake(ball.shell, bowl[:, ::-1], -ball.shell)
     used = np.unique(bowl)
@@ -74,7 +73,7 @@ def test_directions_are_cosine_distributed_about_every_normal(count):
 
 
 def test_a_vertex_without_triangles_has_finite_values():
-    ball = primitives.ball(4)
+    ball = shapes.ball(4)
     V = np.concatenate([ball.shell, [[0.0, 0.0, 1.5]]])
     normals = smooth_normals(V, ball.faces)
     assert not normals[-1].any()
@@ -82,7 +81,7 @@ def test_a_vertex_without_triangles_has_finite_values():
 
 
 def test_smoothing_keeps_constants_and_spreads_a_peak_over_two_rings():
-    ball = primitives.ball(6)
+    ball = shapes.ball(6)
     edges, _ = edges_of(ball.faces)
     np.testing.assert_allclose(_smoothed(np.full(len(ball.shell), 0.3), edges), 0.3)
     peak = np.zeros(len(ball.shell))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from sphere_height_maps import cube_charts
 
-from ripple_sim.render.surfaces.charts import Charts, VertexColumns, shared_places, split_at_charts
-from ripple_sim.render.visuals import primitives
+from ripple_sim.render.surfaces.surface import Charts, VertexColumns, shared_places, split_at_charts
+from ripple_sim.render.visuals import shapes
 from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 
@@ -21,7 +21,7 @@ def turned(points: np.ndarray, seed: int) -> np.ndarray:
 
 def ball_mesh(divisions: int, seed: int):
     """F, attributes, same of a ball whose coordinates for the charts are its vertices' directions."""
-    ball = primitives.ball(divisions)
+    ball = shapes.ball(divisions)
     V = turned(ball.shell, seed)
     return ball.faces, np.concatenate([2 * V, V, V], axis=1), np.arange(len(V))
 

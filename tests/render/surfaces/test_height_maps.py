@@ -5,7 +5,7 @@ import numpy as np
 from sphere_height_maps import cube_charts
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.visuals import primitives
+from ripple_sim.render.visuals import shapes
 
 SIZE = (203, 151)
 
@@ -18,7 +18,7 @@ def test_height_maps_of_different_resolutions_stay_apart(gl):
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    ball = primitives.ball(16)
+    ball = shapes.ball(16)
     resolutions, heights = (8, 20), (0.25, 0.1)
 
     def frame(radii: list[float], swell: tuple[float, float]) -> np.ndarray:

@@ -7,11 +7,17 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from ripple_sim import Camera, Material, RippleRenderer, Ripples
-from ripple_sim.render.surfaces.coarse_mesh import coarse_mesh
-from ripple_sim.render.surfaces.moving_occlusion import MovingOcclusion
-from ripple_sim.render.visuals import primitives
-from ripple_sim.render.visuals.ambient_occlusion import bake, bounding_radius, cast, frames_about
-from ripple_sim.render.visuals.corners import smooth_normals, triangle_normals
+from ripple_sim.render.surfaces.moving import MovingOcclusion
+from ripple_sim.render.surfaces.vertices import coarse_mesh
+from ripple_sim.render.visuals import shapes
+from ripple_sim.render.visuals.corners import (
+    bake,
+    bounding_radius,
+    cast,
+    frames_about,
+    smooth_normals,
+    triangle_normals,
+)
 
 TURN = Rotation.from_rotvec([0.4, -1.1, 0.7])
 
@@ -44,7 +50,7 @@ def rms(values):
 
 @pytest.mark.parametrize("divisions", [8, 24])
 def test_a_rigid_motion_changes_nothing(divisions):
-    ball = primitives.ball(divisions)
+    ball = shapes.ball(divisions)
     V = ball.shell * (0.4 + 0.6 * ball.shell[:, :1] ** 2)  # with a waist
     moving, baked = occlusion(V, ball.faces)
     assert_allclose(moving(V), baked, atol=1e-6)
@@ -53,7 +59,7 @@ def test_a_rigid_motion_changes_nothing(divisions):
 
 @pytest.mark.parametrize("divisions", [10, 24])
 def test_a_dent_gets_as_dark_as_one_that_was_there_from_the_beginning(divisions):
-    ball = primitives.ball(divisions)
+    ball = shapes.ball(divisions)
     moving, baked = occlusion(ball.shell, ball.faces)
     V, depth = dented(ball.shell)
     from_scratch = np.stack(cast(V, ball.faces, frames_about(smooth_normals(V, ball.faces)), 64, 1.0), axis=1)
@@ -94,7 +100,7 @@ def test_light_does_not_flicker_on_a_surface_that_moves_slowly():
 
 
 def test_a_coarse_mesh_is_spread_evenly_and_has_no_holes():
-    ball = primitives.ball(40)
+    ball = shapes.ball(40)
     mesh = coarse_mesh(ball.faces, ball.shell, 600)
     assert len(mesh.vertices) == len(np.unique(mesh.vertices)) == 600
     V = ball.shell[mesh.vertices]
@@ -108,7 +114,7 @@ def test_a_coarse_mesh_is_spread_evenly_and_has_no_holes():
 
 
 def test_two_sides_of_a_thin_plate_stay_apart():
-    plate = primitives.ball(30)
+    plate = shapes.ball(30)
     V = plate.shell * [1.0, 1.0, 0.02]
     normals = smooth_normals(V, plate.faces)
     moving, _ = occlusion(V, plate.faces)

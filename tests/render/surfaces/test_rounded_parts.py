@@ -3,7 +3,7 @@
 import numpy as np
 import trimesh
 
-from ripple_sim.render.surfaces.rounded_parts import rounded_parts
+from ripple_sim.render.surfaces.vertices import rounded_parts
 from ripple_sim.solver import Mesh, build_atlas
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 
-from ripple_sim.render.surfaces.charts import ChartedMesh
-from ripple_sim.render.surfaces.vertex_order import in_memory_order, morton_order
+from ripple_sim.render.surfaces.surface import ChartedMesh
+from ripple_sim.render.surfaces.vertices import in_memory_order, morton_order
 
 
 def test_points_of_one_octant_are_consecutive():

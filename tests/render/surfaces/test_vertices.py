@@ -6,8 +6,7 @@ import pytest
 from drawn import ball_surface
 
 from ripple_sim.coupling.target_mesh import target_atlas
-from ripple_sim.render.surfaces.charts import Charts
-from ripple_sim.render.surfaces.surface import Surface
+from ripple_sim.render.surfaces.surface import Charts, Surface
 from ripple_sim.render.surfaces.vertices import (
     BAKED,
     COORDINATES,

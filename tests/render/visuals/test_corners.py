@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from ripple_sim.render.visuals import primitives
+from ripple_sim.render.visuals import shapes
 from ripple_sim.render.visuals.corners import corner_normals
 
 
 def test_normals_are_smooth_below_the_crease_angle_and_sharp_above():
-    cube = primitives.box(1)
+    cube = shapes.box(1)
     V, F = cube.positions(np.ones(3), np.full(3, 1e-9)), cube.faces
     big = np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1) > 1.0
     welded, index = np.unique(np.round(V, 6), axis=0, return_inverse=True)

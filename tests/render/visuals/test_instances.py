@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.render.visuals.assets import Assets
 from ripple_sim.render.visuals.geoms import GeomVisuals
+from ripple_sim.render.visuals.instances import Assets
 
 XML = """<mujoco><worldbody>
 <geom type="sphere" size=".3" pos="1 2 3" euler="10 20 30"/><geom type="ellipsoid" size=".3 .2 .1" pos="0 1 0"/>

@@ -3,8 +3,7 @@
 import pytest
 from textured import textured_model
 
-from ripple_sim.render.visuals.materials import look_of
-from ripple_sim.render.visuals.visual import geom_visual
+from ripple_sim.render.visuals.visual import geom_visual, look_of
 
 
 def test_a_material_answers_light_as_it_says():

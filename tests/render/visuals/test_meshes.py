@@ -5,7 +5,7 @@ import numpy as np
 from textured import textured_model
 
 from ripple_sim.render.contract import MappingKind
-from ripple_sim.render.visuals import meshes
+from ripple_sim.render.visuals import shapes
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual
 
@@ -15,7 +15,7 @@ def test_height_field_stands_as_high_as_it_says():
       <asset><hfield name="h" nrow="3" ncol="4" size="2 1 .5 .1"/></asset>
       <worldbody><geom type="hfield" hfield="h"/></worldbody></mujoco>""")
     model.hfield_data[:] = np.linspace(0, 1, 12)
-    shape = meshes.height_field(model, 0)
+    shape = shapes.height_field(model, 0)
     np.testing.assert_allclose(shape.shell.min(axis=0), [-2, -1, -0.1])
     np.testing.assert_allclose(shape.shell.max(axis=0), [2, 1, 0.5])
     top = shape.shell[shape.shell[:, 2] > -0.05]
@@ -32,5 +32,5 @@ def test_a_mesh_keeps_its_texture_coordinates():
     model = textured_model('<geom type="mesh" mesh="m" material="m"/>', 'texrepeat="3 2"', asset=mesh)
     mapping = mapping_of(model, geom_visual(model, 0))
     assert (mapping.kind, mapping.own, mapping.tiling) == (MappingKind.FLAT_IMAGE, True, (3.0, 2.0, 0.0, 0.0))
-    shape = meshes.mesh_asset(model, 0)
+    shape = shapes.mesh_asset(model, 0)
     assert {tuple(uv) for uv in shape.uv} == {(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)}

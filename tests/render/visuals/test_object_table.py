@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from shader_functions import evaluated
 
-from ripple_sim.render.visuals.looks import LOOKS, Look, find_look
-from ripple_sim.render.visuals.object_table import ObjectTable
+from ripple_sim.render.visuals.instances import ObjectTable
+from ripple_sim.render.visuals.visual import LOOKS, Look, find_look
 from ripple_sim.solver import RippleError
 
 LOOK = Look((0.1, 0.2, 0.3), 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.5)

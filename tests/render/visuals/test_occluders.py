@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from shader_functions import evaluated
 
-from ripple_sim.render.bounds import Balls
+from ripple_sim.render.camera import Balls
 from ripple_sim.render.contract import MAX_OCCLUDERS
-from ripple_sim.render.visuals.occluders import Occluders, _capsules
+from ripple_sim.render.visuals.geoms import Occluders, _capsules
 
 
 def posed(geoms: str):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.render.visuals import primitives
+from ripple_sim.render.visuals import shapes
 
 
 def ellipsoid_area(a: float, b: float, c: float) -> float:
@@ -16,11 +16,11 @@ def ellipsoid_area(a: float, b: float, c: float) -> float:
 @pytest.mark.parametrize(
     ("shape", "core", "shell", "area"),
     [
-        (primitives.ball(14), [0, 0, 0], [0.5, 0.5, 0.5], np.pi),
-        (primitives.ball(14), [0, 0, 0], [0.5, 0.3, 0.2], ellipsoid_area(0.5, 0.3, 0.2)),
-        (primitives.capsule(40, 9), [0, 0, 0.4], [0.3, 0.3, 0.3], 4 * np.pi * 0.09 + 2 * np.pi * 0.3 * 0.8),
-        (primitives.cylinder(56, 3), [0.299, 0.299, 0.399], [0.001] * 3, 2 * np.pi * 0.09 + 2 * np.pi * 0.3 * 0.8),
-        (primitives.box(3), [0.199, 0.299, 0.399], [0.001] * 3, 8 * (0.2 * 0.3 + 0.3 * 0.4 + 0.4 * 0.2)),
+        (shapes.ball(14), [0, 0, 0], [0.5, 0.5, 0.5], np.pi),
+        (shapes.ball(14), [0, 0, 0], [0.5, 0.3, 0.2], ellipsoid_area(0.5, 0.3, 0.2)),
+        (shapes.capsule(40, 9), [0, 0, 0.4], [0.3, 0.3, 0.3], 4 * np.pi * 0.09 + 2 * np.pi * 0.3 * 0.8),
+        (shapes.cylinder(56, 3), [0.299, 0.299, 0.399], [0.001] * 3, 2 * np.pi * 0.09 + 2 * np.pi * 0.3 * 0.8),
+        (shapes.box(3), [0.199, 0.299, 0.399], [0.001] * 3, 8 * (0.2 * 0.3 + 0.3 * 0.4 + 0.4 * 0.2)),
     ],
     ids=["sphere", "ellipsoid", "capsule", "cylinder", "box"],
 )

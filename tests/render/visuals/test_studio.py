@@ -5,8 +5,7 @@ import pytest
 from shader_functions import evaluated
 
 from ripple_sim.render.camera import Camera
-from ripple_sim.render.visuals.lights import Light, Lighting
-from ripple_sim.render.visuals.studio import SOFT_BOX_LIGHTS, set_lighting, studio_lighting
+from ripple_sim.render.visuals.lights import SOFT_BOX_LIGHTS, Light, Lighting, set_lighting, studio_lighting
 
 POSES = [
     Camera((0.0, 0.0, 0.0), 2.0, azimuth, elevation).pose() for azimuth, elevation in ((0, 0), (70, -30), (200, 89))

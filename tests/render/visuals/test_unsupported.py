@@ -7,7 +7,7 @@ import pytest
 
 from ripple_sim.errors import RippleWarning
 from ripple_sim.render import Renderer
-from ripple_sim.render.visuals.unsupported import warn_of_unsupported
+from ripple_sim.render.visuals.geoms import warn_of_unsupported
 
 
 def test_what_is_not_drawn_is_said_once(gl):

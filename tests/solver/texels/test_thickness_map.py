@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import RippleWarning
-from ripple_sim.scenes.implicit import polygonise, sphere
+from ripple_sim.scenes.shapes import polygonise, sphere
 from ripple_sim.solver import AtlasError, Mesh, MeshError, Volume, sphere_atlas, thickness_map
 
 RADIUS, BOUNDS = 0.6, ((-0.8, -0.8, -0.8), (0.8, 0.8, 0.8))
