@@ -231,13 +231,13 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
 @pytest.mark.parametrize(
     ("number", "status", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
 )
-@pytest.mark.parametrize("where", ["cli._parse = meet_signal", "info_command.Info.run = meet_signal"])
+@pytest.mark.parametrize("where", ["cli._parse = meet_signal", "info.Info.run = meet_signal"])
 def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_path, number, status, word, where):
     (tmp_path / "slow.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\nfor _ in range(10**9): pass\n")
     code = (
         "import signal, sys\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # which a job in the background has ignored
-        "from ripple_sim.cli import info_command\n"
+        "from ripple_sim.cli import info\n"
         "from ripple_sim.cli import main as cli\n"
         "def meet_signal(argument):\n"
         "    import slow\n"

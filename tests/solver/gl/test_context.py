@@ -106,12 +106,12 @@ def test_lost_context_is_reported() -> None:
     script = """
         import ctypes, sys
         from ripple_sim.solver import GLError, WaveSolver, sphere_atlas
-        from ripple_sim.solver.gl import egl, shared_context
+        from ripple_sim.solver.gl import context, shared_context
         try:
             waves = WaveSolver(sphere_atlas(1.0, 8), backend="gl")
         except GLError:
             sys.exit(77)
-        library = egl.load_egl()
+        library = context.load_egl()
         for function in (library.eglGetCurrentDisplay, library.eglGetPlatformDisplay):
             function.restype = ctypes.c_void_p
         with shared_context():
