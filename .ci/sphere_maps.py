@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from ripple_sim.coupling.model.geoms import TARGET_TYPES, find_geom
-from ripple_sim.coupling.model.target_mesh import target_mesh
+from ripple_sim.coupling.geoms import TARGET_TYPES, find_geom
+from ripple_sim.coupling.target_mesh import target_mesh
 from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.scene.scene_path import shipped_scenes
+from ripple_sim.scene.scene import shipped_scenes
 from ripple_sim.scenes.sphere_maps import FOLDER, sphere_map_path
 from ripple_sim.solver.errors import MeshError
-from ripple_sim.solver.mesh.genus_zero import check_genus_zero
-from ripple_sim.solver.sphere_map import progressive_sphere_map
+from ripple_sim.solver.layouts.sphere_map import progressive_sphere_map
+from ripple_sim.solver.mesh.mesh import check_genus_zero
 
 needed = set()
 for name in shipped_scenes():

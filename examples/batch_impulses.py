@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 
 from ripple_sim import load_batch
 from ripple_sim.batch.plan import read_plan
-from ripple_sim.batch.run_batch import run_batch
-from ripple_sim.batch.run_options import RunOptions
+from ripple_sim.batch.run import RunOptions, run_batch
 
 MODEL = """<mujoco>
   <option timestep="0.002"/>

@@ -11,8 +11,7 @@ import argparse
 from pathlib import Path
 
 from ripple_sim.batch.plan import read_plan
-from ripple_sim.batch.run_batch import run_batch
-from ripple_sim.batch.run_options import RunOptions
+from ripple_sim.batch.run import RunOptions, run_batch
 
 
 def main() -> None:

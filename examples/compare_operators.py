@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from ripple_sim.bench.accuracy import sphere_modes
-from ripple_sim.bench.arrival_table import arrivals
-from ripple_sim.bench.plane_wave import plane_arrival
+from ripple_sim.bench.arrival import arrivals, plane_arrival
+from ripple_sim.bench.report import sphere_modes
 from ripple_sim.solver import WaveSolver, sphere_atlas
 from ripple_sim.solver.operator.assembly import OPERATORS
 

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from ripple_sim import Camera, Material, RippleRenderer, Ripples
-from ripple_sim.scenes.implicit import Sdf, ellipsoid, polygonise, rounded_cone, smooth_union, sphere
+from ripple_sim.scenes.shapes import Sdf, ellipsoid, polygonise, rounded_cone, smooth_union, sphere
 
 MODEL = """<mujoco model="arm">
   <compiler angle="degree"/>

@@ -6,14 +6,13 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .batch.load_batch import load_batch
-    from .coupling.colliders.collidable import make_collidable
+    from .batch.report import load_batch
+    from .coupling.colliders import make_collidable
     from .coupling.ripples import Impulse, Ripples
     from .errors import RippleWarning
-    from .export.export_scene import export_scene
-    from .export.exporter import Exporter
+    from .export.exporter import Exporter, RippleRenderer
     from .export.options import ExportOptions
-    from .export.ripple_renderer import RippleRenderer
+    from .export.scene import export_scene
     from .render import Camera
     from .scene.load_scene import load_scene
     from .simulation import Simulation
@@ -48,15 +47,15 @@ _HOMES = {
     "Impulse": ".coupling.ripples",
     "Material": ".solver",
     "RippleError": ".solver",
-    "RippleRenderer": ".export.ripple_renderer",
+    "RippleRenderer": ".export.exporter",
     "RippleWarning": ".errors",
     "Ripples": ".coupling.ripples",
     "Simulation": ".simulation",
     "VideoOptions": ".video.options",
-    "export_scene": ".export.export_scene",
-    "load_batch": ".batch.load_batch",
+    "export_scene": ".export.scene",
+    "load_batch": ".batch.report",
     "load_scene": ".scene.load_scene",
-    "make_collidable": ".coupling.colliders.collidable",
+    "make_collidable": ".coupling.colliders",
     "render_video": ".video.render_video",
 }
 

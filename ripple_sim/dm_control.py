@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ripple_sim.coupling.model.geoms import ByGeom
+from ripple_sim.coupling.geoms import ByGeom
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.solver import Material
 

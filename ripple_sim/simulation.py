@@ -9,16 +9,14 @@ from typing import Protocol, Self
 
 import mujoco
 
-from ripple_sim.coupling.model.geoms import find_target, target_name
+from ripple_sim.coupling.geoms import find_target, target_name
 from ripple_sim.coupling.ripples import Impulse, Ripples
-from ripple_sim.coupling.stepping.divergence import divergence
-from ripple_sim.coupling.stepping.physics_messages import physics_errors
+from ripple_sim.coupling.stepping import divergence, physics_errors
+from ripple_sim.errors import SceneError, SimulationError
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
-from ripple_sim.scene.target_maps import apply_maps, uniform_material
-from ripple_sim.solver.compilation import work_clock
-
-from .errors import SceneError, SimulationError
+from ripple_sim.scene.scene_file import apply_maps, uniform_material
+from ripple_sim.solver.kernel import work_clock
 
 # More is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000

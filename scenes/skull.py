@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.atomic_file import atomic_write
+from ripple_sim.solver.files import atomic_write
 
 from .face import FOOT, head_solid
-from .implicit import (
+from .shapes import (
     Array,
     Sdf,
     capsule,
@@ -25,8 +25,8 @@ from .implicit import (
     smooth_intersection,
     smooth_union,
     sphere,
+    write_obj,
 )
-from .shapes import write_obj
 
 FILE = Path(__file__).parent / "meshes" / "skull.obj"
 

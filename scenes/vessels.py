@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from .implicit import (
+from .shapes import (
     Array,
     Sdf,
+    Triangles,
     ellipsoid,
     half_space,
     polygonise,
@@ -23,8 +24,8 @@ from .implicit import (
     smooth_intersection,
     smooth_union,
     sphere,
+    write_obj,
 )
-from .shapes import Triangles, write_obj
 
 TEAPOT_FILE = Path(__file__).parent / "meshes" / "teapot.obj"
 PRETZEL_FILE = TEAPOT_FILE.with_name("pretzel.obj")

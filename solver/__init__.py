@@ -9,25 +9,21 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .atlas.build import build_atlas
-    from .atlas.load import load_atlas
-    from .cube_map.sphere_atlas import SphereAtlas, sphere_atlas
     from .errors import AtlasError, GLError, MeshError, RippleError, SolverError, SphereMapError
+    from .layouts.build import build_atlas, load_atlas
+    from .layouts.cube.atlas import SphereAtlas, sphere_atlas
+    from .mesh.files import load_mesh
     from .mesh.mesh import Mesh
-    from .mesh.mesh_file import load_mesh
-    from .mesh.volume import Volume
-    from .mesh.volume_file import load_volume
+    from .mesh.volume import Volume, load_volume
     from .mesh.wrap import Wrap, wrap
-    from .operator.absorbing import absorbing_damping
-    from .operator.holding import hold
     from .operator.material import Material
+    from .operator.regions import absorbing_damping, hold
     from .texels.atlas import Atlas
-    from .texels.glue import glue
     from .texels.maps import texture_map, vertex_map
     from .texels.texel_atlas import texel_atlas
     from .texels.texel_mesh import TexelMesh
-    from .texels.thickness_map import thickness_map
-    from .texels.topology import TexelTopology
+    from .texels.thickness import thickness_map
+    from .texels.topology import TexelTopology, glue
     from .waves.footprint import Footprint
     from .waves.height_map import HeightMap
     from .waves.load import Load
@@ -45,24 +41,24 @@ _HOME = {
     "HeightMap": "waves.height_map",
     "RippleError": "errors",
     "SolverError": "errors",
-    "SphereAtlas": "cube_map.sphere_atlas",
+    "SphereAtlas": "layouts.cube.atlas",
     "SphereMapError": "errors",
     "TexelMesh": "texels.texel_mesh",
     "TexelTopology": "texels.topology",
     "Volume": "mesh.volume",
     "WaveSolver": "waves.wave_solver",
     "Wrap": "mesh.wrap",
-    "absorbing_damping": "operator.absorbing",
-    "build_atlas": "atlas.build",
-    "glue": "texels.glue",
-    "hold": "operator.holding",
-    "load_atlas": "atlas.load",
-    "load_mesh": "mesh.mesh_file",
-    "load_volume": "mesh.volume_file",
-    "sphere_atlas": "cube_map.sphere_atlas",
+    "absorbing_damping": "operator.regions",
+    "build_atlas": "layouts.build",
+    "glue": "texels.topology",
+    "hold": "operator.regions",
+    "load_atlas": "layouts.build",
+    "load_mesh": "mesh.files",
+    "load_volume": "mesh.volume",
+    "sphere_atlas": "layouts.cube.atlas",
     "texel_atlas": "texels.texel_atlas",
     "texture_map": "texels.maps",
-    "thickness_map": "texels.thickness_map",
+    "thickness_map": "texels.thickness",
     "vertex_map": "texels.maps",
     "wrap": "mesh.wrap",
 }

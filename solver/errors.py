@@ -1,4 +1,18 @@
-"""The errors a caller may catch. Every one of them is a `RippleError`."""
+"""The errors a caller may catch. Every one of them is a `RippleError`.
+
+Arguments of public functions checked in one place: `checked` names the argument, its value and what is valid.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+import math
+import numbers
+import os
+from collections.abc import Callable
+from typing import Any, ParamSpec, TypeVar
 
 
 class RippleError(Exception):
@@ -30,3 +44,92 @@ class GLError(RippleError):
 
 class RippleWarning(UserWarning):
     """Something runs, but not as expected: a hull off its surface, a body too fast for the time step."""
+
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
+
+# Of a value in a message [characters].
+_LONGEST = 120
+
+
+@dataclasses.dataclass(frozen=True)
+class Valid:
+    """A condition on an argument, and the words for it: "valid is ..."."""
+
+    holds: Callable[[Any], bool]
+    words: str
+
+
+def is_finite(value: object) -> bool:
+    """Whether a value is a number that a float can hold, neither NaN nor infinite."""
+    try:
+        return isinstance(value, numbers.Real) and math.isfinite(float(value))
+    except OverflowError:
+        return False
+
+
+def _is_path(value: object) -> bool:
+    try:
+        return "\0" not in os.fsdecode(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return False
+
+
+POSITIVE = Valid(lambda value: is_finite(value) and value > 0, "a finite number greater than 0")
+PATH = Valid(_is_path, "a path: a str or pathlib.Path without a NUL")
+
+
+def whole(least: int) -> Valid:
+    """A whole number from `least` on."""
+    return Valid(
+        lambda value: isinstance(value, numbers.Integral) and int(value) >= least, f"a whole number, {least} or greater"
+    )
+
+
+def instance(kind: type, hint: str = "", *, optional: bool = False) -> Valid:
+    """An instance of a class, or None where it is optional, with a hint where to get one."""
+    article = "an" if kind.__name__[0] in "AEIO" else "a"
+    return Valid(
+        lambda value: isinstance(value, kind) or (optional and value is None), f"{article} {kind.__name__}{hint}"
+    )
+
+
+def shown(value: object) -> str:
+    """A value as messages show it, not at any length."""
+    try:
+        text = repr(value)
+    except Exception:  # of the value's own, or an int of too many digits
+        text = f"a value of type {type(value).__name__}"
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+
+
+def checked(
+    error: type[RippleError], **valid: Valid
+) -> Callable[[Callable[Parameters, Result]], Callable[Parameters, Result]]:
+    """Decorate a function so that arguments of these names are checked before it runs.
+
+    A wrong number of arguments, or a wrong name, stays Python's TypeError.
+
+    Parameters
+    ----------
+    error : type
+        What is raised.
+    valid : Valid
+        By the argument's name.
+    """
+
+    def decorate(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+        signature = inspect.signature(function)
+
+        @functools.wraps(function)
+        def checking(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+            given = signature.bind(*args, **kwargs).arguments
+            for name, each in valid.items():
+                if name in given and not each.holds(given[name]):
+                    raise error(f"{name.replace('_', ' ')} is {shown(given[name])}; valid is {each.words}")
+            return function(*args, **kwargs)
+
+        return checking
+
+    return decorate

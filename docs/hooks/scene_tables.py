@@ -13,16 +13,14 @@ from typing import Any
 
 import msgspec
 
-from ripple_sim.batch.distributions import Distribution
-from ripple_sim.batch.plan import MeshesEntry, PlanFile
-from ripple_sim.batch.store_entry import StoreEntry
+from ripple_sim.batch.plan import Distribution, MeshesEntry, PlanFile, StoreEntry
 from ripple_sim.render import LIGHTING, LOOKS
 from ripple_sim.scene import scene_file
-from ripple_sim.scene.body_shapes import BODY_SHAPES
+from ripple_sim.scene.drop_model import BODY_SHAPES
 from ripple_sim.scene.material_entry import LAWS
-from ripple_sim.scene.overlays import NAMES as OVERLAYS
+from ripple_sim.scene.scene import NAMES as OVERLAYS
 from ripple_sim.solver import Material
-from ripple_sim.solver.atlas.layouts import LAYOUTS
+from ripple_sim.solver.layouts.build import LAYOUTS
 from ripple_sim.solver.operator.assembly import RIMS
 from ripple_sim.solver.operator.presets import PRESETS
 from ripple_sim.solver.texels.maps import CHANNELS

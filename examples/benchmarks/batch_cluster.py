@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim import load_batch
-from ripple_sim.batch.dask_executor import DaskExecutor
+from ripple_sim.batch.executors import DaskExecutor
 from ripple_sim.batch.make_scene import Outcome
 
 SCENES, FRAMES = 10_000, 24

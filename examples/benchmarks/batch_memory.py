@@ -13,10 +13,9 @@ from pathlib import Path
 import numpy as np
 from sample_batch import write_plan
 
-from ripple_sim.batch.batch_folder import BatchFolder
+from ripple_sim.batch.folder import BatchFolder, keep_plan, stored
 from ripple_sim.batch.make_scene import make_scene
 from ripple_sim.batch.plan import read_plan
-from ripple_sim.batch.stored_plan import keep_plan, stored
 
 
 def resident() -> float:

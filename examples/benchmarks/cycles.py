@@ -17,10 +17,8 @@ from PIL import Image
 from ripple_sim import Exporter, ExportOptions, Simulation, load_scene
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
-from ripple_sim.cycles.blender import frames_of_cycles, python_with_bpy
-from ripple_sim.cycles.settings import blender_settings
-from ripple_sim.cycles.tone_mapping import tone_mapped
-from ripple_sim.export.export_scene import scene_source
+from ripple_sim.cycles.render import blender_settings, frames_of_cycles, python_with_bpy, tone_mapped
+from ripple_sim.export.scene import scene_source
 
 WIDTH, HEIGHT, FPS = 480, 270, 20
 SCENES = (("sphere", 0.9), ("face", 0.8), ("duck", 1.65))  # and the moment [s]

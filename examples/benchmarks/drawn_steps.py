@@ -13,12 +13,12 @@ import mujoco
 import numpy as np
 
 from ripple_sim import Camera
-from ripple_sim.bench.table import POLYGONS, RESOLUTIONS, knobbly_body
+from ripple_sim.bench.report import POLYGONS, RESOLUTIONS, knobbly_body
 from ripple_sim.render import Renderer, Surface
-from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.solver import Atlas, HeightMap, Material, Mesh, WaveSolver, build_atlas
-from ripple_sim.solver.atlas.build import atlas_from_sphere_map
 from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.layouts.build import atlas_from_sphere_map
 
 
 def posed(mesh: Mesh) -> mujoco.MjModel:

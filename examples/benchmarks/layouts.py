@@ -15,9 +15,9 @@ import mujoco
 import numpy as np
 
 from ripple_sim import Camera
-from ripple_sim.bench.speed import Advances, Waited, race
+from ripple_sim.bench.report import Advances, Waited, race
 from ripple_sim.render import Renderer, Surface
-from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.solver import Atlas, GLError, HeightMap, Material, Mesh, build_atlas, load_mesh
 from ripple_sim.solver.backends.backend import make_backend
 from ripple_sim.solver.gl import shared_context

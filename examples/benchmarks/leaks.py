@@ -97,9 +97,9 @@ def descriptors() -> int:
 
 def objects() -> int:
     """How many buffers, textures, framebuffers, vertex arrays and programs of OpenGL there are."""
-    from ripple_sim.solver.gl import egl, shared_context
+    from ripple_sim.solver.gl import context, shared_context
 
-    find = egl.load_egl().eglGetProcAddress
+    find = context.load_egl().eglGetProcAddress
     find.restype, find.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
     with shared_context() as ctx:
         texture = ctx.texture((1, 1), 4)

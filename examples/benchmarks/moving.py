@@ -15,10 +15,10 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from ripple_sim import Camera, Material, RippleRenderer, Ripples, Simulation, load_scene
-from ripple_sim.coupling.load.high_pass import coarse_motions
+from ripple_sim.coupling.soft import coarse_motions
 from ripple_sim.solver import WaveSolver, build_atlas, sphere_atlas
-from ripple_sim.solver.operator.moving import MovingOperator
-from ripple_sim.solver.texels.moved_stencil import MovedPlaces
+from ripple_sim.solver.operator.assembly import MovingOperator
+from ripple_sim.solver.texels.moving import MovedPlaces
 from ripple_sim.solver.texels.riding import SurfaceRide
 
 SPEED = Material(speed=1.0)

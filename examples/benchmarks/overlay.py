@@ -14,7 +14,7 @@ import numpy as np
 
 from ripple_sim import Simulation, VideoOptions, load_scene
 from ripple_sim.overlay.notes import Notebook
-from ripple_sim.scene.overlays import parse_request
+from ripple_sim.scene.scene import parse_request
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.video.film import Film
 

@@ -22,11 +22,10 @@ import numpy as np
 import trimesh
 
 import ripple_sim.scenes
-from ripple_sim.bench.arrival import arrival_error
-from ripple_sim.bench.sources import spread_sources
+from ripple_sim.bench.arrival import arrival_error, spread_sources
 from ripple_sim.solver import Atlas, Mesh, RippleError, build_atlas, load_mesh
-from ripple_sim.solver.patch_map.layout import patch_map
-from ripple_sim.solver.patches.patch_atlas import atlas_from_patch_map, cells_for
+from ripple_sim.solver.layouts.patches.atlas import atlas_from_patch_map, cells_for
+from ripple_sim.solver.layouts.patches.layout import patch_map
 
 SHIPPED = ("pretzel", "duck", "limbed", "teapot")
 RESOLUTIONS = (48, 96, 128)

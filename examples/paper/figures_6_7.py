@@ -11,7 +11,7 @@ import msgspec
 from page import Part
 from stills import strip
 
-from ripple_sim.bench.arrival_table import arrivals
+from ripple_sim.bench.arrival import arrivals
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.events import Events, PokeEntry
 from ripple_sim.scenes.shapes import LIMBED_FILE

@@ -16,12 +16,10 @@ import trimesh
 from page import Part
 from stills import strip
 
-from ripple_sim.bench.arrival import arrival
-from ripple_sim.bench.arrival_table import mean_error
-from ripple_sim.bench.sources import spread_sources
+from ripple_sim.bench.arrival import arrival, mean_error, spread_sources
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.events import Events, PokeEntry
-from ripple_sim.scenes.implicit import pebble, polygonise, rounded_cone, smooth_intersection, smooth_union
+from ripple_sim.scenes.shapes import pebble, polygonise, rounded_cone, smooth_intersection, smooth_union
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
 
 PRETZEL = Path(__file__).parents[2] / "scenes" / "meshes" / "pretzel.obj"

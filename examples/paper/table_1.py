@@ -7,7 +7,7 @@ from pathlib import Path
 
 from page import Part
 
-from ripple_sim.bench.table import RESOLUTIONS, steps_per_second
+from ripple_sim.bench.report import RESOLUTIONS, steps_per_second
 
 PAPER = {"polygons": "21,338", "texels": "15,000", "seconds": "177"}
 

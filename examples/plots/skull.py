@@ -16,8 +16,8 @@ import numpy as np
 from figure import FAINT, FOLDER, TEXT, plain, save, sheet
 
 from ripple_sim import Simulation, load_scene
-from ripple_sim.scene.inside import InsideEntry
 from ripple_sim.scene.scene import Scene
+from ripple_sim.scene.target_maps import InsideEntry
 from ripple_sim.scenes.skull import BONE_THRESHOLD, head_volume
 
 FPS, SHOWN, VOXEL = 240, 1.2, 0.01  # 1/s, s, m

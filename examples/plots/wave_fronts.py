@@ -13,15 +13,12 @@ import numpy as np
 from figure import FAINT, FOLDER, NAMES, TEXT, save, sheet
 from matplotlib.colors import ListedColormap
 
-from ripple_sim.bench.arrival import arrival_times, ideal_width
-from ripple_sim.bench.geodesics import geodesic_distance
-from ripple_sim.bench.plane_wave import NEAREST, plane_arrival
-from ripple_sim.figures.atlas_painter import AtlasPainter
-from ripple_sim.figures.view import View
-from ripple_sim.overlay.colormap import color_table, colors
-from ripple_sim.scene.up_axis import usual_up
+from ripple_sim.bench.arrival import NEAREST, arrival_times, geodesic_distance, ideal_width, plane_arrival
+from ripple_sim.figures.atlas_view import AtlasPainter, View
+from ripple_sim.overlay.notes import color_table, colors
+from ripple_sim.scene.drop import usual_up
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
-from ripple_sim.solver.texels.sampling import sampling_matrix
+from ripple_sim.solver.texels.topology import sampling_matrix
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
 VIEW = {"azimuth": 38.0, "elevation": 24.0}

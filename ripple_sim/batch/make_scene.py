@@ -1,4 +1,7 @@
-"""`make_scene`: one scene of a batch, made in a folder of its own by whatever process is told to."""
+"""`make_scene`: one scene of a batch, made in a folder of its own by whatever process is told to.
+
+A small image of a scene, from the middle of its video.
+"""
 
 from __future__ import annotations
 
@@ -12,22 +15,53 @@ import traceback
 from pathlib import Path
 from typing import Any, Literal
 
+import av
 import msgspec
+from PIL import Image
 
 from ripple_sim.errors import EncodingError
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver.files import atomic_write
+from ripple_sim.video.options import frame_count, settled
 from ripple_sim.video.render_video import render_video
-from ripple_sim.video.settings import frame_count, settled
 
-from .batch_folder import BatchFolder, Claim, clear
-from .finished_scene import FACTS, TIMES
-from .frame_record import FrameRecord
-from .plan import Plan
-from .store_entry import StoreEntry, options_of, video_name
-from .stored_plan import load_plan
-from .thumbnail import write_thumbnail
+from .finished import FACTS, TIMES
+from .folder import BatchFolder, Claim, clear, load_plan
+from .plan import Plan, StoreEntry, options_of, video_name
+from .records import FrameRecord
 from .variation import Variation
+
+_SIZE = 160  # its longer edge [pixels]
+
+
+def write_thumbnail(video: Path, output: Path) -> None:
+    """Write a JPEG of the middle frame of a video or a folder of PNG frames; of EXR frames there is none."""
+    if video.is_dir():
+        frames = sorted(video.glob("*.png"))
+        middle: Image.Image | None = Image.open(frames[len(frames) // 2]) if frames else None
+    else:
+        middle = _middle_frame(video)
+    if middle is not None:
+        image = middle.convert("RGB")
+        image.thumbnail((_SIZE, _SIZE))
+        with atomic_write(output) as path:
+            image.save(path, format="JPEG", quality=80)
+
+
+def _middle_frame(video: Path) -> Image.Image | None:
+    if video.suffix in (".gif", ".webp"):
+        with Image.open(video) as image:
+            image.seek(getattr(image, "n_frames", 1) // 2)
+            return image.copy()
+    with av.open(str(video)) as container:
+        stream = container.streams.video[0]
+        middle = (stream.frames or 1) // 2
+        for number, frame in enumerate(container.decode(stream)):
+            if number == middle:
+                return frame.to_image()
+    return None
+
 
 # The renderer's context belongs to one scene at a time, also where an executor has threads.
 _one_at_a_time = threading.Lock()

@@ -1,23 +1,287 @@
-"""The TOML file of a batch: what varies, how often, and what is stored."""
+"""The TOML file of a batch: what varies, how often, and what is stored.
+
+What a value of a plan may be drawn from.
+
+Keys of a plan: `camera.azimuth`, `ripple[duck].material.speed`, `geom[ball*].size[0]`.
+
+`[store]` of a plan: what is kept of each scene.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import glob
-from collections.abc import Iterator
+import importlib.util
+import math
+import re
+import tempfile
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
+import numpy as np
 import trimesh
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.scene_path import shipped_scenes
-from ripple_sim.scene.toml_file import read_toml
-from ripple_sim.solver.checked import shown
+from ripple_sim.scene.scene import read_toml, shipped_scenes
+from ripple_sim.solver.errors import shown
+from ripple_sim.video.options import VideoOptions, check_options
 
-from .distributions import KINDS, Distribution
-from .key_path import parse_key
-from .store_entry import StoreEntry, check_store
+Numbers = float | list[float]
+
+# What a random draw may be, one of which a distribution names.
+KINDS = ("uniform", "log_uniform", "normal", "integers", "choice", "orientation", "constant")
+
+_MOST_DRAWS = 10_000  # until a normal one lies within its limits
+
+
+class Distribution(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """A random value: one of `uniform`, `log_uniform`, `normal`, `integers`, `choice`, `orientation`, `constant`."""
+
+    uniform: tuple[Numbers, Numbers] | None = None
+    """Lowest and highest number, or vectors of these."""
+    log_uniform: tuple[Numbers, Numbers] | None = None
+    """Likewise, above 0; as many between 1 and 2 as between 2 and 4."""
+    normal: tuple[float, float] | None = None
+    """Mean and standard deviation."""
+    integers: tuple[int, int] | None = None
+    """Lowest and highest whole number, both included."""
+    choice: list[Any] | None = None
+    """Values of any kind."""
+    orientation: bool = False
+    """A turn, all equally likely, as a unit quaternion w, x, y, z."""
+    constant: Any = None
+    """Always this value."""
+    weights: list[float] | None = None
+    """How likely each of the choices is, in any unit; by default all are equally likely."""
+    limits: tuple[float, float] | None = None
+    """Of a normal one: it is drawn again until it lies between them."""
+    length: int | None = None
+    """How many numbers are drawn, independently, for a vector."""
+    apply: Literal["set", "add", "multiply"] = "set"
+    """What is done with the value that is there: it is replaced, added to, or multiplied."""
+    together: bool = False
+    """Whether a key that fits several places gives them all the same value."""
+
+    def draw(self, rng: np.random.Generator) -> Any:
+        """Draw a value: a float, an int, a list of these, or any of the choices.
+
+        Floats are rounded to 12 digits, so that no processor's last bit counts.
+        """
+        if self.choice is not None:
+            share = None if self.weights is None else np.divide(self.weights, math.fsum(self.weights))
+            return self.choice[int(rng.choice(len(self.choice), p=share))]
+        if self.constant is not None:
+            return self.constant
+        if self.orientation:
+            turn = rng.standard_normal(4)
+            return _plain(turn / math.sqrt(math.fsum(turn**2)))
+        if self.integers is not None:
+            whole = rng.integers(self.integers[0], self.integers[1], size=self.length, endpoint=True)
+            return whole.tolist() if self.length else int(whole)
+        return _plain(self._number(rng))
+
+    def _number(self, rng: np.random.Generator) -> Any:
+        if self.uniform is not None:
+            return rng.uniform(*self.uniform, size=self.length)
+        if self.log_uniform is not None:
+            low, high = np.log(np.array(self.log_uniform[0])), np.log(np.array(self.log_uniform[1]))
+            return np.exp(rng.uniform(low, high, size=self.length))
+        mean, deviation = self.normal or (0.0, 0.0)
+        least, greatest = self.limits or (-math.inf, math.inf)
+        number = rng.normal(mean, deviation, size=self.length)
+        for _ in range(_MOST_DRAWS):
+            outside = (number < least) | (number > greatest)
+            if not np.any(outside):
+                return number
+            number = np.where(outside, rng.normal(mean, deviation, size=self.length), number)
+        raise SceneError(f"normal {self.normal} hardly ever lies within the limits {self.limits}; widen them")
+
+    def check(self, key: str) -> None:
+        """Make sure that it names one kind, and that its numbers fit; raises `SceneError` with the key."""
+        given = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
+        if len(given) != 1:
+            raise SceneError(
+                f"plan: {key} is drawn from {' and '.join(given) or 'nothing'}; valid is one of {', '.join(KINDS)}"
+            )
+        kind = given[0]
+        for other, extra in (("weights", self.weights), ("limits", self.limits)):
+            if extra is not None and kind != {"weights": "choice", "limits": "normal"}[other]:
+                raise SceneError(f"plan: {key} has {other}, which {kind} does not take")
+        if self.length is not None and (self.length < 1 or kind not in KINDS[:4]):
+            raise SceneError(f"plan: {key} has length {self.length}; valid is 1 or more, of numbers")
+        problem = self._problem()
+        if problem:
+            raise SceneError(f"plan: {key} is drawn from {kind} = {shown(getattr(self, kind))}; {problem}")
+
+    def _problem(self) -> str | None:
+        """What is wrong with the numbers, as what is valid."""
+        pair = self.uniform or self.log_uniform or self.integers or self.limits
+        if pair is not None:
+            low, high = np.array(pair[0], float), np.array(pair[1], float)
+            if low.shape not in ((), high.shape) and high.shape != ():
+                return "valid are two numbers, or two vectors of the same length"
+            if not (np.isfinite(low).all() and np.isfinite(high).all() and np.all(low <= high)):
+                return "valid are two finite numbers, the lower one first"
+            if self.log_uniform and np.any(low <= 0):
+                return "valid are numbers above 0"
+            if self.length is not None and max(low.size, high.size) > 1:
+                return "vectors have their own length; leave `length` out"
+        if self.normal is not None and not (np.isfinite(self.normal).all() and self.normal[1] >= 0):
+            return "valid are a mean and a standard deviation of 0 or more"
+        if self.choice is not None:
+            if not self.choice:
+                return "valid is at least one value"
+            weights = self.weights
+            if weights is not None and not (
+                len(weights) == len(self.choice) and min(weights) >= 0 and 0 < sum(weights) < math.inf
+            ):
+                return f"valid are {len(self.choice)} weights, none below 0"
+        return None
+
+
+def _plain(value: Any) -> Any:
+    """Numbers of numpy as Python's, with 12 digits."""
+    if np.ndim(value):
+        return [float(f"{number:.12g}") for number in value]
+    return float(f"{value:.12g}")
+
+
+_STEP = re.compile(r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?(?:\.|$)")
+
+
+@dataclasses.dataclass(frozen=True)
+class Step:
+    """A part of a key: a name, and what stands in brackets behind it: a number, a name, or a pattern with *."""
+
+    name: str
+    chosen: str | None = None
+
+    @property
+    def index(self) -> int | None:
+        """The number in brackets."""
+        return int(self.chosen) if self.chosen is not None and self.chosen.isdecimal() else None
+
+
+def parse_key(key: str) -> tuple[Step, ...]:
+    """Read a key of a plan.
+
+    Raises
+    ------
+    SceneError
+        If it is not names between dots.
+    """
+    steps, place = [], 0
+    while place < len(key):
+        found = _STEP.match(key, place)
+        if found is None:
+            break
+        steps.append(Step(found[1], found[2]))
+        place = found.end()
+    if not steps or place < len(key) or key.endswith("."):
+        raise SceneError(
+            f"plan: {key!r} is not a key; valid are names between dots, with a number, a name or a pattern in "
+            "brackets, such as camera.azimuth, ripple[duck].material.speed or geom[ball*].size"
+        )
+    return tuple(steps)
+
+
+def choose(names: Sequence[str], step: Step, where: str) -> list[int]:
+    """Numbers of the items that a step chooses from items of these names; without brackets all of them.
+
+    Raises
+    ------
+    SceneError
+        If there is none.
+    """
+    if step.chosen is None:
+        found = list(range(len(names)))
+    elif step.index is not None and step.chosen not in names:
+        found = [step.index] if step.index < len(names) else []
+    else:
+        found = [number for number, name in enumerate(names) if fnmatchcase(name, step.chosen)]
+    if not found:
+        listed = ", ".join(name or f"number {number}" for number, name in enumerate(names)) or "none"
+        raise SceneError(f"plan: {where} has no {step.name}[{step.chosen or '*'}]; there is {listed}")
+    return found
+
+
+Video = Literal["mp4", "webm", "gif", "webp", "png", "exr", "none"]
+
+
+class StoreEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[store]`: what is kept of each scene."""
+
+    video: Video = "mp4"
+    """`mp4`, `webm`, `gif`, `webp`; `png` or `exr`: a folder of frames; `none`: nothing is drawn."""
+    size: tuple[int, int] = (256, 256)
+    """Of the frames [pixels]."""
+    fps: int = 24
+    """Frames per second."""
+    duration: float | None = None
+    """Length of each scene [s]; by default the scene's."""
+    supersample: int = 1
+    """Frames are drawn this many times as wide and high, and averaged."""
+    resolution: int | None = None
+    """Texels along the edge of a chart; by default the scene's."""
+    backend: Literal["cpu", "gl", "auto"] = "cpu"
+    """Where waves are computed. The same numbers on every machine come from `cpu` alone."""
+    overlay: list[str] | None = None
+    """Drawn on the video; by default the scene's."""
+    passes: list[str] = []
+    """Passes of every frame: depth, normal, segmentation, flow, position, height."""
+    pass_format: Literal["npz", "exr"] = "npz"
+    """Format of the passes."""
+    impulses: bool = True
+    """`impulses.csv`: every contact's impulse and place, step by step."""
+    heights: bool = False
+    """`heights.zarr.zip`: the height of each target at every frame."""
+    positions: bool = True
+    """`qpos.npy`: MuJoCo's generalised positions at every frame, float64 [frames, nq]."""
+    format: Literal["folders", "webdataset"] = "folders"
+    """A folder a scene, or tar files of many scenes each."""
+    scenes_per_tar: int = 100
+    """How many scenes a tar file holds."""
+
+
+def video_name(store: StoreEntry) -> str | None:
+    """Name of a scene's video or folder of frames, or None if nothing is drawn."""
+    return {"none": None, "png": "frames", "exr": "frames"}.get(store.video, f"video.{store.video}")
+
+
+def options_of(store: StoreEntry) -> VideoOptions:
+    """How the scenes of a batch are rendered."""
+    return VideoOptions(
+        size=store.size,
+        fps=store.fps,
+        duration=store.duration,
+        supersample=store.supersample,
+        resolution=store.resolution,
+        backend=store.backend,
+        overlay=store.overlay,
+        passes=store.passes,
+        pass_format=store.pass_format,
+        frame_format="exr" if store.video == "exr" else "png",
+    )
+
+
+def check_store(store: StoreEntry) -> None:
+    """Make sure that scenes can be kept in this way, before one is made.
+
+    Raises
+    ------
+    RippleError
+        Naming what is invalid, or the package that is missing.
+    """
+    if store.passes and store.video == "none":
+        raise SceneError("plan: store.passes need frames, and store.video is 'none'; name a video, or leave passes out")
+    if store.heights and importlib.util.find_spec("zarr") is None:
+        raise SceneError("plan: store.heights needs the package zarr; install it with: pip install 'ripple-sim[zarr]'")
+    with tempfile.TemporaryDirectory(prefix="ripple-sim-plan-") as folder:
+        check_options(options_of(store), Path(folder) / (video_name(store) or "frames"))
+
 
 MOST_SCENES = 10_000_000
 

@@ -1,9 +1,15 @@
-"""One scene of a batch: its seed, its values, and the scene that they make."""
+"""One scene of a batch: its seed, its values, and the scene that they make.
+
+Values put into the table of a scene file.
+
+Values put into a MuJoCo model before it is compiled.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,17 +18,180 @@ import mujoco
 import numpy as np
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.check_scene import check_scene
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.events import Events
-from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.load_scene import check_scene, load_scene
 from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import parse_scene
+from ripple_sim.solver.errors import shown
 
-from .distributions import Distribution
-from .plan import MeshesEntry, Plan
-from .vary_model import vary_model
-from .vary_table import vary_table
+from .plan import Distribution, MeshesEntry, Plan, Step, choose, parse_key
+
+# The stream of random numbers of a key.
+Stream = Callable[[str], np.random.Generator]
+
+_NAMES = ("geom", "body", "actuator")  # what an entry of a list goes by
+
+
+class Place(NamedTuple):
+    """Where a value stands: the table or list that holds it, the key or number there, and the whole key."""
+
+    holder: Any
+    key: Any
+    name: str
+
+
+def vary_table(table: dict[str, Any], entries: Mapping[str, Distribution], stream: Stream) -> dict[str, Any]:
+    """Draw values for the keys of a scene file's table and put them there.
+
+    Returns
+    -------
+    dict
+        The values drawn, by the key of each place.
+
+    Raises
+    ------
+    SceneError
+        If a key fits nothing in the table, or there is no number to add to or to multiply.
+    """
+    values = {}
+    for key, distribution in entries.items():
+        for place in _places(table, parse_key(key), ""):
+            value = distribution.draw(stream(key if distribution.together else place.name))
+            values[place.name] = value
+            _put(place, value, distribution)
+    return values
+
+
+def _places(table: dict[str, Any], steps: Sequence[Step], before: str) -> Iterator[Place]:
+    step, rest = steps[0], steps[1:]
+    here = f"{before}.{step.name}" if before else step.name
+    if not rest and step.chosen is None:
+        yield Place(table, step.name, here)
+        return
+    inner = table.get(step.name)
+    if inner is None and step.chosen is None:
+        inner = table[step.name] = {}
+    if isinstance(inner, list) and all(isinstance(item, dict) for item in inner):
+        names = [next((str(item[key]) for key in _NAMES if key in item), "") for item in inner]
+        for number in choose(names, step, "the scene"):
+            item = f"{here}[{names[number] or number}]"
+            if not rest:
+                raise SceneError(f"plan: {item} is a table; name one of its keys")
+            yield from _places(inner[number], rest, item)
+    elif isinstance(inner, list) and not rest and step.index is not None and step.index < len(inner):
+        yield Place(inner, step.index, f"{here}[{step.index}]")
+    elif isinstance(inner, dict) and step.chosen is None:
+        yield from _places(inner, rest, here)
+    else:
+        raise SceneError(f"plan: the scene has no {'.'.join([here, *(each.name for each in rest)])} to vary")
+
+
+def _put(place: Place, value: Any, distribution: Distribution) -> None:
+    if distribution.apply != "set":
+        old = place.holder.get(place.key) if isinstance(place.holder, dict) else place.holder[place.key]
+        try:
+            if old is None:  # left out, which numpy takes for NaN
+                raise TypeError
+            value = combined(np.asarray(old, float), value, distribution.apply).tolist()
+        except (TypeError, ValueError) as error:
+            raise SceneError(
+                f"plan: {place.name} is {old!r} in the scene, which {value!r} cannot {distribution.apply}; write a "
+                "number into the scene file, or set the value"
+            ) from error
+    place.holder[place.key] = value
+
+
+def combined(old: Any, value: Any, apply: str) -> Any:
+    """A number or vector with a value added, or multiplied by it."""
+    return old + np.asarray(value, float) if apply == "add" else old * np.asarray(value, float)
+
+
+# Elements of an MJCF by their tags, and where a specification lists them.
+ELEMENTS = {
+    "body": "bodies", "geom": "geoms", "joint": "joints", "site": "sites", "camera": "cameras", "light": "lights",
+    "material": "materials", "texture": "textures", "mesh": "meshes", "tendon": "tendons", "actuator": "actuators",
+}  # fmt: skip
+_GROUPS = ("option", "visual")
+
+
+def vary_model(spec: mujoco.MjSpec, entries: Mapping[str, Distribution], stream: Stream) -> dict[str, Any]:
+    """Draw values for attributes of a model's elements, such as `geom[ball].size`, and set them in place.
+
+    Returns
+    -------
+    dict
+        The values drawn, by the key of each attribute.
+
+    Raises
+    ------
+    SceneError
+        If the model has no such element, the element no such attribute, or the value does not fit.
+    """
+    values = {}
+    for key, distribution in entries.items():
+        for element, attribute, index, name in _attributes(spec, key):
+            value = distribution.draw(stream(key if distribution.together else name))
+            values[name] = value
+            try:
+                _assign(element, attribute, index, value, distribution.apply)
+            except (TypeError, ValueError, IndexError) as error:
+                raise SceneError(
+                    f"plan: {name} cannot {distribution.apply} {shown(value)}; in the model it is "
+                    f"{shown(getattr(element, attribute))}"
+                ) from error
+    return values
+
+
+def _attributes(spec: mujoco.MjSpec, key: str) -> Iterator[tuple[Any, str, int | None, str]]:
+    """Each element that a key fits, its attribute, the number in the attribute's brackets, and the whole key."""
+    first, *steps = parse_key(key)
+    if not steps or first.name not in (*ELEMENTS, *_GROUPS):
+        raise SceneError(
+            f"plan: {key!r} is no attribute of a model; valid are an element and its attribute, such as "
+            f"geom[ball].size, of {', '.join((*ELEMENTS, *_GROUPS))}"
+        )
+    if first.name in _GROUPS:
+        found = [(getattr(spec, first.name), first.name)]
+    else:
+        elements = getattr(spec, ELEMENTS[first.name])
+        names = [each.name for each in elements]
+        chosen = choose(names, first, "the model")
+        found = [(elements[number], f"{first.name}[{names[number] or number}]") for number in chosen]
+    last = steps[-1]
+    for element, name in found:
+        for step in steps[:-1]:
+            element, name = _inner(element, step.name, key), f"{name}.{step.name}"
+        _inner(element, last.name, key)
+        yield element, last.name, last.index, f"{name}.{last.name}" + (f"[{last.chosen}]" if last.chosen else "")
+
+
+def _inner(element: Any, attribute: str, key: str) -> Any:
+    if not hasattr(element, attribute):
+        valid = ", ".join(name for name in dir(element) if not name.startswith("_"))
+        raise SceneError(f"plan: {key!r} names the attribute {attribute!r}; valid are {valid}")
+    return getattr(element, attribute)
+
+
+def _assign(element: Any, attribute: str, index: int | None, value: Any, apply: str) -> None:
+    """Set an attribute; a vector takes as many numbers as are given, like an MJCF's."""
+    old = getattr(element, attribute)
+    if attribute == "mass" and apply == "multiply" and not np.isfinite(old):
+        attribute, old = "density", element.density
+    if isinstance(old, np.ndarray):
+        new, given = old.copy(), np.atleast_1d(np.asarray(value, float))
+        part: slice = np.s_[index : index + 1] if index is not None else np.s_[: len(given)]
+        if apply == "multiply" and index is None and np.ndim(value) == 0:
+            part = np.s_[:]
+        new[part] = given if apply == "set" else combined(old[part], given, apply)
+        if attribute == "quat" and hasattr(element, "alt"):
+            element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+        setattr(element, attribute, new)
+    elif isinstance(old, str):
+        setattr(element, attribute, value)
+    else:
+        setattr(element, attribute, type(old)(value if apply == "set" else combined(old, value, apply)))
+
 
 _SEED_BITS = 29  # so that `ripple-sim render --seed` takes it: nine digits
 

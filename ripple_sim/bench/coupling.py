@@ -10,10 +10,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.colliders.collidable import make_collidable
+from ripple_sim.coupling.colliders import make_collidable
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.scenes.implicit import ellipsoid, polygonise, smooth_intersection
-from ripple_sim.scenes.shapes import duck
+from ripple_sim.scenes.shapes import duck, ellipsoid, polygonise, smooth_intersection
 from ripple_sim.solver import Material
 
 Shape = tuple[NDArray[np.float64], NDArray[np.int64]]

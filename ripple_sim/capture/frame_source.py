@@ -1,24 +1,205 @@
-"""`FrameSource`: snapshots of a simulation rendered to frames, offscreen."""
+"""`FrameSource`: snapshots of a simulation rendered to frames, offscreen.
+
+A camera's sensor: averages the finer pixels and the exposures of a frame, in linear light.
+
+What the renderer draws of a target.
+
+Viewpoint of a scene's camera at a given time, free or fixed, orbiting or tracking; and its focal distance.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
-from ripple_sim.render.camera import ThroughLens, Viewpoint
-from ripple_sim.render.surfaces.height_maps import AnyHeightMap, MovedHeightMap
+from ripple_sim.render.camera import Pose, ThroughLens, Viewpoint, linear_to_srgb, srgb_to_linear
+from ripple_sim.render.resources import AnyHeightMap, MovedHeightMap
+from ripple_sim.render.surfaces.surface import Charts
+from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver import SphereAtlas, WaveSolver, sphere_atlas
 from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.kernel import Floats32, kernel
 
-from .exposure import Exposures
 from .passes import SeenMesh, Sighting
-from .sensor import Sensor
-from .snapshot import Snapshot
-from .target_surface import surface_of
-from .viewpoint import focal_distance, viewpoint
+from .snapshot import Exposures, Snapshot
+
+# Steps of the table from linear light to sRGB: enough that each of the 256 values has entries, the darkest too.
+_FINE = 1 << 14
+_LINEAR = srgb_to_linear(np.arange(256) / 255).astype(np.float32)
+_SRGB = np.rint(255 * linear_to_srgb(np.arange(_FINE + 1) / _FINE)).astype(np.uint8)
+
+
+class Sensor:
+    """Averages images in linear light.
+
+    Images are uint8, in sRGB, with a fourth channel for their opacity, by which the colours are weighted; or float16,
+    in linear light, with colours already multiplied by their opacity.
+
+    Parameters
+    ----------
+    factor : int
+        Blocks of factor by factor pixels become one.
+    exposures : int
+        Images that make up a frame.
+    """
+
+    def __init__(self, factor: int = 1, exposures: int = 1) -> None:
+        self._factor, self._exposures = factor, exposures
+        self._count = 0
+        self._light = np.zeros((0, 0, 4), np.float32)  # sums: light times opacity, opacity
+
+    def expose(self, image: NDArray) -> NDArray | None:
+        """Take in an image.
+
+        Parameters
+        ----------
+        image : uint8 or float16 [factor height, factor width, 3 or 4]
+            The same shape and kind for all exposures of a frame.
+
+        Returns
+        -------
+        uint8 or float16 [height, width, 3 or 4]
+            The frame after its last exposure; None before.
+        """
+        if self._factor == self._exposures == 1:
+            return image
+        factor, (height, width, channels) = self._factor, image.shape
+        if self._count == 0:
+            self._light = np.zeros((height // factor, width // factor, 4), np.float32)
+        if image.dtype == np.uint8:
+            _gather_codes(image, factor, _LINEAR, self._light)
+        else:
+            blocks = image.reshape(height // factor, factor, width // factor, factor, channels)
+            self._light[..., :channels] += blocks.sum(axis=(1, 3), dtype=np.float32)
+        self._count = (self._count + 1) % self._exposures
+        if self._count:
+            return None
+        most = factor * factor * self._exposures
+        if image.dtype != np.uint8:
+            return (self._light[..., :channels] / most).astype(image.dtype)
+        frame = np.empty((*self._light.shape[:2], channels), np.uint8)
+        _encode(self._light, most, _SRGB, frame)
+        return frame
+
+
+@kernel
+def _gather_codes(image: NDArray[np.uint8], factor: int, linear: Floats32, light: Floats32) -> None:
+    """Add an image's blocks, in linear light, to the sums `light` [height, width, 4]: light times opacity, opacity."""
+    opaque = image.shape[2] == 3
+    for row in range(light.shape[0]):
+        for column in range(light.shape[1]):
+            red = green = blue = opacity = np.float32(0)
+            for i in range(factor * row, factor * (row + 1)):
+                for j in range(factor * column, factor * (column + 1)):
+                    weight = np.float32(1) if opaque else np.float32(image[i, j, 3])
+                    red += weight * linear[image[i, j, 0]]
+                    green += weight * linear[image[i, j, 1]]
+                    blue += weight * linear[image[i, j, 2]]
+                    opacity += weight
+            light[row, column, 0] += red
+            light[row, column, 1] += green
+            light[row, column, 2] += blue
+            light[row, column, 3] += opacity
+
+
+@kernel
+def _encode(light: Floats32, most: int, srgb: NDArray[np.uint8], frame: NDArray[np.uint8]) -> None:
+    """Means of the sums `light` of `most` values each, as sRGB codes with straight opacity."""
+    for row in range(light.shape[0]):
+        for column in range(light.shape[1]):
+            opacity = light[row, column, 3]
+            scale = (len(srgb) - 1) / opacity if opacity > 0 else np.float32(0)
+            for channel in range(3):
+                frame[row, column, channel] = srgb[int(light[row, column, channel] * scale + 0.5)]
+            if frame.shape[2] == 4:
+                frame[row, column, 3] = int(opacity / most + 0.5)
+
+
+# Resolution of the sphere that is drawn: the mesh of its atlas has a vertex a texel, more than pictures need.
+_SPHERE = 32
+
+
+def surface_of(waves: WaveSolver, look: str, color: tuple[float, float, float] | None = None) -> Surface:
+    """Surface to be drawn of a target."""
+    atlas = drawn = waves.rest
+    if isinstance(atlas, SphereAtlas) and atlas.resolution > _SPHERE:
+        drawn = sphere_atlas(atlas.radius, _SPHERE)
+    mesh = drawn.mesh
+    return Surface(
+        V=mesh.V,
+        F=mesh.F,
+        charts=Charts(drawn.chart_map, atlas.texels.shape),
+        look=look,
+        color=color,
+        uv=mesh.uv if mesh.corner_uv is None else mesh.corner_uv,
+        moving=None if drawn is atlas else (atlas.mesh.V, atlas.mesh.F),
+    )
+
+
+_NEAREST = 0.02  # least focal distance, in camera distances: the near plane
+
+
+def viewpoint(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, time: float) -> Camera | FixedCamera:
+    """Camera of a scene at a time [s].
+
+    A camera named in the MJCF is taken as it stands in `data` (it may ride on a body). Otherwise MuJoCo's free camera,
+    aimed at the model's middle where the scene says nothing else. With `orbit` either circles by that many degrees a
+    second; with `track` the free camera moves along with a body's centre of mass, and the named one turns towards it.
+    """
+    tracked = None if entry.track is None else data.subtree_com[model.body(entry.track).id]
+    if entry.name is not None:
+        fixed = Camera.from_mjcf(model, data, entry.name)
+        if tracked is not None:
+            fixed = _aimed(fixed, tracked)
+        return fixed if not entry.orbit else _turned(fixed, np.radians(entry.orbit) * time)
+    base = np.zeros(3) if tracked is not None else model.stat.center
+    aim = base if entry.lookat is None else entry.lookat
+    x, y, z = (float(value) for value in (aim if tracked is None else tracked + aim))
+    return Camera(
+        lookat=(x, y, z),
+        distance=entry.distance if entry.distance is not None else 1.5 * float(model.stat.extent),
+        azimuth=entry.azimuth + entry.orbit * time,
+        elevation=entry.elevation,
+        fovy=entry.fovy,
+    )
+
+
+def focal_distance(model: mujoco.MjModel, data: mujoco.MjData, entry: CameraEntry, pose: Pose) -> float:
+    """Distance of the plane in focus from a scene's camera, along its axis [m]."""
+    if entry.focus is None:
+        return pose.distance
+    if isinstance(entry.focus, float):
+        return entry.focus
+    if isinstance(entry.focus, str):
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, entry.focus)
+        point = data.subtree_com[body] if body >= 0 else data.geom_xpos[model.geom(entry.focus).id]
+    else:
+        point = np.array(entry.focus)
+    return max(float((pose.position - point) @ pose.rotation[:, 2]), _NEAREST * pose.distance)
+
+
+def _aimed(camera: FixedCamera, target: NDArray[np.float64]) -> FixedCamera:
+    """The camera turned in place, upright, towards a point [m]."""
+    back = camera.position - target
+    distance = float(np.linalg.norm(back))
+    right = np.cross([0.0, 0.0, 1.0], back)
+    if distance == 0 or not right.any():  # at the point itself, or exactly above or below it
+        return camera
+    right /= np.linalg.norm(right)
+    back = back / distance
+    return FixedCamera(camera.position, np.stack([right, np.cross(back, right), back], axis=1), distance, camera.fovy)
+
+
+def _turned(camera: FixedCamera, angle: float) -> FixedCamera:
+    """The camera turned by an angle [rad] around the vertical through its aim."""
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    focus = camera.pose().focus
+    return FixedCamera(focus + turn @ (camera.position - focus), turn @ camera.rotation, camera.distance, camera.fovy)
 
 
 class FrameSource:

@@ -10,12 +10,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.model.soft_ids import first_skin
+from ripple_sim.coupling.soft import first_skin
 from ripple_sim.render.camera import Pose
-from ripple_sim.render.passes.surface_buffers import SurfaceImage
-from ripple_sim.render.surfaces.moving_vertices import MovingVertices
-from ripple_sim.render.surfaces.spline_heights import spline_heights, spline_samples
-from ripple_sim.solver.texels.chart_page import ChartPage
+from ripple_sim.render.passes.layers import SurfaceImage
+from ripple_sim.render.surfaces.adaptive import spline_heights, spline_samples
+from ripple_sim.render.surfaces.moving import MovingVertices
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 
 class SeenMesh(NamedTuple):

@@ -1,4 +1,11 @@
-"""Frozen copies of a running simulation's state, one for each exposure of a frame."""
+"""Frozen copies of a running simulation's state, one for each exposure of a frame.
+
+A simulation's state at times between its physics steps, while the shutter is open.
+
+Height maps of a target, wherever its surface is.
+
+How a frame is exposed: at which times while the shutter is open, and through which points of the lens.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +13,174 @@ import dataclasses
 import hashlib
 import itertools
 from collections.abc import Iterable, Iterator
+from typing import TypeAlias
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.ripples import Impulse
-from ripple_sim.render.surfaces.height_maps import AnyHeightMap
+from ripple_sim.coupling.ripples import Impulse, Ripples
+from ripple_sim.render.resources import AnyHeightMap, MovedHeightMap
+from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.simulation import Simulation
+from ripple_sim.solver import HeightMap
+from ripple_sim.solver.backends.gl_fields import DeviceField
+from ripple_sim.solver.waves.motion import MovedGradients
 
-from .drawn_heights import DrawnHeights
-from .exposure import Exposures
-from .shutter import Heights, ShutterTimes
+Field: TypeAlias = NDArray[np.float32] | DeviceField
+Heights = dict[str, Field]
+
+_ROUNDING = 9  # decimals of a physics step: what is a whole step but for round-off is one
+
+
+class ShutterTimes:
+    """States of a simulation at given times of each frame.
+
+    Iterating over it advances the simulation through the times of the present frame. It takes the same physics steps
+    as without a shutter, so motion blur does not change the motion. Within a step, states are interpolated between its
+    ends: bodies move at constant velocity, as in MuJoCo's Euler and implicit integrators, and heights linearly.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    times : float64 [n]
+        In frames from a frame's beginning, ascending, from 0 to 1.
+    """
+
+    def __init__(self, simulation: Simulation, times: NDArray[np.float64]) -> None:
+        self._simulation = simulation
+        # in physics steps
+        self._places = np.round(times * simulation.steps_per_frame, _ROUNDING).tolist()
+        self._start, self._between = mujoco.MjData(simulation.model), mujoco.MjData(simulation.model)
+
+    def __iter__(self) -> Iterator[tuple[mujoco.MjData, Heights]]:
+        """Advance to one time after the other.
+
+        Yields
+        ------
+        data : mujoco.MjData
+            State of the bodies, until the next iteration.
+        heights : dict
+            By the geom's name [m], float32 [C, n, n], or on the GPU, see `WaveSolver.snapshot`. The same object as
+            before where no time has passed.
+        """
+        simulation = self._simulation
+        done = 0
+        before = now = self._heights()
+        for place in self._places:
+            while done < place:
+                mujoco.mj_copyData(self._start, simulation.model, simulation.data)
+                simulation.step()
+                before, now = now, self._heights()
+                done += 1
+            rest = done - place
+            if rest == 0:
+                yield simulation.data, now
+            else:
+                self._go_back(rest * simulation.model.opt.timestep)
+                yield self._between, {name: _blend(now[name], before[name], rest) for name in now}
+
+    def _heights(self) -> Heights:
+        return {name: self._simulation.ripples[name].snapshot() for name in self._simulation.ripples}
+
+    def _go_back(self, duration: float) -> None:
+        """Set the bodies to where they were a duration [s] ago, within the last step.
+
+        After `mj_step` MuJoCo's poses are those at the step's beginning. So are these, and the motion that led to them
+        is the one of the step before.
+        """
+        model, data = self._simulation.model, self._between
+        mujoco.mj_copyData(data, model, self._start)
+        data.time = self._simulation.data.time - duration
+        mujoco.mj_integratePos(model, data.qpos, data.qvel, -duration)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_flex(model, data)
+        mujoco.mj_camlight(model, data)
+
+
+def _blend(first: Field, second: Field, share: float) -> Field:
+    if isinstance(first, DeviceField):
+        return first.blend(second, share) if isinstance(second, DeviceField) else first
+    return first + np.float32(share) * (second - first)
+
+
+class DrawnHeights:
+    """What a renderer needs of a target's heights.
+
+    Parameters
+    ----------
+    ripples : Ripples
+    name : str
+        Of the target.
+    limit : bool
+        Whether heights that are too large for the object are bent, see `DisplacementLimit`.
+    """
+
+    def __init__(self, ripples: Ripples, name: str, limit: bool) -> None:
+        self._ripples, self._name = ripples, name
+        self._height_map = HeightMap.drawn(ripples[name].rest, limit)
+        self._gradients: MovedGradients | None = None
+
+    def __call__(self, height: Field, data: mujoco.MjData) -> AnyHeightMap:
+        """Height map of heights [m], [C, n, n], with the vertices where they are in `data`, if they have moved."""
+        height_map: AnyHeightMap = self._height_map(height)
+        V = self._ripples.vertices(self._name, data)
+        if V is None:
+            return height_map
+        if self._gradients is None:
+            self._gradients = MovedGradients(self._ripples[self._name].rest)
+        return MovedHeightMap(self._gradients(np.asarray(height_map), V), V)
+
+
+_GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0
+_FULL_TURN = 360.0  # degrees of a rotary shutter: open from one frame to the next
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Exposures:
+    """The exposures whose mean is a frame, the same for every frame, in the order of time.
+
+    Attributes
+    ----------
+    times : float64 [n]
+        In frames after the frame's own time, when the shutter opens. The first is 0.
+    offsets : float64 [n, 2]
+        Point of the lens, to the right and up of its middle [m].
+    """
+
+    times: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @classmethod
+    def of(cls, camera: CameraEntry) -> Exposures:
+        """Exposures of a scene's camera: a single one, through the middle of the lens, without shutter and aperture."""
+        count = camera.exposures if camera.shutter > 0 or camera.aperture > 0 else 1
+        times = camera.shutter / _FULL_TURN * np.arange(count) / count
+        return cls(times, camera.aperture / 2 * _shuffled(disc_points(count)))
+
+
+def disc_points(count: int) -> NDArray[np.float64]:
+    """Points spread evenly over the unit disc, float64 [count, 2], with their mean in its middle.
+
+    A spiral whose points follow one another under the golden angle (Vogel, "A better way to construct the sunflower
+    head", Mathematical Biosciences 44, 1979).
+    """
+    index = np.arange(count)
+    radius, angle = np.sqrt((index + 0.5) / count), 2 * np.pi * _GOLDEN_RATIO * index
+    points = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return points - points.mean(axis=0)
+
+
+def _shuffled(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The points in an order that visits all parts of the lens in any part of the time.
+
+    From the middle outwards, moving bodies would begin sharp and end blurred.
+    """
+    return points[np.argsort(np.argsort(np.arange(len(points)) * _GOLDEN_RATIO % 1.0))]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

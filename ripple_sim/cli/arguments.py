@@ -1,20 +1,26 @@
-"""Types of command line arguments: how a word is parsed, and the message if it is invalid."""
+"""Types of command line arguments: how a word is parsed, and the message if it is invalid.
+
+The command line's form of `VideoOptions`: its fields, defaults and help, with the words that the user types.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from collections.abc import Callable
-from typing import Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
 from tyro.constructors import PrimitiveConstructorSpec
 
-from ripple_sim.overlay.comparison import BASELINES
-from ripple_sim.scene.up_axis import UP_AXES
-from ripple_sim.solver.atlas.layouts import LAYOUTS
-from ripple_sim.solver.checked import shown
-from ripple_sim.solver.operator.rims import RIMS
+from ripple_sim.overlay.notes import BASELINES
+from ripple_sim.scene.drop import UP_AXES
+from ripple_sim.solver.errors import shown
+from ripple_sim.solver.layouts.build import LAYOUTS
+from ripple_sim.solver.operator.assembly import RIMS
+from ripple_sim.video.options import VideoOptions
 
 
 def parse_size(word: str) -> tuple[int, int]:
@@ -182,3 +188,45 @@ SceneLayout = Annotated[
     str | None, _one_word(parse_layout, "{auto,cube,patches}"), arg(help_behavior_hint="(default: the scene's)")
 ]
 Rim = Annotated[str | None, _one_word(parse_rim, "{free,fixed}"), arg(help_behavior_hint="(default: the scene's)")]
+
+
+# By field: how its word on the command line is read. The others are read as their types say.
+_WORDS: dict[str, Any] = {
+    "size": Size,
+    "fps": FrameRate,
+    "duration": Duration,
+    "slow_motion": Factor,
+    "supersample": Supersample,
+    "shutter": Shutter,
+    "aperture": Aperture,
+    "focus": Focus,
+    "exposures": Exposures,
+    "overlay": Overlay,
+    "passes": Passes,
+    "compare": Baseline,
+    "resolution": Resolution,
+    "layout": SceneLayout,
+    "rim": Rim,
+}
+
+if TYPE_CHECKING:
+    _VideoFields = VideoOptions
+else:
+    _VideoFields = dataclasses.make_dataclass(
+        "_VideoFields", list(_WORDS.items()), bases=(VideoOptions,), frozen=True, kw_only=True
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class _Output:
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
+    """Output file ending in .mp4, .webm, .gif or .webp, or a name without ending for a folder of frames."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class VideoArguments(_VideoFields, _Output):
+    """The arguments of every command that renders a video."""
+
+    def options(self) -> VideoOptions:
+        """Options that the user chose."""
+        return VideoOptions(**{field.name: getattr(self, field.name) for field in dataclasses.fields(VideoOptions)})

@@ -37,9 +37,8 @@ def _run(command: Any) -> int:
     os.environ.setdefault("MUJOCO_GL", "disable")  # MuJoCo's own renderer would take the OpenGL context away
 
     from ripple_sim.errors import DisplayError, EncodingError
-    from ripple_sim.solver.atomic_file import OF_THE_DISK, OF_THE_NAME
-    from ripple_sim.solver.checked import shown
-    from ripple_sim.solver.errors import GLError, RippleError
+    from ripple_sim.solver.errors import GLError, RippleError, shown
+    from ripple_sim.solver.files import OF_THE_DISK, OF_THE_NAME
 
     end_in_good_order()
     try:

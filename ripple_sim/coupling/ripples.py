@@ -11,27 +11,38 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.amplitude.amplitude_check import AmplitudeCheck
-from ripple_sim.coupling.colliders.collision_warnings import collision_warnings
-from ripple_sim.coupling.colliders.tunnelling import TunnellingCheck
-from ripple_sim.coupling.load.contact_loads import ContactLoads
-from ripple_sim.coupling.load.contact_record import Impulse
-from ripple_sim.coupling.load.high_pass import HighPass
-from ripple_sim.coupling.model.collision_geoms import named_collision_geoms
-from ripple_sim.coupling.model.coupled_model import CoupledModel
-from ripple_sim.coupling.model.geoms import ByGeom, GeomKey, target_name
-from ripple_sim.coupling.two_way.push_back import PushBack
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Load, Material
-from ripple_sim.solver.checked import checked, whole
+from ripple_sim.solver.errors import checked, whole
 
-from .arguments import for_each, integrator_warning, own_data, own_model
-from .stepping.clock import StepClock, missed_warning
-from .stepping.divergence import divergence_warning, goes_on_broken
-from .stepping.followed import followed
-from .stepping.physics_messages import adopt_warnings, physics_errors
-from .stepping.solved import UNSOLVED_WARNING, SolvedForces
+from .amplitude import AmplitudeCheck
+from .collision_warnings import TunnellingCheck, collision_warnings
+from .geoms import (
+    ByGeom,
+    GeomKey,
+    for_each,
+    integrator_warning,
+    named_collision_geoms,
+    own_data,
+    own_model,
+    target_name,
+)
+from .load import ContactLoads, Impulse
+from .model import CoupledModel
+from .soft import HighPass
+from .stepping import (
+    UNSOLVED_WARNING,
+    SolvedForces,
+    StepClock,
+    adopt_warnings,
+    divergence_warning,
+    followed,
+    goes_on_broken,
+    missed_warning,
+    physics_errors,
+)
 from .targets import Targets
+from .two_way import PushBack
 
 __all__ = ["Impulse", "Ripples"]
 

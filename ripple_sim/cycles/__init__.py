@@ -1,5 +1,5 @@
 """Frames by Cycles, Blender's path tracer, of the USD of a run."""
 
-from .render_cycles import render_cycles
+from .render import render_cycles
 
 __all__ = ["render_cycles"]

@@ -13,7 +13,7 @@ import numpy as np
 from av.video.reformatter import ColorPrimaries, ColorRange, Colorspace, ColorTrc
 from numpy.typing import NDArray
 
-from .mark import MARK
+from .replace import MARK
 
 # Fixed, since x264's output depends on it; small, since the renderer needs the processor too.
 THREADS = 2

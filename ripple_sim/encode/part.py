@@ -16,10 +16,8 @@ from pathlib import Path
 
 from ripple_sim.errors import VideoError
 
-from .mark import made_here
-from .move import move
 from .output import check_replaceable
-from .record import SETTINGS, STATES, Record
+from .replace import SETTINGS, STATES, Record, made_here, move
 
 _FRAMES, _WHOLE = "frames", "whole"
 _SEGMENT = re.compile(r"frames?_(\d+)(?:-(\d+))?")

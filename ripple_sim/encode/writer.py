@@ -1,7 +1,18 @@
-"""`FrameWriter`: frames go in one by one, a video comes out at the end or not at all."""
+"""`FrameWriter`: frames go in one by one, a video comes out at the end or not at all.
+
+`Encoder`: frames encoded into segments, in a thread of its own, and joined to the video.
+
+`open_writer`: starts a video, or continues an interrupted one.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import queue
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -10,11 +21,111 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import EncodingError, SimulationError, VideoError
 from ripple_sim.solver.errors import SolverError
+from ripple_sim.solver.files import final_path
 
 from .clip import Stream
-from .encoder import Encoder
-from .formats import Format
+from .output import FORMATS, Format, Segment, check_output, video_format
 from .part import Part
+
+# Rendering runs ahead of encoding by at most this many frames; 8 frames of 1280x720 are 22 MB, or 44 MB of EXR.
+QUEUE_FRAMES = 8
+
+
+class Encoder:
+    """A thread that takes frames, stores them as segments of a `Part`, and finally joins these.
+
+    Parameters
+    ----------
+    part : Part
+    video : Format
+    stream : Stream
+
+    Attributes
+    ----------
+    error : Exception or None
+        What made encoding fail. Frames after that are dropped.
+    seconds : float
+        Time spent encoding [s]; complete after `stop`.
+    finished : bool
+        Whether the video is in its place.
+    """
+
+    def __init__(self, part: Part, video: Format, stream: Stream) -> None:
+        self._part, self._format, self._stream = part, video, stream
+        self._segment: Segment | None = None
+        self._pending = 0
+        self._queue: queue.Queue[NDArray | None] = queue.Queue(QUEUE_FRAMES)
+        self._abandoned = False
+        self.error: Exception | None = None
+        self.seconds = 0.0
+        self.finished = False
+        self._thread = threading.Thread(target=self._run, name="video encoder", daemon=True)
+        self._thread.start()
+
+    @property
+    def running(self) -> bool:
+        """Whether it still takes frames."""
+        return self._thread.is_alive()
+
+    def put(self, frame: NDArray) -> None:
+        """Add a frame, which must stay as it is; waits while the queue is full."""
+        self._queue.put(frame)
+
+    def stop(self) -> None:
+        """Encode what is in the queue, put the video in its place, and end the thread."""
+        if self._thread.is_alive():
+            self._queue.put(None)
+            self._thread.join()
+
+    def abandon(self) -> None:
+        """End the thread without finishing the video."""
+        self._abandoned = True
+        self.stop()
+
+    def _run(self) -> None:
+        while (frame := self._queue.get()) is not None:
+            self._timed(self._add, frame)
+        self._timed(self._finish)
+        if self._segment is not None:
+            with contextlib.suppress(Exception):  # the first error has been kept
+                self._segment.close()
+
+    def _add(self, frame: NDArray) -> None:
+        if self._segment is None:
+            self._segment = self._format.start(self._part.unfinished, self._stream)
+        self._segment.write(frame)
+        self._pending += 1
+        if self._pending == self._format.length:
+            self._store()
+
+    def _store(self) -> None:
+        if self._segment is not None:
+            self._segment.finish()
+            self._part.store(self._pending)
+            self._segment, self._pending = None, 0
+
+    def _finish(self) -> None:
+        self._store()
+        if self._format.join is not None:
+            self._format.join(self._part.segments(), self._part.whole, self._stream)
+        if not self._abandoned:
+            self._part.finish()
+            self.finished = True
+
+    def _timed(self, work: Callable[..., None], *arguments: object) -> None:
+        """Do the work unless it has become useless, and keep an error instead of ending the thread.
+
+        The thread must go on taking frames from the queue, or `put` would wait for ever.
+        """
+        if self._abandoned or self.error is not None:
+            return
+        start = time.perf_counter()
+        try:
+            work(*arguments)
+        except Exception as error:  # of any kind: it is raised in the caller's thread
+            self.error = error
+        self.seconds += time.perf_counter() - start
+
 
 # Errors that would occur again when the render is resumed.
 _HOPELESS = (SimulationError, SolverError)
@@ -138,3 +249,68 @@ class FrameWriter:
         if error is not None:
             reason = getattr(error, "strerror", None) or error
             raise EncodingError(f"cannot write the video {self.path}: {reason}") from error
+
+
+def open_writer(
+    path: str | Path,
+    *,
+    width: int,
+    height: int,
+    fps: int,
+    transparent: bool = False,
+    frame_format: str = "png",
+    settings: Mapping[str, str | int | float] | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+) -> FrameWriter:
+    """Start a video, or continue one; the ending of `path` chooses its format.
+
+    `.mp4` is H.264, `.webm` VP9, `.gif` and `.webp` are animated images; a name without ending becomes a folder of PNG
+    or EXR frames. Missing parent folders are created. Nothing appears at `path` before the video is complete; an
+    earlier file stays until then; one that was not written here is replaced only with `overwrite`. A link is written
+    through. Meanwhile the frames are in a folder beside it, `path` with `.part` appended, as
+    playable clips or as images. They join to the same video, bit for bit, however often the work was interrupted.
+
+    Parameters
+    ----------
+    path : str or Path
+        Where the video goes.
+    width, height : int
+        Size of the frames [pixels].
+    fps : int
+        Frames per second.
+    transparent : bool
+        Frames have a fourth channel, their opacity; colours are multiplied by it for EXR only.
+    frame_format : str
+        Of a folder's frames, "png" or "exr".
+    settings : mapping, optional
+        Everything that decides the pixels, by name. With it, finished segments survive an interruption.
+    resume : bool
+        Continue an interrupted writer of the same settings: the next frame to write is number `frames`.
+    overwrite : bool
+        Replace an older file, or older frames, that were not written here.
+
+    Raises
+    ------
+    VideoError
+        If `check_output` refuses the arguments, another process is writing this video, or, with `resume`, the
+        interrupted video has other settings.
+    EncodingError
+        If the folder cannot be written.
+    """
+    path = Path(path)
+    check_output(path, width, height, fps, transparent=transparent, frame_format=frame_format, overwrite=overwrite)
+    video = FORMATS[video_format(path, frame_format)]
+    try:
+        part = Part(
+            final_path(path),
+            suffix=video.suffix,
+            length=video.length,
+            settings=settings or {},
+            resume=resume,
+            overwrite=overwrite,
+        )
+    except OSError as error:
+        raise EncodingError(f"cannot write the video {path}: {error.strerror}") from error
+    shape = (height, width, 4 if transparent else 3)
+    return FrameWriter(part, video, Stream(width, height, fps), shape, resumable=settings is not None)

@@ -1,29 +1,38 @@
-"""`Exporter`: a run of anybody's own loop, written frame by frame to the file of another program."""
+"""`Exporter`: a run of anybody's own loop, written frame by frame to the file of another program.
+
+`RippleRenderer`: frames of a MuJoCo model with its ripples, in your own loop.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import html
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Self, Unpack
+from typing import Self, TypeAlias, Unpack
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
-from ripple_sim.coupling.arguments import check_targets, own_data, own_model, posed
-from ripple_sim.coupling.model.geoms import ByGeom, by_name
+from ripple_sim.capture.frame_source import surface_of
+from ripple_sim.capture.snapshot import DrawnHeights
+from ripple_sim.coupling.geoms import ByGeom, by_name, check_targets, own_data, own_model, posed
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.errors import EncodingError, ExportError
-from ripple_sim.render.visuals.looks import find_look
-from ripple_sim.scene.camera import CameraEntry, check_camera
-from ripple_sim.solver.checked import PATH, POSITIVE, checked, instance
+from ripple_sim.render import Camera, FixedCamera, Renderer
+from ripple_sim.render.camera import Viewpoint, find_viewpoint
+from ripple_sim.render.visuals.visual import find_look
+from ripple_sim.scene.scene_file import CameraEntry, check_camera
+from ripple_sim.solver.errors import PATH, POSITIVE, checked, instance
+from ripple_sim.solver.gl import GLContext, shared_context
 
-from .endings import check_export
-from .html.notebook import framed
-from .options import WRITE_OPTIONS, WriteOptions
-from .place import Unfinished
-from .settings import check_write_options
+from .options import WRITE_OPTIONS, WriteOptions, check_write_options
+from .page import framed
+from .place import Unfinished, check_export
 from .source import Chunking, Moment, Paint, Source
 
 
@@ -227,3 +236,109 @@ def camera_entry(model: mujoco.MjModel, camera: str | CameraEntry | None) -> Cam
     )
     check_camera(model, entry)
     return entry
+
+
+AnyCamera: TypeAlias = Camera | FixedCamera | str | int | mujoco.MjvCamera
+
+
+class RippleRenderer:
+    """Renders a model and its rippling surfaces offscreen, as `mujoco.Renderer` renders a model.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+        That of the ripples, or one that differs in its looks alone; or dm_control's wrapper of one, likewise the data
+        of each frame.
+    ripples : Ripples
+        Whose targets are drawn with their ripples.
+    width : int
+        [pixels].
+    height : int
+        [pixels].
+    looks : mapping
+        Geom, by its name or id, to the look of its surface, one of `LOOKS`: rubber (the default), jelly, clay and so
+        on. Its colour is the geom's, where the model gives it a texture or a colour, as in a scene file.
+    gl : GLContext, optional
+        By default the process's shared one.
+    limit : bool
+        Whether heights that are too large for the object are drawn smaller, so that its surface does not pass through
+        itself; see `DisplacementLimit`.
+
+    Raises
+    ------
+    RippleError
+        If the ripples belong to another model, for an unknown look or geom, or if the driver cannot render frames of
+        this size.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        ripples: Ripples,
+        *,
+        width: int = 1280,
+        height: int = 720,
+        looks: ByGeom[str] | None = None,
+        gl: GLContext | None = None,
+        limit: bool = True,
+    ) -> None:
+        self._model, self._ripples = own_model(model), ripples
+        check_targets(self._model, ripples.model, ripples.geom_ids)
+        self._height_maps = {name: DrawnHeights(ripples, name, limit) for name in ripples}
+        named = by_name(self._model, looks or {}, "looks")
+        surfaces = {
+            geom: surface_of(ripples[name], named.get(name, "rubber")) for name, geom in ripples.geom_ids.items()
+        }
+        self._size, self._looks, self._limit = (width, height), named, limit
+        self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
+        self._renderer = Renderer(gl or shared_context(), self._model, surfaces, size=(width, height))
+
+    def render(self, data: mujoco.MjData, camera: AnyCamera | None = None) -> NDArray[np.uint8]:
+        """Render the present state to pixels, uint8 [height, width, 3].
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+            After `mj_step` or `mj_forward`. Where no poses were ever computed, those of its `qpos` are drawn.
+        camera : Camera, FixedCamera, str, int or mujoco.MjvCamera, optional
+            A camera, or the name or the id of one in the MJCF, or one of MuJoCo's that is free, tracks a body or is
+            fixed; by default, and with -1, MuJoCo's free camera, aimed at the model's middle.
+
+        Raises
+        ------
+        SceneError
+            If the data belongs to another model, or the camera is none of these or not in the model.
+        """
+        data = posed(self._model, own_data(self._model, data, drawn=True))
+        seen = find_viewpoint(self._model, data, -1 if camera is None else camera)
+        self._seen = data, self._entry(camera if isinstance(camera, str) else seen)
+        height_maps = {
+            self._ripples.geom_ids[name]: height_map(self._ripples[name].snapshot(), data)
+            for name, height_map in self._height_maps.items()
+        }
+        return self._renderer.render(data, height_maps, seen)
+
+    def _entry(self, camera: Viewpoint | str) -> CameraEntry:
+        """What `[camera]` of a scene file would say; MuJoCo's free camera where it has no words for it."""
+        if isinstance(camera, Camera):
+            return CameraEntry(**dataclasses.asdict(camera))
+        return camera_entry(self._model, camera if isinstance(camera, str) else None)
+
+    def _repr_html_(self) -> str | None:
+        """In a notebook: the present state of what was rendered last, to turn and to zoom."""
+        if self._seen is None:
+            return None
+        data, camera = self._seen
+        with tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder:
+            page = Path(folder) / "now.html"
+            with Exporter(
+                self._model,
+                self._ripples,
+                page,
+                camera=camera,
+                looks=self._looks,
+                size=self._size,
+                limit=self._limit,
+            ) as exporter:
+                exporter.write(data)
+            return framed(page, self._size[0] / self._size[1])

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.surfaces.charts import Charts
-from ripple_sim.render.surfaces.moving_surface import MovingSurface
-from ripple_sim.render.surfaces.moving_vertices import Riding
+from ripple_sim.render.surfaces.moving import MovingSurface, Riding
+from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.render.surfaces.vertices import COORDINATES, DIRECTION, NORMAL, POSITION, UV, tessellated
 from ripple_sim.render.visuals.corners import normalized, smooth_normals, split_corners
 from ripple_sim.solver import Atlas, HeightMap

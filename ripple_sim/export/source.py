@@ -9,10 +9,10 @@ from typing import Protocol
 
 import mujoco
 
-from ripple_sim.capture.viewpoint import focal_distance, viewpoint
+from ripple_sim.capture.frame_source import focal_distance, viewpoint
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.render.camera import Pose
-from ripple_sim.scene.camera import CameraEntry
+from ripple_sim.scene.scene_file import CameraEntry
 
 from .moving_mesh import MovingMesh
 

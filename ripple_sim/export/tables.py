@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ripple_sim.encode.mark import MARK
+from ripple_sim.encode.replace import MARK
 
 from .source import Moment, Source
 

@@ -8,13 +8,22 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.gpu.contract import MappingKind
-from ripple_sim.render.visuals.looks import MODEL_LOOK, Look, find_look
-from ripple_sim.render.visuals.materials import look_of, texture_pixels
+from ripple_sim.render.camera import srgb_to_linear
+from ripple_sim.render.contract import MappingKind
 from ripple_sim.render.visuals.shapes import shape_of, sizes
 from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of
-from ripple_sim.render.visuals.visual import Visual, geom_visual, site_visual, visible_geoms, visible_sites
+from ripple_sim.render.visuals.visual import (
+    MODEL_LOOK,
+    Look,
+    Visual,
+    find_look,
+    geom_visual,
+    look_of,
+    site_visual,
+    texture_pixels,
+    visible_geoms,
+    visible_sites,
+)
 
 from .moving_mesh import MovingMesh
 from .source import Paint

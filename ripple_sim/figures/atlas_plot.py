@@ -1,21 +1,134 @@
-"""A figure of an atlas: the mesh with the texel grid, the charts, stretch and quality."""
+"""A figure of an atlas: the mesh with the texel grid, the charts, stretch and quality.
+
+The page that a plot is drawn on: its title, its images, and the file that it becomes.
+
+Colours of an atlas's texels: by stretch, and by chart.
+
+A figure of a layer's thickness: the mesh from both sides, and how much of it has which thickness.
+"""
 
 from __future__ import annotations
 
+import colorsys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure  # without pyplot, which would look for a display
 from numpy.typing import NDArray
 
-from ripple_sim.solver import Atlas
+from ripple_sim.encode.replace import MARK, made_here
+from ripple_sim.solver import Atlas, AtlasError, TexelTopology, sphere_atlas
+from ripple_sim.solver.files import final_path
 
-from .atlas_painter import AtlasPainter
-from .chart_images import cross, sphere_image, squares
-from .plot_page import FAINT, TEXT, check_plot_path, dressed, save_plot, show
-from .texel_colors import STRETCH_COLORS, STRETCH_RANGE, chart_colors, stretch_colors, stretch_shade, texel_stretch
-from .view import View
+from .atlas_view import AtlasPainter, View, cross, sphere_image, squares
+
+TEXT, FAINT = "#1b2432", "#6b7685"
+
+_ENDINGS = (".png", ".jpg", ".pdf", ".svg")
+_DPI = 120
+
+
+def check_plot_path(path: str | Path, overwrite: bool = True) -> None:
+    """Raise `AtlasError` if the ending is unknown, the folder missing, or the file another's that must not go."""
+    path = Path(path)
+    if path.suffix.lower() not in _ENDINGS:
+        raise AtlasError(f"plot file {str(path)!r} has an unknown ending; valid are {', '.join(_ENDINGS)}")
+    if not path.absolute().parent.is_dir() or path.is_dir():
+        raise AtlasError(f"plot file {str(path)!r} cannot be written: name a file in a folder that exists")
+    try:
+        final = final_path(path)
+    except OSError as error:
+        raise AtlasError(f"plot file {str(path)!r} cannot be written: {error.strerror}; name another file") from error
+    if final.exists() and not (overwrite or made_here(final)):
+        raise AtlasError(
+            f"plot file {str(path)!r} cannot be written: it exists and was not {MARK}; name another file, or add "
+            "--overwrite"
+        )
+
+
+def dressed(title: str, subtitle: str) -> Figure:
+    """An empty figure with a title."""
+    figure = Figure(figsize=(16, 9), dpi=_DPI, facecolor="white")
+    figure.text(0.03, 0.945, title, fontsize=25, fontweight="bold", color=TEXT, va="center")
+    figure.text(0.03, 0.903, subtitle, fontsize=12.5, color=FAINT, va="center")
+    return figure
+
+
+def show(figure: Figure, place: tuple[float, float, float, float], image: NDArray, caption: str = "") -> None:
+    """Put an image at a place of a figure, left, bottom, width, height in shares of it."""
+    axes = figure.add_axes(place)
+    axes.imshow(image, interpolation="antialiased")
+    axes.set_axis_off()
+    if caption:
+        axes.text(0.5, -0.03, caption, transform=axes.transAxes, ha="center", va="top", fontsize=11.5, color=FAINT)
+
+
+def save_plot(figure: Figure, path: str | Path) -> None:
+    """Write a figure with the mark of files that were made here.
+
+    Raises
+    ------
+    AtlasError
+        If that fails.
+    """
+    try:
+        figure.savefig(path, dpi=_DPI, **_marked(Path(path).suffix.lower()))
+    except OSError as error:
+        raise AtlasError(f"plot file {str(path)!r} cannot be written: {error.strerror or error}") from error
+
+
+def _marked(ending: str) -> dict[str, Any]:
+    """How each format is told to hold the mark of files that were made here."""
+    if ending == ".jpg":
+        return {"pil_kwargs": {"comment": MARK.encode()}}
+    name = "Software" if ending == ".png" else "Creator"
+    return {"metadata": {name: MARK, **({"Date": None} if ending == ".svg" else {})}}
+
+
+# Finer than an even spread is blue, coarser is red; the ends stand for a factor of 2.
+STRETCH_COLORS = LinearSegmentedColormap.from_list(
+    "stretch", ["#1f4e8c", "#3f8fc0", "#8fd0d4", "#f6f1df", "#f4b46f", "#dd6247", "#8c1d40"], N=512
+)
+STRETCH_RANGE = 2.0
+_HUES = 12
+
+
+def texel_stretch(atlas: Atlas) -> NDArray[np.float64]:
+    """Stretch at every texel, [C, n, n]: sqrt(real area over even share).
+
+    In the cube layout the even share is that of the texel on the sphere, in others the same for all texels.
+    """
+    share = sphere_atlas(1.0, atlas.resolution).areas if atlas.layout == "cube" else np.ones_like(atlas.areas)
+    return np.sqrt((atlas.areas / atlas.areas.sum()) / (share / share.sum()))
+
+
+def stretch_shade(stretch: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Place on the colour scale, 0 to 1."""
+    return np.clip(0.5 + 0.5 * np.log(stretch) / np.log(STRETCH_RANGE), 0, 1)
+
+
+def stretch_colors(stretch: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Colours [..., 3] of stretches."""
+    return STRETCH_COLORS(stretch_shade(stretch))[..., :3]
+
+
+def chart_colors(topology: TexelTopology) -> NDArray[np.float64]:
+    """A pale colour for each chart, [C, 3], never that of a chart beside it."""
+    hues = np.full(len(topology.glued), -1)
+    meeting: list[set[int]] = [set() for _ in range(int(topology.corners.max()) + 1)]
+    for chart, corners in enumerate(topology.corners.tolist()):
+        for corner in corners:
+            meeting[corner].add(chart)
+    for chart, corners in enumerate(topology.corners.tolist()):
+        near = {int(hues[other]) for corner in corners for other in meeting[corner]}
+        # steps of 5 hues of 12 visit all of them, far from each other
+        free = [hue for hue in (5 * (chart + k) % _HUES for k in range(_HUES)) if hue not in near]
+        hues[chart] = free[0] if free else chart % _HUES
+    return np.array([colorsys.hls_to_rgb(hue / _HUES, 0.74 - 0.08 * (hue % 2), 0.62) for hue in hues.tolist()])
 
 
 def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = "", up: str = "y") -> None:
@@ -101,3 +214,64 @@ def _figures(figure: Figure, atlas: Atlas) -> None:
             text = "-"
         figure.text(left, 0.196 - 0.062 * k, text, fontsize=16, fontweight="bold", color=TEXT, va="center")
         figure.text(left, 0.170 - 0.062 * k, name, fontsize=11, color=FAINT, va="center")
+
+
+# Thin is dark, as bone near the skin is in a scan that is looked through.
+_COLORS = colormaps["viridis"]
+_SHOWN = (0.005, 0.97)  # shares of the area between which the colours run
+
+
+def plot_thickness(
+    atlas: Atlas, thickness: NDArray[np.float64], path: str | Path, *, title: str, subtitle: str = "", up: str = "y"
+) -> None:
+    """Write a figure of the thickness [m] of a layer, [C, n, n], see `thickness_map`.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    thickness : [C, n, n]
+    path : path
+        Ends in .png, .jpg, .pdf or .svg.
+    title, subtitle : str
+    up : str
+        Axis of the mesh that points up in the figure, "y" or "z".
+
+    Raises
+    ------
+    AtlasError
+        If the ending is unknown or the file cannot be written.
+    """
+    check_plot_path(path)
+    low, high = np.quantile(thickness, _SHOWN)
+    shade = np.clip((thickness - low) / max(high - low, 1e-9 * high), 0, 1)
+    painter = _Painter(atlas, _COLORS(shade)[..., :3])
+    figure = dressed(title, subtitle)
+    show(figure, (0.03, 0.17, 0.45, 0.70), painter.mesh(View(up=up), 800))
+    show(figure, (0.52, 0.17, 0.45, 0.70), painter.mesh(View(azimuth=View.azimuth + 180, up=up), 800), "the other side")
+    _thickness_histogram(figure.add_axes((0.3, 0.075, 0.38, 0.07)), thickness, atlas.areas, (low, high))
+    save_plot(figure, path)
+
+
+class _Painter(AtlasPainter):
+    """Leaves out the texel grid."""
+
+    def paint(
+        self, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        last = self._atlas.resolution - 1
+        i, j = (np.clip(np.rint(x).astype(np.int64), 0, last) for x in (row, column))
+        return self._colors[chart, i, j]
+
+
+def _thickness_histogram(
+    axes: Axes, thickness: NDArray[np.float64], areas: NDArray[np.float64], ends: tuple[float, float]
+) -> None:
+    """Share of the surface over thickness, in the colours of the images, as their legend."""
+    bins = np.linspace(*ends, 101)
+    share, _ = np.histogram(thickness.clip(*ends), bins, weights=areas)
+    colors = _COLORS((bins[:-1] - bins[0]) / (bins[-1] - bins[0]))
+    axes.bar(bins[:-1] * 1e3, share / share.max(), np.diff(bins) * 1e3, align="edge", color=colors, edgecolor="none")
+    axes.set_yticks([])
+    axes.set_xlim(ends[0] * 1e3, ends[1] * 1e3)
+    axes.spines[["top", "left", "right"]].set_visible(False)
+    axes.set_xlabel("thickness [mm]; height: share of the surface", fontsize=11.5)

@@ -1,69 +1,281 @@
-"""Contact marks on a frame: arrows as long as the impulse is large."""
+"""`Sprite`: a small transparent image that is drawn once and laid over many frames.
+
+Arrows with a light rim and smooth edges.
+
+Marks of contacts with the targets and their impulses, which stay long enough to be seen.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+import dataclasses
+import functools
+import importlib.util
+import math
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image, ImageDraw, ImageFont
 
-from .arrows import HEAD_WIDTH, RIM, draw_arrow
-from .contact_marks import Mark
-from .layout import Layout
-from .projection import Projection
-from .sprite import Sprite
+from ripple_sim.coupling.ripples import Impulse
+from ripple_sim.coupling.soft import target_pose
+from ripple_sim.simulation import Simulation
 
-_LONGEST = 1.5  # times the scale's arrow; a growing scale lags for a moment
-_HIDDEN = 0.3  # opacity behind other geoms
-_SAMPLES = 9  # along an arrow, to find its hidden parts
+Color = tuple[int, int, int]
 
+INK, FAINT, PAPER = (27, 36, 50), (97, 107, 122), (255, 255, 255)
 
-class PlacedMark(NamedTuple):
-    """An arrow on a frame: its ends [pixels], and its opacity along it."""
-
-    tip: NDArray[np.float64]
-    tail: NDArray[np.float64]
-    opacity: NDArray[np.float64]
+_SUPERSAMPLING = 8
+_CORNERS = {"left": 0.0, "middle": 0.5, "right": 1.0}
 
 
-def place_marks(
-    marks: Sequence[Mark], scale: float, layout: Layout, projection: Projection, model: Any, data: Any
-) -> list[PlacedMark]:
-    """Place contact marks on a frame.
+class Sprite:
+    """Shapes and text with smooth edges on a transparent background.
 
-    Arrows stand on the surface, in perspective except for their size, the same at any distance. Hidden parts are faint.
+    Coordinates are in pixels from the upper left corner, x to the right and y down; whole numbers lie between pixels.
+    Colours are sRGB, 0 to 255.
 
     Parameters
     ----------
-    marks : sequence of Mark
-    scale : float
-        Impulse [N s] of an arrow of length `Layout.arrow_length`, seen from the side.
-    layout : Layout
-    projection : Projection
-        Of this frame.
-    model, data : mujoco.MjModel, mujoco.MjData
-        Whose geoms may hide the arrows.
+    width, height : int
+        [pixels].
     """
-    placed = []
-    for mark in marks:
-        length = layout.arrow_length * projection.metres(mark.point) * min(mark.impulse / scale, _LONGEST)
-        points = mark.point + length * np.linspace(0, 1, _SAMPLES)[:, None] * mark.axis
-        pixels = projection.pixels(points)
-        if np.isfinite(pixels).all():
-            opacity = mark.opacity * np.where(projection.seen(model, data, points), 1.0, _HIDDEN)
-            placed.append(PlacedMark(pixels[0], pixels[-1], opacity))
-    return placed
+
+    def __init__(self, width: int, height: int) -> None:
+        self.width, self.height = width, height
+        self._color = np.zeros((height, width, 3), np.float32)  # times alpha
+        self._alpha = np.zeros((height, width, 1), np.float32)
+
+    def copy(self) -> Sprite:
+        """A copy with the same content."""
+        other = Sprite(self.width, self.height)
+        other._color, other._alpha = self._color.copy(), self._alpha.copy()
+        return other
+
+    def fill(self, coverage: NDArray[np.floating], color: NDArray | Color, opacity: float = 1.0) -> None:
+        """Lay a colour, or an image [height, width, 3], over the share `coverage`, 0 to 1, of each pixel."""
+        alpha = (opacity * coverage[..., None]).astype(np.float32)
+        self._color += alpha * (np.asarray(color, dtype=np.float32) - self._color)
+        self._alpha += alpha * (1 - self._alpha)
+
+    def box(
+        self,
+        left: float,
+        top: float,
+        right: float,
+        bottom: float,
+        color: NDArray | Color,
+        opacity: float = 1.0,
+    ) -> None:
+        """Fill an upright rectangle."""
+        across, down = _overlap(left, right, self.width), _overlap(top, bottom, self.height)
+        self.fill(down[:, None] * across, color, opacity)
+
+    def polygon(self, corners: list[tuple[float, float]], color: NDArray | Color, opacity: float = 1.0) -> None:
+        """Fill a polygon."""
+        self.fill(self._drawn(lambda draw, k: draw.polygon([(k * x, k * y) for x, y in corners], 255)), color, opacity)
+
+    def disc(self, x: float, y: float, radius: float, color: Color) -> None:
+        """Fill a circle."""
+        across, down = np.arange(self.width) + 0.5 - x, np.arange(self.height) + 0.5 - y
+        self.fill(np.clip(radius + 0.5 - np.hypot(across, down[:, None]), 0, 1), color)
+
+    def panel(self, radius: float, opacity: float) -> None:
+        """Fill the whole sprite with paper, its corners rounded."""
+        size = (0, 0, _SUPERSAMPLING * self.width - 1, _SUPERSAMPLING * self.height - 1)
+        self.fill(self._drawn(lambda draw, k: draw.rounded_rectangle(size, k * radius, 255)), PAPER, opacity)
+
+    def text(self, x: float, y: float, text: str, size: int, color: Color = INK, align: str = "left") -> None:
+        """Write a line on the baseline y that begins, is centred or ends at x ("left", "middle", "right")."""
+        mask = Image.new("L", (self.width, self.height))
+        x -= _CORNERS[align] * text_width(text, size)
+        ImageDraw.Draw(mask).text((round(x), round(y)), text, font=_font(size), fill=255, anchor="ls")
+        self.fill(np.asarray(mask, dtype=np.float32) / 255, color)
+
+    def over(self, frame: NDArray[np.uint8], left: int, top: int) -> None:
+        """Lay the sprite over a frame in place, clipped to it.
+
+        The frame is uint8 [height, width, 3], or [height, width, 4] with straight alpha.
+        """
+        x0, y0 = max(left, 0), max(top, 0)
+        x1, y1 = min(left + self.width, frame.shape[1]), min(top + self.height, frame.shape[0])
+        if x0 >= x1 or y0 >= y1:
+            return
+        inside = np.s_[y0 - top : y1 - top, x0 - left : x1 - left]
+        under, color, alpha = frame[y0:y1, x0:x1], self._color[inside], self._alpha[inside]
+        if frame.shape[2] == 3:
+            under[:] = under * (1 - alpha) + color + 0.5
+            return
+        below = under[..., 3:] / np.float32(255) * (1 - alpha)
+        total = below + alpha
+        under[..., :3] = (under[..., :3] * below + color) / np.maximum(total, 1e-6) + 0.5
+        under[..., 3:] = 255 * total + 0.5
+
+    def _drawn(self, paint: Callable[[ImageDraw.ImageDraw, int], None]) -> NDArray[np.float32]:
+        """Coverage of what a function of (ImageDraw, enlargement) paints."""
+        k = _SUPERSAMPLING
+        large = Image.new("L", (k * self.width, k * self.height))
+        paint(ImageDraw.Draw(large), k)
+        return np.asarray(large.reduce(k), dtype=np.float32) / np.float32(255)
 
 
-def draw_marks(frame: NDArray[np.uint8], marks: Sequence[PlacedMark], layout: Layout) -> None:
-    """Draw contacts over a frame, uint8 [height, width, 3 or 4], in place; the later ones cover the earlier."""
-    thickness = layout.arrow_thickness
-    reach = thickness * (HEAD_WIDTH + RIM) + 1
-    for tip, tail, opacity in marks:
-        low = np.floor(np.maximum(np.minimum(tip, tail) - reach, 0)).astype(int)
-        high = np.ceil(np.minimum(np.maximum(tip, tail) + reach, frame.shape[1::-1])).astype(int)
-        if (low < high).all():
-            sprite = Sprite(int(high[0] - low[0]), int(high[1] - low[1]))
-            draw_arrow(sprite, tip - low, tail - low, thickness, opacity)
-            sprite.over(frame, int(low[0]), int(low[1]))
+def text_width(text: str, size: int) -> float:
+    """Width of a line of text [pixels]."""
+    return _font(size).getlength(text)
+
+
+@functools.lru_cache(maxsize=32)
+def _font(size: int) -> ImageFont.FreeTypeFont:
+    # Matplotlib ships DejaVu Sans, which has a minus sign, a micro sign, and digits of equal width
+    package = importlib.util.find_spec("matplotlib")
+    folder = Path((package.submodule_search_locations or [""])[0] if package else "")
+    return ImageFont.truetype(folder / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf", size)
+
+
+def _overlap(low: float, high: float, count: int) -> NDArray[np.float32]:
+    """Share of each of `count` pixels in a row that lies between two places."""
+    edge = np.arange(count + 1)
+    inside = np.clip(edge, low, high)
+    return np.diff(inside).astype(np.float32)
+
+
+HEAD_LENGTH, HEAD_WIDTH, DOT, RIM = 6.0, 2.2, 1.5, 0.7  # in thicknesses of the shaft
+
+
+def draw_arrow(sprite: Sprite, tip: ArrayLike, tail: ArrayLike, thickness: float, opacity: ArrayLike = (1.0,)) -> None:
+    """Draw an arrow with a dot at its tip.
+
+    Parameters
+    ----------
+    sprite : Sprite
+    tip, tail : [2]
+        [pixels], x to the right, y down.
+    thickness : float
+        Of the shaft [pixels].
+    opacity : [k]
+        0 to 1, at equal distances from tip to tail.
+    """
+    tip, opacity = np.asarray(tip, dtype=np.float64), np.asarray(opacity, dtype=np.float64)
+    way = np.asarray(tail, dtype=np.float64) - tip
+    length = float(np.hypot(*way))
+    along = way / max(length, 1e-9)
+    x, y = np.arange(sprite.width) + 0.5 - tip[0], np.arange(sprite.height)[:, None] + 0.5 - tip[1]
+    u, across = x * along[0] + y * along[1], np.abs(y * along[0] - x * along[1])
+    outside = _distance(u, across, length, thickness)
+    place = np.clip(u / max(length, 1e-9), 0, 1) * (len(opacity) - 1)
+    here = np.interp(place, np.arange(len(opacity)), opacity)
+    sprite.fill(np.clip(0.5 - (outside - RIM * thickness), 0, 1) * here, PAPER, 0.9)
+    sprite.fill(np.clip(0.5 - outside, 0, 1) * here, INK)
+
+
+def _distance(u: NDArray, across: NDArray, length: float, thickness: float) -> NDArray[np.float64]:
+    """Distance [pixels] of places, `u` along the arrow from its tip and `across`, from the shape; negative inside."""
+    dot = np.hypot(u, across) - DOT * thickness
+    if length < DOT * thickness:
+        return dot
+    head = min(HEAD_LENGTH * thickness, length)
+    half = HEAD_WIDTH / HEAD_LENGTH * head
+    triangle = np.maximum((across * head - u * half) / np.hypot(head, half), u - head)
+    shaft = np.maximum(across - thickness / 2, np.maximum(0.8 * head - u, u - length))
+    return np.minimum(np.minimum(triangle, shaft), dot)
+
+
+MEMORY = 0.25  # time in which a mark fades to 1/e [s]; it holds the impulse of about this time
+_FADING, _FADED = 0.35, 0.08  # shares of its largest impulse at which a mark begins to fade, and disappears
+_SAME_PLACE = 0.05  # contacts closer than this share of the target's size are one moving contact
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Mark:
+    """A contact.
+
+    Attributes
+    ----------
+    point : float64 [3]
+        On the rippled surface, in the world [m].
+    axis : float64 [3]
+        The surface's outward normal there, against which the contact presses.
+    impulse : float
+        [N s], with the weight exp(-age / MEMORY).
+    opacity : float
+        From 1 to 0 as the mark fades.
+    """
+
+    point: NDArray[np.float64]
+    axis: NDArray[np.float64]
+    impulse: float
+    opacity: float = 1.0
+
+
+@dataclasses.dataclass(eq=False)
+class _Contact:
+    geom: str
+    other: str
+    place: NDArray[np.float64]  # on the undeformed surface, in the geom's frame [m]
+    texel: tuple[int, int, int]
+    impulse: float = 0.0
+    largest: float = 0.0
+
+
+class ContactMarks:
+    """Gathers the impulses of a running simulation.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    dt : float
+        Time between frames [s].
+    """
+
+    def __init__(self, simulation: Simulation, dt: float) -> None:
+        self._simulation = simulation
+        self._fade = math.exp(-dt / MEMORY)
+        self._contacts: list[_Contact] = []
+        ripples = simulation.ripples
+        self._near = {name: _SAME_PLACE * float(np.ptp(ripples[name].atlas.mesh.V, axis=0).max()) for name in ripples}
+
+    def follow(self) -> list[Mark]:
+        """Take in the simulation's present frame; return the marks to draw, the weakest first."""
+        for contact in self._contacts:
+            contact.impulse *= self._fade
+        for impulse in self._simulation.impulses:
+            self._add(impulse)
+        self._contacts = [contact for contact in self._contacts if contact.impulse > _FADED * contact.largest]
+        touched = {contact.geom for contact in self._contacts}
+        heights = {name: self._simulation.ripples[name].height for name in sorted(touched)}
+        weakest_first = sorted(self._contacts, key=lambda contact: contact.impulse)
+        return [self._mark(contact, float(heights[contact.geom][contact.texel])) for contact in weakest_first]
+
+    def _add(self, hit: Impulse) -> None:
+        if hit.impulse <= 0:
+            return
+        position, rotation = self._pose(hit.geom)
+        atlas = self._simulation.ripples[hit.geom].atlas
+        place = atlas.project((hit.point - position) @ rotation)[0][0]  # a fast target has moved since the contact
+        for contact in self._contacts:
+            same = (contact.geom, contact.other) == (hit.geom, hit.other)
+            if same and np.linalg.norm(contact.place - place) < self._near[hit.geom]:
+                break
+        else:
+            contact = _Contact(hit.geom, hit.other, place, hit.texel)
+            self._contacts.append(contact)
+        contact.place, contact.texel = place, hit.texel
+        contact.impulse += hit.impulse
+        contact.largest = max(contact.largest, contact.impulse)
+
+    def _mark(self, contact: _Contact, height: float) -> Mark:
+        position, rotation = self._pose(contact.geom)
+        waves = self._simulation.ripples[contact.geom]
+        normal = waves.atlas.normals[contact.texel]
+        place = contact.place if waves.vertices is None else waves.atlas.positions[contact.texel]
+        opacity = (contact.impulse / contact.largest - _FADED) / (_FADING - _FADED)
+        return Mark(
+            point=position + rotation @ (place + height * normal),
+            axis=rotation @ normal,
+            impulse=contact.impulse,
+            opacity=min(opacity, 1.0),
+        )
+
+    def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return target_pose(self._simulation.data, self._simulation.ripples.geom_ids[name])

@@ -1,21 +1,225 @@
-"""The content of the overlays, gathered from running simulations frame by frame."""
+"""The content of the overlays, gathered from running simulations frame by frame.
+
+A diverging colour map: blue for negative, almost white for zero, red for positive values.
+
+It is a curve in CIELAB of constant speed, so that equal steps of the value look equally large. Both arms have the same
+lightness at the same distance from zero, and blue differs from orange-red in every common colour vision.
+
+Two runs of one scene side by side: their wave operators and titles.
+
+Heatmaps: a scalar field on the texels, prepared for the renderer.
+
+A curve over the whole length of a video in bounded memory.
+
+Round numbers for axes: steady limits, and a unit in which they are easy to read.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
+import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.scene.overlays import Request
+from ripple_sim.errors import SceneError
+from ripple_sim.render.camera import linear_to_srgb
+from ripple_sim.scene.scene import Request
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.texels.halo import with_filled_halo
+from ripple_sim.solver.texels.topology import with_filled_halo
 
-from .contact_marks import ContactMarks, Mark
-from .heatmap import magnitude
-from .history import History
-from .scale import Limit
+from .marks import ContactMarks, Mark
+
+SIZE = 513  # odd: zero has a colour of its own
+
+# lightness, chroma at equal distances from zero; hues of the two arms [degrees]
+_ARM = np.array([(96.0, 0.0), (85.0, 19.0), (70.0, 39.0), (53.0, 49.0), (34.0, 45.0)])
+_BLUE, _RED = (245.0, 285.0), (62.0, 30.0)  # near zero, at the end
+
+_WHITE = np.array([0.95047, 1.0, 1.08883])  # D65
+_XYZ_TO_RGB = np.array(
+    [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
+)
+
+
+@functools.lru_cache(maxsize=1)
+def color_table() -> NDArray[np.uint8]:
+    """Return the colours, sRGB uint8 [SIZE, 3], from the most negative to the most positive value."""
+    negative, positive = (_evenly(_arm(*hues)) for hues in (_BLUE, _RED))
+    lab = np.concatenate([negative[::-1], positive[1:]])
+    table = np.rint(255 * np.clip(lab_to_srgb(lab), 0, 1)).astype(np.uint8)
+    table.setflags(write=False)
+    return table
+
+
+def colors(values: ArrayLike, limit: float) -> NDArray[np.uint8]:
+    """Colours of values, sRGB uint8 [..., 3]; the map extends from -limit to limit, and values beyond are clipped."""
+    place = np.clip(np.asarray(values, dtype=np.float64) / limit, -1, 1)
+    return color_table()[np.rint((0.5 + 0.5 * place) * (SIZE - 1)).astype(np.int64)]
+
+
+def lab_to_srgb(lab: NDArray[np.float64]) -> NDArray[np.float64]:
+    """SRGB values (IEC 61966-2-1) of CIELAB colours under D65, [..., 3]; outside of 0 to 1 where sRGB has none."""
+    f = (lab[..., :1] + 16) / 116 + np.stack([lab[..., 1] / 500, np.zeros(lab.shape[:-1]), -lab[..., 2] / 200], axis=-1)
+    xyz = _WHITE * np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29))
+    rgb = xyz @ _XYZ_TO_RGB.T
+    return linear_to_srgb(rgb)
+
+
+def _arm(hue_near: float, hue_end: float) -> NDArray[np.float64]:
+    """CIELAB colours from zero to an end, [k, 3], through the control points."""
+    place = np.linspace(0, 1, 1025)
+    lightness, chroma = (_smooth(place, column) for column in _ARM.T)
+    hue = np.radians(hue_near + (hue_end - hue_near) * place)
+    return np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], axis=1)
+
+
+def _smooth(place: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Polynomial through control points at equal distances."""
+    knots = np.linspace(0, 1, len(points))
+    return np.asarray(np.polyval(np.polyfit(knots, points, len(points) - 1), place), dtype=np.float64)
+
+
+def _evenly(lab: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points of a curve at equal differences of colour (CIE 1976), [SIZE // 2 + 1, 3]."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(lab, axis=0), axis=1))])
+    even = np.linspace(0, length[-1], SIZE // 2 + 1)
+    return np.stack([np.interp(even, length, column) for column in lab.T], axis=1)
+
+
+OWN = "fem"
+
+# By wave operator: a title, and a remark.
+TITLES = {
+    OWN: ("ripple-sim", "finite elements"),
+    "paper": ("paper", "real distances, 4 neighbours"),
+    "uncorrected": ("uncorrected", "one distance everywhere"),
+    "dynamic-paint": ("Dynamic Paint", "real distances, 8 neighbours"),
+}
+BASELINES = tuple(name for name in TITLES if name != OWN)
+
+
+def compared_operators(baseline: str | None) -> tuple[str, ...]:
+    """Wave operators of the runs of a video: our own, and a baseline if given.
+
+    Raises
+    ------
+    SceneError
+        For an unknown baseline.
+    """
+    if baseline is None:
+        return (OWN,)
+    if baseline not in BASELINES:
+        raise SceneError(f"there is no operator {baseline!r} to compare with; valid are {', '.join(BASELINES)}")
+    return OWN, baseline
+
+
+def magnitude(field: NDArray[np.float32]) -> float:
+    """Mean magnitude of a field with halo, weighted by the magnitude itself: how high the waves are.
+
+    The calm surface around a small wave does not count, and the few texels in the dent under a contact count little.
+    """
+    inside = np.abs(field[:, 1:-1, 1:-1]).ravel()
+    total = float(inside.sum(dtype=np.float64))
+    return float(np.dot(inside, inside)) / total if total else 0.0
+
+
+def grid_spacing(resolution: int) -> int:
+    """Texels between grid lines: a power of two that leaves 16 to 31 cells along a chart, or one texel per cell."""
+    return 1 << max(0, (resolution // 16).bit_length() - 1)
+
+
+MOST_POINTS = 1024  # more than the energy plot has columns of pixels, save on very large frames
+
+
+class History:
+    """One value per frame, thinned to at most `MOST_POINTS`: of several frames the largest is kept.
+
+    Parameters
+    ----------
+    frames : int
+        How many will come.
+    """
+
+    def __init__(self, frames: int) -> None:
+        self._stride = -(-frames // MOST_POINTS)
+        self._values = np.zeros(-(-frames // self._stride))
+        self._frames = 0
+
+    def add(self, value: float) -> None:
+        """Take in the value of the next frame."""
+        point, late = divmod(self._frames, self._stride)
+        self._values[point] = max(self._values[point], value) if late else value
+        self._frames += 1
+
+    def curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Frame numbers and values of the points so far: copies."""
+        points = -(-self._frames // self._stride)
+        return np.arange(points, dtype=np.float64) * self._stride, self._values[:points].copy()
+
+
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # halves of these are short numbers too
+_EASE = 0.12  # time in which a limit covers most of the way to its new value [s]
+_FAR = 4.0  # a limit that is more than this factor away catches up at once
+
+
+def round_up(value: float, steps: tuple[float, ...] = _STEPS) -> float:
+    """Return the smallest of `steps` times a power of ten that is at least a positive value."""
+    power = 10.0 ** math.floor(math.log10(value) + 1e-9)
+    return next((step * power for step in steps if value <= step * power * (1 + 1e-9)), 10.0 * power)
+
+
+class Limit:
+    """End of a scale that follows the magnitudes so far and never shrinks.
+
+    Its goals are round numbers, so it seldom moves, and it glides from one to the next. It depends on the magnitudes
+    alone: the same run has the same limits.
+
+    Parameters
+    ----------
+    floor : float
+        The least limit. 0: the first positive magnitude sets it.
+    fixed : float, optional
+        The limit, for good.
+    memory : float
+        Magnitudes are averaged over about this time [s], so that brief peaks do not count. 0: each counts.
+    """
+
+    def __init__(self, floor: float = 0.0, fixed: float | None = None, memory: float = 0.0) -> None:
+        self._fixed = fixed is not None
+        self._memory, self._mean = memory, 0.0
+        self.goal = fixed if fixed is not None else round_up(floor) if floor > 0 else 0.0
+        self.value = self.goal
+
+    def follow(self, magnitude: float, dt: float) -> float:
+        """Take in a magnitude, dt seconds after the last one; return the limit, 0 while there is none."""
+        if self._fixed:
+            return self.value
+        self._mean += (magnitude - self._mean) * (-math.expm1(-dt / self._memory) if self._memory else 1.0)
+        if self._mean > self.goal:
+            self.goal = round_up(self._mean)
+        self.value = max(self.value, self.goal / _FAR) if self.value else self.goal
+        if self.value >= 0.995 * self.goal:
+            self.value = self.goal
+        else:
+            self.value *= (self.goal / self.value) ** -math.expm1(-dt / _EASE)
+        return self.value
+
+
+def readable(limit: float, unit: str) -> tuple[float, str]:
+    """Factor and unit in which a limit is a number from 1 to 1000, such as (1e3, "mm") for 0.02 and "m"."""
+    power = min(9, max(-9, 3 * math.floor(math.log10(limit * (1 + 1e-9)) / 3)))
+    return 10.0**-power, _PREFIXES[power] + unit
+
+
+def number(value: float) -> str:
+    """Format a number briefly, with a true minus sign."""
+    text = f"{value:.4g}"
+    return "0" if text == "-0" else text.replace("-", "\N{MINUS SIGN}")
+
 
 # The colours end at this share of the targets' size, or of their wave speed, until higher waves come.
 _LEAST = 1e-3

@@ -1,18 +1,74 @@
-"""Cameras: MuJoCo's free camera, a camera fixed in the model, or a point of its lens."""
+"""Cameras: MuJoCo's free camera, a camera fixed in the model, or a point of its lens.
+
+Bounding balls: of visuals, of parts of a mesh, of all shadow casters.
+
+The sRGB transfer curve (IEC 61966-2-1), both ways.
+
+View and projection matrices, for column vectors, in OpenGL's conventions.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import numbers
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import RippleError
+
+
+class Balls(NamedTuple):
+    """Centres [k, 3] and radii [k] in the world [m]; a radius may be infinite."""
+
+    centres: NDArray[np.float64]
+    radii: NDArray[np.float64]
+
+
+def join(*balls: Balls) -> Balls:
+    """All balls in one list."""
+    return Balls(np.concatenate([each.centres for each in balls]), np.concatenate([each.radii for each in balls]))
+
+
+def within(balls: Balls, point: NDArray[np.float64], reach: float) -> Balls:
+    """Those balls that any point within `reach` [m] of a point [3] touches."""
+    near = np.linalg.norm(balls.centres - point, axis=1) - balls.radii < reach
+    return Balls(balls.centres[near], balls.radii[near])
+
+
+def enclosing(balls: Balls) -> tuple[NDArray[np.float64], float]:
+    """Centre [3] and radius of a ball that contains others."""
+    centres, radii = balls
+    centre = ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0)) / 2
+    return centre, float((np.linalg.norm(centres - centre, axis=1) + radii).max())
+
+
+def balls_about(triangles: NDArray[np.float64], count: int) -> Balls:
+    """Balls that each contain a share of some triangles, which are close together.
+
+    Parameters
+    ----------
+    triangles : array, shape [m, 3, 3]
+        Corners [m].
+    count : int
+        The least number of balls, unless there are fewer triangles.
+    """
+    groups = [triangles]
+    while len(groups) < min(count, len(triangles)):
+        halves = []
+        for group in groups:
+            middles = group.mean(axis=1)
+            order = np.argsort(middles[:, np.ptp(middles, axis=0).argmax()], kind="stable")
+            halves += [group[half] for half in np.array_split(order, 2) if len(half)]
+        groups = halves
+    corners = [group.reshape(-1, 3) for group in groups]
+    centres = np.array([(each.min(axis=0) + each.max(axis=0)) / 2 for each in corners])
+    radii = [np.linalg.norm(each - centre, axis=1).max() for each, centre in zip(corners, centres, strict=True)]
+    return Balls(centres, np.array(radii))
 
 
 @dataclass(frozen=True)
@@ -192,4 +248,56 @@ def _placed(model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera
     x, y, z = (float(each) for each in lookat)
     return Camera(
         (x, y, z), float(camera.distance), float(camera.azimuth), float(camera.elevation), model.vis.global_.fovy
+    )
+
+
+# sRGB is SLOPE x up to BREAK, and (1 + OFFSET) x^(1 / EXPONENT) - OFFSET above it
+BREAK, SLOPE, OFFSET, EXPONENT = 0.0031308, 12.92, 0.055, 2.4
+_ENCODED_BREAK = 0.04045
+
+
+def srgb_to_linear(srgb: ArrayLike) -> NDArray[np.float64]:
+    """Linear values of sRGB values, 0 to 1 both, any shape."""
+    value = np.asarray(srgb, dtype=np.float64)
+    above = np.maximum(value, _ENCODED_BREAK)
+    return np.where(value <= _ENCODED_BREAK, value / SLOPE, ((above + OFFSET) / (1 + OFFSET)) ** EXPONENT)
+
+
+def linear_to_srgb(linear: ArrayLike) -> NDArray[np.float64]:
+    """Inverse of `srgb_to_linear`; values beyond 0 to 1 continue the curve."""
+    value = np.asarray(linear, dtype=np.float64)
+    above = np.maximum(value, BREAK)
+    return np.where(value <= BREAK, SLOPE * value, (1 + OFFSET) * above ** (1 / EXPONENT) - OFFSET)
+
+
+def view_matrix(pose: Pose) -> NDArray[np.float64]:
+    """World to eye coordinates, shape [4, 4]."""
+    view = np.eye(4)
+    view[:3, :3] = pose.rotation.T
+    view[:3, 3] = -pose.rotation.T @ pose.eye
+    return view
+
+
+def perspective(
+    fovy: float, aspect: float, near: float, far: float, shear: ArrayLike = (0.0, 0.0)
+) -> NDArray[np.float64]:
+    """Eye to clip coordinates, shape [4, 4].
+
+    `fovy` in degrees; `aspect` is width over height; `near` and `far` in metres; for `shear` see `Pose`.
+    """
+    scale = 1.0 / np.tan(np.radians(fovy) / 2)
+    projection = np.zeros((4, 4))
+    projection[0, 0] = scale / aspect
+    projection[1, 1] = scale
+    projection[:2, 2] = np.multiply([scale / aspect, scale], shear)
+    projection[2, 2] = (near + far) / (near - far)
+    projection[2, 3] = 2 * near * far / (near - far)
+    projection[3, 2] = -1.0
+    return projection
+
+
+def orthographic(half_width: float, depth: float) -> NDArray[np.float64]:
+    """Eye to clip coordinates of a square box from 0 to `depth` [m] in front of the eye, shape [4, 4]."""
+    return np.diag([1 / half_width, 1 / half_width, -2 / depth, 1.0]) + np.array(
+        [[0.0] * 4, [0.0] * 4, [0.0, 0.0, 0.0, -1.0], [0.0] * 4]
     )

@@ -1,30 +1,168 @@
-"""Reading a scene: one MJCF, and one TOML file that names its targets, the camera, the duration and the script."""
+"""Reading a scene: one MJCF, and one TOML file that names its targets, the camera, the duration and the script.
+
+A scene's names and numbers against its model, before anything is simulated.
+
+The files that an MJCF names, looked at before MuJoCo opens them: it would wait for ever for one that is a FIFO.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import stat
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
+from xml.parsers import expat
 
 import msgspec
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.model.geoms import find_target, target_name
-from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
+from ripple_sim.coupling.geoms import find_target, named_collision_geoms, own_model, target_name
+from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.checked import PATH, checked
+from ripple_sim.solver.errors import PATH, checked
+from ripple_sim.solver.files import open_image
+from ripple_sim.solver.layouts.build import LAYOUTS
 
-from .check_scene import check_scene
-from .events import Events
-from .model_files import check_files
-from .motion import DropEntry, ThrowEntry
-from .randomize import RandomEntry, randomize
-from .scene import Scene
-from .scene_file import RippleEntry, SceneFile, parse_scene
-from .scene_path import scene_path
-from .toml_file import read_toml
+from .drop_model import RandomEntry, randomize
+from .events import DropEntry, Events, Script, ThrowEntry
+from .scene import MAX_DURATION, Scene, parse_request, read_toml, scene_path
+from .scene_file import RippleEntry, SceneFile, check_camera, parse_scene
+
+
+def check_scene(scene: Scene) -> None:
+    """Check a scene's names and numbers against its model.
+
+    Raises
+    ------
+    SceneError
+    SolverError
+        For an invalid material.
+    """
+    from ripple_sim.render import LIGHTING  # brings OpenGL, which reading a scene file can do without until here
+
+    own_model(scene.model)
+    if not scene.targets:
+        raise SceneError(f"scene {scene.name!r} has no [[ripple]] entry; name at least one geom")
+    if not 0 < scene.duration < MAX_DURATION:
+        raise SceneError(f"duration is {scene.duration!r} s; valid is a positive number, less than {MAX_DURATION}")
+    seen = set()
+    for entry in scene.targets:
+        if entry.geom in seen:
+            raise SceneError(f"geom {entry.geom!r} has two [[ripple]] entries; valid is one")
+        seen.add(entry.geom)
+        _check_target(scene.model, entry)
+    named_collision_geoms(scene.model, [entry.geom for entry in scene.targets], scene.contacts)
+    parse_request(scene.overlay)
+    if scene.lighting not in LIGHTING:
+        raise SceneError(f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
+    Script(scene.model, scene.events, [entry.geom for entry in scene.targets])
+    check_camera(scene.model, scene.camera)
+
+
+def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
+    from ripple_sim.render import LOOKS
+    from ripple_sim.solver.operator.assembly import RIMS
+
+    find_target(model, entry.geom)
+    for what, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS), ("rim", entry.rim, RIMS)):
+        if name not in valid:
+            raise SceneError(f"{what} {name!r} does not exist; valid are {', '.join(valid)}")
+    if entry.color is not None and not all(0 <= part <= 1 for part in entry.color):
+        raise SceneError(f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 (sRGB)")
+    entry.material.material(np.ones((1, 1, 1)) if entry.inside else None)
+    for body in entry.inside:
+        body.check()
+    if entry.height is not None:
+        entry.height.check()
+    least, greatest = entry.thickness_limits
+    if not 0 <= least <= greatest:
+        raise SceneError(
+            f"thickness_limits of geom {entry.geom!r} are {entry.thickness_limits} m; valid are two numbers from 0 on, "
+            "the least first"
+        )
+    for coefficient, each in entry.material.maps().items():
+        _check_image(
+            f"ripple.material.{coefficient}", each.map, "a number, or the path of an image relative to the scene file"
+        )
+    if entry.still_map is not None:
+        _check_image("ripple.still_map", entry.still_map, "the path of an image relative to the scene file")
+    for disc in entry.still:
+        if not 0 < disc.radius < float("inf"):
+            raise SceneError(
+                f"a [[ripple.still]] disc of geom {entry.geom!r} has radius {disc.radius!r} m; valid is above 0"
+            )
+
+
+def _check_image(key: str, path: str, valid: str) -> None:
+    if not Path(path).is_file():
+        raise SceneError(f"{key} names the image {path!r}, which does not exist; valid is {valid}")
+
+
+# Attributes of <compiler> that name folders, and those that name files.
+_FOLDERS = ("meshdir", "texturedir", "assetdir")
+_FILES = ("file", "filename", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
+
+_BAD_CHARACTER = expat.errors.codes[expat.errors.XML_ERROR_BAD_CHAR_REF]
+
+# Elements whose PNG files MuJoCo reads whole, however large.
+_IMAGES = ("texture", "hfield")
+
+
+def check_files(path: Path) -> None:
+    """Make sure that an MJCF and all that it includes or names are regular files, as far as they exist.
+
+    Its images must not be larger than pillow allows.
+
+    Raises
+    ------
+    SceneError
+        Naming the file.
+    """
+    waiting, seen = [path], set()
+    folders = {path.parent}
+    while waiting:
+        xml = waiting.pop()
+        if xml in seen:
+            continue
+        seen.add(xml)
+        try:
+            root = ElementTree.parse(xml).getroot()
+        except ElementTree.ParseError as error:
+            if error.code == _BAD_CHARACTER:
+                line, column = error.position
+                raise SceneError(
+                    f"the model {str(xml)!r} refers to an unknown character, at line {line}, column {column}: "
+                    "MuJoCo would cut the text there; valid are names without a NUL"
+                ) from error
+            continue  # MuJoCo says what is wrong
+        except (OSError, ValueError, LookupError, RecursionError):
+            continue  # likewise
+        folders |= {path.parent / each.get(name, "") for each in root.iter("compiler") for name in _FOLDERS}
+        for element in root.iter():
+            for name in filter(None, map(element.get, _FILES)):
+                found = [place for folder in {*folders, xml.parent} if _exists(place := folder / name)]
+                if element.tag == "include":
+                    waiting += found
+                elif element.tag in _IMAGES:
+                    for place in found:
+                        if place.suffix.lower() == ".png":
+                            open_image(SceneError, place, element.tag).close()
+
+
+def _exists(path: Path) -> bool:
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return False
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise SceneError(
+            f"the model names {str(path)!r}, which is not a regular file; a FIFO or a device cannot be read"
+        )
+    return stat.S_ISREG(mode)
+
 
 Moved = TypeVar("Moved", DropEntry, ThrowEntry)
 Edit = Callable[[mujoco.MjSpec], None]

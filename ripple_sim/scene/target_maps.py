@@ -1,43 +1,290 @@
-"""A target as its scene file wants it: maps of the material, the layer over what is inside, and parts without waves."""
+"""`[[ripple.inside]]`: what lies under a layer, as a bone under the skin, and so how thick the layer is.
+
+Expressions of position in scene files, such as "0.02 * exp(-(x**2 + y**2) / 0.1**2)": arithmetic alone.
+
+`[ripple.height]`: the shape of the surface at the beginning.
+"""
 
 from __future__ import annotations
 
+import ast
 import dataclasses
-import functools
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.ripples import Ripples
-from ripple_sim.solver import Material, texture_map
+from ripple_sim.errors import SceneError
+from ripple_sim.solver import Atlas, Mesh, Volume, load_mesh, load_volume, texture_map, thickness_map
+from ripple_sim.solver.errors import shown
+from ripple_sim.solver.mesh.volume import is_volume
 
-from .inside import layer_thickness
-from .scene_file import RippleEntry
+from .events import Vector
+
+# name: function and how many arguments it takes
+FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
+    "abs": (np.abs, 1),
+    "sqrt": (np.sqrt, 1),
+    "exp": (np.exp, 1),
+    "log": (np.log, 1),
+    "sin": (np.sin, 1),
+    "cos": (np.cos, 1),
+    "tan": (np.tan, 1),
+    "atan2": (np.arctan2, 2),
+    "hypot": (np.hypot, 2),
+    "minimum": (np.minimum, 2),
+    "maximum": (np.maximum, 2),
+    "where": (np.where, 3),
+}
+_CONSTANTS = {"pi": np.pi}
+_OPERATORS: dict[type, Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Mod: operator.mod,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}
+_LONGEST = 1000  # [characters]
 
 
-def uniform_material(entry: RippleEntry) -> Material:
-    """A target's material before its maps; one whose layer is still unknown promises nothing of wavelengths."""
-    material = entry.material.material()
-    return dataclasses.replace(material, wavelengths=(0.0, np.inf)) if entry.inside else material
+def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Value of an expression of some variables, arrays of one shape.
 
-
-def apply_maps(ripples: Ripples, entry: RippleEntry) -> None:
-    """Give a target the coefficients that vary over it, and hold still what is to be still.
+    It may hold numbers, the variables, pi, + - * / % **, parentheses, the functions of `FUNCTIONS`, and one comparison
+    at a time as the condition of `where`. Nothing of Python is run.
 
     Raises
     ------
-    RippleError
-        If a file cannot be read, or does not suit the target.
+    SceneError
+        If it holds anything else, or its value is not finite everywhere.
     """
-    atlas, coefficients = ripples[entry.geom].atlas, {}
-    if entry.inside:
-        to_atlas = functools.partial(ripples.to_geom, entry.geom)
-        thickness = layer_thickness(atlas, entry.inside, entry.thickness_limits, to_atlas)
-        coefficients.update(vars(entry.material.material(thickness)))
-    for name, each in entry.material.maps().items():
-        coefficients[name] = texture_map(atlas, each.map, each.low, each.high, each.channel)
-    if coefficients:
-        ripples.change_material(entry.geom, **coefficients)
-    if entry.still_map is not None:
-        ripples.hold(entry.geom, 1.0 - texture_map(atlas, entry.still_map, 0.0, 1.0))
-    for disc in entry.still:
-        ripples.make_rigid(entry.geom, disc.point, disc.radius)
+    try:
+        if len(text) > _LONGEST:
+            raise _WrongError(f"it has {len(text)} characters, valid are {_LONGEST} at most")
+        tree = ast.parse(text.strip(), mode="eval")
+        with np.errstate(all="ignore"):
+            value = _value(tree.body, {**_CONSTANTS, **variables})
+        result = np.zeros_like(next(iter(variables.values()))) + np.asarray(value, dtype=np.float64)
+    except _WrongError as wrong:
+        raise SceneError(f"the expression {shown(text)} cannot be used: {wrong}") from None
+    except (SyntaxError, ValueError, RecursionError, MemoryError, TypeError) as error:
+        raise SceneError(f"the expression {shown(text)} is not valid: {str(error).splitlines()[0]}") from error
+    if not np.isfinite(result).all():
+        raise SceneError(f"the expression {shown(text)} is not finite everywhere; valid are finite heights")
+    return result
+
+
+class _WrongError(Exception):
+    """What an expression may not hold."""
+
+
+def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
+    match node:
+        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+            return np.float64(number)
+        case ast.Name(id=name) if name in names:
+            return names[name]
+        case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
+            return _OPERATORS[type(op)](_value(operand, names))
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+            return _OPERATORS[type(op)](_value(left, names), _value(right, names))
+        case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _OPERATORS:
+            return _OPERATORS[type(op)](_value(left, names), _value(right, names))
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
+            function, count = FUNCTIONS[name]
+            if len(arguments) != count:
+                raise _WrongError(f"{name} has {len(arguments)} arguments, valid are {count}")
+            return function(*[_value(argument, names) for argument in arguments])
+    what, valid = shown(ast.unparse(node)), f"numbers, {', '.join(names)}, + - * / % **, and {', '.join(FUNCTIONS)}"
+    raise _WrongError(f"{what} is unknown; valid are {valid}")
+
+
+class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[ripple.height]`: the height at the beginning: an expression, an image, or a saved field.
+
+    Where the waves conserve the volume, the mean is removed.
+    """
+
+    expression: str | None = None
+    """Height [m] as an expression of the position x, y, z in the frame of the geom's body [m], such as
+    "0.02 * exp(-(x**2 + y**2) / 0.1**2)"; functions are abs, sqrt, exp, log, sin, cos, tan, atan2, hypot, minimum,
+    maximum and where(condition, then, otherwise)."""
+    map: str | None = None
+    """Instead, path of an image in the mesh's own texture coordinates."""
+    low: float = 0.0
+    """Height where the image is black [m]."""
+    high: float = 0.01
+    """Height where it is white [m]."""
+    channel: str = "luminance"
+    """Part of the image that counts."""
+    field: str | None = None
+    """Instead, path of a .npy with one height a texel [m], [C, n, n], as `numpy.save(path, waves.height)` writes it."""
+
+    def located(self, folder: Path) -> HeightEntry:
+        """The same with its paths made relative to a folder."""
+        image, field = (None if path is None else str(folder / path) for path in (self.map, self.field))
+        return msgspec.structs.replace(self, map=image, field=field)
+
+    def check(self) -> None:
+        """Raise `SceneError` unless there is one shape, and the files exist."""
+        given = [key for key in ("expression", "map", "field") if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise SceneError(
+                f"[ripple.height] has {' and '.join(given) or 'no shape'}; valid is one of expression, map, field"
+            )
+        for key in ("map", "field"):
+            path = getattr(self, key)
+            if path is not None and not Path(path).is_file():
+                raise SceneError(f"ripple.height.{key} names the file {path!r}, which does not exist")
+        if self.expression is not None:
+            evaluate(self.expression, dict.fromkeys("xyz", np.ones(0)))
+
+    def heights(self, ripples: Ripples, geom: str) -> NDArray[np.float64]:
+        """Height at every texel of a geom [m], [C, n, n].
+
+        Raises
+        ------
+        RippleError
+            If a file cannot be read or does not suit the target, or an expression is not finite.
+        """
+        atlas = ripples[geom].atlas
+        if self.expression is not None:
+            return evaluate(self.expression, dict(zip("xyz", _places(ripples, geom), strict=True)))
+        if self.map is not None:
+            return texture_map(atlas, self.map, self.low, self.high, self.channel)
+        return _saved(self.field or "", atlas)
+
+
+def _places(ripples: Ripples, geom: str) -> NDArray[np.float64]:
+    """Positions of the texels in the frame of the geom's body [m], [3, C, n, n]."""
+    origin = ripples.to_geom(geom, np.zeros(3))
+    axes = ripples.to_geom(geom, np.eye(3)) - origin  # of the body, as rows
+    return np.moveaxis((ripples[geom].atlas.positions - origin) @ axes.T, -1, 0)
+
+
+def _saved(path: str, atlas: Atlas) -> NDArray[np.float64]:
+    try:
+        field = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise SceneError(f"saved field {path!r} cannot be read: {error}") from error
+    shape = atlas.areas.shape
+    if not isinstance(field, np.ndarray) or field.shape != shape or field.dtype.kind not in "iuf":
+        raise SceneError(f"saved field {path!r} holds {getattr(field, 'shape', 'no array')}; valid are numbers {shape}")
+    if not np.isfinite(field).all():
+        raise SceneError(f"saved field {path!r} has heights that are not finite")
+    return field.astype(np.float64)
+
+
+Array = NDArray[np.float64]
+
+
+class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """`[[ripple.inside]]`: a body under the layer; the way to it from each texel inwards is the layer's thickness.
+
+    The material's preset is then one of a layer. Places are in the frame of the geom's body. Of several bodies the
+    nearest counts; where there is none below, the layer is as thick as at its thickest, or as its limits let it be.
+    """
+
+    mesh: str | None = None
+    """Path of a mesh file, relative to the scene file."""
+    volume: str | None = None
+    """Instead, path of a volume: NIfTI, NRRD, the folder of a DICOM series, or .npy. All but .npy need the package
+    SimpleITK."""
+    threshold: float | None = None
+    """Value of the volume at the body's surface."""
+    spacing: float | None = None
+    """Between the nodes of a .npy [m]; a scan has its own."""
+    origin: Vector = (0.0, 0.0, 0.0)
+    """Where the first node of a .npy is [m]."""
+    scale: float = 1.0
+    """To metres, where the file is in other units. Scans are read in metres."""
+
+    def located(self, folder: Path) -> InsideEntry:
+        """The same with its path made relative to a folder."""
+        mesh, volume = (None if path is None else str(folder / path) for path in (self.mesh, self.volume))
+        return msgspec.structs.replace(self, mesh=mesh, volume=volume)
+
+    def check(self) -> None:
+        """Raise `SceneError` where keys are missing, too many, or out of range."""
+        if (self.mesh is None) == (self.volume is None):
+            raise SceneError("a [[ripple.inside]] names neither or both of mesh and volume; valid is one of them")
+        if self.volume is not None and self.threshold is None:
+            raise SceneError(
+                f"the volume {self.volume!r} of a [[ripple.inside]] needs a threshold: its value at the surface of "
+                "what lies inside, about 300 for bone in Hounsfield units"
+            )
+        if self.mesh is not None and (self.threshold is not None or self.spacing is not None):
+            raise SceneError(f"the mesh {self.mesh!r} of a [[ripple.inside]] takes no threshold and no spacing")
+        for key, value in (("scale", self.scale), ("spacing", self.spacing)):
+            if value is not None and not value > 0:
+                raise SceneError(f"the {key} of a [[ripple.inside]] is {value!r}; valid is a number greater than 0")
+
+    def body(self) -> Mesh | Volume:
+        """What is inside, in the frame of the geom's body.
+
+        Raises
+        ------
+        MeshError
+            If the file cannot be read.
+        """
+        return load_inside(self.mesh or self.volume or "", self.threshold, self.spacing, self.origin, self.scale)
+
+
+def layer_thickness(
+    atlas: Atlas,
+    entries: Sequence[InsideEntry],
+    limits: tuple[float, float],
+    to_atlas: Callable[[ArrayLike], Array],
+) -> Array:
+    """Thickness of the layer over some bodies, [C, n, n], and its limits [m]; `to_atlas` moves points to the atlas."""
+    return thickness_map(atlas, [_moved(entry.body(), to_atlas) for entry in entries], limits)
+
+
+def _moved(body: Mesh | Volume, to_atlas: Callable[[ArrayLike], Array]) -> Mesh | Volume:
+    if isinstance(body, Mesh):
+        return dataclasses.replace(body, V=to_atlas(body.V))
+    origin = np.asarray(body.origin, dtype=np.float64)
+    ends = to_atlas(origin + np.asarray(body.directions, dtype=np.float64).T)
+    return dataclasses.replace(body, origin=to_atlas(origin), directions=(ends - to_atlas(origin)).T)
+
+
+def load_inside(
+    path: str | Path,
+    threshold: float | None = None,
+    spacing: float | None = None,
+    origin: Vector = (0.0, 0.0, 0.0),
+    scale: float = 1.0,
+) -> Mesh | Volume:
+    """Read what lies inside: a volume where the path is that of one, else a mesh; scaled.
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be read.
+    SceneError
+        If a volume comes without a threshold, or a mesh with one.
+    """
+    if not is_volume(path):
+        if threshold is not None or spacing is not None:
+            raise SceneError(f"{str(path)!r} is a mesh, which takes no threshold and no spacing; leave them out")
+        mesh = load_mesh(path)
+        return dataclasses.replace(mesh, V=scale * mesh.V)
+    if threshold is None:
+        raise SceneError(
+            f"{str(path)!r} is a volume, which needs a threshold: its value at the surface of what is inside"
+        )
+    volume = load_volume(path, threshold, spacing, origin)
+    place, between = scale * np.asarray(volume.origin), scale * np.asarray(volume.spacing)
+    return volume if scale == 1 else dataclasses.replace(volume, origin=place, spacing=between)

@@ -1,4 +1,9 @@
-"""`Film`: one simulation, or two side by side, rendered to frames with overlays."""
+"""`Film`: one simulation, or two side by side, rendered to frames with overlays.
+
+Passes beside the frames of a film.
+
+`Shot`: everything that one exposure of a film shows.
+"""
 
 from __future__ import annotations
 
@@ -11,24 +16,78 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.capture.frame_source import FrameSource
-from ripple_sim.capture.snapshot import snapshots
-from ripple_sim.encode.pass_files import PassFiles
-from ripple_sim.overlay.colormap import color_table
-from ripple_sim.overlay.comparison import TITLES, compared_operators
-from ripple_sim.overlay.heatmap import grid_spacing
-from ripple_sim.overlay.layout import Layout
-from ripple_sim.overlay.marks import PlacedMark, draw_marks, place_marks
-from ripple_sim.overlay.notes import Notebook
+from ripple_sim.capture.passes import Sighting, passes_of
+from ripple_sim.capture.snapshot import Snapshot, snapshots
+from ripple_sim.coupling.geoms import geom_name
+from ripple_sim.encode.images import PassFiles
+from ripple_sim.overlay.notes import TITLES, Notebook, Notes, color_table, compared_operators, grid_spacing
 from ripple_sim.overlay.painter import Painter
-from ripple_sim.overlay.projection import Projection
+from ripple_sim.overlay.panels import Layout, PlacedMark, Projection, draw_marks, place_marks
 from ripple_sim.render import Surface
-from ripple_sim.scene.overlays import parse_request
+from ripple_sim.scene.scene import parse_request
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.compilation import work_clock
+from ripple_sim.solver.kernel import work_clock
 
 from .options import VideoOptions
-from .pass_writer import PassWriter, segmented
-from .shot import Shot
+
+
+class PassWriter:
+    """Writes the passes of one frame when the next one is seen, to which its pixels flow.
+
+    Parameters
+    ----------
+    files : PassFiles
+    names : tuple of str
+        Of the passes.
+    """
+
+    def __init__(self, files: PassFiles, names: tuple[str, ...]) -> None:
+        self._files, self._names = files, names
+        self._last: tuple[int, Sighting] | None = None
+
+    def add(self, source: FrameSource, snapshot: Snapshot) -> None:
+        """Look at the first exposure of a frame."""
+        sighting = source.sighting(snapshot)
+        self._write(sighting)
+        self._last = snapshot.number, sighting
+
+    def finish(self) -> None:
+        """Write the last frame's, where nothing flows."""
+        self._write(None)
+
+    def _write(self, later: Sighting | None) -> None:
+        if self._last is not None:
+            number, sighting = self._last
+            self._files.write(number, passes_of(sighting, later, self._names))
+
+
+def segmented(simulation: Simulation) -> dict[int, str]:
+    """What each number of the segmentation stands for: 0 the background, from 1 on the geoms."""
+    model = simulation.model
+    soft = {target + 1: name for name, target in simulation.ripples.geom_ids.items() if target >= model.ngeom}
+    return {0: "background", **{geom + 1: geom_name(model, geom) for geom in range(model.ngeom)}, **soft}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Shot:
+    """An exposure of a film's frame: a snapshot of each run, and the overlays' content, which a whole frame shares."""
+
+    snapshots: tuple[Snapshot, ...]
+    notes: Notes
+
+    @property
+    def number(self) -> int:
+        """Of the frame, from 0."""
+        return self.snapshots[0].number
+
+    @property
+    def exposure(self) -> int:
+        """Of the frame's exposures, from 0."""
+        return self.snapshots[0].exposure
+
+    def digest(self) -> str:
+        """Fingerprint of all runs, see `Snapshot.digest`."""
+        return "".join(snapshot.digest() for snapshot in self.snapshots)
 
 
 class Film:

@@ -1,28 +1,168 @@
-"""`render_video`: a scene rendered to a video. Simulation, rendering and encoding overlap."""
+"""`render_video`: a scene rendered to a video. Simulation, rendering and encoding overlap.
+
+`open_video`: starts a video, or continues one, as its options say.
+
+Double buffering: an iterator in a thread of its own, a few items ahead of its consumer.
+
+`Summary`: what a rendered video took.
+"""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator
+import dataclasses
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Generic, NamedTuple, TypeVar
 
-from ripple_sim.coupling.stepping.physics_messages import adopt_warnings
-from ripple_sim.encode import FrameWriter
+from ripple_sim.coupling.stepping import adopt_warnings
+from ripple_sim.encode import FrameWriter, open_writer
 from ripple_sim.errors import VideoError
-from ripple_sim.overlay.comparison import compared_operators
-from ripple_sim.scene.camera_override import with_exposure
-from ripple_sim.scene.scene import Scene
+from ripple_sim.overlay.notes import compared_operators
+from ripple_sim.scene.scene import Scene, with_exposure
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.checked import PATH, checked, instance
+from ripple_sim.solver.errors import PATH, checked, instance
 from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.solver.kernel import compile_times, work_clock
 
-from .film import Film
-from .open_video import open_video
-from .options import VideoOptions
-from .prefetch import Prefetch
-from .settings import EXPOSURE, check_options, frame_count, render_settings, settled
-from .shot import Shot
-from .summary import Summary, Times
+from .film import Film, Shot
+from .options import EXPOSURE, VideoOptions, check_options, frame_count, render_settings, settled
+
+
+def open_video(
+    output: Path, options: VideoOptions, settings: Mapping[str, str | int | float] | None = None
+) -> FrameWriter:
+    """Writer of a video with settled options; see `open_writer`."""
+    return open_writer(
+        output,
+        width=options.size[0],
+        height=options.size[1],
+        fps=options.fps or 0,
+        transparent=options.transparent,
+        frame_format=options.frame_format,
+        settings=settings,
+        resume=options.resume,
+        overwrite=options.overwrite,
+    )
+
+
+Item = TypeVar("Item")
+
+_END = object()
+
+
+class Prefetch(Generic[Item]):
+    """Runs an iterable in a thread, at most `depth` items ahead; iterate over this instead, inside a `with`.
+
+    Items come in their order. An exception of the iterable is raised in place of its next item. Leaving the block stops
+    the thread at its current item.
+
+    Parameters
+    ----------
+    items : iterable
+        Consumed by the thread alone.
+    depth : int
+        How many finished items may wait.
+    """
+
+    def __init__(self, items: Iterable[Item], depth: int) -> None:
+        self._items = items
+        self._queue: queue.Queue[tuple[object, BaseException | None]] = queue.Queue(depth)
+        self._stopped = False
+        self._thread = threading.Thread(target=self._run, name="simulation", daemon=True)
+
+    def __enter__(self) -> Iterator[Item]:
+        self._thread.start()
+        return self._take()
+
+    def __exit__(self, *error: object) -> None:
+        self._stopped = True
+        while self._thread.is_alive():
+            with contextlib.suppress(queue.Empty):  # makes room for the thread's current item
+                self._queue.get(timeout=0.05)
+
+    def _run(self) -> None:
+        error: BaseException | None = None
+        try:
+            for item in self._items:
+                if self._stopped:
+                    return
+                self._queue.put((item, None))
+        except BaseException as failure:  # of any kind: it is raised in the consumer's thread
+            error = failure
+        self._queue.put((_END, error))
+
+    def _take(self) -> Iterator[Item]:
+        while True:
+            item, error = self._queue.get()
+            if error is not None:
+                raise error
+            if item is _END:
+                return
+            yield item  # type: ignore[misc]
+
+
+class Times(NamedTuple):
+    """A moment [s]: on the wall's clock, on this thread's `work_clock`, and the time of compilation so far."""
+
+    wall: float
+    work: float
+    compiled: float
+
+    @classmethod
+    def now(cls) -> Times:
+        """Take the time."""
+        return cls(time.perf_counter(), work_clock(), sum(compile_times().values()))
+
+
+@dataclasses.dataclass(frozen=True)
+class Summary:
+    """What a rendered video took.
+
+    Of its `frames`, those before `resumed_at` were there already. `renderer` is the driver's GL_RENDERER, `backend` the
+    wave solver's. Times in seconds; the stages overlap, so they add up to more than `wall_seconds`. What was spent on
+    compiling kernels, at their first use on a machine, is told apart from the work of the stages.
+    """
+
+    output: Path
+    frames: int
+    resumed_at: int
+    renderer: str
+    backend: str
+    substeps_per_frame: float
+    compile_seconds: float
+    setup_seconds: float
+    physics_seconds: float
+    wave_seconds: float
+    render_seconds: float
+    encode_seconds: float
+    wall_seconds: float
+
+    @classmethod
+    def of(
+        cls, film: Film, writer: FrameWriter, gl: GLContext, *, resumed_at: int, started: Times, ready: Times
+    ) -> Summary:
+        """Summary of a film that has been written; it was started, and its first frame could begin, at these times."""
+        simulations, ended = film.simulations, Times.now()
+        return cls(
+            output=writer.path,
+            frames=writer.frames,
+            resumed_at=resumed_at,
+            renderer=gl.renderer,
+            backend=simulations[0].backend,
+            substeps_per_frame=sum(each.substeps_taken for each in simulations) / max(writer.frames - 1, 1),
+            compile_seconds=ended.compiled - started.compiled,
+            setup_seconds=ready.work - started.work,
+            physics_seconds=sum(each.physics_seconds for each in simulations),
+            wave_seconds=sum(each.wave_seconds for each in simulations),
+            render_seconds=film.seconds,
+            encode_seconds=writer.encode_seconds,
+            wall_seconds=ended.wall - started.wall,
+        )
+
 
 # Shots that wait to be rendered. One would do if all frames took the same time.
 _WAITING = 2

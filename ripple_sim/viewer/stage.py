@@ -1,19 +1,253 @@
-"""`Stage`: a session's targets, bodies, shadows and lights in a PyVista plotter."""
+"""`Stage`: a session's targets, bodies, shadows and lights in a PyVista plotter.
+
+The floor: the plane that shadows fall on, and a large plane drawn as a disc that fades into the background.
+
+Geoms and skins as PyVista actors.
+
+Soft round shadows on the floor, which show how high bodies and targets are.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
+import mujoco
+import numpy as np
 import pyvista as pv
+from numpy.typing import NDArray
 
-from ripple_sim.capture.viewpoint import viewpoint
-from ripple_sim.coupling.model.soft_ids import is_soft, target_pose
+from ripple_sim.capture.frame_source import viewpoint
+from ripple_sim.coupling.soft import is_soft, target_pose
 from ripple_sim.render.surfaces.surface import target_color
+from ripple_sim.render.visuals.shapes import shape_of, sizes
+from ripple_sim.render.visuals.visual import geom_visual, visible_geoms
 
-from .actors import HEIGHT, BodyActors, SkinActor
-from .floor import BACKGROUND, find_floor
-from .session import Session
-from .shadows import Shadows
+from .session import Session, Skin
+
+_PLANE = mujoco.mjtGeom.mjGEOM_PLANE
+BACKGROUND = (0.74, 0.77, 0.81)
+_FADE_RINGS, _FADE_SIDES = 24, 72
+
+
+def find_floor(model: mujoco.MjModel, data: mujoco.MjData) -> int | None:
+    """Geom id of the highest plane that faces up, or None."""
+    planes = [
+        geom for geom in range(model.ngeom) if model.geom_type[geom] == _PLANE and data.geom_xmat[geom, 8] > 0.999
+    ]
+    return max(planes, key=lambda geom: float(data.geom_xpos[geom, 2]), default=None)
+
+
+def is_endless(model: mujoco.MjModel, geom: int, reach: float) -> bool:
+    """Whether a geom is a plane that is infinite or extends beyond the view."""
+    size = model.geom_size[geom, :2]
+    return model.geom_type[geom] == _PLANE and bool(((size <= 0) | (size > reach / 2)).all())
+
+
+def add_floor(plotter: pv.Plotter, middle: NDArray[np.float64], radius: float, rgba: NDArray[np.float64]) -> pv.Actor:
+    """Add a plane as a disc around a middle [m], unlit: software OpenGL is much slower with light, and it is large."""
+    disc = pv.Disc(inner=0.0, outer=radius, normal=(0, 0, 1), r_res=_FADE_RINGS, c_res=_FADE_SIDES)
+    away = np.linalg.norm(disc.points, axis=1) / radius
+    share = np.clip((away - 0.1) / 0.7, 0, 1)[:, None]
+    share = share * share * (3 - 2 * share)
+    colors = (1 - share) * rgba[:3] + share * np.array(BACKGROUND)
+    disc.points[:, :2] += middle[:2]
+    disc.point_data["color"] = np.rint(255 * colors).astype(np.uint8)
+    return plotter.add_mesh(disc, scalars="color", rgb=True, lighting=False, reset_camera=False)
+
+
+HEIGHT = "height [mm]"
+_PER_METRE = 1000.0
+
+_GEOM = mujoco.mjtGeom
+_COLORMAP = "coolwarm"
+_SEGMENTS = 8  # of a geom, per right angle
+
+
+class BodyActors:
+    """The geoms of a model that do not ripple, moved by MuJoCo's poses.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+    session : Session
+    middle : float64 [3]
+        Of the view [m].
+    reach : float
+        Bodies farther than this from the middle wait for their turn, and are hidden [m].
+    """
+
+    def __init__(self, plotter: pv.Plotter, session: Session, middle: NDArray[np.float64], reach: float) -> None:
+        self._session, self._middle, self._reach = session, middle, reach
+        model = session.simulation.model
+        self._actors = {}
+        for geom in visible_geoms(model):
+            if geom in session.simulation.ripples.geom_ids.values():
+                continue
+            rgba = geom_visual(model, geom).rgba
+            if is_endless(model, geom, reach):
+                position, rotation = self._pose(geom)
+                self._actors[geom] = add_floor(plotter, (middle - position) @ rotation, reach, rgba)
+            elif (mesh := geom_mesh(model, geom)) is not None:
+                self._actors[geom] = _add(plotter, mesh, rgba)
+        self.update()
+
+    @property
+    def solid(self) -> list[int]:
+        """Visible geoms except planes."""
+        kinds = self._session.simulation.model.geom_type
+        return [geom for geom in self._actors if kinds[geom] != _GEOM.mjGEOM_PLANE]
+
+    def update(self) -> None:
+        """Take the poses from the session."""
+        parked, solid = self._session.parked, set(self.solid)
+        for geom, actor in self._actors.items():
+            position, rotation = self._pose(geom)
+            _place(actor, position, rotation)
+            far = geom in solid and np.linalg.norm(position - self._middle) > self._reach
+            actor.SetVisibility(not (far or geom in parked))
+
+    def _pose(self, geom: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Position [m] and rotation matrix in the world."""
+        data = self._session.simulation.data
+        return data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
+
+
+class SkinActor:
+    """A rippling surface: its points, normals and heights are written into the arrays that VTK reads.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+    skin : Skin
+    color : tuple
+        sRGB, 0 to 1.
+    """
+
+    def __init__(self, plotter: pv.Plotter, skin: Skin, color: NDArray[np.float64]) -> None:
+        mesh = pv.PolyData.from_regular_faces(skin.points, skin.F)
+        mesh.point_data.active_normals = skin.normals
+        mesh.point_data.set_array(_PER_METRE * skin.height, HEIGHT)
+        mesh.set_active_scalars(HEIGHT)
+        self._skin, self._mesh = skin, mesh
+        self.actor = plotter.add_mesh(
+            mesh,
+            scalars=HEIGHT,
+            cmap=_COLORMAP,
+            clim=(-1.0, 1.0),
+            color=color.tolist(),
+            show_scalar_bar=False,
+            copy_mesh=False,
+            interpolation="Phong",
+            **_SHADING,
+        )
+        self.actor.prop.specular_color = "white"
+
+    def update(self, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
+        """Take the skin's present points, normals and heights, and its pose in the world."""
+        mesh, skin = self._mesh, self._skin
+        mesh.points[:] = skin.points
+        data = mesh.GetPointData()
+        for array, new in ((data.GetNormals(), skin.normals), (data.GetArray(HEIGHT), _PER_METRE * skin.height)):
+            pv.convert_array(array)[:] = new
+            array.Modified()
+        mesh.GetPoints().Modified()
+        _place(self.actor, position, rotation)
+
+    def color_by_height(self, limit: float | None) -> None:
+        """Show the height as colours from minus to plus a limit [m]; with None, the surface in its own colour."""
+        mapper = self.actor.mapper
+        mapper.scalar_visibility = limit is not None
+        if limit is not None:
+            mapper.scalar_range = (-_PER_METRE * limit, _PER_METRE * limit)
+
+
+_SHADING: dict[str, Any] = {"ambient": 0.32, "diffuse": 0.75, "specular": 0.3, "specular_power": 30.0}
+
+
+def geom_mesh(model: mujoco.MjModel, geom: int) -> pv.PolyData | None:
+    """Surface of a geom in its frame [m], with normals; None for types that cannot be drawn."""
+    visual = geom_visual(model, geom)
+    found = shape_of(model, visual)
+    if found is None:
+        return None
+    _, make = found
+    shape = make(_SEGMENTS)
+    mesh = pv.PolyData.from_regular_faces(shape.positions(*sizes(model, visual)), shape.faces)
+    mesh.point_data.active_normals = shape.normals
+    return mesh
+
+
+def _add(plotter: pv.Plotter, mesh: pv.PolyData, rgba: NDArray[np.float64]) -> pv.Actor:
+    return plotter.add_mesh(
+        mesh, color=rgba[:3].tolist(), opacity=float(rgba[3]), interpolation="Phong", reset_camera=False, **_SHADING
+    )
+
+
+def _place(actor: pv.Actor, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation.reshape(3, 3), position
+    actor.user_matrix = pose
+
+
+# Darkness under a geom that touches the floor, and the height above the floor, in radii, from which it casts none.
+_DARKEST, _HIGHEST = 0.42, 6.0
+# Radius of a shadow over that of the geom's bounding ball, and its height above the floor, in radii.
+_WIDER, _ABOVE = 1.15, 0.01
+_RINGS, _SIDES = 8, 32
+
+
+class Shadows:
+    """A shadow for each of some geoms on a horizontal plane.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+    session : Session
+    geoms : list of int
+        That cast shadows.
+    floor : int
+        Geom id of the plane.
+    """
+
+    def __init__(self, plotter: pv.Plotter, session: Session, geoms: list[int], floor: int) -> None:
+        self._session, self._floor = session, floor
+        disc = pv.Disc(inner=0.0, outer=1.0, normal=(0, 0, 1), r_res=_RINGS, c_res=_SIDES)
+        dark = np.clip(1 - np.linalg.norm(disc.points, axis=1), 0, 1)
+        shade = np.zeros((disc.n_points, 4), np.uint8)
+        shade[:, 3] = np.rint(255 * dark * dark * (3 - 2 * dark))
+        disc.point_data["shade"] = shade
+        self._actors = {
+            geom: plotter.add_mesh(
+                disc, scalars="shade", rgb=True, lighting=False, reset_camera=False, show_scalar_bar=False
+            )
+            for geom in geoms
+        }
+        self.update()
+
+    def update(self) -> None:
+        """Take the places from the session."""
+        data, model = self._session.simulation.data, self._session.simulation.model
+        ground = data.geom_xpos[self._floor, 2]
+        parked = self._session.parked
+        for geom, actor in self._actors.items():
+            x, y, z = data.geom_xpos[geom]
+            half = _half_height(model, data, geom)
+            radius = float(model.geom_rbound[geom])
+            above = z - half - ground
+            dark = _DARKEST * max(0.0, 1 - above / (_HIGHEST * radius))
+            actor.SetVisibility(dark > 0 and above > -half and geom not in parked)
+            actor.prop.opacity = dark
+            wide = _WIDER * radius * (1 + 0.1 * max(0.0, above) / radius)
+            pose = np.diag([wide, wide, 1.0, 1.0])
+            pose[:3, 3] = x, y, ground + _ABOVE * radius
+            actor.user_matrix = pose
+
+
+def _half_height(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
+    """Half the vertical extent of a geom's bounding box in the world [m]."""
+    return float(np.abs(data.geom_xmat[geom].reshape(3, 3)[2]) @ model.geom_aabb[geom, 3:])
+
 
 # Bodies farther away than this many distances of the first camera wait for their turn, and are hidden.
 _REACH = 4.0

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.operator.fluid_operator import FluidOperator
-from ripple_sim.solver.operator.step_coefficients import damped_step
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-
-from .arguments import Amplitude
+from ..operator.deep_water import FluidOperator
+from ..operator.wave_operator import WaveOperator, damped_step
+from .stencil_loops import Amplitude
 
 
 class FluidBackend:

@@ -1,4 +1,7 @@
-"""The stiffness of a moving surface on the GPU, made there from its vertices."""
+"""The stiffness of a moving surface on the GPU, made there from its vertices.
+
+A stencil in a storage buffer, which follows a surface that moves.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +9,14 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.kernel import Ints
-from ripple_sim.solver.texels.cells import HOURGLASS, LEAST_AREA, SHARE, UNEVEN
-from ripple_sim.solver.texels.irregular import NO_LINKS, IrregularLinks
-from ripple_sim.solver.texels.moved_stencil import MovedStencil
-from ripple_sim.solver.texels.quad_pass import LEAST_RATIO
-from ripple_sim.solver.texels.riding import Ride
-from ripple_sim.solver.texels.stencil import Stencil
-from ripple_sim.solver.texels.topology import TexelTopology
-
+from ..gl import GLContext
+from ..kernel import Ints
+from ..texels.assembly import LEAST_RATIO
+from ..texels.cells import HOURGLASS, LEAST_AREA, SHARE, UNEVEN
+from ..texels.moving import MovedStencil
+from ..texels.riding import Ride
+from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil
+from ..texels.topology import TexelTopology
 from .gl_dispatch import Dispatch
 from .gl_fields import FieldLayout
 
@@ -158,3 +159,36 @@ class DeviceLinks:
 def _upload(gl: GLContext, values: NDArray, kind: type) -> moderngl.Buffer:
     with gl as ctx:
         return ctx.buffer(np.ascontiguousarray(values, kind).tobytes() or bytes(8))
+
+
+class StencilBuffer:
+    """The nine-point stencil as the wave step reads it, and the irregular links.
+
+    Attributes
+    ----------
+    buffer : moderngl.Buffer
+    irregular : IrregularLinks or None
+    """
+
+    def __init__(self, gl: GLContext, fields: FieldLayout, dispatch: Dispatch, stencil: Stencil) -> None:
+        self._gl, self._fields, self._dispatch = gl, fields, dispatch
+        self.buffer, self.irregular = fields.upload_stencil(stencil), stencil.irregular
+        self._device: DeviceStiffness | None = None
+
+    @property
+    def on_device(self) -> bool:
+        """Whether it has been made on the GPU."""
+        return self._device is not None
+
+    def write(self, stencil: Stencil, mass: NDArray[np.float64]) -> None:
+        """Take over another stencil of the same topology: made on the GPU where that can be, else uploaded.
+
+        A software driver's shaders run on the processor's own cores, where the CPU's loops take a fifth of the time.
+        """
+        if not self._gl.software and isinstance(stencil, MovedStencil) and DeviceStiffness.suits(stencil):
+            if self._device is None:
+                self._device = DeviceStiffness(self._gl, self._fields, self._dispatch, stencil, mass)
+            self.irregular = self._device.write(stencil, self.buffer)
+        else:
+            self._fields.write_stencil(self.buffer, stencil)
+            self.irregular = stencil.irregular

@@ -1,7 +1,21 @@
-"""The OpenGL context: created here, entered here, checked here, and nowhere else."""
+"""The OpenGL context: created here, entered here, checked here, and nowhere else.
+
+OpenGL drivers that render on the processor. EGL falls back to one of them without saying so.
+
+EGL: the libraries, the devices, and the context that is current.
+
+Fences: OpenGL's sync objects, which moderngl lacks, to wait for the GPU without blocking other Python threads.
+
+Programs that nobody uses at the time, for whoever asks for the same next: compiling takes as long as a frame.
+
+The one context of a device that all in the process share.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
+import functools
 import os
 import threading
 import time
@@ -10,13 +24,152 @@ from typing import Any
 
 import moderngl
 
-from ripple_sim.solver.errors import GLError
-
-from .drivers import is_software
-from .egl import create_context, current_context, load_egl, release_current
-from .fence import Fences
-from .program_pool import ProgramPool
+from ..errors import GLError
 from .shader import load_shader
+
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr", "software")
+
+
+def is_software(renderer: str) -> bool:
+    """Whether a driver renders on the processor, by its GL_RENDERER."""
+    name = renderer.lower()
+    return any(word in name for word in _SOFTWARE)
+
+
+# The plain sonames first; the versioned ones are what runtime packages without -dev symlinks install.
+_LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
+
+
+def create_context(device: int | None) -> moderngl.Context:
+    """Create a headless OpenGL 4.3 context on a device, or on the first that yields one; raises GLError."""
+    devices = range(8) if device is None else [device]
+    reasons = []
+    for libraries in _LIBRARIES:
+        for index in devices:
+            try:
+                # moderngl's hints lack the keywords of its backends
+                settings: dict[str, Any] = {"backend": "egl", "device_index": index, **libraries}
+                return moderngl.create_context(require=430, standalone=True, **settings)
+            except Exception as error:  # moderngl raises bare Exception here
+                reasons.append(str(error))
+                if "not loaded" in str(error):
+                    break
+    reason = reasons[-1] if reasons else "no device"
+    if device is not None:
+        raise GLError(f"no OpenGL 4.3 context on EGL device {device} ({reason}); devices are counted from 0")
+    raise GLError(
+        f"no OpenGL 4.3 context on any EGL device ({reason}); "
+        "install Mesa with: apt-get install libegl1 libgl1 libgl1-mesa-dri libegl-mesa0"
+    )
+
+
+def current_context() -> int | None:
+    """Handle of the EGL context that is current in this thread; None if there is none."""
+    return load_egl().eglGetCurrentContext()
+
+
+def release_current() -> None:
+    """Leave this thread without a current context, so that another thread may take it."""
+    egl = load_egl()
+    egl.eglMakeCurrent(egl.eglGetCurrentDisplay(), None, None, None)
+
+
+@functools.cache
+def load_egl() -> ctypes.CDLL:
+    """The EGL library that moderngl has loaded already."""
+    for libraries in _LIBRARIES:
+        with contextlib.suppress(OSError):
+            egl = ctypes.CDLL(libraries.get("libegl", "libEGL.so"))
+            for function in (egl.eglGetCurrentContext, egl.eglGetCurrentDisplay, egl.eglGetProcAddress):
+                function.restype = ctypes.c_void_p
+            egl.eglMakeCurrent.argtypes = [ctypes.c_void_p] * 4
+            return egl
+    raise GLError("the EGL library is gone since the context was created; see `ripple-sim info`")
+
+
+_COMMANDS_COMPLETE = 0x9117  # GL_SYNC_GPU_COMMANDS_COMPLETE
+_FLUSH = 0x1  # GL_SYNC_FLUSH_COMMANDS_BIT
+_TIMEOUT_EXPIRED, _FAILED = 0x911B, 0x911D
+
+
+class Fences:
+    """Creates fences in the current context, and waits for them without holding the interpreter's lock.
+
+    Parameters
+    ----------
+    address : callable
+        Address of an OpenGL function, by its name.
+    """
+
+    def __init__(self, address: Callable[[bytes], int]) -> None:
+        pointer, number, wide = ctypes.c_void_p, ctypes.c_uint, ctypes.c_uint64
+        self._create = ctypes.CFUNCTYPE(pointer, number, number)(address(b"glFenceSync"))
+        self._wait = ctypes.CFUNCTYPE(number, pointer, number, wide)(address(b"glClientWaitSync"))
+        self._delete = ctypes.CFUNCTYPE(None, pointer)(address(b"glDeleteSync"))
+
+    def put(self) -> int:
+        """Put a fence behind all commands so far, and return its handle."""
+        return self._create(_COMMANDS_COMPLETE, 0)
+
+    def reached(self, fence: int, patience: float) -> bool:
+        """Wait until the driver has finished all commands before the fence, for so long [s] at most.
+
+        A fence that was reached is deleted.
+
+        Raises
+        ------
+        GLError
+            If the driver reports a failure.
+        """
+        state = _FAILED
+        try:
+            state = self._wait(fence, _FLUSH, round(1e9 * patience))
+        finally:
+            if state != _TIMEOUT_EXPIRED:
+                self._delete(fence)
+        if state == _FAILED:
+            raise GLError("OpenGL cannot wait for its own commands; see `ripple-sim info`")
+        return state != _TIMEOUT_EXPIRED
+
+
+_MOST = 64  # idle at a time
+
+
+class ProgramPool:
+    """Compiled programs and compute shaders by their sources, with the uniforms that they began with."""
+
+    def __init__(self) -> None:
+        self._idle: dict[int, Any] = {}  # by their number in OpenGL, the longest idle first
+        self._begun: dict[int, tuple[tuple[str, ...], dict[str, bytes]]] = {}
+
+    def take(self, sources: tuple[str, ...], compiled: Callable[[], Any]) -> Any:
+        """An idle program with its uniforms as after compilation, or else a new one; within the context."""
+        for number in reversed(self._idle):
+            known, begun = self._begun[number]
+            if known == sources:
+                program = self._idle.pop(number)
+                for name, value in begun.items():
+                    program[name].write(value)
+                return program
+        program = compiled()
+        begun = {name: program[name].read() for name in program if isinstance(program[name], moderngl.Uniform)}
+        self._begun[program.glo] = sources, begun
+        return program
+
+    def give_back(self, program: Any) -> Any:
+        """Take back a program that is used no longer; return the one to be released for it, or None.
+
+        That is the longest idle one where there are too many, and the program itself where it is unknown.
+        """
+        if program.glo not in self._begun:
+            return program
+        self._idle[program.glo] = program
+        if len(self._idle) <= _MOST:
+            return None
+        oldest = next(iter(self._idle))
+        del self._begun[oldest]
+        return self._idle.pop(oldest)
+
 
 # How long a thread waits for another to leave the context [s]: longer than any frame takes.
 _PATIENCE = 120.0
@@ -204,3 +357,25 @@ def _compiled(name: str, compile_shader: Callable[[], Any]) -> Any:
         return compile_shader()
     except moderngl.Error as error:
         raise GLError(f"shader {name} does not compile: {error}") from error
+
+
+_shared: dict[int | None, GLContext] = {}
+_selected: int | None = None
+_lock = threading.Lock()
+
+
+def select_device(device: int | None) -> None:
+    """Select the EGL device of `shared_context`; None: the first that yields a context."""
+    global _selected
+    with _lock:
+        _selected = device
+
+
+def shared_context(device: int | None = None) -> GLContext:
+    """Return the process-wide context of a device (by default the selected one), created at the first call."""
+    with _lock:
+        device = _selected if device is None else device
+        if device not in _shared:
+            _shared[device] = GLContext(device)
+        _shared[device].check_process()
+        return _shared[device]

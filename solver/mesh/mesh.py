@@ -1,4 +1,9 @@
-"""Triangle meshes: manifold and oriented surfaces of any kind, made from any triangle soup."""
+"""Triangle meshes: manifold and oriented surfaces of any kind, made from any triangle soup.
+
+Normals of vertices, which point away from every triangle round them where any direction does.
+
+What the cube layout asks of a surface: closed, one part, no handles. Refusals come with numbers and places.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +13,65 @@ import functools
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.errors import MeshError
+from ..errors import MeshError
+from .clean import cleaned
+from .corners import counted, part_volumes, place
+from .topology import distinct, genera, labels, rims_of, sides_of
 
-from .cleaning import cleaned
-from .normals import vertex_normals
-from .orientation import part_volumes
-from .topology import distinct, genera, rims_of, sides_of
-from .winding import labels
+_STEEP = 0.1  # cosine between a vertex's normal and a triangle's below which another direction is looked for
+_STEPS = 300
+
+
+def vertex_normals(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Unit normals weighted by corner angle, shape [n, 3] (Thuermer and Wuethrich 1998).
+
+    At tips and knife edges that mean may point into a triangle. There the direction is taken that is nearest to the
+    farthest of the triangles' normals (Aubry and Loehner 2008), if it is better.
+    """
+    normal = _unit(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]))
+    corners, total = V[F], np.zeros_like(V)
+    for k in range(3):
+        a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
+        angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+        for axis in range(3):
+            total[:, axis] += np.bincount(F[:, k], weights=angle * normal[:, axis], minlength=len(V))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    mean = np.where(length > 0, _unit(total), [0.0, 0.0, 1.0])
+    vertex, triangle = F.ravel(), np.repeat(np.arange(len(F)), 3)
+    steep = np.flatnonzero(_worst(mean, vertex, normal[triangle]) < _STEEP)
+    if not len(steep):
+        return mean
+    chosen = np.isin(vertex, steep)
+    vertex, beside = np.searchsorted(steep, vertex[chosen]), normal[triangle[chosen]]
+    other = _middles(mean[steep], vertex, beside)
+    better = _worst(other, vertex, beside) > _worst(mean[steep], vertex, beside)
+    mean[steep[better]] = other[better]
+    return mean
+
+
+def _middles(start: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Middles [k, 3] of the smallest caps that hold the normals [c, 3] at vertices [c] (Badoiu and Clarkson 2003)."""
+    middle = start.copy()
+    for i in range(1, _STEPS):
+        cosine = np.einsum("ij,ij->i", middle[vertex], beside)
+        order = np.lexsort((cosine, vertex))
+        farthest = order[np.searchsorted(vertex[order], np.arange(len(middle)))]
+        middle += (beside[farthest] - middle) / (i + 1)
+    return _unit(middle)
+
+
+def _worst(normal: NDArray[np.float64], vertex: NDArray[np.int64], beside: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Least cosine between the normal of each vertex [k, 3] and those of its triangles."""
+    worst = np.full(len(normal), np.inf)
+    np.minimum.at(worst, vertex, np.einsum("ij,ij->i", normal[vertex], beside))
+    return worst
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """As they are where they have no length."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(length > 0, length, 1)
+
 
 # Lengths whose squares and cubes are far from the limits of float64, in either direction.
 _SMALLEST, _LARGEST = 1e-12, 1e12
@@ -173,3 +230,43 @@ def _area_vectors(V: NDArray, F: NDArray) -> tuple[NDArray, NDArray]:
     """Normals of the triangles as long as twice their areas, and those lengths."""
     vectors = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
     return vectors, np.linalg.norm(vectors, axis=1)
+
+
+# A surface that encloses less, relative to the cube of its size, has no inside.
+_FLAT = 1e-12
+# Parts beyond which a surface round all of them serves better than each by itself.
+_MANY_PARTS = 100
+
+
+def many_parts(mesh: Mesh) -> str:
+    """Advice for a mesh of very many parts; none, "", for others."""
+    parts = mesh.component_count
+    return f"wrap (--wrap) would put one closed surface round its {parts:,} parts" if parts > _MANY_PARTS else ""
+
+
+def check_genus_zero(mesh: Mesh) -> None:
+    """Raise `MeshError`, naming every defect, unless the mesh is a closed surface of genus 0 in one part."""
+    defects, advice = [], ""
+    parts = mesh.component_count
+    if parts > 1:
+        defects.append(f"in {parts:,} separate parts (valid is one; keep the part you want, or join them)")
+    if not mesh.closed:
+        edges = sum(len(rim) for rim in mesh.rims)
+        near = place(mesh.V[mesh.rims[0][:2]].mean(axis=0))
+        defects.append(
+            f"open: {counted(edges, 'boundary edge')} round {counted(len(mesh.rims), 'hole')} (one near {near})"
+        )
+        advice = "; repair (--repair) closes holes"
+    handles = int(mesh.genus.sum())
+    if parts == 1 and handles:
+        defects.append(f"of genus {handles} (valid is genus 0: no handles or tunnels)")
+    if many_parts(mesh):
+        advice = f"; {many_parts(mesh)}"
+    if defects:
+        cuts = "".join(f"; {note}" for note in mesh.notes if note.startswith("cut "))
+        raise MeshError(f"{mesh.name} is not a closed genus-0 surface: it is {', and '.join(defects)}{cuts}{advice}")
+    extent = np.ptp(mesh.V, axis=0).max()
+    if not abs(mesh.volume) > _FLAT * extent**3:
+        raise MeshError(
+            f"{mesh.name} is degenerate: it encloses no volume ({mesh.volume:.3g} m^3 at a size of {extent:.3g} m)"
+        )

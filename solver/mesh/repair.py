@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ripple_sim.solver.errors import MeshError
-
-from .counting import counted, place
+from ..errors import MeshError
+from .corners import counted, place
 from .mesh import Mesh
-from .polygons import Soup
+from .ply import Soup
 
 _INSTALL = "pip install 'ripple-sim[repair]' (it adds the package pymeshfix, which is under the GPL)"
 _TIME_LIMIT = 120  # [s]; a hundred thousand triangles take a few, hopeless cases hours

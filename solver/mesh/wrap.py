@@ -2,6 +2,10 @@
 
 All points at a given distance from the object, by marching cubes (Lorensen and Cline 1987). What cannot be reached from
 far away without coming closer than that counts as inside, as in alpha wrapping (Portaneri et al. 2022).
+
+Distance from triangles on a regular grid, computed where it matters.
+
+The surface of a field on a regular grid, by marching cubes.
 """
 
 from __future__ import annotations
@@ -10,14 +14,92 @@ import dataclasses
 
 import igl
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import label
 
-from ripple_sim.solver.errors import MeshError
-
-from .counting import counted
-from .distance_grid import distance_grid, filled
-from .isosurface import zero_surface
+from ..errors import MeshError
+from .corners import counted
 from .mesh import Mesh
+
+_COARSEST = 16  # spacings along the side of the largest blocks
+_MARGIN = 2  # layers of nodes beyond the surface, on all sides
+
+
+def distance_grid(
+    V: NDArray[np.float64], F: NDArray[np.int64], distance: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Distance from a mesh at the nodes of a grid whose spacing is `distance` too.
+
+    Parameters
+    ----------
+    V, F : [vertex_count, 3], [triangle_count, 3]
+    distance : float
+        Where the distance has to be known exactly [m]. Farther than two spacings from there, a node may have the
+        distance of its block's middle, which is on the same side.
+
+    Returns
+    -------
+    values : float64 [x, y, z]
+        Distances [m].
+    origin : [3]
+        Place of the first node [m]; the outermost ones are farther from the mesh than `distance`.
+    """
+    tree = igl.AABB()
+    tree.init(V, F)
+    low, high = V.min(axis=0), V.max(axis=0)
+    origin = low - (1 + _MARGIN) * distance
+    shape = np.ceil((high - low) / distance).astype(int) + 3 + 2 * _MARGIN
+    blocks = -(-shape // _COARSEST)
+    values = np.empty(blocks * _COARSEST)
+    corners = _COARSEST * np.stack(np.meshgrid(*map(np.arange, blocks), indexing="ij"), axis=-1).reshape(-1, 3)
+    size = _COARSEST
+    while True:
+        middle = origin + distance * (corners + (size - 1) / 2)
+        found = np.sqrt(tree.squared_distance(V, F, middle)[0])
+        places = corners[:, None] + _block(size)
+        values[tuple(np.moveaxis(places, -1, 0))] = found[:, None]
+        if size == 1:
+            return values, origin
+        near = np.abs(found - distance) <= (2 + (size - 1) / 2 * np.sqrt(3)) * distance
+        size //= 2
+        corners = (corners[near][:, None] + size * _block(2)).reshape(-1, 3)
+
+
+def filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values on a grid with what is positive, but shut off from the first node, made negative."""
+    region, _ = label(values > 0)
+    return np.where((values > 0) & (region != region[0, 0, 0]), -values, values)
+
+
+def _block(size: int) -> NDArray[np.int64]:
+    """Nodes of a cube, [size^3, 3], counted from its first corner."""
+    return np.stack(np.meshgrid(*[np.arange(size)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+# Corners of a grid cell as `igl.marching_cubes` counts them: along x, y, z.
+_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
+
+
+def zero_surface(
+    values: NDArray[np.float64], origin: ArrayLike, spacing: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Triangles where values on a grid [x, y, z] change their sign, from those cells alone in which they do."""
+    inside = values < 0
+    corners = [inside[tuple(slice(d, n - 1 + d) for d, n in zip(c, values.shape, strict=True))] for c in _CORNERS]
+    count = np.sum(corners, axis=0)
+    cells = np.argwhere((count > 0) & (count < 8))
+    nodes = (cells[:, None] + _CORNERS).reshape(-1, 3)
+    number = np.ravel_multi_index(tuple(nodes.T), values.shape)
+    used, index = np.unique(number, return_inverse=True)
+    places = np.stack(np.unravel_index(used, values.shape), axis=1)
+    V, F, _ = igl.marching_cubes(
+        values.ravel()[used],
+        np.asarray(origin) + np.asarray(spacing) * places,
+        index.reshape(-1, 8).astype(np.int64),
+        0.0,
+    )
+    return V, F
+
 
 # Below, the grid has more than some 20 million nodes; above, little of the object's shape is left.
 _SMALLEST, _LARGEST = 0.004, 0.2

@@ -1,11 +1,24 @@
-"""Real materials by name: a law of `Material`, its parameters, where they come from, and where they hold."""
+"""Real materials by name: a law of `Material`, its parameters, where they come from, and where they hold.
+
+How far a surface gives way under a load or a hit, and the stiffness that keeps it from giving way further.
+
+A load F that is spread like a Gaussian of standard deviation s presses a membrane with a restoring stiffness in by
+
+    h = F / (4 pi sigma c^2) exp(z) E1(z),    z = s^2 k / (2 c^2),
+
+the integral of exp(-q^2 s^2 / 2) / (c^2 q^2 + k) over all wave numbers q. For the exponential integral this takes
+ln(1 + 1/z), which is an upper bound and can be inverted (Abramowitz and Stegun 1964, 5.1.20).
+
+Coefficients that suit an object's size and what hits it.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import math
 
-from ripple_sim.solver.checked import shown
-from ripple_sim.solver.errors import SolverError
+from ..errors import SolverError, shown
+from .coefficients import require_positive
 
 _GELATINE = (
     "Nguyen et al. 2014, Ultrasound in Medicine and Biology 40, 168 (shear wave elastography, Voigt model; "
@@ -127,3 +140,121 @@ def preset_named(name: str) -> Preset:
     if not isinstance(name, str) or name not in PRESETS:
         raise SolverError(f"the preset {shown(name)} does not exist; valid are {', '.join(PRESETS)}")
     return PRESETS[name]
+
+
+# Standard deviation of a footprint (1 - (d/r)^2)^3 along an axis, over its radius r.
+SPREAD = 10**-0.5
+
+
+def stiffness_under(force: float, depth: float, *, radius: float, density: float, speed: float) -> float:
+    """Stiffness with which a resting load sinks by a depth at most [1/s^2].
+
+    Parameters
+    ----------
+    force : float
+        [N].
+    depth, radius : float
+        [m], the latter of the footprint.
+    density, speed : float
+        Of the material [kg/m^2], [m/s].
+    """
+    if not force > 0:
+        return 0.0
+    ratio = 4 * math.pi * density * speed**2 * depth / force
+    spread = SPREAD * radius
+    if ratio < 1e-9:  # tension bears nothing
+        return force / (2 * math.pi * density * spread**2 * depth)
+    return 2 * speed**2 / spread**2 / math.expm1(ratio) if ratio < 100 else 0.0
+
+
+def stiffness_after(
+    impulse: float, depth: float, *, duration: float, radius: float, density: float, speed: float
+) -> float:
+    """Stiffness with which a hit dents the surface by about a depth at most [1/s^2].
+
+    The hit counts as a load impulse / T for a time T, its duration or, if that is longer, the time that a wave takes
+    across the footprint's standard deviation. In this time the surface's own inertia holds it back as a stiffness of
+    1 / T^2 would.
+
+    Parameters
+    ----------
+    impulse : float
+        [N s].
+    duration : float
+        [s].
+    depth, radius, density, speed : float
+        As for `stiffness_under`.
+    """
+    time = max(duration, SPREAD * radius / speed if speed > 0 else 0.0)
+    whole = stiffness_under(impulse / time, depth, radius=radius, density=density, speed=speed)
+    return max(whole - 1 / time**2, 0.0)
+
+
+def density_for(impulse: float, depth: float, *, radius: float, speed: float) -> float:
+    """Density with which a short hit dents a surface without stiffness by a depth [kg/m^2].
+
+    The dent of a Gaussian footprint is deepest after 1.31 s / c, with s its standard deviation: there it is
+    0.765 J / (2 pi sigma c s), where 0.765 is sqrt(2) times the maximum of Dawson's integral.
+    """
+    return 0.765 * impulse / (2 * math.pi * speed * SPREAD * radius * depth)
+
+
+# Size over the length to which a dent narrows, c / sqrt(k).
+NARROW = 16.0
+
+# Impulse of a hit over mass times speed: it bounces back with half its speed.
+BOUNCE = 1.5
+
+_RADIUS = 0.05  # footprint over size
+_VISCOSITY = 1e-3  # over speed times size
+_GRAVITY = 9.81
+
+
+def suited_coefficients(
+    size: float,
+    hit: float | tuple[float, float],
+    radius: float | None,
+    amplitude: float,
+    crossing: float,
+    decay: float,
+) -> dict[str, float]:
+    """Coefficients by their names; see `Material.suited`."""
+    require_positive(size=(size, "m"))
+    radius = _RADIUS * size if radius is None else radius
+    impulse, mass = _impulse(hit)
+    require_positive(
+        size=(size, "m"), radius=(radius, "m"), amplitude=(amplitude, "of the size"), crossing=(crossing, "s"),
+        decay=(decay, "s"),
+    )  # fmt: skip
+    speed, depth = size / crossing, amplitude * size
+    density = density_for(impulse, depth, radius=radius, speed=speed)
+    resting = stiffness_under(_GRAVITY * mass, depth / 2, radius=radius, density=density, speed=speed)
+    return {
+        "speed": speed,
+        "damping": damping_for(decay),
+        "stiffness": max(narrow_stiffness(size, speed), resting),
+        "viscosity": _VISCOSITY * speed * size,
+        "density": density,
+    }
+
+
+def narrow_stiffness(size: float, speed: float) -> float:
+    """Stiffness that keeps dents narrow beside the object [1/s^2]."""
+    return (NARROW * speed / size) ** 2
+
+
+def damping_for(decay: float) -> float:
+    """Damping with which waves fall to a tenth in a time [s], in 1/s."""
+    return 2 * math.log(10) / decay
+
+
+def _impulse(hit: float | tuple[float, float]) -> tuple[float, float]:
+    """Impulse [N s] of a hit, and the mass of the body [kg], or 0 where it is not known."""
+    if isinstance(hit, tuple | list):
+        if len(hit) != 2:
+            raise SolverError(f"hit is {hit!r}; valid is an impulse [N s], or a mass [kg] and a speed [m/s]")
+        mass, speed = hit
+        require_positive(**{"mass of the hit": (mass, "kg"), "speed of the hit": (speed, "m/s")})
+        return BOUNCE * mass * speed, mass
+    require_positive(hit=(hit, "N s"))
+    return hit, 0.0

@@ -1,19 +1,95 @@
-"""The discrete wave operator: stencil weights, masses, and the largest time step they allow."""
+"""The discrete wave operator: stencil weights, masses, and the largest time step they allow.
+
+The parts of a surface that float freely: each has a mean height of its own that nothing pulls back.
+
+The coefficients of one substep of a wave operator.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
 
-from ripple_sim.solver.texels.spectrum import largest_eigenvalue
-from ripple_sim.solver.texels.stencil import Stencil
-from ripple_sim.solver.texels.topology import TexelTopology
+from ..errors import SolverError
+from ..texels.stencil import EAST, NORTH, Stencil, largest_eigenvalue, link_exists, stiffness_matrix
+from ..texels.topology import TexelTopology
 
-from .components import Ties, floating_parts
+
+class Ties(NamedTuple):
+    """What joins texels: the links of a stencil; of a texel that bends, with `rigidity` [C, n, n], all neighbours."""
+
+    stencil: Stencil
+    rigidity: NDArray[np.float64] | None = None
+
+
+def floating_parts(
+    ties: Sequence[Ties], held: NDArray[np.bool_], movable: NDArray[np.bool_]
+) -> NDArray[np.int32] | None:
+    """Number of the part to which each texel belongs, [C, n, n]; None where there is one part only.
+
+    Texels belong together where something joins them. Of each of the mesh's own parts, all those that are held count as
+    one, however zero wave speeds cut them up: what holds them brings them back to where they were.
+
+    Parameters
+    ----------
+    ties : sequence of Ties
+    held : bool [C, n, n]
+        Texels that a spring or a clamp holds.
+    movable : bool [C, n, n]
+        The others are rigid, and belong to any part.
+    """
+    topology = ties[0].stencil.topology
+    of_chart = _chart_parts(topology)
+    if any(_joins_all(tie) for tie in ties):
+        charts = of_chart[:, None, None]
+        return None if not of_chart.any() else np.ascontiguousarray(np.broadcast_to(charts, topology.shape), np.int32)
+    part = connected_components(sum(_graph(tie) for tie in ties), directed=False)[1].astype(np.int64)
+    is_held = np.bincount(part, held.reshape(-1)) > 0
+    # those that are held bear the number of their part of the mesh, after all others
+    of_texel = np.repeat(of_chart, topology.texel_count // len(of_chart))
+    part = np.where(is_held[part], part.max() + 1 + of_texel, part)
+    moves = movable.reshape(-1)
+    names, number = np.unique(part[moves], return_inverse=True)
+    if len(names) <= 1:
+        return None
+    # rigid texels do not break up a chart
+    part[:] = -1
+    part[moves] = number
+    charts = part.reshape(len(of_chart), -1)
+    filled = np.where(charts < 0, charts.max(axis=1, keepdims=True).clip(0), charts)
+    return filled.astype(np.int32).reshape(topology.shape)
+
+
+def _chart_parts(topology: TexelTopology) -> NDArray[np.int64]:
+    """Part of the mesh to which each chart belongs, [C], from 0."""
+    chart, side = np.nonzero(topology.glued[..., 0] >= 0)
+    other, count = topology.glued[chart, side, 0], len(topology.glued)
+    graph = coo_array((np.ones(len(chart)), (chart, other)), shape=(count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _joins_all(tie: Ties) -> bool:
+    """Whether the sides of all quads are links, so that every part of the mesh is one."""
+    stencil, rigidity = tie
+    sides = (stencil.weights[:, link][link_exists(stencil.topology, link)] for link in (EAST, NORTH))
+    return (rigidity is None or bool((rigidity > 0).all())) and all(side.all() for side in sides)
+
+
+def _graph(tie: Ties) -> csr_array:
+    """Texels that are joined, [C n^2, C n^2]; not symmetric."""
+    graph = abs(stiffness_matrix(tie.stencil))
+    if tie.rigidity is not None:
+        graph = csr_array(graph.multiply((tie.rigidity.reshape(-1, 1) > 0).astype(np.float64)))
+    graph.eliminate_zeros()
+    return graph
+
 
 # Share of the theoretical stability limit that is used: round-off in float32 must not cross it.
 SAFETY = 0.99
@@ -174,3 +250,61 @@ class WaveOperator:
     def _rate(self, force: Callable[[NDArray[np.float64]], NDArray[np.float64]], bound: float) -> float:
         """Largest eigenvalue of -M^-1 force, or its bound."""
         return bound if self.bounded else largest_eigenvalue(force, self.mass, self.free, bound)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StepCoefficients:
+    """The kick of a step dt: v = decay v + gain force - spring h.
+
+    Damping is implicit (centred): decay = (1 - zeta dt/2) / (1 + zeta dt/2), and 0 where that would be negative, zeta
+    dt > 2: the velocity is then what the forces sustain against the damping, and does not change its sign each substep.
+
+    Attributes
+    ----------
+    gain : float32 [C, n, n]
+        [s/kg]; 0 where the surface is clamped.
+    decay, spring, span : float32 or float32 [C, n, n]
+        One number where a coefficient is uniform, which saves the kernel's reads. The spring is in 1/s; the span [s] is
+        how long the acceleration of a pressure that acts everywhere counts: 0 where sources move nothing.
+    """
+
+    gain: NDArray[np.float32]
+    decay: NDArray[np.float32] | np.float32
+    spring: NDArray[np.float32] | np.float32
+    span: NDArray[np.float32] | np.float32
+
+
+def step_coefficients(operator: WaveOperator, dt: float) -> StepCoefficients:
+    """Coefficients of the kick of one substep of dt [s].
+
+    Raises
+    ------
+    SolverError
+        If float32 cannot hold one of them.
+    """
+    decay, span = damped_step(operator, dt)
+    with np.errstate(over="ignore"):
+        kick = StepCoefficients(
+            gain=np.where(operator.free, span / operator.mass, 0).astype(np.float32),
+            decay=number_or_field(decay),
+            spring=number_or_field(span * operator.stiffness),
+            span=number_or_field(span * operator.response),
+        )
+    if not all(np.isfinite(value).all() for value in (kick.gain, kick.spring, kick.span)):
+        raise SolverError(
+            f"a substep of {dt:.4g} s on texels of {operator.mass.min():.4g} kg and more is beyond float32; valid is a "
+            "shorter step, or a larger mesh or material density"
+        )
+    return kick
+
+
+def damped_step(operator: WaveOperator, dt: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Decay of the velocity over a substep of dt [s], and how long a force counts [s], each [C, n, n]."""
+    half = operator.damping * (dt / 2)
+    return np.maximum((1 - half) / (1 + half), 0), dt / (1 + np.maximum(half, 2 * half - 1))
+
+
+def number_or_field(field: NDArray) -> NDArray[np.float32] | np.float32:
+    """One float32 number where a field has one value, else the field as float32."""
+    first = field.flat[0]
+    return np.float32(first) if (field == first).all() else field.astype(np.float32)

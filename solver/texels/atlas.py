@@ -1,26 +1,158 @@
-"""The atlas: a texel mesh on the surface of a mesh, each texel with its surface point."""
+"""The atlas: a texel mesh on the surface of a mesh, each texel with its surface point.
+
+Named arrays in one file: an uncompressed NumPy archive, read at the speed of memory and verified.
+
+NumPy's own reader goes through the zip module in small pieces. Here every array is read straight into place, on several
+threads, and verified against the archive's checksum before use.
+
+Atlases on disk: one verified file format, for users and for the cache.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+import io
+import os
+import struct
+import zipfile
+import zlib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.checked import PATH, checked, shown
-from ripple_sim.solver.errors import AtlasError
-from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.mesh.triangle_tree import TriangleTree, closest_points, triangle_tree
+from ..errors import PATH, AtlasError, checked, shown
+from ..files import atomic_write, final_path
+from ..mesh.closest import TriangleTree, closest_points, triangle_tree
+from ..mesh.mesh import Mesh
+from .chart_map import ChartMap, MeshPlaces, TextureCoordinates, nearest_places, texture_coordinates
+from .texel_mesh import TexelMesh, texel_quality
+from .topology import sampling_matrix
 
-from .atlas_file import check_atlas_place, write_atlas_file
-from .chart_map import ChartMap, TextureCoordinates, texture_coordinates
-from .nearest import MeshPlaces, nearest_places
-from .quality import texel_quality
-from .sampling import sampling_matrix
-from .texel_mesh import TexelMesh
+_LOCAL_HEADER = struct.Struct("<26xHH")  # how long the name and the extra field are that follow
+_LONGEST_HEAD = 4096  # of an array: its shape and type
+
+
+def write_arrays(file: BinaryIO, arrays: dict[str, NDArray]) -> None:
+    """Write an archive that `read_arrays` and `numpy.load` read."""
+    np.savez(file, allow_pickle=False, **arrays)
+
+
+def read_arrays(path: Path) -> dict[str, NDArray]:
+    """Read all arrays of an archive.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged, or is not such an archive.
+    OSError
+        If it cannot be read.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+    except (zipfile.BadZipFile, NotImplementedError, struct.error) as error:
+        raise ValueError(str(error)) from error
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        arrays = list(threads.map(lambda member: _read_array(path, member), members))
+    return {member.filename.removesuffix(".npy"): array for member, array in zip(members, arrays, strict=True)}
+
+
+def _read_array(path: Path, member: zipfile.ZipInfo) -> NDArray:
+    damaged = ValueError(f"{member.filename!r} is damaged")
+    size = member.file_size
+    if member.header_offset < 0 or size > path.stat().st_size:
+        raise damaged
+    with path.open("rb") as file:
+        file.seek(member.header_offset)
+        start = file.read(_LOCAL_HEADER.size)
+        if len(start) < _LOCAL_HEADER.size:
+            raise damaged
+        file.seek(sum(_LOCAL_HEADER.unpack(start)), os.SEEK_CUR)
+        content = np.empty(size, np.uint8)
+        if file.readinto(content.data) != size or zlib.crc32(content.data) != member.CRC:
+            raise damaged
+    head = io.BytesIO(content[:_LONGEST_HEAD].tobytes())
+    version = npy.read_magic(head)
+    shape, fortran_order, dtype = npy.read_array_header_1_0(head)
+    if version != (1, 0) or fortran_order or dtype.hasobject:
+        raise damaged
+    return content[head.tell() :].view(dtype).reshape(shape)
+
+
+# Raise it when a layout's map or the file's contents change: older files are rebuilt.
+FORMAT = 13
+ADVICE = "make it again with `ripple-sim atlas MESH -o FILE`"
+
+_NEEDED = {"V", "F", "kind", "format", "glued", "positions", "normals", "areas", "triangles", "barycentrics"}
+_INDICES = {"F", "triangles", "glued", "charts", "piece_triangle", "piece_chart"}  # in 32 bits
+
+
+def write_atlas_file(path: Path, arrays: dict[str, NDArray]) -> None:
+    """Write an atlas's arrays; the file appears whole or not at all.
+
+    Raises
+    ------
+    AtlasError
+        If the file cannot be written.
+    """
+    small = {name: arrays[name].astype(np.int32) for name in _INDICES & arrays.keys()}
+    try:
+        with atomic_write(path) as unfinished, unfinished.open("wb") as file:
+            write_arrays(file, {**arrays, **small, "format": np.array([FORMAT])})
+    except OSError as error:
+        raise AtlasError(f"atlas file {str(path)!r} cannot be written: {error.strerror or error}") from error
+
+
+def check_atlas_place(path: Path, overwrite: bool) -> None:
+    """Make sure that an atlas may be written to a path.
+
+    Raises
+    ------
+    AtlasError
+        If there can be no such name, or another file is there, unless it is empty or `overwrite` says that it is to go.
+    """
+    try:
+        final_path(path)
+    except OSError as error:
+        raise AtlasError(f"atlas file {str(path)!r} cannot be written: {error.strerror}; name another file") from error
+    if overwrite or not path.is_file() or path.stat().st_size == 0:
+        return
+    try:
+        with zipfile.ZipFile(path) as archive:
+            known = {"format.npy", "positions.npy"} <= set(archive.namelist())
+    except (OSError, zipfile.BadZipFile, NotImplementedError, struct.error):
+        known = False
+    if not known:
+        raise AtlasError(
+            f"atlas file {str(path)!r} cannot be written: it exists and is no atlas; name another file, or "
+            "ask to overwrite it"
+        )
+
+
+def read_atlas_file(path: Path) -> dict[str, NDArray]:
+    """Read the arrays of an atlas.
+
+    Raises
+    ------
+    AtlasError
+        If the file is missing, truncated, changed, or not an atlas of this version.
+    """
+    try:
+        if not path.is_file():
+            problem = "is not a file" if path.exists() else "does not exist"
+            raise AtlasError(f"atlas file {str(path)!r} {problem}; make one with `ripple-sim atlas MESH -o FILE`")
+        arrays = read_arrays(path)
+    except (OSError, ValueError) as error:
+        raise AtlasError(f"atlas file {str(path)!r} is damaged or not an atlas ({error}); {ADVICE}") from error
+    if _NEEDED - arrays.keys() or arrays["format"].tolist() != [FORMAT]:
+        raise AtlasError(f"atlas file {str(path)!r} is not an atlas, or of another version; {ADVICE}")
+    return arrays | {name: arrays[name].astype(np.int64) for name in _INDICES & arrays.keys()}
+
 
 # [m]. Squares of what is farther away overflow on the way to the nearest surface point.
 _FARTHEST = 1e100

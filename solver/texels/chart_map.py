@@ -1,4 +1,13 @@
-"""The way from a point of the mesh to its place on the charts, which each layout knows in its own manner."""
+"""The way from a point of the mesh to its place on the charts, which each layout knows in its own manner.
+
+Barycentric coordinates of points in triangles.
+
+The nearest place of a surface in compiled code, for all layouts: contacts ask at every step.
+
+A chart map that is linear in each triangle: its corners lie at rows and columns of one chart.
+
+The parts of a mesh's triangles on which map coordinates are linear, as a mesh of their own.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +17,38 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.mesh.mesh import Mesh
-
+from ..kernel import Floats, Ints, kernel, variant
+from ..mesh.closest import TriangleTree, closest_point
+from ..mesh.mesh import Mesh
 from .topology import TexelTopology
+
+
+def barycentrics_in(corners: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Barycentric coordinates [k, 3], not negative, of points [k, 3] in triangles [k, 3, 3]."""
+    u, v, p = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
+    uu, uv, vv, pu, pv = (np.einsum("ij,ij->i", a, b) for a, b in ((u, u), (u, v), (v, v), (p, u), (p, v)))
+    area = uu * vv - uv * uv
+    # a triangle without area has no barycentrics: its middle is as good as any point of it
+    flat = area <= 0
+    scale = np.where(flat, 1.0, area)
+    s = np.where(flat, 1 / 3, np.clip((vv * pu - uv * pv) / scale, 0.0, 1.0))
+    t = np.where(flat, 1 / 3, np.clip((uu * pv - uv * pu) / scale, 0.0, 1.0 - s))
+    return np.stack([1 - s - t, s, t], axis=1)
+
+
+@kernel
+def barycentrics_at(corners: Floats, x: float, y: float, z: float) -> tuple[float, float]:
+    """The second and third barycentric coordinate of a point in a triangle [3, 3], as in `barycentrics_in`."""
+    point = (x, y, z)
+    uu = uv = vv = pu = pv = 0.0
+    for k in range(3):
+        u, v, p = corners[1, k] - corners[0, k], corners[2, k] - corners[0, k], point[k] - corners[0, k]
+        uu, uv, vv, pu, pv = uu + u * u, uv + u * v, vv + v * v, pu + p * u, pv + p * v
+    area = uu * vv - uv * uv
+    if not area > 0:
+        return 1 / 3, 1 / 3
+    s = min(max((vv * pu - uv * pv) / area, 0.0), 1.0)
+    return s, min(max((uu * pv - uv * pu) / area, 0.0), 1.0 - s)
 
 
 class ChartMap(Protocol):
@@ -144,3 +182,182 @@ def texture_coordinates(chart_map: ChartMap, mesh: Mesh) -> TextureCoordinates:
     coordinates = np.einsum("pij,pjk->pik", within, parts.coordinates[part])
     barycentrics = np.einsum("pij,pjk->pik", within, parts.barycentrics[part])
     return TextureCoordinates(parts.triangle[part], barycentrics, chart, coordinates, chart_map.uv(coordinates, chart))
+
+
+class MeshPlaces(NamedTuple):
+    """What is asked for the nearest places of a mesh: its triangles, and the arrays of its chart map."""
+
+    tree: TriangleTree
+    charts: Any
+
+
+@kernel
+def nearest_places(surface: Any, points: Floats) -> tuple[Floats, Ints]:
+    """Closest surface points [m], [k, 3], and the flat index of the texel nearest to each in the atlas, [k].
+
+    Parameters
+    ----------
+    surface : NamedTuple
+        See `Atlas.places`.
+    points : float64 [k, 3]
+        [m].
+    """
+    closest, texels = np.empty((len(points), 3)), np.empty(len(points), np.int64)
+    for i in range(len(points)):
+        x, y, z, texels[i] = nearest_place(surface, points[i, 0], points[i, 1], points[i, 2])
+        closest[i, 0], closest[i, 1], closest[i, 2] = x, y, z
+    return closest, texels
+
+
+def nearest_place(surface: Any, x: float, y: float, z: float) -> tuple[float, float, float, int]:
+    """Closest surface point [m] and the texel nearest to it; every kind of surface has a `variant` of this."""
+    raise NotImplementedError
+
+
+def texel_on(charts: Any, triangle: int, x: float, y: float, z: float) -> int:
+    """Texel in which a point of a triangle lies [m]; every chart map has a `variant` of this."""
+    raise NotImplementedError
+
+
+@variant(nearest_place, MeshPlaces)
+def _nearest_on_mesh(surface: MeshPlaces, x: float, y: float, z: float) -> tuple[float, float, float, int]:
+    triangle, x, y, z = closest_point(surface.tree, x, y, z)
+    return x, y, z, texel_on(surface.charts, triangle, x, y, z)
+
+
+class LinearCharts(NamedTuple):
+    """Triangles in space [m], [m, 3, 3], and on the charts; see `LinearChartMap`."""
+
+    triangles: Floats
+    charts: Ints
+    corners: Floats
+    resolution: int
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LinearChartMap:
+    """Triangles laid out on charts; map coordinates are chart, row and column. See `ChartMap`.
+
+    Attributes
+    ----------
+    charts : int64 [triangle_count]
+        Chart of each triangle.
+    corners : float64 [triangle_count, 3, 2]
+        Row and column of its corners, from -0.5 to n - 0.5.
+    resolution : int
+        Texels along a chart's side, n.
+    """
+
+    charts: NDArray[np.int64]
+    corners: NDArray[np.float64]
+    resolution: int
+
+    @property
+    def layout(self) -> str:
+        """Name of the layout."""
+        return "given"
+
+    def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Chart, row and column, [k, 3], of points [k, 3] [m] that lie on triangles [k]."""
+        weights = barycentrics_in(mesh.V[mesh.F[triangles]], points)
+        places = np.einsum("kc,kcj->kj", weights, self.corners[triangles])
+        return np.concatenate([self.charts[triangles, None], places], axis=1)
+
+    def chart_points(
+        self, coordinates: NDArray[np.float64], resolution: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Chart, row and column, each [k]."""
+        return coordinates[:, 0].astype(np.int64), coordinates[:, 1], coordinates[:, 2]
+
+    def compiled(self, mesh: Mesh, topology: TexelTopology) -> LinearCharts:
+        """The triangles in space and on the charts."""
+        return LinearCharts(mesh.V[mesh.F], self.charts, np.ascontiguousarray(self.corners), topology.shape[1])
+
+    def linear_parts(self, mesh: Mesh) -> LinearParts:
+        """The triangles, with chart, row and column of their corners."""
+        chart = np.broadcast_to(self.charts[:, None, None], (len(self.charts), 3, 1))
+        return LinearParts.whole(np.concatenate([chart, self.corners], axis=2))
+
+    def split(self, corners: NDArray[np.float64]) -> ChartPieces:
+        """The triangles as they are: each lies in one chart."""
+        return ChartPieces.uncut(corners[:, 0, 0].astype(np.int64))
+
+    def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Place [k, ..., 2] in the charts, 0 to 1, of map coordinates [k, ..., 3]."""
+        return np.clip((coordinates[..., [2, 1]] + 0.5) / self.resolution, 0.0, 1.0)
+
+    def quality(self, mesh: Mesh) -> dict[str, float]:
+        """None: whoever laid the triangles out knows."""
+        return {}
+
+    def arrays(self) -> dict[str, NDArray]:
+        """Charts and corners of the triangles."""
+        return {"charts": self.charts, "corners": self.corners}
+
+
+@variant(texel_on, LinearCharts)
+def _texel_on_linear_charts(charts: LinearCharts, triangle: int, x: float, y: float, z: float) -> int:
+    s, t = barycentrics_at(charts.triangles[triangle], x, y, z)
+    texel, n = charts.charts[triangle], charts.resolution
+    for k in range(2):
+        place = (1 - s - t) * charts.corners[triangle, 0, k]
+        place += s * charts.corners[triangle, 1, k] + t * charts.corners[triangle, 2, k]
+        texel = texel * n + min(max(int(np.rint(place)), 0), n - 1)
+    return texel
+
+
+_BITS = 34  # of coordinates in which copies of a point agree
+_ON_SIDE = 1e-9  # barycentric coordinates below it count as 0
+
+
+class PartsMesh(NamedTuple):
+    """A mesh cut into parts; neighbours share their vertices.
+
+    Attributes
+    ----------
+    V : float64 [n, 3]
+        [m].
+    F : int64 [m, 3]
+    triangle : int64 [m]
+        Triangle of the mesh in which each lies.
+    barycentrics : float64 [m, 3, 3]
+        Where in it, of the three corners.
+    coordinates : float64 [m, 3, d]
+        Map coordinates of the corners.
+    """
+
+    V: NDArray[np.float64]
+    F: NDArray[np.int64]
+    triangle: NDArray[np.int64]
+    barycentrics: NDArray[np.float64]
+    coordinates: NDArray[np.float64]
+
+    def carry(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the parts' corners [m, 3, ...] of what is linear in each triangle [triangle_count, 3, ...]."""
+        return np.einsum("pij,pj...->pi...", self.barycentrics, corner_values[self.triangle])
+
+
+def parts_mesh(chart_map: ChartMap, mesh: Mesh) -> PartsMesh:
+    """Cut a mesh into the parts of a chart map; the mesh itself where its triangles are whole."""
+    triangle, barycentrics, coordinates = chart_map.linear_parts(mesh)
+    if len(triangle) == len(mesh.F) and (barycentrics == np.eye(3)).all():
+        return PartsMesh(mesh.V, mesh.F, triangle, barycentrics, coordinates)
+    points = np.einsum("pij,pjk->pik", barycentrics, mesh.V[mesh.F[triangle]])
+    step = np.ldexp(1.0, np.frexp(np.abs(mesh.V).max())[1] - _BITS)
+    place = np.rint(points / step).astype(np.int64).reshape(-1, 3)
+    key = np.column_stack([_owners(mesh, triangle, barycentrics).reshape(-1, 2), place])
+    _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return PartsMesh(points.reshape(-1, 3)[first], number.reshape(-1, 3), triangle, barycentrics, coordinates)
+
+
+def _owners(mesh: Mesh, triangle: NDArray[np.int64], barycentrics: NDArray[np.float64]) -> NDArray[np.int64]:
+    """What of the mesh each corner lies on [p, 3, 2]: the ends of an edge, one vertex twice, or a triangle and -1.
+
+    Sheets that touch have points of their own.
+    """
+    corners = np.broadcast_to(mesh.F[triangle][:, None], barycentrics.shape)
+    held = barycentrics > _ON_SIDE
+    low = np.where(held, corners, len(mesh.V)).min(axis=2)
+    high = np.where(held, corners, -1).max(axis=2)
+    inside = held.all(axis=2)
+    return np.stack([np.where(inside, triangle[:, None], low), np.where(inside, -1, high)], axis=2)

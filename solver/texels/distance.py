@@ -9,8 +9,7 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
-
+from ..kernel import Floats, Ints, kernel
 from .texel_mesh import TexelMesh
 
 

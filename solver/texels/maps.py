@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.image_file import read_image
-
+from ..errors import SolverError
+from ..files import read_image
 from .atlas import Atlas
 
 _CHANNELS = {"red": 0, "green": 1, "blue": 2, "alpha": 3}

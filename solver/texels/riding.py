@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats, Ints, Ints32, kernel
-from ripple_sim.solver.mesh.triangle_tree import closest_points
-
+from ..kernel import Floats, Ints, Ints32, kernel
+from ..mesh.closest import closest_points
 from .atlas import Atlas
-from .barycentrics import barycentrics_in
+from .chart_map import barycentrics_in
 
 # Rest positions further off their triangles than this, in units of the surface's size, keep that distance.
 _OFF = 1e-9

@@ -4,20 +4,245 @@ Layout. A stencil's weights are [C, 4, n + 1, n + 1]: those of the links of plac
 east (r, c)-(r, c + 1), north (r, c)-(r + 1, c), north-east (r, c)-(r + 1, c + 1), and its other diagonal
 (r, c + 1)-(r + 1, c). A link that crosses a glued side is stored on both charts, with the same value to the last bit.
 Links to places beyond a fixed rim, where heights are 0, tie the last texels down; a free rim has none.
+
+Links beyond the nine-point stencil: the diagonals of the cells round irregular vertices.
+
+The links of the nine-point stencil: their ends, their lengths, and the copies of those that cross a glued side.
+
+The largest eigenvalue of an operator on texels, which sets the time step.
+
+A stencil as a sparse matrix.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh_tridiagonal
+from scipy.sparse import coo_array, csr_array
 
-from ripple_sim.solver.kernel import Floats, kernel
-
-from .irregular import IrregularLinks, gather_links
-from .links import rim_ties
+from ..kernel import Floats, Ints, kernel
 from .topology import TexelTopology
+
+
+class IrregularLinks(NamedTuple):
+    """Links by the texels in which they end; every link is stored for both of its ends.
+
+    Attributes
+    ----------
+    texels : int64 [k]
+        Flat indices, ascending, each once.
+    begins : int64 [k + 1]
+        The links of texel i are those from begins[i] to begins[i + 1].
+    others : int64 [m]
+        The texel at the other end.
+    weights : float64 [m]
+    """
+
+    texels: Ints
+    begins: Ints
+    others: Ints
+    weights: Floats
+
+    @classmethod
+    def of(cls, ends: NDArray[np.int64], weights: NDArray[np.float64]) -> IrregularLinks | None:
+        """Sort links [k, 2] with weights [k]; None where there are none."""
+        if not len(ends):
+            return None
+        both, twice = np.concatenate([ends, ends[:, ::-1]]), np.tile(weights, 2)
+        order = np.lexsort((both[:, 1], both[:, 0]))
+        texels, begins = np.unique(both[order, 0], return_index=True)
+        return cls(texels, np.append(begins, len(both)), both[order, 1], twice[order])
+
+
+NO_LINKS = IrregularLinks(np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0))
+
+
+@kernel
+def gather_links(links: IrregularLinks, field: Floats, out: Floats) -> None:
+    """Add the sum over the links of weight (h_j - h_i) to a flat field."""
+    for i in range(len(links.texels)):
+        t = links.texels[i]
+        total = 0.0
+        for k in range(links.begins[i], links.begins[i + 1]):
+            total += links.weights[k] * (field[links.others[k]] - field[t])
+        out[t] += total
+
+
+EAST, NORTH, NORTHEAST, NORTHWEST = range(4)
+
+_EVERY, _LOW, _HIGH = slice(None), slice(None, -1), slice(1, None)
+# For every link, the slices of a field with halo that hold its two ends.
+LINK_ENDS = (
+    ((_EVERY, _LOW, _LOW), (_EVERY, _LOW, _HIGH)),
+    ((_EVERY, _LOW, _LOW), (_EVERY, _HIGH, _LOW)),
+    ((_EVERY, _LOW, _LOW), (_EVERY, _HIGH, _HIGH)),
+    ((_EVERY, _LOW, _HIGH), (_EVERY, _HIGH, _LOW)),
+)
+
+
+def link_lengths(topology: TexelTopology, halo_positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Real-space length of every link [m], [C, 4, n + 1, n + 1]; infinite where no link exists."""
+    charts, n, _ = topology.shape
+    lengths = np.full((charts, 4, n + 1, n + 1), np.inf)
+    for link, (a, b) in enumerate(LINK_ENDS):
+        exists = link_exists(topology, link) | ties_to_rim(topology, link)
+        lengths[:, link][exists] = np.linalg.norm(halo_positions[a] - halo_positions[b], axis=-1)[exists]
+    return mean_of_copies(topology, lengths)
+
+
+def link_exists(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
+    """Where a link joins two texels of which one is the chart's own, [C, n + 1, n + 1]."""
+    a, b = LINK_ENDS[link]
+    there = (topology.halo >= 0) & ~topology.rim
+    return there[a] & there[b] & (topology.own[a] | topology.own[b])
+
+
+def ties_to_rim(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
+    """Where a link joins one of the chart's own texels to a fixed rim, [C, n + 1, n + 1]."""
+    a, b = LINK_ENDS[link]
+    own, rim = topology.own, topology.rim & topology.fixed_rim
+    return (own[a] & rim[b]) | (rim[a] & own[b])
+
+
+@functools.lru_cache(maxsize=4)  # asked for in every step, where a surface moves
+def rim_ties(topology: TexelTopology) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Flat texels [k] that links tie to a fixed rim, and the flat places [k] of these among a stencil's weights."""
+    charts, n, _ = topology.shape
+    place = np.arange(4 * charts * (n + 1) ** 2).reshape(charts, 4, n + 1, n + 1)
+    texels, places = [], []
+    for link, (a, b) in enumerate(LINK_ENDS):
+        tied = ties_to_rim(topology, link)
+        own = np.where(topology.own[a], topology.halo[a], topology.halo[b])
+        texels.append(own[tied])
+        places.append(place[:, link][tied])
+    return np.concatenate(texels), np.concatenate(places)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CrossingLinks:
+    """The links across glued sides; each is stored on two charts.
+
+    Attributes
+    ----------
+    keys : int64 [k]
+        Of the two texels that a copy joins, see `key`.
+    places : tuple of int64 [k]
+        Index of the copy in a stencil's weights.
+    size : int
+        Number of texels.
+    """
+
+    keys: NDArray[np.int64]
+    places: tuple[NDArray[np.int64], ...]
+    size: int
+
+    @classmethod
+    def of(cls, topology: TexelTopology) -> CrossingLinks:
+        """The crossing links of a topology."""
+        keys, places = [], []
+        for link, (a, b) in enumerate(LINK_ENDS):
+            crossing = link_exists(topology, link) & (topology.own[a] != topology.own[b])
+            keys.append(_key(topology.halo[a][crossing], topology.halo[b][crossing], topology.texel_count))
+            chart, row, column = np.nonzero(crossing)
+            places.append(np.stack([chart, np.full_like(chart, link), row, column]))
+        return cls(np.concatenate(keys), tuple(np.concatenate(places, axis=1)), topology.texel_count)
+
+    def add(
+        self, weights: NDArray[np.float64], pairs: NDArray[np.int64], values: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Add values [m] to both copies of the links between pairs of texels [m, 2]; return which pairs have none."""
+        keys = _key(pairs[:, 0], pairs[:, 1], self.size)
+        for key, value in zip(keys, values, strict=True):
+            weights[tuple(index[self.keys == key] for index in self.places)] += value
+        return ~np.isin(keys, self.keys)
+
+
+def mean_of_copies(topology: TexelTopology, weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give both copies of every link that crosses a glued side their mean; clear entries that are not links."""
+    for link in range(4):
+        exists = link_exists(topology, link) | ties_to_rim(topology, link)
+        weights[:, link][~exists & np.isfinite(weights[:, link])] = 0
+    crossing = CrossingLinks.of(topology)
+    if not len(crossing.keys):
+        return weights
+    _, pair = np.unique(crossing.keys, return_inverse=True)
+    copies = weights[crossing.places]
+    weights[crossing.places] = (np.bincount(pair, copies) / np.bincount(pair))[pair]
+    return weights
+
+
+def _key(a: NDArray[np.int64], b: NDArray[np.int64], size: int) -> NDArray[np.int64]:
+    return np.minimum(a, b) * size + np.maximum(a, b)
+
+
+# Largest eigenvalue of an even grid's stencil times its spacing squared: that of the chessboard pattern.
+EVEN_RATE = 6.4
+
+# On smaller charts Gershgorin's bound is as good.
+_LANCZOS_FROM = 6
+
+# Residual of the eigenvalue, as a share of it; Lanczos steps from one look at it to the next, and at most.
+_RESIDUAL, _LOOK, _MOST = 2e-3, 5, 1000
+
+
+def largest_eigenvalue(
+    force: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    mass: NDArray[np.float64],
+    free: NDArray[np.bool_],
+    bound: float,
+) -> float:
+    """Upper bound, within about 0.5 %, of the largest eigenvalue of -M^-1 force, by Lanczos iteration.
+
+    Parameters
+    ----------
+    force : callable
+        Linear, from a field [C, n, n] to one.
+    mass : float64 [C, n, n]
+    free : bool [C, n, n]
+        The other texels do not move.
+    bound : float
+        One that is always safe, such as Gershgorin's, caps the estimate.
+    """
+    if not free.any():
+        return 0.0
+    if bound == 0 or mass.shape[1] < _LANCZOS_FROM:
+        return bound
+    weight = free / np.sqrt(mass)
+
+    def multiply(x: NDArray) -> NDArray:
+        return -(force(x.reshape(weight.shape) * weight) * weight).ravel()
+
+    start = np.random.default_rng(0).standard_normal(mass.size)
+    return float(np.clip(1.005 * _lanczos(multiply, start, bound), 0, bound))
+
+
+def _lanczos(multiply: Callable[[NDArray], NDArray], start: NDArray[np.float64], bound: float) -> float:
+    """Largest eigenvalue of a symmetric matrix; the bound if it is not found.
+
+    Plain Lanczos, without a basis that is kept orthogonal: lost orthogonality repeats eigenvalues and makes no new ones
+    (Paige 1972), and the sums are numpy's own, since BLAS' threads wait for each other where others use the cores.
+    """
+    before, vector = np.zeros_like(start), start / np.sqrt((start * start).sum())
+    diagonal: list[float] = []
+    side: list[float] = []
+    for step in range(1, _MOST + 1):
+        rest = multiply(vector) - (side[-1] if side else 0.0) * before
+        diagonal.append(float((vector * rest).sum()))
+        rest -= diagonal[-1] * vector
+        length = float(np.sqrt((rest * rest).sum()))
+        if step % _LOOK == 0 or length == 0.0:
+            top, vectors = eigh_tridiagonal(diagonal, side, select="i", select_range=(step - 1, step - 1))
+            if length * abs(vectors[-1, 0]) <= _RESIDUAL * abs(top[0]):
+                return float(top[0])
+        side.append(length)
+        before, vector = vector, rest / length
+    return bound
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -91,3 +316,38 @@ def _gather(w: Floats, h: Floats, out: Floats) -> None:
                     for link, i, j, dr, dc in links:
                         total += w[chart, link, r + i, c + j] * (h[chart, r + dr, c + dc] - h[chart, r, c])
                 out[chart, r - 1, c - 1] = total
+
+
+def stiffness_matrix(stencil: Stencil) -> csr_array:
+    """A stencil as a matrix [T, T] whose product with a field is minus the stencil's value."""
+    topology = stencil.topology
+    rows, columns, weights = [], [], []
+    for link, (a, b) in enumerate(LINK_ENDS):
+        for end, other in ((a, b), (b, a)):
+            own = link_exists(topology, link) & topology.own[end]
+            rows.append(topology.halo[end][own])
+            columns.append(topology.halo[other][own])
+            weights.append(stencil.weights[:, link][own])
+    irregular = stencil.irregular
+    if irregular is not None:
+        rows.append(np.repeat(irregular.texels, np.diff(irregular.begins)))
+        columns.append(irregular.others)
+        weights.append(irregular.weights)
+    row, column, weight = np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
+    size = topology.texel_count
+    diagonal = np.bincount(row, weight, size) + _ties_to_rim(stencil)
+    texels = np.arange(size)
+    entries = np.concatenate([-weight, diagonal])
+    places = np.concatenate([row, texels]), np.concatenate([column, texels])
+    return csr_array(coo_array((entries, places), shape=(size, size)))
+
+
+def _ties_to_rim(stencil: Stencil) -> NDArray[np.float64]:
+    """Sum of the weights that tie each texel to a fixed rim, [T]."""
+    topology = stencil.topology
+    sums = np.zeros(topology.texel_count)
+    for link, (a, b) in enumerate(LINK_ENDS):
+        for end in (a, b):
+            tied = ties_to_rim(topology, link) & topology.own[end]
+            sums += np.bincount(topology.halo[end][tied], stencil.weights[:, link][tied], topology.texel_count)
+    return sums

@@ -3,6 +3,16 @@
 A chart is a square of n x n texels. Its sides are numbered counter-clockwise, south (row 0), east, north, west; side s
 runs from corner s to corner s + 1, so that corner 0 lies south-west. Two charts that share a side run along it in
 opposite directions, as on any oriented surface.
+
+The corners of glued charts: how many charts meet in each, and the cells round irregular vertices.
+
+Connecting charts along their sides: the halo table, rims and corners of a texel mesh.
+
+Fields with halo: each chart surrounded by copies of the texels beyond its border.
+
+Fields between the texels: bilinear interpolation on charts with halo.
+
+Stretch in figures: how much wider than in an even spread texels are.
 """
 
 from __future__ import annotations
@@ -12,6 +22,9 @@ import functools
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from ..errors import AtlasError
 
 # A corner where so many charts meet is a triangle or a quad of the nine-point stencil.
 TRIANGLE, QUAD = 3, 4
@@ -113,3 +126,183 @@ class HaloAddresses:
     texels: NDArray[np.int64]
     ghosts: NDArray[np.int64]
     sources: NDArray[np.int64]
+
+
+# Row and column of the four corners of a chart with halo, in units of n + 1.
+_CORNERS = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
+
+
+def close_corners(
+    glued: NDArray[np.int64], n: int, halo: NDArray[np.int64], rim: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], list[NDArray[np.int64]]]:
+    """Fill in the halo's corners; return how many charts meet in each, its number, and the cells that are polygons."""
+    valence, corners = np.zeros((len(glued), 4), np.int64), np.full((len(glued), 4), -1)
+    polygons = []
+    for chart in range(len(glued)):
+        for corner in range(4):
+            fan, closed = _fan(glued, chart, corner)
+            texels = np.array([_corner_texel(c, k, n) for c, k in fan])
+            place = (chart, *_CORNERS[corner] * (n + 1))
+            count = len(fan)
+            if corners[chart, corner] < 0:
+                corners[tuple(np.transpose(fan))] = corners.max() + 1
+            if closed:
+                valence[chart, corner] = count
+            if closed and count == QUAD:
+                halo[place] = texels[2]
+            elif not closed and count <= 2:
+                # along a straight rim: beyond it lies what the chart on the other side of the corner has beside it
+                halo[place] = texels[(fan.index((chart, corner)) + 1) % count]
+                rim[place] = True
+            elif count > (TRIANGLE if closed else 2) and (chart, corner) == min(fan):
+                polygons.append(texels)
+    return valence, corners, polygons
+
+
+def _fan(glued: NDArray[np.int64], chart: int, corner: int) -> tuple[list[tuple[int, int]], bool]:
+    """The corners (chart, corner) that meet in one, counter-clockwise, and whether they surround it.
+
+    From the one itself where they do, else from rim to rim.
+    """
+    fan = [(chart, corner)]
+    while True:
+        # over the side that ends in the corner; the one that it is glued to begins there
+        other, side = (int(x) for x in glued[fan[-1][0], (fan[-1][1] + 3) % 4])
+        if other < 0:
+            break
+        if (other, side) == fan[0]:
+            return fan, True
+        fan.append((other, side))
+    while True:
+        other, side = (int(x) for x in glued[fan[0][0], fan[0][1]])
+        if other < 0:
+            return fan, False
+        fan.insert(0, (other, (side + 1) % 4))
+
+
+def _corner_texel(chart: int, corner: int, n: int) -> int:
+    row, column = _CORNERS[corner] * (n - 1)
+    return int((chart * n + row) * n + column)
+
+
+def glue(glued: NDArray[np.int64], n: int) -> TexelTopology:
+    """Connect charts of n x n texels along their sides.
+
+    Parameters
+    ----------
+    glued : int64 [C, 4, 2]
+        Chart and side beyond each side; -1 where there is none. Mutual: the side beyond the side beyond is the side
+        itself.
+    n : int
+        Texels along a side.
+
+    Raises
+    ------
+    AtlasError
+        If the table is of another shape, or not mutual.
+    """
+    glued = _checked(glued)
+    charts, size = len(glued), n * n
+    halo = np.full((charts, n + 2, n + 2), -1)
+    rim = np.zeros(halo.shape, dtype=bool)
+    first = size * np.arange(charts)[:, None]
+    halo[:, 1:-1, 1:-1] = np.arange(charts * size).reshape(charts, n, n)
+    border, beyond = _border_texels(n), _places_beyond(n)
+    for side in range(4):
+        chart, other = glued[:, side].T
+        is_rim = chart < 0
+        # counter-clockwise on both charts: the texels of the other side come in reverse
+        across = size * chart[:, None] + border[other][:, ::-1]
+        halo.reshape(charts, -1)[:, beyond[side]] = np.where(is_rim[:, None], first + border[side], across)
+        rim.reshape(charts, -1)[:, beyond[side]] = is_rim[:, None]
+    valence, corners, polygons = close_corners(glued, n, halo, rim)
+    for array in (halo, rim, valence, corners):
+        array.setflags(write=False)
+    return TexelTopology(glued, halo, rim, valence, corners, tuple(polygons))
+
+
+def _checked(glued: NDArray[np.int64]) -> NDArray[np.int64]:
+    table = np.asarray(glued, dtype=np.int64)
+    if table.ndim != 3 or table.shape[1:] != (4, 2) or not len(table):
+        raise AtlasError(
+            f"the table of glued sides has shape {table.shape}; valid is [C, 4, 2]: chart and side beyond each"
+        )
+    joined = np.argwhere(table[..., 0] >= 0)
+    for chart, side in joined.tolist():
+        other, back = table[chart, side].tolist()
+        if not (other < len(table) and 0 <= back < 4 and table[other, back].tolist() == [chart, side]):
+            raise AtlasError(
+                f"side {side} of chart {chart} is glued to side {back} of chart {other}, which is not glued back to it"
+            )
+    return table
+
+
+def _border_texels(n: int) -> NDArray[np.int64]:
+    """Index row n + column of the texels along each side of a chart, [4, n]."""
+    along, last = np.arange(n), n - 1
+    return np.stack([along, along * n + last, last * n + last - along, (last - along) * n])
+
+
+def _places_beyond(n: int) -> NDArray[np.int64]:
+    """Address of the places beyond each side in a chart with halo, [4, n]."""
+    along, width, last = np.arange(1, n + 1), n + 2, n + 1
+    return np.stack([along, along * width + last, last * width + last - along, (last - along) * width])
+
+
+def fill_halo(topology: TexelTopology, field: NDArray) -> None:
+    """Fill in the halo of a field [C, n + 2, n + 2, ...] from its texels.
+
+    Where no texel lies, in corners of other than four charts, comes the mean of the three next to it: bilinear
+    interpolation is then continuous where three charts meet. Beyond a rim the last texels are repeated.
+    """
+    addresses = topology.addresses
+    flat = field.reshape(topology.halo.size, *field.shape[3:])
+    flat[addresses.ghosts] = flat[addresses.sources]
+    last = field.shape[1] - 1
+    for r, r_in in ((0, 1), (last, last - 1)):
+        for c, c_in in ((0, 1), (last, last - 1)):
+            missing = topology.halo[:, r, c] < 0
+            mean = (field[:, r_in, c_in] + field[:, r_in, c] + field[:, r, c_in]) / field.dtype.type(3)
+            field[missing, r, c] = mean[missing]
+
+
+def with_filled_halo(topology: TexelTopology, field: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A field [C, n, n, ...] surrounded by its halo; see `fill_halo`."""
+    around = topology.with_halo(field)
+    fill_halo(topology, around)
+    return around
+
+
+def sampling_matrix(
+    topology: TexelTopology, chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64]
+) -> csr_array:
+    """Matrix that takes a flattened field [C n^2] to its values at chart points, each [k]; see `Atlas.locate`.
+
+    In a corner where other than four charts meet the weight of the texel that is missing is shared out.
+    """
+    r, c = np.floor(row).astype(np.int64), np.floor(column).astype(np.int64)
+    s, t = row - r, column - c
+    texels, weights = [], []
+    for i, j, weight in ((0, 0, (1 - s) * (1 - t)), (0, 1, (1 - s) * t), (1, 0, s * (1 - t)), (1, 1, s * t)):
+        texel = topology.halo[chart, r + 1 + i, c + 1 + j]
+        texels.append(np.maximum(texel, 0))
+        weights.append(np.where(texel < 0, 0, weight))
+    share = np.array(weights)
+    share /= share.sum(axis=0)
+    rows = np.tile(np.arange(len(chart)), 4)
+    return csr_array((share.ravel(), (rows, np.concatenate(texels))), shape=(len(chart), topology.texel_count))
+
+
+QUANTILES = {"q001": 0.001, "q01": 0.01, "q50": 0.5, "q99": 0.99, "q999": 0.999}
+STARVED = 4.0
+
+
+def stretch_summary(stretch: NDArray[np.float64], areas: NDArray[np.float64]) -> dict[str, float]:
+    """Quantiles of the stretch over the real areas, both [m], and the starved share; see `Atlas.quality`."""
+    order = np.argsort(stretch, kind="stable")
+    share = np.cumsum(areas[order]) / areas.sum()
+    at = np.minimum(np.searchsorted(share, list(QUANTILES.values())), len(order) - 1)
+    return {
+        **{name: float(value) for name, value in zip(QUANTILES, stretch[order][at], strict=True)},
+        "starved": float(areas[stretch > STARVED].sum() / areas.sum()),
+    }

@@ -1,25 +1,214 @@
-"""What a renderer needs of the waves: height and surface gradient of every texel, with a halo for interpolation."""
+"""What a renderer needs of the waves: height and surface gradient of every texel, with a halo for interpolation.
+
+A limit on the height that is drawn, so that a surface with waves too high for it does not pass through itself.
+
+The height map where the heights are on the GPU: they go into the renderer's texture without leaving it.
+"""
 
 from __future__ import annotations
 
-from typing import overload
+import functools
+from collections.abc import Callable
+from typing import Any, overload
 
+import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.backends.device_field import DeviceField
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.gl import GLContext
-from ripple_sim.solver.kept import kept_with
-from ripple_sim.solver.kernel import Floats32, kernel
-from ripple_sim.solver.memory import require_memory
-from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.texels.halo import fill_halo
-from ripple_sim.solver.texels.texel_mesh import TexelMesh
-from ripple_sim.solver.texels.topology import TexelTopology
+from ..backends.gl_fields import DeviceField
+from ..cache import kept_with
+from ..errors import SolverError
+from ..files import require_memory
+from ..gl import GLContext
+from ..kernel import Floats32, kernel
+from ..texels.atlas import Atlas
+from ..texels.texel_atlas import ChartPage
+from ..texels.texel_mesh import TexelMesh
+from ..texels.thickness import LEAST, medial_radius
+from ..texels.topology import TexelTopology, fill_halo
 
-from .device_height_map import DeviceHeightMap, HeightMapShaders
-from .displacement_limit import DisplacementLimit
+# Of the medial radius: heights up to the first share are drawn as they are, and none beyond the second.
+FREE, MOST = 0.25, 0.6
+
+
+class DisplacementLimit:
+    """Bends heights that are large beside the object's local radius, and leaves the others alone.
+
+    With R the medial radius at a texel (see `medial_radius`), a height h is drawn as it is up to R / 4. Beyond, it is
+    drawn as R (a + (b - a) tanh((|h| / R - a) / (b - a))) with its sign, a = 1/4 and b = 0.6: twice continuously
+    differentiable, growing with h, and never more than 0.6 R. The waves themselves know nothing of it.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    """
+
+    def __init__(self, atlas: Atlas) -> None:
+        self._atlas = atlas
+        self._always_free = FREE * LEAST * float(np.ptp(atlas.mesh.V, axis=0).max())
+
+    @functools.cached_property
+    def radius(self) -> NDArray[np.float32]:
+        """The medial radius R [m], [C, n, n]: it takes a while, and most waves never ask for it."""
+        return medial_radius(self._atlas)
+
+    def may_bend(self, highest: float) -> bool:
+        """Whether heights of at most that size [m] may be drawn otherwise than they are."""
+        return highest > self._always_free
+
+    def __call__(self, height: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The heights to draw [m], float32 [C, n, n]; the same array where none is beyond the limit."""
+        high, radius, beyond = self._beyond(height)
+        if not len(radius):
+            return height
+        drawn = height.copy()
+        drawn[high] = np.sign(height[high]) * radius * (FREE + (MOST - FREE) * np.tanh(beyond))
+        return drawn
+
+    def rate(self, height: NDArray[np.float32], velocity: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Rate of the heights to draw [m/s], float32 [C, n, n], where heights change with a velocity."""
+        high, radius, beyond = self._beyond(height)
+        if not len(radius):
+            return velocity
+        rate = velocity.copy()
+        rate[high] *= 1 - np.tanh(beyond) ** 2
+        return rate
+
+    def _beyond(self, height: NDArray[np.float32]) -> tuple[NDArray[np.bool_], NDArray, NDArray]:
+        """Texels where heights are bent, the radius at each of these [k], and the hyperbolic tangent's argument [k]."""
+        size = np.abs(height)
+        if not self.may_bend(float(size.max())):
+            return np.zeros(height.shape, np.bool_), np.empty(0, np.float32), np.empty(0, np.float32)
+        share = size / self.radius
+        high = share > FREE
+        # the cap keeps float32 from overflowing, where tanh is 1 by far
+        return high, self.radius[high], (np.minimum(share[high], 1e3) - FREE) / (MOST - FREE)
+
+
+_GROUP = 256
+_SHADERS = "ripple_sim.solver"
+_NONE = -1  # of the table of sources: no texel lies there; below: a texel's mirror image, -2 - its number
+
+
+class HeightMapShaders:
+    """What turns heights into height maps on the GPU, see `HeightMap`.
+
+    Parameters
+    ----------
+    gl : GLContext
+    topology : TexelTopology
+    weights : float32 [C n^2, 8, 3]
+        Of the gradient.
+    limit : DisplacementLimit, optional
+    """
+
+    def __init__(
+        self, gl: GLContext, topology: TexelTopology, weights: NDArray[np.float32], limit: DisplacementLimit | None
+    ) -> None:
+        self._gl, self._limit, self.shape = gl, limit, (*topology.halo.shape, 4)
+        charts, n, _ = topology.shape
+        sources, means, ends = _tables(topology)
+        self._place_count, self._corner_counts = sources.size, (len(means), len(means) + len(ends))
+        defines = {"GROUP": _GROUP, "N": n, "COLUMNS": ChartPage(charts, n).columns, "FREE": FREE, "MOST": MOST}
+        with gl as ctx:
+            self._heights, self._limited, self._map, self._corners = (
+                gl.shared_compute_shader(_SHADERS, f"waves/shaders/{name}", **defines, **more)
+                for name, more in (
+                    ("halo_heights", {}),
+                    ("halo_heights", {"LIMIT": 1}),
+                    ("height_map", {}),
+                    ("height_map_corners", {}),
+                )
+            )
+            self._sources = ctx.buffer(sources.tobytes())
+            self._corner_places = ctx.buffer(np.concatenate([means, ends]).tobytes() or bytes(16))
+            self._weights = ctx.buffer(weights.tobytes())
+            self._around = ctx.buffer(bytes(4 * sources.size))
+            self._peak = ctx.buffer(bytes(4))
+        self._radii: moderngl.Buffer | None = None
+
+    def fill(self, field: DeviceField, texture: moderngl.TextureArray, layer: int) -> float:
+        """Write the height map's page into a layer of a texture, RGBA32F; return the largest height drawn [m].
+
+        Raises
+        ------
+        SolverError
+            If a height is not finite.
+        """
+        highest = field.peak
+        if not np.isfinite(highest):
+            raise SolverError(
+                "heights to be drawn are no longer finite; a source was too large for float32: make it smaller and "
+                "`reset()` the waves"
+            )
+        limit = self._limit
+        limited = limit is not None and limit.may_bend(highest)
+        with self._gl as ctx:
+            if limit is not None and limited:
+                self._peak.write(bytes(4))
+                self._radii = self._radii or ctx.buffer(limit.radius.tobytes())
+            self._bind(self._around, self._peak, self._sources, field.buffer, self._radii)
+            self._run(ctx, self._limited if limited else self._heights, self._place_count)
+            texture.bind_to_image(0, read=True, write=True)
+            self._bind(self._around, self._weights, self._sources)
+            self._map["layer"] = layer
+            self._run(ctx, self._map, self._place_count)
+            self._bind(self._corner_places)
+            self._corners["layer"], self._corners["means"], self._corners["count"] = layer, *self._corner_counts
+            self._run(ctx, self._corners, self._corner_counts[1])
+            return float(np.frombuffer(self._peak.read(), np.float32)[0]) if limited else highest
+
+    def _bind(self, *buffers: moderngl.Buffer | None) -> None:
+        for binding, buffer in enumerate(buffers):
+            if buffer is not None:
+                buffer.bind_to_storage_buffer(binding)
+
+    def _run(self, ctx: moderngl.Context, shader: moderngl.ComputeShader, count: int) -> None:
+        if count:
+            shader.run(-(-count // _GROUP))
+            ctx.memory_barrier()
+
+
+class DeviceHeightMap:
+    """The height map of a field on the GPU, not yet made; `numpy.asarray` gives it as `HeightMap` does.
+
+    Attributes
+    ----------
+    gl : GLContext
+    shape : (C, n + 2, n + 2, 4)
+    """
+
+    def __init__(self, shaders: HeightMapShaders, field: DeviceField, on_host: Callable[[NDArray], NDArray]) -> None:
+        self._shaders, self._field, self._on_host = shaders, field, on_host
+        self.gl, self.shape = field.gl, shaders.shape
+
+    def fill(self, texture: moderngl.TextureArray, layer: int) -> float:
+        """Write it into a texture; see `HeightMapShaders.fill`."""
+        return self._shaders.fill(self._field, texture, layer)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray:
+        return self._on_host(self._field.read()).astype(np.float32 if dtype is None else dtype, copy=False)
+
+
+def _tables(topology: TexelTopology) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    """The texel that each place of the charts with halo shows, [C, n + 2, n + 2], and the corners that show none.
+
+    A corner is a row of its place and the three about it: first of those with their mean, then of those in a fixed rim,
+    where the four heights have a mean of 0.
+    """
+    sources = np.where(topology.halo >= 0, topology.halo, _NONE)
+    mirrored = topology.rim & (topology.halo >= 0) if topology.fixed_rim else np.zeros_like(topology.rim)
+    sources[mirrored] = _NONE - 1 - topology.halo[mirrored]
+    place = np.arange(sources.size).reshape(sources.shape)
+    last = sources.shape[1] - 1
+    means, ends = [], []
+    for corner, (r, c) in enumerate(((0, 0), (0, last), (last, last), (last, 0))):
+        r_in, c_in = abs(r - 1), abs(c - 1)
+        rows = np.stack([place[:, r, c], place[:, r_in, c_in], place[:, r_in, c], place[:, r, c_in]], axis=1)
+        means.append(rows[topology.halo[:, r, c] < 0])
+        ends.append(rows[topology.valence[:, corner] == 0] if topology.fixed_rim else rows[:0])
+    return sources.astype(np.int32), np.concatenate(means).astype(np.int32), np.concatenate(ends).astype(np.int32)
+
 
 # Weight of the second-order terms' regularisation, relative to the squared distances that they multiply.
 _REGULARISATION = 1e-4

@@ -1,4 +1,7 @@
-"""An atlas whose vertices move, and the operator on it."""
+"""An atlas whose vertices move, and the operator on it.
+
+Gradients of the height on a surface that has moved, from those on the surface at rest.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +11,20 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.checked import shown
-from ripple_sim.solver.errors import RippleWarning, SolverError
-from ripple_sim.solver.kernel import Floats, Ints, kernel
-from ripple_sim.solver.mesh.folds import Folds
-from ripple_sim.solver.mesh.mesh import Mesh
-from ripple_sim.solver.mesh.triangle_tree import refitted
-from ripple_sim.solver.operator.material import Material
-from ripple_sim.solver.operator.moving import MovingOperator
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-from ripple_sim.solver.texels.atlas import Atlas
-from ripple_sim.solver.texels.moved_stencil import MovedPlaces
-from ripple_sim.solver.texels.riding import SurfaceRide
-from ripple_sim.solver.texels.texel_mesh import TexelMesh
+from ..errors import RippleWarning, SolverError, shown
+from ..kernel import Floats, Floats32, Ints, kernel
+from ..mesh.closest import refitted
+from ..mesh.mesh import Mesh
+from ..mesh.topology import Folds
+from ..operator.assembly import MovingOperator
+from ..operator.material import Material
+from ..operator.wave_operator import WaveOperator
+from ..texels.atlas import Atlas
+from ..texels.moving import MovedPlaces
+from ..texels.riding import SurfaceRide
+from ..texels.texel_mesh import TexelMesh
+from ..texels.topology import fill_halo
+from .height_map import mirror_at_rim
 
 # The stiffness is made anew once the square of an edge's length has changed by this share since it was made.
 _CHANGED = 2e-3
@@ -152,3 +156,53 @@ def _squared(V: Floats, edges: Ints, i: int) -> float:
     for k in range(3):
         total += (V[b, k] - V[a, k]) ** 2
     return total
+
+
+class MovedGradients:
+    """Turns a height map of the surface at rest into that of the moved one.
+
+    Heights stay with the texels, so that their differences along rows and columns stay, while the ways there change.
+
+    Parameters
+    ----------
+    rest : Atlas
+    """
+
+    def __init__(self, rest: Atlas) -> None:
+        self._texels, self._ride = rest.texels, SurfaceRide(rest)
+        self._rest = _tangents(rest.texels.halo_positions)
+
+    def __call__(self, height_map: NDArray[np.float32], V: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Height map [C, n + 2, n + 2, 4], see `HeightMap`, where the vertices are at V [vertex_count, 3] [m]."""
+        moved = np.array(height_map, np.float32)
+        _carry(self._rest, _tangents(np.moveaxis(self._ride.around(V), 0, -1)), moved)
+        fill_halo(self._texels.topology, moved)
+        mirror_at_rim(self._texels.topology, moved)
+        return moved
+
+
+def _tangents(around: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Differences of positions along rows and columns, [C, n, n, 2, 3], one-sided at a rim without positions."""
+    own = around[:, 1:-1, 1:-1]
+    beside = (around[:, 1:-1, 2:], around[:, 1:-1, :-2], around[:, 2:, 1:-1], around[:, :-2, 1:-1])
+    east, west, north, south = (np.where(np.isfinite(each), each, own) for each in beside)
+    return np.stack([east - west, north - south], axis=3)
+
+
+@kernel
+def _carry(rest: Floats, moved: Floats, height_map: Floats32) -> None:
+    """Replace gradients: those of the same differences along the moved tangents."""
+    charts, n = rest.shape[:2]
+    for chart in range(charts):
+        for r in range(n):
+            for c in range(n):
+                g, t, m = height_map[chart, r + 1, c + 1], rest[chart, r, c], moved[chart, r, c]
+                a = t[0, 0] * g[0] + t[0, 1] * g[1] + t[0, 2] * g[2]
+                b = t[1, 0] * g[0] + t[1, 1] * g[1] + t[1, 2] * g[2]
+                uu = m[0, 0] ** 2 + m[0, 1] ** 2 + m[0, 2] ** 2
+                vv = m[1, 0] ** 2 + m[1, 1] ** 2 + m[1, 2] ** 2
+                uv = m[0, 0] * m[1, 0] + m[0, 1] * m[1, 1] + m[0, 2] * m[1, 2]
+                area = max(uu * vv - uv * uv, 1e-6 * uu * vv)
+                along, across = (vv * a - uv * b), (uu * b - uv * a)
+                for k in range(3):
+                    g[k] = (along * m[0, k] + across * m[1, k]) / area if area > 0 else 0.0

@@ -1,29 +1,96 @@
-"""The wave solver: impulses and loads in, time steps forward."""
+"""The wave solver: impulses and loads in, time steps forward.
+
+How many substeps a step takes.
+
+All that decides how waves go on: what one solver hands to another.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from ripple_sim.solver.backends.backend import make_backend
-from ripple_sim.solver.checked import checked, instance
-from ripple_sim.solver.errors import SolverError
-from ripple_sim.solver.memory import require_memory
-from ripple_sim.solver.operator.assembly import build_operator
-from ripple_sim.solver.operator.material import Material
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-from ripple_sim.solver.operator.wavelengths import warn_of_wavelengths
-from ripple_sim.solver.texels.atlas import Atlas
-
-from .finite import require_finite
-from .finite_guard import Source
+from ..backends.backend import make_backend
+from ..errors import SolverError, checked, instance, shown, whole
+from ..files import require_memory
+from ..operator.assembly import build_operator
+from ..operator.material import Material, warn_of_wavelengths
+from ..operator.wave_operator import WaveOperator
+from ..texels.atlas import Atlas
+from .finite import Source, require_finite
 from .load import Load
 from .motion import Motion
-from .substeps import count_substeps
-from .wave_sources import WaveSources
-from .wave_state import WaveState
+from .wave_field import WaveSources
+
+# A step that needs more is a mistake in a unit, and would run for ever.
+_MOST = 1_000_000
+_ONE_OR_MORE = whole(1)
+
+
+def count_substeps(dt: float, stable: float, asked: int | None) -> int:
+    """Number of equal substeps for a step of dt [s], at most `stable` [s] long each.
+
+    Parameters
+    ----------
+    dt, stable : float
+        [s].
+    asked : int or None
+        How many the caller wants; None: the fewest.
+
+    Raises
+    ------
+    SolverError
+        If the step would take far too many, or fewer are asked for than stability allows.
+    """
+    ratio = dt / stable * (1 - 1e-12)
+    if not ratio < _MOST:
+        raise SolverError(
+            f"a step of {dt:.4g} s would take {ratio:.3g} substeps of the stable {stable:.4g} s; "
+            f"valid are {_MOST} at most: take shorter steps, or a material with slower waves"
+        )
+    needed = max(1, int(np.ceil(ratio)))
+    if asked is None:
+        return needed
+    if not (_ONE_OR_MORE.holds(asked) and asked <= _MOST):
+        raise SolverError(
+            f"substeps is {shown(asked)}; valid is {_ONE_OR_MORE.words}, up to {_MOST}, or None for the fewest"
+        )
+    if asked < needed:
+        raise SolverError(
+            f"{asked} substeps of {dt / max(asked, 1):.4g} s are longer than the stable {stable:.4g} s; "
+            f"use {needed} or more substeps, or leave the number out"
+        )
+    return asked
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class WaveState:
+    """The state of a wave solver at a time; see `WaveSolver.state`.
+
+    Attributes
+    ----------
+    elastic, dent : float32 [C, n, n]
+        The part of the height that springs back and the part that stays [m]; the height is their sum.
+    velocity : float32 [C, n, n]
+        [m/s].
+    held : Load
+        Forces held until further notice.
+    time, substep : float
+        [s]; the substep is the latest one, which `energy` needs.
+    substeps_taken : int
+    """
+
+    elastic: NDArray[np.float32]
+    dent: NDArray[np.float32]
+    velocity: NDArray[np.float32]
+    held: Load
+    time: float
+    substep: float
+    substeps_taken: int
+
 
 # Memory for each texel while a solver is made, at least [bytes]; half of it is kept.
 _TEXEL = 300

@@ -3,7 +3,7 @@
 import pytest
 from small_batch import new_batch
 
-from ripple_sim.batch.batch_folder import BatchFolder
+from ripple_sim.batch.folder import BatchFolder
 from ripple_sim.batch.make_scene import make_scene
 
 

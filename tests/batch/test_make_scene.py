@@ -8,8 +8,8 @@ import pytest
 from small_batch import files, new_batch
 
 from ripple_sim.batch import make_scene as module
-from ripple_sim.batch.load_batch import load_batch
 from ripple_sim.batch.make_scene import make_scene
+from ripple_sim.batch.report import load_batch
 
 
 def test_a_scene_has_the_same_bytes_in_another_folder_and_order(unbroken, tmp_path):

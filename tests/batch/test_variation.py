@@ -3,11 +3,8 @@ import numpy as np
 import pytest
 from small_batch import PLAN, small_plan
 
-from ripple_sim.batch.key_path import Step, parse_key
-from ripple_sim.batch.plan import read_plan
-from ripple_sim.batch.variation import Variation
-from ripple_sim.batch.vary_model import vary_model
-from ripple_sim.batch.vary_table import vary_table
+from ripple_sim.batch.plan import Step, parse_key, read_plan
+from ripple_sim.batch.variation import Variation, vary_model, vary_table
 from ripple_sim.errors import SceneError
 from ripple_sim.scenes.shapes import LIMBED_FILE
 

@@ -3,7 +3,7 @@
 import pytest
 
 from ripple_sim.bench.coupling import coupling_cost
-from ripple_sim.scenes.implicit import ellipsoid, polygonise
+from ripple_sim.scenes.shapes import ellipsoid, polygonise
 
 
 def coarse_egg():

@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 from exposed_scene import MJCF, SHOT, THROW, TOML
 
-from ripple_sim.scene.camera_override import with_exposure
 from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.scene.scene import Scene
+from ripple_sim.scene.scene import Scene, with_exposure
 
 
 @pytest.fixture

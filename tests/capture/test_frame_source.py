@@ -1,17 +1,25 @@
-"""Motion blur and depth of field: streaks as long and discs as wide as a camera's, and no light lost."""
+"""Motion blur and depth of field: streaks as long and discs as wide as a camera's, and no light lost.
+
+Averaging pixels: in linear light, weighted by opacity.
+
+Where the camera of a scene stands: free, fixed, orbiting, tracking a body.
+"""
 
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from exposed_scene import DISTANCE, FOVY, FPS, HEIGHT, SPEED, WIDTH, linear
 from PIL import Image
 
-from ripple_sim.capture.frame_source import FrameSource
+from ripple_sim.capture.frame_source import FrameSource, Sensor, focal_distance, viewpoint
 from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.errors import SceneError, VideoError
-from ripple_sim.scene.camera_override import with_exposure
-from ripple_sim.scene.scene import Scene
+from ripple_sim.render import Camera
+from ripple_sim.render.camera import ThroughLens, perspective, view_matrix
+from ripple_sim.scene.scene import Scene, with_exposure
+from ripple_sim.scene.scene_file import CameraEntry, check_camera
 from ripple_sim.simulation import Simulation
 from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import Progress, render_video
@@ -169,3 +177,180 @@ def test_a_blurred_video_is_resumed_to_the_same_one(make_scene, tmp_path):
 def test_what_no_camera_can_do_is_refused(make_scene, wrong, message):
     with pytest.raises(SceneError, match=message):
         make_scene(**wrong)
+
+
+def shrink(picture: np.ndarray, factor: int) -> np.ndarray:
+    frame = Sensor(factor).expose(picture)
+    assert frame is not None
+    return frame
+
+
+@pytest.mark.parametrize("factor", [1, 2, 3])
+@pytest.mark.parametrize("channels", [3, 4])
+def test_even_areas_keep_their_colour(factor, channels):
+    small = np.random.default_rng(1).integers(0, 256, (5, 7, channels), np.uint8)
+    small[..., 3:] = 255
+    np.testing.assert_array_equal(shrink(small.repeat(factor, axis=0).repeat(factor, axis=1), factor), small)
+
+
+def test_all_values_survive():
+    small = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, axis=2)
+    np.testing.assert_array_equal(shrink(small.repeat(2, axis=0).repeat(2, axis=1), 2), small)
+
+
+def test_black_and_white_average_to_half_the_light():
+    frame = np.zeros((2, 2, 3), np.uint8)
+    frame[:, 0] = 255
+    assert shrink(frame, 2).tolist() == [[[188, 188, 188]]]  # sRGB of 0.5
+
+
+def test_transparent_pixels_lend_no_colour():
+    frame = np.zeros((2, 2, 4), np.uint8)
+    frame[0, 0] = (200, 100, 50, 255)
+    frame[1, 1] = (0, 255, 0, 0)
+    assert shrink(frame, 2).tolist() == [[[200, 100, 50, 64]]]
+    assert shrink(np.zeros((2, 2, 4), np.uint8), 2).tolist() == [[[0, 0, 0, 0]]]
+
+
+def test_linear_light_is_averaged_as_it_is() -> None:
+    rng = np.random.default_rng(5)
+    pictures = np.exp(rng.uniform(-5, 8, (3, 8, 6, 4))).astype(np.float16)
+    sensor = Sensor(factor=2, exposures=3)
+    assert sensor.expose(pictures[0]) is None
+    assert sensor.expose(pictures[1]) is None
+    frame = sensor.expose(pictures[2])
+    assert frame is not None
+    assert frame.dtype == np.float16
+    expected = pictures.astype(float).reshape(3, 4, 2, 3, 2, 4).mean(axis=(0, 2, 4))
+    np.testing.assert_allclose(frame, expected, rtol=1e-3)
+
+
+def test_the_sensor_averages_light_over_exposures():
+    black, white = np.zeros((2, 3, 3), np.uint8), np.full((2, 3, 3), 255, np.uint8)
+    sensor = Sensor(exposures=2)
+    for _ in range(2):  # the second frame keeps nothing of the first
+        assert sensor.expose(black) is None
+        np.testing.assert_array_equal(sensor.expose(white), 188)  # sRGB of half the light
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+def test_the_sensor_averages_codes_and_linear_light_alike(channels):
+    codes = np.random.default_rng(6).integers(0, 256, (3, 4, 6, channels), dtype=np.uint8)
+    light = linear(codes)
+    light[..., 3:] = codes[..., 3:] / 255
+    light[..., :3] *= light[..., 3:] if channels == 4 else 1
+    sensor, meter = Sensor(2, 3), Sensor(2, 3)
+    for number in range(3):
+        frame, mean = sensor.expose(codes[number]), meter.expose(light[number].astype(np.float32))
+    np.testing.assert_allclose(mean, light.reshape(3, 2, 2, 3, 2, channels).mean(axis=(0, 2, 4)), rtol=1e-5)
+    assert frame.dtype == np.uint8
+    expected = mean[..., :3] / (mean[..., 3:] if channels == 4 else 1)
+    np.testing.assert_allclose(linear(frame)[..., :3], expected, atol=5e-3)
+    np.testing.assert_allclose(frame[..., 3:] / 255, mean[..., 3:], atol=2e-3)
+
+
+MJCF = """<mujoco><worldbody>
+<geom name="lamp" size="0.1" pos="1 0.5 3"/>
+<camera name="corner" pos="3 -2 1" xyaxes="0 1 0 0 0 1"/>
+<body name="cart" pos="0.5 0.25 1"><freejoint/><geom size="0.1"/>
+<body name="flag" pos="0 0 2"><geom size="0.1"/></body></body>
+</worldbody></mujoco>"""
+
+
+@pytest.fixture
+def world() -> tuple[mujoco.MjModel, mujoco.MjData]:
+    model = mujoco.MjModel.from_xml_string(MJCF)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def test_the_free_camera_looks_at_the_middle_of_the_model(world):
+    model, data = world
+    pose = viewpoint(model, data, CameraEntry(distance=2.0), 0.0).pose()
+    np.testing.assert_allclose(pose.focus, model.stat.center)
+    assert np.linalg.norm(pose.position - pose.focus) == pytest.approx(2.0)
+
+
+def test_an_orbiting_camera_goes_round_what_it_looks_at(world):
+    for entry in (CameraEntry(distance=2.0, orbit=30.0), CameraEntry(name="corner", orbit=30.0)):
+        start, quarter, full = (viewpoint(*world, entry, time).pose() for time in (0.0, 3.0, 12.0))
+        np.testing.assert_allclose(quarter.focus, start.focus, atol=1e-12)
+        before, after = (pose.position - pose.focus for pose in (start, quarter))
+        np.testing.assert_allclose(after, [-before[1], before[0], before[2]], atol=1e-12)
+        np.testing.assert_allclose(full.position, start.position, atol=1e-12)
+        np.testing.assert_allclose(full.rotation, start.rotation, atol=1e-12)
+
+
+def test_a_tracking_camera_moves_along_with_the_centre_of_mass(world):
+    model, data = world
+    entry = CameraEntry(track="cart", lookat=(0.0, 0.0, 0.5), distance=2.0)
+    before = viewpoint(model, data, entry, 0.0).pose()
+    np.testing.assert_allclose(before.focus, [0.5, 0.25, 2.0 + 0.5])  # cart and flag weigh the same
+    data.qpos[:3] += [1.0, -3.0, 0.25]
+    mujoco.mj_forward(model, data)
+    after = viewpoint(model, data, entry, 0.0).pose()
+    np.testing.assert_allclose(after.position - before.position, [1.0, -3.0, 0.25])
+    np.testing.assert_array_equal(after.rotation, before.rotation)
+
+
+def test_a_tracking_camera_of_the_model_turns_to_the_body_upright(world):
+    model, data = world
+    entry = CameraEntry(name="corner", track="flag")
+    for shift in ([0.0, 0.0, 0.0], [1.0, -3.0, 2.0]):
+        data.qpos[:3] = np.add([0.5, 0.25, 1.0], shift)
+        mujoco.mj_forward(model, data)
+        pose = viewpoint(model, data, entry, 0.0).pose()
+        np.testing.assert_array_equal(pose.position, [3.0, -2.0, 1.0])
+        np.testing.assert_allclose(pose.focus, data.body("flag").xpos)
+        np.testing.assert_allclose(pose.rotation.T @ pose.rotation, np.eye(3), atol=1e-12)
+        assert np.linalg.det(pose.rotation) == pytest.approx(1.0)
+        assert pose.rotation[2, 0] == 0  # level
+        assert pose.rotation[2, 1] > 0  # and not upside down
+
+
+def test_a_camera_focuses_on_what_it_is_told_to(world):
+    model, data = world
+    free = {"lookat": (0.0, 0.0, 1.0), "distance": 4.0, "azimuth": 0.0, "elevation": 0.0}  # looks along x, from x = -4
+    for focus, depth in ((None, 4.0), (1.5, 1.5), ("cart", 4.5), ("lamp", 5.0), ((2.0, 7.0, -3.0), 6.0)):
+        entry = CameraEntry(**free, focus=focus)
+        check_camera(model, entry)
+        assert focal_distance(model, data, entry, viewpoint(model, data, entry, 0.0).pose()) == pytest.approx(depth)
+    entry = CameraEntry(**free, focus="cart")
+    pose = viewpoint(model, data, entry, 0.0).pose()
+    for shift, depth in ((1.0, 5.5), (-9.0, 0.08)):  # behind the camera: as near as anything is drawn
+        data.qpos[0] = 0.5 + shift
+        mujoco.mj_forward(model, data)
+        assert focal_distance(model, data, entry, pose) == pytest.approx(depth)
+
+
+def test_the_eye_goes_over_the_lens_and_the_focal_plane_stays(world):
+    camera = Camera((0.1, 0.2, 0.3), distance=3.0, azimuth=130.0, elevation=-25.0, fovy=40.0)
+    lens, focus, aspect = (0.05, -0.02), 2.0, 1.5
+    middle, pose = camera.pose(), ThroughLens(camera, lens, focus).pose()
+    half = np.tan(np.radians(20.0))
+    for depth in (0.5, focus, 9.0):
+        point = middle.position + middle.rotation @ [0.3, -0.2, -depth]
+        seen = []
+        for each in (middle, pose):
+            clip = perspective(40.0, aspect, 0.1, 50.0, each.shear) @ view_matrix(each) @ [*point, 1.0]
+            x, y = clip[:2] / clip[3]
+            seen.append([half * aspect * x, half * y])
+            # the ray that the shaders send through that pixel meets the point
+            way = each.rotation @ [seen[-1][0] + each.shear[0], seen[-1][1] + each.shear[1], -1.0]
+            np.testing.assert_allclose(each.eye + depth * way, point, atol=1e-12)
+        # thin lens: a point of the aperture sees it shifted by its share of the circle of confusion
+        np.testing.assert_allclose(np.subtract(*seen[::-1]), np.array(lens) * (1 / focus - 1 / depth), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        (CameraEntry(name="ear"), "no camera 'ear'; its cameras are corner"),
+        (CameraEntry(focus="cat"), "nothing 'cat' .* its bodies are world, cart, flag; its geoms are lamp"),
+        (CameraEntry(track="cat"), "no body 'cat' for the camera to track; its bodies are world, cart, flag"),
+    ],
+)
+def test_what_the_model_does_not_have_is_refused(world, entry, message):
+    with pytest.raises(SceneError, match=message):
+        check_camera(world[0], entry)

@@ -1,4 +1,9 @@
-"""Snapshots hold the state of their time while the simulation goes on, and tell states apart bit for bit."""
+"""Snapshots hold the state of their time while the simulation goes on, and tell states apart bit for bit.
+
+The exposures of a frame: points of the lens, and times.
+
+States at times between physics steps.
+"""
 
 import dataclasses
 
@@ -8,10 +13,11 @@ import pytest
 from exposed_scene import FPS, SPEED, THROW
 
 from ripple_sim.capture.frame_source import FrameSource
-from ripple_sim.capture.snapshot import Snapshot, snapshots
+from ripple_sim.capture.snapshot import Exposures, ShutterTimes, Snapshot, disc_points, snapshots
+from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import HeightMap
-from ripple_sim.solver.backends.device_field import DeviceField
+from ripple_sim.solver.backends.gl_fields import DeviceField
 from ripple_sim.solver.gl import GLContext
 
 POKE = '[[poke]]\ngeom = "egg"\ntime = 0.01\npoint = [0.0, 0.0, 0.05]\nimpulse = 1e-4\nradius = 0.02\n'
@@ -114,3 +120,50 @@ def test_on_a_gpu_heights_stay_there_and_the_frames_are_the_same(make_scene, mon
     assert digests[0] == digests[1]
     assert len(set(digests[0])) == 3
     assert np.abs(frames[0] - frames[1]).max() <= 1
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 32, 100])
+def test_lens_points_fill_the_disc_evenly(count):
+    points = disc_points(count)
+    np.testing.assert_allclose(points.mean(axis=0), 0, atol=1e-12)
+    assert np.linalg.norm(points, axis=1).max(initial=0) <= 1.15
+    if count >= 32:
+        # of a full disc: a quarter along each axis, nothing between them
+        np.testing.assert_allclose(points.T @ points / count, np.eye(2) / 4, atol=0.02)
+
+
+def test_exposures_of_a_camera():
+    assert len(Exposures.of(CameraEntry())) == 1
+    assert not Exposures.of(CameraEntry(shutter=180.0, aperture=0.1, exposures=1)).offsets.any()
+    exposures = Exposures.of(CameraEntry(shutter=180.0, aperture=0.1, exposures=40))
+    np.testing.assert_allclose(exposures.times, np.arange(40) / 80)
+    # whatever part of the time is looked at, the eye has been all over the lens
+    for begin in range(0, 40, 10):
+        part = exposures.offsets[begin : begin + 10]
+        assert np.linalg.norm(part.mean(axis=0)) < 0.015
+        assert 0.025 < np.linalg.norm(part, axis=1).mean() < 0.042
+
+
+def test_states_within_a_step_are_interpolated_and_do_not_change_the_motion(make_scene):
+    poke = '[[poke]]\ngeom = "egg"\ntime = 0.02\npoint = [0.0, 0.0, 0.05]\nimpulse = 1e-4\nradius = 0.02\n'
+    scene = make_scene(script=THROW + poke)
+    whole, parts = (Simulation(scene, fps=FPS, backend="cpu") for _ in range(2))
+    steps, dt = whole.steps_per_frame, whole.model.opt.timestep
+    times = np.array([0, 0.5, 1, 1.25, steps - 0.5, steps])
+    shutter_times = ShutterTimes(parts, times / steps)
+    for number in range(3):
+        begin, start, heights = whole.data.time, whole.data.body("shot").xpos[1], [whole.ripples["egg"].height]
+        for _ in range(steps):
+            whole.step()
+            heights.append(whole.ripples["egg"].height)
+        whole.advance_frame()
+        for time, (data, shown) in zip(times, shutter_times, strict=True):
+            assert data.time == pytest.approx(begin + time * dt, abs=1e-12)
+            if number:  # in frame 0 it stands still until the first step
+                assert data.body("shot").xpos[1] == pytest.approx(start - SPEED * time * dt, abs=1e-9)
+            before, after = heights[int(np.floor(time))], heights[int(np.ceil(time))]
+            np.testing.assert_allclose(shown["egg"], before + (time % 1) * (after - before), rtol=1e-5, atol=1e-9)
+        parts.advance_frame()
+        np.testing.assert_array_equal(parts.data.qpos, whole.data.qpos)
+        np.testing.assert_array_equal(parts.ripples["egg"].height, whole.ripples["egg"].height)
+    assert whole.ripples["egg"].height.any()

@@ -1,11 +1,20 @@
-"""Words of the command line: what they mean, and what is said where they mean nothing."""
+"""Words of the command line: what they mean, and what is said where they mean nothing.
 
+The command line of a video has every option of `VideoOptions`, with its default and its type.
+"""
+
+import dataclasses
 import math
+import re
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from ripple_sim.cli import arguments
+from ripple_sim.cli.parser import UsageError, View, parse
+from ripple_sim.cli.render import Drop, Render
+from ripple_sim.video.options import VideoOptions
 
 
 @pytest.mark.parametrize(
@@ -67,3 +76,95 @@ def test_numbers_that_are_read_are_finite(parse: Callable[[str], float]) -> None
         assert math.isfinite(parse(word))
     with pytest.raises(ValueError, match="valid"):
         parse("1e999")
+
+
+WORDS = {
+    "size": ("320x180", (320, 180)),
+    "fps": ("24", 24),
+    "duration": ("0.5", 0.5),
+    "slow_motion": ("4", 4.0),
+    "supersample": ("2", 2),
+    "shutter": ("180", 180.0),
+    "aperture": ("0.02", 0.02),
+    "focus": ("stone", "stone"),
+    "exposures": ("8", 8),
+    "transparent": (None, True),
+    "frame_format": ("exr", "exr"),
+    "passes": ("depth,flow", ("depth", "flow")),
+    "pass_format": ("exr", "exr"),
+    "overlay": ("height,time", ("height", "time")),
+    "compare": ("paper", "paper"),
+    "resolution": ("48", 48),
+    "layout": ("patches", "patches"),
+    "rim": ("fixed", "fixed"),
+    "backend": ("cpu", "cpu"),
+    "resume": (None, True),
+    "overwrite": (None, True),
+}
+COMMANDS = {"render": ("duck", Render), "drop": ("mesh.obj", Drop)}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_without_options_they_are_those_of_python(command: str) -> None:
+    name, kind = COMMANDS[command]
+    made = parse([command, name, "-o", "clip.mp4"])
+    assert isinstance(made, kind)
+    assert made.output == Path("clip.mp4")
+    assert made.options() == VideoOptions()
+
+
+def test_every_option_has_a_word_in_this_test() -> None:
+    assert list(WORDS) == [field.name for field in dataclasses.fields(VideoOptions)]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("option", WORDS)
+def test_an_option_changes_its_own_field_alone(command: str, option: str) -> None:
+    word, value = WORDS[option]
+    flag = [f"--{option.replace('_', '-')}", *([] if word is None else [word])]
+    made = parse([command, COMMANDS[command][0], "--output", "clip.mp4", *flag])
+    assert made.options() == dataclasses.replace(VideoOptions(), **{option: value})
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["render", "duck"], "--output"),
+        (["render", "-o", "a.mp4"], "SCENE"),
+        (["render", "duck", "-o", "a.mp4", "--fps", "0"], "'0' is not valid; it must be a whole number, 1 or more"),
+        (["drop", "m.obj", "-o", "a.mp4", "--up", "x"], "'x' is not valid; it must be"),
+        (["drop", "m.obj", "-o", "a.mp4", "--size", "big"], "'big' is not a frame size"),
+        (["view", "duck", "--port", "-1"], "-1"),
+        (["render", "duck", "-o", "a.mp4", "--backend", "cuda"], "cuda"),
+        (["render", "duck", "-o", "a.mp4", "--no-such-option"], "no-such-option"),
+        (["fly"], "fly"),
+        ([], ""),
+    ],
+)
+def test_a_usage_error_is_one_line_with_the_cause_and_the_help(words: list[str], said: str) -> None:
+    with pytest.raises(UsageError) as error:
+        parse(words)
+    text = str(error.value)
+    assert said in text
+    assert "\n" not in text
+    assert not set(text) & set("│╭╰─")
+    assert re.search(r"; see ripple-sim( [a-z]+)? --help$", text)
+
+
+def test_the_commands_have_their_own_arguments() -> None:
+    drop = parse(["drop", "m.obj", "-o", "a.mp4", "--bodies", "3", "--seed", "7", "--up", "y", "--repair", "--wrap"])
+    assert (drop.mesh, drop.bodies, drop.seed, drop.up) == (Path("m.obj"), 3, 7, "y")
+    assert drop.repair
+    assert drop.wrap
+    render = parse(["render", "duck", "-o", "a.mp4", "--camera", "side", "--device", "1"])
+    assert (render.scene, render.camera, render.device) == ("duck", "side", 1)
+    view = parse(["view", "duck", "--bodies", "0", "--size", "320x200", "--web", "--port", "9000"])
+    assert isinstance(view, View)
+    assert (view.bodies, view.size, view.web, view.port, view.benchmark) == (0, (320, 200), True, 9000, False)
+    assert view.folder == Path()
+
+
+def test_help_is_printed_and_no_command_made(capsys: pytest.CaptureFixture[str]) -> None:
+    assert parse(["render", "--help"]) is None
+    text = capsys.readouterr().out
+    assert all(f"--{option.replace('_', '-')}" in text for option in WORDS)

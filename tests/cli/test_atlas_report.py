@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from ripple_sim.cli.atlas_report import atlas_report, report_text
+from ripple_sim.cli.atlas import atlas_report, report_text
 from ripple_sim.solver import Atlas, Mesh, build_atlas
 
 

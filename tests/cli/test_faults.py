@@ -59,13 +59,13 @@ def test_without_streams_home_and_cache_an_atlas_is_whole(tmp_path: Path) -> Non
 def test_a_full_disk_is_no_bad_input(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from ripple_sim.solver.texels import atlas_file
+    from ripple_sim.solver.texels import atlas
 
     def full(file: BinaryIO, *_: object) -> None:
         file.write(b"half")
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(atlas_file, "write_arrays", full)
+    monkeypatch.setattr(atlas, "write_arrays", full)
     (tmp_path / "mesh.obj").write_text(MESH)
     assert cli.main(["atlas", str(tmp_path / "mesh.obj"), "--resolution", "4", "-o", str(tmp_path / "a.npz")]) == 1
     assert capsys.readouterr().err.endswith("a.npz' cannot be written: No space left on device\n")

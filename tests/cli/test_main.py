@@ -10,7 +10,7 @@ import warnings
 
 import pytest
 
-from ripple_sim.cli import info_command
+from ripple_sim.cli import info
 from ripple_sim.cli import main as cli
 from ripple_sim.errors import EncodingError, RippleWarning, SceneError
 from ripple_sim.solver.errors import GLError
@@ -123,7 +123,7 @@ def test_a_place_that_cannot_be_written_is_a_failure_in_one_line(capsys):
 
 
 def test_a_device_that_is_not_there_is_a_failure_in_one_line(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("ripple_sim.solver.gl.shared._selected", None)  # put back after the test
+    monkeypatch.setattr("ripple_sim.solver.gl.context._selected", None)  # put back after the test
     assert cli.main(["render", "sphere", "-o", str(tmp_path / "clip.mp4"), "--device", "77"]) == 1
     assert re.fullmatch(r"ripple-sim: no OpenGL .* on EGL device 77 .*\n", capsys.readouterr().err)
     assert list(tmp_path.iterdir()) == []
@@ -212,7 +212,7 @@ def test_the_exit_status_tells_what_kind_of_error_it_was(monkeypatch, capsys, er
     def run(self):
         raise error
 
-    monkeypatch.setattr(info_command.Info, "run", run)
+    monkeypatch.setattr(info.Info, "run", run)
     assert cli.main(["info"]) == status
     line = capsys.readouterr().err
     assert line.startswith("ripple-sim: ")
@@ -223,7 +223,7 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
     def run(self):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(info_command.Info, "run", run)
+    monkeypatch.setattr(info.Info, "run", run)
     with pytest.raises(ZeroDivisionError):
         cli.main(["info"])
 
@@ -231,13 +231,13 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
 @pytest.mark.parametrize(
     ("number", "status", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
 )
-@pytest.mark.parametrize("where", ["cli._parse = meet_signal", "info_command.Info.run = meet_signal"])
+@pytest.mark.parametrize("where", ["cli._parse = meet_signal", "info.Info.run = meet_signal"])
 def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_path, number, status, word, where):
     (tmp_path / "slow.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\nfor _ in range(10**9): pass\n")
     code = (
         "import signal, sys\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # which a job in the background has ignored
-        "from ripple_sim.cli import info_command\n"
+        "from ripple_sim.cli import info\n"
         "from ripple_sim.cli import main as cli\n"
         "def meet_signal(argument):\n"
         "    import slow\n"
@@ -256,7 +256,7 @@ def test_an_interrupted_command_says_what_is_left(monkeypatch, capsys):
         ending.add_note("48 frames are kept")
         raise ending
 
-    monkeypatch.setattr(info_command.Info, "run", run)
+    monkeypatch.setattr(info.Info, "run", run)
     assert cli.main(["info"]) == 130
     assert capsys.readouterr().err == "ripple-sim: interrupted; 48 frames are kept\n"
 
@@ -266,7 +266,7 @@ def test_a_warning_is_one_line_and_the_handler_is_given_back(monkeypatch, capsys
         warnings.warn("the hull is\noff the surface", RippleWarning, stacklevel=1)
 
     before = warnings.showwarning
-    monkeypatch.setattr(info_command.Info, "run", run)
+    monkeypatch.setattr(info.Info, "run", run)
     assert cli.main(["info"]) == 0
     assert capsys.readouterr().err == "ripple-sim: warning: the hull is off the surface\n"
     assert warnings.showwarning is before

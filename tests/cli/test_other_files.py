@@ -9,12 +9,12 @@ from PIL import Image
 
 from ripple_sim.cli import main as cli
 from ripple_sim.encode import FrameWriter, check_output, open_writer
-from ripple_sim.encode.mark import made_here
+from ripple_sim.encode.replace import made_here
 from ripple_sim.errors import EncodingError, ExportError, VideoError
-from ripple_sim.export.endings import check_export
-from ripple_sim.figures.plot_page import check_plot_path
+from ripple_sim.export.place import check_export
+from ripple_sim.figures.atlas_plot import check_plot_path
 from ripple_sim.solver import AtlasError, RippleError, load_atlas, sphere_atlas
-from ripple_sim.solver.texels.atlas_file import check_atlas_place
+from ripple_sim.solver.texels.atlas import check_atlas_place
 
 SIZE = {"width": 32, "height": 16, "fps": 25}
 FRAME = np.full((16, 32, 3), 90, np.uint8)

@@ -15,9 +15,7 @@ from packaging.requirements import Requirement
 from PIL import Image
 
 from ripple_sim import VideoOptions, load_scene
-from ripple_sim.cycles.blender import PYTHON
-from ripple_sim.cycles.render_cycles import check_cycles, render_cycles
-from ripple_sim.cycles.tone_mapping import tone_mapped
+from ripple_sim.cycles.render import PYTHON, check_cycles, render_cycles, tone_mapped
 from ripple_sim.errors import RippleError, RippleWarning, VideoError
 from ripple_sim.render import Camera, Renderer
 from ripple_sim.solver.gl import shared_context

@@ -60,13 +60,13 @@ RETIRED = {
 
 # Retired words that stay: the beginning of the path, the word, and why.
 ALLOWED = [
-    ("solver/sphere_map/", "ring", "the one-ring of a vertex"),
-    ("solver/sphere_map/", "carried", "area of collapsed vertices, which the kept ones stand for"),
-    ("solver/sphere_map/", "ahead", "a trial step of the descent"),
-    ("solver/sphere_map/", "folded", "a triangle that the map turns over"),
-    ("solver/patch_map/", "folded", "a triangle that the map turns over"),
-    ("solver/patches/", "folded", "a texel whose neighbours turn over"),
-    ("solver/texels/quality.py", "folded", "a texel whose neighbours turn over"),
+    ("solver/layouts/sphere_map/", "ring", "the one-ring of a vertex"),
+    ("solver/layouts/sphere_map/", "carried", "area of collapsed vertices, which the kept ones stand for"),
+    ("solver/layouts/sphere_map/", "ahead", "a trial step of the descent"),
+    ("solver/layouts/sphere_map/", "folded", "a triangle that the map turns over"),
+    ("solver/layouts/patches/", "folded", "a triangle that the map turns over"),
+    ("solver/layouts/patches/", "folded", "a texel whose neighbours turn over"),
+    ("solver/texels/texel_mesh.py", "folded", "a texel whose neighbours turn over"),
     ("solver/mesh/", "folded", "a polygon that turns over"),
     ("solver/", "piece", "part of a triangle, cut at the edges of the cube"),
     ("solver/", "pieces", "parts of a triangle"),
@@ -132,7 +132,7 @@ def test_no_name_has_a_retired_word() -> None:
         ("solver/shaders/a.glsl", "int RING_COUNT; // a relief", "RING_COUNT (say halo)"),
         ("ripple_sim/a.py", "# the relief\nstring = 'relief'\nbelief = 1", None),
         ("ripple_sim/a.py", "substring = bring(everywhere)", None),
-        ("solver/sphere_map/alignment.py", "ring = 1", None),
+        ("solver/layouts/sphere_map/certificate.py", "ring = 1", None),
     ],
 )
 def test_retired_words_are_found_in_names_only(tmp_path: Path, file: str, text: str, found: str | None) -> None:

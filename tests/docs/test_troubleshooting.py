@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from ripple_sim.encode.mark import MARK
+from ripple_sim.encode.replace import MARK
 
 ROOT = Path(__file__).parents[2]
 QUOTED = re.findall(

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from ripple_sim.encode.clip import Stream
-from ripple_sim.encode.encoder import QUEUE_FRAMES, Encoder
-from ripple_sim.encode.formats import Format, Segments
+from ripple_sim.encode.output import Format, Segments
 from ripple_sim.encode.part import Part
+from ripple_sim.encode.writer import QUEUE_FRAMES, Encoder
 
 STREAM, LENGTH = Stream(1, 1, 25), 3
 

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from ripple_sim.encode.clip import LOSSLESS, Clip, Stream
-from ripple_sim.encode.gif import join_gif
+from ripple_sim.encode.images import join_gif
 
 WIDTH, HEIGHT = 40, 24
 

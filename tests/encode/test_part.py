@@ -16,7 +16,7 @@ from PIL import Image
 from unfinished_videos import contents
 
 from ripple_sim.encode import FrameWriter, open_writer
-from ripple_sim.encode.formats import FRAMES_IN_CLIP
+from ripple_sim.encode.output import FRAMES_IN_CLIP
 from ripple_sim.errors import SimulationError, VideoError
 
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ripple_sim.encode.pass_files import PassFiles, check_passes
+from ripple_sim.encode.images import PassFiles, check_passes
 from ripple_sim.errors import VideoError
 
 DEPTH = np.linspace(1, 2, 12, dtype=np.float32).reshape(3, 4)

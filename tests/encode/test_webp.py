@@ -8,7 +8,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from ripple_sim.encode.clip import Stream
-from ripple_sim.encode.webp import join_webp
+from ripple_sim.encode.images import join_webp
 
 
 def noise(count: int, width: int, height: int, channels: int) -> np.ndarray:

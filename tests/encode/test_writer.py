@@ -11,7 +11,7 @@ from PIL import Image, ImageSequence
 
 from ripple_sim.encode import FrameWriter, check_output, default_fps, open_writer
 from ripple_sim.encode.clip import Stream
-from ripple_sim.encode.formats import FORMATS, FRAMES_IN_CLIP, Format
+from ripple_sim.encode.output import FORMATS, FRAMES_IN_CLIP, Format
 from ripple_sim.errors import EncodingError, VideoError
 from ripple_sim.solver.errors import RippleError
 

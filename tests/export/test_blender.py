@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ripple_sim import Exporter, Material, RippleError, Ripples
-from ripple_sim.cycles.blender import python_with_bpy
+from ripple_sim.cycles.render import python_with_bpy
 
 pytest.importorskip("pxr")
 

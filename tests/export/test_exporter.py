@@ -81,7 +81,7 @@ def test_a_file_without_frames_is_refused(ripples: Ripples, tmp_path: Path) -> N
 def test_a_full_disk_is_an_error_that_names_the_file(
     ripples: Ripples, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from ripple_sim.export.usd.usd_writer import UsdWriter
+    from ripple_sim.export.usd import UsdWriter
 
     def full(self: UsdWriter) -> None:
         raise OSError(28, "No space left on device")

@@ -8,7 +8,7 @@ from ripple_sim.export.moving_mesh import MovingMesh
 from ripple_sim.render.visuals.corners import smooth_normals
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, WaveSolver, build_atlas, sphere_atlas
-from ripple_sim.solver.texels.halo import with_filled_halo
+from ripple_sim.solver.texels.topology import with_filled_halo
 
 RESOLUTION = 16
 

@@ -19,10 +19,9 @@ from PIL import Image
 from ripple_sim import Exporter, ExportOptions, Material, RippleRenderer, Ripples, export_scene
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
-from ripple_sim.encode.mark import made_here
-from ripple_sim.export.html.coding import packed, parents_of, quantised, residuals
-from ripple_sim.export.html.ordering import local_order
+from ripple_sim.encode.replace import made_here
 from ripple_sim.export.moving_mesh import MovingMesh
+from ripple_sim.export.page_motion import local_order, packed, parents_of, quantised, residuals
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 

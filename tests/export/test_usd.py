@@ -10,8 +10,8 @@ import pytest
 
 from ripple_sim import Exporter, ExportOptions, Ripples, export_scene
 from ripple_sim.export.moving_mesh import MovingMesh
-from ripple_sim.scene.camera import CameraEntry
 from ripple_sim.scene.scene import Scene
+from ripple_sim.scene.scene_file import CameraEntry
 
 pxr = pytest.importorskip("pxr")
 from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdValidation  # noqa: E402

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.figures.atlas_painter import AtlasPainter
 from ripple_sim.figures.atlas_plot import plot_atlas
+from ripple_sim.figures.atlas_view import AtlasPainter
 from ripple_sim.solver import AtlasError
 
 

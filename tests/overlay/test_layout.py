@@ -2,7 +2,7 @@
 
 import pytest
 
-from ripple_sim.overlay.layout import Layout
+from ripple_sim.overlay.panels import Layout
 
 SIZES = [(320, 180), (640, 360), (1280, 720), (720, 1280), (3840, 2160)]
 

@@ -1,12 +1,15 @@
-"""Panels appear as requested, where they belong, and leave the rest of the frame alone."""
+"""Panels appear as requested, where they belong, and leave the rest of the frame alone.
+
+The plot of energy over time.
+"""
 
 import numpy as np
 import pytest
 
-from ripple_sim.overlay.layout import Layout
 from ripple_sim.overlay.notes import Notes, Scale
-from ripple_sim.overlay.painter import Painter
-from ripple_sim.scene.overlays import parse_request
+from ripple_sim.overlay.painter import EnergyPlot, Painter
+from ripple_sim.overlay.panels import Layout
+from ripple_sim.scene.scene import parse_request
 
 SIZE = (640, 360)
 CURVE = (np.linspace(0, 1, 9), np.ones(9))
@@ -62,3 +65,34 @@ def test_panels_of_one_corner_lie_below_one_another() -> None:
     both, clock = painted(["time", "grid"], notes()), painted(["time"], notes())
     under = np.nonzero((both != clock).any(axis=(1, 2)))[0]
     assert under.min() > np.nonzero((clock != 90).any(axis=(1, 2)))[0].max()
+
+
+def test_energy_plot_draws_values_at_their_height() -> None:
+    layout = Layout(1280, 720)
+    plot = EnergyPlot(layout, "energy", "J", 10.0)
+    times = np.linspace(0, 10, 300)
+
+    def row_of(value: float) -> float:
+        frame = np.full((400, 400, 3), 255, np.uint8)
+        plot.draw([(times, np.full(300, value))], 2.0, 2.0).over(frame, 0, 0)
+        blue = (frame[..., 2].astype(int) - frame[..., 0]) > 80
+        return float(np.flatnonzero(blue[:, 200]).mean())
+
+    low, middle, high = row_of(0.5), row_of(1.0), row_of(1.5)
+    assert low > middle > high
+    assert low - middle == pytest.approx(middle - high, abs=1.0)
+
+
+def test_energy_plot_grows_with_time() -> None:
+    layout = Layout(1280, 720)
+    plot = EnergyPlot(layout, "energy", "J", 10.0)
+
+    def reach(until: float) -> int:
+        times = np.linspace(0, until, 50)
+        frame = np.full((400, 400, 3), 255, np.uint8)
+        plot.draw([(times, np.ones(50))], 2.0, 2.0).over(frame, 0, 0)
+        blue = (frame[..., 2].astype(int) - frame[..., 0]) > 80
+        return int(np.flatnonzero(blue.any(axis=0)).max())
+
+    quarter, half, whole = reach(2.5), reach(5.0), reach(10.0)
+    assert half - quarter == pytest.approx((whole - quarter) / 3, abs=1.5)

@@ -1,19 +1,35 @@
-"""Panels fit, and their type stays inside and apart."""
+"""Panels fit, and their type stays inside and apart.
+
+Arrows of contacts: their length, what hides them, and that drawing stays inside the frame.
+
+Points on a frame and back, and what hides them.
+"""
 
 import itertools
+from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.overlay.colormap import colors
-from ripple_sim.overlay.comparison import TITLES
-from ripple_sim.overlay.energy_plot import EnergyPlot
-from ripple_sim.overlay.layout import Layout
-from ripple_sim.overlay.notes import Notes, Scale
-from ripple_sim.overlay.painter import Painter
-from ripple_sim.overlay.panels import arrow_key, color_bar, label
-from ripple_sim.overlay.sprite import Sprite, text_width
-from ripple_sim.scene.overlays import NAMES, parse_request
+from ripple_sim.coupling.ripples import Impulse
+from ripple_sim.overlay.marks import MEMORY, ContactMarks, Mark, Sprite, draw_arrow, text_width
+from ripple_sim.overlay.notes import TITLES, Notes, Scale, colors
+from ripple_sim.overlay.painter import EnergyPlot, Painter
+from ripple_sim.overlay.panels import (
+    Layout,
+    PlacedMark,
+    Projection,
+    arrow_key,
+    color_bar,
+    draw_marks,
+    label,
+    place_marks,
+)
+from ripple_sim.render import Camera
+from ripple_sim.render.camera import Pose
+from ripple_sim.scene.scene import NAMES, parse_request
+from ripple_sim.solver import sphere_atlas
 
 SIZES = [(320, 180), (640, 360), (720, 1280), (1280, 720), (3840, 2160)]
 
@@ -120,3 +136,176 @@ def test_bar_has_the_colors_of_its_values() -> None:
         assert nearest.min() <= 2
     middle = np.abs(row - colors(0.0, 0.02).astype(int)).sum(axis=1)
     assert abs(int(np.argmin(middle)) - bar.width / 2) < 3
+
+
+SIZE = (640, 480)
+LAYOUT = Layout(*SIZE)
+EMPTY = '<mujoco><worldbody><geom size=".1" pos="0 0 -9"/>{}</worldbody></mujoco>'
+FRONT = Projection(Camera((0, 0, 0), 5.0, 90.0, 0.0).pose(), *SIZE)
+
+
+def state(body: str = "") -> tuple[mujoco.MjModel, mujoco.MjData]:
+    model = mujoco.MjModel.from_xml_string(EMPTY.format(body))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def mark(
+    impulse: float, axis: tuple[float, float, float] = (1, 0, 0), place: tuple = (0, 0, 0), **fields: float
+) -> Mark:
+    return Mark(np.array(place, float), np.array(axis, float), impulse, **fields)
+
+
+@pytest.mark.parametrize(("impulse", "length"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0), (1.4, 1.4), (9.0, 1.5)])
+@pytest.mark.parametrize("distance", [0.0, 40.0])
+def test_an_arrow_across_the_view_is_as_long_as_its_impulse_at_any_distance(
+    impulse: float, length: float, distance: float
+) -> None:
+    [placed] = place_marks([mark(2 * impulse, place=(0, distance, 0))], 2.0, LAYOUT, FRONT, *state())
+    np.testing.assert_allclose(placed.tip, [320, 240], atol=1e-9)
+    np.testing.assert_allclose(placed.tail, [320 + length * LAYOUT.arrow_length, 240], atol=1e-9)
+
+
+def test_an_arrow_along_the_view_is_foreshortened_and_one_behind_the_camera_left_out() -> None:
+    marks = [mark(1.0, axis=(0, -1, 0), place=(0.5, 0, 0)), mark(1.0, place=(0, -9, 0))]
+    [placed] = place_marks(marks, 1.0, LAYOUT, FRONT, *state())
+    assert np.linalg.norm(placed.tail - placed.tip) < 0.2 * LAYOUT.arrow_length
+
+
+def test_hidden_parts_are_faint_and_fading_marks_fainter() -> None:
+    box = '<geom type="box" size=".2 .1 1" pos=".2 -1 0"/>'
+    reach = 0.4 / FRONT.metres(np.zeros(3)) / LAYOUT.arrow_length
+    [placed] = place_marks([mark(reach, place=(0.2, 0, 0), opacity=0.5)], 1.0, LAYOUT, FRONT, *state(box))
+    assert placed.opacity[0] == pytest.approx(0.15)
+    assert placed.opacity[-1] == pytest.approx(0.5)
+    assert set(np.round(placed.opacity, 9)) == {0.15, 0.5}
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("shift", [(0, 0), (-30, 20), (1000, 0), (0, -1000)])
+def test_a_mark_over_the_border_is_the_one_on_a_larger_frame_cut(shift: tuple[int, int], channels: int) -> None:
+    layout, opacity = Layout(1280, 720), np.ones(9)
+    tip, tail = np.array([40.3, 30.6]), np.array([-20.0, 60.0])
+    small, large = (np.full((*size, channels), 200, np.uint8) for size in ((60, 80), (3060, 3080)))
+    draw_marks(small, [PlacedMark(tip + shift, tail + shift, opacity)], layout)
+    draw_marks(large, [PlacedMark(tip + shift + 1500, tail + shift + 1500, opacity)], layout)
+    np.testing.assert_allclose(small.astype(int), large[1500:1560, 1500:1580], atol=1)
+    assert (small != 200).any() == (max(map(abs, shift)) < 1000)
+
+
+class Still:
+    """A sphere on a turned geom, touched as the test says."""
+
+    def __init__(self) -> None:
+        self.atlas = sphere_atlas(0.5, 8)
+        self.turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+        waves = SimpleNamespace(atlas=self.atlas, height=np.zeros((6, 8, 8)), vertices=None)
+        self.ripples = type("Named", (dict,), {"geom_ids": {"ball": 0}})(ball=waves)
+        pose = {"geom_xpos": np.array([[1.0, 2.0, 3.0]]), "geom_xmat": self.turn.reshape(1, 9)}
+        self.data = SimpleNamespace(model=SimpleNamespace(ngeom=1), **pose)
+        self.impulses: list[Impulse] = []
+
+    def touch(self, impulse: float, texel: tuple[int, int, int] = (0, 4, 4), other: str = "stone") -> Impulse:
+        point = self.data.geom_xpos[0] + self.turn @ self.atlas.positions[texel]
+        return Impulse("ball", other, point, impulse, texel)
+
+
+def test_a_mark_stands_on_the_risen_surface_in_the_world() -> None:
+    still = Still()
+    still.impulses = [still.touch(2.0)]
+    still.ripples["ball"].height[0, 4, 4] = 0.1
+    [found] = ContactMarks(still, 1 / 60).follow()
+    normal = still.turn @ still.atlas.normals[0, 4, 4]
+    np.testing.assert_allclose(found.axis, normal)
+    np.testing.assert_allclose(found.point, still.impulses[0].point + 0.1 * normal, atol=2e-3)
+    assert (found.impulse, found.opacity) == (2.0, 1.0)
+
+
+def test_a_mark_fades_with_its_memory_and_is_forgotten() -> None:
+    still = Still()
+    still.impulses = [still.touch(2.0)]
+    marks = ContactMarks(still, MEMORY / 4)
+    marks.follow()
+    still.impulses = []
+    seen = [marks.follow() for _ in range(12)]
+    for number, found in enumerate(seen, 1):
+        share = np.exp(-number / 4)
+        assert len(found) == (share > 0.08)
+        if found:
+            assert found[0].impulse == pytest.approx(2.0 * share)
+            assert found[0].opacity == pytest.approx(min(1.0, (share - 0.08) / (0.35 - 0.08)))
+
+
+def test_contacts_in_one_place_add_up_and_others_are_apart_the_weakest_first() -> None:
+    still = Still()
+    still.impulses = [still.touch(1.0), still.touch(2.0), still.touch(0.0, (1, 4, 4)), still.touch(0.5, other="leaf")]
+    still.impulses.append(still.touch(0.7, (3, 2, 2)))
+    found = ContactMarks(still, 1 / 60).follow()
+    assert [mark.impulse for mark in found] == pytest.approx([0.5, 0.7, 3.0])
+
+
+def test_a_mark_is_the_whole_arrow_up_to_its_rim() -> None:
+    layout, tip, tail, opacity = Layout(1280, 720), np.array([60.0, 40.0]), np.array([20.0, 40.0]), np.ones(9)
+    frame, whole = (np.zeros((80, 90, 3), np.uint8) for _ in range(2))
+    draw_marks(frame, [PlacedMark(tip, tail, opacity)], layout)
+    sprite = Sprite(90, 80)
+    draw_arrow(sprite, tip, tail, layout.arrow_thickness, opacity)
+    sprite.over(whole, 0, 0)
+    np.testing.assert_array_equal(frame, whole)
+
+
+CAMERA = Camera((0.1, -0.2, 0.3), 4.0, 37.0, -25.0, 50.0)
+SCENE = """<mujoco><worldbody><geom type="box" size=".5 .5 .5"/>
+<geom name="veil" type="box" size=".01 9 9" pos="2 0 0" group="{}"/></worldbody></mujoco>"""
+
+
+def ray(pose: Pose, size: tuple[int, int], pixel: np.ndarray) -> np.ndarray:
+    """Way from the camera through a pixel, from the angle of view alone."""
+    up = np.tan(np.radians(pose.fovy) / 2)
+    x, y = (2 * pixel[0] / size[0] - 1) * up * size[0] / size[1], (1 - 2 * pixel[1] / size[1]) * up
+    return pose.rotation @ [x, y, -1.0]
+
+
+@pytest.mark.parametrize("size", [(640, 480), (480, 640), (33, 17)])
+def test_points_on_the_ray_through_a_pixel_come_back_to_it(size: tuple[int, int]) -> None:
+    pose = CAMERA.pose()
+    for pixel in np.random.default_rng(0).uniform(0, size, (20, 2)):
+        points = pose.position + np.array([[0.1], [3.0], [400.0]]) * ray(pose, size, pixel)
+        np.testing.assert_allclose(Projection(pose, *size).pixels(points), np.tile(pixel, (3, 1)), rtol=1e-9)
+
+
+def test_the_point_looked_at_is_in_the_middle_and_up_is_up() -> None:
+    projection = Projection(CAMERA.pose(), 640, 480)
+    middle, above = projection.pixels(np.array(CAMERA.lookat) + np.array([[0, 0, 0], [0, 0, 0.1]]))
+    np.testing.assert_allclose(middle, [320, 240])
+    assert above[0] == pytest.approx(320)
+    assert above[1] < 240
+
+
+def test_behind_the_camera_nothing_has_a_pixel() -> None:
+    pose = CAMERA.pose()
+    points = pose.position + np.array([[1.0], [0.0], [-1.0]]) * pose.rotation[:, 2]
+    np.testing.assert_array_equal(np.isnan(Projection(pose, 640, 480).pixels(points)).all(axis=1), [True, True, False])
+
+
+def test_a_length_across_the_view_covers_the_pixels_that_it_should() -> None:
+    pose = CAMERA.pose()
+    projection = Projection(pose, 640, 480)
+    for distance in (0.5, 4.0, 30.0):
+        point = pose.position - distance * pose.rotation[:, 2] + 0.1 * pose.rotation[:, 1]
+        across = point + 25 * projection.metres(point) * pose.rotation[:, 0]
+        one, other = projection.pixels(np.array([point, across]))
+        np.testing.assert_allclose(other - one, [25, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize(("group", "seen"), [(0, False), (2, False), (3, True)])
+def test_geoms_of_hidden_groups_hide_nothing(group: int, seen: bool) -> None:
+    model = mujoco.MjModel.from_xml_string(SCENE.format(group))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    pose = Camera((0, 0, 0), 5.0, 180.0, 0.0).pose()  # at x = 5, looks along -x
+    np.testing.assert_allclose(pose.position, [5, 0, 0], atol=1e-12)
+    points = np.array([[0.5, 0.1, 0.2], [0.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [3.0, 0.0, 0.0]])
+    found = Projection(pose, 64, 48).seen(model, data, points)
+    np.testing.assert_array_equal(found, [seen, False, False, True])

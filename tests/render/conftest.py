@@ -4,8 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from ripple_sim.render.gpu.frame_uniforms import FrameUniforms
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.resources import FrameUniforms, Resources
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
 

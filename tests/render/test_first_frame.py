@@ -11,7 +11,7 @@ from drawn import BALL, FLOOR, FRONT, SIZE, SUN, ball_surface
 
 from ripple_sim.render import Renderer
 from ripple_sim.render.camera import ThroughLens
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.resources import Resources
 
 SKY = '<texture type="skybox" builtin="gradient" rgb1=".3 .5 .7" rgb2="0 0 0" width="16" height="96"/>'
 TILES = '<texture name="tiles" type="2d" builtin="checker" rgb1=".2 .3 .4" rgb2=".1 .2 .3" width="8" height="8"/>'

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.render.camera import Camera, Pose
-from ripple_sim.render.projection import orthographic, perspective, view_matrix
+from ripple_sim.render.camera import Camera, Pose, orthographic, perspective, view_matrix
 
 CAMERAS = [
     Camera((0.0, 0.0, 0.0), 2.0, 0.0, 0.0),

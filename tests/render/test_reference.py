@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter
 from sphere_height_maps import cube_charts
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.visuals import primitives as meshes
+from ripple_sim.render.visuals import shapes as meshes
 from ripple_sim.solver import HeightMap, sphere_atlas
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import shared_context

@@ -6,7 +6,7 @@ import pytest
 from sphere_height_maps import constant_height_map, cube_charts, height_map_of, linear_height_map
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.visuals import primitives
+from ripple_sim.render.visuals import shapes
 from ripple_sim.solver import RippleError
 
 SIZE = (240, 180)
@@ -42,7 +42,7 @@ SCENE = """
 
 
 def ball_surface(radius: float = 1.0, look: str = "clay") -> Surface:
-    ball = primitives.ball(16)
+    ball = shapes.ball(16)
     return Surface(radius * ball.shell, ball.faces, cube_charts(ball.shell), look)
 
 

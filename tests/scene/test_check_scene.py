@@ -6,13 +6,11 @@ import mujoco
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.camera import CameraEntry
-from ripple_sim.scene.check_scene import check_scene
-from ripple_sim.scene.events import Events, PokeEntry
+from ripple_sim.scene.events import DropEntry, Events, PokeEntry
+from ripple_sim.scene.load_scene import check_scene
 from ripple_sim.scene.material_entry import MaterialEntry
-from ripple_sim.scene.motion import DropEntry
 from ripple_sim.scene.scene import MAX_DURATION, Scene
-from ripple_sim.scene.scene_file import RippleEntry, StillEntry
+from ripple_sim.scene.scene_file import CameraEntry, RippleEntry, StillEntry
 from ripple_sim.solver import RippleError
 
 MODEL = mujoco.MjModel.from_xml_string(

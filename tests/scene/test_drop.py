@@ -1,15 +1,31 @@
-"""The default scene around a mesh stands upright on the floor, whatever the file's axes and units."""
+"""The default scene around a mesh stands upright on the floor, whatever the file's axes and units.
+
+The picture of a mesh file is found and reaches the film.
+
+The image on a target arrives in MuJoCo's model, the right way up.
+
+Which way is up depends on the format of the file alone.
+"""
+
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
-from ripple_sim.coupling.model.target_mesh import target_mesh
-from ripple_sim.errors import SceneError
-from ripple_sim.scene.check_scene import check_scene
-from ripple_sim.scene.drop import drop_scene
+from ripple_sim.capture.frame_source import FrameSource
+from ripple_sim.capture.snapshot import snapshots
+from ripple_sim.coupling.target_mesh import target_mesh
+from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.scene.drop import UP_AXES, drop_scene, mesh_image, paint_target, usual_up
+from ripple_sim.scene.load_scene import check_scene
 from ripple_sim.scene.scene import Scene
+from ripple_sim.scenes.shapes import peanut, write_obj
+from ripple_sim.simulation import Simulation
+from ripple_sim.solver import Mesh, load_mesh
+from ripple_sim.solver.errors import GLError
 
 
 def vertices(scene: Scene) -> np.ndarray:
@@ -105,3 +121,163 @@ def test_bodies_drop_on_the_edge_of_an_upright_sheet_that_is_not_seen_from_above
     scene = drop_scene(path, bodies=3, up="y")
     places = np.array([drop.position for drop in scene.events.drop])
     np.testing.assert_allclose(np.abs(places[:, :2]), [[0.5, 0]] * 3, atol=1e-6)
+
+
+RED, BLUE = (230, 20, 20), (20, 20, 230)
+
+
+def half_and_half(path: Path) -> Path:
+    """A picture that is red in its upper half and blue in its lower one."""
+    picture = np.full((16, 16, 3), BLUE, dtype=np.uint8)
+    picture[:8] = RED
+    Image.fromarray(picture).save(path)
+    return path
+
+
+def textured_obj(path: Path, head: str = "", before_faces: str = "") -> Path:
+    """A peanut whose v is its height from 0 to 1; y is up, as is usual in OBJ files."""
+    V, F = peanut()
+    lines = [head, *(f"v {x} {y} {z}" for x, y, z in V)]
+    lines += [f"vt 0.5 {v}" for v in (V[:, 1] - V[:, 1].min()) / np.ptp(V[:, 1])]
+    lines += [before_faces, *("f " + " ".join(f"{i + 1}/{i + 1}" for i in face) for face in F)]
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_the_picture_is_named_by_the_material_library(tmp_path):
+    half_and_half(tmp_path / "coat of paint.png")
+    (tmp_path / "p.mtl").write_text(
+        "newmtl other\nmap_Kd slot_scratch.png\nnewmtl skin\nKd 1 1 1\nmap_Kd coat of paint.png\n"
+    )
+    mesh = textured_obj(tmp_path / "p.obj", "mtllib p.mtl", "usemtl skin")
+    picture = mesh_image(mesh)
+    assert tuple(picture[0, 0]) == RED
+    assert tuple(picture[-1, 0]) == BLUE
+
+
+def test_without_a_library_a_picture_beside_it_serves(tmp_path):
+    mesh = textured_obj(tmp_path / "p.obj")
+    assert mesh_image(mesh) is None
+    half_and_half(tmp_path / "p_texture.png")
+    assert mesh_image(mesh).shape == (16, 16, 3)
+
+
+def test_two_images_are_not_mixed_up(tmp_path):
+    for name in ("a", "b"):
+        half_and_half(tmp_path / f"{name}.png")
+    (tmp_path / "p.mtl").write_text("newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png\n")
+    mesh = textured_obj(tmp_path / "p.obj", "mtllib p.mtl", "usemtl a\nusemtl b")
+    with pytest.warns(RippleWarning, match="2 images.*--texture"):
+        assert mesh_image(mesh) is None
+
+
+def test_the_image_of_a_glb_is_inside_it(tmp_path):
+    V, F = peanut()
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.open(half_and_half(tmp_path / "x.png")))
+    visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(V), 2)), material=material)
+    trimesh.Trimesh(V, F, visual=visual, process=False).export(tmp_path / "p.glb")
+    assert tuple(mesh_image(tmp_path / "p.glb")[0, 0]) == RED
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_dropped_on_mesh_wears_its_image(tmp_path, named):
+    """Red above and blue below, in the film and in the model that MuJoCo would draw."""
+    mesh = textured_obj(tmp_path / "p.obj")
+    half_and_half(tmp_path / ("p_texture.png" if named else "paint.png"))
+    scene = drop_scene(mesh, bodies=0, texture=None if named else tmp_path / "paint.png")
+    model = scene.model
+    assert model.mat_texid[model.geom("target").matid[0], mujoco.mjtTextureRole.mjTEXROLE_RGB] == 0
+    simulation = Simulation(scene, fps=10, resolution=16, backend="cpu")
+    try:
+        source = FrameSource(simulation, width=96, height=72)
+    except GLError as error:
+        pytest.skip(f"no OpenGL context: {error}")
+    frame = source.render(next(iter(snapshots(simulation, 1)))).astype(int)
+    redder = frame[..., 0] - frame[..., 2]
+    rows = np.arange(72)[:, None]
+    assert (redder > 60).sum() > 100
+    assert (redder < -60).sum() > 100
+    assert np.median(np.where(redder > 60, rows, np.nan)[redder > 60]) < np.median(
+        np.where(redder < -60, rows, np.nan)[redder < -60]
+    )
+
+
+def test_an_image_that_cannot_be_shown_is_refused(tmp_path):
+    bare, textured = tmp_path / "bare.obj", textured_obj(tmp_path / "p.obj")
+    write_obj(bare, *peanut())
+    paint = half_and_half(tmp_path / "paint.png")
+    with pytest.raises(SceneError, match=r"paint\.png.*no texture coordinates"):
+        drop_scene(bare, texture=paint)
+    (tmp_path / "broken.png").write_bytes(b"no picture")
+    with pytest.raises(SceneError, match=r"broken\.png.*cannot be read"):
+        drop_scene(textured, texture=tmp_path / "broken.png")
+
+
+PIXELS = np.random.default_rng(0).integers(0, 256, (3, 5, 3), dtype=np.uint8)
+
+
+def textured_cube(folder) -> tuple[mujoco.MjSpec, Mesh]:
+    """A cube whose texture coordinates are its x and z, and a model with it as its target."""
+    V, F = trimesh.creation.box(extents=(1, 1, 1)).vertices + 0.5, trimesh.creation.box().faces
+    lines = [f"v {x} {y} {z}" for x, y, z in V] + [f"vt {x} {z}" for x, _, z in V]
+    lines += ["f " + " ".join(f"{i + 1}/{i + 1}" for i in face) for face in F]
+    (folder / "cube.obj").write_text("\n".join(lines))
+    mesh, spec = load_mesh(folder / "cube.obj"), mujoco.MjSpec()
+    spec.add_mesh(name="target", uservert=mesh.V.ravel(), userface=mesh.F.ravel())
+    spec.worldbody.add_geom(name="target", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="target")
+    return spec, mesh
+
+
+def test_the_image_reaches_the_model_bit_for_bit(tmp_path) -> None:
+    spec, mesh = textured_cube(tmp_path)
+    Image.fromarray(PIXELS).save(tmp_path / "image.png")
+    paint_target(spec, mesh, tmp_path / "cube.obj", tmp_path / "image.png")
+    model = spec.compile()
+    assert (model.tex_height[0], model.tex_width[0], model.tex_nchannel[0]) == PIXELS.shape
+    np.testing.assert_array_equal(model.tex_data.reshape(PIXELS.shape), PIXELS)
+    material = model.geom("target").matid[0]
+    assert model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB] == model.texture("target").id
+
+
+def test_mujoco_counts_v_from_the_upper_edge_of_the_image(tmp_path) -> None:
+    spec, mesh = textured_cube(tmp_path)
+    Image.fromarray(PIXELS).save(tmp_path / "image.png")
+    paint_target(spec, mesh, tmp_path / "cube.obj", tmp_path / "image.png")
+    model = spec.compile()
+    corners = model.mesh_texcoord[model.mesh_facetexcoord]
+    rotation = np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, model.mesh_quat[0])
+    V = model.mesh_vert @ rotation.reshape(3, 3).T + model.mesh_pos[0]
+    places = V[model.mesh_face]
+    np.testing.assert_allclose(corners[..., 0], places[..., 0], atol=1e-6)
+    np.testing.assert_allclose(corners[..., 1], 1 - places[..., 2], atol=1e-6)
+
+
+def test_an_image_beside_the_mesh_is_used_unless_another_is_asked_for(tmp_path) -> None:
+    Image.fromarray(PIXELS).save(tmp_path / "cube_texture.png")
+    Image.fromarray(255 - PIXELS).save(tmp_path / "other.png")
+    for texture, expected in ((None, PIXELS), (tmp_path / "other.png", 255 - PIXELS)):
+        spec, mesh = textured_cube(tmp_path)
+        paint_target(spec, mesh, tmp_path / "cube.obj", texture)
+        np.testing.assert_array_equal(spec.compile().tex_data.reshape(PIXELS.shape), expected)
+
+
+def test_without_an_image_or_without_coordinates_the_model_stays_plain(tmp_path) -> None:
+    spec, mesh = textured_cube(tmp_path)
+    paint_target(spec, mesh, tmp_path / "cube.obj", None)
+    assert spec.compile().ntex == 0
+    bare = Mesh.from_arrays(mesh.V, mesh.F)
+    Image.fromarray(PIXELS).save(tmp_path / "cube_texture.png")
+    paint_target(spec, bare, tmp_path / "cube.obj", None)
+    assert spec.compile().ntex == 0
+    with pytest.raises(SceneError, match=r"cannot be shown on '.*cube.obj', which has no texture coordinates: choose"):
+        paint_target(spec, bare, tmp_path / "cube.obj", tmp_path / "cube_texture.png")
+
+
+@pytest.mark.parametrize(
+    ("name", "up"),
+    [("a.stl", "z"), ("A.STL", "z"), ("a.stl.obj", "y"), ("a.glb", "y"), ("stl", "y"), ("b.stl/a.ply", "y")],
+)
+def test_printers_files_stand_on_z_and_others_on_y(name: str, up: str) -> None:
+    assert usual_up(name) == usual_up(Path("there") / name) == up
+    assert up in UP_AXES

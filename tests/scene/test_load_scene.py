@@ -8,8 +8,8 @@ import pytest
 
 from ripple_sim import RippleError
 from ripple_sim.errors import SceneError
+from ripple_sim.scene.drop_model import RandomEntry
 from ripple_sim.scene.load_scene import load_model, load_scene, refusal_of
-from ripple_sim.scene.randomize import RandomEntry
 from ripple_sim.simulation import Simulation
 
 MJCF = """<mujoco><worldbody><geom name="egg" size="0.1"/>

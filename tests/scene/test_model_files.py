@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.scene.load_scene import load_model, load_scene
-from ripple_sim.scene.model_files import check_files
+from ripple_sim.scene.load_scene import check_files, load_model, load_scene
 
 BALL = '<worldbody><body><freejoint/><geom name="ball" type="sphere" size="1"/></body></worldbody>'
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.motion import DropEntry, Motions, PlaceEntry, ThrowEntry, check_time, free_joint
+from ripple_sim.scene.events import DropEntry, Motions, PlaceEntry, ThrowEntry, check_time, free_joint
 
 MJCF = """<mujoco><option timestep="0.002"/><worldbody><geom name="ground" type="plane" size="9 9 1"/>
 <body name="post" pos="5 0 0"><joint type="hinge" axis="0 0 1"/><geom size="0.1"/></body>

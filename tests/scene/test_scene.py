@@ -1,15 +1,34 @@
-"""Scene files: what is shipped loads, what is wrong is named."""
+"""Scene files: what is shipped loads, what is wrong is named.
 
+A scene through another camera or with another exposure: what has no effect is refused.
+
+Overlays by name: what is understood, and what is refused.
+
+TOML files of any content become a table or one line that says what is wrong.
+"""
+
+import dataclasses
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
+from ripple_sim.cli.main import main
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.scene.scene_path import shipped_scenes
+from ripple_sim.scene.scene import (
+    NAMES,
+    Request,
+    Scene,
+    parse_request,
+    read_toml,
+    shipped_scenes,
+    through_camera,
+    with_exposure,
+)
+from ripple_sim.scene.scene_file import CameraEntry, RippleEntry
 from ripple_sim.scenes.shapes import peanut, write_obj
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import RippleError
@@ -149,3 +168,117 @@ def test_drop_scene_is_the_same_for_the_same_seed(tmp_path: Path) -> None:
 def test_drop_scene_refuses_wrong_numbers(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="0 to 100"):
         drop_scene(tmp_path / "any.obj", bodies=101)
+
+
+MODEL = mujoco.MjModel.from_xml_string(
+    """<mujoco><worldbody><camera name="eye" pos="0 -3 1"/><camera name="side" pos="3 0 1"/>
+    <geom name="egg" size="0.1"/><body name="stone" pos="0 0 1"><geom size="0.05"/></body></worldbody></mujoco>"""
+)
+
+
+def scene(**camera: object) -> Scene:
+    return Scene("still", MODEL, (RippleEntry(geom="egg"),), CameraEntry(**camera), 1.0)
+
+
+def test_through_camera_changes_the_camera_alone_and_not_the_scene_itself() -> None:
+    before = scene(shutter=180.0)
+    after = through_camera(before, "side")
+    assert after.camera == CameraEntry(name="side")
+    assert before.camera == CameraEntry(shutter=180.0)
+    assert dataclasses.replace(after, camera=before.camera).__dict__ == before.__dict__
+    with pytest.raises(SceneError, match="no camera 'ear'; its cameras are eye, side"):
+        through_camera(before, "ear")
+
+
+def test_exposure_replaces_what_is_given_and_leaves_what_is_none() -> None:
+    before = scene(azimuth=12.0, shutter=90.0, aperture=0.1, exposures=8)
+    after = with_exposure(before, shutter=180, aperture=None, focus="stone", exposures=None)
+    assert after.camera == CameraEntry(azimuth=12.0, shutter=180.0, aperture=0.1, focus="stone", exposures=8)
+    assert with_exposure(before).camera == before.camera
+    assert with_exposure(before, aperture=0.0).camera.aperture == 0.0, "0 is a value"
+
+
+@pytest.mark.parametrize(
+    ("camera", "changes", "message"),
+    [
+        ({}, {"shutter": "wide"}, r"camera: Expected `float`, got `str` - at `shutter`"),
+        ({}, {"exposures": 2.5}, r"camera: .*`exposures`"),
+        ({}, {"shutter": 400}, "shutter angle is 400"),
+        ({}, {"focus": 1.0}, "a focus needs a lens: give the camera an aperture of more than 0 m"),
+        ({"shutter": 180.0}, {"focus": "stone"}, "a focus needs a lens"),
+        ({}, {"exposures": 16}, "all 16 exposures would be the same: give the camera a shutter angle"),
+        ({"shutter": 180.0}, {"shutter": 0.0, "exposures": 2}, "all 2 exposures would be the same"),
+    ],
+)
+def test_an_exposure_without_effect_or_sense_is_refused(camera: dict, changes: dict, message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        with_exposure(scene(**camera), **changes)
+
+
+def test_one_exposure_needs_neither_shutter_nor_lens() -> None:
+    assert with_exposure(scene(), exposures=1).camera.exposures == 1
+    assert with_exposure(scene(shutter=180.0), exposures=16).camera.exposures == 16
+
+
+def test_request_takes_every_name_and_ranges() -> None:
+    request = parse_request([" height=0.02", "contacts", "grid", "time", "energy "])
+    assert request == Request("height", 0.02, True, True, True, True)
+    assert parse_request(["velocity"]) == Request(heatmap="velocity")
+    assert not parse_request([])
+    assert parse_request(["time"])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["hight"], ", ".join(NAMES)),
+        ([""], "valid are"),
+        (["height", "velocity"], "choose one"),
+        (["height=0"], "positive number"),
+        (["height=wide"], "positive number"),
+        (["velocity=inf"], "m/s"),
+        (["time=3"], "has no range"),
+    ],
+)
+def test_request_refuses(words: list[str], said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        parse_request(words)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [(["--overlay", "height,hight"], "valid are height, velocity"), (["--compare", "fem"], "valid are paper")],
+)
+def test_program_refuses_bad_names(
+    options: list[str], said: str, capsys: pytest.CaptureFixture, tmp_path: Path
+) -> None:
+    assert main(["render", "duck", "-o", str(tmp_path / "x.mp4"), *options]) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        (
+            ".".join(["a"] * 200_000) + " = 1",
+            r"plan '.*a\.toml' has a key of 200000 parts",
+        ),  # tomllib would take half an hour
+        ("[" + " . ".join(["'a'"] * 101) + "]", "has a key of 101 parts .*; valid are at most 100"),
+        ("a = " + "9" * 5000, "is not valid TOML: Exceeds the limit"),
+        ("a = " + "[" * 5000, "nested too deeply"),
+        ("a", "is not valid TOML"),
+        ("a = \ud800", "cannot be read"),
+    ],
+)
+def test_what_is_no_table_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "a.toml"
+    path.write_bytes(text.encode(errors="surrogatepass"))
+    with pytest.raises(SceneError, match=said):
+        read_toml(path, "plan")
+
+
+def test_dots_in_numbers_paths_and_comments_are_no_keys(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(f"# {'.' * 300}\n# {'. ' * 300}\na = [{', '.join(['0.5'] * 300)}]\nb.c = '../../x.y'\n")
+    assert read_toml(path, "plan") == {"a": [0.5] * 300, "b": {"c": "../../x.y"}}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.scene.scene_path import shipped_scenes
+from ripple_sim.scene.scene import shipped_scenes
 from ripple_sim.scenes import shapes
 from ripple_sim.simulation import Simulation
 

@@ -4,7 +4,7 @@ import igl
 import numpy as np
 import pytest
 
-from ripple_sim.scenes import implicit, shapes
+from ripple_sim.scenes import shapes
 
 
 @pytest.fixture(scope="module", params=["duck", "limbed", "peanut"])
@@ -74,7 +74,7 @@ def test_written_mesh_reads_back_and_leaves_nothing_else(tmp_path):
 
 
 def test_polygonised_ball_converges_to_the_ball_at_second_order():
-    ball = implicit.sphere((0.1, -0.05, 0.02), 0.5)
+    ball = shapes.sphere((0.1, -0.05, 0.02), 0.5)
     cells = np.array([0.16, 0.08, 0.04])
     errors = []
     for cell in cells:
@@ -88,21 +88,21 @@ def test_polygonised_ball_converges_to_the_ball_at_second_order():
 @pytest.mark.parametrize(
     "solid",
     [
-        implicit.sphere((0.1, 0.2, 0.3), 0.2),
-        implicit.capsule((-0.2, 0.0, 0.1), (0.3, 0.1, 0.0), 0.1),
-        implicit.rounded_cone((-0.2, 0.0, 0.1), (0.3, 0.1, 0.0), 0.2, 0.05),
-        implicit.rounded_cone((-0.2, 0.0, 0.1), (0.3, 0.1, 0.0), 0.05, 0.2),
-        implicit.pebble((0.0, 0.1, 0.0), 0.2, 0.05),
-        implicit.half_space((0.6, 0.0, 0.8), 0.1),
+        shapes.sphere((0.1, 0.2, 0.3), 0.2),
+        shapes.capsule((-0.2, 0.0, 0.1), (0.3, 0.1, 0.0), 0.1),
+        shapes.rounded_cone((-0.2, 0.0, 0.1), (0.3, 0.1, 0.0), 0.2, 0.05),
+        shapes.rounded_cone((-0.2, 0.0, 0.1), (0.3, 0.1, 0.0), 0.05, 0.2),
+        shapes.pebble((0.0, 0.1, 0.0), 0.2, 0.05),
+        shapes.half_space((0.6, 0.0, 0.8), 0.1),
     ],
     ids=["sphere", "capsule", "narrowing cone", "widening cone", "pebble", "half space"],
 )
 def test_distance_grows_by_one_metre_a_metre_outside(solid):
     points = np.random.default_rng(3).uniform(-1.0, 1.0, (2000, 3))
     points = points[solid(points) > 0.01]
-    slopes = np.linalg.norm(implicit.gradient(solid, points), axis=1)
+    slopes = np.linalg.norm(shapes.gradient(solid, points), axis=1)
     np.testing.assert_allclose(slopes, 1.0, atol=1e-4)
-    nearest = implicit.project(solid, points, steps=1)
+    nearest = shapes.project(solid, points, steps=1)
     np.testing.assert_allclose(solid(nearest), 0.0, atol=1e-4)
 
 
@@ -110,16 +110,16 @@ def test_ellipsoid_is_zero_on_its_surface_and_negative_at_its_centre():
     directions = np.random.default_rng(5).normal(size=(500, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     centre, radii, quarter = np.array([0.1, 0.2, 0.3]), [0.3, 0.2, 0.1], [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
-    solid = implicit.ellipsoid(centre, radii, quarter)
+    solid = shapes.ellipsoid(centre, radii, quarter)
     np.testing.assert_allclose(solid(centre + directions * radii @ np.transpose(quarter)), 0.0, atol=1e-12)
     assert solid(centre[None])[0] == -0.1
 
 
 def test_blends_change_a_solid_only_within_their_width():
-    a, b, k = implicit.sphere((0, 0, 0), 0.3), implicit.sphere((0.4, 0, 0), 0.3), 0.1
+    a, b, k = shapes.sphere((0, 0, 0), 0.3), shapes.sphere((0.4, 0, 0), 0.3), 0.1
     points = np.random.default_rng(7).uniform(-1.0, 1.0, (2000, 3))
     hard = np.minimum(a(points), b(points))
-    blended = implicit.smooth_union(k, a, b)(points)
+    blended = shapes.smooth_union(k, a, b)(points)
     far = np.abs(a(points) - b(points)) >= k
     assert np.array_equal(blended[far], hard[far])
     assert np.all(blended[~far] < hard[~far])

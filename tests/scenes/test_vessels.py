@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.scenes import vessels
-from ripple_sim.scenes.implicit import polygonise, sphere
+from ripple_sim.scenes.shapes import polygonise, sphere
 from ripple_sim.solver import load_mesh
 
 

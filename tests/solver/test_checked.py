@@ -18,7 +18,7 @@ from ripple_sim.solver import (
     sphere_atlas,
     thickness_map,
 )
-from ripple_sim.solver.checked import PATH, POSITIVE, Valid, checked, instance, shown, whole
+from ripple_sim.solver.errors import PATH, POSITIVE, Valid, checked, instance, shown, whole
 
 HUGE = 10**400  # no float holds it
 ATLAS = sphere_atlas(resolution=4)

@@ -1,6 +1,6 @@
 import weakref
 
-from ripple_sim.solver.kept import Kept, kept_with
+from ripple_sim.solver.cache import Kept, kept_with
 
 
 def test_the_latest_small_results_are_kept():

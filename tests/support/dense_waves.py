@@ -3,8 +3,7 @@
 import numpy as np
 
 from ripple_sim.solver.operator.wave_operator import WaveOperator
-from ripple_sim.solver.texels.stencil import Stencil
-from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
+from ripple_sim.solver.texels.stencil import Stencil, stiffness_matrix
 
 
 def matrix(stencil: Stencil | None, size: int) -> np.ndarray:

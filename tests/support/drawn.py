@@ -4,7 +4,7 @@ import mujoco
 from sphere_height_maps import cube_charts
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.visuals import primitives
+from ripple_sim.render.visuals import shapes
 
 SIZE = (160, 120)
 ABOVE = Camera((0.0, 0.0, 0.0), 4.0, 90.0, -89.9, 40.0)  # the frame's up is +y, its right +x
@@ -28,5 +28,5 @@ def frame_of(gl, body, *, asset="", visual="", camera=ABOVE, targets=None, size=
 
 
 def ball_surface(look: str, radius: float = 0.5) -> Surface:
-    ball = primitives.ball(16)
+    ball = shapes.ball(16)
     return Surface(radius * ball.shell, ball.faces, cube_charts(ball.shell, 8), look)

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from ripple_sim.solver.sphere_map.corner_table import corner_table
-from ripple_sim.solver.sphere_map.energy import Reference, total_energy
-from ripple_sim.solver.sphere_map.hessian import assemble
-from ripple_sim.solver.sphere_map.level import build_level
-from ripple_sim.solver.sphere_map.newton import tangents
+from ripple_sim.solver.layouts.sphere_map.decimation import corner_table
+from ripple_sim.solver.layouts.sphere_map.energy import Reference, total_energy
+from ripple_sim.solver.layouts.sphere_map.hessian import assemble, tangents
+from ripple_sim.solver.layouts.sphere_map.level import build_level
 
 
 def icosphere(subdivisions):

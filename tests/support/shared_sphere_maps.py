@@ -9,7 +9,7 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.atlas import build
+from ripple_sim.solver.layouts import build
 
 SphereMap = Callable[[NDArray[np.float64], NDArray[np.int64]], NDArray[np.float64]]
 

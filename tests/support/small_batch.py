@@ -4,9 +4,8 @@ from pathlib import Path
 
 from unfinished_videos import contents
 
-from ripple_sim.batch.batch_folder import BatchFolder
+from ripple_sim.batch.folder import BatchFolder, keep_plan, stored
 from ripple_sim.batch.plan import Plan, read_plan
-from ripple_sim.batch.stored_plan import keep_plan, stored
 
 MJCF = """<mujoco><option timestep="0.005"/><worldbody><light name="key" pos="0 0 3"/>
 <geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>

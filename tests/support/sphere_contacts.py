@@ -3,9 +3,9 @@
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.contacts.target_contacts import TargetContacts
-from ripple_sim.coupling.load.target_load import TargetLoad
-from ripple_sim.coupling.patches.pose import Pose, in_world
+from ripple_sim.coupling.contacts import TargetContacts
+from ripple_sim.coupling.load import TargetLoad
+from ripple_sim.coupling.patches import Pose, in_world
 from ripple_sim.solver import Material, WaveSolver, sphere_atlas
 
 RADII = np.array([1.0, 0.1, 0.1, 0.1])

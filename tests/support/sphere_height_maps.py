@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ripple_sim.render.surfaces.charts import Charts
-from ripple_sim.solver.cube_map.convention import cube_topology, texel_directions
-from ripple_sim.solver.cube_map.cube_chart_map import CubeChartMap
+from ripple_sim.render.surfaces.surface import Charts
+from ripple_sim.solver.layouts.cube.atlas import CubeChartMap
+from ripple_sim.solver.layouts.cube.convention import cube_topology, texel_directions
 
 N = 24
 

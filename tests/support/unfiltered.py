@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 
 from ripple_sim import Material, Ripples
-from ripple_sim.coupling.load.contact_loads import ContactLoads
-from ripple_sim.coupling.model.coupled_model import CoupledModel
+from ripple_sim.coupling.load import ContactLoads
+from ripple_sim.coupling.model import CoupledModel
 from ripple_sim.solver import Load, WaveSolver
 
 

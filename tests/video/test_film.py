@@ -13,23 +13,18 @@ from sphere_height_maps import cube_charts
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.errors import SceneError
-from ripple_sim.overlay.colormap import color_table, colors
-from ripple_sim.overlay.comparison import compared_operators
-from ripple_sim.overlay.contact_marks import MEMORY, ContactMarks, Mark
-from ripple_sim.overlay.layout import Layout
-from ripple_sim.overlay.marks import draw_marks, place_marks
-from ripple_sim.overlay.notes import Notebook
-from ripple_sim.overlay.projection import Projection
+from ripple_sim.overlay.marks import MEMORY, ContactMarks, Mark
+from ripple_sim.overlay.notes import Notebook, color_table, colors, compared_operators
+from ripple_sim.overlay.panels import Layout, Projection, draw_marks, place_marks
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.projection import perspective, view_matrix
-from ripple_sim.render.visuals import primitives as meshes
+from ripple_sim.render.camera import perspective, view_matrix
+from ripple_sim.render.visuals import shapes as meshes
 from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.scene.overlays import NAMES, parse_request
-from ripple_sim.scene.scene import Scene
+from ripple_sim.scene.scene import NAMES, Scene, parse_request
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.cube_map.convention import cube_topology, texel_directions
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.texels.halo import with_filled_halo
+from ripple_sim.solver.layouts.cube.convention import cube_topology, texel_directions
+from ripple_sim.solver.texels.topology import with_filled_halo
 from ripple_sim.video.film import Film
 from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import Progress, render_video

@@ -1,23 +1,28 @@
-"""Interrupted renders go on to the same video, or say why not."""
+"""Interrupted renders go on to the same video, or say why not.
+
+A stage that runs ahead: the same items in the same order, no more of them than may wait, and its errors.
+"""
 
 import json
 import re
 import subprocess
 import sys
 import threading
+import time
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from PIL import Image
 from unfinished_videos import MJCF, contents
 
-from ripple_sim.encode.formats import FRAMES_IN_CLIP
+from ripple_sim.encode.output import FRAMES_IN_CLIP
 from ripple_sim.errors import VideoError
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.scene import Scene
 from ripple_sim.solver.gl import GLContext
 from ripple_sim.video.options import VideoOptions
-from ripple_sim.video.render_video import render_video
+from ripple_sim.video.render_video import Prefetch, render_video
 
 OPTIONS = {"size": (64, 48), "fps": 30}
 
@@ -125,3 +130,60 @@ def test_waves_on_a_gpu_run_beside_the_drawing_and_the_video_is_the_same(scene, 
     )
     assert len(host) == len(device) == 6
     assert max(np.abs(a - b).max() for a, b in zip(host, device, strict=True)) <= 1
+
+
+def test_items_come_in_order_from_another_thread():
+    threads = set()
+
+    def items() -> Iterator[int]:
+        for number in range(50):
+            threads.add(threading.get_ident())
+            yield number
+
+    with Prefetch(items(), 3) as prefetched:
+        assert list(prefetched) == list(range(50))
+    assert len(threads) == 1
+    assert threading.get_ident() not in threads
+
+
+def test_it_runs_ahead_as_far_as_it_may_and_no_further():
+    begun: list[int] = []
+
+    def items() -> Iterator[int]:
+        for number in range(50):
+            begun.append(number)
+            yield number
+
+    with Prefetch(items(), 3) as prefetched:
+        for number in prefetched:
+            waited = time.monotonic() + 60
+            # one is in the taker's hands, three wait, one is held until there is room
+            while len(begun) < min(number + 5, 50) and time.monotonic() < waited:
+                time.sleep(0.001)
+            assert len(begun) == min(number + 5, 50)
+
+
+def test_an_error_comes_where_the_next_item_would_have_come():
+    def items() -> Iterator[int]:
+        yield 1
+        yield 2
+        raise ZeroDivisionError
+
+    taken = []
+    with pytest.raises(ZeroDivisionError), Prefetch(items(), 3) as prefetched:
+        for number in prefetched:
+            taken.append(number)
+    assert taken == [1, 2]
+
+
+def test_leaving_early_stops_the_thread():
+    def items() -> Iterator[int]:
+        number = 0
+        while True:
+            yield number
+            number += 1
+
+    before = threading.active_count()
+    with Prefetch(items(), 3) as prefetched:
+        assert next(prefetched) == 0
+    assert threading.active_count() == before

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from ripple_sim.capture.snapshot import Snapshot
-from ripple_sim.cli.render_commands import _summary_text
-from ripple_sim.video.shot import Shot
-from ripple_sim.video.summary import Summary, Times
+from ripple_sim.cli.render import _summary_text
+from ripple_sim.video.film import Shot
+from ripple_sim.video.render_video import Summary, Times
 
 MODEL = mujoco.MjModel.from_xml_string(
     '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>'

@@ -13,9 +13,9 @@ pytest.importorskip("trame")
 aiohttp = pytest.importorskip("aiohttp")
 msgpack = pytest.importorskip("msgpack")
 
-from ripple_sim.viewer import access  # noqa: E402
+from ripple_sim.viewer import web  # noqa: E402
 
-SECRET = access.new_secret()
+SECRET = web.new_secret()
 LIMIT = 60.0  # [s]
 
 
@@ -26,12 +26,12 @@ def free_port() -> int:
 
 
 @asynccontextmanager
-async def served(name: str, host: str = access.LOOPBACK) -> AsyncIterator[tuple[int, Any, list[str]]]:
+async def served(name: str, host: str = web.LOOPBACK) -> AsyncIterator[tuple[int, Any, list[str]]]:
     """Port of a page of trame's, a client, and the calls that reached the server."""
     from trame.app import get_server
 
     server, port, calls = get_server(name), free_port(), []
-    access.restrict(server, host=host, port=port, secret=SECRET)
+    web.restrict(server, host=host, port=port, secret=SECRET)
     server.controller.trigger_name(lambda: None)
     server.trigger("drive")(lambda: calls.append("drive"))
     serving = asyncio.ensure_future(server.start(exec_mode="coroutine", open_browser=False, show_connection_info=False))
@@ -107,9 +107,7 @@ def test_a_name_that_another_site_points_at_this_machine_is_refused() -> None:
     asyncio.run(check())
 
 
-@pytest.mark.parametrize(
-    "secret", ["wslink-secret", "", access.new_secret()], ids=["default", "none", "of another run"]
-)
+@pytest.mark.parametrize("secret", ["wslink-secret", "", web.new_secret()], ids=["default", "none", "of another run"])
 def test_without_this_runs_secret_no_call_is_answered(secret: str) -> None:
     async def check() -> None:
         async with served(f"secret {secret}") as (port, client, calls):
@@ -126,7 +124,7 @@ def test_a_message_longer_than_the_pages_own_ends_the_connection() -> None:
         async with served("size") as (port, client, _):
             async with client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}") as ws:
                 await drive(ws, SECRET)
-                await ws.send_bytes(packed("trame.trigger", "x" * 2 * access.LARGEST_MESSAGE))
+                await ws.send_bytes(packed("trame.trigger", "x" * 2 * web.LARGEST_MESSAGE))
                 closing = await ws.receive(timeout=LIMIT)
             assert closing.type in (aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSED)
             assert ws.close_code == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
@@ -148,13 +146,13 @@ def test_the_page_cannot_be_framed_by_another_and_gives_its_address_to_none() ->
 
 
 def test_every_run_has_a_secret_of_its_own_that_is_no_number() -> None:
-    secrets = {access.new_secret() for _ in range(100)}
+    secrets = {web.new_secret() for _ in range(100)}
     assert len(secrets) == 100
     assert all(len(secret) == 33 and not secret[0].isdigit() for secret in secrets)
 
 
 def test_other_machines_are_let_in_by_their_users_choice_alone() -> None:
-    assert [access.is_local(host) for host in ("127.0.0.1", "localhost", "::1", "0.0.0.0", "192.168.0.7", "a.b")] == [
+    assert [web.is_local(host) for host in ("127.0.0.1", "localhost", "::1", "0.0.0.0", "192.168.0.7", "a.b")] == [
         True,
         True,
         True,
@@ -162,12 +160,12 @@ def test_other_machines_are_let_in_by_their_users_choice_alone() -> None:
         False,
         False,
     ]
-    assert access.address("0.0.0.0", 80, "s1").startswith(f"http://{socket.gethostname()}:80/")
-    assert access.address("::1", 80, "s1") == "http://[::1]:80/?secret=s1"
+    assert web.address("0.0.0.0", 80, "s1").startswith(f"http://{socket.gethostname()}:80/")
+    assert web.address("::1", 80, "s1") == "http://[::1]:80/?secret=s1"
 
 
 def test_what_is_exposed_is_said_in_one_line(tmp_path: Path) -> None:
-    line = access.exposure("0.0.0.0", tmp_path)
+    line = web.exposure("0.0.0.0", tmp_path)
     assert "\n" not in line
     for word in ("--host 0.0.0.0", "sees and drives", str(tmp_path), "nothing is encrypted"):
         assert word in line

@@ -1,4 +1,9 @@
-"""The viewer without a window: running, pausing, resetting, poking."""
+"""The viewer without a window: running, pausing, resetting, poking.
+
+Rays find the nearest surface.
+
+The skin follows the surface.
+"""
 
 import re
 import subprocess
@@ -7,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from played import RADIUS, run
+from played import MIDDLE, RADIUS, run
 
 from ripple_sim.errors import SimulationError
 from ripple_sim.scene.scene import Scene
 from ripple_sim.scenes import shapes
-from ripple_sim.solver import SolverError
+from ripple_sim.solver import SolverError, sphere_atlas
 from ripple_sim.viewer.opening import open_scene
-from ripple_sim.viewer.session import OPERATORS, Session
+from ripple_sim.viewer.session import OPERATORS, Session, Skin
 
 
 def state(session: Session) -> bytes:
@@ -180,3 +185,65 @@ def test_the_example_of_the_documentation_runs(capsys: pytest.CaptureFixture[str
     [code] = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     exec(compile(code, "docs/viewer.md", "exec"), {})
     assert float(capsys.readouterr().out.split()[0]) < 0
+
+
+def test_a_ray_finds_the_surface_where_geometry_says(session: Session) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        origin = MIDDLE + 3 * rng.standard_normal(3) / np.sqrt(3)
+        if np.linalg.norm(origin - MIDDLE) < 1:
+            continue
+        toward = MIDDLE + 0.3 * rng.uniform(-1, 1, 3) - origin
+        hit = session.pick(origin, toward)
+        assert hit is not None
+        # |o + t d| = R
+        local = origin - MIDDLE
+        a, b, c = toward @ toward, local @ toward, local @ local - RADIUS**2
+        assert hit.distance == pytest.approx((-b - np.sqrt(b * b - a * c)) / a, rel=3e-3)
+    assert session.pick([3, 0, 0.5], [1, 0, 0]) is None
+    assert session.pick([3, 0, 2.5], [-1, 0, 0]) is None
+
+
+def test_a_ray_finds_the_nearest_of_two_turned_and_moved_surfaces() -> None:
+    session = Session(open_scene("pair"), resolution=16)
+    run(session, 4)
+    data, ids = session.simulation.data, session.simulation.ripples.geom_ids
+    left, right = (data.geom_xpos[ids[name]] for name in ("left", "right"))
+    along = (right - left) / np.linalg.norm(right - left)
+    for start, way, name in ((left - 2 * along, along, "left"), (right + 2 * along, -along, "right")):
+        hit = session.pick(start, way)
+        assert hit is not None
+        assert hit.geom == name
+        atlas = session.simulation.ripples[name].atlas
+        closest, _ = atlas.project(hit.point)
+        assert np.linalg.norm(closest[0] - hit.point) < 1e-3  # triangles in a ball
+        # carried back to the world the point lies on the ray
+        world = data.geom_xpos[ids[name]] + data.geom_xmat[ids[name]].reshape(3, 3) @ hit.point
+        np.testing.assert_allclose(world, start + hit.distance * way, atol=1e-6)
+
+
+def test_a_skin_is_the_surface_while_nothing_moves(session: Session) -> None:
+    skin = session.skins["sphere"]
+    np.testing.assert_allclose(np.linalg.norm(skin.points, axis=1), RADIUS, rtol=2e-3)
+    np.testing.assert_allclose(np.linalg.norm(skin.normals, axis=1), 1, rtol=1e-5)
+    corners = skin.points[skin.F]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (np.einsum("ij,ij->i", outward, corners.mean(axis=1)) > 0).all()
+
+
+def test_a_skin_follows_a_smooth_height_with_its_points_and_normals() -> None:
+    atlas = sphere_atlas(1.0, 48)
+    skin = Skin(atlas)
+    rest, flat, height = skin.points.copy(), skin.normals.copy(), 0.02
+    x, _, z = np.moveaxis(atlas.positions, -1, 0)
+    skin.update((height * (x * z)).astype(np.float32))
+    direction = rest / np.linalg.norm(rest, axis=1, keepdims=True)
+    wave = height * direction[:, 0] * direction[:, 2]
+    np.testing.assert_allclose(skin.height, wave, atol=2e-3 * height)
+    np.testing.assert_allclose(np.linalg.norm(skin.points - rest, axis=1), np.abs(wave), atol=3e-3 * height)
+    # gradient on the unit sphere of a x z: the plane gradient (z, 0, x) a without its radial part
+    gradient = height * np.stack([direction[:, 2], np.zeros(len(rest)), direction[:, 0]], axis=1)
+    gradient -= np.einsum("ij,ij->i", gradient, direction)[:, None] * direction
+    tipped = flat - gradient
+    tipped /= np.linalg.norm(tipped, axis=1, keepdims=True)
+    assert np.linalg.norm(skin.normals - tipped, axis=1).max() < 0.02 * np.linalg.norm(tipped - flat, axis=1).max()

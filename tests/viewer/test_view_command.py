@@ -12,8 +12,8 @@ import pytest
 
 from ripple_sim.cli import main as cli
 from ripple_sim.errors import DisplayError
-from ripple_sim.viewer.controls import CONTROLS, MOUSE, help_text
-from ripple_sim.viewer.display import check_display
+from ripple_sim.viewer.canvas import CONTROLS, MOUSE, help_text
+from ripple_sim.viewer.window import check_display
 
 
 @pytest.fixture(autouse=True)

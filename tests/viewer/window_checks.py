@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ripple_sim.viewer import desktop
-from ripple_sim.viewer.controls import CONTROLS
+from ripple_sim.viewer.canvas import CONTROLS
 from ripple_sim.viewer.opening import BALLS, open_scene
 from ripple_sim.viewer.session import OPERATORS, SLIDERS, Session
-from ripple_sim.viewer.window import Window
+from ripple_sim.viewer.window import Window, benchmark, run
 
 OFF_SCREEN = "DISPLAY" not in os.environ
 MIDDLE = (200, 160)  # of the sphere in the window, from the lower left [pixels]
@@ -255,7 +254,7 @@ def test_arrays_are_changed_in_place(window: Window) -> None:
 
 
 def test_the_benchmark_reports_and_closes(closed: Window) -> None:
-    result = desktop.benchmark(closed, updates=3, tries=1)
+    result = benchmark(closed, updates=3, tries=1)
     assert result.updates_per_second > 0
     assert "updates/s" in str(result)
     assert result.renderer in str(result)
@@ -272,7 +271,7 @@ def test_the_loop_runs_until_the_user_quits(closed: Window, monkeypatch: pytest.
         return ticks[-1]
 
     monkeypatch.setattr(closed, "tick", tick)
-    desktop.run(closed)
+    run(closed)
     assert ticks == [True] * 4
     assert closed.session.time == pytest.approx(4 / 30)
 

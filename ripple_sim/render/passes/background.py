@@ -1,17 +1,101 @@
-"""The background: floor and sky behind the solids."""
+"""The background: floor and sky behind the solids.
+
+The tiles of a frame that a coarse background fills.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from enum import IntEnum
 
 import moderngl
+import numpy as np
 
-from ripple_sim.render.gpu.contract import LEVELS, Unit
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import LEVELS, BackgroundTiles, Unit
+from ripple_sim.render.resources import Resources
 
-from .background_tiles import SortedTiles
 from .floor import Floor
-from .frame_pass import FramePass
+from .layers import FramePass
+
+_BLOCKS = 8  # along an edge of a tile
+_GROUP = 64
+
+
+class Kind(IntEnum):
+    """How a tile is filled."""
+
+    PLAIN = 0  # interpolated from its corners
+    SMOOTH = 1  # interpolated from the blocks
+    ROUGH = 2  # likewise, and shaded where that is not smooth
+
+
+class SortedTiles:
+    """Square tiles of the frame, sorted on the GPU, each to be filled as fast as it allows.
+
+    Parameters
+    ----------
+    resources : Resources
+    size : (width, height)
+        Of the frame [pixels].
+    block : int
+        Edge of what a texel of the coarse background stands for [pixels].
+    options : mapping
+        Defines as for the shaders of `DeferredShading`.
+    """
+
+    def __init__(self, resources: Resources, size: tuple[int, int], block: int, options: Mapping[str, int]) -> None:
+        edge = block * _BLOCKS
+        tiles = -(-size[0] // edge), -(-size[1] // edge)
+        self._groups = -(-tiles[0] * tiles[1] // _GROUP)
+        self._corners = resources.buffer(reserve=8 * len(Kind) * tiles[0] * tiles[1])
+        self._empty = np.array([[4, 0, 0, kind * tiles[0] * tiles[1], 0] for kind in Kind], dtype=np.uint32).tobytes()
+        self._commands = resources.buffer(self._empty)
+        self._sort = resources.compute_shader("passes/sort_tiles", TILE=_BLOCKS, GROUP=_GROUP)
+        self._sort["tiles"] = tiles
+        plain, smooth, rough = (
+            resources.program("passes/coarse_tile_vertex", fragment, **options, PLAIN=plain)
+            for fragment, plain in (
+                ("passes/tile_fragment", 1),
+                ("passes/tile_fragment", 0),
+                ("passes/background_fill_fragment", 0),
+            )
+        )
+        shade = resources.program("passes/view_tile_vertex", "passes/background_fragment", **options, SHADOW=1, BLOCK=1)
+        extent = 2.0 * edge / size[0], 2.0 * edge / size[1]
+        self._sort["extent"] = extent
+        for program in (plain, smooth, rough, shade):
+            program["extent"] = extent
+        for program in (plain, smooth, rough):
+            program["blocks"] = size[0] / block, size[1] / block
+        self._plain, self._smooth, self._rough, self._shade = (
+            resources.vertex_array(program, [(self._corners, "2f/i", "in_corner")])
+            for program in (plain, smooth, rough, shade)
+        )
+
+    def sort(self, ctx: moderngl.Context) -> None:
+        """Sort the tiles by the coarse background that is bound."""
+        self._commands.write(self._empty)
+        self._corners.bind_to_storage_buffer(BackgroundTiles.TILES)
+        self._commands.bind_to_storage_buffer(BackgroundTiles.COMMANDS)
+        self._sort.run(self._groups)
+        ctx.memory_barrier()
+
+    def fill(self, ctx: moderngl.Context, frame: moderngl.Framebuffer) -> None:
+        """Fill the framebuffer in use from the coarse background that is bound."""
+        ctx.depth_func = "<="
+        self._draw(self._rough, Kind.ROUGH, 0.0)
+        frame.depth_mask = False
+        self._draw(self._plain, Kind.PLAIN, LEVELS["MIXED"])
+        self._draw(self._smooth, Kind.SMOOTH, LEVELS["MIXED"])
+        ctx.depth_func = "=="
+        for level in ("SHADED", "MIXED"):
+            self._draw(self._shade, Kind.ROUGH, LEVELS[level])
+        frame.depth_mask = True
+
+    def _draw(self, tiles: moderngl.VertexArray, kind: Kind, level: float) -> None:
+        tiles.program["level"] = level
+        tiles.render_indirect(self._commands, moderngl.TRIANGLE_STRIP, count=1, first=kind)
+
 
 _PIXELS = 4  # along an edge of a block
 

@@ -1,25 +1,62 @@
-"""Deferred shading: the G-buffer is lit, each visible surface of a pixel once, with the floor and the background."""
+"""Deferred shading: the G-buffer is lit, each visible surface of a pixel once, with the floor and the background.
+
+The tiles of the frame in which something may show.
+
+The reflection in the floor: the scene as a camera below the floor sees it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Callable, Mapping
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.frame_format import FrameFormat
-from ripple_sim.render.gpu.contract import LEVELS
-from ripple_sim.render.gpu.g_buffer import GBuffer
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.camera import Balls, Pose
+from ripple_sim.render.contract import LEVELS, Unit
+from ripple_sim.render.resources import FrameUniforms, Resources
+from ripple_sim.render.targets import FrameFormat, GBuffer
 from ripple_sim.solver.errors import RippleError
 
 from .background import Background, CoarseBackground
 from .floor import Floor
-from .frame_pass import FramePass
-from .layers import TransparentLayers
-from .screen_bounds import scissor_of
-from .tiles import Tiles
+from .layers import FramePass, TransparentLayers, boxes_of, scissor_of
+
+_TILE = 32  # [pixels]
+
+
+class Tiles:
+    """The square tiles of the frame that any of some boxes touches, as instances for a shader.
+
+    Parameters
+    ----------
+    resources : Resources
+    size : (width, height)
+        Of the frame [pixels].
+    """
+
+    def __init__(self, resources: Resources, size: tuple[int, int]) -> None:
+        self._mask = np.zeros((-(-size[1] // _TILE), -(-size[0] // _TILE)), dtype=bool)
+        self._scale = 2.0 * _TILE / np.array(size)
+        self.buffer: moderngl.Buffer = resources.buffer(reserve=8 * self._mask.size, dynamic=True)
+        self.count = 0
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Width and height of a tile, where the frame extends from -1 to 1."""
+        return float(self._scale[0]), float(self._scale[1])
+
+    def cover(self, boxes: NDArray[np.int64]) -> None:
+        """Select the tiles that any of some boxes [k, 4] touches; see `boxes_of`."""
+        self._mask[...] = False
+        for left, lower, right, upper in boxes[(boxes[:, :2] < boxes[:, 2:]).all(axis=1)]:
+            self._mask[lower // _TILE : -(-upper // _TILE), left // _TILE : -(-right // _TILE)] = True
+        tiles = np.argwhere(self._mask)[:, ::-1]
+        self.count = len(tiles)
+        if self.count:
+            self.buffer.write((tiles * self._scale - 1.0).astype("f4").tobytes())
 
 
 class DeferredShading:
@@ -135,3 +172,74 @@ def _check_size(resources: Resources, size: tuple[int, int]) -> None:
             f"frame size is {width}x{height} pixels; valid with this driver are 1 to {limit} along each side: choose a "
             "size within that"
         )
+
+
+class Mirror:
+    """The reflection, at half the frame's resolution.
+
+    Parameters
+    ----------
+    resources : Resources
+    frame_format : FrameFormat
+        Of the frame.
+    floor : Floor
+    light_options : mapping
+        As for `DeferredShading`.
+    """
+
+    def __init__(
+        self, resources: Resources, frame_format: FrameFormat, floor: Floor, light_options: Mapping[str, int]
+    ) -> None:
+        self._floor, self._aspect = floor, frame_format.aspect
+        width, height = frame_format.size
+        half = dataclasses.replace(frame_format, size=(max(width // 2, 1), max(height // 2, 1)))
+        self._size = half.size
+        self._frame = FrameUniforms(resources)
+        self._shading = DeferredShading(resources, half, None, light_options)
+        self._image = resources.texture(half.size, 4, dtype=half.dtype)
+        self._image.repeat_x = self._image.repeat_y = False
+        self._framebuffer = resources.framebuffer([self._image])
+
+    def draw(
+        self,
+        ctx: moderngl.Context,
+        frame: FrameUniforms,
+        pose: Pose,
+        balls: Balls,
+        draw_solids: Callable[[], None],
+        bind_maps: Callable[[], None],
+    ) -> None:
+        """Draw the reflection for a frame whose uniforms are set; `frame` is bound again afterwards.
+
+        Parameters
+        ----------
+        ctx : moderngl.Context
+        frame : FrameUniforms
+        pose : Pose
+            Of the camera above the floor.
+        balls : Balls
+            That contain all solids.
+        draw_solids, bind_maps : callable
+            Draw the solids into the G-buffer; bind what shading needs.
+        """
+        self._frame.values[...] = frame.values
+        floor = self._floor
+        flip = np.eye(3) - 2 * np.outer(floor.normal, floor.normal)
+        position = floor.origin + flip @ (pose.position - floor.origin)
+        mirrored = dataclasses.replace(pose, position=position, rotation=flip @ pose.rotation)
+        self._frame.set_camera(mirrored, self._aspect)
+        self._frame.set_vector("floor_origin", floor.origin, 0.0)
+        self._frame.bind()
+        ctx.front_face = "cw"
+        self._shading.clear(ctx)
+        self._shading.begin(ctx)
+        draw_solids()
+        ctx.front_face = "ccw"
+        bind_maps()
+        self._shading.shade(ctx, boxes_of(balls, mirrored, self._size))
+        ctx.copy_framebuffer(self._framebuffer, self._shading.frame)
+        frame.bind()
+
+    def bind(self) -> None:
+        """Bind the reflection for the floor's shader."""
+        self._image.use(Unit.MIRROR)

@@ -8,8 +8,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.contract import VERTEX_GROUP, Binding
-from ripple_sim.render.gpu.resources import Resources
+from ripple_sim.render.contract import VERTEX_GROUP, Binding
+from ripple_sim.render.resources import Resources
 
 from .vertices import DIRECTION, POSITION, SurfaceVertices
 

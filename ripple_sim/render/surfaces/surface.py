@@ -1,28 +1,196 @@
-"""The surface of a target as it is drawn: geometry, look and texture."""
+"""The surface of a target as it is drawn: geometry, look and texture.
+
+Where a target's surface lies on the charts of its atlas.
+
+A heatmap: one of the solver's fields on a target, in false colours.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.gpu.contract import MappingKind
-from ripple_sim.render.gpu.resources import Resources
-from ripple_sim.render.gpu.textures import srgb_texture
-from ripple_sim.render.visuals.looks import MODEL_LOOK, Look, find_look
-from ripple_sim.render.visuals.materials import look_of
+from ripple_sim.render.camera import srgb_to_linear
+from ripple_sim.render.contract import MappingKind, Unit
+from ripple_sim.render.resources import Resources, srgb_texture, write_page
 from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of
-from ripple_sim.render.visuals.visual import geom_visual
+from ripple_sim.render.visuals.visual import MODEL_LOOK, Look, find_look, geom_visual, look_of
+from ripple_sim.solver import Atlas
 from ripple_sim.solver.errors import RippleError
-from ripple_sim.solver.image_file import read_image
+from ripple_sim.solver.files import read_image
+from ripple_sim.solver.texels.chart_map import ChartMap
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
-from .charts import Charts
-from .heatmap import UNDER_HEATMAP
+_ON_BORDER = 1e-9  # of a chart
+_BITS = 36  # of the attributes of cut points: round-off is within their last one
+
+
+class Charts(NamedTuple):
+    """The charts of a surface.
+
+    Attributes
+    ----------
+    map : ChartMap
+        The way from the surface's mesh to the charts.
+    shape : (C, n, n)
+        Of a field on them.
+    """
+
+    map: ChartMap
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def of(cls, atlas: Atlas) -> Charts:
+        """The charts of an atlas."""
+        return cls(atlas.chart_map, atlas.texels.shape)
+
+    @property
+    def page(self) -> ChartPage:
+        """All of them on one page."""
+        return ChartPage(self.shape[0], self.shape[1])
+
+    @property
+    def halo_shape(self) -> tuple[int, int, int]:
+        """Shape (C, n + 2, n + 2) of a field with halo."""
+        count, n, _ = self.shape
+        return count, n + 2, n + 2
+
+
+class VertexColumns(NamedTuple):
+    """Columns of vertex attributes: what cut points share where they are one, unit normals, map coordinates."""
+
+    position: slice
+    normal: slice
+    coordinates: slice
+
+
+class ChartedMesh(NamedTuple):
+    """A mesh of which every triangle lies in one chart; vertices on the borders stand once for each chart.
+
+    Attributes
+    ----------
+    F : int64 [m, 3]
+    attributes : float64 [n, ...]
+        Of the vertices.
+    same : int64 [n]
+        Equal for vertices that differ in their texture coordinates and charts at most; see `tessellate`.
+    chart : int64 [n]
+    """
+
+    F: NDArray[np.int64]
+    attributes: NDArray[np.float64]
+    same: NDArray[np.int64]
+    chart: NDArray[np.int64]
+
+
+def split_at_charts(
+    mesh: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]], columns: VertexColumns, charts: Charts
+) -> ChartedMesh:
+    """Cut the triangles of a mesh (F, attributes, same; see `tessellate`) where they leave a chart.
+
+    What the vertices have is linear in each triangle.
+    """
+    F, attributes, same = mesh
+    triangle, barycentrics, chart = charts.map.split(attributes[F][:, :, columns.coordinates])
+    whole, corner = barycentrics.max(axis=2) == 1, barycentrics.argmax(axis=2)
+    vertex = np.take_along_axis(F[triangle], corner, axis=1)
+    part, place = np.nonzero(~whole)
+    cut = np.einsum("ci,cij->cj", barycentrics[part, place], attributes[F[triangle[part]]])
+    cut[:, columns.normal] /= np.maximum(np.linalg.norm(cut[:, columns.normal], axis=1, keepdims=True), 1e-12)
+    cut = _snapped(cut, attributes)
+    _, point = np.unique(cut[:, [*_range(columns.position), *_range(columns.normal)]], axis=0, return_inverse=True)
+    _, distinct = np.unique(cut, axis=0, return_inverse=True)
+    source, alike = np.where(whole, vertex, 0), np.where(whole, vertex, 0)
+    source[part, place] = len(attributes) + np.arange(len(cut))
+    alike[part, place] = len(attributes) + distinct.ravel()
+    key = alike * charts.shape[0] + chart[:, None]
+    _, where, index = np.unique(key, return_index=True, return_inverse=True)
+    row = source.ravel()[where]
+    return ChartedMesh(
+        index.reshape(-1, 3),
+        np.concatenate([attributes, cut])[row],
+        np.concatenate([same, int(same.max()) + 1 + point.ravel()])[row],
+        key.ravel()[where] % charts.shape[0],
+    )
+
+
+def _snapped(cut: NDArray[np.float64], attributes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Attributes of cut points without the round-off by which two triangles differ in a point that they share."""
+    exponent = np.frexp(np.abs(attributes).max(axis=0))[1]
+    step = np.ldexp(1.0, exponent - _BITS)
+    return np.round(cut / step) * step
+
+
+def _range(columns: slice) -> range:
+    return range(columns.start, columns.stop)
+
+
+def shared_places(uv: NDArray[np.float64], places: NDArray[np.float64], points: NDArray) -> NDArray[np.float64]:
+    """Places [n, 2] on the page that are the same for vertices at the same point, whatever their charts.
+
+    Heights on both sides of a border are equal but for round-off; looked up in one place they are the same, so that no
+    gap opens. `points` [n, k] are equal where the vertices are at one point.
+    """
+    border = np.flatnonzero(((uv < _ON_BORDER) | (uv > 1 - _ON_BORDER)).any(axis=1))
+    _, first, index = np.unique(points[border], axis=0, return_index=True, return_inverse=True)
+    shared = places.copy()
+    shared[border] = places[border[first[index.ravel()]]]
+    return shared
+
+
+# What is lit under the colours: only its shadows are kept.
+UNDER_HEATMAP = Look(color=(0.81, 0.81, 0.81), roughness=0.8)
+
+
+class HeatmapTexture:
+    """A field's values and their colours on the GPU, for heatmap.glsl.
+
+    Parameters
+    ----------
+    resources : Resources
+    page : ChartPage
+        Of the target's charts.
+    colors : array of uint8, shape [k, 3]
+        sRGB, from the least to the greatest value.
+    """
+
+    def __init__(self, resources: Resources, page: ChartPage, colors: NDArray[np.uint8]) -> None:
+        self._page, self._shape = page, (page.charts, page.block, page.block)
+        self._values = resources.texture_array((*page.size, 1), 1, dtype="f4")
+        self._colors = resources.texture((len(colors), 1), 3, np.ascontiguousarray(colors).tobytes(), alignment=1)
+        for texture in (self._values, self._colors):
+            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            texture.repeat_x = texture.repeat_y = False
+        self.set(np.zeros(self._shape, np.float32), 1.0)
+
+    def set(self, values: NDArray[np.float32], limit: float) -> None:
+        """Replace the values, [C, n + 2, n + 2]; the colours range from -limit to limit.
+
+        Raises
+        ------
+        RippleError
+            If the shape is another, or the limit is not a positive, finite number.
+        """
+        if values.shape != self._shape:
+            raise RippleError(
+                f"the heatmap's values have shape {list(values.shape)}; valid is {list(self._shape)}: charts with a "
+                "halo of one texel"
+            )
+        if not (np.isfinite(limit) and limit > 0):
+            raise RippleError(f"the heatmap's limit is {limit!r}; valid is a positive, finite number")
+        write_page(self._values, self._page, 0, values)
+        self._limit = float(limit)
+
+    def use(self, program: moderngl.Program) -> None:
+        """Bind everything for a draw call."""
+        self._values.use(Unit.HEATMAP)
+        self._colors.use(Unit.HEATMAP_COLORS)
+        program["heatmap_limit"] = self._limit
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,13 @@
-"""The triangles and vertices that a target is drawn with: small, round in outline, split at creases and seams."""
+"""The triangles and vertices that a target is drawn with: small, round in outline, split at creases and seams.
+
+A mesh with few of the vertices of another one, spread evenly, that moves with it.
+
+A mesh cut into the parts of its chart map, as round as before it was cut.
+
+Order of triangles and vertices in memory, for the vertex caches of GPUs and software drivers.
+
+What a target is drawn with, kept for the next scene: in a batch it mostly has the same surfaces.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +16,140 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.visuals.corners import normalized, smooth_normals, split_corners
+from ripple_sim.render.camera import Balls, balls_about
+from ripple_sim.render.visuals import corners as occlusion
+from ripple_sim.render.visuals.corners import corner_normals, normalized, smooth_normals, split_corners
 from ripple_sim.render.visuals.texture_mapping import Mapping
 from ripple_sim.solver import Mesh
+from ripple_sim.solver.cache import Kept, content_key
+from ripple_sim.solver.texels.chart_map import ChartMap, PartsMesh, parts_mesh
 
-from . import ambient_occlusion as occlusion
-from .charts import Charts, VertexColumns, shared_places, split_at_charts
-from .rounded_parts import rounded_parts
-from .surface import Surface
-from .tessellation import Edges, edges_of, midpoints, tessellate
-from .vertex_order import in_memory_order
+from .surface import ChartedMesh, Charts, Surface, VertexColumns, shared_places, split_at_charts
+from .tessellation import Edges, bulges, edges_of, midpoints, tessellate
+
+
+class CoarseMesh(NamedTuple):
+    """Some of the vertices of a mesh.
+
+    Attributes
+    ----------
+    vertices : int64 [k]
+        Of the mesh.
+    F : int64 [m, 3]
+        Triangles between them.
+    """
+
+    vertices: NDArray[np.int64]
+    F: NDArray[np.int64]
+
+
+def coarse_mesh(F: NDArray[np.int64], features: NDArray[np.float64], count: int) -> CoarseMesh:
+    """Merge every vertex with the nearest of `count` that are far from one another (Rossignac and Borrel 1993).
+
+    Parameters
+    ----------
+    F : int64 [m, 3]
+    features : float64 [n, d]
+        Of the vertices; near is what is near in them.
+    count : int
+    """
+    if len(features) <= count:
+        return CoarseMesh(np.arange(len(features)), np.asarray(F))
+    chosen, owner = _spread(features, count)
+    merged = owner[F]
+    merged = merged[(merged != np.roll(merged, 1, axis=1)).all(axis=1)]
+    # each begins with its least vertex, so that the same triangle is the same row
+    first = merged.argmin(axis=1)[:, None]
+    return CoarseMesh(chosen, np.unique(np.take_along_axis(merged, (first + np.arange(3)) % 3, axis=1), axis=0))
+
+
+def _spread(features: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows [count], each the farthest from those before, and the number among them of the nearest to every row [n].
+
+    In plain numpy, column by column: it takes twice the time of a compiled loop, and less than to compile that.
+    """
+    columns = np.ascontiguousarray(features.T)
+    chosen, owner = np.zeros(count, np.int64), np.zeros(len(features), np.int64)
+    square = np.full(len(features), np.inf)
+    latest = 0
+    for k in range(count):
+        chosen[k] = latest
+        distance = np.zeros(len(features))
+        for column in columns:
+            distance += np.square(column - column[latest])
+        nearer = distance < square
+        np.copyto(square, distance, where=nearer)
+        owner[nearer] = k
+        latest = int(square.argmax())
+    return chosen, owner
+
+
+_ALIKE = 1e-4  # normals at a vertex that differ by less are one
+
+
+class RoundedParts(NamedTuple):
+    """Parts, the places of their vertices [m], float64 [n, 3], and the normals of their corners, [m, 3, 3]."""
+
+    parts: PartsMesh
+    V: NDArray[np.float64]
+    normals: NDArray[np.float64]
+
+
+def rounded_parts(mesh: Mesh, chart_map: ChartMap) -> RoundedParts:
+    """Cut a mesh; normals go over from the mesh's triangles, whose parts bulge out as the triangles themselves would.
+
+    A triangle is the quadratic patch whose edges have the midpoints of `tessellate`: flat where its normals say so.
+    """
+    parts, normals = parts_mesh(chart_map, mesh), corner_normals(mesh.V, mesh.F)
+    if parts.V is mesh.V:
+        return RoundedParts(parts, mesh.V, normals)
+    w, out = parts.barycentrics, _bulges_of_sides(mesh)[parts.triangle]
+    V = parts.V.copy()
+    V[parts.F] += 4 * np.einsum("pck,pck,pkj->pcj", w, np.roll(w, -1, axis=2), out)
+    return RoundedParts(parts, V, _unified(parts.F, normalized(parts.carry(normals))))
+
+
+def _bulges_of_sides(mesh: Mesh) -> NDArray[np.float64]:
+    """How far the midpoint of each triangle's side from corner k to k + 1 bulges out [m], [m, 3, 3]."""
+    split = split_corners(mesh.V, mesh.F)
+    attributes = np.concatenate([mesh.V[split.vertices], split.normals], axis=1)
+    edges = edges_of(split.F, np.arange(len(attributes)))
+    return bulges(edges, attributes, slice(0, 3), slice(3, 6))[edges.of_side]
+
+
+def _unified(F: NDArray[np.int64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corner normals [m, 3, 3] that are the same to the last bit where they differ by round-off at a vertex."""
+    key = np.column_stack([F.ravel(), np.rint(normals.reshape(-1, 3) / _ALIKE).astype(np.int64)])
+    _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return normals.reshape(-1, 3)[first[group.ravel()]].reshape(normals.shape)
+
+
+_BITS = 10  # of a coordinate
+
+
+def in_memory_order(mesh: ChartedMesh, position: slice) -> ChartedMesh:
+    """The same mesh with neighbours close in memory: its triangles along a Morton curve, its vertices as they use them.
+
+    `position` are the attributes' columns that hold the vertices' positions.
+    """
+    F = mesh.F[morton_order(mesh.attributes[:, position][mesh.F].mean(axis=1))]
+    used, first = np.unique(F, return_index=True)
+    vertices = used[np.argsort(first)]
+    number = np.empty(len(mesh.attributes), dtype=np.int64)
+    number[vertices] = np.arange(len(vertices))
+    return ChartedMesh(number[F], mesh.attributes[vertices], mesh.same[vertices], mesh.chart[vertices])
+
+
+def morton_order(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Order of points [k, 3] along a Morton (Z-order) curve."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    cell = ((points - low) / max((high - low).max(), 1e-300) * (2**_BITS - 1)).astype(np.int64)
+    code = np.zeros(len(points), dtype=np.int64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")
+
 
 _LEAST_FACES, _MOST_FACES = 8_000, 400_000
 # Creases are split down to half a texel, as heights have no finer detail, but to no less than a quarter of other edges.
@@ -147,3 +280,47 @@ def mapped_coordinates(vertices: NDArray[np.float64], mapping: Mapping) -> NDArr
     u, v = vertices[:, UV].T
     # a surface counts v from the image's lower edge, MuJoCo from the upper edge
     return np.stack([u, 1.0 - v, np.zeros_like(u)], axis=1)
+
+
+_BALLS = 16  # that bound the mesh
+_COARSE = 600  # vertices of what the floor sees: texels of its map are about as far apart
+_APART = 0.1  # of the bounding radius: how far from each other the two sides of a thin body are
+_MOST_KEPT_FACES = 100_000  # of a surface that is kept: 30 MB
+
+
+class BoundedVertices(NamedTuple):
+    """The vertices of a surface, whose arrays cannot be written to, balls about it, and few triangles of its shape."""
+
+    vertices: SurfaceVertices
+    balls: Balls
+    coarse: NDArray[np.int64]
+
+
+_kept: Kept[BoundedVertices] = Kept(4, lambda each: len(each.vertices.F) <= _MOST_KEPT_FACES)
+
+
+def bounded_vertices(surface: Surface, max_length: float, max_faces: int) -> BoundedVertices:
+    """Tessellate a surface as `surface_vertices` does, or take what came of it before."""
+    charts, uv = surface.charts, np.zeros(0) if surface.uv is None else np.asarray(surface.uv)
+    arrays = charts.map.arrays()
+    name = f"{charts.map.layout} {charts.shape} {list(arrays)} {max_length!r} {max_faces}"
+    key = content_key(name, [surface.V, surface.F, uv, *arrays.values()])
+    return _kept.get(key, lambda: _bounded(surface_vertices(surface, max_length, max_faces)))
+
+
+def _bounded(vertices: SurfaceVertices) -> BoundedVertices:
+    for array in (*vars(vertices.edges).values(), *vertices._asdict().values()):
+        if isinstance(array, np.ndarray):
+            array.flags.writeable = False
+    middle = len(vertices.attributes) - len(vertices.edges.ends) + vertices.edges.of_side
+    corners = np.concatenate([vertices.F, middle])
+    points = vertices.attributes[:, POSITION]
+    return BoundedVertices(vertices, balls_about(points[corners], _BALLS), _coarse(vertices, points))
+
+
+def _coarse(vertices: SurfaceVertices, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Triangles [m, 3] between few of the vertices."""
+    base = len(points) - len(vertices.edges.ends)
+    apart = _APART * np.ptp(points, axis=0).max() / 2 * vertices.attributes[:base, DIRECTION]
+    mesh = coarse_mesh(vertices.F, np.hstack([points[:base], apart]), _COARSE)
+    return mesh.vertices[mesh.F]

@@ -1,17 +1,174 @@
-"""Shapes of visuals: which mesh each kind of geom is drawn as, and its sizes."""
+"""Shapes of visuals: which mesh each kind of geom is drawn as, and its sizes.
+
+Tessellated primitives.
+
+Every MuJoCo primitive is the Minkowski sum of a box-like core and a ball-like shell: a point of it is
+`core * core_size + shell * shell_size`, component by component. A sphere has no core, a
+capsule's is a segment, a box's a box; boxes and cylinders get a small round shell: edges that catch the light.
+
+Meshes and height fields of a MuJoCo model, with vertex normals.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from . import meshes, primitives
-from .primitives import Shape
+from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS, CHART_U, CHART_V
+
+from .corners import normalized, split_corners
 from .visual import Visual
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A triangle mesh whose vertices scale with two sizes.
+
+    `core`, `shell` and `normals` have shape [n, 3], `faces` shape [m, 3]; `uv`, shape [n, 2], are texture coordinates
+    where the mesh has any.
+    """
+
+    core: NDArray[np.float64]
+    shell: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    uv: NDArray[np.float64] | None = None
+
+    def positions(self, core_size: NDArray[np.float64], shell_size: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Vertices [n, 3] for the two sizes [m], shape [3] each."""
+        return self.core * core_size + self.shell * shell_size
+
+
+def ball(divisions: int) -> Shape:
+    """Unit sphere: a cube of `divisions` squares an edge, projected at equal angles. Also for ellipsoids."""
+    points, faces = _cube_grid(np.linspace(-1.0, 1.0, divisions + 1))
+    directions = normalized(np.tan(np.pi / 4 * points))
+    return Shape(np.zeros_like(directions), directions, directions, faces)
+
+
+def box(divisions: int) -> Shape:
+    """Box with half sizes core + shell and round edges of `divisions` segments."""
+    # a face's grid line is straight between -1 and 1 and bends round the edges beyond; an edge's middle is at 1.5
+    bend = np.linspace(0.0, 0.5, divisions + 1)[1:]
+    points, faces = _cube_grid(np.concatenate([-1 - bend[::-1], [-1.0, 1.0], 1 + bend]))
+    core = np.clip(points, -1.0, 1.0)
+    directions = normalized(np.tan(np.pi / 2 * (points - core)))
+    return Shape(core, directions, directions, faces)
+
+
+def capsule(sides: int, rings: int) -> Shape:
+    """Capsule along z: the core is a segment of half length core_size[2], the shell a ball."""
+    angle = np.concatenate([np.linspace(-np.pi / 2, 0, rings + 1), np.linspace(0, np.pi / 2, rings + 1)])
+    core_z = np.repeat([-1.0, 1.0], rings + 1)
+    return _revolved(np.zeros_like(angle), core_z, np.cos(angle), np.sin(angle), sides)
+
+
+def cylinder(sides: int, rings: int) -> Shape:
+    """Cylinder along z with round rims: radius and half height are core + shell."""
+    lower, upper = np.linspace(-np.pi / 2, 0, rings + 1), np.linspace(0, np.pi / 2, rings + 1)
+    angle = np.concatenate([[-np.pi / 2], lower, upper, [np.pi / 2]])
+    core_r = np.concatenate([[0.0], np.ones(2 * rings + 2), [0.0]])
+    core_z = np.repeat([-1.0, 1.0], rings + 2)
+    return _revolved(core_r, core_z, np.cos(angle), np.sin(angle), sides)
+
+
+def sheet() -> Shape:
+    """Square of half size 1, visible from above only."""
+    core = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+    up = np.tile([0.0, 0.0, 1.0], (4, 1))
+    return Shape(core, up, up, np.array([[0, 1, 2], [0, 2, 3]]))
+
+
+def _cube_grid(line: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices and outward triangles of a cube with the grid line x line on each face; edges are welded.
+
+    Vertices are welded by whole numbers: a coordinate is the entry of `line` at (lattice + last) / 2.
+    """
+    last = len(line) - 1
+    row, column = np.divmod(np.arange(len(line) ** 2), len(line))
+    a, b = 2 * column - last, 2 * row - last
+    lattice = np.concatenate(
+        [
+            last * normal + a[:, None] * u + b[:, None] * v
+            for normal, u, v in zip(CHART_NORMALS, CHART_U, CHART_V, strict=True)
+        ]
+    )
+    corner = (np.arange(last)[:, None] * len(line) + np.arange(last)).ravel()
+    quad = np.stack([corner, corner + 1, corner + len(line) + 1, corner + len(line)], axis=1)
+    quads = np.concatenate([quad + face * len(line) ** 2 for face in range(6)])
+    welded, index = np.unique(lattice, axis=0, return_inverse=True)
+    return line[(welded + last) // 2], index.ravel()[np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])]
+
+
+def _revolved(core_r: NDArray, core_z: NDArray, shell_r: NDArray, shell_z: NDArray, sides: int) -> Shape:
+    """Revolve a profile, from the lower pole to the upper one, about z; the poles are single vertices."""
+    turn = 2 * np.pi * np.arange(sides) / sides
+    circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(sides)], axis=1)
+    axis = np.array([0.0, 0.0, 1.0])
+    inner = slice(1, -1)
+
+    def rings(radius: NDArray, height: NDArray) -> NDArray[np.float64]:
+        body = radius[inner, None, None] * circle + height[inner, None, None] * axis
+        return np.concatenate([[height[0] * axis], body.reshape(-1, 3), [height[-1] * axis]])
+
+    count = len(core_r) - 2
+    index = 1 + np.arange(count * sides).reshape(count, sides)
+    after = np.roll(index, -1, axis=1)
+    top = 1 + count * sides
+    faces = [np.stack([np.zeros(sides, dtype=np.int64), after[0], index[0]], axis=1)]
+    for lower in range(count - 1):
+        a, b, c, d = index[lower], after[lower], after[lower + 1], index[lower + 1]
+        faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    faces.append(np.stack([index[-1], after[-1], np.full(sides, top)], axis=1))
+    shell = normalized(rings(shell_r, shell_z))
+    return Shape(rings(core_r, core_z), shell, shell, np.concatenate(faces))
+
+
+def mesh_asset(model: Any, mesh: int) -> Shape:
+    """Mesh of a MuJoCo model in its geom's frame."""
+    first, first_face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+    faces = slice(first_face, first_face + model.mesh_facenum[mesh])
+    V = np.asarray(model.mesh_vert[first : first + model.mesh_vertnum[mesh]], dtype=np.float64)
+    F = np.asarray(model.mesh_face[faces], dtype=np.int64)
+    start = model.mesh_texcoordadr[mesh]
+    if start < 0:
+        return creased(V, F)
+    uv = np.asarray(model.mesh_texcoord[start : start + model.mesh_texcoordnum[mesh]], dtype=np.float64)
+    return creased(V, F, uv[model.mesh_facetexcoord[faces]])
+
+
+def height_field(model: Any, hfield: int) -> Shape:
+    """Height field of a MuJoCo model with its walls, in its geom's frame."""
+    rows, columns = int(model.hfield_nrow[hfield]), int(model.hfield_ncol[hfield])
+    half_x, half_y, top, bottom = (float(x) for x in model.hfield_size[hfield])
+    start = model.hfield_adr[hfield]
+    height = top * np.asarray(model.hfield_data[start : start + rows * columns], dtype=np.float64).reshape(
+        rows, columns
+    )
+    x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
+    ground = np.stack([x, y, height], axis=2).reshape(-1, 3)
+    index = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
+    F = [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+    # round the rim, counter-clockwise from above
+    rim = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
+    foot = len(ground) + np.arange(len(rim))
+    after, foot_after = np.roll(rim, -1), np.roll(foot, -1)
+    F += [np.stack([rim, foot, foot_after], axis=1), np.stack([rim, foot_after, after], axis=1)]
+    return creased(np.concatenate([ground, ground[rim] * [1, 1, 0] - [0, 0, bottom]]), np.concatenate(F))
+
+
+def creased(V: NDArray, F: NDArray, corner_uv: NDArray | None = None) -> Shape:
+    """Mesh of a fixed size, its vertices split where normals or texture coordinates [m, 3, 2] jump."""
+    split = split_corners(V, F, corner_uv)
+    positions = V[split.vertices]
+    return Shape(np.zeros_like(positions), positions, split.normals, split.F, None if corner_uv is None else split.uv)
+
 
 _BEVEL = 0.06
 _ENDLESS = 100.0  # half size of infinite planes, in extents of the model
@@ -20,12 +177,12 @@ _GEOM = mujoco.mjtGeom
 # name, and a function that makes the shape with a number of segments to a right angle
 NamedShape: TypeAlias = tuple[str, Callable[[int], Shape]]
 _SHAPES: dict[int, NamedShape] = {
-    _GEOM.mjGEOM_SPHERE: ("ball", primitives.ball),
-    _GEOM.mjGEOM_ELLIPSOID: ("ball", primitives.ball),
-    _GEOM.mjGEOM_CAPSULE: ("capsule", lambda n: primitives.capsule(4 * n, n)),
-    _GEOM.mjGEOM_CYLINDER: ("cylinder", lambda n: primitives.cylinder(4 * n, 3)),
-    _GEOM.mjGEOM_BOX: ("box", lambda n: primitives.box(min(n // 3, 3))),
-    _GEOM.mjGEOM_PLANE: ("sheet", lambda n: primitives.sheet()),
+    _GEOM.mjGEOM_SPHERE: ("ball", ball),
+    _GEOM.mjGEOM_ELLIPSOID: ("ball", ball),
+    _GEOM.mjGEOM_CAPSULE: ("capsule", lambda n: capsule(4 * n, n)),
+    _GEOM.mjGEOM_CYLINDER: ("cylinder", lambda n: cylinder(4 * n, 3)),
+    _GEOM.mjGEOM_BOX: ("box", lambda n: box(min(n // 3, 3))),
+    _GEOM.mjGEOM_PLANE: ("sheet", lambda n: sheet()),
 }
 
 
@@ -36,9 +193,9 @@ def shape_of(model: Any, visual: Visual) -> NamedShape | None:
     """
     kind, asset = visual.kind, visual.asset
     if kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF) and asset >= 0:
-        return f"mesh {asset}", lambda _: meshes.mesh_asset(model, asset)
+        return f"mesh {asset}", lambda _: mesh_asset(model, asset)
     if kind == _GEOM.mjGEOM_HFIELD and asset >= 0:
-        return f"hfield {asset}", lambda _: meshes.height_field(model, asset)
+        return f"hfield {asset}", lambda _: height_field(model, asset)
     return _SHAPES.get(kind)
 
 

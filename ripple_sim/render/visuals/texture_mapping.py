@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.gpu.contract import MappingKind, Unit
+from ripple_sim.render.contract import MappingKind, Unit
 
 from .visual import Visual
 

@@ -1,17 +1,80 @@
-"""Visuals: the geoms and sites that a MuJoCo model shows, read alike."""
+"""Visuals: the geoms and sites that a MuJoCo model shows, read alike.
+
+Looks: named sets of parameters for the surface of a target.
+
+MuJoCo's materials and textures, in the shaders' terms.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
+import moderngl
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.model.soft_ids import first_flex, first_skin, is_soft
-from ripple_sim.render.bounds import Balls
-from ripple_sim.render.color import srgb_to_linear
+from ripple_sim.coupling.soft import first_flex, first_skin, is_soft
+from ripple_sim.render.camera import Balls, srgb_to_linear
+from ripple_sim.render.resources import Resources, srgb_cube, srgb_texture
+from ripple_sim.solver.errors import RippleError
+
+# The look that takes colour, texture and gloss from the geom's MuJoCo material.
+MODEL_LOOK = "model"
+
+
+@dataclass(frozen=True)
+class Look:
+    """Parameters of the surface shader.
+
+    Attributes
+    ----------
+    color : tuple
+        sRGB, 0 to 1; used where the surface has no colour of its own.
+    roughness : float
+        Of the microfacet distribution, 0 (mirror) to 1.
+    metallic : float
+        0 dielectric, 1 metal.
+    sheen : float
+        Strength of the soft glow towards the silhouette.
+    coat : float
+        Strength of a clear, smooth coat above the base layer, 0 to 1.
+    translucency : float
+        Share of the light that enters the object and leaves it elsewhere, 0 to 1.
+    transparency : float
+        Share of the base layer through which the surroundings are seen, refracted, 0 to 1.
+    emission : float
+        Radiance of its own, in units of its colour.
+    """
+
+    color: tuple[float, float, float]
+    roughness: float
+    metallic: float = 0.0
+    sheen: float = 0.0
+    coat: float = 0.0
+    translucency: float = 0.0
+    transparency: float = 0.0
+    emission: float = 0.0
+
+
+LOOKS: dict[str, Look] = {
+    "rubber": Look(color=(1.0, 0.80, 0.05), roughness=0.36, sheen=0.15, coat=0.6, translucency=0.3),
+    "jelly": Look(color=(0.90, 0.07, 0.20), roughness=0.14, coat=0.8, translucency=0.7, transparency=0.5),
+    "skin": Look(color=(0.87, 0.62, 0.52), roughness=0.48, sheen=0.3, coat=0.25, translucency=0.55),
+    "clay": Look(color=(0.80, 0.52, 0.40), roughness=0.75, sheen=0.25),
+    "metal": Look(color=(0.80, 0.81, 0.84), roughness=0.22, metallic=1.0),
+    "water": Look(color=(0.42, 0.76, 0.90), roughness=0.06, coat=1.0, translucency=0.15, transparency=0.9),
+    MODEL_LOOK: Look(color=(0.5, 0.5, 0.5), roughness=0.42, coat=0.2),
+}
+
+
+def find_look(name: str) -> Look:
+    """Return the look called `name`, or raise `RippleError` with the valid names."""
+    if name not in LOOKS:
+        raise RippleError(f"look is {name!r}; valid are {', '.join(map(repr, LOOKS))}")
+    return LOOKS[name]
+
 
 _GEOM = mujoco.mjtGeom
 _VISIBLE_GROUPS = 3  # MuJoCo shows groups 0 to 2 by default
@@ -143,3 +206,65 @@ def _visual(model: Any, which: str, index: int, asset: int) -> Visual:
         rgba = np.array(model.mat_rgba[material], dtype=np.float64)
     size = np.array(value("size"), dtype=np.float64)
     return Visual(which == "site", index, int(value("type")), size, asset, rgba, material, int(value("group")))
+
+
+def look_of(model: Any, visual: Visual) -> Look:
+    """Look of a visual's material; roughness is derived from MuJoCo's shininess where the material gives none."""
+    red, green, blue = (float(x) for x in visual.color)
+    rgb = red, green, blue
+    material = visual.material
+    if material < 0:
+        return Look(color=rgb, roughness=0.42, coat=0.2)
+    roughness, metallic = float(model.mat_roughness[material]), float(model.mat_metallic[material])
+    if roughness < 0:
+        roughness = 0.15 + 0.55 * (1.0 - float(model.mat_shininess[material]))
+    coat = 0.4 * float(model.mat_specular[material]) + float(model.mat_reflectance[material])
+    return Look(
+        color=rgb,
+        roughness=float(np.clip(roughness, 0.05, 1.0)),
+        metallic=max(metallic, 0.0),
+        coat=min(coat, 1.0),
+        emission=float(model.mat_emission[material]),
+    )
+
+
+class Textures:
+    """The textures of a model on the GPU, each uploaded at its first use."""
+
+    def __init__(self, resources: Resources, model: Any) -> None:
+        self._resources, self._model = resources, model
+        self._uploaded: dict[int, moderngl.Texture | moderngl.TextureCube] = {}
+
+    def get(self, texture: int) -> moderngl.Texture | moderngl.TextureCube:
+        """Return the texture of an id; it reads as linear light."""
+        if texture not in self._uploaded:
+            pixels = texture_pixels(self._model, texture)
+            flat = self._model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
+            self._uploaded[texture] = srgb_texture(self._resources, pixels) if flat else self._cube(pixels)
+        return self._uploaded[texture]
+
+    def skybox(self) -> tuple[moderngl.TextureCube, NDArray[np.float64]] | None:
+        """Return the model's skybox and its mean linear colour, or None."""
+        for texture in range(self._model.ntex):
+            if self._model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
+                pixels = texture_pixels(self._model, texture)
+                self._uploaded[texture] = cube = self._cube(pixels)
+                return cube, srgb_to_linear(pixels[::4, ::4] / 255.0).mean(axis=(0, 1))
+        return None
+
+    def _cube(self, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:
+        """Cube map of faces below one another."""
+        size = pixels.shape[1]
+        if pixels.shape[0] != 6 * size:  # one image for all faces
+            pixels = np.concatenate([pixels[:size]] * 6)
+        return srgb_cube(self._resources, pixels)
+
+
+def texture_pixels(model: Any, texture: int) -> NDArray[np.uint8]:
+    """Pixels of a model's texture, uint8 [height, width, 3], top row first."""
+    height, width, channels = (int(n[texture]) for n in (model.tex_height, model.tex_width, model.tex_nchannel))
+    start = int(model.tex_adr[texture])
+    pixels = np.asarray(model.tex_data[start : start + height * width * channels]).reshape(height, width, channels)
+    return np.ascontiguousarray(
+        np.repeat(pixels[..., :1], 3, axis=2) if channels < 3 else pixels[..., :3], dtype=np.uint8
+    )

@@ -1,14 +1,20 @@
-"""Deferred shading: which sizes a driver can draw, that a frame is what its format says, and what surfaces reflect."""
+"""Deferred shading: which sizes a driver can draw, that a frame is what its format says, and what surfaces reflect.
+
+The reflection in the floor.
+
+Tiles cover boxes, once and little more.
+"""
 
 import mujoco
 import numpy as np
 import pytest
-from drawn import FLOOR, FRONT, SUN, frame_of
+from drawn import BALL, FLOOR, FRONT, SUN, frame_of
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.color import srgb_to_linear
-from ripple_sim.render.frame_format import FrameFormat
-from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.render.camera import srgb_to_linear
+from ripple_sim.render.passes.deferred import Tiles
+from ripple_sim.render.surfaces.surface import Charts
+from ripple_sim.render.targets import FrameFormat
 from ripple_sim.solver import HeightMap, RippleError, sphere_atlas
 
 XML = '<mujoco><worldbody><geom type="sphere" size="1" rgba=".8 .2 .2 1"/></worldbody></mujoco>'
@@ -106,3 +112,54 @@ def test_a_rough_surface_blurs_the_shadows_that_it_reflects(gl):
         on_wall = np.s_[136:147, 140:200, 1]
         deepest.append((1.0 - with_shadow / without)[on_wall].max())
     assert deepest[1] < 0.355 * deepest[0]
+
+
+def test_a_reflecting_floor_shows_the_ball_upside_down(gl):
+    def frame(reflectance: float):
+        asset = f'<material name="f" rgba=".4 .4 .4 1" reflectance="{reflectance}"/>'
+        floor = '<geom type="plane" size="0 0 .1" material="f"/>'
+        ball = BALL.replace(".8 .2 .2", "1 0 0")
+        return frame_of(gl, floor + ball, asset=asset, camera=Camera((0, 0, 0), 4.0, 90.0, -20.0, 40.0))
+
+    redder = [(f[..., 0] - f[..., 2])[70:110, 70:90].max() for f in (frame(0.0), frame(0.5))]
+    assert redder[1] > redder[0] + 40
+
+
+SIZE = (200, 120)
+
+
+class Buffer:
+    """Stands for a buffer on the GPU."""
+
+    def write(self, data: bytes) -> None:
+        self.corners = np.frombuffer(data, dtype="f4").reshape(-1, 2)
+
+
+class Context:
+    """Makes buffers."""
+
+    def buffer(self, **_: object) -> Buffer:
+        return Buffer()
+
+
+def test_tiles_cover_the_boxes_once_and_little_more() -> None:
+    tiles = Tiles(Context(), SIZE)
+    boxes = np.array([[10, 20, 60, 50], [40, 40, 64, 64], [150, 100, 200, 120], [70, 70, 70, 70]])
+    tiles.cover(boxes)
+    shown = np.zeros(SIZE[::-1], dtype=int)
+    wanted = np.zeros(SIZE[::-1], dtype=bool)
+    for corner in tiles.buffer.corners[: tiles.count]:
+        left, lower = np.round((corner + 1) / 2 * SIZE).astype(int)
+        right, upper = np.round((corner + tiles.extent + 1) / 2 * SIZE).astype(int)
+        shown[lower:upper, left:right] += 1
+    for left, lower, right, upper in boxes:
+        wanted[lower:upper, left:right] = True
+    assert shown.max() == 1
+    assert (shown[wanted] == 1).all()
+    assert tiles.count == 7
+
+
+def test_no_tiles_without_boxes() -> None:
+    tiles = Tiles(Context(), SIZE)
+    tiles.cover(np.zeros((0, 4), dtype=np.int64))
+    assert tiles.count == 0

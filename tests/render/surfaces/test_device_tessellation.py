@@ -6,10 +6,10 @@ import pytest
 from sphere_height_maps import cube_charts
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.surfaces import device_tessellation
-from ripple_sim.render.visuals import primitives
+from ripple_sim.render.surfaces import adaptive
+from ripple_sim.render.visuals import shapes
 from ripple_sim.solver import HeightMap, sphere_atlas
-from ripple_sim.solver.backends.device_field import DeviceField
+from ripple_sim.solver.backends.gl_fields import DeviceField
 
 N, SIZE = 16, (120, 480)  # so high that there are edges to be split
 
@@ -26,7 +26,7 @@ def scene(gl):
         '<mujoco><worldbody><geom type="plane" size="3 3 .1"/><geom type="sphere" size=".5" pos="0 0 .5"/>'
         '<geom type="sphere" size=".1" pos=".5 .4 .9"/></worldbody></mujoco>'
     )
-    data, ball, atlas = mujoco.MjData(model), primitives.ball(16), sphere_atlas(1.0, N)
+    data, ball, atlas = mujoco.MjData(model), shapes.ball(16), sphere_atlas(1.0, N)
     mujoco.mj_forward(model, data)
     height_map = HeightMap(atlas.texels)
     targets = {1: Surface(0.5 * ball.shell, ball.faces, cube_charts(ball.shell, N), "rubber")}
@@ -53,21 +53,21 @@ def test_frames_are_those_of_the_host(scene, depth) -> None:
 
 @pytest.mark.parametrize("group", [32, 256])
 def test_the_triangles_are_the_hosts_in_their_order(gl, scene, group, monkeypatch) -> None:
-    monkeypatch.setattr(device_tessellation, "_GROUP", group)  # of 32 there are more than a group has threads
+    monkeypatch.setattr(adaptive, "_GROUP", group)  # of 32 there are more than a group has threads
     renderer, atlas, frame = scene
     (target,) = renderer._scene._targets
     found = target._triangles
-    adaptive, found._on_device = found._tessellation, None
+    host, found._on_device = found._tessellation, None
     for seed, depth in ((0, 0.0), (1, 0.02), (2, 0.2)):
         noise = np.random.default_rng(seed).normal(0.0, 1.0, (6, N, N)).astype(np.float32)
         heights = np.float32(depth) * noise * (np.abs(noise) > 1)
         frame(heights, True)
-        triangles, used = adaptive(HeightMap(atlas.texels)(heights))
+        triangles, used = host(HeightMap(atlas.texels)(heights))
         with gl:
             split = np.frombuffer(found.midpoints.read(), np.int32)
             count = np.frombuffer(found.count.read(), np.int32)
             indices = np.frombuffer(found.indices.read(), np.int32)[: count[0]]
         np.testing.assert_array_equal(count[1:], [1, 0, 0, 0])
         np.testing.assert_array_equal(indices.reshape(-1, 3), triangles)
-        np.testing.assert_array_equal(np.flatnonzero(split) + adaptive.base_count, used)
+        np.testing.assert_array_equal(np.flatnonzero(split) + host.base_count, used)
         assert (len(used) > 0) == (depth > 0)

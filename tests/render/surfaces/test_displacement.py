@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from sphere_height_maps import cube_charts, height_map_of
 
+from ripple_sim.render.resources import HeightMapTextures
+from ripple_sim.render.surfaces.adaptive import spline_heights
 from ripple_sim.render.surfaces.displacement import Displacement, Place
-from ripple_sim.render.surfaces.height_maps import HeightMapTextures
-from ripple_sim.render.surfaces.spline_heights import spline_heights
 from ripple_sim.render.surfaces.tessellation import Edges
 from ripple_sim.render.surfaces.vertices import DIRECTION, POSITION, UV, SurfaceVertices
-from ripple_sim.render.visuals.occluders import Occluders
-from ripple_sim.solver.texels.chart_page import ChartPage
+from ripple_sim.render.visuals.geoms import Occluders
+from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 N = 8
 PAGE = ChartPage(6, N)

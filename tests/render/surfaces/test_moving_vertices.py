@@ -6,9 +6,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ripple_sim import Camera, RippleRenderer, Ripples
-from ripple_sim.render.surfaces.moving_vertices import MovingVertices
+from ripple_sim.render.surfaces.moving import MovingVertices
 from ripple_sim.solver import HeightMap, Material, sphere_atlas
-from ripple_sim.solver.waves.moved_gradients import MovedGradients
+from ripple_sim.solver.waves.motion import MovedGradients
 
 ATLAS = sphere_atlas(1.0, 8)
 TURN = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]

@@ -6,7 +6,7 @@ from drawn import ball_surface
 from hand_made import RIM, flat_charts
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.surfaces.charts import Charts
+from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.solver import TexelMesh, texel_atlas
 from ripple_sim.solver.waves.height_map import HeightMap
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.render.surfaces.tessellation import tessellate
-from ripple_sim.render.visuals import primitives
+from ripple_sim.render.visuals import shapes
 from ripple_sim.render.visuals.corners import triangle_normals
 
 
@@ -20,7 +20,7 @@ def refine(V, F, normals, same=None, **limits):
 
 
 def test_subdivision_splits_long_edges_opens_no_gap_and_rounds_a_ball():
-    ball = primitives.ball(3)
+    ball = shapes.ball(3)
     F, finer, attributes = refine(ball.shell, ball.faces, ball.shell, max_length=0.1, max_faces=20_000)
     edges = directed_edges(F)
     np.testing.assert_array_equal(np.unique(edges, axis=0), np.unique(edges[:, ::-1], axis=0))
@@ -33,7 +33,7 @@ def test_subdivision_splits_long_edges_opens_no_gap_and_rounds_a_ball():
 
 def test_subdivision_keeps_creases_and_flat_faces_as_they_are():
     """A cube whose vertices are split at its edges, and one of whose faces is cut by a seam of texture coordinates."""
-    cube = primitives.box(1)
+    cube = shapes.box(1)
     V, F = cube.positions(np.ones(3), np.full(3, 1e-9)), cube.faces
     large = np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1) > 1.0
     corners = V[F[large]].reshape(-1, 3).round(6)
@@ -45,7 +45,7 @@ def test_subdivision_keeps_creases_and_flat_faces_as_they_are():
 
 
 def test_a_seam_of_texture_coordinates_is_no_crease():
-    ball = primitives.ball(4)
+    ball = shapes.ball(4)
     # every triangle has vertices of its own, which differ in nothing that counts
     V, F = ball.shell[ball.faces].reshape(-1, 3), np.arange(3 * len(ball.faces)).reshape(-1, 3)
     seams = refine(V, F, V, same=ball.faces.ravel(), max_length=0.2, max_faces=5000)[1][:, :3]
@@ -54,6 +54,6 @@ def test_a_seam_of_texture_coordinates_is_no_crease():
 
 
 def test_subdivision_stops_at_the_budget():
-    ball = primitives.ball(8)
+    ball = shapes.ball(8)
     F = refine(ball.shell, ball.faces, ball.shell, max_length=1e-3, max_faces=5000)[0]
     assert 2500 < len(F) <= 5000

@@ -1,13 +1,16 @@
-"""The vertices that a target is drawn with: on its surface, split where they must be, and looked up in one place."""
+"""The vertices that a target is drawn with: on its surface, split where they must be, and looked up in one place.
+
+A mesh cut for its charts is drawn as round as it was, and as sharp.
+"""
 
 import mujoco
 import numpy as np
 import pytest
+import trimesh
 from drawn import ball_surface
 
-from ripple_sim.coupling.model.target_mesh import target_atlas
-from ripple_sim.render.surfaces.charts import Charts
-from ripple_sim.render.surfaces.surface import Surface
+from ripple_sim.coupling.target_mesh import target_atlas
+from ripple_sim.render.surfaces.surface import ChartedMesh, Charts, Surface
 from ripple_sim.render.surfaces.vertices import (
     BAKED,
     COORDINATES,
@@ -15,10 +18,14 @@ from ripple_sim.render.surfaces.vertices import (
     NORMAL,
     POSITION,
     UV,
+    in_memory_order,
     mapped_coordinates,
+    morton_order,
+    rounded_parts,
     surface_vertices,
 )
 from ripple_sim.render.visuals.texture_mapping import Mapping
+from ripple_sim.solver import Mesh, build_atlas
 
 
 @pytest.fixture(scope="module")
@@ -79,3 +86,60 @@ def test_a_surface_counts_v_from_below_and_a_model_from_above(vertices):
     np.testing.assert_allclose(own, [[0, 1, 0], [1, 1, 0], [0.25, 0, 0], [0.5, 0.25, 0]])
     by_place = mapped_coordinates(attributes, Mapping(scale=np.array([1.0, 2.0, 4.0])))
     np.testing.assert_allclose(by_place, attributes[:, POSITION] * [1, 2, 4])
+
+
+def parts_of(shape: trimesh.Trimesh):
+    mesh = Mesh.from_arrays(shape.vertices, shape.faces)
+    atlas = build_atlas(mesh, 16, layout="patches", cache=False)
+    rounded = rounded_parts(mesh, atlas.chart_map)
+    assert len(rounded.parts.F) > 1.2 * len(mesh.F), "triangles were cut"
+    return rounded
+
+
+def test_a_cut_ball_stays_round():
+    """Flat triangles of this ball lie up to 2 % under it, quadratic patches a tenth of that."""
+    parts, V, normals = parts_of(trimesh.creation.icosphere(subdivisions=2))
+    assert np.linalg.norm(parts.V, axis=1).min() < 0.983
+    assert np.abs(np.linalg.norm(V, axis=1) - 1).max() < 2e-3
+    radial = V[parts.F] / np.linalg.norm(V[parts.F], axis=2, keepdims=True)
+    assert np.einsum("fcj,fcj->fc", normals, radial).min() > np.cos(np.radians(1.0))
+
+
+def test_corners_that_meet_have_the_same_normal_to_the_last_bit():
+    parts, _, normals = parts_of(trimesh.creation.icosphere(subdivisions=2))
+    _, vertex = np.unique(parts.F, return_inverse=True)
+    distinct = np.unique(np.column_stack([vertex.ravel(), normals.reshape(-1, 3)]), axis=0)
+    assert len(distinct) == len(parts.V)
+
+
+def test_a_cut_box_stays_flat_with_sharp_edges():
+    parts, V, normals = parts_of(trimesh.creation.box((1.0, 1.0, 1.0)).subdivide())
+    np.testing.assert_allclose(V, parts.V, atol=1e-12)
+    np.testing.assert_allclose(np.abs(normals).max(axis=2), 1.0, atol=1e-12)
+
+
+def test_points_of_one_octant_are_consecutive():
+    points = np.random.default_rng(1).random((800, 3))
+    points[0], points[1] = 0, 1
+    octant = (points >= 512 / 1023)[morton_order(points)] @ [1, 2, 4]
+    assert np.flatnonzero(np.diff(octant)).size == 7
+
+
+def test_points_at_one_place_keep_their_order():
+    assert (morton_order(np.ones((5, 3))) == np.arange(5)).all()
+
+
+def test_a_mesh_keeps_its_triangles():
+    rng = np.random.default_rng(2)
+    position = rng.random((40, 3))
+    F = rng.permuted(np.tile(np.arange(40), (90, 1)), axis=1)[:, :3]
+    mesh = ChartedMesh(F, position, np.arange(40), np.arange(40) % 6)
+    ordered = in_memory_order(mesh, slice(0, 3))
+
+    def rows(mesh: ChartedMesh) -> list:
+        per_corner = [mesh.attributes, mesh.same[:, None], mesh.chart[:, None]]
+        return sorted(np.concatenate(per_corner, axis=1)[mesh.F].reshape(-1, 15).tolist())
+
+    assert rows(ordered) == rows(mesh)
+    _, first = np.unique(ordered.F, return_index=True)
+    assert (np.diff(first) > 0).all()  # vertices stand in the order of their first use

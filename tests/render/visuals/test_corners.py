@@ -1,13 +1,18 @@
-"""Normals of a mesh's corners, and vertices split where they jump."""
+"""Normals of a mesh's corners, and vertices split where they jump.
+
+Ambient occlusion and thickness of solids on which both are known.
+"""
 
 import numpy as np
+import pytest
 
-from ripple_sim.render.visuals import primitives
-from ripple_sim.render.visuals.corners import corner_normals
+from ripple_sim.render.visuals import shapes
+from ripple_sim.render.visuals.corners import _hemisphere, _smoothed, bake, corner_normals, frames_about, smooth_normals
+from ripple_sim.solver.mesh.topology import edges_of
 
 
 def test_normals_are_smooth_below_the_crease_angle_and_sharp_above():
-    cube = primitives.box(1)
+    cube = shapes.box(1)
     V, F = cube.positions(np.ones(3), np.full(3, 1e-9)), cube.faces
     big = np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1) > 1.0
     welded, index = np.unique(np.round(V, 6), axis=0, return_inverse=True)
@@ -36,3 +41,99 @@ def test_a_sharp_tip_keeps_the_normals_of_its_triangles():
     normals = corner_normals(V, F)
     assert len(np.unique(normals[:, 2].round(9), axis=0)) == 24
     assert len(np.unique(normals[:, :2].reshape(-1, 3), axis=0)) == 24
+
+
+def test_nothing_hides_the_sky_from_a_ball():
+    ball = shapes.ball(8)
+    visibility, thickness, _ = bake(3.0 * ball.shell, ball.faces, ball.shell)
+    np.testing.assert_allclose(visibility, 1.0, atol=1e-6)
+    # the mean chord of cosine-distributed rays into a ball is 4/3 of its radius
+    np.testing.assert_allclose(thickness, 4 / 3, atol=0.04)
+
+
+def test_the_size_of_a_mesh_changes_nothing():
+    ball = shapes.ball(6)
+    V = ball.shell * [1.0, 0.6, 0.3]
+    normals = smooth_normals(V, ball.faces)
+    first, second = (bake(scale * V + offset, ball.faces, normals) for scale, offset in ((1, 0), (1e-3, 5e-3)))
+    np.testing.assert_allclose(first, second, atol=5e-3)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_tiny_body_is_like_any_other():
+    ball = shapes.ball(6)
+    first, second = (bake(radius * ball.shell, ball.faces, ball.shell) for radius in (1.0, 1e-3))
+    np.testing.assert_allclose(first, second, atol=5e-3)
+
+
+def test_a_flat_body_is_thin_and_a_round_one_thick():
+    ball = shapes.ball(8)
+    mean = [
+        bake(V, ball.faces, smooth_normals(V, ball.faces))[1].mean() for V in (ball.shell, ball.shell * [1, 1, 0.1])
+    ]
+    assert mean[1] < 0.4 * mean[0]
+
+
+def test_a_wall_close_above_hides_the_sky_and_one_further_than_the_radius_does_not():
+    """Two slabs over each other: their inner sides face one another."""
+    slab = shapes.box(1)
+    V = slab.positions(np.array([1.0, 1.0, 0.04]), np.full(3, 0.01))
+    F = np.concatenate([slab.faces, slab.faces + len(V)])
+    normals = np.concatenate([slab.shell, slab.shell])
+    inner = np.concatenate([slab.core[:, 2] > 0, slab.core[:, 2] < 0]) & (np.abs(normals[:, 2]) > 0.99)
+    assert inner.any()
+    aside = np.array([0.0, 0.0, 0.5])
+    near, far = (bake(np.concatenate([V - gap * aside, V + gap * aside]), F, normals)[0] for gap in (0.2, 8.0))
+    # the smoothing mixes the corners of the inner sides with their edges, which see the sky
+    assert near[inner].max() < 0.9
+    assert near[inner].mean() < near[~inner].mean() - 0.1
+    assert far.min() > 0.99
+
+
+def test_the_inner_side_of_an_open_surface_sees_what_the_outer_side_of_the_turned_one_sees():
+    ball = shapes.ball(8)
+    bowl = ball.faces[(ball.shell[ball.faces][:, :, 2] < 0.1).all(axis=1)]
+    one, turned = bake(ball.shell, bowl, ball.shell), bake(ball.shell, bowl[:, ::-1], -ball.shell)
+    used = np.unique(bowl)
+    np.testing.assert_allclose(one.inner_visibility[used], turned.visibility[used], atol=0.02)
+    assert one.inner_visibility[used].max() < 0.97 < one.visibility[used].min()
+
+
+@pytest.mark.parametrize("count", [16, 64])
+def test_directions_are_cosine_distributed_about_every_normal(count):
+    normals = np.random.default_rng(0).normal(size=(300, 3))
+    normals = np.concatenate([normals, np.eye(3), -np.eye(3)])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    directions = _hemisphere(frames_about(normals), count)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=2), 1.0, atol=1e-12)
+    cosine = np.einsum("vki,vi->vk", directions, normals)
+    assert cosine.min() > 0
+    np.testing.assert_allclose((cosine**2).mean(axis=1), 1 / 2, atol=1e-12)  # of a Lambertian emitter
+    np.testing.assert_allclose(cosine.mean(axis=1), 2 / 3, atol=0.01)
+    sideways = directions.mean(axis=1) - cosine.mean(axis=1)[:, None] * normals
+    assert np.linalg.norm(sideways, axis=1).max() < 2 / count
+
+
+def test_a_vertex_without_triangles_has_finite_values():
+    ball = shapes.ball(4)
+    V = np.concatenate([ball.shell, [[0.0, 0.0, 1.5]]])
+    normals = smooth_normals(V, ball.faces)
+    assert not normals[-1].any()
+    assert np.isfinite(bake(V, ball.faces, normals)).all()
+
+
+def test_smoothing_keeps_constants_and_spreads_a_peak_over_two_rings():
+    ball = shapes.ball(6)
+    edges, _ = edges_of(ball.faces)
+    np.testing.assert_allclose(_smoothed(np.full(len(ball.shell), 0.3), edges), 0.3)
+    peak = np.zeros(len(ball.shell))
+    peak[17] = 1.0
+    spread = _smoothed(peak, edges)
+    ring = {17}
+    for _ in range(2):
+        ring |= {int(v) for face in ball.faces if ring & set(face) for v in face}
+    assert set(np.flatnonzero(spread)) == ring
+    assert spread.argmax() == 17
+    assert 0 < spread.min() + spread.max() < 1
+    lone = _smoothed(np.array([1.0, 1.0, 1.0, 5.0]), np.array([[0, 1], [0, 2], [1, 2]]))
+    np.testing.assert_allclose(lone[:3], 1.0)

@@ -1,11 +1,17 @@
-"""Round geoms are as finely tessellated as the frame needs, and their poses are MuJoCo's."""
+"""Round geoms are as finely tessellated as the frame needs, and their poses are MuJoCo's.
+
+The table of objects as shaders read it.
+"""
 
 import mujoco
 import numpy as np
 import pytest
+from shader_functions import evaluated
 
-from ripple_sim.render.visuals.assets import Assets
-from ripple_sim.render.visuals.geom_visuals import GeomVisuals
+from ripple_sim.render.visuals.geoms import GeomVisuals
+from ripple_sim.render.visuals.instances import Assets, ObjectTable
+from ripple_sim.render.visuals.visual import LOOKS, Look, find_look
+from ripple_sim.solver import RippleError
 
 XML = """<mujoco><worldbody>
 <geom type="sphere" size=".3" pos="1 2 3" euler="10 20 30"/><geom type="ellipsoid" size=".3 .2 .1" pos="0 1 0"/>
@@ -67,3 +73,68 @@ def test_the_shadow_bias_covers_the_gap_between_chord_and_arc_and_flat_geoms_hav
     assert (both.shadow_biases < 0.05).all()
     box = next(each for each in drawn._opaque if len(each.numbers) == 1 and not each.sites)
     assert not box.shadow_biases.any()
+
+
+LOOK = Look((0.1, 0.2, 0.3), 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.5)
+
+
+@pytest.fixture
+def table(resources):
+    return ObjectTable(resources)
+
+
+def read(gl, table, expression, count=1) -> np.ndarray:
+    """An expression of an object `object_at(int(x.x))`, for all rows."""
+    with gl:
+        table.bind()
+    return evaluated(gl, "visuals/object_table.glsl", expression, np.arange(count)[:, None])
+
+
+def test_shaders_find_a_look_in_its_row(gl, table):
+    table.add(Look((0, 0, 0), 1.0), 3)
+    number = table.add(LOOK, 17, opacity=0.25, size=2.5, heatmap=True, height_map=4)
+    row = f"object_at({number})"
+    np.testing.assert_allclose(read(gl, table, f"{row}.base")[0], [0.4, 0.5, 0.6, 0.7], rtol=1e-6)
+    np.testing.assert_allclose(read(gl, table, f"{row}.volume")[0], [0.8, 0.9, 1.5, 0.25], rtol=1e-6)
+    np.testing.assert_allclose(read(gl, table, f"{row}.place")[0], [17, 2.5, 0, 1])
+    np.testing.assert_allclose(read(gl, table, f"{row}.height_map")[0, :2], [4, 1])
+    np.testing.assert_allclose(read(gl, table, "object_at(0).height_map")[0, :2], [0, 0])
+
+
+def test_numbers_count_up_and_rows_added_later_are_seen_too(gl, table):
+    for number in range(5):
+        assert table.add(LOOK, 10 * number) == number
+        geoms = read(gl, table, "vec4(object_at(int(x.x)).place.x)", number + 1)[:, 0]
+        np.testing.assert_array_equal(geoms, 10 * np.arange(number + 1))
+
+
+def test_the_rotation_turns_gradients_into_the_world(gl, table):
+    rotation, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
+    table.add(LOOK, 0)
+    number = table.add(LOOK, 1)
+    table.set_height_map(number, 0.125, rotation)
+    for axis, unit in enumerate(("1, 0, 0", "0, 1, 0", "0, 0, 1")):
+        turned = read(gl, table, f"vec4(object_at({number}).rotation * vec3({unit}), 0.0)")[0, :3]
+        np.testing.assert_allclose(turned, rotation[:, axis], atol=1e-6)
+    np.testing.assert_allclose(read(gl, table, "vec4(object_at(int(x.x)).place.z)", 2)[:, 0], [0, 0.125])
+
+
+def test_an_empty_table_can_be_bound(gl, table):
+    assert not read(gl, table, "object_at(0).base").any()
+
+
+@pytest.mark.parametrize("name", ["chrome", "", "Rubber"])
+def test_an_unknown_look_is_named_with_all_valid_ones(name):
+    with pytest.raises(RippleError, match=f"look is '{name}'; valid are ") as error:
+        find_look(name)
+    assert all(repr(each) in str(error.value) for each in LOOKS)
+
+
+@pytest.mark.parametrize("name", LOOKS)
+def test_looks_are_within_the_limits_that_the_shaders_count_on(name):
+    look = find_look(name)
+    shares = [*look.color, look.roughness, look.metallic, look.coat, look.translucency, look.transparency]
+    assert all(0 <= share <= 1 for share in shares)
+    assert look.sheen >= 0
+    assert look.emission == 0  # nothing shines unless a model says so
+    assert not (look.metallic and (look.translucency or look.transparency))  # light does not pass through metal

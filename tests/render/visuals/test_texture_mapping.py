@@ -12,7 +12,7 @@ from sphere_height_maps import cube_charts
 from textured import textured_model
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.visuals import primitives
+from ripple_sim.render.visuals import shapes
 
 SIZE = 96
 
@@ -93,7 +93,7 @@ def test_a_cube_texture_is_stretched_over_a_primitive_or_with_texuniform_is_not(
 @pytest.mark.parametrize(("shape", "look"), [("sphere", "model"), ("capsule", "model"), ("sphere", "rubber")])
 def test_a_target_has_its_texture_as_other_geoms_do(gl, shape, look):
     model = textured_model(f'<geom type="{shape}" size=".4 .2" material="m"/>')
-    ball = primitives.ball(12)
+    ball = shapes.ball(12)
     V = 0.4 * ball.shell + (np.sign(ball.shell) * [0, 0, 0.2] if shape == "capsule" else 0.0)
     places = [*corners(5), *corners(12)]
     surface = Surface(V, ball.faces, cube_charts(ball.shell, 8), look)

@@ -1,7 +1,14 @@
-"""Visuals: the geoms and sites that MuJoCo shows."""
+"""Visuals: the geoms and sites that MuJoCo shows.
+
+Looks of MuJoCo's materials.
+"""
 
 import numpy as np
+import pytest
 from drawn import BALL, FLOOR, FRONT, SIZE, frame_of
+from textured import textured_model
+
+from ripple_sim.render.visuals.visual import geom_visual, look_of
 
 
 def test_groups_above_two_are_hidden(gl):
@@ -25,3 +32,17 @@ def test_sites_of_visible_groups_are_drawn_like_geoms(gl):
     assert (as_site[ball][:, 0] - as_site[ball][:, 2]).mean() > 2 * (clear[ball][:, 0] - clear[ball][:, 2]).mean() > 10
     green = frame_of(gl, site.format('material="g"'), asset='<material name="g" rgba="0 .8 0 1"/>', camera=FRONT)
     assert (green[ball][:, 1] > green[ball][:, 0] + 60).mean() > 0.9
+
+
+def test_a_material_answers_light_as_it_says():
+    """Roughness is taken where it is given; otherwise more shininess is less of it. Reflectance is a coat."""
+
+    def look(attributes: str):
+        return look_of(model := textured_model('<geom size=".1" material="m"/>', attributes), geom_visual(model, 0))
+
+    assert look('roughness="0.3" metallic="1" shininess="0.9"').roughness == pytest.approx(0.3)
+    assert look('roughness="0.3" metallic="1"').metallic == 1.0
+    assert look('shininess="0"').roughness > look('shininess="0.5"').roughness > look('shininess="1"').roughness
+    assert look('reflectance="0.4"').coat == pytest.approx(0.4)
+    assert look('emission="0.7"').emission == pytest.approx(0.7)
+    assert look("").metallic == 0.0

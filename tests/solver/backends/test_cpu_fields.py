@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hand_made import flat_torus, polygon, square, two_squares
 
-from ripple_sim.solver.backends.cpu_fields import LINE, PAGE, FieldLayout, aligned
+from ripple_sim.solver.backends.cpu import LINE, PAGE, FieldLayout, aligned
 from ripple_sim.solver.backends.kernels import fill
 
 MESHES = [square(1), square(15), polygon(3, 6), polygon(5, 14), flat_torus(4), two_squares(7)]

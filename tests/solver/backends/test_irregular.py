@@ -7,7 +7,7 @@ import pytest
 from hand_made import flat_torus, polygon, square, two_squares
 
 from ripple_sim.solver import Material, WaveSolver, texel_atlas
-from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
+from ripple_sim.solver.texels.stencil import stiffness_matrix
 
 MATERIALS = {
     "membrane": Material(speed=1.0, damping=0.3),

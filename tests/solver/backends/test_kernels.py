@@ -6,11 +6,9 @@ from dense_waves import matrix
 from hand_made import flat_torus, polygon, square
 
 from ripple_sim.solver import TexelMesh
-from ripple_sim.solver.backends.arguments import Drift, Loads, Plasticity
-from ripple_sim.solver.backends.cpu_fields import FieldLayout
-from ripple_sim.solver.backends.kernels import drift, fill, flow
-from ripple_sim.solver.backends.kicks import kick_texels
-from ripple_sim.solver.backends.stencil_loops import apply
+from ripple_sim.solver.backends.cpu import FieldLayout
+from ripple_sim.solver.backends.kernels import drift, fill, flow, kick_texels
+from ripple_sim.solver.backends.stencil_loops import Drift, Loads, Plasticity, apply
 
 MESHES = [square(1), square(6), polygon(3, 5), polygon(5, 4), flat_torus(7)]
 

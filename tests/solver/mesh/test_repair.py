@@ -13,7 +13,7 @@ from solids import BALL
 from sound import assert_sound
 
 from ripple_sim.solver import MeshError, load_mesh
-from ripple_sim.solver.mesh.polygons import Soup
+from ripple_sim.solver.mesh.ply import Soup
 from ripple_sim.solver.mesh.repair import repaired
 
 

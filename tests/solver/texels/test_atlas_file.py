@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import AtlasError
-from ripple_sim.solver.texels.array_file import write_arrays
-from ripple_sim.solver.texels.atlas_file import FORMAT, read_atlas_file, write_atlas_file
+from ripple_sim.solver.texels.atlas import FORMAT, read_atlas_file, write_arrays, write_atlas_file
 
 
 @pytest.fixture

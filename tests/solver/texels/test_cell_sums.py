@@ -5,7 +5,7 @@ import pytest
 from hand_made import RIM, flat_charts, flat_torus, polygon, square
 
 from ripple_sim.solver import TexelMesh
-from ripple_sim.solver.cube_map.convention import cube_topology
+from ripple_sim.solver.layouts.cube.convention import cube_topology
 from ripple_sim.solver.texels.cells import quad, triangle
 
 

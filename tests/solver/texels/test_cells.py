@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.solver.texels.cells import quad
-from ripple_sim.solver.texels.polygon_cell import polygon
+from ripple_sim.solver.texels.cells import polygon, quad
 
 
 @pytest.mark.parametrize(("long", "angle"), [(1.0, 30.0), (2.0, 35.0), (3.0, 20.0), (1.3, 150.0)])

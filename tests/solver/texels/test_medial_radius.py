@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
-from ripple_sim.solver.texels.medial_radius import LEAST, medial_radius
+from ripple_sim.solver.texels.thickness import LEAST, medial_radius
 
 
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])

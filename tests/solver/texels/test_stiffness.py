@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ripple_sim.solver.cube_map.convention import cube_topology, texel_directions
+from ripple_sim.solver.layouts.cube.convention import cube_topology, texel_directions
 from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
 

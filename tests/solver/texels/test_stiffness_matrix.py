@@ -5,7 +5,7 @@ import pytest
 from hand_made import flat_torus, polygon, square
 
 from ripple_sim.solver import TexelMesh
-from ripple_sim.solver.texels.stiffness_matrix import stiffness_matrix
+from ripple_sim.solver.texels.stencil import stiffness_matrix
 
 MESHES = {
     "square": lambda: square(5),

@@ -1,13 +1,21 @@
-"""Texel meshes of any topology: rims, irregular vertices, several parts, against what is known of their waves."""
+"""Texel meshes of any topology: rims, irregular vertices, several parts, against what is known of their waves.
+
+Figures of merit of a texel mesh, where they are known.
+
+Smoothing by passes of 1 2 1: its frequency response, its width, and its symmetry.
+"""
 
 import copy
+import dataclasses
 
 import numba
 import numpy as np
 import pytest
-from hand_made import eigenvalues, flat_torus, polygon, square
+from hand_made import disk, eigenvalues, flat_charts, flat_torus, polygon, square
 
 from ripple_sim.solver import Material, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
+from ripple_sim.solver.layouts.cube.convention import cube_rotations, cube_topology, permute_texels
+from ripple_sim.solver.texels.texel_mesh import smoothed, texel_quality
 
 
 def mode_error(texels: TexelMesh, mode: np.ndarray, frequency: float) -> float:
@@ -104,3 +112,108 @@ def test_momentum_of_an_impulse_on_a_rim_and_an_irregular_vertex() -> None:
 def test_no_kernel_is_compiled_anew_for_a_copy() -> None:
     texels = square(4)
     assert numba.typeof(copy.deepcopy(texels).grid) == numba.typeof(texels.grid)
+
+
+RIMS = [[(-1, -1)] * 4]
+
+
+def test_a_rectangle_is_covered_by_texels_as_long_and_as_wide_as_its_sides_say() -> None:
+    texels = flat_charts([[[0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0]]], RIMS, 5)
+    found = texel_quality(texels, texel_atlas(texels).mesh)
+    timestep = found.pop("timestep")
+    assert found == pytest.approx({"edge_min": 1 / 5, "edge_max": 3 / 5, "folded": 0, "coverage": 1, "spanned": 1})
+    # the shorter sides set it
+    assert 1 / np.sqrt(3) < timestep < 1
+
+
+def test_edges_across_a_glued_side_count_too() -> None:
+    texels = flat_torus(6)
+    beyond = texels.beyond.copy()
+    beyond[..., 0] *= 2
+    wide = TexelMesh.of(texels.topology, beyond[:, 1:-1, 1:-1], beyond=beyond)
+    found = texel_quality(wide, texel_atlas(wide).mesh)
+    assert (found["edge_min"], found["edge_max"]) == pytest.approx((1 / 6, 1 / 3))
+
+
+def test_texels_in_the_same_place_do_not_count_as_the_shortest_edge() -> None:
+    texels = square(4)
+    positions = texels.positions.copy()
+    positions[0, 1, 1] = positions[0, 1, 2]
+    crowded = texels.with_positions(positions, beyond=texels.beyond)
+    assert texel_quality(crowded, texel_atlas(texels).mesh)["edge_min"] == pytest.approx(1 / 4)
+
+
+@pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
+def test_edges_grow_with_a_sphere_and_shares_of_its_area_do_not(radius: float) -> None:
+    unit, ball = (sphere_atlas(r, 8) for r in (1.0, radius))
+    one, other = (texel_quality(atlas.texels, atlas.mesh) for atlas in (unit, ball))
+    for name, power in {"edge_min": 1, "edge_max": 1, "coverage": 0, "spanned": 0, "timestep": 0}.items():
+        assert other[name] == pytest.approx(one[name] * radius**power)
+
+
+def test_coverage_follows_the_areas_of_the_texels_and_spanned_their_places() -> None:
+    texels = square(4)
+    mesh = texel_atlas(texels).mesh
+    heavy = dataclasses.replace(texels, areas=3 * texels.areas)
+    assert texel_quality(heavy, mesh)["coverage"] == pytest.approx(3)
+    assert texel_quality(heavy, mesh)["spanned"] == pytest.approx(1)
+    ends = TexelMesh.of(texels.topology, texels.positions)
+    assert texel_quality(ends, mesh)["spanned"] == pytest.approx(np.square(3 / 4))
+
+
+def test_the_time_step_is_that_of_waves_over_an_even_grids() -> None:
+    even, uneven = (texel_atlas(each) for each in (flat_torus(12), disk(12)))
+    assert even.quality()["timestep"] == pytest.approx(1, rel=5e-3)
+    steps = [WaveSolver(atlas, backend="cpu").stable_timestep for atlas in (even, uneven)]
+    spacings = [np.sqrt(atlas.mesh.area / atlas.areas.size) for atlas in (even, uneven)]
+    expected = steps[1] / spacings[1] / (steps[0] / spacings[0])
+    assert uneven.quality()["timestep"] == pytest.approx(expected * even.quality()["timestep"], rel=1e-6)
+    assert 0.5 < uneven.quality()["timestep"] < 0.8
+
+
+@pytest.mark.parametrize(("k", "m"), [(0, 0), (1, 0), (2, 3), (6, 6)])
+def test_waves_on_a_torus_fade_as_cos_to_the_eighth_of_half_their_phase(k: int, m: int) -> None:
+    n = 12
+    row, column = np.indices((n, n))
+    wave = np.cos(2 * np.pi * (k * column + m * row) / n)[None]
+    # one pass of 1 2 1 over 4 is cos^2 of half the phase from texel to texel
+    response = (np.cos(np.pi * k / n) * np.cos(np.pi * m / n)) ** 8
+    np.testing.assert_allclose(smoothed(flat_torus(n).topology, wave), response * wave, atol=1e-12)
+
+
+def test_a_point_spreads_with_a_standard_deviation_of_root_2_and_keeps_its_sum() -> None:
+    field = np.zeros((1, 16, 16))
+    field[0, 8, 8] = 1
+    spread = smoothed(flat_torus(16).topology, field)[0]
+    assert spread.sum() == pytest.approx(1)
+    offset = np.arange(16) - 8
+    for axis in (0, 1):
+        assert spread.sum(axis=axis) @ offset**2 == pytest.approx(2)
+    assert np.count_nonzero(spread) == 81
+
+
+@pytest.mark.parametrize(
+    "topology", [cube_topology(4), square(4).topology, polygon(3, 4).topology, polygon(5, 4).topology]
+)
+def test_constants_stay_and_nothing_leaves_its_range(topology) -> None:
+    np.testing.assert_allclose(smoothed(topology, np.full(topology.shape, 7.0)), 7)
+    field = np.random.default_rng(0).uniform(-1, 2, topology.shape)
+    found = smoothed(topology, field)
+    assert field.min() < found.min() < found.max() < field.max()
+
+
+def test_smoothing_does_not_know_how_the_cube_is_turned() -> None:
+    topology = cube_topology(6)
+    field = np.random.default_rng(1).standard_normal((6, 6, 6))
+    found = smoothed(topology, field)
+    for rotation in cube_rotations():
+        np.testing.assert_allclose(
+            smoothed(topology, permute_texels(field, rotation)), permute_texels(found, rotation), atol=1e-14
+        )
+
+
+def test_the_field_itself_is_left_alone() -> None:
+    field = np.random.default_rng(2).standard_normal((6, 4, 4))
+    before = field.copy()
+    smoothed(cube_topology(4), field)
+    np.testing.assert_array_equal(field, before)

@@ -1,10 +1,15 @@
-"""Half the thickness of solids on which it is known."""
+"""Half the thickness of solids on which it is known.
+
+The thickness of a layer over what lies inside: spheres whose answer is known, from meshes and from voxels.
+"""
 
 import numpy as np
 import pytest
 import trimesh
 
-from ripple_sim.solver import Mesh, build_atlas, sphere_atlas
+from ripple_sim import RippleWarning
+from ripple_sim.scenes.shapes import polygonise, sphere
+from ripple_sim.solver import AtlasError, Mesh, MeshError, Volume, build_atlas, sphere_atlas, thickness_map
 from ripple_sim.solver.texels.thickness import half_thickness
 
 
@@ -20,3 +25,76 @@ def test_of_a_slab_it_is_half_its_thickness_up_to_the_edges() -> None:
     away = flat & (np.abs(atlas.positions[..., :2]) < 0.4).all(axis=-1)
     np.testing.assert_allclose(half_thickness(atlas)[away], 0.1, rtol=0.02)
     np.testing.assert_allclose(half_thickness(atlas)[flat], 0.1, atol=0.05)
+
+
+RADIUS, BOUNDS = 0.6, ((-0.8, -0.8, -0.8), (0.8, 0.8, 0.8))
+
+
+def ball(centre: tuple[float, float, float], radius: float = RADIUS) -> Mesh:
+    return Mesh.from_arrays(*polygonise(sphere(centre, radius), BOUNDS, 0.025))
+
+
+def exact(points: np.ndarray, centre: tuple[float, float, float]) -> np.ndarray:
+    """Way from points of the unit sphere inwards to a ball, infinite beside it."""
+    to = np.array(centre) - points
+    along = -(to * points).sum(axis=-1)
+    under = RADIUS**2 - (to**2).sum(axis=-1) + along**2
+    return np.where(under > 0, along - np.sqrt(np.maximum(under, 0)), np.inf)
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0, 0.0), (0.1, -0.05, 0.15)])
+def test_thickness_over_a_sphere_is_exact(centre: tuple[float, float, float]) -> None:
+    atlas = sphere_atlas(1.0, 32)
+    error = np.abs(thickness_map(atlas, ball(centre)) / exact(atlas.positions, centre) - 1)
+    assert np.median(error) < 0.01
+    assert np.quantile(error, 0.99) < 0.03
+
+
+def test_voxels_with_noise_give_the_same_within_a_voxel() -> None:
+    atlas, centre, voxel = sphere_atlas(1.0, 32), (0.1, -0.05, 0.15), 0.05
+    nodes = np.arange(-0.8, 0.8 + voxel / 2, voxel)
+    grid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), axis=-1)
+    depth = RADIUS - np.linalg.norm(grid - centre, axis=-1)
+    # bone has 1000 and the rest 40, with the blur of a scanner and its noise
+    values = 40 + 960 / (1 + np.exp(-4 * depth / voxel)) + np.random.default_rng(0).normal(0, 20, depth.shape)
+    volume = Volume(values, threshold=520.0, spacing=voxel, origin=(-0.8, -0.8, -0.8))
+    assert np.abs(thickness_map(atlas, volume) - thickness_map(atlas, ball(centre))).max() < voxel
+
+
+def test_of_several_bodies_the_nearest_counts() -> None:
+    atlas = sphere_atlas(1.0, 16)
+    both = thickness_map(atlas, [ball((0, 0, 0), 0.3), ball((0, 0, 0))])
+    np.testing.assert_allclose(both, thickness_map(atlas, ball((0, 0, 0))))
+
+
+def test_rays_that_miss_get_the_greatest_thickness_and_a_warning() -> None:
+    atlas, centre = sphere_atlas(1.0, 48), (0.0, 0.0, 0.35)
+    small = ball(centre, 0.2)
+    with pytest.warns(RippleWarning, match="have nothing below them"):
+        thickness = thickness_map(atlas, small)
+    below = atlas.positions[..., 2] < -0.5
+    assert thickness[atlas.positions[..., 2] > 0.998] == pytest.approx(0.45, abs=0.02)
+    # rays from below go on through the middle to the ball, the longest of them is what others get
+    assert thickness[below].min() > 1.0
+    assert thickness.max() < 1.4
+
+
+def test_what_comes_out_of_the_surface_leaves_no_layer() -> None:
+    atlas = sphere_atlas(1.0, 32)
+    large = Mesh.from_arrays(*polygonise(sphere((0.0, 0.0, 0.6), 0.6), ((-0.8, -0.8, -0.2), (0.8, 0.8, 1.4)), 0.05))
+    with pytest.warns(RippleWarning, match="comes out of the surface"):
+        thickness = thickness_map(atlas, large)
+    assert np.median(thickness[atlas.positions[..., 2] > 0.95]) < 1e-3
+
+
+def test_bodies_that_are_not_inside_and_volumes_without_one_are_refused() -> None:
+    atlas = sphere_atlas(1.0, 8)
+    with pytest.raises(AtlasError, match="met by no ray"):
+        thickness_map(atlas, [])
+    far = ball((0, 0, 0), 0.2)
+    with pytest.raises(AtlasError, match="met by no ray"):
+        thickness_map(atlas, Mesh.from_arrays(far.V + 9.0, far.F))
+    with pytest.raises(MeshError, match="a threshold between, not 2"):
+        thickness_map(atlas, Volume(np.random.default_rng(0).random((4, 4, 4)), threshold=2.0))
+    with pytest.raises(MeshError, match=r"shape \(4, 4\)"):
+        Volume(np.zeros((4, 4)), threshold=0.5).surface()

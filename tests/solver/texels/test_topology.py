@@ -1,11 +1,21 @@
-"""The connectivity of charts: what lies beyond each side, and the addresses that copy it."""
+"""The connectivity of charts: what lies beyond each side, and the addresses that copy it.
+
+Corners of glued charts: how many charts meet there, which point it is, and the cells that are polygons.
+
+Charts glued along their sides.
+
+Fields with halo: wrapped, repeated, and continuous where three charts meet.
+
+Bilinear sampling between texels: exact where it should be, and without a jump from chart to chart.
+"""
 
 import numpy as np
 import pytest
-from hand_made import RIM, flat_torus, polygon, square
+from hand_made import RIM, eigenvalues, flat_charts, flat_torus, polygon, square, two_squares
 
-from ripple_sim.solver import TexelTopology, glue
-from ripple_sim.solver.cube_map.convention import cube_topology
+from ripple_sim.solver import AtlasError, Material, TexelMesh, TexelTopology, WaveSolver, glue, texel_atlas
+from ripple_sim.solver.layouts.cube.convention import cube_topology
+from ripple_sim.solver.texels.topology import fill_halo, sampling_matrix, with_filled_halo
 
 TOPOLOGIES = {
     "cube": lambda: cube_topology(4),
@@ -81,3 +91,293 @@ def test_the_tables_cannot_be_changed(topology: TexelTopology) -> None:
     for table in (topology.halo, topology.rim, topology.valence, topology.corners):
         with pytest.raises(ValueError, match="read-only"):
             table.flat[0] = 0
+
+
+UNIT = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+ROWS, COLUMNS = [0, 0, -1, -1], [0, -1, -1, 0]
+
+
+def random_gluing(charts: int, rims: int, seed: int) -> np.ndarray:
+    """Sides in random pairs, but for an even number of rims."""
+    rng = np.random.default_rng(seed)
+    sides = rng.permutation(4 * charts)
+    glued = np.full((4 * charts, 2), -1)
+    for a, b in sides[rims:].reshape(-1, 2):
+        glued[a], glued[b] = divmod(b, 4), divmod(a, 4)
+    return glued.reshape(charts, 4, 2)
+
+
+def points_by_merging(glued: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Number of the point in which each corner lies, by merging the ends of glued sides, and whether a rim ends there.
+
+    Side s runs from corner s to corner s + 1, against the side that it is glued to.
+    """
+    charts = len(glued)
+    point = np.arange(4 * charts).reshape(charts, 4)
+    at_rim = np.zeros((charts, 4), bool)
+    for _ in range(4 * charts):
+        for chart, side in np.ndindex(charts, 4):
+            other, back = glued[chart, side]
+            if other < 0:
+                continue
+            for a, b in (((chart, side), (other, (back + 1) % 4)), ((chart, (side + 1) % 4), (other, back))):
+                point[a] = point[b] = min(point[a], point[b])
+    for chart, side in np.argwhere(glued[..., 0] < 0):
+        ends = point[chart, side], point[chart, (side + 1) % 4]
+        at_rim |= np.isin(point, ends)
+    return point, at_rim
+
+
+def same_partition(a: np.ndarray, b: np.ndarray) -> bool:
+    pairs = set(zip(a.ravel().tolist(), b.ravel().tolist(), strict=True))
+    return len(pairs) == len(set(a.ravel().tolist())) == len(set(b.ravel().tolist()))
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(("charts", "rims"), [(1, 0), (1, 2), (2, 0), (3, 4), (5, 0), (6, 10)])
+def test_corners_of_any_gluing_are_those_that_merge(charts: int, rims: int, seed: int) -> None:
+    glued = random_gluing(charts, rims, seed)
+    topology = glue(glued, 3)
+    point, at_rim = points_by_merging(glued)
+    assert same_partition(topology.corners, point)
+    assert topology.corners.min() == 0 and topology.corners.max() == len(np.unique(point)) - 1
+    meeting = (point.ravel() == point.ravel()[:, None]).sum(axis=1).reshape(charts, 4)
+    np.testing.assert_array_equal(topology.valence, np.where(at_rim, 0, meeting))
+    # one polygon for each point that does not fit the stencil
+    limit = np.where(at_rim, 2, 4)
+    assert len(topology.polygons) == len(np.unique(point[meeting > limit]))
+    if rims == 0:
+        # Euler: C faces, 2 C edges; each part has at most the characteristic of a sphere, and that of a handle less 2
+        assert (topology.corners.max() + 1 - charts) % 2 == 0
+
+
+def test_the_cube_has_eight_corners_of_three_charts() -> None:
+    topology = cube_topology(5)
+    assert (topology.valence == 3).all()
+    assert np.bincount(topology.corners.ravel()).tolist() == [3] * 8
+    assert (topology.halo[:, ROWS, COLUMNS] == -1).all()
+    assert topology.polygons == ()
+
+
+def test_beyond_a_corner_of_four_charts_lies_the_texel_across() -> None:
+    topology = flat_torus(4).topology
+    index = np.arange(16).reshape(4, 4)
+    np.testing.assert_array_equal(topology.halo[0], np.pad(index, 1, mode="wrap"))
+    assert (topology.valence == 4).all() and (topology.corners == 0).all()
+
+
+@pytest.mark.parametrize("sides", [3, 4, 5, 8])
+def test_charts_round_a_point_are_a_polygon_from_five_on(sides: int) -> None:
+    texels = polygon(sides, 4)
+    topology = texels.topology
+    assert (topology.valence[:, 0] == sides).all()
+    assert len(np.unique(topology.corners[:, 0])) == 1
+    assert len(topology.polygons) == (sides > 4)
+    for cell in topology.polygons:
+        assert cell.tolist() == [16 * chart for chart in range(sides)]
+
+
+def signed_area(points: np.ndarray) -> float:
+    x, y, _ = points.T
+    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
+
+
+def l_shape(n: int, turns: tuple[int, int, int]) -> TexelMesh:
+    """Three unit squares round an inner corner of the rim; each chart may begin at any of its corners.
+
+    The surface ends at its last texels.
+    """
+    squares = UNIT + np.array([[[0, 0, 0]], [[1, 0, 0]], [[0, 1, 0]]])
+    corners = np.stack([np.roll(square, -turn, axis=0) for square, turn in zip(squares, turns, strict=True)])
+    glued = np.full((3, 4, 2), -1)
+    for (a, side), (b, back) in (((0, 1), (1, 3)), ((0, 2), (2, 0))):
+        mine, other = (side - turns[a]) % 4, (back - turns[b]) % 4
+        glued[a, mine], glued[b, other] = (b, other), (a, mine)
+    u = (np.arange(n) + 0.5) / n
+    s, t = u[None, None, :, None], u[None, :, None, None]
+    a, b, c, d = (corners[:, k, None, None] for k in range(4))
+    return TexelMesh.of(glue(glued, n), (1 - s) * (1 - t) * a + s * (1 - t) * b + s * t * c + (1 - s) * t * d)
+
+
+@pytest.mark.parametrize("turns", [(0, 0, 0), (1, 2, 3), (3, 0, 2)])
+def test_three_charts_at_a_rim_make_a_triangle_wherever_the_charts_begin(turns: tuple[int, int, int]) -> None:
+    n = 4
+    texels = l_shape(n, turns)
+    [cell] = texels.topology.polygons
+    points = texels.positions.reshape(-1, 3)[cell]
+    # counter-clockwise, the three texels nearest to the inner corner
+    assert signed_area(points) == pytest.approx((1 / n) ** 2 / 2)
+    np.testing.assert_allclose(np.abs(points - [1, 1, 0])[:, :2], 0.5 / n)
+    # all squares of four texels, but for those that touch the missing quarter, and the triangle
+    assert texels.areas.sum() == pytest.approx(((2 * n - 1) ** 2 - n**2 + 0.5) / n**2)
+
+
+def places_beyond_corners(topology: TexelTopology) -> tuple[np.ndarray, np.ndarray]:
+    return topology.halo[:, ROWS, COLUMNS], topology.rim[:, ROWS, COLUMNS]
+
+
+def test_a_lone_chart_repeats_its_corner_texels_beyond_the_rim() -> None:
+    halo, rim = places_beyond_corners(square(4).topology)
+    assert rim.all()
+    assert halo.tolist() == [[0, 3, 15, 12]]
+
+
+def test_beyond_a_straight_rim_lies_what_the_chart_beside_has_there() -> None:
+    glued = [[RIM, (1, 3), RIM, RIM], [RIM, RIM, RIM, (0, 1)]]
+    halo, rim = places_beyond_corners(flat_charts([UNIT, UNIT + np.array([1, 0, 0])], glued, 3).topology)
+    assert rim.all()
+    # where the two charts meet, each shows the other's texel; at the far corners its own
+    assert halo.tolist() == [[0, 9, 15, 6], [2, 11, 17, 8]]
+
+
+def test_charts_side_by_side_are_one_chart() -> None:
+    whole, parts = square(12), polygon(4, 6)
+    # the same square, turned by an eighth and 2 ** 0.5 as wide
+    np.testing.assert_allclose(eigenvalues(parts, 12), eigenvalues(whole, 12) / 2, rtol=1e-9, atol=1e-9)
+
+
+def test_waves_stay_in_their_part() -> None:
+    waves = WaveSolver(texel_atlas(two_squares(16)), Material(speed=1.0), backend="cpu", conserve_volume=False)
+    waves.add_impulse([0.5, 0.5, 1.0], 1.0, 0.2)
+    waves.step(1.0)
+    assert (waves.height[0] == 0).all()
+    assert np.abs(waves.height[1]).max() > 0
+    np.testing.assert_allclose(eigenvalues(two_squares(8), 4)[:2], 0, atol=1e-9)
+
+
+def test_what_does_not_fit_is_refused() -> None:
+    with pytest.raises(AtlasError, match="not glued back"):
+        glue(np.array([[(0, 2), (0, 3), (0, 1), (0, 0)]]), 4)
+    with pytest.raises(AtlasError, match=r"shape \(1, 4\); valid is"):
+        glue(np.zeros((1, 4)), 4)
+    with pytest.raises(AtlasError, match="texel positions have shape"):
+        TexelMesh.of(square(4).topology, np.zeros((4, 4, 3)))
+    with pytest.raises(AtlasError, match="not finite"):
+        square(4).with_positions(np.full((1, 4, 4, 3), np.nan))
+
+
+def noise(*shape: int) -> np.ndarray:
+    return np.random.default_rng(0).standard_normal(shape).astype(np.float32)
+
+
+@pytest.mark.parametrize(("topology", "mode"), [(flat_torus(5).topology, "wrap"), (square(5).topology, "edge")])
+def test_a_torus_goes_round_and_a_rim_repeats_the_last_texels(topology, mode: str) -> None:
+    field = noise(1, 5, 5)
+    np.testing.assert_array_equal(with_filled_halo(topology, field)[0], np.pad(field[0], 1, mode=mode))
+
+
+def at_corners(around: np.ndarray) -> np.ndarray:
+    """Bilinear interpolation at the four corners of each chart, [C, 4]."""
+    last = around.shape[1] - 2
+    return np.stack(
+        [around[:, r : r + 2, c : c + 2].mean(axis=(1, 2)) for r, c in ((0, 0), (0, last), (last, last), (last, 0))],
+        axis=1,
+    )
+
+
+@pytest.mark.parametrize("topology", [cube_topology(4), polygon(3, 4).topology, polygon(4, 4).topology])
+def test_charts_that_meet_in_a_corner_agree_on_its_value(topology) -> None:
+    around = with_filled_halo(topology, noise(*topology.shape)).astype(np.float64)
+    values, inner = at_corners(around), topology.valence > 0
+    for point in np.unique(topology.corners[inner]):
+        here = values[topology.corners == point]
+        assert len(here) >= 3
+        np.testing.assert_allclose(here, here[0], atol=1e-6)
+
+
+def test_a_missing_corner_is_the_mean_of_the_three_texels_round_it() -> None:
+    topology = polygon(3, 4).topology
+    field = noise(3, 4, 4)
+    np.testing.assert_allclose(with_filled_halo(topology, field)[:, 0, 0], field[:, 0, 0].mean(), rtol=1e-5)
+
+
+def test_constants_stay_constant_even_in_corners_of_five_charts() -> None:
+    for topology in (polygon(5, 4).topology, cube_topology(4)):
+        np.testing.assert_allclose(with_filled_halo(topology, np.full(topology.shape, 2.5, np.float32)), 2.5)
+
+
+def test_filling_replaces_an_old_halo_and_keeps_the_texels() -> None:
+    topology = cube_topology(4)
+    field = noise(6, 4, 4)
+    around = np.full((6, 6, 6), np.nan, np.float32)
+    around[:, 1:-1, 1:-1] = field
+    fill_halo(topology, around)
+    np.testing.assert_array_equal(around[:, 1:-1, 1:-1], field)
+    np.testing.assert_array_equal(around, with_filled_halo(topology, field))
+    assert around.dtype == np.float32
+
+
+def test_components_of_a_vector_field_are_filled_one_by_one() -> None:
+    topology = cube_topology(4)
+    field = noise(6, 4, 4, 3)
+    around = with_filled_halo(topology, field)
+    for k in range(3):
+        np.testing.assert_array_equal(around[..., k], with_filled_halo(topology, field[..., k]))
+
+
+def at_side(side: int, along: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Row and column of places on a side of a chart, 0 to 1 from its first corner to its second."""
+    low, high, there = np.full_like(along, -0.5), np.full_like(along, n - 0.5), n * along - 0.5
+    return ((low, there), (there, high), (high, there[::-1]), (there[::-1], low))[side]
+
+
+@pytest.mark.parametrize("topology", [cube_topology(4), polygon(3, 4).topology, polygon(4, 4).topology])
+def test_both_charts_agree_along_a_glued_side_up_to_its_corners(topology) -> None:
+    n = topology.shape[1]
+    field = np.random.default_rng(0).standard_normal(topology.texel_count)
+    along = np.linspace(0, 1, 41)
+    for chart, side in np.argwhere(topology.glued[..., 0] >= 0):
+        other, back = topology.glued[chart, side]
+        here = sampling_matrix(topology, np.full(41, chart), *at_side(side, along, n)) @ field
+        there = sampling_matrix(topology, np.full(41, other), *at_side(back, along, n)) @ field
+        np.testing.assert_allclose(here, there[::-1], atol=1e-12)
+
+
+def test_texel_centres_take_their_own_texel_alone() -> None:
+    topology = cube_topology(4)
+    chart, row, column = (each.ravel() for each in np.indices(topology.shape))
+    matrix = sampling_matrix(topology, chart, row.astype(float), column.astype(float))
+    np.testing.assert_array_equal(matrix.toarray(), np.eye(topology.texel_count))
+
+
+@pytest.mark.parametrize("topology", [cube_topology(4), flat_torus(4).topology, polygon(5, 4).topology])
+def test_weights_are_a_mean_of_at_most_four_texels(topology) -> None:
+    rng = np.random.default_rng(1)
+    chart = rng.integers(0, topology.shape[0], 500)
+    matrix = sampling_matrix(topology, chart, *rng.uniform(-0.5, 3.5, (2, 500)))
+    dense = matrix.toarray()
+    assert dense.min() >= 0
+    np.testing.assert_allclose(dense.sum(axis=1), 1)
+    assert (np.count_nonzero(dense, axis=1) <= 4).all()
+
+
+def test_a_bilinear_field_is_reproduced_inside_a_chart() -> None:
+    topology = square(6).topology
+    row, column = np.random.default_rng(2).uniform(0, 5, (2, 200))
+    r, c = np.indices((6, 6))
+    matrix = sampling_matrix(topology, np.zeros(200, np.int64), row, column)
+    expected = 2 + 3 * row - column + 0.5 * row * column
+    np.testing.assert_allclose(matrix @ (2 + 3 * r - c + 0.5 * r * c).ravel(), expected)
+
+
+def test_up_to_a_rim_the_last_texels_go_on() -> None:
+    topology = square(4).topology
+    field = np.random.default_rng(3).standard_normal((4, 4))
+    place = np.array([0.0, 1.0, 3.0])
+    matrix = sampling_matrix(topology, np.zeros(3, np.int64), np.full(3, 3.5), place)
+    np.testing.assert_allclose(matrix @ field.ravel(), field[3, [0, 1, 3]])
+    corner = sampling_matrix(topology, np.zeros(1, np.int64), np.array([-0.5]), np.array([3.5]))
+    np.testing.assert_allclose(corner @ field.ravel(), field[0, 3])
+
+
+def test_a_corner_of_three_charts_is_the_mean_of_its_texels() -> None:
+    topology = polygon(3, 4).topology
+    matrix = sampling_matrix(topology, np.arange(3), np.full(3, -0.5), np.full(3, -0.5)).toarray()
+    expected = np.zeros(48)
+    expected[[0, 16, 32]] = 1 / 3
+    np.testing.assert_allclose(matrix, np.tile(expected, (3, 1)))
+
+
+def test_no_points_make_an_empty_matrix() -> None:
+    none = np.zeros(0)
+    assert sampling_matrix(cube_topology(4), none.astype(np.int64), none, none).shape == (0, 96)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import Atlas, Mesh, WaveSolver, build_atlas, sphere_atlas
-from ripple_sim.solver.cube_map.convention import cube_rotations, permute_texels
+from ripple_sim.solver.layouts.cube.convention import cube_rotations, permute_texels
 
 MIRROR = np.diag([1.0, 1.0, -1.0])
 ALL_48 = np.concatenate([cube_rotations(), cube_rotations() @ MIRROR])
@@ -70,7 +70,7 @@ def test_rotated_impulse_on_a_fine_mesh_of_a_sphere(ball_mesh: Mesh) -> None:
 
 def sample(atlas: Atlas, field: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Bilinear samples of a field at surface points."""
-    from ripple_sim.solver.cube_map.convention import cube_topology
+    from ripple_sim.solver.layouts.cube.convention import cube_topology
 
     n = atlas.resolution
     chart, row, column = atlas.locate(points)

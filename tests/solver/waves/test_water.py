@@ -7,7 +7,7 @@ import pytest
 from hand_made import flat_torus
 
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, sphere_atlas, texel_atlas
-from ripple_sim.solver.operator.dispersion import frequency
+from ripple_sim.solver.operator.material import frequency
 
 DENSITY, GRAVITY = 1000.0, 9.81
 

@@ -1,0 +1,202 @@
+"""Scenes made by processes of this machine.
+
+Scenes made by the workers of a Dask cluster, which share the batch's folder with this process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import functools
+import itertools
+import math
+import multiprocessing
+import os
+import queue
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any
+
+from ripple_sim.errors import BatchError
+from ripple_sim.solver.errors import shown
+
+_PER_THREAD = 2  # tasks a thread, so that none waits for the next one
+_COUNTED = 2.0  # between looks at how many threads there are [s]
+
+
+class DaskExecutor(Executor):
+    """The workers of a Dask cluster, however many there are at the time.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, such as tcp://host:8786.
+
+    Raises
+    ------
+    BatchError
+        If Dask is not installed or does not answer.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            from distributed import Client
+        except ImportError as error:
+            raise BatchError("--dask needs Dask; install it with: pip install 'ripple-sim[dask]'") from error
+        try:
+            self._client = Client(address, timeout=20, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise BatchError(
+                f"no Dask scheduler answers at {shown(address)} ({error}); valid is an address such as tcp://host:8786"
+            ) from error
+        self._places, self._counted = 0, -math.inf
+        self._executor = self._client.get_executor(pure=False, retries=0)
+
+    @property
+    def places(self) -> int:
+        """How many tasks may be submitted at a time."""
+        if time.monotonic() - self._counted > _COUNTED:  # the scheduler takes a while to answer
+            self._places = _PER_THREAD * max(1, sum(self._client.nthreads().values()))
+            self._counted = time.monotonic()
+        return self._places
+
+    def submit(self, function: Callable, /, *arguments: Any, **named: Any) -> Future:
+        """Have a function called by one of the workers."""
+        return self._executor.submit(function, *arguments, **named)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Leave the cluster; without `wait` what is not yet done is given up."""
+        self._executor.shutdown(wait=wait)
+        self._client.close()
+
+
+def available_cores() -> list[int]:
+    """Numbers of the cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return sorted(os.sched_getaffinity(0))
+    return list(range(os.cpu_count() or 1))
+
+
+def usual_workers() -> int:
+    """How many workers use this machine well: one for every two cores, two at least where there are two."""
+    cores = len(available_cores())
+    return max(2, cores // 2) if cores > 1 else 1
+
+
+def shares(cores: list[int], workers: int) -> list[list[int]]:
+    """The cores shared out among workers as evenly as can be; more workers than cores share them all."""
+    if workers > len(cores):
+        return [cores] * workers
+    ends = [len(cores) * number // workers for number in range(workers + 1)]
+    return [cores[first:last] for first, last in itertools.pairwise(ends)]
+
+
+class LocalExecutor(Executor):
+    """Spawned processes, each with a core or more and an OpenGL context of its own.
+
+    One that dies fails what it was at, and is replaced; all of them end with this process, however it ends.
+
+    Parameters
+    ----------
+    workers : int
+        How many.
+
+    Attributes
+    ----------
+    places : int
+        How many tasks may be submitted at a time.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self.places = workers
+        self._free: queue.SimpleQueue[int] = queue.SimpleQueue()
+        self._starts = [functools.partial(_pool, cores) for cores in shares(available_cores(), workers)]
+        self._pools: dict[int, ProcessPoolExecutor] = {}
+        self._processes: dict[int, Future[int]] = {}
+        for place in range(workers):
+            self._free.put(place)
+
+    def submit(self, function: Callable, /, *arguments: Any, **named: Any) -> Future:
+        """Have a function called in one of the processes; at most `places` tasks at a time."""
+        place = self._free.get_nowait()
+        try:
+            future = self._pool(place).submit(function, *arguments, **named)
+        except BrokenProcessPool:  # it died while it had nothing to do
+            del self._pools[place]
+            future = self._pool(place).submit(function, *arguments, **named)
+        future.add_done_callback(functools.partial(self._release, place))
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes; without `wait` at once, whatever they are at."""
+        for place, pool in list(self._pools.items()):
+            process = self._processes[place]
+            if not wait and process.done() and not process.exception():
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(process.result(), signal.SIGKILL)
+            pool.shutdown(wait, cancel_futures=cancel_futures)
+
+    def _pool(self, place: int) -> ProcessPoolExecutor:
+        if place not in self._pools:
+            self._pools[place] = pool = self._starts[place]()
+            self._processes[place] = pool.submit(os.getpid)
+        return self._pools[place]
+
+    def _release(self, place: int, future: Future) -> None:
+        if not future.cancelled() and isinstance(future.exception(), BrokenProcessPool):
+            self._pools.pop(place).shutdown(wait=False)
+        self._free.put(place)
+
+
+def _pool(cores: list[int]) -> ProcessPoolExecutor:
+    """A process that keeps to some cores."""
+    context = multiprocessing.get_context("spawn")  # OpenGL does not survive a fork
+    return ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(cores,))
+
+
+def _begin(cores: list[int]) -> None:
+    """Begin a worker: before anything heavy is imported, it gets its share of the cores."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all processes: the parent ends this one
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, cores)
+    for variable in ("LP_NUM_THREADS", "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(variable, str(len(cores)))
+    os.environ.setdefault("MUJOCO_GL", "disable")
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+@contextlib.contextmanager
+def first_alone(work: Path, what: str) -> Iterator[None]:
+    """Let the first of something be done alone on each machine, while all others wait.
+
+    Parameters
+    ----------
+    work : path
+        Folder that the processes share.
+    what : str
+        Name of what is done.
+    """
+    ready = work / f"ready-{socket.gethostname()}-{what}"
+    if ready.exists():
+        yield
+        return
+    with (work / f"first-{socket.gethostname()}-{what}").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not ready.exists():
+            yield
+            ready.touch()
+            return
+    yield

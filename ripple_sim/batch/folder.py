@@ -1,0 +1,321 @@
+"""The folder of a batch: where things stand in it, what is finished, and who works on what.
+
+`plan.json` is what the scenes are made by; `scenes/000012` is a finished scene, or a member of `tars/000000.tar`;
+`work/000012` is one that is being made, locked by whoever makes it; `failed/000012.json` and `.log` tell what went
+wrong. A scene is finished when its folder is renamed from `work` to `scenes`: nothing else has to be kept in step.
+
+Tar files of finished scenes, as WebDataset reads them: files of one scene one after another, named by its number.
+
+The plan as it stands in the folder of a batch, and how another differs from it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import functools
+import hashlib
+import io
+import os
+import re
+import shutil
+import tarfile
+from collections.abc import Iterable, Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+
+from ripple_sim.errors import BatchError
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.solver.errors import shown
+from ripple_sim.solver.files import atomic_write
+from ripple_sim.video.options import scene_digest
+
+from .plan import Plan
+
+NUMBER = re.compile(r"\d{6,}")
+
+
+def member_name(number: int, name: str) -> str:
+    """Name of a scene's file in a tar file: WebDataset takes what is before the first dot for the scene."""
+    return f"{number:06d}.{name.replace('/', '.')}"
+
+
+def times_of(tar: Path) -> Path:
+    """The file that tells who made the scenes of a tar file and how long each took, which is not in their bytes."""
+    return tar.with_suffix(".times.json")
+
+
+def packed(tar: Path) -> set[int]:
+    """Numbers of the scenes in a tar file."""
+    return set(members(tar))
+
+
+def members(tar: Path) -> dict[int, dict[str, tarfile.TarInfo]]:
+    """The files in a tar file by their names, by scene."""
+    found: dict[int, dict[str, tarfile.TarInfo]] = {}
+    with tarfile.open(tar) as file:
+        for member in file:
+            number, name = member.name.split(".", 1)
+            found.setdefault(int(number), {})[name] = member
+    return found
+
+
+def write_tar(tar: Path, files: Iterable[tuple[str, bytes]]) -> None:
+    """Write a tar file of names and contents; it appears whole, and tells nothing of who wrote it and when."""
+    with atomic_write(tar) as path, tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as file:
+        for name, content in files:
+            member = tarfile.TarInfo(name)
+            member.size = len(content)
+            file.addfile(member, io.BytesIO(content))
+
+
+# Until a scene is put aside: errors of its own, and deaths of its worker, which may have another reason.
+ERRORS, DEATHS = 3, 9
+
+
+class Failure(msgspec.Struct):
+    """How often a scene has failed, how often its worker died meanwhile, and what was said of the last time."""
+
+    errors: int = 0
+    deaths: int = 0
+    error: str = ""
+
+    @property
+    def attempts(self) -> int:
+        """How often it was tried."""
+        return self.errors + self.deaths
+
+    @property
+    def aside(self) -> bool:
+        """Whether it is not tried again by itself."""
+        return self.errors >= ERRORS or self.deaths >= DEATHS
+
+
+class Claim(NamedTuple):
+    """A scene that this process makes: the folder to make it in, and where it goes when it is finished."""
+
+    work: Path
+    finished: Path
+
+    def finish(self) -> None:
+        """Put the scene in its place, whole and on the disk."""
+        for path in (*self.work.rglob("*"), self.work):
+            handle = os.open(path, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
+        self.work.rename(self.finished)
+
+
+class BatchFolder:
+    """The folder of a batch on the disk."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.plan, self.scenes, self.tars = path / "plan.json", path / "scenes", path / "tars"
+        self.failed, self.thumbnails, self.work = path / "failed", path / "thumbnails", path / "work"
+        self.index, self.page = path / "index.parquet", path / "index.html"
+
+    def make(self) -> None:
+        """Make the folders."""
+        for folder in (self.scenes, self.tars, self.failed, self.thumbnails, self.work):
+            folder.mkdir(parents=True, exist_ok=True)
+
+    def scene(self, number: int) -> Path:
+        """Folder of a finished scene."""
+        return self.scenes / f"{number:06d}"
+
+    def thumbnail(self, number: int) -> Path:
+        """A small image of a scene."""
+        return self.thumbnails / f"{number:06d}.jpg"
+
+    def finished(self) -> set[int]:
+        """Numbers of the scenes that are there."""
+        return self.loose().union(*map(packed, self.tar_files()))  # in this order: scenes move into tar files
+
+    def loose(self) -> set[int]:
+        """Numbers of the scenes that have a folder."""
+        return {int(path.name) for path in _entries(self.scenes) if NUMBER.fullmatch(path.name)}
+
+    def is_finished(self, number: int) -> bool:
+        """Whether a scene is there."""
+        if self.scene(number).exists():
+            return True
+        tars = [tar for tar in self.tar_files() if int(tar.stem) <= number]  # named by their first scene
+        return bool(tars) and number in packed(tars[-1])
+
+    def tar(self, first: int) -> Path:
+        """Tar file of the scenes from a number on."""
+        return self.tars / f"{first:06d}.tar"
+
+    def tar_files(self) -> list[Path]:
+        """The tar files, in their order."""
+        return sorted(path for path in _entries(self.tars) if path.suffix == ".tar" and path.stem.isdecimal())
+
+    @contextlib.contextmanager
+    def claimed(self, number: int) -> Iterator[Claim | None]:
+        """Lock a scene against other processes; None if another one makes it now, or it is finished.
+
+        A process that dies leaves no lock behind.
+        """
+        work = self.work / f"{number:06d}"
+        work.mkdir(parents=True, exist_ok=True)
+        handle = os.open(work, os.O_RDONLY | os.O_NOFOLLOW)
+        try:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                yield None
+                return
+            if self.is_finished(number):  # by another process, meanwhile
+                _remove_empty(work)
+                yield None
+            else:
+                yield Claim(work, self.scene(number))
+        finally:
+            os.close(handle)
+
+    def failures(self) -> dict[int, Failure]:
+        """The scenes that have failed, also those that may yet succeed."""
+        found = {}
+        for path in _entries(self.failed):
+            if path.suffix == ".json" and NUMBER.fullmatch(path.stem):
+                with contextlib.suppress(msgspec.DecodeError):
+                    found[int(path.stem)] = msgspec.json.decode(path.read_bytes(), type=Failure)
+        return found
+
+    def note_failure(self, number: int, failure: Failure, log: str) -> None:
+        """Keep what went wrong with a scene."""
+        with (self.failed / f"{number:06d}.log").open("a") as file:
+            file.write(f"attempt {failure.attempts}: {failure.error}\n{log}\n")
+        with atomic_write(self.failed / f"{number:06d}.json") as path:
+            path.write_bytes(msgspec.json.encode(failure))
+
+    def forget_failure(self, number: int) -> None:
+        """Remove what went wrong with a scene."""
+        for ending in ("json", "log"):
+            (self.failed / f"{number:06d}.{ending}").unlink(missing_ok=True)
+
+    def check(self) -> None:
+        """Make sure that this is the folder of a batch; raises `BatchError`."""
+        if not self.plan.is_file():
+            raise BatchError(
+                f"{self.path} is not the folder of a batch: it has no plan.json; make one by "
+                "`ripple-sim batch PLAN.toml -o DIR`"
+            )
+
+
+def clear(folder: Path) -> None:
+    """Remove everything in a folder."""
+    for path in folder.iterdir():
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def _entries(folder: Path) -> list[Path]:
+    return sorted(folder.iterdir()) if folder.is_dir() else []
+
+
+def _remove_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+
+
+_PACKAGES = ("ripple-sim", "mujoco", "numpy", "numba", "moderngl", "av", "pillow")
+
+# A larger batch begins like a smaller one; tar files tell themselves what is in them.
+_MAY_CHANGE = ("plan.count",)
+
+
+class StoredPlan(msgspec.Struct, frozen=True):
+    """A plan with all that decides its scenes: fingerprints of its files, and versions of the software."""
+
+    plan: Plan
+    files: dict[str, str]
+    versions: dict[str, str]
+
+
+def stored(plan: Plan) -> StoredPlan:
+    """The plan with the fingerprints of its files; reads all of them.
+
+    Raises
+    ------
+    RippleError
+        If one is invalid.
+    """
+    files = {source: _fingerprint(source) for source in dict.fromkeys(plan.sources)}
+    return StoredPlan(plan, files, {package: version(package) for package in _PACKAGES})
+
+
+def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
+    """Write the plan into the folder of its batch, or make sure that the one there is the same.
+
+    Raises
+    ------
+    BatchError
+        Naming what has changed.
+    """
+    if batch.plan.exists():
+        before, now = _flat(load_stored(batch.plan)), _flat(plan)
+        changed = sorted(
+            key for key in before.keys() | now.keys() if before.get(key) != now.get(key) and key not in _MAY_CHANGE
+        )
+        if changed:
+            key = changed[0]
+            more = f", and {len(changed) - 1} more ({', '.join(changed[1:4])})" if len(changed) > 1 else ""
+            raise BatchError(
+                f"{batch.path} holds a batch by another plan: {key} was {shown(before.get(key))} and is "
+                f"{shown(now.get(key))}{more}; take it back, or name another folder"
+            )
+    elif batch.path.is_dir() and any(batch.path.iterdir()):
+        raise BatchError(f"{batch.path} holds other files and no batch; name a new folder")
+    batch.make()
+    with atomic_write(batch.plan) as path:
+        path.write_bytes(msgspec.json.format(msgspec.json.encode(plan), indent=1))
+
+
+def load_stored(path: Path) -> StoredPlan:
+    """Read the plan in the folder of a batch; raises `BatchError`."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=StoredPlan)
+    except (OSError, msgspec.MsgspecError) as error:
+        raise BatchError(f"{path} cannot be read: {error}; it is the plan of a batch and must stay as it is") from error
+
+
+@functools.lru_cache(maxsize=4)
+def _load_plan(path: Path, modified: int) -> Plan:
+    return load_stored(path).plan
+
+
+def load_plan(path: Path) -> Plan:
+    """Read the plan that a worker makes scenes by."""
+    return _load_plan(path, path.stat().st_mtime_ns)
+
+
+def _fingerprint(source: str) -> str:
+    if Path(source).suffix in ("", ".toml"):
+        return scene_digest(load_scene(source))
+    return hashlib.blake2b(Path(source).read_bytes(), digest_size=8).hexdigest()
+
+
+def _flat(value: Any) -> dict[str, Any]:
+    """Values of nested tables by keys with dots; files by their names, wherever the plan is."""
+    content = msgspec.to_builtins(value)
+    plan = content["plan"]
+    plan["sources"] = [Path(source).name for source in plan["sources"]]
+    content["files"] = {Path(source).name: digest for source, digest in content["files"].items()}
+    found: dict[str, Any] = {}
+
+    def walk(table: dict[str, Any], before: str) -> None:
+        for key, inner in table.items():
+            name = f"{before}.{key}" if before else key
+            if isinstance(inner, dict) and before not in ("plan.vary", "plan.model"):
+                walk(inner, name)
+            else:
+                found[name] = inner
+
+    walk(content, "")
+    return found

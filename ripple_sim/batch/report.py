@@ -1,0 +1,264 @@
+"""The index of a batch: a Parquet table with a row a scene.
+
+The summary page of a batch.
+
+`load_batch`: the finished scenes of a batch, one after another or by number.
+
+How far a batch is, from its folder alone.
+
+A batch tried before it is made: the first scenes' values, and what one scene takes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import html
+import json
+import shutil
+import tempfile
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from ripple_sim.errors import BatchError
+from ripple_sim.solver.errors import PATH, checked
+from ripple_sim.solver.files import atomic_write
+from ripple_sim.solver.kernel import compile_times
+
+from .executors import usual_workers
+from .finished import FinishedScene, finished_scenes
+from .folder import BatchFolder, keep_plan, load_stored, stored
+from .make_scene import make_scene
+from .plan import Plan
+from .variation import Variation
+
+_MOST = 5_000  # scenes on the page
+
+_HEAD = """<!doctype html><meta charset="utf-8"><title>{name}</title><style>
+body{{font:15px system-ui,sans-serif;margin:2rem;color:#222;background:#fafafa}}
+main{{display:grid;grid-template-columns:repeat(auto-fill,minmax(170px,1fr));gap:12px}}
+a{{display:block;background:#fff;border-radius:6px;padding:5px;color:inherit;text-decoration:none;font-size:12px;
+box-shadow:0 1px 3px #0003}}img{{width:100%;display:block;border-radius:3px}}.failed{{background:#fdd}}
+</style><h1>{name}</h1><p>{summary}</p><main>
+"""
+
+
+def write_page(batch: BatchFolder, rows: list[dict[str, Any]]) -> None:
+    """Write `index.html`: a thumbnail a scene, with what was drawn for it, and what the whole took."""
+    finished = [row for row in rows if row["status"] == "finished"]
+    frames, size, seconds = (sum(row[key] for row in finished) for key in ("frames", "bytes", "seconds"))
+    shown = f"; the first {_MOST} are shown" if len(rows) > _MOST else ""
+    summary = (
+        f"{len(finished)} scenes, {frames} frames, {size / 1e6:.1f} MB, {seconds:.0f} s of work; "
+        f"{len(rows) - len(finished)} failed{shown}"
+    )
+    cards = "".join(_card(batch, row) for row in rows[:_MOST])
+    name = html.escape(batch.path.name)
+    with atomic_write(batch.page) as path:
+        path.write_text(_HEAD.format(name=name, summary=summary) + cards + "</main>\n", encoding="utf-8")
+
+
+def _card(batch: BatchFolder, row: dict[str, Any]) -> str:
+    number = row["number"]
+    if row["status"] != "finished":
+        log = f"failed/{number:06d}.log"
+        return f'<a class="failed" href="{log}">{number}: {html.escape(str(row["error"]))}</a>\n'
+    title = html.escape("\n".join(f"{name}: {value}" for name, value in row.items()), quote=True)
+    thumbnail = batch.thumbnail(number)
+    image = f'<img loading="lazy" src="thumbnails/{thumbnail.name}" alt="">' if thumbnail.exists() else ""
+    folder = batch.scene(number)
+    link = f"scenes/{folder.name}/" if folder.exists() else "tars/"
+    text = f"{number}: {html.escape(row['source'])}, {row['impulse']:.3g} N s"
+    return f'<a href="{link}" title="{title}">{image}{text}</a>\n'
+
+
+_PLAIN = ("number", "seed", "source", "frames", "fps", "contacts", "impulse", "bytes", "states", "hash")
+
+
+def parquet() -> Any:
+    """The library that reads and writes the index; raises `BatchError` where it is missing."""
+    try:
+        import pyarrow.parquet
+    except ImportError as error:
+        raise BatchError(
+            "batches need the package pyarrow; install it with: pip install 'ripple-sim[batch]'"
+        ) from error
+    return pyarrow.parquet
+
+
+class Index:
+    """The rows of a batch's scenes, those that are there and those that are added."""
+
+    def __init__(self, batch: BatchFolder) -> None:
+        self._batch, self._parquet = batch, parquet()
+        self._rows: dict[int, dict[str, Any]] = {}
+
+    def add(self, facts: dict[str, Any], times: dict[str, Any]) -> None:
+        """Add a finished scene."""
+        self._rows[facts["number"]] = row(facts, times)
+
+    def write(self) -> None:
+        """Write the table and the page, with all scenes that anybody has finished, and those put aside."""
+        import pyarrow
+
+        for scene in finished_scenes(self._batch, self._rows):
+            with contextlib.suppress(FileNotFoundError):  # another process packs it, and will write the index too
+                self._rows[scene.number] = row(scene.facts(), scene.times())
+        failures = self._batch.failures()
+        rows = [self._rows[number] for number in sorted(self._rows)]
+        rows += [
+            {"number": number, "status": "failed", "attempts": failure.attempts, "error": failure.error}
+            for number, failure in sorted(failures.items())
+            if number not in self._rows
+        ]
+        rows.sort(key=lambda each: each["number"])
+        with atomic_write(self._batch.index) as path:
+            self._parquet.write_table(pyarrow.table(_columns(rows)), path)
+        write_page(self._batch, rows)
+
+
+def row(facts: dict[str, Any], times: dict[str, Any]) -> dict[str, Any]:
+    """What the index says of a finished scene: one value a column."""
+    targets = facts["targets"].values()
+    return {
+        "status": "finished",
+        **{name: facts[name] for name in _PLAIN},
+        "seconds": times["seconds"],
+        "cpu_seconds": times["cpu_seconds"],
+        "height_max": max(each["height_max"] for each in targets),
+        "energy_max": sum(each["energy_max"] for each in targets),
+        "energy_end": sum(each["energy_end"] for each in targets),
+        **facts["values"],
+    }
+
+
+def _columns(rows: list[dict[str, Any]]) -> dict[str, list[Any]]:
+    """Lists of values by column; a column of values of several kinds holds their JSON."""
+    names = dict.fromkeys(name for each in rows for name in each)
+    columns = {name: [each.get(name) for each in rows] for name in ("number", *(n for n in names if n != "number"))}
+    return {
+        name: values if _alike(values) else [json.dumps(value) for value in values] for name, values in columns.items()
+    }
+
+
+def _alike(values: Iterable[Any]) -> bool:
+    kinds = {float if isinstance(value, int) and not isinstance(value, bool) else type(value) for value in values}
+    return len(kinds - {type(None)}) <= 1 and not kinds & {dict}
+
+
+class Batch(Sequence):
+    """The scenes of a batch that were finished when it was loaded, in the order of their numbers.
+
+    It may be sent to other processes, such as a loader's workers; files are read when they are asked for.
+
+    Attributes
+    ----------
+    path : Path
+    numbers : list of int
+        Of the scenes; one that failed is not among them.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._scenes = sorted(finished_scenes(BatchFolder(path)), key=lambda scene: scene.number)
+        self.numbers = [scene.number for scene in self._scenes]
+
+    def __len__(self) -> int:
+        return len(self._scenes)
+
+    def __getitem__(self, place: Any) -> Any:
+        """The scene at a place among those that are there; its number is another if some are missing."""
+        return self._scenes[place]
+
+    def __iter__(self) -> Iterator[FinishedScene]:
+        return iter(self._scenes)
+
+    def table(self) -> Any:
+        """The Parquet index as a table of pyarrow; where pandas is installed, its `to_pandas` makes a data frame."""
+        return parquet().read_table(BatchFolder(self.path).index)
+
+
+@checked(BatchError, path=PATH)
+def load_batch(path: str | Path) -> Batch:
+    """Load a batch from its folder, also while others still make scenes of it.
+
+    Raises
+    ------
+    BatchError
+        If there is no batch in the folder.
+    """
+    path = Path(path).absolute()
+    BatchFolder(path).check()
+    return Batch(path)
+
+
+_LISTED = 5  # failures
+
+
+def status_text(path: Path) -> str:
+    """What is finished, what failed and why, and what is still to be made.
+
+    Raises
+    ------
+    BatchError
+        If there is no batch in the folder.
+    """
+    batch = BatchFolder(path)
+    batch.check()
+    count = load_stored(batch.plan).plan.count
+    finished = {number for number in batch.finished() if number < count}
+    failures = {number: each for number, each in batch.failures().items() if number not in finished}
+    aside = [number for number, each in failures.items() if each.aside]
+    lines = [
+        f"{path}: {len(finished)} of {count} scenes finished, {len(aside)} put aside, "
+        f"{count - len(finished) - len(aside)} to be made"
+    ]
+    lines += [
+        f"scene {number} failed {each.attempts} times: {each.error} ({batch.failed.name}/{number:06d}.log)"
+        for number, each in sorted(failures.items())[:_LISTED]
+    ]
+    if len(failures) > _LISTED:
+        lines.append(f"and {len(failures) - _LISTED} more failed")
+    if aside:
+        lines.append(f"`ripple-sim batch {path} --retry-failed` tries them again")
+    return "\n".join(lines)
+
+
+_SHOWN = 3  # scenes whose values are told
+
+
+def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
+    """Make one scene in a temporary folder; tell the first ones' values, and the time and room that all will take.
+
+    Raises
+    ------
+    RippleError
+        If the plan or one of the first scenes is invalid.
+    """
+    if plan is None:
+        plan = load_stored(BatchFolder(folder).plan).plan
+    lines = []
+    for number in range(min(_SHOWN, plan.count)):
+        variation = Variation(plan, number)
+        values = ", ".join(f"{key} = {value}" for key, value in variation.load().values.items()) or "nothing varies"
+        lines.append(f"scene {number} ({Path(variation.source).name}, seed {variation.seed}): {values}")
+    with tempfile.TemporaryDirectory(prefix="ripple-sim-trial-") as name:
+        batch = BatchFolder(Path(name))
+        keep_plan(batch, stored(plan))
+        start, compiled = time.perf_counter(), sum(compile_times().values())
+        outcome = make_scene(name, 0)
+        if outcome.state != "made":
+            raise BatchError(f"scene 0 cannot be made: {outcome.error}")
+        seconds = time.perf_counter() - start - (sum(compile_times().values()) - compiled)
+        size = sum(path.stat().st_size for path in batch.scene(0).rglob("*") if path.is_file())
+    count = workers or usual_workers()
+    while not folder.exists():
+        folder = folder.absolute().parent
+    lines.append(
+        f"{plan.count} scenes of {outcome.row['frames']} frames: {seconds:.1f} s and {size / 1e6:.2f} MB for one, "
+        f"so about {plan.count * seconds / 3600:.2g} h of work (here by {count} workers, at best "
+        f"{plan.count * seconds / 3600 / count:.2g} h) and {plan.count * size / 1e9:.2g} GB; "
+        f"{shutil.disk_usage(folder).free / 1e9:.1f} GB are free"
+    )
+    return "\n".join(lines)

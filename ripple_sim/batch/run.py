@@ -1,0 +1,271 @@
+"""One run of a batch: what is to be made is given out, and what comes back is noted.
+
+How a batch is run, and how far a run is.
+
+`run_batch`: makes the scenes of a plan that are not there yet, whoever works on them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import queue
+import shutil
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from pathlib import Path
+
+from ripple_sim.errors import BatchError
+
+from .executors import DaskExecutor, LocalExecutor, first_alone, usual_workers
+from .finished import pack
+from .folder import BatchFolder, Failure, keep_plan, load_plan, load_stored, stored
+from .make_scene import Outcome, make_scene
+from .plan import Plan
+from .report import Index
+from .variation import Variation
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """How a batch is run; none of it changes a byte of the scenes."""
+
+    workers: int | None = None
+    """Processes of this machine; by default one for every two cores, at least two where there are two."""
+    shard: tuple[int, int] = (1, 1)
+    """Which part of the scenes to make, of how many."""
+    limit: int | None = None
+    """At most so many scenes in this run."""
+    dask: str | None = None
+    """Address of a Dask scheduler whose workers make the scenes."""
+    retry_failed: bool = False
+    """Try the scenes again that were put aside."""
+    keep_free: float = 1e9
+    """Stop when the disk has no more room than this [bytes]."""
+
+
+@dataclasses.dataclass
+class Progress:
+    """How far a batch is.
+
+    Attributes
+    ----------
+    scenes, finished, aside : int
+        Of this run's share: all, those that are there, those that have been put aside.
+    made, frames, bytes, failures : int
+        By this run: scenes, their frames and size on the disk, and scenes that failed once or more.
+    seconds : float
+        That this run has taken so far [s].
+    free : int
+        Room left on the disk [bytes].
+    """
+
+    scenes: int
+    finished: int
+    aside: int
+    made: int = 0
+    frames: int = 0
+    bytes: int = 0
+    failures: int = 0
+    seconds: float = 0.0
+    free: int = 0
+
+
+_PATIENCE = 1.0  # between looks at scenes that another process makes [s]
+_INDEXED = 30.0  # between versions of the index while scenes are made [s]
+_REST = 20.0  # or so many times as long as the last one took to write
+
+
+class BatchRun:
+    """The scenes that one process has made, and those that it still has to."""
+
+    def __init__(self, batch: BatchFolder, plan: Plan, options: RunOptions) -> None:
+        self.batch, self.options = batch, options
+        self.index = Index(batch)
+        self.failures, finished = batch.failures(), batch.finished()
+        share = [number for number in range(plan.count) if in_shard(number, plan, options.shard)]
+        self._share = set(share)
+        aside = {number for number, failure in self.failures.items() if failure.aside}
+        pending = [number for number in share if number not in finished and number not in aside]
+        self.pending = deque(pending[: options.limit])
+        self._tar_size = plan.store.scenes_per_tar if plan.store.format == "webdataset" else 0
+        self._open = Counter(number // self._tar_size for number in pending) if self._tar_size else Counter()
+        self.progress = Progress(len(share), len(finished.intersection(share)), len(aside.intersection(share)))
+        self.full: str | None = None
+        self._done: queue.SimpleQueue[tuple[int, Future]] = queue.SimpleQueue()
+        self._running: set[int] = set()
+        self._later: list[int] = []  # what other processes are at
+
+    def work(self, executor: LocalExecutor | DaskExecutor, progress: Callable[[Progress], None] | None) -> None:
+        """Have all scenes made."""
+        start = indexed = time.monotonic()
+        pause = _INDEXED
+        if self._tar_size:  # those that were not packed before a kill
+            for number in {number // self._tar_size for number in self.batch.loose() & self._share}:
+                self._pack(number)
+        while self.pending or self._running or self._later:
+            self._submit(executor)
+            with contextlib.suppress(queue.Empty):
+                number, future = self._done.get(timeout=_PATIENCE)
+                self._running.remove(number)
+                self._take(number, _outcome(number, future))
+            if not self.pending and not self._running and self._later and self.full is None:
+                time.sleep(_PATIENCE)
+                self.pending, self._later = deque(self._later), []
+            self.progress.seconds = time.monotonic() - start
+            if progress is not None:
+                progress(self.progress)
+            if time.monotonic() - indexed > pause:
+                before = time.monotonic()
+                self.index.write()
+                indexed = time.monotonic()
+                pause = max(_INDEXED, _REST * (indexed - before))
+
+    def _submit(self, executor: LocalExecutor | DaskExecutor) -> None:
+        """Give out scenes while there is a place for one, and room on the disk."""
+        self.progress.free = shutil.disk_usage(self.batch.path).free
+        if self.progress.free < self.options.keep_free and self.full is None:
+            self.full = (
+                f"the disk has {self.progress.free / 1e9:.1f} GB left, less than the {self.options.keep_free / 1e9:g} "
+                "GB to be kept free"
+            )
+        if self.full is not None:
+            self.pending.clear()
+            self._later.clear()
+        while self.pending and len(self._running) < executor.places:
+            number = self.pending.popleft()
+            self._running.add(number)
+            future = executor.submit(work, str(self.batch.path), number)
+            future.add_done_callback(lambda future, number=number: self._done.put((number, future)))  # type: ignore[misc]
+
+    def _take(self, number: int, outcome: Outcome) -> None:
+        if outcome.state == "busy":
+            self._later.append(number)
+        elif outcome.state == "full":
+            self.full = f"the disk is full: {outcome.error}"
+        elif outcome.state in ("failed", "died"):
+            self._note_failure(number, outcome)
+        else:
+            self.progress.finished += 1
+            if outcome.state == "made":
+                self.progress.made += 1
+                self.progress.frames += outcome.row["frames"]
+                self.progress.bytes += outcome.row["bytes"]
+                self.index.add(outcome.row, outcome.times)
+            if self.failures.pop(number, None) is not None:
+                self.batch.forget_failure(number)
+            self._close(number)
+
+    def _note_failure(self, number: int, outcome: Outcome) -> None:
+        """Try a scene again after all others, or put it aside."""
+        before = self.failures.get(number, Failure())
+        self.progress.failures += before.attempts == 0
+        died = outcome.state == "died"
+        failure = Failure(before.errors + (not died), before.deaths + died, outcome.error)
+        self.failures[number] = failure
+        self.batch.note_failure(number, failure, outcome.log)
+        if not failure.aside:
+            self.pending.append(number)
+        else:
+            self.progress.aside += 1
+            self._close(number)
+
+    def _close(self, number: int) -> None:
+        """Pack the tar file of a scene if no other scene of it is to be made."""
+        if self._tar_size:
+            self._open[number // self._tar_size] -= 1
+            self._pack(number // self._tar_size)
+
+    def _pack(self, group: int) -> None:
+        if self._open[group] <= 0:
+            pack(self.batch, group * self._tar_size, (group + 1) * self._tar_size)
+
+
+def work(folder: str, number: int) -> Outcome:
+    """What a worker does: make a scene.
+
+    The first on each machine is made alone, for it compiles the kernels for all others; so is the first of each
+    source, which makes the atlases.
+    """
+    batch = BatchFolder(Path(folder))
+    sources = load_plan(batch.plan).sources
+    with first_alone(batch.work, "machine"), first_alone(batch.work, f"source-{number % len(sources)}"):
+        return make_scene(folder, number)
+
+
+def in_shard(number: int, plan: Plan, shard: tuple[int, int]) -> bool:
+    """Whether a scene belongs to a part of the batch; scenes of a tar file stay together."""
+    together = plan.store.scenes_per_tar if plan.store.format == "webdataset" else 1
+    return number // together % shard[1] == shard[0] - 1
+
+
+def _outcome(number: int, future: Future) -> Outcome:
+    try:
+        return future.result()
+    except Exception as error:  # the worker died
+        return Outcome(number, "died", error=f"its worker died: {' '.join(str(error).split())}")
+
+
+_TRIED = 3  # scenes whose values are drawn before the batch begins
+
+
+def run_batch(
+    plan: Plan | None,
+    output: str | Path,
+    options: RunOptions = RunOptions(),
+    *,
+    progress: Callable[[Progress], None] | None = None,
+) -> Progress:
+    """Make the scenes of a batch that are not there yet.
+
+    It may be killed at any time and started again, also while others make scenes of the same batch.
+
+    Parameters
+    ----------
+    plan : Plan or None
+        From `read_plan`; None goes on with the plan in the folder.
+    output : path
+        Folder of the batch.
+    options : RunOptions
+    progress : callable, optional
+        Called with the progress, about once a second.
+
+    Raises
+    ------
+    RippleError
+        If the plan is another than the folder's, a key of it fits nothing, or the disk is nearly full.
+    """
+    batch = BatchFolder(Path(output).absolute())
+    if plan is None:
+        batch.check()
+        plan = load_stored(batch.plan).plan
+    for number in range(min(len(plan.sources), plan.count, _TRIED)):
+        Variation(plan, number).load()  # a key that fits nothing is told before anything is made
+    keep_plan(batch, stored(plan))
+    if options.retry_failed:
+        for number in batch.failures():
+            batch.forget_failure(number)
+    run = BatchRun(batch, plan, options)
+    with _executor(options, run) as executor:
+        run.work(executor, progress)
+    run.index.write()
+    if run.full is not None:
+        raise BatchError(f"{run.full}; make room, or lower --keep-free, and run the same command again to go on")
+    return run.progress
+
+
+@contextlib.contextmanager
+def _executor(options: RunOptions, run: BatchRun) -> Iterator[LocalExecutor | DaskExecutor]:
+    executor: LocalExecutor | DaskExecutor
+    if options.dask is not None:
+        executor = DaskExecutor(options.dask)
+    else:
+        executor = LocalExecutor(min(options.workers or usual_workers(), max(1, len(run.pending))))
+    try:
+        yield executor
+    except BaseException:  # such as Ctrl-C: what is unfinished goes on next time
+        executor.shutdown(wait=False, cancel_futures=True)
+        raise
+    executor.shutdown()

@@ -1,0 +1,124 @@
+"""`ripple-sim materials`.
+
+`ripple-sim bench`.
+
+`ripple-sim cache`.
+
+`ripple-sim completion`.
+
+`ripple-sim info`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import json as json_format
+import math
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from tyro.conf import Positional, arg
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Bench:
+    """Measure the wave solver: speed against rivals and the bound of memory, accuracy against exact solutions."""
+
+    meshes: Annotated[Positional[tuple[Path, ...]], arg(metavar="[MESH ...]", help_behavior_hint="(optional)")] = ()
+    """Meshes on which to measure arrival times, in addition to the built-in one."""
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Measure and print; the stages are announced on stderr."""
+        from ripple_sim.bench.report import as_text, measure
+
+        report = measure(list(self.meshes), lambda stage: print(f"measuring {stage} ...", file=sys.stderr))
+        print(json_format.dumps(report, indent=2) if self.json else as_text(report))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Cache:
+    """Show where atlases are kept, and how much room they take: at most RIPPLE_SIM_CACHE_LIMIT megabytes, or 500."""
+
+    clear: bool = False
+    """Remove them."""
+
+    def run(self) -> None:
+        """Clear the cache if asked to, and print what is in it."""
+        from ripple_sim.solver.cache import cache_folder, cache_limit, cached_files, remove
+
+        limit, files = cache_limit(), cached_files()
+        if self.clear:
+            freed = sum(remove(file) for file in files)
+            print(f"removed {len(files)} files, {_megabytes(freed)} MB")
+            files = cached_files()
+        size = sum(file.size for file in files)
+        print(f"{cache_folder()}: {len(files)} files, {_megabytes(size)} of {_megabytes(limit)} MB")
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:.0f}"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Completion:
+    """Print a shell completion script. To use it: source <(ripple-sim completion bash)."""
+
+    shell: Annotated[Positional[Literal["bash", "zsh"]], arg(metavar="SHELL")]
+    """Shell to complete in: bash or zsh."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Info:
+    """Show versions, the OpenGL driver and the wave solver, and what to install if rendering is not possible."""
+
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Print the report."""
+        from ripple_sim.diagnostics import as_text, collect
+
+        info = collect()
+        print(json_format.dumps(dataclasses.asdict(info), indent=2) if self.json else as_text(info))
+
+
+# Of the wave whose speed and decay are told [m].
+_WAVELENGTH = 0.05
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Materials:
+    """List the real materials by name, with speed and decay of a wave of 5 cm, sources, and where they hold."""
+
+    json: bool = False
+    """Print them as JSON."""
+
+    def run(self) -> None:
+        """Print the table."""
+        from ripple_sim.solver.operator.presets import PRESETS
+
+        table = {name: _told(name) for name in PRESETS}
+        if self.json:
+            print(json.dumps(table, indent=2))
+            return
+        width = max(map(len, table))
+        for name, row in table.items():
+            print(f"{name:{width}}  {row['speed [m/s]']:.3g} m/s, falls to 1/e in {row['decay [s]']:.3g} s")
+            parameters = ", ".join(f"{key} {value:g}" for key, value in row["parameters"].items())
+            print(f"{'':{width}}  {row['law']}: {parameters}")
+            print(f"{'':{width}}  holds: {row['valid']}")
+            print(f"{'':{width}}  source{'' if row['checked'] else ', not checked'}: {row['source']}")
+
+
+def _told(name: str) -> dict[str, Any]:
+    from ripple_sim.solver import Material
+    from ripple_sim.solver.operator.material import decay_time, phase_speed
+    from ripple_sim.solver.operator.presets import PRESETS
+
+    material, q = Material.preset(name), 2 * math.pi / _WAVELENGTH
+    told = {"speed [m/s]": phase_speed(material, q), "decay [s]": decay_time(material, q)}
+    return told | dataclasses.asdict(PRESETS[name])

@@ -1,0 +1,312 @@
+"""`ripple-sim render` and `ripple-sim drop`.
+
+`ripple-sim export`.
+
+A progress bar for a terminal, which tells what is being compiled; silence for a pipe or a log.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.text import Text
+from tyro.conf import Positional, arg
+
+from ripple_sim.export.options import ExportOptions
+from ripple_sim.solver.kernel import compile_times, compiling
+
+from .arguments import (
+    Count,
+    Device,
+    Duration,
+    Factor,
+    Limit,
+    Resolution,
+    Rim,
+    SceneLayout,
+    SceneSeed,
+    Seed,
+    Size,
+    UpAxis,
+    VideoArguments,
+)
+
+if TYPE_CHECKING:
+    from ripple_sim.scene.scene import Scene
+    from ripple_sim.video.render_video import Summary
+
+# By field: how its word on the command line is read. The others are read as their types say.
+_WORDS: dict[str, Any] = {
+    "fps": Count,
+    "duration": Duration,
+    "slow_motion": Factor,
+    "triangles": Count,
+    "chunk": Limit,
+    "size": Size,
+    "resolution": Resolution,
+    "layout": SceneLayout,
+    "rim": Rim,
+}
+
+if TYPE_CHECKING:
+    _ExportFields = ExportOptions
+else:
+    _ExportFields = dataclasses.make_dataclass(
+        "_ExportFields", list(_WORDS.items()), bases=(ExportOptions,), frozen=True, kw_only=True
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Export(_ExportFields):
+    """Simulate a scene, and write it to the file of another program."""
+
+    scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
+    """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...), on which bodies
+    then drop."""
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
+    """Output file; its ending says what is written: .usdc, .usda or .usdz (the moving scene), .html (a player),
+    .zarr (fields over time), .csv or .parquet (impulses)."""
+    camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
+    """Camera of the MJCF."""
+    seed: SceneSeed = None
+    """Seed of the scene's random variation, or of the bodies that drop on a mesh."""
+
+    def run(self) -> None:
+        """Export the scene and print a summary."""
+        from ripple_sim.export.options import check_options
+        from ripple_sim.export.place import check_export
+        from ripple_sim.scene.drop import find_scene, is_scene
+
+        is_scene(self.scene)
+        options = ExportOptions(**{each.name: getattr(self, each.name) for each in dataclasses.fields(ExportOptions)})
+        check_options(options)  # before anything that takes time
+        check_export(self.output, options.overwrite)
+
+        from ripple_sim.export.options import frame_count
+        from ripple_sim.export.scene import export_scene
+        from ripple_sim.scene.scene import through_camera
+
+        pass
+
+        scene = find_scene(self.scene, seed=self.seed)
+        for note in scene.notes:
+            print(f"{Path(self.scene).name}: {note}", file=sys.stderr)
+        if self.camera is not None:
+            scene = through_camera(scene, self.camera)
+        with frame_progress(f"export to {self.output}", frame_count(options, scene)) as progress:
+            summary = export_scene(scene, self.output, options, progress=progress)
+        print(
+            f"{summary.output}: {summary.frames} frames\n"
+            f"stages    simulation {summary.simulate_seconds:.1f} s, writing {summary.write_seconds:.1f} s"
+        )
+
+
+Report = Callable[[int, int], None]
+
+
+# What the kernels of a package do, in a user's words; the longest name that fits counts.
+_STAGES = {
+    "ripple_sim.solver.layouts.sphere_map": "the sphere map",
+    "ripple_sim.solver.layouts.patches": "the charts",
+    "ripple_sim.solver": "the atlas",
+    "ripple_sim.solver.operator": "the wave operator",
+    "ripple_sim.solver.backends": "the wave step",
+    "ripple_sim.solver.waves": "loads and height maps",
+    "ripple_sim.coupling": "the contacts",
+    "ripple_sim.render": "the renderer",
+}
+
+
+class _Compiling(ProgressColumn):
+    """What is being compiled, and for how many seconds so far; nothing while nothing is."""
+
+    def render(self, task: Task) -> Text:
+        module = compiling()
+        if module is None:
+            return Text("")
+        stage = _stage(module)
+        seconds = sum(time for each, time in compile_times().items() if _stage(each) == stage)
+        return Text(f"compiling {stage} (once): {seconds:.0f} s")
+
+
+def _stage(module: str) -> str:
+    """What a module's kernels do."""
+    fitting = [package for package in _STAGES if f"{module}.".startswith(f"{package}.")]
+    return _STAGES[max(fitting, key=len)] if fitting else module
+
+
+class _Rate(ProgressColumn):
+    def render(self, task: Task) -> Text:
+        return Text(f"{task.speed:.1f} frames/s" if task.speed else "", style="progress.data.speed")
+
+
+@contextlib.contextmanager
+def frame_progress(title: str, total: int | None = None) -> Iterator[Report | None]:
+    """Show a title, and below it frames done of a total, rate and remaining time, on stderr while the block runs.
+
+    Yields a function of the number of frames done and of all frames, or None if stderr is not a terminal.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("frames"), _Rate(), TimeRemainingColumn(), _Compiling())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        progress.console.print(title, markup=False, highlight=False)
+        task = progress.add_task("", total=total)
+        yield lambda done, total: progress.update(task, completed=done, total=total)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class _VideoCommand(VideoArguments):
+    camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
+    """Camera of the MJCF to render from."""
+    device: Device = None
+    """EGL device to render on, by number, where there are several."""
+    renderer: Literal["gl", "cycles"] = "gl"
+    """Ours, with OpenGL, or Cycles, Blender's path tracer (needs bpy), which takes seconds to minutes a frame."""
+    samples: Count = 64
+    """Paths a pixel that Cycles takes."""
+
+    def check_input(self) -> None:
+        """Make sure that what is to be rendered exists."""
+        raise NotImplementedError
+
+    def load(self) -> Scene:
+        """Make the scene that is rendered."""
+        raise NotImplementedError
+
+    def run(self) -> None:
+        """Render the scene and print a summary."""
+        self.check_input()  # before what this machine may lack
+        if self.renderer == "cycles":
+            self._run_cycles()
+        else:
+            self._run_gl()
+
+    def _run_gl(self) -> None:
+        from ripple_sim.video.options import check_options
+
+        check_options(self.options(), self.output)  # before anything that takes time
+
+        from ripple_sim.solver.gl import select_device, shared_context
+        from ripple_sim.video.options import frame_count, settled
+        from ripple_sim.video.render_video import render_video
+
+        pass
+
+        if self.device is not None:
+            select_device(self.device)
+        scene = self._seen()
+        options = settled(self.options(), scene, self.output)
+        title = f"renderer {shared_context().renderer}, waves {options.backend}"
+        with frame_progress(title, frame_count(options)) as progress:
+            summary = render_video(scene, self.output, options, progress=progress)
+        print(_summary_text(summary))
+
+    def _run_cycles(self) -> None:
+        from ripple_sim.cycles.render import check_cycles, render_cycles
+
+        check_cycles(self.options(), self.output, self.samples)  # before anything that takes time
+
+        from ripple_sim.video.options import frame_count, settled
+
+        pass
+
+        scene = self._seen()
+        frames = frame_count(settled(self.options(), scene, self.output))
+        with frame_progress(f"renderer Cycles, {self.samples} samples", frames) as progress:
+            summary = render_cycles(scene, self.output, self.options(), samples=self.samples, progress=progress)
+        print(f"{summary.output}: {summary.frames} frames")
+        print(f"stages    simulation and export {summary.export_seconds:.1f} s, Cycles {summary.render_seconds:.1f} s")
+
+    def _seen(self) -> Scene:
+        """The scene through the camera that is asked for."""
+        from ripple_sim.scene.scene import through_camera
+
+        scene = self.load()
+        return scene if self.camera is None else through_camera(scene, self.camera)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Render(_VideoCommand):
+    """Render a scene to a video."""
+
+    scene: Annotated[Positional[str], arg(metavar="SCENE")]
+    """Name of a shipped scene, such as duck, or path of a scene file (TOML)."""
+    seed: SceneSeed = None
+    """Seed of the scene's random variation, in place of the one in its [random]."""
+
+    def check_input(self) -> None:
+        """Make sure that there is such a scene."""
+        from ripple_sim.scene.scene import scene_path
+
+        scene_path(self.scene)
+
+    def load(self) -> Scene:
+        """Load the scene."""
+        from ripple_sim.scene.load_scene import load_scene
+
+        return load_scene(self.scene, seed=self.seed)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Drop(_VideoCommand):
+    """Put a mesh on a floor, drop bodies on it, and render a video."""
+
+    mesh: Annotated[Positional[Path], arg(metavar="MESH")]
+    """Mesh file (OBJ, OFF, PLY, STL, GLB ...)."""
+    bodies: Count = 12
+    """Number of falling bodies."""
+    seed: Seed = 0
+    """Seed for the bodies' places and sizes; the same seed gives the same video."""
+    up: UpAxis = None
+    """Axis of the mesh that points up; a flat sheet lies down."""
+    texture: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Image in the mesh's own texture coordinates; by default the one that the file names, or NAME_texture.png."""
+    repair: bool = False
+    """Close the mesh's holes (needs the package pymeshfix)."""
+    wrap: bool = False
+    """Take a closed surface round the mesh: for parts that pass through each other, or scans in pieces."""
+
+    def check_input(self) -> None:
+        """Make sure that there is such a file."""
+        from ripple_sim.solver.mesh.files import check_mesh_file
+
+        check_mesh_file(self.mesh)
+
+    def load(self) -> Scene:
+        """Build a scene around the mesh."""
+        from ripple_sim.scene.drop import drop_scene
+
+        scene = drop_scene(
+            self.mesh,
+            bodies=self.bodies,
+            seed=self.seed,
+            up=self.up,
+            texture=self.texture,
+            repair=self.repair,
+            wrap=self.wrap,
+        )
+        for note in scene.notes:
+            print(f"{self.mesh.name}: {note}", file=sys.stderr)
+        return scene
+
+
+def _summary_text(summary: Summary) -> str:
+    resumed = f", the first {summary.resumed_at} of them rendered before" if summary.resumed_at else ""
+    compiling = f"compiling (once) {summary.compile_seconds:.1f} s, " if summary.compile_seconds >= 0.05 else ""
+    return (
+        f"{summary.output}: {summary.frames} frames in {summary.wall_seconds:.1f} s{resumed}\n"
+        f"renderer  {summary.renderer}\n"
+        f"waves     {summary.backend}, {summary.substeps_per_frame:.1f} steps per frame\n"
+        f"stages    {compiling}set-up {summary.setup_seconds:.1f} s, physics {summary.physics_seconds:.1f} s, "
+        f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
+        f"encoding {summary.encode_seconds:.1f} s"
+    )

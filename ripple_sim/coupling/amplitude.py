@@ -1,0 +1,227 @@
+"""Waves too high or too steep for the object that carries them are reported once a target.
+
+How high and how steep waves are, beside what the object allows.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.errors import RippleWarning
+from ripple_sim.solver import Atlas, WaveSolver
+from ripple_sim.solver.kernel import Floats32, kernel
+from ripple_sim.solver.texels.thickness import half_thickness
+
+# The height allowed over the local radius.
+HIGH = 0.25
+
+# Of the surface, what is counted as the thinnest part is beyond this share.
+_THINNEST = 0.99
+
+_ROWS = 4
+
+
+class Scales(NamedTuple):
+    """What heights are compared with; fields are [C, n, n].
+
+    Attributes
+    ----------
+    per_limit
+        1 over the greatest height allowed [1/m].
+    per_row, per_column
+        1 over the distance to the next texel in the next row and column [1/m]; 0 beyond the chart.
+    share
+        Of the surface's area.
+    per_thinnest : float
+        1 over the greatest height allowed where the object is thinnest [1/m].
+    calm : float
+        Waves that are no higher are neither too high nor too steep anywhere [m].
+    """
+
+    per_limit: Floats32
+    per_row: Floats32
+    per_column: Floats32
+    share: Floats32
+    per_thinnest: float
+    calm: float
+
+
+def scales_of(atlas: Atlas) -> Scales:
+    """What the heights on an atlas are compared with."""
+    fields = np.zeros((4, *atlas.areas.shape))
+    fields[0] = 1 / (HIGH * half_thickness(atlas))
+    for axis in (1, 2):
+        spacing = np.linalg.norm(np.diff(atlas.positions, axis=axis), axis=-1)
+        inner = (slice(None),) * axis + (slice(None, -1),)
+        # needles, on which a slope means little
+        fields[axis][inner] = 1 / np.maximum(spacing, 0.5 * np.median(spacing))
+    fields[3] = atlas.areas / atlas.areas.sum()
+    thinnest = float(np.quantile(fields[0], _THINNEST))
+    # no slope can reach 1 where neighbours differ by twice this height at most
+    calm = min(1 / fields[0].max(), 1 / (8**0.5 * fields[1:3].max()))
+    per_limit, per_row, per_column, share = fields.astype(np.float32)
+    return Scales(per_limit, per_row, per_column, share, thinnest, float(calm))
+
+
+def highest(height: NDArray[np.float32], scales: Scales) -> tuple[float, int]:
+    """The greatest height over what is allowed there, and its texel."""
+    share = (np.abs(height) * scales.per_limit).reshape(-1)
+    texel = int(share.argmax())
+    return float(share[texel]), texel
+
+
+@kernel
+def steep_area(height: Floats32, per_row: Floats32, per_column: Floats32, share: Floats32) -> float:
+    """Share of the surface that is steeper than 1, seen on every fourth row."""
+    charts, n, _ = height.shape
+    steep, all_seen = 0.0, 0.0
+    for f in range(charts):
+        for r in range(0, n - 1, _ROWS):
+            for c in range(n - 1):
+                h = height[f, r, c]
+                down = (height[f, r + 1, c] - h) * per_row[f, r, c]
+                right = (height[f, r, c + 1] - h) * per_column[f, r, c]
+                all_seen += share[f, r, c]
+                if down * down + right * right > 1:
+                    steep += share[f, r, c]
+    return steep / all_seen
+
+
+def slope_of_share(height: NDArray[np.float32], scales: Scales, share: float) -> float:
+    """The slope that a share of the surface exceeds."""
+    down = np.diff(height, axis=1, append=0) * scales.per_row
+    right = np.diff(height, axis=2, append=0) * scales.per_column
+    slope = np.hypot(down, right).ravel()
+    order = np.argsort(-slope)
+    return slope[order[np.searchsorted(np.cumsum(scales.share.ravel()[order]), share)]]
+
+
+# Slopes beyond 1 are reported if more than this share of the surface has them: a pit under a hard body is steep, but
+# small.
+_STEEP_AREA = 0.01
+
+# Heights are looked at once in so many steps. They are read back from a GPU for that, which lets it run dry.
+_EVERY = {"cpu": 16, "gl": 128}
+
+# A wave that is too high is followed for so many looks, or until it falls again, so that the advice is based on its
+# crest.
+_FOLLOWED = 4
+
+# The density that is advised is this much more than the least for what was seen, and for a wave of this share of its
+# height that has spread to where the object is thinnest.
+_MARGIN, _SPREAD = 2.0, 0.3
+
+
+class AmplitudeCheck:
+    """Compares the heights of all targets with their local radii (`half_thickness`), and their slopes with 1.
+
+    Parameters
+    ----------
+    waves : mapping of int to WaveSolver
+        By geom; others may put new ones in.
+    names : sequence of str
+        Of all geoms.
+    """
+
+    def __init__(self, waves: Mapping[int, WaveSolver], names: Sequence[str]) -> None:
+        self._waves, self._names = waves, names
+        self._watched = {geom: _Watch(each.rest) for geom, each in waves.items()}
+        self._steps = 0
+
+    def __call__(self) -> None:
+        """Look at the heights, if it is time to. Call it after each step of the waves."""
+        self._steps += 1
+        for geom, watch in list(self._watched.items()):
+            waves = self._waves[geom]
+            if self._steps % _EVERY[waves.backend] == 0 and watch.look(waves.height):
+                self._warn(geom)
+
+    def ignore(self, geom: int) -> None:
+        """Give no warning of a geom."""
+        self._watched.pop(geom, None)
+
+    def flush(self) -> None:
+        """Look at the heights a last time, and warn of all that has been seen: the waves are about to end."""
+        for geom, watch in list(self._watched.items()):
+            watch.look(self._waves[geom].height)
+            if watch.excess > 1:
+                self._warn(geom)
+
+    def _warn(self, geom: int) -> None:
+        watch, waves = self._watched.pop(geom), self._waves[geom]
+        factor = _rounded_up(_MARGIN * watch.needed)
+        density = np.asarray(waves.material.density, dtype=np.float64)
+        advice = f"{_rounded_up(factor * float(density)):g} kg/m^2 or more" if not density.ndim else "as much more"
+        warnings.warn(
+            f"the waves on geom {self._names[geom]!r} are {watch.what}; pictures show them limited. A density "
+            f"{factor:g} times as high would do: {advice}",
+            RippleWarning,
+            stacklevel=5,
+        )
+
+
+class _Watch:
+    """One target's waves.
+
+    Attributes
+    ----------
+    excess : float
+        The most, over what is allowed, of heights and slopes.
+    needed : float
+        By how much waves would have to be lower.
+    what : str
+        What was too large, how large, and where.
+    """
+
+    def __init__(self, atlas: Atlas) -> None:
+        self._atlas = atlas
+        size = float(np.ptp(atlas.mesh.V, axis=0).max())
+        # lower waves are right anywhere, or too small to matter
+        self._calm = 1e-3 * size
+        self._scales: Scales | None = None
+        self.excess, self.needed, self.what = 0.0, 0.0, ""
+        self._looks = 0
+
+    def look(self, height: NDArray[np.float32]) -> bool:
+        """Whether the waves are too high or too steep, and it is time to say so."""
+        excess = 0.0
+        if max(float(height.max()), -float(height.min())) > self._calm:
+            excess = self._measure(height)
+        if self.excess > 1:
+            self._looks += 1
+        return self.excess > 1 and (excess < self.excess or self._looks >= _FOLLOWED)
+
+    def _measure(self, height: NDArray[np.float32]) -> float:
+        if self._scales is None:
+            self._scales = scales_of(self._atlas)
+            self._calm = self._scales.calm
+        scales = self._scales
+        high, texel = highest(height, scales)
+        steep_share = steep_area(height, scales.per_row, scales.per_column, scales.share)
+        excess, what = high, ""
+        if steep_share > _STEEP_AREA:
+            steep = float(slope_of_share(height, scales, _STEEP_AREA))
+            excess, what = max(excess, steep), f"too steep: a slope of {steep:.2g} or more on {steep_share:.1%} of it"
+        if excess > max(self.excess, 1.0):
+            if high == excess:
+                where = ", ".join(f"{x:.3g}" for x in self._atlas.positions.reshape(-1, 3)[texel])
+                radius = 1 / (HIGH * float(scales.per_limit.reshape(-1)[texel]))
+                here = abs(float(height.reshape(-1)[texel]))
+                what = f"too high: {here:.2g} m at ({where}) m, where the object's radius is {radius:.2g} m"
+            self.what = what
+        self.excess = max(self.excess, excess)
+        spread = _SPREAD * float(np.abs(height).max()) * scales.per_thinnest
+        self.needed = max(self.needed, excess, spread)
+        return excess
+
+
+def _rounded_up(value: float) -> float:
+    """To two digits."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / step - 1e-9) * step

@@ -1,1 +1,0 @@
-"""Waves too high or too steep for the object that carries them."""

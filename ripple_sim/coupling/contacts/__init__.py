@@ -1,1 +1,0 @@
-"""MuJoCo's contacts with targets: normal forces, and where they act."""

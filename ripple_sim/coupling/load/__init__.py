@@ -1,1 +1,0 @@
-"""From contact patches to forces on texels."""

@@ -1,0 +1,371 @@
+"""`CoupledModel`: what a MuJoCo model says about what collides, computed once and shared by all steps.
+
+The contacts of bodies that sleep from the beginning, as MuJoCo would find them if it held the bodies still.
+
+Which geoms and flexes MuJoCo lets touch each other.
+
+Convex colliders: geoms that collide as the convex parts of a mesh geom, in its place.
+
+Flex colliders: rigid flexes through which mesh geoms collide.
+
+Soft flexes as colliders: each of their vertices touches for itself.
+
+The contacts of sleeping bodies, which MuJoCo does not report.
+"""
+
+from __future__ import annotations
+
+import collections
+import copy
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.kernel import Floats
+
+from .contacts import TargetContacts
+from .geoms import find_collision_geoms, geom_name
+from .soft import SoftSurface, is_soft, soft_names
+
+_SLEEP, _STATE = int(mujoco.mjtEnableBit.mjENBL_SLEEP), int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+# Contacts of these parameters have no spring, and a share of nearly 1 in what holds bodies: their forces are those of
+# statics, however deep the bodies lie in each other.
+_NO_SPRING, _RIGID = (1e6, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
+# Geoms that are apart by this share of the smaller one's size are meant to touch.
+_NEAR = 1e-3
+
+
+def at_rest(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData | None:
+    """Data with the contacts of all bodies as they lie, all awake and at rest; None where none of them sleeps."""
+    if not model.opt.enableflags & _SLEEP or (data.tree_asleep < 0).all():
+        return None
+    still = copy.copy(model)
+    still.opt.enableflags &= ~_SLEEP
+    for kind in ("geom", "pair", "flex"):
+        getattr(still, f"{kind}_solref")[:] = _NO_SPRING
+        getattr(still, f"{kind}_solimp")[:] = _RIGID
+    # planes, which have no end, are given a radius of 0
+    still.geom_margin += _NEAR * np.minimum(still.geom_aabb[:, 3:].min(axis=1), still.geom_rbound)
+    state = np.empty(mujoco.mj_stateSize(model, _STATE))
+    mujoco.mj_getState(model, data, state, _STATE)
+    resting = mujoco.MjData(still)
+    mujoco.mj_setState(still, resting, state, _STATE)
+    resting.qvel[:], resting.qacc_warmstart[:] = 0.0, 0.0
+    mujoco.mj_forward(still, resting)
+    return resting
+
+
+class ContactMasks:
+    """The contact masks of a model's geoms, and its predefined pairs.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    flex_colliders : mapping
+        Geom id to the id of its flex collider, whose masks are the geom's.
+    convex_colliders : mapping
+        Geom id to the ids of its convex colliders, whose masks are the geom's alone.
+
+    Attributes
+    ----------
+    contype, conaffinity : int32 [ngeom]
+        Of what collides: the geom, its flex, or its convex colliders.
+    collides : bool [ngeom]
+        Whether anything at all may touch a geom.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, flex_colliders: Mapping[int, int], convex_colliders: Mapping[int, Sequence[int]]
+    ) -> None:
+        self._model = model
+        self.contype, self.conaffinity = model.geom_contype.copy(), model.geom_conaffinity.copy()
+        for geom, flex in flex_colliders.items():
+            self.contype[geom], self.conaffinity[geom] = model.flex_contype[flex], model.flex_conaffinity[flex]
+        for geom, parts in convex_colliders.items():
+            self.contype[geom], self.conaffinity[geom] = model.geom_contype[parts[0]], model.geom_conaffinity[parts[0]]
+            self.contype[parts] = self.conaffinity[parts] = 0
+        self._soft = np.setdiff1d(np.arange(model.nflex), list(flex_colliders.values()))
+        paired = np.isin(np.arange(model.ngeom), [model.pair_geom1, model.pair_geom2])
+        self.collides = (self.contype | self.conaffinity).astype(np.bool_) | paired
+
+    def match(self, geoms: Sequence[int]) -> NDArray[np.bool_]:
+        """Geoms, [ngeom], that MuJoCo collides with one of these by their masks, or as a pair."""
+        found, pairs = np.zeros(self._model.ngeom, dtype=np.bool_), (self._model.pair_geom1, self._model.pair_geom2)
+        for geom in geoms:
+            found |= (self.contype[geom] & self.conaffinity | self.contype & self.conaffinity[geom]) != 0
+            for one, two in (pairs, pairs[::-1]):
+                found[two[one == geom]] = True
+        return found
+
+    def apart(self, geom: int) -> NDArray[np.bool_]:
+        """Geoms, [ngeom], on bodies not welded to that of this one."""
+        weld = self._model.body_weldid[self._model.geom_bodyid]
+        return np.asarray(weld != weld[geom])
+
+    def out_of_touch(self, geom: int, colliders: Sequence[int]) -> bool:
+        """Whether there are geoms or flexes that collide, but none that meets those that collide for this geom."""
+        meets = (self.match(colliders) & self.apart(geom)).any() or len(self.soft_flexes(colliders))
+        return not meets and bool(len(self._soft) or (self.collides & self.apart(geom)).any())
+
+    def soft_flexes(self, geoms: Sequence[int]) -> NDArray[np.int64]:
+        """Flexes other than flex colliders that MuJoCo collides with one of these geoms."""
+        model, soft, of = self._model, self._soft, list(geoms)
+        types, affinities = model.flex_contype[soft, None], model.flex_conaffinity[soft, None]
+        return soft[((self.contype[of] & affinities | types & self.conaffinity[of]) != 0).any(axis=1)]
+
+
+_VISIBLE = (int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_SDF))
+
+
+def part_name(geom: str, index: int) -> str:
+    """Name of a convex part of a geom: of its collider, and of that one's mesh."""
+    return f"{geom}#{index}"
+
+
+def find_convex_colliders(model: mujoco.MjModel) -> dict[int, list[int]]:
+    """Convex colliders by the id of their geom, which does not collide itself.
+
+    They are mesh geoms on its body, called by its name, "#" and a number.
+    """
+    found: dict[int, list[int]] = {}
+    for part in np.flatnonzero(model.geom_type == _VISIBLE[0]).tolist():
+        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, part) or ""
+        whole, mark, number = name.rpartition("#")
+        geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, whole) if mark and number.isdecimal() else -1
+        if geom < 0 or model.geom_type[geom] not in _VISIBLE or model.geom_bodyid[geom] != model.geom_bodyid[part]:
+            continue
+        if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
+            found.setdefault(geom, []).append(part)
+    return found
+
+
+def find_flex_colliders(model: mujoco.MjModel) -> dict[int, int]:
+    """Flex that collides in place of a geom, by geom id: a rigid one of triangles, of its name and on its body."""
+    found = {}
+    for flex in range(model.nflex):
+        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex)
+        geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name) if name else -1
+        if geom < 0 or model.flex_dim[flex] != 2 or not model.flex_rigid[flex]:
+            continue
+        if model.flex_vertbodyid[model.flex_vertadr[flex]] == model.geom_bodyid[geom]:
+            found[geom] = flex
+    return found
+
+
+def flex_thickness(model: mujoco.MjModel, flex: int) -> float:
+    """Distance from its triangles at which a flex holds other geoms off [m]."""
+    return float(model.flex_margin[flex] + model.flex_radius[flex])
+
+
+def flex_name(model: mujoco.MjModel, flex: int) -> str:
+    """Name of a flex, or "flex <id>"."""
+    return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex) or f"flex {flex}"
+
+
+def vertex_flexes(model: mujoco.MjModel) -> NDArray[np.int64]:
+    """Id of the flex of each vertex, [nflexvert]."""
+    return np.repeat(np.arange(model.nflex), model.flex_vertnum)
+
+
+def vertex_spacing(model: mujoco.MjModel) -> NDArray[np.float64]:
+    """Mean length of the edges of each vertex's flex [m], [nflexvert]."""
+    spacing = [
+        model.flexedge_length0[first : first + count].mean() if count else 0.0
+        for first, count in zip(model.flex_edgeadr, model.flex_edgenum, strict=True)
+    ]
+    return np.array(spacing)[vertex_flexes(model)]
+
+
+_GEOM = mujoco.mjtGeom
+_ENDLESS = (int(_GEOM.mjGEOM_PLANE), int(_GEOM.mjGEOM_HFIELD))
+_NOT_CONVEX = (int(_GEOM.mjGEOM_SDF), int(_GEOM.mjGEOM_HFIELD))
+
+# Footprint radius of a contact over the touching geom's smallest half-extent: about the patch of a ball that is sunk in
+# by an eighth of its radius.
+_FOOTPRINT = 0.5
+
+_NONE_NAMED: Mapping[int, Sequence[int]] = MappingProxyType({})
+
+
+class CoupledModel:
+    """The geoms of a MuJoCo model as the coupling sees them.
+
+    A mesh geom may collide through a flex, its flex collider: then the flex's contact settings are the geom's. It may
+    collide through its convex parts, which then touch as that geom. Of any other flex each vertex is a collider.
+    Collider ids are those of the geoms, and after them one for each vertex, each flex and each skin; there are c of
+    them. A flex or a skin that ripples touches as a whole, with the last ones, see `soft_ids`. A target may have
+    collision geoms, whose contacts load it; see `find_collision_geoms`.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    targets : iterable of int
+        Geom ids, and of soft targets.
+    named : mapping
+        Of some targets' ids to those of their collision geoms.
+
+    Attributes
+    ----------
+    model : mujoco.MjModel
+    names : list of str
+        Of all geoms, see `geom_name`, and then of all flexes and skins.
+    owners : int64 [c]
+        What a collider is part of, by its place among the names: a geom itself, or the flex of a vertex.
+    bodies : int64 [c]
+        The body of each collider, -1 for vertices between several.
+    flex_colliders : dict of int to int
+        Geom id to the id of its flex collider.
+    convex_colliders : dict of int to list of int
+        Geom id to the ids of its convex colliders.
+    has_flex : bool [ngeom]
+        Whether a geom collides through a flex.
+    extents : float64 [c]
+        Smallest half-extents [m]; infinite for planes and height fields, the spacing of a flex's vertices for them.
+    collider_extents : float64 [ngeom]
+        Of the geoms alone, with the thickness of its flex where a geom has one [m].
+    solref : float64 [ngeom, 2]
+        Of what collides, the geom or its flex.
+    footprint_radii : float64 [c]
+        Footprint radius of a contact with each collider [m]; of a pair the smaller one counts.
+    convex : bool [c]
+        Whether what touches at two points touches between them too.
+    masks : ContactMasks
+    soft : dict of int to SoftSurface
+        The soft targets.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        targets: Iterable[int] = (),
+        named: Mapping[int, Sequence[int]] = _NONE_NAMED,
+    ) -> None:
+        self.model = model
+        geoms, softs = range(model.ngeom), model.nflex + model.nskin
+        self.names = [geom_name(model, geom) for geom in geoms] + soft_names(model)
+        whole = model.ngeom + np.arange(softs)
+        self.owners = np.concatenate([geoms, model.ngeom + vertex_flexes(model), whole]).astype(np.int64)
+        self.bodies = np.concatenate([model.geom_bodyid, model.flex_vertbodyid, np.full(softs, -1)]).astype(np.int64)
+        self.flex_colliders = find_flex_colliders(model)
+        self.convex_colliders = find_convex_colliders(model)
+        self.has_flex = np.zeros(model.ngeom, dtype=np.bool_)
+        self.has_flex[list(self.flex_colliders)] = True
+        extents = np.where(np.isin(model.geom_type, _ENDLESS), np.inf, model.geom_aabb[:, 3:].min(axis=1))
+        self.collider_extents, self.solref = extents.copy(), model.geom_solref.copy()
+        for geom, flex in self.flex_colliders.items():
+            self.collider_extents[geom], self.solref[geom] = flex_thickness(model, flex), model.flex_solref[flex]
+        spacing = vertex_spacing(model)
+        endless = np.full(softs, np.inf)
+        self.extents = np.concatenate([extents, spacing, endless])
+        self.footprint_radii = np.concatenate([_FOOTPRINT * extents, spacing, endless])
+        convex = ~np.isin(model.geom_type, _NOT_CONVEX) & ~self.has_flex
+        convex[[geom for geom, parts in self.convex_colliders.items() if len(parts) > 1]] = False
+        self.convex = np.concatenate([convex, np.zeros(model.nflexvert + softs, dtype=np.bool_)])
+        self.masks = ContactMasks(model, self.flex_colliders, self.convex_colliders)
+        targets = list(targets)
+        self.soft = {each: SoftSurface(model, each) for each in targets if is_soft(model, each)}
+        for target, surface in self.soft.items():
+            self.footprint_radii[target] = surface.spacing
+        geoms_alone = [each for each in targets if each not in self.soft]
+        self._collision_geoms = find_collision_geoms(model, self.masks.collides, geoms_alone, named)
+
+    def collision_geoms(self, geom: int) -> tuple[int, ...]:
+        """Geoms whose contacts are those of this one: itself, or of a target those that collide for it."""
+        return self._collision_geoms.get(geom, (geom,))
+
+    def masks_match(self, geom: int) -> NDArray[np.bool_]:
+        """Geoms, [ngeom], that MuJoCo may collide with this one, or with those that collide for it."""
+        return self.masks.match(self.collision_geoms(geom))
+
+    def can_collide(self, geom: int) -> NDArray[np.bool_]:
+        """The same on bodies that are not welded to that of this geom."""
+        return self.masks_match(geom) & self.masks.apart(geom)
+
+
+_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
+# A body falls asleep after it was slow for this many steps: `mjMINAWAKE` of MuJoCo.
+_SLOW_STEPS = 10
+
+
+class _Pair(NamedTuple):
+    """The latest contacts of a collider with a target, and their summed forces in the latest steps [N]."""
+
+    points: Floats
+    forces: Floats
+    normals: Floats
+    sums: collections.deque[float]
+
+
+class SleepingContacts:
+    """Holds the contacts of bodies that sleep on a target that sleeps too or is static.
+
+    A sleeping body still presses on what it lies on. Its contacts stay where they were, with their mean force over the
+    steps before it fell asleep, until one of the two wakes.
+
+    Parameters
+    ----------
+    coupled : CoupledModel
+    """
+
+    def __init__(self, coupled: CoupledModel) -> None:
+        self._coupled = coupled
+        self._pairs: dict[tuple[int, int], _Pair] = {}
+
+    def add(self, data: mujoco.MjData, contacts: dict[int, TargetContacts]) -> dict[int, TargetContacts]:
+        """Contacts of each target, by geom id, with those of sleeping bodies."""
+        if not self._coupled.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
+            return contacts
+        present = {(target, pair[0]): pair for target, each in contacts.items() for pair in _split(each)}
+        held: dict[int, list[tuple[int, Floats, Floats, Floats]]] = {}
+        for key, pair in list(self._pairs.items()):
+            if key in present:
+                continue
+            if self._sleeps(data, *key):
+                share = sum(pair.sums) / len(pair.sums) / pair.forces.sum()
+                held.setdefault(key[0], []).append((key[1], pair.points, share * pair.forces, pair.normals))
+            else:
+                pair.sums.append(0.0)
+                if not any(pair.sums):
+                    del self._pairs[key]
+        for key, (_, points, forces, normals) in present.items():
+            sums = self._pairs[key].sums if key in self._pairs else collections.deque(maxlen=_SLOW_STEPS)
+            sums.append(float(forces.sum()))
+            self._pairs[key] = _Pair(points, forces, normals, sums)
+        if not held:
+            return contacts
+        return {
+            target: _joined(target, [*(_split(contacts[target]) if target in contacts else ()), *held.get(target, ())])
+            for target in sorted(contacts.keys() | held.keys())
+        }
+
+    def _sleeps(self, data: mujoco.MjData, target: int, other: int) -> bool:
+        """Whether neither of a pair is awake: each sleeps or is static. Vertices between bodies never sleep."""
+        bodies = self._coupled.bodies[[target, other]]
+        return bool((bodies >= 0).all() and (data.body_awake[bodies] != _AWAKE).all())
+
+
+def _split(contacts: TargetContacts) -> list[tuple[int, Floats, Floats, Floats]]:
+    """Collider id, points, forces and normals of each pair."""
+    begins = contacts.begins.tolist()
+    return [
+        (other, contacts.points[a:b], contacts.forces[a:b], contacts.normals[a:b])
+        for other, a, b in zip(contacts.others.tolist(), begins, begins[1:], strict=False)
+    ]
+
+
+def _joined(target: int, pairs: list[tuple[int, Floats, Floats, Floats]]) -> TargetContacts:
+    """The opposite of `_split`."""
+    others, points, forces, normals = zip(*sorted(pairs, key=lambda pair: pair[0]), strict=True)
+    return TargetContacts(
+        target=target,
+        others=np.array(others),
+        begins=np.cumsum([0, *map(len, forces)]),
+        points=np.concatenate(points),
+        forces=np.concatenate(forces),
+        normals=np.concatenate(normals),
+    )

@@ -1,1 +1,0 @@
-"""What a MuJoCo model says about its targets, computed once."""

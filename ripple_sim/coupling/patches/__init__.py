@@ -1,1 +1,0 @@
-"""Contact patches: the areas on a target over which geoms touch it."""

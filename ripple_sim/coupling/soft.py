@@ -1,0 +1,242 @@
+"""Soft targets: the surface of a flex, and a skin over bodies, in the world.
+
+Ids and names of soft targets: flexes and skins come after geoms and the vertices of flexes; see `CoupledModel`.
+
+A high-pass for loads: a flex moves coarsely by itself, and its waves get what it cannot follow.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+from ripple_sim.errors import SceneError
+from ripple_sim.solver import Load, Mesh, WaveSolver
+
+
+def first_flex(model: mujoco.MjModel) -> int:
+    """Target id of the first flex."""
+    return int(model.ngeom + model.nflexvert)
+
+
+def first_skin(model: mujoco.MjModel) -> int:
+    """Target id of the first skin."""
+    return first_flex(model) + int(model.nflex)
+
+
+def is_soft(model: mujoco.MjModel, target: int) -> bool:
+    """Whether a target is a flex or a skin, whose surface moves in the world, and not a geom."""
+    return target >= model.ngeom
+
+
+def target_pose(data: mujoco.MjData, target: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Position [3] [m] and rotation [3, 3] of a target's frame in the world, copies; what is soft is in the world."""
+    if is_soft(data.model, target):
+        return np.zeros(3), np.eye(3)
+    return data.geom_xpos[target].copy(), data.geom_xmat[target].reshape(3, 3).copy()
+
+
+def find_soft(model: mujoco.MjModel, name: object) -> int:
+    """Target id of the flex or skin of a name, -1 if there is none."""
+    if not isinstance(name, str) or not name:
+        return -1
+    for kind, first in ((mujoco.mjtObj.mjOBJ_FLEX, first_flex(model)), (mujoco.mjtObj.mjOBJ_SKIN, first_skin(model))):
+        number = mujoco.mj_name2id(model, kind, name)
+        if number >= 0:
+            return first + int(number)
+    return -1
+
+
+def soft_name(model: mujoco.MjModel, target: int) -> str:
+    """Name of a flex or a skin, or "flex <id>", "skin <id>"."""
+    skin = target - first_skin(model)
+    if skin >= 0:
+        return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SKIN, skin) or f"skin {skin}"
+    flex = target - first_flex(model)
+    return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex) or f"flex {flex}"
+
+
+def soft_names(model: mujoco.MjModel) -> list[str]:
+    """Names of all flexes, then of all skins."""
+    return [soft_name(model, first_flex(model) + i) for i in range(model.nflex + model.nskin)]
+
+
+class SoftSurface:
+    """A flex's outer surface, a cloth's sheet, or a skin.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    target : int
+        See `soft_ids`.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        At the model's initial pose, in the world [m].
+    geoms : list of int
+        Geoms of the bodies under a skin, whose contacts are the skin's; none for a flex.
+    flex : int
+        Its id, or -1 for a skin.
+    """
+
+    def __init__(self, model: mujoco.MjModel, target: int) -> None:
+        self._model, self.flex, self._skin = model, -1, -1
+        if target < first_skin(model):
+            self.flex = target - first_flex(model)
+            F = _flex_triangles(model, self.flex)
+        else:
+            self._skin = target - first_skin(model)
+            first = model.skin_faceadr[self._skin]
+            F = model.skin_face[first : first + model.skin_facenum[self._skin]]
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_flex(model, data)
+        every = self._all(data)
+        self.mesh = Mesh.from_arrays(every, F, name=f"surface of {soft_name(model, target)!r}")
+        # the mesh has merged vertices that lie at one place
+        distance, self._vertices = cKDTree(every).query(self.mesh.V)
+        if distance.max() > 1e-6 * np.ptp(every, axis=0).max():
+            raise SceneError(f"the surface of {soft_name(model, target)!r} is not that of its vertices")
+        self.geoms = [] if self._skin < 0 else np.flatnonzero(np.isin(model.geom_bodyid, self.bodies)).tolist()
+
+    def vertices(self, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Where the vertices of the mesh are in the world [m], [n, 3]."""
+        return self._all(data)[self._vertices]
+
+    @property
+    def bodies(self) -> NDArray[np.int64]:
+        """Bodies that carry it."""
+        model = self._model
+        if self._skin >= 0:
+            return np.unique(model.skin_bonebodyid[self._bones]).astype(np.int64)
+        first, count = model.flex_vertadr[self.flex], model.flex_vertnum[self.flex]
+        bodies = model.flex_vertbodyid[first : first + count]
+        if model.flex_interp[self.flex]:
+            node, nodes = model.flex_nodeadr[self.flex], model.flex_nodenum[self.flex]
+            bodies = model.flex_nodebodyid[node : node + nodes]
+        return np.unique(bodies[bodies >= 0]).astype(np.int64)
+
+    @property
+    def degree(self) -> int:
+        """Of the polynomials by which a flex is interpolated between its nodes: 1 or 2; 0 where its vertices move."""
+        return 0 if self._skin >= 0 else int(self._model.flex_interp[self.flex])
+
+    @property
+    def mass(self) -> float:
+        """Of its bodies [kg]."""
+        return float(self._model.body_mass[self.bodies].sum())
+
+    @property
+    def spacing(self) -> float:
+        """Mean distance between vertices side by side [m]: no contact is known more closely."""
+        side = self.mesh.V[self.mesh.F] - self.mesh.V[np.roll(self.mesh.F, 1, axis=1)]
+        return float(np.linalg.norm(side, axis=2).mean())
+
+    @property
+    def rgba(self) -> NDArray[np.float64]:
+        """Colour and opacity of the model."""
+        return np.array(self._model.skin_rgba[self._skin] if self._skin >= 0 else self._model.flex_rgba[self.flex])
+
+    @functools.cached_property
+    def _bones(self) -> slice:
+        first = int(self._model.skin_boneadr[self._skin])
+        return slice(first, first + int(self._model.skin_bonenum[self._skin]))
+
+    def _all(self, data: mujoco.MjData) -> NDArray[np.float64]:
+        model = self._model
+        if self._skin < 0:
+            first = model.flex_vertadr[self.flex]
+            return np.array(data.flexvert_xpos[first : first + model.flex_vertnum[self.flex]], dtype=np.float64)
+        first, count = model.skin_vertadr[self._skin], model.skin_vertnum[self._skin]
+        V = model.skin_vert[first : first + count].astype(np.float64)
+        moved, rotation, turn, back = np.zeros_like(V), np.zeros(9), np.zeros(4), np.zeros(4)
+        for bone in range(self._bones.start, self._bones.stop):
+            body = model.skin_bonebodyid[bone]
+            mujoco.mju_negQuat(back, model.skin_bonebindquat[bone].astype(np.float64))
+            mujoco.mju_mulQuat(turn, data.xquat[body], back)
+            mujoco.mju_quat2Mat(rotation, turn)
+            begin = model.skin_bonevertadr[bone]
+            which = slice(begin, begin + model.skin_bonevertnum[bone])
+            vertices, weights = model.skin_bonevertid[which], model.skin_bonevertweight[which, None]
+            placed = (V[vertices] - model.skin_bonebindpos[bone]) @ rotation.reshape(3, 3).T + data.xpos[body]
+            np.add.at(moved, vertices, weights * placed)
+        return moved
+
+
+def _flex_triangles(model: mujoco.MjModel, flex: int) -> NDArray[np.int64]:
+    """Triangles of a flex of triangles, or of the outside of one of tetrahedra, [m, 3]."""
+    if model.flex_dim[flex] == 1:
+        name = soft_name(model, first_flex(model) + flex)
+        raise SceneError(f"flex {name!r} is a cable, which cannot ripple; valid are surfaces and solids (dim 2 and 3)")
+    if model.flex_dim[flex] == 2:
+        first, count = model.flex_elemdataadr[flex], model.flex_elemnum[flex]
+        return model.flex_elem[first : first + 3 * count].reshape(-1, 3).astype(np.int64)
+    first, count = model.flex_shelldataadr[flex], model.flex_shellnum[flex]
+    return model.flex_shell[first : first + 3 * count].reshape(-1, 3).astype(np.int64)
+
+
+# Share of a mass that is added to each coarse motion's own: some are next to the same.
+_LEAST = 1e-9
+
+
+class HighPass:
+    """Takes out of a load what would set the surface in a motion that its flex makes itself.
+
+    The forces that are left do no work on any coarse velocity: M B u is taken off, with M the texels' masses, the
+    columns of B the coarse motions along the normals, and B' M B u = B' f.
+
+    Parameters
+    ----------
+    waves : WaveSolver
+    surface : SoftSurface
+        Of a flex.
+    """
+
+    def __init__(self, waves: WaveSolver, surface: SoftSurface) -> None:
+        self._mass = waves.operator.mass.reshape(-1)
+        self._basis = coarse_motions(waves, surface)
+        gram = csc_array(self._basis.T @ (self._basis * self._mass[:, None]))
+        diagonal = np.maximum(gram.diagonal(), _LEAST * gram.diagonal().max())
+        gram.setdiag(diagonal * (1 + _LEAST))
+        self._solve = splu(gram).solve
+
+    def __call__(self, load: Load) -> Load:
+        """The fine part of a load: forces on all texels."""
+        if not len(load.texels):
+            return load
+        forces = np.bincount(load.texels, load.forces, len(self._mass)).astype(np.float64)
+        # sparse products, and einsum, stay off the threads of BLAS, which wait for one another on a busy machine
+        coarse = self._solve(_times(self._basis.T, forces))
+        return Load(np.arange(len(forces)), forces - self._mass * _times(self._basis, coarse))
+
+
+def _times(matrix: csr_array | NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.einsum("ij,j->i", matrix, vector) if isinstance(matrix, np.ndarray) else matrix @ vector
+
+
+def coarse_motions(waves: WaveSolver, surface: SoftSurface) -> csr_array | NDArray[np.float64]:
+    """Motions of the texels along their normals that a flex makes itself, [T, k].
+
+    Of a flex with its own vertices as degrees of freedom: each of these moves along the normal, and heights between
+    them are linear. Of one that is interpolated between 8 or 27 nodes: all polynomials of that degree along each axis.
+    """
+    atlas = waves.rest
+    texels = np.arange(atlas.areas.size)
+    if not surface.degree:
+        corners = np.asarray(atlas.mesh.F)[atlas.triangles.reshape(-1)]
+        entries = atlas.barycentrics.reshape(-1), (np.repeat(texels, 3), corners.reshape(-1))
+        return csr_array(entries, shape=(len(texels), len(atlas.mesh.V)))
+    x = atlas.positions.reshape(-1, 3)
+    x = 2 * (x - x.min(axis=0)) / np.ptp(x, axis=0) - 1
+    powers = np.stack(np.meshgrid(*[np.arange(surface.degree + 1)] * 3), axis=-1).reshape(-1, 3)
+    functions = np.prod(x[:, None] ** powers, axis=2)
+    # motion by motion in memory: products with vectors are then sums along it
+    return np.concatenate([functions.T * n for n in atlas.normals.reshape(-1, 3).T]).T

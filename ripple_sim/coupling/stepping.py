@@ -1,0 +1,343 @@
+"""Contact forces are read only where MuJoCo has solved for them.
+
+A mark in MuJoCo's data that every reset wipes out.
+
+Time alone does not tell: a reset after one step, and one more step, and it is the same time again; or steps that nobody
+saw after a reset bring the time to where it was, or beyond; or a keyframe sets it to any value.
+
+Time as the waves follow it: how much has passed, how many steps nobody saw, and whether the simulation was reset.
+
+Whether MuJoCo found its own state to be broken.
+
+Steps that other code takes, such as an environment's `step`, seen one by one, when their forces are known.
+
+What MuJoCo itself says: its warnings as ours, and its errors with what helps.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import random
+import re
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from ripple_sim.errors import RippleWarning, SimulationError
+
+_FWDINV = int(mujoco.mjtEnableBit.mjENBL_FWDINV)
+# nothing that is computed depends on the marks, so they may differ from run to run
+_random = random.SystemRandom()
+
+
+class ResetMark:
+    """Sees whether `data` was reset since it last looked.
+
+    The mark is a negative number in `data.solver_fwdinv[0]`: a step leaves it alone, `copy` keeps it, and
+    `mj_resetData`, a keyframe and the automatic reset of a simulation that diverges all wipe it out. MuJoCo's own
+    values there are not negative, and written only where the flag `fwdinv` is enabled: then no mark is made, and only
+    a time that goes back tells.
+    """
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Accept whatever mark comes next."""
+        self._mark: float | None = None
+
+    def __getstate__(self) -> dict[str, object]:
+        # MuJoCo's data loses the mark when it is pickled; that is no reset
+        return {"_mark": None}
+
+    def stands(self, model: mujoco.MjModel, data: mujoco.MjData) -> bool:
+        """Whether the mark is still there. Makes one where there is none, and takes over one that others made."""
+        if model.opt.enableflags & _FWDINV:
+            return True
+        found = float(data.solver_fwdinv[0])
+        if not found < 0:
+            found = -1.0 - _random.random()
+            data.solver_fwdinv[0] = found
+        stands = self._mark is None or found == self._mark
+        self._mark = found
+        return stands
+
+
+_ROUND_OFF = 1e-6  # of times, in time steps
+
+
+class Passed(NamedTuple):
+    """What happened since the last look.
+
+    Attributes
+    ----------
+    elapsed : float
+        Over how much time the waves go on [s]; 0 if there was no step.
+    missed : int
+        Physics steps before the latest one, whose contact forces are gone.
+    reset : bool
+        Whether the simulation began anew.
+    """
+
+    elapsed: float
+    missed: int = 0
+    reset: bool = False
+
+
+class StepClock:
+    """Follows the simulation's time from look to look.
+
+    The simulation began anew if MuJoCo's data lost its mark (see `ResetMark`) or its time went back. Then, as at the
+    first look, only the latest step counts: what came before belongs to no wave. At time 0 there was no step yet.
+    """
+
+    def __init__(self) -> None:
+        self._mark = ResetMark()
+        self.restart()
+
+    def restart(self) -> None:
+        """Start anew."""
+        self._mark.forget()
+        self._time: float | None = None
+        self._timestep = 0.0
+
+    def look(self, model: mujoco.MjModel, data: mujoco.MjData) -> Passed:
+        """What happened since the last look."""
+        time, timestep = float(data.time), float(model.opt.timestep)
+        before, longest = self._time, max(timestep, self._timestep)
+        reset = not self._mark.stands(model, data) or (before is not None and time < before)
+        self._time, self._timestep = time, timestep
+        if before is None or reset:
+            return Passed(timestep if time else 0.0, reset=reset)
+        elapsed = time - before
+        # a step that equals the last one to the last bit saves the solver new coefficients
+        if abs(elapsed - timestep) < _ROUND_OFF * timestep:
+            return Passed(timestep)
+        steps = round(elapsed / timestep)
+        elapsed = steps * timestep if abs(elapsed - steps * timestep) < _ROUND_OFF * timestep else elapsed
+        return Passed(elapsed, max(round(elapsed / longest) - 1, 0))
+
+
+def missed_warning(missed: int) -> str | None:
+    """What to warn of where steps were missed, else None."""
+    if not missed:
+        return None
+    return (
+        f"{missed + 1} physics steps were taken between two calls of `Ripples.step`, of which only the latest gives "
+        f"its impulses: MuJoCo no longer has the contact forces of the other {missed}; call "
+        f"`ripples.mj_step(data, nstep={missed + 1})` in place of `mujoco.mj_step`, or, around code that steps by "
+        "itself, `with ripples.following(data):`"
+    )
+
+
+_BROKEN = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+_NO_RESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+
+
+def divergence(data: mujoco.MjData) -> str | None:
+    """Name of MuJoCo's warning of a position, velocity or acceleration that is not finite or huge, else None.
+
+    Where its automatic reset is not disabled, MuJoCo has then gone back to the initial state, and keeps the warning.
+    """
+    return next((warning.name for warning in _BROKEN if data.warning[warning].number), None)
+
+
+def goes_on_broken(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
+    """Whether MuJoCo's automatic reset is disabled, and its state is broken since the last one."""
+    return bool(model.opt.disableflags & _NO_RESET) and divergence(data) is not None
+
+
+def divergence_warning(model: mujoco.MjModel, data: mujoco.MjData) -> str | None:
+    """What to warn of where the simulation has diverged, else None."""
+    broken = divergence(data)
+    if broken is None:
+        return None
+    then = (
+        "its automatic reset is disabled, and the ripples stay flat until you reset it"
+        if model.opt.disableflags & _NO_RESET
+        else "MuJoCo reset it to its initial state, and the ripples with it"
+    )
+    advice = "use a shorter time step in the MJCF's <option>, or softer contacts"
+    return f"the simulation diverged ({broken}): {then}; {advice}"
+
+
+_FINISH_A_STEP = ("mj_step", "mj_step2")
+
+_lock = threading.Lock()
+# By the id of the data; who follows keeps the data alive.
+_followers: dict[int, list[Callable[[], None]]] = {}
+_mujoco_functions: dict[str, Callable[..., None]] = {}
+
+
+@contextlib.contextmanager
+def followed(data: mujoco.MjData, after_step: Callable[[], None]) -> Iterator[None]:
+    """Call a function after each physics step that anybody takes on this data within the context.
+
+    While somebody follows, `mujoco.mj_step` and `mujoco.mj_step2` are replaced by functions that do the same and then
+    call the followers of their data. MuJoCo has no callback after a step; this is the one place that all code passes,
+    whatever framework it belongs to, but for code that bound the functions to names of its own (`from mujoco import
+    mj_step`).
+    """
+    with _lock:
+        if not _followers:
+            _replace()
+        _followers.setdefault(id(data), []).append(after_step)
+    try:
+        yield
+    finally:
+        with _lock:
+            _followers[id(data)].remove(after_step)
+            if not _followers[id(data)]:
+                del _followers[id(data)]
+            if not _followers:
+                _restore()
+
+
+def _replace() -> None:
+    for name in _FINISH_A_STEP:
+        _mujoco_functions[name] = getattr(mujoco, name)
+        setattr(mujoco, name, _following(_mujoco_functions[name]))
+
+
+def _restore() -> None:
+    for name in _FINISH_A_STEP:
+        setattr(mujoco, name, _mujoco_functions.pop(name))
+
+
+def _following(function: Callable[..., None]) -> Callable[..., None]:
+    """The same function, which calls the followers after each step."""
+
+    def step(m: mujoco.MjModel, d: mujoco.MjData, *args: Any, **kwargs: Any) -> None:
+        followers = _followers.get(id(d))
+        if not followers:
+            function(m, d, *args, **kwargs)
+            return
+        for _ in range(_count(*args, **kwargs)):
+            function(m, d)
+            for follow in tuple(followers):
+                follow()
+
+    return step
+
+
+def _count(nstep: int = 1) -> int:
+    """How many steps a call asks for."""
+    return nstep
+
+
+def adopt_warnings() -> None:
+    """Have MuJoCo's warnings given as `RippleWarning`, from now on, each once.
+
+    Of itself it writes them to standard error and to MUJOCO_LOG.TXT in the current folder. A handler that the user has
+    given to `mujoco.set_mju_user_warning` stays.
+    """
+    handler = mujoco.get_mju_user_warning()
+    if handler is None or isinstance(handler, _Warner):
+        mujoco.set_mju_user_warning(_Warner())
+
+
+class _Warner:
+    """What MuJoCo calls with its warnings."""
+
+    def __init__(self) -> None:
+        self._said: set[str] = set()
+
+    def __call__(self, message: str) -> None:
+        text = re.sub(r" *Time = [0-9.]+", "", " ".join(message.split()))
+        kind = re.sub(r"[0-9]+", "", text)
+        # an unstable simulation ends in an error, or begins anew with a warning
+        if kind in self._said or "simulation is unstable" in text:
+            return
+        self._said.add(kind)
+        with contextlib.suppress(RippleWarning):  # no exception can pass through MuJoCo
+            warnings.warn(f"MuJoCo: {text}", RippleWarning, stacklevel=2)
+
+
+@contextlib.contextmanager
+def physics_errors() -> Iterator[None]:
+    """Turn MuJoCo's errors into a `SimulationError`: above all, too little memory for the contacts of many bodies."""
+    try:
+        yield
+    except mujoco.FatalError as error:
+        reason = " ".join(str(error).split())
+        advice = '; enlarge <size memory="..."/> in the MJCF' if "memory" in reason or "stack" in reason else ""
+        raise SimulationError(f"MuJoCo cannot go on: {reason}{advice}") from error
+
+
+# The order of a loop's calls shows as soon as something moves: so many steps are looked at then, later one in so many.
+_FIRST, _EVERY = 5, 20
+# Movement within a step, in radians or metres, that shows in the poses whatever their scale.
+_MOVES = 1e-8
+
+UNSOLVED_WARNING = (
+    "`Ripples.step` was called between `mj_step1` and `mj_step2`, before MuJoCo had solved for the contact forces: "
+    "they are solved for with the controls as they are, and may differ from those of the coming `mj_step2`; call "
+    "`step` between `mj_step2` and `mj_step1`, or take steps within `with ripples.following(data):`"
+)
+
+
+class SolvedForces:
+    """Finds data whose contact forces belong to its contacts.
+
+    After `mj_step`, or `mj_step1` and `mj_step2`, poses, contacts and their forces are those at the beginning of the
+    step. But a loop that ends with `mj_step1` has moved on to the poses and contacts of the next step, and the forces
+    beside them mean nothing until `mj_step2`.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._model = model
+        self._poses = mujoco.MjData(model)
+        self._steps = 0
+        self._completed: mujoco.MjData | None = None
+
+    def of(self, data: mujoco.MjData) -> tuple[mujoco.MjData, bool]:
+        """Data with solved forces, and whether those of `data` were not.
+
+        That is `data` itself, or, from the first time on that `data` has moved on to the next step, a copy of it,
+        completed as `mj_step2` will do with the controls as they are. Forces that are solved already, as after
+        `mj_forward`, come out the same.
+        """
+        if self._completed is None:
+            if not self._moved_on(data):
+                return data, False
+            self._completed = copy.copy(data)
+        if not data.nefc:
+            return data, False
+        model = self._model
+        mujoco.mj_copyData(self._completed, model, data)
+        mujoco.mj_fwdActuation(model, self._completed)
+        mujoco.mj_fwdAcceleration(model, self._completed)
+        mujoco.mj_fwdConstraint(model, self._completed)
+        return self._completed, not _solved(model, data)
+
+    def _moved_on(self, data: mujoco.MjData) -> bool:
+        """Whether the poses are already those that follow from the positions."""
+        if self._steps >= _FIRST:
+            self._steps += 1
+            if self._steps % _EVERY:
+                return False
+        if not (self._model.nv and np.abs(data.qvel).max() * self._model.opt.timestep > _MOVES):
+            return False
+        self._steps += self._steps < _FIRST
+        poses = self._poses
+        poses.qpos, poses.mocap_pos, poses.mocap_quat = data.qpos, data.mocap_pos, data.mocap_quat
+        mujoco.mj_kinematics(self._model, poses)
+        return np.array_equal(poses.xpos, data.xpos) and np.array_equal(poses.xquat, data.xquat)
+
+
+def _solved(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
+    """Whether the forces f give on the Jacobian J what MuJoCo solved for, J^T f."""
+    force = np.zeros(model.nv)
+    mujoco.mj_mulJacTVec(model, data, force, data.efc_force)
+    expected = data.qfrc_constraint
+    # the sums may be made in another order
+    return float(np.abs(force - expected).max()) <= 1e-9 * (1.0 + float(np.abs(expected).max()))

@@ -1,0 +1,149 @@
+"""The surface of a target as a mesh, and its atlas, in the geom's own frame.
+
+Triangles on MuJoCo's height fields.
+
+Triangles on the surfaces of MuJoCo's primitive geoms.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from ripple_sim.scenes.sphere_maps import shipped_sphere_map
+from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
+from ripple_sim.solver.cache import Kept, content_key
+
+from .geoms import TARGET_TYPES, geom_name
+from .soft import SoftSurface, is_soft
+
+
+def height_field_triangles(model: mujoco.MjModel, field: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices [m], [n, 3], on the top of a height field in the frame of its geom, and triangles, [m, 3], facing up.
+
+    The cells are cut along the diagonal along which MuJoCo cuts them into prisms (`mjc_ConvexHField`).
+    """
+    rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
+    first, size = int(model.hfield_adr[field]), model.hfield_size[field]
+    x, y = np.meshgrid(np.linspace(-size[0], size[0], columns), np.linspace(-size[1], size[1], rows))
+    z = size[2] * model.hfield_data[first : first + rows * columns].astype(np.float64)
+    number = np.arange(rows * columns).reshape(rows, columns)
+    south_west, south_east = number[:-1, :-1].ravel(), number[:-1, 1:].ravel()
+    north_west, north_east = number[1:, :-1].ravel(), number[1:, 1:].ravel()
+    F = [
+        np.stack([south_west, south_east, north_east], axis=1),
+        np.stack([south_west, north_east, north_west], axis=1),
+    ]
+    return np.stack([x.ravel(), y.ravel(), z], axis=1), np.concatenate(F)
+
+
+# Longest edge of a triangle over the size of the primitive.
+_LONGEST_EDGE = 1 / 24
+_CYLINDER_SIDES = 96
+
+
+def primitive_triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices [m], [n, 3], on a primitive geom of a MuJoCo size, [3], and triangles, [m, 3]."""
+    if kind == "sphere":
+        kind, size = "ellipsoid", np.full(3, size[0])
+    # trimesh merges vertices within a fixed distance: triangles are made at a size of about 1
+    scale = 2.0 ** np.floor(np.log2(size.max()))
+    V, F = _triangles(kind, size / scale)
+    return scale * V, F
+
+
+def _triangles(kind: str, size: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Triangles on a primitive whose largest size is from 1 to 2."""
+    if kind == "ellipsoid":
+        solid = trimesh.creation.icosphere(subdivisions=4)
+        solid.apply_scale(size)
+    elif kind == "capsule":
+        solid = trimesh.creation.capsule(height=2 * size[1], radius=size[0], count=(48, 48))
+        solid.apply_translation([0, 0, -solid.bounds.mean(axis=0)[2]])
+    elif kind == "cylinder":
+        solid = trimesh.creation.cylinder(radius=size[0], height=2 * size[1], sections=_CYLINDER_SIDES)
+    else:
+        solid = trimesh.creation.box(extents=2 * size)
+    longest = float(np.max(solid.extents)) * _LONGEST_EDGE
+    V, F = trimesh.remesh.subdivide_to_size(solid.vertices, solid.faces, max_edge=longest)
+    return _on_round_surface(kind, size, V), F
+
+
+def _on_round_surface(kind: str, size: NDArray[np.float64], V: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vertices moved along the radius from the chords of a round solid onto its surface [m]."""
+    if kind == "ellipsoid":
+        return V / np.linalg.norm(V / size, axis=1, keepdims=True)
+    if kind == "capsule":
+        axis = np.clip(V[:, 2:], -size[1], size[1]) * [0.0, 0.0, 1.0]
+        return axis + size[0] * (V - axis) / np.linalg.norm(V - axis, axis=1, keepdims=True)
+    if kind == "cylinder":
+        radius = np.linalg.norm(V[:, :2], axis=1)
+        # the other vertices lie inside the flat ends
+        on_side = radius > size[0] * (np.cos(np.pi / _CYLINDER_SIDES) - 1e-9)
+        V = V.copy()
+        V[on_side, :2] *= (size[0] / radius[on_side])[:, None]
+    return V
+
+
+_MOST_TEXELS = 100_000  # of an atlas that is kept: 20 MB
+
+_kept: Kept[Atlas] = Kept(4, lambda atlas: atlas.areas.size <= _MOST_TEXELS)
+
+
+def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str = "auto") -> Atlas:
+    """Atlas of a geom's surface in the geom's frame [m], in a layout of `build_atlas`; of what is soft in the world.
+
+    Raises
+    ------
+    MeshError
+        If the geom's mesh does not suit the layout.
+    """
+    if is_soft(model, geom):
+        return build_atlas(SoftSurface(model, geom).mesh, resolution, layout=layout)
+    if TARGET_TYPES[int(model.geom_type[geom])] == "sphere" and layout != "patches":
+        radius = float(model.geom_size[geom, 0])
+        return _kept.get(f"sphere {radius!r} {resolution}", lambda: sphere_atlas(radius, resolution))
+    V, F, uv, name = _surface(model, geom)
+    key = content_key(f"{resolution} {layout}", [V, F, np.zeros(0) if uv is None else uv])
+
+    def build() -> Atlas:
+        mesh = Mesh.from_arrays(V, F, uv, name)
+        return build_atlas(mesh, resolution, layout=layout, sphere=shipped_sphere_map(mesh))
+
+    return _kept.get(key, build)
+
+
+def target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:
+    """Surface of a geom in the geom's frame [m]; see `target_atlas`."""
+    return Mesh.from_arrays(*_surface(model, geom))
+
+
+def _surface(model: mujoco.MjModel, geom: int) -> tuple[NDArray, NDArray, NDArray | None, str]:
+    """What `Mesh.from_arrays` takes: vertices, triangles, texture coordinates, name."""
+    kind = TARGET_TYPES[int(model.geom_type[geom])]
+    name = f"mesh of geom {geom_name(model, geom)!r}"
+    if kind == "hfield":
+        return *height_field_triangles(model, int(model.geom_dataid[geom])), None, name
+    if kind not in ("mesh", "sdf"):
+        return *primitive_triangles(kind, model.geom_size[geom]), None, name
+    mesh = model.geom_dataid[geom]
+    first_vertex, first_triangle = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+    V = model.mesh_vert[first_vertex : first_vertex + model.mesh_vertnum[mesh]]
+    F = model.mesh_face[first_triangle : first_triangle + model.mesh_facenum[mesh]]
+    return V, F, _texture_coordinates(model, mesh), name
+
+
+def _texture_coordinates(model: mujoco.MjModel, mesh: int) -> NDArray[np.float64] | None:
+    """A mesh's own texture coordinates at the corners of its triangles, [triangle_count, 3, 2], or None.
+
+    MuJoCo counts v from the upper edge of the image.
+    """
+    first, first_triangle = model.mesh_texcoordadr[mesh], model.mesh_faceadr[mesh]
+    if first < 0:
+        return None
+    pairs = model.mesh_texcoord[first : first + model.mesh_texcoordnum[mesh]]
+    corners = model.mesh_facetexcoord[first_triangle : first_triangle + model.mesh_facenum[mesh]]
+    uv = pairs[corners].astype(np.float64)
+    return np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1)

@@ -1,1 +1,0 @@
-"""How moving surfaces push back on bodies."""

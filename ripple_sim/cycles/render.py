@@ -1,0 +1,302 @@
+"""`render_cycles`: a scene simulated, written as USD, and rendered by Cycles.
+
+The process of Blender: which Python runs it, and frames as they come from it.
+
+What Blender is told beside the stage: frames, sky, soft boxes, and the floor that fades into the sky.
+
+Linear radiance to the colours of a frame, as the renderer's shader makes them (render/glsl/tone_mapping.glsl).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import importlib.resources
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.coupling.stepping import adopt_warnings
+from ripple_sim.errors import ExportError, VideoError
+from ripple_sim.export.exporter import Exporter
+from ripple_sim.export.options import ExportOptions
+from ripple_sim.export.place import ending_of
+from ripple_sim.export.scene import scene_source
+from ripple_sim.export.source import Source
+from ripple_sim.export.visuals import mean_color
+from ripple_sim.render.passes.floor import find_floor
+from ripple_sim.render.visuals.lights import (
+    BESIDE_LIGHTS,
+    FADE,
+    SOFT_BOX_LIGHTS,
+    STUDIO_FADE,
+    is_lit,
+    model_lighting,
+    sky_colors,
+    studio_lighting,
+)
+from ripple_sim.render.visuals.texture_mapping import mapping_of
+from ripple_sim.render.visuals.visual import geom_visual, visible_geoms
+from ripple_sim.scene.scene import Scene, with_exposure
+from ripple_sim.simulation import Simulation
+from ripple_sim.video.options import EXPOSURE, VideoOptions, check_options, frame_count, settled
+from ripple_sim.video.render_video import open_video
+
+PYTHON = "RIPPLE_SIM_BPY_PYTHON"
+OLDEST = (5, 0)  # bpy before it has other names for what the importer of USD is told
+_LAST = 300  # characters of what a process said last
+_ADVICE = (
+    "on Python 3.13 install it with: pip install 'ripple-sim[cycles]'; otherwise give it an environment of its own "
+    f"(python3.11 -m venv blender; blender/bin/pip install 'bpy>=5.0') and set {PYTHON}=blender/bin/python"
+)
+
+
+def python_with_bpy() -> str:
+    """Python that can import bpy: the one that the environment names, or this one.
+
+    Raises
+    ------
+    VideoError
+        If there is none, its bpy is too old, or cannot be imported.
+    """
+    named = os.environ.get(PYTHON)
+    if named:
+        if not os.access(named, os.X_OK):
+            raise VideoError(f"{PYTHON} is {named!r}, which cannot be run; name a Python that has bpy")
+    elif importlib.util.find_spec("bpy") is None:
+        raise VideoError(f"the renderer cycles needs bpy, which is not installed; {_ADVICE}")
+    python = named or sys.executable
+    version = _version_of_bpy(python)
+    if version < OLDEST:
+        found, oldest = (".".join(map(str, each)) for each in (version, OLDEST))
+        raise VideoError(f"{python} has bpy {found}; valid is {oldest} or later: {_ADVICE}")
+    return python
+
+
+@functools.cache  # asking takes most of a second
+def _version_of_bpy(python: str) -> tuple[int, ...]:
+    code = "import bpy; print(*bpy.app.version)"
+    asked = subprocess.run([python, "-c", code], capture_output=True, text=True, errors="replace", check=False)
+    last = (asked.stdout if asked.returncode == 0 else asked.stderr).strip().splitlines()[-1:]
+    try:
+        return tuple(map(int, last[0].split()))
+    except (IndexError, ValueError):
+        reason = "".join(last)[:_LAST] or f"status {asked.returncode}"
+        raise VideoError(f"{python} cannot import bpy: {reason}; {_ADVICE}") from None
+
+
+def frames_of_cycles(python: str, settings: dict[str, Any], folder: Path) -> Iterator[NDArray[np.float32]]:
+    """Linear frames [height, width, 3], in their order, from a process of Blender's own.
+
+    Parameters
+    ----------
+    python : str
+        From `python_with_bpy`.
+    settings : dict
+        What blender_process.py reads.
+    folder : Path
+        For the files that pass between the processes.
+
+    Raises
+    ------
+    VideoError
+        If the process ends before the last frame.
+    """
+    told, errors = folder / "settings.json", folder / "blender.log"
+    told.write_text(json.dumps({**settings, "folder": str(folder)}), encoding="utf-8")
+    place = {**os.environ, "TMPDIR": str(folder)}  # Blender leaves folders behind where temporary files go
+    script = importlib.resources.files(__package__).joinpath("blender_process.py")
+    with (
+        importlib.resources.as_file(script) as path,
+        errors.open("wb") as log,
+        subprocess.Popen([python, str(path), str(told)], stdout=subprocess.PIPE, stderr=log, env=place) as process,
+    ):
+        try:
+            assert process.stdout is not None
+            for number in range(settings["frames"]):
+                _wait_for(number, process, errors)
+                file = folder / f"{number}.npy"
+                yield np.load(file)
+                file.unlink()
+        finally:
+            process.terminate()
+
+
+def _wait_for(number: int, process: subprocess.Popen, errors: Path) -> None:
+    """Read what the process says until it has made a frame; the rest is Blender's own."""
+    last = ""
+    for line in process.stdout or ():
+        text = line.decode(errors="replace").strip()
+        if text == f"frame {number}":
+            return
+        last = text or last
+    said = errors.read_text(errors="replace").strip().splitlines()
+    reason = (said[-1] if said else last)[:_LAST] or "without a word"
+    raise VideoError(f"Blender ended before frame {number} with status {process.wait()}: {reason}")
+
+
+# what the renderer's soft boxes give to diffuse surfaces, over what lights of their size and radiance would
+_DIFFUSE_SHARE = 0.13 * np.pi / 4
+
+
+def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
+    """Light and background of a source at its first frame, and its camera's shutter and size, as JSON has them."""
+    model = source.model
+    pose, _ = source.pose(data)
+    studio = source.lighting == "studio" or (source.lighting == "auto" and not is_lit(model))
+    lighting = studio_lighting(pose) if studio else model_lighting(model, data, pose)
+    floor = find_floor(model, [geom for geom in visible_geoms(model) if geom not in source.ripples.geom_ids.values()])
+    albedo = None
+    if floor is not None:
+        visual = geom_visual(model, floor)
+        albedo = visual.color * mean_color(model, mapping_of(model, visual))
+    sky = sky_colors(lighting, pose, albedo, None)
+    strength = 1.0 if studio else BESIDE_LIGHTS
+    return {
+        "size": list(source.size),
+        "fps": source.fps,
+        "shutter": source.camera.shutter / 360,
+        "distance": pose.distance,
+        "horizon": sky.horizon.tolist(),
+        "zenith": sky.zenith.tolist(),
+        "sky": sky.light.tolist(),
+        "floor": None
+        if floor is None
+        else mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, floor) or f"geom_{floor}",
+        "fade": list(STUDIO_FADE if studio else FADE),
+        "boxes_reflected": strength,
+        "boxes_diffuse": _DIFFUSE_SHARE * strength if studio else 0.0,
+        "boxes": [
+            {"azimuth": azimuth, "elevation": elevation, "half": [width, height], "radiance": list(radiance)}
+            for azimuth, elevation, width, height, radiance in SOFT_BOX_LIGHTS
+        ],
+    }
+
+
+_SHOULDER = 0.72  # radiance from which on brightness rolls off
+_BLEACHING = 0.18
+
+
+def tone_mapped(radiance: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Colours, sRGB [height, width, 3], of linear radiance of the same shape."""
+    radiance = np.maximum(radiance, 0.0)
+    peak = radiance.max(axis=-1, keepdims=True)
+    excess = np.maximum(peak - _SHOULDER, 0.0)
+    compressed = np.minimum(peak, _SHOULDER) + (1 - _SHOULDER) * excess / (excess + 1 - _SHOULDER)
+    color = radiance * (compressed / np.maximum(peak, 1e-4))
+    color += (compressed - color) * (1 - 1 / (1 + _BLEACHING * excess))
+    coded = np.where(color <= 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)
+    return np.rint(255 * np.clip(coded, 0.0, 1.0)).astype(np.uint8)
+
+
+Progress = Callable[[int, int], None]
+
+SAMPLES = 64
+_OURS_ALONE = ("compare", "overlay", "passes", "resume", "transparent")
+
+
+@dataclasses.dataclass(frozen=True)
+class CyclesSummary:
+    """What a video by Cycles took: its frames, and times [s]."""
+
+    output: Path
+    frames: int
+    export_seconds: float
+    render_seconds: float
+
+
+def render_cycles(
+    scene: Scene,
+    output: str | Path,
+    options: VideoOptions = VideoOptions(),  # noqa: B008 - frozen
+    *,
+    samples: int = SAMPLES,
+    progress: Progress | None = None,
+) -> CyclesSummary:
+    """Simulate a scene and write its video with frames by Cycles, of the same camera, lamps and looks.
+
+    The run goes to a USD file in a temporary folder, which a process of Blender's own renders.
+
+    Parameters
+    ----------
+    scene : Scene
+    output : path
+        As for `render_video`.
+    options : VideoOptions
+        Without overlays, passes, comparison, transparency and resuming.
+    samples : int
+        Paths a pixel.
+    progress : callable, optional
+        Called with (frames done, frames in all) after each frame.
+
+    Raises
+    ------
+    RippleError
+        Before anything is simulated if bpy or usd-core is missing, an option is one of ours alone, or the output or
+        the scene is invalid; later if Blender fails or the video cannot be written.
+    """
+    adopt_warnings()
+    output = Path(output)
+    python = check_cycles(options, output, samples)
+    options = settled(dataclasses.replace(options, overlay=()), scene, output)
+    scene = with_exposure(scene, **{name: getattr(options, name) for name in EXPOSURE})
+    frames, start = frame_count(options), time.perf_counter()
+    with (
+        open_video(output, options) as writer,
+        tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder,
+    ):
+        stage = Path(folder) / "stage.usdc"
+        settings = _export(scene, stage, options, frames)
+        exported = time.perf_counter()
+        told = {**settings, "stage": str(stage), "frames": frames, "samples": samples}
+        for frame in frames_of_cycles(python, told, Path(folder)):
+            writer.write(frame.astype(np.float16) if options.linear else tone_mapped(frame))
+            if progress is not None:
+                progress(writer.frames, frames)
+    return CyclesSummary(output, frames, exported - start, time.perf_counter() - exported)
+
+
+def check_cycles(options: VideoOptions, output: Path, samples: int = SAMPLES) -> str:
+    """Make sure, before anything that takes time, that Cycles can render with these options; return its Python.
+
+    Raises
+    ------
+    RippleError
+    """
+    for name in _OURS_ALONE:
+        if getattr(options, name):
+            raise VideoError(f"the renderer cycles has no --{name}; leave it out, or render with --renderer gl")
+    if not isinstance(samples, int) or not 1 <= samples <= 65536:
+        raise VideoError(f"there shall be {samples!r} samples; valid is a whole number from 1 to 65536")
+    check_options(options, output)
+    try:
+        ending_of(Path("stage.usdc"))
+    except ExportError as error:
+        raise VideoError(f"the renderer cycles reads USD: {error}") from error
+    return python_with_bpy()
+
+
+def _export(scene: Scene, stage: Path, options: VideoOptions, frames: int) -> dict:
+    """Write the run, and return what Blender is told beside it."""
+    simulation = Simulation.of(scene, options)
+    exported = ExportOptions(fps=options.fps or 1, slow_motion=options.slow_motion, size=options.size)
+    source = scene_source(scene, simulation, exported)
+    with Exporter.of(source, stage) as exporter:
+        for number in range(frames):
+            if number:
+                simulation.advance_frame()
+            else:
+                settings = blender_settings(source, simulation.data)
+            exporter.write(simulation.data, simulation.impulses)
+    return settings

@@ -1,0 +1,271 @@
+"""Why OpenGL does not run headless, or not on the GPU: common reasons on Linux, each with its fix.
+
+An OpenGL program without a window uses libEGL.so.1 (of libglvnd), which reads the vendor files: small JSON files that
+name each driver's own EGL library. Mesa's driver then opens a render node, /dev/dri/renderD*; NVIDIA's opens
+/dev/nvidia*.
+
+The report of `ripple-sim info`: versions, OpenGL driver, wave solver; and what to install to render.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import grp
+import importlib.metadata
+import json
+import os
+import platform
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from ripple_sim.solver.backends.backend import auto_backend, measured
+from ripple_sim.solver.errors import GLError
+from ripple_sim.solver.gl import shared_context
+
+_VENDOR_FOLDERS = ("/etc/glvnd/egl_vendor.d", "/usr/share/glvnd/egl_vendor.d")
+_LIBRARIES = {"libEGL.so.1": "libegl1", "libGL.so.1": "libgl1"}
+_NVIDIA_VERSION = Path("/proc/driver/nvidia/version")
+_CONTAINER = "in a container, start that with NVIDIA_DRIVER_CAPABILITIES=all"
+
+
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """A problem and its fix."""
+
+    problem: str
+    fix: str
+
+    def __str__(self) -> str:
+        return f"{self.problem}: {self.fix}"
+
+
+def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[Finding]:
+    """Find what keeps OpenGL off the GPU, or from running at all.
+
+    Parameters
+    ----------
+    software : bool or None
+        Whether OpenGL runs on the processor; None if it does not run.
+    devices : Path
+        Folder of the device files.
+
+    Returns
+    -------
+    list of Finding
+        The likeliest cause first; empty if OpenGL runs on a GPU, or for an unknown cause.
+    """
+    if software is False:
+        return []
+    if software is None:
+        # a missing library explains the rest
+        return list(_library_problems()) or list(_vendor_problems()) or list(_device_problems(devices))
+    found = [*_device_problems(devices), *_nvidia_problems(devices)]
+    if found or any(_gpus(devices)):
+        return found
+    return [
+        Finding(
+            f"OpenGL runs in software, on the processor: there is no GPU ({devices}/dri/renderD* or {devices}/nvidia*)",
+            "nothing to fix; rendering is faster on a machine with a GPU (in a container, pass it through with "
+            "--device /dev/dri or --gpus all)",
+        )
+    ]
+
+
+def _library_problems() -> Iterator[Finding]:
+    for library, package in _LIBRARIES.items():
+        try:
+            ctypes.CDLL(library)
+        except OSError as error:
+            missing = "No such file" in str(error)
+            yield Finding(
+                f"the library {library} is missing" if missing else f"the library {library} cannot be loaded ({error})",
+                f"apt-get install {package}" if missing else f"apt-get install --reinstall {package}",
+            )
+
+
+def _vendor_problems() -> Iterator[Finding]:
+    files, where = _vendor_files()
+    if not files:
+        yield Finding(
+            f"there is no EGL vendor file (*.json) in {where}",
+            "apt-get install libegl-mesa0 libgl1-mesa-dri; for an NVIDIA GPU install libnvidia-gl of the driver's "
+            f"version, or, {_CONTAINER}",
+        )
+    for file in files:
+        library = _library_of(file)
+        if library is None:
+            yield Finding(
+                f"the EGL vendor file {file} is damaged", f"reinstall the package it belongs to: dpkg -S {file}"
+            )
+            continue
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            nvidia = "nvidia" in library
+            yield Finding(
+                f"the EGL vendor file {file} names {library}, which cannot be loaded",
+                _install_nvidia() if nvidia else "apt-get install --reinstall libegl-mesa0 libgl1-mesa-dri",
+            )
+
+
+def _device_problems(devices: Path) -> Iterator[Finding]:
+    for node in _render_nodes(devices):
+        if not os.access(node, os.R_OK | os.W_OK, effective_ids=True):
+            group = _group_of(node)
+            yield Finding(
+                f"this user has no access to the GPU's render node {node}",
+                f"sudo usermod -aG {group} $USER, then log in again (in a container: --group-add {group})",
+            )
+
+
+def _nvidia_problems(devices: Path) -> Iterator[Finding]:
+    """An NVIDIA driver in the kernel without its EGL library beside it."""
+    if (devices / "nvidia0").exists() and not any("nvidia" in (_library_of(f) or "") for f in _vendor_files()[0]):
+        yield Finding(
+            "there is an NVIDIA GPU, but no EGL vendor file of its driver, so OpenGL runs in software",
+            _install_nvidia(),
+        )
+
+
+def _install_nvidia() -> str:
+    version = re.search(r"\b(\d{3})\.\d+", _NVIDIA_VERSION.read_text()) if _NVIDIA_VERSION.exists() else None
+    package = f"libnvidia-gl-{version[1]}" if version else "libnvidia-gl-NNN, where NNN is the driver's version"
+    return f"apt-get install {package}; {_CONTAINER}"
+
+
+def _vendor_files() -> tuple[list[Path], str]:
+    """The vendor files that libglvnd reads, and its search path."""
+    names = os.environ.get("__EGL_VENDOR_LIBRARY_FILENAMES")
+    if names:
+        return [Path(name) for name in names.split(":")], f"__EGL_VENDOR_LIBRARY_FILENAMES={names}"
+    folders = os.environ.get("__EGL_VENDOR_LIBRARY_DIRS")
+    places = folders.split(":") if folders else list(_VENDOR_FOLDERS)
+    return sorted(file for place in places for file in Path(place).glob("*.json")), " or ".join(places)
+
+
+def _library_of(file: Path) -> str | None:
+    """Library named in a vendor file; None if it cannot be read."""
+    try:
+        return str(json.loads(file.read_text())["ICD"]["library_path"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _render_nodes(devices: Path) -> list[Path]:
+    return sorted((devices / "dri").glob("renderD*"))
+
+
+def _gpus(devices: Path) -> list[Path]:
+    return [*_render_nodes(devices), *devices.glob("nvidia[0-9]*")]
+
+
+def _group_of(path: Path) -> str:
+    number = path.stat().st_gid
+    try:
+        return grp.getgrgid(number).gr_name
+    except KeyError:
+        return str(number)
+
+
+PACKAGES = (
+    "ripple-sim",
+    "mujoco",
+    "numpy",
+    "scipy",
+    "numba",
+    "libigl",
+    "trimesh",
+    "embreex",
+    "moderngl",
+    "av",
+    "pyvista",
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class OpenGL:
+    """The driver that renders, in its own words."""
+
+    renderer: str
+    vendor: str
+    version: str
+    software: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Info:
+    """What `ripple-sim info` reports.
+
+    Attributes
+    ----------
+    versions : dict
+        Version of ripple-sim, Python and each main dependency; None if it is not installed.
+    system : str
+        Operating system and architecture.
+    processors : int
+    opengl : OpenGL or None
+        None if there is no usable context; `advice` then says what to install.
+    backend : str
+        The wave solver of "auto": "gl" or "cpu".
+    measured : str
+        What was measured to choose it, once on this machine; "" where nothing was.
+    advice : str
+        Problems that prevent or slow down rendering, with their fixes, one per line; "" if there is none.
+    """
+
+    versions: dict[str, str | None]
+    system: str
+    processors: int
+    opengl: OpenGL | None
+    backend: str
+    measured: str
+    advice: str
+
+
+def collect() -> Info:
+    """Examine this machine; a lack of OpenGL is reported, not raised."""
+    opengl, failure = None, ""
+    try:
+        context = shared_context()
+    except GLError as error:
+        failure = str(error)
+    else:
+        opengl = OpenGL(context.renderer, context.vendor, context.version, context.software)
+    findings = find_problems(opengl.software if opengl else None)
+    return Info(
+        versions={"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
+        system=platform.platform(),
+        processors=os.cpu_count() or 1,
+        opengl=opengl,
+        backend=auto_backend(),
+        measured=str(measured(context)) if opengl and not opengl.software else "",
+        advice="\n".join(map(str, findings)) or failure,
+    )
+
+
+def as_text(info: Info) -> str:
+    """Format the report as text."""
+    gl = info.opengl
+    where = "on the CPU" if info.backend == "cpu" else "on the GPU, in OpenGL compute shaders"
+    rows = {
+        **{name: version or "not installed" for name, version in info.versions.items()},
+        "system": f"{info.system}, {info.processors} processors",
+        "OpenGL": f"{gl.version}, {gl.vendor}" if gl else "none",
+        "renderer": f"{gl.renderer} ({'software' if gl.software else 'hardware'})"
+        if gl
+        else "none: rendering is impossible",
+        "waves": f"{info.backend} (auto: {where})",
+        **({"measured": f"nine substeps: {info.measured}"} if info.measured else {}),
+    }
+    width = max(map(len, rows))
+    lines = [f"{name:<{width}}  {value}" for name, value in rows.items()]
+    return "\n".join([*lines, *(["", info.advice] if info.advice else [])])
+
+
+def _version(name: str) -> str | None:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None

@@ -1,1 +1,0 @@
-"""Versions and drivers of this machine, and reasons why it cannot render."""

@@ -1,0 +1,312 @@
+"""Files of passes: one a frame, NumPy's .npz or OpenEXR, in a folder beside the video.
+
+OpenEXR frames: linear light in half floats, for compositing and grading.
+
+GIF with one palette made for the whole animation.
+
+The palette depends on every frame, so the frames are first stored losslessly, and then read twice: to choose the
+colours, and to draw with them. Memory does not grow with the length of the video.
+
+Animated WebP, assembled from still images so that memory does not grow with the length of the video.
+
+The container is RIFF; see "WebP Container Specification" by Google: VP8X (size and flags), ANIM (background, loops),
+an ANMF chunk per frame with the chunks of a still image, and XMP with the mark.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import json
+import re
+import struct
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from av.filter import Graph
+from numpy.typing import NDArray
+
+from ripple_sim.errors import EncodingError, VideoError
+from ripple_sim.solver.files import final_path
+
+from .clip import GIF, Clip, Stream
+from .replace import MARK, made_here, mark_gif
+
+# ITU-R BT.709: x and y of red, green, blue and white
+_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+
+
+def check_exr() -> None:
+    """Make sure that EXR frames can be written.
+
+    Raises
+    ------
+    VideoError
+        If OpenEXR is not installed.
+    """
+    if importlib.util.find_spec("OpenEXR") is None:
+        raise VideoError(
+            "EXR frames need OpenEXR, which is not installed; install it with: pip install 'ripple-sim[exr]'"
+        )
+
+
+class Exr:
+    """One frame in a file of its own; the same frame gives the same bytes."""
+
+    def __init__(self, path: Path, stream: Stream) -> None:
+        self._path, self._rate = path, stream.fps
+
+    def write(self, frame: NDArray[np.float16]) -> None:
+        """Write the image, float16 [height, width, 3 or 4], with colours multiplied by opacity."""
+        import OpenEXR
+
+        header = {
+            "type": OpenEXR.scanlineimage,
+            "compression": OpenEXR.ZIP_COMPRESSION,
+            "chromaticities": _CHROMATICITIES,
+            "software": MARK,
+            "framesPerSecond": Fraction(self._rate),
+        }
+        # through memory: the library does not notice a disk that fills up with the last bytes of a file
+        file = io.BytesIO()
+        OpenEXR.File(header, {"RGBA"[: frame.shape[2]]: np.ascontiguousarray(frame)}).write(file)
+        self._path.write_bytes(file.getbuffer())
+
+    def finish(self) -> None:
+        """Do nothing: the image is complete."""
+
+    def close(self) -> None:
+        """Do nothing: no file is open."""
+
+
+# Ordered dithering is the same from frame to frame: it does not shimmer, and it compresses well.
+_PALETTE_USE = "dither=bayer:bayer_scale=4:diff_mode=rectangle"
+
+
+def join_gif(clips: Sequence[tuple[Path, int]], path: Path, stream: Stream) -> None:
+    """Make an endlessly looping GIF of clips, given with the number of each one's first frame."""
+    palette = _choose_palette(clips, stream)
+    gif = Clip(path, GIF, stream)
+    try:
+        for image in _draw(clips, palette, stream):
+            gif.encode(image)
+    except BaseException:
+        gif.close()
+        raise
+    gif.finish()
+    mark_gif(path)
+
+
+def _images(clips: Sequence[tuple[Path, int]], fps: int) -> Iterator[av.VideoFrame]:
+    for clip, first in clips:
+        with av.open(str(clip)) as container:
+            for number, image in enumerate(container.decode(video=0)):
+                image = image.reformat(format="rgb24")
+                image.pts, image.time_base = first + number, Fraction(1, fps)
+                yield image
+
+
+def _choose_palette(clips: Sequence[tuple[Path, int]], stream: Stream) -> av.VideoFrame:
+    graph = Graph()
+    frames = _source(graph, "rgb24", stream.width, stream.height, stream.fps)
+    sink = graph.add("buffersink")
+    graph.link_nodes(frames, graph.add("palettegen"), sink).configure()
+    for image in _images(clips, stream.fps):
+        frames.push(image)
+    frames.push(None)
+    return sink.pull()
+
+
+def _draw(clips: Sequence[tuple[Path, int]], palette: av.VideoFrame, stream: Stream) -> Iterator[av.VideoFrame]:
+    graph = Graph()
+    frames = _source(graph, "rgb24", stream.width, stream.height, stream.fps)
+    colours = _source(graph, palette.format.name, palette.width, palette.height, stream.fps)
+    draw, sink = graph.add("paletteuse", _PALETTE_USE), graph.add("buffersink")
+    frames.link_to(draw, 0, 0)
+    colours.link_to(draw, 0, 1)
+    draw.link_to(sink)
+    graph.configure()
+    colours.push(palette)
+    colours.push(None)
+    for image in _images(clips, stream.fps):
+        frames.push(image)
+        yield from _ready(sink)
+    frames.push(None)
+    yield from _ready(sink)
+
+
+def _source(graph: Graph, pixel_format: str, width: int, height: int, fps: int) -> Any:
+    return graph.add_buffer(
+        width=width, height=height, format=av.VideoFormat(pixel_format, width, height), time_base=Fraction(1, fps)
+    )
+
+
+def _ready(sink: Any) -> Iterator[av.VideoFrame]:
+    while True:
+        try:
+            yield sink.pull()
+        except (av.BlockingIOError, av.EOFError):
+            return
+
+
+PASSES = ("depth", "normal", "segmentation", "flow", "position", "height")
+PASS_FORMATS = ("npz", "exr")
+_NAME = re.compile(rf"passes_\d{{5,}}\.({'|'.join(PASS_FORMATS)})|segmentation\.json")
+_CHANNELS = {"normal": "XYZ", "position": "XYZ", "flow": "XY"}  # of an EXR; one channel has the pass's own name
+
+
+class PassFiles:
+    """Writes the passes of frames.
+
+    Parameters
+    ----------
+    video : Path
+        Beside which the folder `NAME.passes` stands, NAME without an ending.
+    form : str
+        One of `PASS_FORMATS`.
+    geoms : mapping
+        Name of what each number of the segmentation stands for.
+    """
+
+    def __init__(self, video: Path, form: str, geoms: Mapping[int, str]) -> None:
+        self._video, self._form = video, form
+        self.folder = passes_folder(video)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            for each in self.folder.iterdir():  # of an earlier run; they were looked at
+                each.unlink()
+            text = json.dumps({"software": MARK, "geoms": {str(k): name for k, name in geoms.items()}}, indent=1)
+            self._write(self.folder / "segmentation.json", text.encode())
+        except OSError as error:
+            raise self._error(error) from error
+
+    def write(self, frame: int, passes: Mapping[str, NDArray]) -> None:
+        """Write the passes of a frame, by name, [height, width] or [height, width, 2 or 3].
+
+        Raises
+        ------
+        EncodingError
+            If they cannot be written.
+        """
+        path = self.folder / f"passes_{frame:05d}.{self._form}"
+        unfinished = path.with_name(f".{path.name}")
+        try:
+            (_write_npz if self._form == "npz" else _write_exr)(unfinished, passes)
+            unfinished.replace(path)
+        except OSError as error:
+            unfinished.unlink(missing_ok=True)
+            raise self._error(error) from error
+
+    def _write(self, path: Path, content: bytes) -> None:
+        unfinished = path.with_name(f".{path.name}")
+        unfinished.write_bytes(content)
+        unfinished.replace(path)
+
+    def _error(self, error: OSError) -> EncodingError:
+        return EncodingError(f"cannot write passes to {self.folder}: {error.strerror or error}")
+
+
+def passes_folder(video: Path) -> Path:
+    """Folder of the passes of a video."""
+    video = final_path(video)
+    return video.with_name(f"{video.stem if video.suffix else video.name}.passes")
+
+
+def check_passes(video: Path, passes: tuple[str, ...], form: str, overwrite: bool) -> None:
+    """Make sure that passes can be written beside a video.
+
+    Raises
+    ------
+    VideoError
+        If there is no such pass or format, OpenEXR is missing, or the folder holds anything that was not made here.
+    """
+    if unknown := [name for name in passes if name not in PASSES]:
+        raise VideoError(f"there is no pass {unknown[0]!r}; valid are {', '.join(PASSES)}")
+    if form not in PASS_FORMATS:
+        raise VideoError(f"pass format is {form!r}; valid is {' or '.join(map(repr, PASS_FORMATS))}")
+    if form == "exr":
+        check_exr()
+    folder = passes_folder(video)
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise VideoError(f"cannot write passes to {folder}: it is not a folder; name another output")
+    for each in folder.iterdir() if folder.is_dir() else ():
+        named = each.is_file() and not each.is_symlink() and _NAME.fullmatch(each.name.lstrip("."))
+        if not named or not (overwrite or made_here(each)):
+            raise VideoError(
+                f"cannot write passes to {folder}: it holds other files ({each.name}); name another output"
+            )
+
+
+def _write_npz(path: Path, passes: Mapping[str, NDArray]) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.comment = MARK.encode()
+        for name, values in passes.items():
+            # the same passes give the same file: without the time of day
+            with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, values)
+
+
+def _write_exr(path: Path, passes: Mapping[str, NDArray]) -> None:
+    import OpenEXR
+
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, "software": MARK}
+    channels = {}
+    for name, values in passes.items():
+        for index, axis in enumerate(_CHANNELS.get(name, "")):
+            channels[f"{name}.{axis}"] = np.ascontiguousarray(values[..., index])
+        if name not in _CHANNELS:
+            channels[name] = np.ascontiguousarray(values)
+    file = io.BytesIO()
+    OpenEXR.File(header, channels).write(file)
+    path.write_bytes(file.getbuffer())
+
+
+_ANIMATION, _METADATA, _OPACITY = 0x02, 0x04, 0x10
+_DO_NOT_BLEND = 0x02
+
+
+def join_webp(stills: Sequence[Path], path: Path, stream: Stream) -> None:
+    """Make an endlessly looping WebP of still ones, all of the stream's size."""
+    flags = _ANIMATION | _METADATA
+    with path.open("wb") as file:
+        file.write(bytes(12 + 8 + 10))  # RIFF and VP8X, which come last: they hold the size and the flags
+        file.write(_chunk(b"ANIM", struct.pack("<IH", 0, 0)))
+        for number, still in enumerate(stills):
+            # whole milliseconds, without accumulating the rounding error
+            begin, end = (round(1000 * n / stream.fps) for n in (number, number + 1))
+            image = _image_chunks(still.read_bytes())
+            if image.startswith(b"ALPH") or (image.startswith(b"VP8L") and image[12] & 0x10):
+                flags |= _OPACITY
+            header = bytes(6) + _canvas(stream) + struct.pack("<I", end - begin)[:3] + bytes([_DO_NOT_BLEND])
+            file.write(_chunk(b"ANMF", header + image))
+        file.write(_chunk(b"XMP ", MARK.encode()))
+        size = file.tell()
+        file.seek(0)
+        file.write(struct.pack("<4sI4s", b"RIFF", size - 8, b"WEBP"))
+        file.write(_chunk(b"VP8X", struct.pack("<I", flags) + _canvas(stream)))
+
+
+def _image_chunks(still: bytes) -> bytes:
+    """The chunks of a still WebP that make up its image."""
+    at, kept = 12, b""
+    while at < len(still):
+        name, size = struct.unpack_from("<4sI", still, at)
+        end = at + 8 + size + size % 2
+        if name in (b"ALPH", b"VP8 ", b"VP8L"):
+            kept += still[at:end]
+        at = end
+    return kept
+
+
+def _canvas(stream: Stream) -> bytes:
+    """Width and height minus one, three bytes each."""
+    return struct.pack("<I", stream.width - 1)[:3] + struct.pack("<I", stream.height - 1)[:3]
+
+
+def _chunk(name: bytes, content: bytes) -> bytes:
+    return struct.pack("<4sI", name, len(content)) + content + bytes(len(content) % 2)

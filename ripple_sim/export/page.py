@@ -1,0 +1,339 @@
+"""`PageWriter`: a run as one self-contained page.
+
+Pages inside a notebook.
+
+What of a page stays the same over time: meshes, looks, textures, camera and light.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import html
+import importlib.resources
+import io
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from ripple_sim.coupling.soft import is_soft, target_pose
+from ripple_sim.encode.replace import MARK, made_here
+from ripple_sim.overlay.notes import color_table
+from ripple_sim.render.passes.floor import find_floor
+from ripple_sim.render.visuals.lights import SOFT_BOX_LIGHTS, is_lit, model_lighting, studio_lighting
+from ripple_sim.render.visuals.visual import texture_pixels, visible_geoms
+
+from .moving_mesh import MovingMesh
+from .page_motion import Motion, local_order, packed, parents_of, quantised, residuals
+from .source import Moment, Source
+from .visuals import Finish, Solid, solid_finish, solids, target_finish, target_uv
+
+__all__ = ["PageWriter", "made_here", "writer"]
+
+_HEIGHT = 420  # [pixels]
+
+
+def framed(page: Path, aspect: float) -> str:
+    """A page as HTML to be shown within another, `aspect` times as wide as high."""
+    source = html.escape(page.read_text(encoding="utf-8"), quote=True)
+    size = f'width="{round(_HEIGHT * aspect)}" height="{_HEIGHT}"'
+    return f'<iframe srcdoc="{source}" {size} style="border: 0; max-width: 100%" allowfullscreen></iframe>'
+
+
+_TRIANGLES, _SEGMENTS = 16_000, 6  # of a target, and of a primitive to a right angle
+_LARGEST_IMAGE = 1024  # [pixels]
+
+
+class Part(NamedTuple):
+    """A mesh of a page: what describes it, its arrays, its triangles, and which vertices of the source are its own."""
+
+    meta: dict[str, Any]
+    arrays: list[NDArray]
+    F: NDArray[np.int64]
+    vertices: NDArray[np.int64]
+
+
+def target_mesh(source: Source, name: str) -> MovingMesh:
+    """The surface of a target as the page shows it."""
+    return MovingMesh(source.ripples[name].rest, source.tessellation, source.limited[name], _TRIANGLES)
+
+
+def target_part(source: Source, name: str, mesh: MovingMesh) -> Part:
+    """A target at rest; its points follow along `directions`, and with its mesh's own vertices."""
+    model, geom = source.model, source.ripples.geom_ids[name]
+    finish = target_finish(model, geom, source.paints[name], mesh.uv is not None)
+    uv = target_uv(model, geom, mesh) if finish.texture >= 0 else None
+    soft = is_soft(model, geom)  # and so in the world
+    meta = {
+        "name": name,
+        "target": True,
+        "body": 0 if soft else int(model.geom_bodyid[geom]),
+        "position": [0, 0, 0] if soft else model.geom_pos[geom].tolist(),
+        "quaternion": [1, 0, 0, 0] if soft else model.geom_quat[geom].tolist(),
+        "open": not source.ripples[name].atlas.mesh.closed,
+        **_look(finish),
+    }
+    return _part(meta, mesh.F, [mesh.rest, mesh.directions], uv)
+
+
+def solid_parts(source: Source, floor: int) -> list[Part]:
+    """Everything else but the floor, which is a geom id."""
+    model = source.model
+    found = solids(model, {*source.ripples.geom_ids.values(), floor}, _SEGMENTS)
+    return [_solid_part(model, solid) for solid in found]
+
+
+def images(model: mujoco.MjModel, parts: list[dict[str, Any]]) -> dict[int, str]:
+    """Textures that parts use, as data URIs, by their ids."""
+    return {part["texture"]: _data_uri(model, part["texture"]) for part in parts if part["texture"] >= 0}
+
+
+def floor_of(model: mujoco.MjModel, geom: int | None) -> dict[str, Any] | None:
+    """The floor: height, albedo and texture."""
+    if geom is None:
+        return None
+    from ripple_sim.render.visuals.texture_mapping import mapping_of
+    from ripple_sim.render.visuals.visual import geom_visual
+
+    from .visuals import mean_color
+
+    visual = geom_visual(model, geom)
+    mapping = mapping_of(model, visual)
+    half = [float(x) if x > 0 else 0.0 for x in visual.size[:2]]
+    return {
+        "body": int(model.geom_bodyid[geom]),
+        "position": model.geom_pos[geom].tolist(),
+        "quaternion": model.geom_quat[geom].tolist(),
+        "half": half,
+        "color": visual.color.tolist(),
+        "mean": (visual.color * mean_color(model, mapping)).tolist(),
+        "texture": mapping.texture if mapping.texture >= 0 else -1,
+        "tiling": list(mapping.tiling),
+    }
+
+
+def light_of(source: Source, data: mujoco.MjData) -> dict[str, Any]:
+    """Lamps, soft boxes and ambient light, as the renderer has them at the first frame."""
+    pose, _ = source.pose(data)
+    studio = source.lighting == "studio" or (source.lighting == "auto" and not is_lit(source.model))
+    lighting = studio_lighting(pose) if studio else model_lighting(source.model, data, pose)
+    lamps = [
+        {
+            # in the camera's frame where the lamp turns with it
+            "direction": light.direction.tolist(),
+            "head": bool(not studio and np.allclose(light.direction, pose.rotation[:, 2]) and light.position is None),
+            "radiance": light.radiance.tolist(),
+            "position": None if light.position is None else light.position.tolist(),
+            "cutoff": float(np.cos(light.cutoff)),
+            "exponent": light.exponent,
+            "falloff": light.falloff.tolist(),
+            "shadow": light.shadow,
+        }
+        for light in lighting.lights[:4]
+    ]
+    return {
+        "studio": studio,
+        "lamps": lamps,
+        "ambient": lighting.ambient.tolist(),
+        "boxes": [[*map(float, box[:4]), *map(float, box[4])] for box in SOFT_BOX_LIGHTS],
+    }
+
+
+def heat_colors() -> list[list[int]]:
+    """Colours of the heights, from the lowest to the highest, sRGB."""
+    return color_table()[::8].tolist()
+
+
+def _solid_part(model: mujoco.MjModel, solid: Solid) -> Part:
+    meta = {
+        "name": solid.name,
+        "target": False,
+        "body": solid.body,
+        "position": solid.position.tolist(),
+        "quaternion": solid.quaternion.tolist(),
+        "open": False,
+        **_look(solid_finish(model, solid.visual)),
+    }
+    return _part(meta, solid.F, [solid.points, solid.normals], solid.uv)
+
+
+def _look(finish: Finish) -> dict[str, Any]:
+    look = finish.look
+    names = ("roughness", "metallic", "sheen", "coat", "translucency", "transparency", "emission")
+    values = {name: float(getattr(look, name)) for name in names}
+    return {"color": finish.color.tolist(), "opacity": finish.opacity, "texture": finish.texture, **values}
+
+
+def _part(meta: dict[str, Any], F: NDArray, fields: list[NDArray], uv: NDArray | None) -> Part:
+    """Points and directions in 16 bits each, triangles, and texture coordinates of their corners."""
+    triangles, vertices, F = local_order(fields[0], F)
+    points, directions = (np.asarray(field, np.float64)[vertices] for field in fields)
+    low, size = points.min(axis=0), max(float(np.ptp(points, axis=0).max()), 1e-9)
+    place = np.rint((points - low) / size * 65535).astype("<u2")
+    arrays = [place, np.rint(directions * 32767).astype("<i2"), F.astype("<u4")]
+    if uv is not None:
+        arrays.append(np.asarray(uv, "<f4")[triangles])
+    counts = {"points": len(points), "triangles": len(F), "textured": uv is not None}
+    return Part({**meta, "low": low.tolist(), "size": size, **counts}, arrays, F, vertices)
+
+
+def _data_uri(model: mujoco.MjModel, texture: int) -> str:
+    image = Image.fromarray(texture_pixels(model, texture))
+    image.thumbnail((_LARGEST_IMAGE, _LARGEST_IMAGE))
+    file = io.BytesIO()
+    image.save(file, "JPEG", quality=88) if image.width > 64 else image.save(file, "PNG")
+    kind = "jpeg" if image.width > 64 else "png"
+    return f"data:image/{kind};base64,{base64.b64encode(file.getvalue()).decode()}"
+
+
+_CHUNK = 16  # frames that are decoded together
+_STEP = 5e-5  # of heights, in sizes of the object
+_SCRIPTS = (
+    *("algebra.js", "decode.js", "motion.js", "light_shaders.js", "shaders.js", "environment.js", "light.js"),
+    *("programs.js", "parts.js", "groups.js", "lit_points.js", "floor.js", "drawing.js", "player.js"),
+)
+
+
+class PageWriter:
+    """Writes a page that plays a run: the player, what stays the same, and chunks of frames, each when it is full.
+
+    Parameters
+    ----------
+    source : Source
+    path : Path
+    """
+
+    def __init__(self, source: Source, path: Path) -> None:
+        self._source, self._file = source, path.open("w", encoding="utf-8")
+        self._meshes = {name: target_mesh(source, name) for name in source.ripples}
+        self._targets = {name: target_part(source, name, mesh) for name, mesh in self._meshes.items()}
+        self._parents = {name: parents_of(part.F, len(part.vertices)) for name, part in self._targets.items()}
+        self._steps = {name: _STEP * float(np.ptp(mesh.rest, axis=0).max()) for name, mesh in self._meshes.items()}
+        self._motions = [
+            Motion(source.ripples[name].rest.mesh, self._meshes[name], part.vertices)
+            for name, part in self._targets.items()
+        ]
+        self._told: set[int] = set()  # targets whose motion has been told of
+        self._last: dict[str, Any] = {}
+        self._poses: list[list[list[float]]] = []
+        self._arrows: list[list[list[float]]] = []
+        self._planes: list[bytes] = []
+        self._frames = 0
+
+    def write(self, moment: Moment) -> None:
+        """Add a frame."""
+        if not self._frames:
+            self._begin(moment.data)
+        self._poses.append(self._pose(moment.data))
+        self._arrows.append([self._arrow(moment.data, impulse) for impulse in moment.impulses])
+        for (name, mesh), motion in zip(self._meshes.items(), self._motions, strict=True):
+            waves = self._source.ripples[name]
+            motion.add(self._source.ripples.vertices(name, moment.data))
+            heights = mesh.shape(waves.height, waves.velocity).heights[self._targets[name].vertices]
+            steps = quantised(heights, self._steps[name])
+            # a chunk begins from nothing, so that it can be decoded alone
+            before = self._last[name] if len(self._poses) > 1 else np.zeros_like(steps)
+            self._planes.append(residuals(steps, before, self._parents[name]))
+            self._last[name] = steps
+        self._frames += 1
+        if len(self._poses) == _CHUNK:
+            self._flush()
+
+    def finish(self) -> None:
+        """Complete the page."""
+        self._flush()
+        self._file.write(f'<script type="application/json" id="end">{{"frames": {self._frames}}}</script>\n')
+        self._file.write("</body>\n</html>\n")
+        self._file.close()
+
+    def close(self) -> str:
+        """Leave the page incomplete."""
+        with contextlib.suppress(OSError):
+            self._file.close()
+        return ""
+
+    def _begin(self, data: mujoco.MjData) -> None:
+        source, model = self._source, self._source.model
+        targets = set(source.ripples.geom_ids.values())
+        floor = find_floor(model, [geom for geom in visible_geoms(model) if geom not in targets])
+        parts = [*self._targets.values(), *solid_parts(source, -1 if floor is None else floor)]
+        pose, _ = source.pose(data)
+        floor_meta = floor_of(model, floor)
+        meta = {
+            "fps": source.fps,
+            "chunk": _CHUNK,
+            "steps": list(self._steps.values()),
+            "parts": [part.meta for part in parts],
+            "images": images(model, [part.meta for part in parts] + ([floor_meta] if floor_meta else [])),
+            "floor": floor_meta,
+            "light": light_of(source, data),
+            "fovy": pose.fovy,
+            "distance": pose.distance,
+            "aspect": source.size[0] / source.size[1],
+            "heat": heat_colors(),
+        }
+        self._file.write(_head(", ".join(self._meshes)))
+        arrays = b"".join(array.tobytes() for part in parts for array in part.arrays)
+        self._file.write(f'<script type="application/json" id="meta">{json.dumps(meta)}</script>\n')
+        self._file.write(f'<script type="text/plain" id="arrays">{packed(arrays)}</script>\n')
+
+    def _pose(self, data: mujoco.MjData) -> list[list[float]]:
+        """Position and quaternion of the camera and of all bodies."""
+        pose, _ = self._source.pose(data)
+        quaternion = np.zeros(4)
+        mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
+        rows = np.concatenate([[[*pose.position, *quaternion]], np.concatenate([data.xpos, data.xquat], axis=1)])
+        return np.round(rows, 5).tolist()
+
+    def _arrow(self, data: mujoco.MjData, impulse: Any) -> list[float]:
+        """Point and inward direction in the world, and impulse [N s]."""
+        ripples = self._source.ripples
+        _, rotation = target_pose(data, ripples.geom_ids[impulse.geom])
+        inwards = -rotation @ ripples[impulse.geom].atlas.normals[impulse.texel] * (-1 if impulse.inner else 1)
+        return [round(float(x), 5) for x in (*impulse.point, *inwards, impulse.impulse)]
+
+    def _flush(self) -> None:
+        """Write the frames that wait as a chunk."""
+        if self._poses:
+            middles, moved = self._moved()
+            text = json.dumps({"poses": self._poses, "arrows": self._arrows, "middles": middles}).encode()
+            content = len(text).to_bytes(4, "little") + text + b"".join(self._planes + moved)
+            self._file.write(f'<script type="text/plain" class="chunk">{packed(content)}</script>\n')
+            self._file.flush()
+        self._poses, self._arrows, self._planes = [], [], []
+
+    def _moved(self) -> tuple[dict[int, list[list[float]]], list[bytes]]:
+        """Middles and coded vertices of the targets that move, by number; each is told of before it first does."""
+        middles, planes = {}, []
+        for number, motion in enumerate(self._motions):
+            places, coded = motion.chunk()
+            if not motion.moves:
+                continue
+            if number not in self._told:
+                told = json.dumps(motion.told())
+                self._file.write(
+                    f'<script type="application/json" class="motion" data-target="{number}">{told}</script>\n'
+                )
+                self._told.add(number)
+            middles[number] = places
+            planes.append(coded)
+        return middles, planes
+
+
+def writer(source: Source, path: Path) -> PageWriter:
+    """Begin a page."""
+    return PageWriter(source, path)
+
+
+def _head(title: str) -> str:
+    def read(name: str) -> str:
+        return importlib.resources.files(__package__).joinpath("html", name).read_text("utf-8")
+
+    page = read("page.html")
+    scripts = "\n".join(f"<script>\n{read(name)}</script>" for name in _SCRIPTS)
+    return page.replace("TITLE", html.escape(title)).replace("MARK", MARK).replace("SCRIPTS", scripts)

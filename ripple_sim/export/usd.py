@@ -1,0 +1,248 @@
+"""`UsdWriter`: a run as a stage of Universal Scene Description.
+
+The camera of a run, with its motion, lens and shutter.
+
+Files of Universal Scene Description, and how one from here is known again.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdUtils
+
+from ripple_sim.coupling.geoms import target_name
+from ripple_sim.coupling.soft import is_soft
+from ripple_sim.encode.replace import MARK
+
+from .moving_mesh import MovingMesh, Shape
+from .source import Moment, Source
+from .usd_chunks import Chunks, save, succeed
+from .usd_looks import Lamps, Materials, child, define_mesh, extent, place, placing, vectors
+from .visuals import solid_finish, solids, target_finish, target_uv
+
+_SENSOR = 0.024  # height [m], that of 35 mm film; the angle of view and the depth of field do not depend on it
+_TENTHS = 10.0  # USD gives lengths in a camera in tenths of a unit
+_NEAR, _FAR = 0.01, 1000.0  # of the camera's distance
+
+
+class MovingCamera:
+    """A camera in a stage, with the motion of the source's.
+
+    Parameters
+    ----------
+    stage : Usd.Stage
+    path : Sdf.Path
+    source : Source
+    """
+
+    def __init__(self, stage: Usd.Stage, path: Sdf.Path, source: Source) -> None:
+        self._source = source
+        self._camera = UsdGeom.Camera.Define(stage, path)
+        width, height = source.size
+        self._camera.CreateVerticalApertureAttr(_TENTHS * _SENSOR)
+        self._camera.CreateHorizontalApertureAttr(_TENTHS * _SENSOR * width / height)
+        self._camera.CreateShutterOpenAttr(0.0)
+        self._camera.CreateShutterCloseAttr(source.camera.shutter / 360)
+
+    def begin(self, data: mujoco.MjData) -> None:
+        """Define what stays as it is at the first frame."""
+        pose, _ = self._source.pose(data)
+        focal, aperture = _SENSOR / 2 / np.tan(np.radians(pose.fovy) / 2), self._source.camera.aperture
+        placing(self._camera)
+        self._camera.CreateFocalLengthAttr(_TENTHS * focal)
+        self._camera.CreateFStopAttr(focal / aperture if aperture else 0.0)  # 0: all is sharp
+        self._camera.CreateClippingRangeAttr(Gf.Vec2f(_NEAR * pose.distance, _FAR * pose.distance))
+        self._camera.CreateFocusDistanceAttr()
+
+    def write(self, data: mujoco.MjData, time: float) -> None:
+        """Add a frame."""
+        pose, focus = self._source.pose(data)
+        quaternion = np.zeros(4)
+        mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
+        place(self._camera, pose.position, quaternion, time)
+        self._camera.GetFocusDistanceAttr().Set(float(focus), Usd.TimeCode(time))
+
+
+# Frames are kept in memory until so many are there, and then appended to the file.
+_KEPT = 8
+
+
+class UsdWriter:
+    """Writes a run to a .usdc, .usda or .usdz file, in metres, with z up, a time code a frame.
+
+    Parameters
+    ----------
+    source : Source
+    path : Path
+    """
+
+    def __init__(self, source: Source, path: Path) -> None:
+        self._source, self._path = source, path
+        # text and packages are made of a binary file, which alone can grow
+        self._binary = path if path.suffix.lower() == ".usdc" else path.with_name(f"{path.stem}.whole.usdc")
+        self._images = path.with_name(f"{path.stem}.textures")
+        layer = Sdf.Layer.CreateNew(str(self._binary))
+        layer.comment = MARK
+        self._stage = stage = Usd.Stage.Open(layer)
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+        stage.SetTimeCodesPerSecond(source.fps)
+        stage.SetFramesPerSecond(source.fps)
+        world = UsdGeom.Xform.Define(stage, "/World")
+        stage.SetDefaultPrim(world.GetPrim())
+        self._materials = Materials(stage, world.GetPath().AppendChild("Looks"), source.model, self._images)
+        self._camera = MovingCamera(stage, world.GetPath().AppendChild("camera"), source)
+        self._lamps = Lamps(stage, world.GetPath().AppendChild("lights"), source)
+        self._bodies = self._define_bodies(UsdGeom.Scope.Define(stage, "/World/bodies").GetPath())
+        self._define_solids()
+        self._before: dict[str, NDArray[np.float32]] = {}
+        self._surfaces = {name: self._define_surface(name) for name in source.ripples}
+        self._last = 0
+        self._chunks = None if source.chunking is None else Chunks(stage, world.GetPath(), source.chunking)
+
+    def write(self, moment: Moment) -> None:
+        """Add a frame, unless it is there from an earlier run."""
+        number, chunks = moment.number, self._chunks
+        if number == 0:
+            self._begin(moment.data)
+        if chunks is None:
+            self._sample(moment, self._shapes(moment.data))
+        else:
+            chunks.check_state(self._source, moment)
+            if number >= chunks.stored - 1:  # the one before tells of motion
+                shapes = self._shapes(moment.data)
+            if number >= chunks.stored:
+                chunks.write(number, lambda: self._sample(moment, shapes))
+        self._last = number
+        if number % _KEPT == _KEPT - 1:
+            self._save()
+
+    def finish(self) -> None:
+        """Complete the file."""
+        self._stage.SetStartTimeCode(0)
+        self._stage.SetEndTimeCode(self._last)
+        if self._chunks is not None:
+            self._chunks.finish(self._path.with_name(f"{self._path.stem}.chunks"), self._last)
+        self._save()
+        match self._path.suffix.lower():
+            case ".usda":
+                succeed(self._stage.GetRootLayer().Export, str(self._path))
+            case ".usdz":
+                succeed(UsdUtils.CreateNewUsdzPackage, Sdf.AssetPath(str(self._binary)), str(self._path))
+                self._clear_images()
+        if self._binary != self._path:
+            self._binary.unlink()
+
+    def close(self) -> str:
+        """Give up what is not saved; say what is kept of an unfinished run, if anything."""
+        return "" if self._chunks is None else self._chunks.close()
+
+    def _begin(self, data: mujoco.MjData) -> None:
+        """Define what stays as it is at the first frame."""
+        self._camera.begin(data)
+        self._lamps.begin(data)
+        for body, prim in self._bodies.items():
+            if _stands(self._source.model, body):
+                place(prim, data.xpos[body], data.xquat[body], 0)
+            else:
+                placing(prim)
+
+    def _shapes(self, data: mujoco.MjData) -> dict[str, Shape]:
+        """The surfaces of a frame; call it frame by frame."""
+        source, shapes = self._source, {}
+        for name, (surface, _) in self._surfaces.items():
+            waves, V = source.ripples[name], source.ripples.vertices(name, data)
+            shape = surface.shape(waves.height, waves.velocity / np.float32(source.slow_motion), V)
+            if V is not None:
+                # waves and motion together, since the frame before
+                before = self._before.get(name, shape.points)
+                shape = shape._replace(velocities=(shape.points - before) * np.float32(source.fps))
+                self._before[name] = shape.points
+            shapes[name] = shape
+        return shapes
+
+    def _sample(self, moment: Moment, shapes: dict[str, Shape]) -> None:
+        """Set the time samples of a frame."""
+        time, data = moment.number, moment.data
+        for body, prim in self._bodies.items():
+            if not _stands(self._source.model, body):
+                place(prim, data.xpos[body], data.xquat[body], time)
+        self._camera.write(data, time)
+        self._lamps.write(data, time)
+        for name, (_, mesh) in self._surfaces.items():
+            shape = shapes[name]
+            mesh.GetPointsAttr().Set(vectors(shape.points), time)
+            mesh.GetNormalsAttr().Set(vectors(shape.normals), time)
+            mesh.GetVelocitiesAttr().Set(vectors(shape.velocities), time)
+            mesh.GetExtentAttr().Set(extent(shape.points), time)
+
+    def _save(self) -> None:
+        save(self._stage.GetRootLayer())
+        if self._chunks is not None:
+            self._chunks.save()
+
+    def _clear_images(self) -> None:
+        """Remove the images, which are in the package now."""
+        if self._images.exists():
+            for image in self._images.iterdir():
+                image.unlink()
+            self._images.rmdir()
+
+    def _define_bodies(self, path: Sdf.Path) -> dict[int, UsdGeom.Xform]:
+        model, prims = self._source.model, {}
+        for body in range(model.nbody):
+            name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body) or f"body_{body}"
+            prims[body] = UsdGeom.Xform.Define(self._stage, child(self._stage, path, name))
+        return prims
+
+    def _define_solids(self) -> None:
+        model = self._source.model
+        for solid in solids(model, set(self._source.ripples.geom_ids.values())):
+            path = child(self._stage, self._bodies[solid.body].GetPath(), solid.name)
+            mesh = define_mesh(self._stage, path, solid.F, solid.uv, open_surface=False)
+            place(mesh, solid.position, solid.quaternion)
+            mesh.CreatePointsAttr(vectors(solid.points))
+            mesh.CreateNormalsAttr(vectors(solid.normals))
+            mesh.CreateExtentAttr(extent(solid.points))
+            self._materials.bind(mesh, solid_finish(model, solid.visual))
+
+    def _define_surface(self, name: str) -> tuple[MovingMesh, UsdGeom.Mesh]:
+        source, model = self._source, self._source.model
+        geom = source.ripples.geom_ids[name]
+        surface, atlas, soft = source.mesh(name), source.ripples[name].rest, is_soft(model, geom)
+        finish = target_finish(model, geom, source.paints[name], surface.uv is not None)
+        uv = surface.uv if finish.texture < 0 else target_uv(model, geom, surface)
+        body = self._bodies[0 if soft else int(model.geom_bodyid[geom])]
+        path = child(self._stage, body.GetPath(), target_name(model, geom))
+        mesh = define_mesh(self._stage, path, surface.F, uv, open_surface=not atlas.mesh.closed)
+        if not soft:
+            place(mesh, model.geom_pos[geom], model.geom_quat[geom])
+        mesh.CreatePointsAttr(), mesh.CreateNormalsAttr(), mesh.CreateVelocitiesAttr(), mesh.CreateExtentAttr()
+        self._materials.bind(mesh, finish)
+        return surface, mesh
+
+
+def _stands(model: mujoco.MjModel, body: int) -> bool:
+    """Whether a body is fixed to the world."""
+    root = int(model.body_weldid[body])
+    return root == 0 and int(model.body_mocapid[int(model.body_rootid[body])]) < 0
+
+
+def writer(source: Source, path: Path) -> UsdWriter:
+    """Begin a file."""
+    return UsdWriter(source, path)
+
+
+def made_here(path: Path) -> bool:
+    """Whether a layer has the mark as its comment."""
+    if not path.is_file():
+        return False
+    try:
+        layer = Sdf.Layer.OpenAsAnonymous(str(path), metadataOnly=True)
+    except Tf.ErrorException:
+        return False
+    return layer is not None and layer.comment == MARK

@@ -1,1 +1,0 @@
-"""Universal Scene Description: the moving geometry, camera, lamps and looks of a run."""

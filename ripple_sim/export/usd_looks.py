@@ -1,0 +1,264 @@
+"""Looks and textures as UsdPreviewSurface materials.
+
+Meshes in a stage: what stays the same over time.
+
+The lamps of a run as UsdLux lights.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
+
+from ripple_sim.encode.replace import png_mark
+from ripple_sim.render.visuals.lights import Light, Lighting, is_lit, model_lighting, studio_lighting
+from ripple_sim.render.visuals.visual import texture_pixels
+
+from .source import Source
+from .visuals import Finish
+
+
+def define_mesh(
+    stage: Usd.Stage, path: Sdf.Path, F: NDArray[np.int64], uv: NDArray[np.float64] | None, *, open_surface: bool
+) -> UsdGeom.Mesh:
+    """Define a mesh of triangles [m, 3], with texture coordinates [m, 3, 2] of their corners."""
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateDoubleSidedAttr(open_surface)
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(F), 3))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(F, np.int32).ravel()))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    if uv is not None:
+        kind = Sdf.ValueTypeNames.TexCoord2fArray
+        primvar = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", kind, UsdGeom.Tokens.faceVarying)
+        places, index = np.unique(uv.reshape(-1, 2).astype(np.float32), axis=0, return_inverse=True)
+        primvar.Set(Vt.Vec2fArray.FromNumpy(places))
+        primvar.SetIndices(Vt.IntArray.FromNumpy(index.ravel().astype(np.int32)))
+    return mesh
+
+
+def vectors(values: NDArray) -> Vt.Vec3fArray:
+    """An array [n, 3] as USD takes it."""
+    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(values, np.float32))
+
+
+def extent(points: NDArray) -> Vt.Vec3fArray:
+    """Bounding box of points [n, 3]."""
+    return vectors(np.stack([points.min(axis=0), points.max(axis=0)]))
+
+
+def place(prim: UsdGeom.Xformable, position: NDArray, quaternion: NDArray, time: float | None = None) -> None:
+    """Set where a prim is in its parent's frame: position [m], and quaternion, w first."""
+    moment = Usd.TimeCode.Default() if time is None else Usd.TimeCode(time)
+    translate, orient = placing(prim)
+    translate.Set(Gf.Vec3d(*map(float, position)), moment)
+    orient.Set(Gf.Quatd(*map(float, quaternion)), moment)
+
+
+def placing(prim: UsdGeom.Xformable) -> tuple[UsdGeom.XformOp, UsdGeom.XformOp]:
+    """Translation and orientation of a prim, added where there are none."""
+    translate, orient = prim.GetOrderedXformOps() or (
+        prim.AddTranslateOp(),
+        prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble),
+    )
+    return translate, orient
+
+
+def child(stage: Usd.Stage, parent: Sdf.Path, name: str) -> Sdf.Path:
+    """A path under a parent that is not taken, called as much like a name as USD allows."""
+    valid = Tf.MakeValidIdentifier(name)
+    path, number = parent.AppendChild(valid), 1
+    while stage.GetPrimAtPath(path):
+        number += 1
+        path = parent.AppendChild(f"{valid}_{number}")
+    return path
+
+
+def keep(prim: Usd.Prim, name: str, value: float) -> None:
+    """Keep a number with a prim, among the properties that are the user's own."""
+    prim.CreateAttribute(f"userProperties:{name}", Sdf.ValueTypeNames.Float).Set(float(value))
+
+
+_LEAST_RADIUS = 0.01  # of a lamp whose MJCF gives none [m]
+_STUDIO_SKY = 0.25  # radiance that stands for the studio's soft boxes, which USD has no equal of
+
+
+class Lamps:
+    """The lights of a source, which stand still or turn with the camera as its renderer's do.
+
+    A white surface that faces a far light has the radiance that it has in the renderer; so it has at the model's middle
+    for a near one, which falls off with the square of the distance everywhere else, as light does.
+
+    Parameters
+    ----------
+    stage : Usd.Stage
+    path : Sdf.Path
+        Under which the lights stand.
+    source : Source
+    """
+
+    def __init__(self, stage: Usd.Stage, path: Sdf.Path, source: Source) -> None:
+        self._stage, self._source = stage, source
+        self._path = UsdGeom.Scope.Define(stage, path).GetPath()
+        self._studio = source.lighting == "studio" or (source.lighting == "auto" and not is_lit(source.model))
+        self._lamps: list[UsdGeom.Xformable] = []
+
+    def begin(self, data: mujoco.MjData) -> None:
+        """Define the lights of the first frame, which only move later."""
+        lighting = self._lighting(data)
+        for index, light in enumerate(lighting.lights):
+            path = self._path.AppendChild(f"lamp_{index}")
+            define = _far if light.position is None else _near
+            self._lamps.append(define(self._stage, path, light, self._source.model.stat.center))
+            placing(self._lamps[-1])
+        sky = lighting.ambient + (_STUDIO_SKY if self._studio else 0.0)
+        if sky.any():
+            dome = UsdLux.DomeLight.Define(self._stage, self._path.AppendChild("sky"))
+            _set_light(dome, sky, 1.0)
+
+    def write(self, data: mujoco.MjData, time: float) -> None:
+        """Add a frame."""
+        for lamp, light in zip(self._lamps, self._lighting(data).lights, strict=False):
+            position = np.zeros(3) if light.position is None else light.position
+            place(lamp, position, _towards(light.direction), time)
+
+    def _lighting(self, data: mujoco.MjData) -> Lighting:
+        pose, _ = self._source.pose(data)
+        return studio_lighting(pose) if self._studio else model_lighting(self._source.model, data, pose)
+
+
+def _far(stage: Usd.Stage, path: Sdf.Path, light: Light, middle: NDArray) -> UsdGeom.Xformable:
+    lamp = UsdLux.DistantLight.Define(stage, path)
+    angle = 2 * np.arctan(light.size)
+    lamp.CreateAngleAttr(float(np.degrees(angle)))
+    lamp.CreateNormalizeAttr(True)
+    _set_light(lamp, light.radiance, np.pi)
+    keep(lamp.GetPrim(), "power", np.pi * light.radiance.max())  # [W/m^2], as Blender has it
+    keep(lamp.GetPrim(), "angle", angle)  # [radians], likewise
+    return lamp
+
+
+def _near(stage: Usd.Stage, path: Sdf.Path, light: Light, middle: NDArray) -> UsdGeom.Xformable:
+    lamp = UsdLux.SphereLight.Define(stage, path)
+    lamp.CreateRadiusAttr(max(light.size, _LEAST_RADIUS))
+    lamp.CreateNormalizeAttr(True)
+    distance = 1.0 if light.position is None else max(float(np.linalg.norm(light.position - middle)), 1e-3)
+    # a sphere's irradiance is its intensity over four times the distance squared
+    strength = np.pi / float(light.falloff @ [1.0, distance, distance**2])
+    _set_light(lamp, light.radiance, 4 * distance**2 * strength)
+    keep(lamp.GetPrim(), "power", 4 * np.pi * distance**2 * strength * light.radiance.max())  # [W], as Blender has it
+    if light.cutoff < np.pi:
+        shaping = UsdLux.ShapingAPI.Apply(lamp.GetPrim())
+        shaping.CreateShapingConeAngleAttr(float(np.degrees(light.cutoff)))
+        shaping.CreateShapingFocusAttr(light.exponent)
+    return lamp
+
+
+def _set_light(lamp: UsdLux.DistantLight, radiance: NDArray, intensity: float) -> None:
+    brightest = max(float(radiance.max()), 1e-9)
+    lamp.CreateColorAttr(Gf.Vec3f(*(float(each) / brightest for each in radiance)))
+    lamp.CreateIntensityAttr(intensity * brightest)
+
+
+def _towards(direction: NDArray) -> NDArray[np.float64]:
+    """Quaternion of a light that shines along its -z, against a direction."""
+    quaternion = np.zeros(4)
+    mujoco.mju_quatZ2Vec(quaternion, np.ascontiguousarray(direction))
+    return quaternion
+
+
+_COAT_ROUGHNESS = 0.1
+_WATER = 1.33  # refractive index of what is transparent
+
+
+class Materials:
+    """Materials under a prim, and their images in a folder beside the stage's file.
+
+    Parameters
+    ----------
+    stage : Usd.Stage
+    path : Sdf.Path
+        Of the prim.
+    model : mujoco.MjModel
+    images : Path
+        The folder; made when it is first needed.
+    """
+
+    def __init__(self, stage: Usd.Stage, path: Sdf.Path, model: mujoco.MjModel, images: Path) -> None:
+        self._stage, self._model, self._images = stage, model, images
+        self._path = UsdGeom.Scope.Define(stage, path).GetPath()
+        self._made: dict[tuple, UsdShade.Material] = {}
+        self._textures: dict[int, str] = {}
+
+    def bind(self, mesh: UsdGeom.Mesh, finish: Finish) -> None:
+        """Give a mesh its material, and its colour for viewers without materials."""
+        mesh.CreateDisplayColorAttr([Gf.Vec3f(*map(float, finish.color))])
+        if finish.opacity < 1:
+            mesh.CreateDisplayOpacityAttr([finish.opacity])
+        key = finish.look, tuple(finish.color), finish.opacity, finish.texture
+        if key not in self._made:
+            self._made[key] = self._material(finish)
+        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(self._made[key])
+
+    def _material(self, finish: Finish) -> UsdShade.Material:
+        path = self._path.AppendChild(f"look_{len(self._made)}")
+        material = UsdShade.Material.Define(self._stage, path)
+        shader = UsdShade.Shader.Define(self._stage, path.AppendChild("surface"))
+        shader.CreateIdAttr("UsdPreviewSurface")
+        look, color = finish.look, Gf.Vec3f(*map(float, finish.color))
+        for name, value in (
+            ("roughness", look.roughness),
+            ("metallic", look.metallic),
+            ("clearcoat", look.coat),
+            ("clearcoatRoughness", _COAT_ROUGHNESS),
+            ("opacity", finish.opacity * (1 - look.transparency)),
+            ("ior", _WATER if look.transparency else 1.5),
+        ):
+            shader.CreateInput(name, Sdf.ValueTypeNames.Float).Set(float(value))
+        diffuse = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+        if look.emission:
+            shader.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f).Set(color * look.emission)
+        if finish.texture >= 0:
+            diffuse.ConnectToSource(self._image(path, finish.texture, color))
+        else:
+            diffuse.Set(color)
+        # what UsdPreviewSurface has no word for; Blender takes such attributes over as custom properties
+        for name, value in (
+            ("translucency", look.translucency),
+            ("sheen", look.sheen),
+            ("transparency", look.transparency),
+            ("opacity", finish.opacity),
+        ):
+            keep(material.GetPrim(), name, value)
+        material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+        return material
+
+    def _image(self, path: Sdf.Path, texture: int, tint: Gf.Vec3f) -> UsdShade.Output:
+        """Node that reads an image, times a linear colour."""
+        reader = UsdShade.Shader.Define(self._stage, path.AppendChild("st"))
+        reader.CreateIdAttr("UsdPrimvarReader_float2")
+        reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
+        image = UsdShade.Shader.Define(self._stage, path.AppendChild("image"))
+        image.CreateIdAttr("UsdUVTexture")
+        image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(self._file(texture))
+        image.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
+        image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(*tint, 1))
+        for side in ("wrapS", "wrapT"):
+            image.CreateInput(side, Sdf.ValueTypeNames.Token).Set("repeat")
+        st = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+        image.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(st)
+        return image.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
+
+    def _file(self, texture: int) -> str:
+        """Write a texture once, and return where it is, from the stage's file."""
+        if texture not in self._textures:
+            self._images.mkdir(exist_ok=True)
+            name = f"texture_{texture}.png"
+            Image.fromarray(texture_pixels(self._model, texture)).save(self._images / name, pnginfo=png_mark())
+            self._textures[texture] = f"./{self._images.name}/{name}"
+        return self._textures[texture]

@@ -1,0 +1,195 @@
+"""`RippleWrapper` makes a MuJoCo environment of Gymnasium ripple.
+
+What a MuJoCo environment of Gymnasium has: its model and data, the size of its frames, and its camera.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ripple_sim.coupling.geoms import ByGeom, own_data, own_model
+from ripple_sim.coupling.ripples import Ripples
+from ripple_sim.errors import RippleWarning, SceneError
+from ripple_sim.export.exporter import RippleRenderer
+from ripple_sim.render import Camera, FixedCamera
+from ripple_sim.solver import Material
+
+try:
+    import gymnasium
+    from gymnasium.utils import EzPickle, RecordConstructorArgs
+except ImportError as error:
+    raise ImportError(
+        "ripple_sim.gymnasium needs Gymnasium, which is not installed; install it with: "
+        "pip install 'ripple-sim[gymnasium]'"
+    ) from error
+
+# Of MuJoCo's cameras, and of frames where an environment does not say.
+_AZIMUTH, _ELEVATION, _SIZE = 90.0, -45.0, 480
+
+
+def model_and_data(env: Any) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Model and data of an unwrapped environment: its own, or those of its dm_control `physics`.
+
+    Raises
+    ------
+    SceneError
+        If it has none.
+    """
+    holder = getattr(env, "physics", env)
+    if not (hasattr(holder, "model") and hasattr(holder, "data")):
+        raise SceneError(
+            f"the environment {env} has no `model` and `data`; valid are MuJoCo environments, such as those derived "
+            "from gymnasium.envs.mujoco.MujocoEnv"
+        )
+    model = own_model(holder.model)
+    return model, own_data(model, holder.data)
+
+
+def frame_size(env: Any) -> tuple[int, int]:
+    """Width and height of an environment's frames [pixels]."""
+    viewer = getattr(env, "mujoco_renderer", env)
+    return getattr(viewer, "width", None) or _SIZE, getattr(viewer, "height", None) or _SIZE
+
+
+class EnvironmentCamera:
+    """The camera with which a `MujocoEnv` renders offscreen.
+
+    That is the one of its `camera_id` or `camera_name`, or else MuJoCo's free camera with the environment's
+    `default_camera_config`, aimed at the median of the geoms as they are when the first frame is drawn.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        Unwrapped.
+    """
+
+    def __init__(self, env: Any) -> None:
+        viewer = getattr(env, "mujoco_renderer", None)
+        self._index = int(getattr(viewer, "camera_id", -1))
+        self._settings: dict[str, Any] = dict(getattr(viewer, "default_cam_config", None) or {})
+
+    def __call__(self, model: mujoco.MjModel, data: mujoco.MjData) -> Camera | FixedCamera:
+        """The camera at the present time."""
+        if self._index >= 0:
+            return FixedCamera(
+                position=data.cam_xpos[self._index].copy(),
+                rotation=data.cam_xmat[self._index].reshape(3, 3).copy(),
+                distance=float(model.stat.extent),
+                fovy=float(model.cam_fovy[self._index]),
+            )
+        x, y, z = self._settings.setdefault("lookat", np.median(data.geom_xpos, axis=0))
+        return Camera(
+            lookat=(float(x), float(y), float(z)),
+            distance=float(self._settings.get("distance", model.stat.extent)),
+            azimuth=float(self._settings.get("azimuth", _AZIMUTH)),
+            elevation=float(self._settings.get("elevation", _ELEVATION)),
+            fovy=float(model.vis.global_.fovy),
+        )
+
+
+_DRAWN = "rgb_array"
+
+
+class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
+    """A MuJoCo environment with ripples on some of its geoms.
+
+    Each physics step within `step` drives the ripples, however many the environment takes (`frame_skip`), and `reset`
+    flattens them. `info` has two more entries:
+
+    - `"impulses"`: list of `Impulse`, those that the surfaces received since the last `step` or `reset`;
+    - `"heights"`: geom name to the heights of its ripples [m], float32 [C, n, n].
+
+    With `render_mode="rgb_array"`, `render` returns a frame with the ripples, drawn by ripple-sim, of the environment's
+    size and from its camera. Other modes draw without them. Observation, reward and their spaces are those of the
+    environment. A pickled or copied environment begins anew, as Gymnasium's own ones do.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        One whose unwrapped environment has MuJoCo's `model` and `data` (or dm_control's `physics`), and that steps
+        through `mujoco.mj_step` or `mujoco.mj_step2`.
+    materials : mapping
+        Geom to its `Material`, as for `Ripples`.
+    looks : mapping, optional
+        Geom to its look, as for `RippleRenderer`.
+    **options
+        Keyword arguments of `Ripples`: resolution, backend, two_way and so on.
+
+    Attributes
+    ----------
+    ripples : Ripples
+
+    Raises
+    ------
+    RippleError
+        If the environment has no MuJoCo model, or as `Ripples` does.
+    """
+
+    _renderer: RippleRenderer | None
+
+    def __init__(
+        self,
+        env: gymnasium.Env,
+        materials: ByGeom[Material],
+        *,
+        looks: ByGeom[str] | None = None,
+        **options: Any,
+    ) -> None:
+        RecordConstructorArgs.__init__(self, materials=materials, looks=looks, **options)
+        EzPickle.__init__(self, env, materials, looks=looks, **options)
+        gymnasium.Wrapper.__init__(self, env)
+        if self.render_mode not in (None, _DRAWN):
+            warnings.warn(
+                f'render_mode is {self.render_mode!r}, which shows no ripples; with "{_DRAWN}" `render` returns frames '
+                "with them",
+                RippleWarning,
+                stacklevel=2,
+            )
+        self._materials, self._looks, self._options = materials, looks, options
+        self._camera = EnvironmentCamera(env.unwrapped)
+        self._couple()
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Step the environment, and the ripples with each of its physics steps."""
+        _, data = model_and_data(self.unwrapped)
+        with self.ripples.following(data):
+            observation, reward, terminated, truncated, info = self.env.step(action)
+        return observation, reward, terminated, truncated, {**info, **self._info()}
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Reset the environment, and flatten the ripples."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        model, _ = model_and_data(self.unwrapped)
+        if model is self.ripples.model:
+            self.ripples.reset()
+        else:  # environments may build a new one for each episode
+            self._couple()
+        return observation, {**info, **self._info()}
+
+    def render(self) -> Any:
+        """Return a frame with the ripples in mode "rgb_array", uint8 [height, width, 3]; else as the environment."""
+        if self.render_mode != _DRAWN:
+            return self.env.render()
+        model, data = model_and_data(self.unwrapped)
+        if self._renderer is None:
+            width, height = frame_size(self.unwrapped)
+            self._renderer = RippleRenderer(model, self.ripples, width=width, height=height, looks=self._looks)
+        return self._renderer.render(data, self._camera(model, data))
+
+    def close(self) -> None:
+        """Close the environment, and release what drawing needs."""
+        self._renderer = None
+        self.env.close()
+
+    def _couple(self) -> None:
+        model, _ = model_and_data(self.unwrapped)
+        self.ripples = Ripples(model, self._materials, **self._options)
+        self._renderer = None
+
+    def _info(self) -> dict[str, Any]:
+        heights = {name: self.ripples[name].height for name in self.ripples}
+        return {"impulses": self.ripples.last_impulses, "heights": heights}

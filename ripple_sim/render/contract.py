@@ -1,0 +1,168 @@
+"""What the renderer and its shaders agree on. Every shader gets all of this as defines; see `DEFINES`."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from ripple_sim.solver.gl.shader import Struct, numbered
+
+from . import camera
+
+MAX_LIGHTS, MAX_SHADOWS, MAX_OCCLUDERS, SOFT_BOXES = 8, 4, 16, 3
+HELD_LIGHTS = 2  # that come to fragments as varyings
+VERTEX_GROUP = 64  # vertices that a work group displaces
+OBJECT_COLUMNS = 64  # objects in a row of their table; a power of two
+
+
+class Unit(IntEnum):
+    """Texture units; `NAME_UNIT` in GLSL."""
+
+    HEIGHT_MAPS = 0
+    SHADOW_TEST = 1  # the shadow maps, compared with a depth
+    SHADOW_MAPS = 2
+    FLOOR_MAP = 3  # ambient visibility of the floor
+    CEILING = 4  # how high above the floor the lowest geoms hang, and of which colour they are
+    FLAT_IMAGE = 5
+    CUBE_IMAGE = 6
+    SKYBOX = 7
+    DEPTHS = 8  # the G-buffer: depths, then its two colour attachments
+    NORMALS = 9
+    COLORS = 10
+    BEHIND = 11  # the frame without the transparent object that is being drawn
+    HEATMAP = 12
+    HEATMAP_COLORS = 13
+    MIRROR = 14
+    COARSE_BACKGROUND = 15
+    BLOCKERS = 16  # what the shadow maps hold, prefiltered
+    FLOOR_BOUNCE = 17  # light that objects throw on the floor
+    TRANSMISSION = 18  # what transparent objects take from the lights
+    OBJECTS = 19  # the table of objects
+    FLOOR_SEEN = 20  # the floor's light as solids see it
+
+
+class Binding(IntEnum):
+    """Bindings of storage buffers and of the one uniform block; `NAME_BINDING` in GLSL."""
+
+    REST_VERTICES = 0
+    MOVED_VERTICES = 1
+    MIDPOINTS = 2
+    FRAME = 3
+    OCCLUDERS = 4
+
+
+class Splitting(IntEnum):
+    """Bindings of the storage buffers of adaptive tessellation, all before those above; `NAME_BINDING` in GLSL."""
+
+    SPLIT = 0
+    LONG_EDGES = 1
+    LOOKUPS = 2
+    FACES = 3
+    BEFORE = 4
+    TOTALS = 5
+    INDICES = 6
+    COMMAND = 7
+
+
+class BackgroundTiles(IntEnum):
+    """Bindings of the storage buffers of the background's tiles; `NAME_BINDING` in GLSL."""
+
+    TILES = 0
+    COMMANDS = 1
+
+
+class MappingKind(IntEnum):
+    """How a texture lies on an object; the same names in GLSL."""
+
+    NO_IMAGE = 0
+    FLAT_IMAGE = 1  # by texture coordinates
+    CUBE_IMAGE = 2
+    BOX_IMAGE = 3  # flat ones wrapped round a primitive
+    BALL_IMAGE = 4
+    CYLINDER_IMAGE = 5
+    CAPSULE_IMAGE = 6
+
+
+# Depths that stand for what a pixel shows, exact in every depth buffer; `NAME_LEVEL` in GLSL.
+LEVELS = {
+    "OPEN": 1.0,  # background that is smooth
+    "SHADED": 0.75,  # background that a shadow may reach, or that is not smooth
+    "MIXED": 0.5,  # solids in some of the samples
+    "SOLID": 0.25,  # solids in all of them
+    "LAYER": 0.125,  # the transparent object that is being drawn
+}
+
+LIGHT = Struct(
+    "Light",
+    position="vec4",  # xyz [m]; w: 1 for a light at a position, 0 for one far away
+    direction="vec4",  # towards the light, or against the beam of a spotlight; w: cosine of the beam's half angle
+    radiance="vec4",  # of a white surface facing the light; w: exponent of the beam
+    falloff="vec4",  # attenuation: constant, linear [1/m], quadratic [1/m^2]
+)
+SHADOW = Struct(
+    "Shadow",
+    matrix="mat4",  # world to shadow map, all three coordinates 0 to 1 after the division
+    planes="mat4",  # its inverse transpose, which transforms planes
+    depth="vec4",  # (x z + y) / (z z + w) turns a depth of the map into the distance from the light [m]
+    width="vec4",  # x + y times that distance: the map's width [m]; z: its texels
+    penumbra="vec4",  # x: tangent of the light's angular radius; y: radius of a near light [m]; z: widest, in the map
+    floor="vec4",  # bounding box of the shadows on the floor, in the floor map: lower and upper corner
+)
+FRAME = Struct(
+    "Frame",
+    view_projection="mat4",
+    eye="vec4",  # xyz [m]; w: distance of the focus [m]
+    focus="vec4",  # the point that the camera is about [m]
+    ray="vec4",  # through the middle of the frame, one metre along the camera's axis; w: near plane [m]
+    ray_right="vec4",  # from there to the frame's right edge; w: far plane [m]
+    ray_up="vec4",
+    zenith="vec4",  # radiance of the background overhead
+    horizon="vec4",
+    sky="vec4",  # ambient radiance from above; w: share of the soft boxes in it
+    soft_box_normal=("vec4", SOFT_BOXES),  # towards the middle; w: half the width over the distance
+    soft_box_tangent=("vec4", SOFT_BOXES),  # horizontal axis; w: half the height over the distance
+    soft_box_radiance=("vec4", SOFT_BOXES),
+    floor_origin="vec4",  # xyz [m]; w: 1 with a floor, 0 without
+    floor_u="vec4",  # axes of the floor; w: its half sizes [m]
+    floor_v="vec4",
+    floor_normal="vec4",
+    floor_albedo="vec4",  # mean
+    floor_light="vec4",  # irradiance over pi where nothing shades the floor
+    floor_map="vec4",  # the floor map: xy centre, z half width [m]
+    floor_fade="vec4",  # x, y: where it begins and ends to fade into the background, in distances of the focus
+    lights=(LIGHT, MAX_LIGHTS),  # the first ones cast shadows
+    shadows=(SHADOW, MAX_SHADOWS),
+    counts="vec4",  # y: lights, z: number of the exposure, w: lights that cast shadows
+)
+OBJECT = Struct(
+    "Object",
+    base="vec4",  # roughness, metallic, sheen, coat
+    volume="vec4",  # translucency, transparency, emission, opacity
+    place="vec4",  # geom, size [m], shadow bias [m], 1 where its colours are those of a heatmap
+    # layer; 1 with a height map, 0 without; bits of the occluders near a geom; a chart's side with its halo [texels]
+    height_map="vec4",
+    rotation="mat3",  # of the height map's gradients, into the world
+)
+
+DEFINES: dict[str, object] = {
+    "MAX_LIGHTS": MAX_LIGHTS,
+    "MAX_OCCLUDERS": MAX_OCCLUDERS,
+    "HELD_LIGHTS": HELD_LIGHTS,
+    "SOFT_BOXES": SOFT_BOXES,
+    "VERTEX_GROUP": VERTEX_GROUP,
+    **numbered(Unit, "_UNIT"),
+    **numbered(Binding, "_BINDING"),
+    **numbered(Splitting, "_BINDING"),
+    **numbered(BackgroundTiles, "_BINDING"),
+    **numbered(MappingKind),
+    **{f"{name}_LEVEL": level for name, level in LEVELS.items()},
+    **LIGHT.defines(),
+    **SHADOW.defines(),
+    **FRAME.defines(),
+    **OBJECT.defines(),
+    "OBJECT_TEXELS": OBJECT.dtype.itemsize // 16,
+    "OBJECT_COLUMNS": OBJECT_COLUMNS,
+    "SRGB_BREAK": camera.BREAK,
+    "SRGB_SLOPE": camera.SLOPE,
+    "SRGB_OFFSET": camera.OFFSET,
+    "SRGB_EXPONENT": camera.EXPONENT,
+}

@@ -1,0 +1,255 @@
+"""Objects on the GPU that are released together.
+
+The uniform block that every shader shares.
+
+Textures of sRGB pixels, which read as linear light.
+
+The height-map textures of all targets, for any pass.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import warnings
+import weakref
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from ripple_sim.errors import RippleWarning
+from ripple_sim.solver.errors import GLError
+from ripple_sim.solver.gl import GLContext
+from ripple_sim.solver.texels.texel_atlas import ChartPage
+from ripple_sim.solver.waves.height_map import DeviceHeightMap
+
+from .camera import Pose, perspective, view_matrix
+from .contract import DEFINES, FRAME, Binding, Unit
+
+_PACKAGE = "ripple_sim.render"
+
+
+class Resources:
+    """Creates objects on the GPU and releases all of them at once, at the latest when their owner is collected.
+
+    It has the methods of `moderngl.Context` that create something (`buffer`, `texture`, ...).
+
+    Parameters
+    ----------
+    gl : GLContext
+    owner : object
+        Whoever uses the objects.
+
+    Attributes
+    ----------
+    gl : GLContext
+    """
+
+    def __init__(self, gl: GLContext, owner: object) -> None:
+        self.gl = gl
+        self._created: list[Any] = []
+        self._finalizer = weakref.finalize(owner, _release, gl, self._created)
+        self._finalizer.atexit = False
+
+    def __getattr__(self, name: str) -> Any:
+        def create(*arguments: Any, **options: Any) -> Any:
+            with self.gl as ctx:
+                return self._own(getattr(ctx, name)(*arguments, **options))
+
+        return create
+
+    def program(self, vertex: str, fragment: str, **options: object) -> moderngl.Program:
+        """Program of two of the renderer's shaders, by their paths; `options` are defines beside the contract."""
+        defines = {"HOLD_UNIFORMS": int(self.gl.software), **DEFINES, **options}
+        return self._own(self.gl.program(_PACKAGE, vertex, fragment, **defines))
+
+    def compute_shader(self, name: str, **options: object) -> moderngl.ComputeShader:
+        """One of the renderer's compute shaders, likewise."""
+        return self._own(self.gl.compute_shader(_PACKAGE, name, **DEFINES, **options))
+
+    def release(self) -> None:
+        """Release everything; a second time does nothing."""
+        self._finalizer()
+
+    def _own(self, created: Any) -> Any:
+        self._created.append(created)
+        return created
+
+
+def _release(gl: GLContext, created: list[Any]) -> None:
+    with contextlib.suppress(GLError), gl as ctx:  # nothing is left of a lost context
+        # a deleted framebuffer must not stay bound
+        ctx.detect_framebuffer(0).use()
+        for each in reversed(created):
+            gl.release(each)
+        created.clear()
+
+
+_NEAR, _FAR = 0.02, 200.0  # clip planes, in camera distances
+
+
+class FrameUniforms:
+    """The block's values and its buffer.
+
+    Parameters
+    ----------
+    resources : Resources
+
+    Attributes
+    ----------
+    values : structured array, shape []
+        Of the dtype of `contract.FRAME`.
+    """
+
+    def __init__(self, resources: Resources) -> None:
+        self.values = np.zeros((), dtype=FRAME.dtype)
+        self.set_vector("floor_map", [0.0, 0.0, 1.0])
+        self._buffer = resources.buffer(reserve=FRAME.dtype.itemsize, dynamic=True)
+
+    def set_vector(self, name: str, xyz: Any, w: float = 0.0) -> None:
+        """Set a vec4 from three numbers and one."""
+        self.values[name][:3] = xyz
+        self.values[name][3] = w
+
+    def set_matrix(self, name: str, matrix: NDArray) -> None:
+        """Set a matrix for column vectors."""
+        self.values[name] = matrix.T
+
+    def set_camera(self, pose: Pose, aspect: float) -> None:
+        """Set whatever depends on the camera only; `aspect` is width over height."""
+        near, far = _NEAR * pose.distance, _FAR * pose.distance
+        matrix = perspective(pose.fovy, aspect, near, far, pose.shear) @ view_matrix(pose)
+        half = np.tan(np.radians(pose.fovy) / 2)
+        self.set_matrix("view_projection", matrix)
+        self.set_vector("eye", pose.eye, pose.distance)
+        self.set_vector("focus", pose.focus)
+        self.set_vector("ray", pose.rotation @ [*pose.shear, -1.0], near)
+        self.set_vector("ray_right", half * aspect * pose.rotation[:, 0], far)
+        self.set_vector("ray_up", half * pose.rotation[:, 1])
+
+    def bind(self) -> None:
+        """Upload the values and bind the block for all programs."""
+        self._buffer.write(self.values.tobytes())
+        self._buffer.bind_to_uniform_block(Binding.FRAME)
+
+
+SRGB8_ALPHA8 = 0x8C43
+
+
+def srgb_texture(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.Texture:
+    """Repeating texture with mipmaps, of pixels [height, width, 3], the first row at v = 0.
+
+    Where the driver takes none as large it is scaled down, with a warning.
+    """
+    pixels = fitted(pixels, _limit(resources, "GL_MAX_TEXTURE_SIZE"))
+    height, width, _ = pixels.shape
+    texture = resources.texture((width, height), 4, _opaque(pixels), internal_format=SRGB8_ALPHA8)
+    return _trilinear(texture)
+
+
+def srgb_cube(resources: Resources, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:
+    """Cube map with mipmaps, of pixels [6 size, size, 3]: its faces below one another."""
+    largest = _limit(resources, "GL_MAX_CUBE_MAP_TEXTURE_SIZE")
+    faces = [fitted(face, largest) for face in np.split(pixels, 6)]
+    pixels, size = np.concatenate(faces), faces[0].shape[1]
+    return _trilinear(resources.texture_cube((size, size), 4, _opaque(pixels), internal_format=SRGB8_ALPHA8))
+
+
+def fitted(pixels: NDArray[np.uint8], largest: int) -> NDArray[np.uint8]:
+    """Pixels [height, width, 3] scaled down so that neither side is longer than `largest`."""
+    height, width, _ = pixels.shape
+    if max(height, width) <= largest:
+        return pixels
+    scale = largest / max(height, width)
+    size = max(1, round(scale * width)), max(1, round(scale * height))
+    warnings.warn(
+        f"a texture of {width}x{height} pixels is larger than the {largest} that the OpenGL driver takes: it is scaled "
+        f"down to {size[0]}x{size[1]}",
+        RippleWarning,
+        stacklevel=3,
+    )
+    return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX))
+
+
+def _limit(resources: Resources, name: str) -> int:
+    with resources.gl as ctx:
+        return int(ctx.info[name])
+
+
+def _opaque(pixels: NDArray[np.uint8]) -> bytes:
+    return np.concatenate([pixels, np.full((*pixels.shape[:2], 1), 255, dtype=np.uint8)], axis=2).tobytes()
+
+
+def _trilinear(texture: Any) -> Any:
+    texture.build_mipmaps()
+    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    return texture
+
+
+class MovedHeightMap(NamedTuple):
+    """Height map of a surface that has moved.
+
+    Attributes
+    ----------
+    height_map : float32 [C, n + 2, n + 2, 4]
+        Its gradients are those on the moved surface; see `MovedGradients`.
+    V : float64 [vertex_count, 3]
+        Where the vertices of the target's mesh are, in its frame [m].
+    """
+
+    height_map: NDArray[np.float32]
+    V: NDArray[np.float64]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the height map."""
+        return self.height_map.shape
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray:
+        return np.asarray(self.height_map, dtype=dtype)
+
+
+# in the host's memory, or on the GPU, where it is made
+AnyHeightMap: TypeAlias = NDArray[np.float32] | DeviceHeightMap | MovedHeightMap
+
+
+class HeightMapTextures:
+    """A texture array with one layer a target: a page of its charts. Layers are as large as the largest page.
+
+    Parameters
+    ----------
+    resources : Resources
+    pages : sequence of ChartPage
+        Of the targets.
+    """
+
+    def __init__(self, resources: Resources, pages: Sequence[ChartPage]) -> None:
+        self._pages = pages
+        width, height = (max((page.size[axis] for page in pages), default=1) for axis in range(2))
+        self._texture = resources.texture_array((width, height, max(len(pages), 1)), 4, dtype="f4")
+        self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self._texture.repeat_x = self._texture.repeat_y = False
+
+    def write(self, layer: int, height_map: AnyHeightMap) -> float:
+        """Replace a target's height map, [C, n + 2, n + 2, 4]; return the largest height in it [m]."""
+        if isinstance(height_map, DeviceHeightMap):
+            return height_map.fill(self._texture, layer)
+        height_map = np.asarray(height_map)
+        write_page(self._texture, self._pages[layer], layer, height_map)
+        return float(np.abs(height_map[..., 3]).max())
+
+    def bind(self) -> None:
+        """Bind the texture for the shaders."""
+        self._texture.use(Unit.HEIGHT_MAPS)
+
+
+def write_page(texture: moderngl.TextureArray, page: ChartPage, layer: int, charts: NDArray[np.float32]) -> None:
+    """Write charts with halo, [C, n + 2, n + 2, ...], to the page in a layer of a texture array."""
+    for first in range(0, len(charts), page.columns):
+        # a row of charts at once: each write has its price
+        row = np.ascontiguousarray(np.concatenate(charts[first : first + page.columns], axis=1), dtype=np.float32)
+        x, y = page.corner(first)
+        texture.write(row, viewport=(x, y, layer, row.shape[1], page.block, 1))

@@ -1,0 +1,336 @@
+"""Adaptive tessellation: for each frame, triangles are split at the edges from which the waves depart.
+
+Heights between the texels on the processor, by the quadratic B-spline of spline.glsl.
+
+Adaptive tessellation on the GPU: the triangles of `AdaptiveTessellation`, in its order, from a texture's heights.
+
+The triangles of a target in one frame: fine where its waves are sharp.
+"""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render.contract import Splitting
+from ripple_sim.render.resources import Resources
+from ripple_sim.solver.kernel import Bools, Floats, Floats32, Ints32, kernel
+from ripple_sim.solver.texels.texel_atlas import ChartPage
+
+from .surface import Charts
+from .tessellation import Edges
+from .vertices import POSITION, SurfaceVertices
+
+
+def spline_samples(page: ChartPage, places: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Where places [k, 2] on a page of charts [texels] lie between the texels.
+
+    Returns
+    -------
+    texel : int32 [k, 3]
+        Chart, row and column, in a chart with its halo, of the first of the 3 x 3 texels about each place.
+    offset : float32 [k, 2]
+        How far off the middle one's centre it is [texels].
+    """
+    chart, row, column = page.locate(places)
+    place = np.stack([row, column], axis=1)
+    nearest = np.clip(np.floor(place + 0.5), 0, page.resolution - 1)
+    return np.column_stack([chart, nearest]).astype(np.int32), (place - nearest).astype(np.float32)
+
+
+@kernel
+def spline_heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Floats32:
+    """Heights [k] of a height map [C, n + 2, n + 2, 4] at offsets [k, 2] in texels [k, 3]; see `spline_samples`."""
+    height = np.empty(len(texel), np.float32)
+    half, most = np.float32(0.5), np.float32(0.75)
+    for i in range(len(texel)):
+        # number by number: unpacking rows takes longer than all the rest
+        chart, row, column = texel[i, 0], texel[i, 1], texel[i, 2]
+        s, t = offset[i, 0], offset[i, 1]
+        left, right = half * (half - t) * (half - t), half * (half + t) * (half + t)
+        middle = most - t * t
+        low, mean, high = height_map[chart, row], height_map[chart, row + 1], height_map[chart, row + 2]
+        height[i] = (
+            half * (half - s) * (half - s) * _across(low, column, left, middle, right)
+            + (most - s * s) * _across(mean, column, left, middle, right)
+            + half * (half + s) * (half + s) * _across(high, column, left, middle, right)
+        )
+    return height
+
+
+@kernel(inline="always")
+def _across(texels: Floats32, column: int, left: np.float32, middle: np.float32, right: np.float32) -> np.float32:
+    """Weighted height of three texels of a row [n + 2, 4], from a column on."""
+    return left * texels[column, 3] + middle * texels[column + 1, 3] + right * texels[column + 2, 3]
+
+
+class AdaptiveTessellation:
+    """Splits the edges of a mesh at their midpoints where a height map bends too much between their ends.
+
+    Whether an edge is split depends only on its length and the heights at its ends and midpoint, so that the triangles
+    on both sides of it agree, across seams and creases, too: no gap opens.
+
+    Parameters
+    ----------
+    F : array, shape [m, 3]
+        Triangles.
+    edges : Edges
+        Of the triangles, k of them.
+    positions : array, shape [n + k, 3]
+        Of the vertices, followed by the edges' midpoints [m].
+    places : array, shape [n + k, 2]
+        Where the height map is looked up, on the page of charts [texels].
+    page : ChartPage
+    tolerance : float
+        How far the height at a midpoint may differ from the mean of those at the ends [m].
+    min_length : float
+        Shorter edges stay whole [m].
+
+    Attributes
+    ----------
+    base_count : int
+        Number n of vertices, without midpoints.
+    faces, sides : int32 [m, 3]
+        Triangles, and their edges.
+    length : float64 [k]
+        Of the edges [m].
+    long : int32 [l]
+        Edges that may be split.
+    ends : int32 [l, 2]
+        Lookups of their ends; those of their midpoints are the last l.
+    texel, offset : int32 and float32, [..., 3] and [..., 2]
+        Of each lookup: chart, row and column of the first of the 3 x 3 texels about it, in a chart with its halo, and
+        how far it is off their centre, in rows and columns.
+    """
+
+    def __init__(
+        self,
+        F: NDArray,
+        edges: Edges,
+        positions: NDArray,
+        places: NDArray,
+        page: ChartPage,
+        tolerance: float,
+        min_length: float,
+    ) -> None:
+        self.base_count = len(positions) - len(edges.ends)
+        self.faces, self.sides = np.asarray(F, np.int32), np.asarray(edges.of_side, np.int32)
+        self.length = np.linalg.norm(positions[edges.ends[:, 1]] - positions[edges.ends[:, 0]], axis=1)
+        self.tolerance = np.float32(tolerance)
+        # heights are looked up at the ends of the edges that may be split, and then at these edges' midpoints
+        self.long = np.flatnonzero(self.length >= min_length).astype(np.int32)
+        ends, index = np.unique(edges.ends[self.long], return_inverse=True)
+        self.ends = index.reshape(-1, 2).astype(np.int32)
+        self.texel, self.offset = spline_samples(page, places[np.concatenate([ends, self.base_count + self.long])])
+
+    def __call__(self, height_map: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Triangles [t, 3] for a height map [C, n + 2, n + 2, 4], and the midpoints [s], as vertices, that they use.
+
+        Where no edge is split, the triangles are the same array each time.
+        """
+        whole = self.faces, np.empty(0, np.int32)
+        if not len(self.long) or not height_map[..., 3].any():
+            return whole
+        split = self.long[_departing(spline_heights(height_map, self.texel, self.offset), self.ends, self.tolerance)]
+        if not len(split):
+            return whole
+        midpoint = np.full(len(self.length), -1, np.int32)
+        midpoint[split] = used = np.int32(self.base_count) + split
+        return _triangles(self.faces, self.sides, midpoint, self.length), used
+
+
+@kernel
+def _departing(height: Floats32, ends: Ints32, tolerance: np.float32) -> Bools:
+    """Which edges' midpoints, the last k of the heights, are off the mean of their ends [k, 2]."""
+    departing = np.empty(len(ends), np.bool_)
+    first = len(height) - len(ends)
+    for i in range(len(ends)):
+        mean = np.float32(0.5) * (height[ends[i, 0]] + height[ends[i, 1]])
+        departing[i] = abs(height[first + i] - mean) > tolerance
+    return departing
+
+
+@kernel
+def _triangles(faces: Ints32, sides: Ints32, midpoint: Ints32, length: Floats) -> Ints32:
+    """Cut every triangle [m, 3] into 1 to 4 by the midpoints of its sides [m, 3], -1: none; lengths are the edges'."""
+    triangles = np.empty((4 * len(faces), 3), np.int32)
+    count = 0
+    for face in range(len(faces)):
+        splits = 0
+        for k in range(3):
+            splits += midpoint[sides[face, k]] >= 0
+        # turn the triangle so that its only split side, or its only whole one, is side 0
+        first = 0
+        if splits == 1 or splits == 2:
+            while (midpoint[sides[face, first]] >= 0) != (splits == 1):
+                first += 1
+        second, third = (first + 1) % 3, (first + 2) % 3
+        a, b, c = faces[face, first], faces[face, second], faces[face, third]
+        ab, bc, ca = sides[face, first], sides[face, second], sides[face, third]
+        m, n, o = midpoint[ab], midpoint[bc], midpoint[ca]
+        if splits == 0:
+            triangles[count] = a, b, c
+        elif splits == 1:
+            triangles[count] = a, m, c
+            triangles[count + 1] = m, b, c
+        elif splits == 2:
+            triangles[count] = o, n, c
+            # the median to the longer side is the shorter diagonal of the rest
+            if length[bc] >= length[ca]:
+                triangles[count + 1] = a, b, n
+                triangles[count + 2] = a, n, o
+            else:
+                triangles[count + 1] = a, b, o
+                triangles[count + 2] = b, n, o
+        else:
+            triangles[count] = a, m, o
+            triangles[count + 1] = b, n, m
+            triangles[count + 2] = c, o, n
+            triangles[count + 3] = m, n, o
+        count += splits + 1
+    return triangles[:count]
+
+
+_GROUP = 256
+
+
+class DeviceTessellation:
+    """Decides which edges are split, and writes triangles and the draw call's size, without asking the host.
+
+    How many triangles come before each face's is a sum over all faces before it: within groups of faces first, and then
+    over the groups. So their order is always the same.
+
+    Parameters
+    ----------
+    resources : Resources
+    adaptive : AdaptiveTessellation
+    page : ChartPage
+    layer : int
+        Of the height map.
+    indices : moderngl.Buffer
+        Where the triangles go, room for four a face.
+
+    Attributes
+    ----------
+    split : moderngl.Buffer
+        int32 an edge: whether its midpoint is used.
+    command : moderngl.Buffer
+        Of an indirect draw call.
+    """
+
+    def __init__(
+        self,
+        resources: Resources,
+        adaptive: AdaptiveTessellation,
+        page: ChartPage,
+        layer: int,
+        indices: moderngl.Buffer,
+    ) -> None:
+        self._layer, self._tolerance = layer, float(adaptive.tolerance)
+        self._counts = len(adaptive.long), len(adaptive.faces)
+        _, rank = np.unique(adaptive.length, return_inverse=True)
+        first = np.array([page.corner(chart) for chart in range(page.charts)])[adaptive.texel[:, 0]]
+        places = np.concatenate([first + adaptive.texel[:, :0:-1], adaptive.offset], axis=1)
+        middles = len(adaptive.texel) - len(adaptive.long) + np.arange(len(adaptive.long))
+        groups = -(-len(adaptive.faces) // _GROUP)
+
+        def buffer(content: NDArray, dtype: str = "i4") -> moderngl.Buffer:
+            return resources.buffer(content.astype(dtype).tobytes() or bytes(16))
+
+        self.split, self.command = buffer(np.zeros(len(rank))), buffer(np.array([0, 1, 0, 0, 0]))
+        sides = adaptive.sides
+        faces = np.concatenate([adaptive.faces, adaptive.base_count + sides, rank.ravel()[sides]], axis=1)
+        self._buffers = {
+            Splitting.SPLIT: self.split,
+            Splitting.LONG_EDGES: buffer(np.column_stack([adaptive.long, adaptive.ends, middles])),
+            Splitting.LOOKUPS: buffer(places, "f4"),
+            Splitting.FACES: buffer(faces),
+            Splitting.BEFORE: buffer(np.zeros(len(faces))),
+            Splitting.TOTALS: buffer(np.zeros(groups)),
+            Splitting.INDICES: indices,
+            Splitting.COMMAND: self.command,
+        }
+        self._split_edges, self._count, self._add, self._write = (
+            resources.compute_shader(f"surfaces/{name}", GROUP=_GROUP, FIRST_MIDPOINT=adaptive.base_count)
+            for name in ("split_edges", "count_triangles", "add_counts", "write_triangles")
+        )
+
+    def run(self, ctx: moderngl.Context) -> None:
+        """Write the triangles for the height map that is bound."""
+        edges, faces = self._counts
+        for binding, buffer in self._buffers.items():
+            buffer.bind_to_storage_buffer(binding)
+        if edges:
+            self._split_edges["layer"], self._split_edges["tolerance"] = self._layer, self._tolerance
+        for shader, count in ((self._split_edges, edges), (self._count, faces), (self._add, 1), (self._write, faces)):
+            if count:
+                if shader is not self._add:
+                    shader["count"] = count
+                shader.run(-(-count // _GROUP))
+                ctx.memory_barrier()
+
+
+PIXELS = 5.6  # length of an edge where the target fills the frame's height
+_TOLERANCE = 0.25  # [pixels], likewise: edges from which the waves depart further are split
+
+
+class SurfaceTriangles:
+    """Triangles of a target on the GPU, found by the host from its copy of the heights, or by the device from its own.
+
+    Parameters
+    ----------
+    resources : Resources
+    vertices : SurfaceVertices
+    charts : Charts
+    layer : int
+        Of the height map.
+    pixel : float
+        Size of a pixel on the target where it fills the frame's height [m].
+
+    Attributes
+    ----------
+    indices : moderngl.Buffer
+        Three vertices a triangle.
+    count : int or moderngl.Buffer
+        Of the indices in use; the device's is an indirect draw call.
+    midpoints : int32 array or moderngl.Buffer
+        Edges whose midpoints are in use; the device's has a flag for every edge.
+    """
+
+    count: int | moderngl.Buffer
+    midpoints: NDArray[np.int32] | moderngl.Buffer
+
+    def __init__(
+        self, resources: Resources, vertices: SurfaceVertices, charts: Charts, layer: int, pixel: float
+    ) -> None:
+        self._resources, self._page, self._layer = resources, charts.page, layer
+        self._tessellation = AdaptiveTessellation(
+            vertices.F,
+            vertices.edges,
+            vertices.attributes[:, POSITION],
+            vertices.lookups,
+            charts.page,
+            tolerance=_TOLERANCE * pixel,
+            min_length=1.5 * PIXELS * pixel,
+        )
+        self.indices = resources.buffer(reserve=4 * 12 * len(vertices.F), dynamic=True)
+        self._written: NDArray[np.int32] | None = None
+        self._on_device: DeviceTessellation | None = None
+
+    def find(self, height_map: NDArray[np.float32]) -> None:
+        """Find the triangles for heights, [C, n + 2, n + 2, 4], and write those that are not there yet."""
+        triangles, self.midpoints = self._tessellation(height_map)
+        if triangles is not self._written:
+            self.indices.write(triangles)
+            self._written = triangles
+        self.count = triangles.size
+
+    def find_on_device(self, ctx: moderngl.Context) -> None:
+        """Have the device find the triangles for the heights that are bound; storage buffers are bound for that."""
+        if self._on_device is None:
+            self._on_device = DeviceTessellation(
+                self._resources, self._tessellation, self._page, self._layer, self.indices
+            )
+        self._on_device.run(ctx)
+        self.midpoints, self.count, self._written = self._on_device.split, self._on_device.command, None

@@ -1,0 +1,260 @@
+"""Points and normals of a tessellated surface whose own vertices move.
+
+Ambient occlusion and thickness of a surface that moves.
+
+A tessellated surface and its height map, wherever its mesh is.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ripple_sim.render.visuals.corners import bounding_radius, cast, frames_about, smooth_normals
+from ripple_sim.solver import Atlas
+from ripple_sim.solver.kernel import Floats, Floats32, Ints, kernel
+from ripple_sim.solver.mesh.closest import closest_points, triangle_tree
+from ripple_sim.solver.texels.chart_map import barycentrics_in
+from ripple_sim.solver.waves.motion import MovedGradients
+
+from .vertices import coarse_mesh
+
+
+class Moved(NamedTuple):
+    """Points [m], directions of displacement and normals, float32 [n, 3] each, and a mesh's vertices [k, 3] [m]."""
+
+    points: Floats32
+    directions: Floats32
+    normals: Floats32
+    V: Floats
+
+
+class Riding(NamedTuple):
+    """Points at rest: vertices and weights of their triangles [n, 3], way from there, directions, normals [n, 3]."""
+
+    corners: Ints
+    weights: Floats
+    off: Floats
+    directions: Floats
+    normals: Floats
+
+
+class MovingVertices:
+    """Takes the points of a finer surface along with the mesh on which it was made.
+
+    A triangle's motion is a linear map, which leaves unit normals of unit length; a vertex takes the mean of those
+    about it, and a point the mean of its triangle's corners: what bulges out bulges on, and normals turn smoothly.
+
+    Parameters
+    ----------
+    V : float64 [k, 3]
+        Vertices of the mesh at rest [m].
+    F : int64 [m, 3]
+    points, directions, normals : float64 [n, 3]
+        Of the finer surface at rest; the latter two are unit vectors.
+
+    Attributes
+    ----------
+    rest : Riding
+    """
+
+    def __init__(self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, normals: NDArray) -> None:
+        self._V, self._F = np.ascontiguousarray(V, np.float64), np.ascontiguousarray(F, np.int64)
+        rest = [np.ascontiguousarray(each, np.float64) for each in (points, directions, normals)]
+        triangle, closest = closest_points(triangle_tree(self._V, self._F), rest[0])
+        corners = self._F[triangle]
+        weights = barycentrics_in(self._V[corners], closest)
+        off = rest[0] - np.einsum("ij,ijk->ik", weights, self._V[corners])
+        self.rest = Riding(corners, weights, off, *rest[1:])
+
+    def __call__(self, V: NDArray[np.float64]) -> Moved:
+        """Where the points are for vertices [k, 3] [m]."""
+        V = np.ascontiguousarray(V, np.float64)
+        maps = _vertex_maps(self._V, V, self._F)
+        points, directions, normals = (np.empty((len(self.rest.off), 3), np.float32) for _ in range(3))
+        _move(V, maps, self.rest, points, directions, normals)
+        return Moved(points, directions, normals, V)
+
+
+@kernel
+def _frame(V: Floats, F: Ints, i: int, frame: Floats) -> float:
+    """Two sides and the unit normal of a triangle, as rows; return twice its area."""
+    for k in range(3):
+        frame[0, k], frame[1, k] = V[F[i, 1], k] - V[F[i, 0], k], V[F[i, 2], k] - V[F[i, 0], k]
+    square = 0.0
+    for k in range(3):
+        y, z = (k + 1) % 3, (k + 2) % 3
+        frame[2, k] = frame[0, y] * frame[1, z] - frame[0, z] * frame[1, y]
+        square += frame[2, k] ** 2
+    length = np.sqrt(square)
+    for k in range(3):
+        frame[2, k] /= max(length, 1e-300)
+    return length
+
+
+@kernel
+def _vertex_maps(rest: Floats, moved: Floats, F: Ints) -> Floats:
+    """Mean linear map about each vertex, [k, 3, 3], of its triangles' maps by their areas."""
+    maps, areas = np.zeros((len(rest), 3, 3)), np.zeros(len(rest))
+    old, new, back = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    for i in range(len(F)):
+        area = _frame(rest, F, i, old)
+        _frame(moved, F, i, new)
+        if not area > 0:
+            continue
+        # rows dual to the two sides and the normal
+        for k in range(3):
+            y, z = (k + 1) % 3, (k + 2) % 3
+            back[0, k] = (old[1, y] * old[2, z] - old[1, z] * old[2, y]) / area
+            back[1, k] = (old[2, y] * old[0, z] - old[2, z] * old[0, y]) / area
+            back[2, k] = old[2, k]
+        for corner in range(3):
+            v = F[i, corner]
+            areas[v] += area
+            for a in range(3):
+                for b in range(3):
+                    for k in range(3):
+                        maps[v, a, b] += area * new[k, a] * back[k, b]
+    for v in range(len(rest)):
+        for a in range(3):
+            for b in range(3):
+                maps[v, a, b] = maps[v, a, b] / areas[v] if areas[v] > 0 else (1.0 if a == b else 0.0)
+    return maps
+
+
+@kernel
+def _turn(mean: Floats, rest: Floats, i: int, out: Floats32) -> None:
+    """A unit normal under the cofactors of a map."""
+    square = 0.0
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        total = 0.0
+        for k in range(3):
+            y, z = (k + 1) % 3, (k + 2) % 3
+            total += (mean[b, y] * mean[c, z] - mean[b, z] * mean[c, y]) * rest[i, k]
+        out[i, a] = total
+        square += total * total
+    length = np.sqrt(square)
+    for a in range(3):
+        out[i, a] = np.float32(out[i, a] / length) if length > 1e-30 else np.float32(rest[i, a])
+
+
+@kernel
+def _move(V: Floats, maps: Floats, rest: Riding, points: Floats32, directions: Floats32, normals: Floats32) -> None:
+    mean = np.empty((3, 3))
+    for i in range(len(points)):
+        mean[:] = 0
+        for j in range(3):
+            for a in range(3):
+                for b in range(3):
+                    mean[a, b] += rest.weights[i, j] * maps[rest.corners[i, j], a, b]
+        for a in range(3):
+            place = 0.0
+            for j in range(3):
+                place += rest.weights[i, j] * V[rest.corners[i, j], a]
+            for b in range(3):
+                place += mean[a, b] * rest.off[i, b]
+            points[i, a] = place
+        _turn(mean, rest.directions, i, directions)
+        _turn(mean, rest.normals, i, normals)
+
+
+_SAMPLES = 1_000  # vertices that cast rays, at most
+_RAYS = 32_000  # a frame, about
+_NEAR = 6  # samples about a point
+
+
+class MovingOcclusion:
+    """Adds to what is baked at rest how it changes.
+
+    Rays find the change, from the vertices of a coarse mesh that moves along, against that mesh, at rest and in each
+    frame: what is coarse about it is then in both. The rays turn with the surface, so that a rigid motion changes
+    nothing and noise does not crawl.
+
+    Parameters
+    ----------
+    V : float64 [k, 3]
+        Vertices of the mesh at rest [m].
+    F : int64 [m, 3]
+    points, directions : float64 [n, 3]
+        Of the drawn surface at rest, and its smooth normals.
+    baked : float64 [n, 3]
+        Ambient visibility, thickness and inner ambient visibility of the points, see `Baked`.
+    """
+
+    def __init__(self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, baked: NDArray) -> None:
+        count, normals = min(_SAMPLES, len(V)), smooth_normals(V, F)
+        spacing = float(np.sqrt(_area(V, F) / count))
+        apart = 2 * spacing * normals  # so that the two sides of a thin body are far from each other
+        mesh = coarse_mesh(F, np.hstack([V, apart]), count)
+        near = np.hstack([V, apart])[mesh.vertices], np.hstack([points, 2 * spacing * directions])
+        self._baked, (self._near, self._weights) = baked, _nearest(*near)
+        self._vertices, self._F, self._radius = mesh.vertices, mesh.F, bounding_radius(V)
+        # triangles of a coarse mesh may lie slightly over its vertices
+        self._start = 0.3 * spacing if count < len(V) else 0.0
+        self._count = int(np.clip(_RAYS // (2 * count), 16, 64))
+        at_rest, normals = self._of(V), normals[mesh.vertices]
+        self._frames = MovingVertices(at_rest, mesh.F, at_rest, frames_about(normals)[:, 1], normals)
+        self._rest = self._measured(V)
+
+    def __call__(self, V: NDArray[np.float64]) -> NDArray[np.float32]:
+        """What `baked` is for vertices [k, 3] [m]."""
+        change = self._measured(V) - self._rest
+        baked = self._baked + np.einsum("ij,ijk->ik", self._weights, change[self._near])
+        return np.clip(baked, 0.0, [1.0, 4.0, 1.0]).astype(np.float32)
+
+    def _of(self, V: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Vertices of the coarse mesh, about their mean: rays are in single precision."""
+        some = V[self._vertices]
+        return some - some.mean(axis=0)
+
+    def _measured(self, V: NDArray[np.float64]) -> NDArray[np.float64]:
+        V = self._of(V)
+        moved = self._frames(V)
+        frames = frames_about(moved.normals, moved.directions)
+        return np.stack(cast(V, self._F, frames, self._count, self._radius, self._start), axis=1)
+
+
+def _area(V: NDArray, F: NDArray) -> float:
+    return float(np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1).sum() / 2)
+
+
+def _nearest(samples: NDArray, points: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """The samples nearest to each point, [n, k], and weights, of which that of the farthest is 0: no point jumps."""
+    distance, near = cKDTree(samples).query(points, min(_NEAR + 1, len(samples)))
+    reach = np.maximum(distance[:, -1:], 1e-300)
+    weights = (1 - distance / reach) ** 2 + 1e-12
+    return near, weights / weights.sum(axis=1, keepdims=True)
+
+
+class MovingSurface:
+    """Takes points, normals and height maps along; what that takes is made when the surface first moves.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        At rest.
+    points, directions, normals : [n, 3]
+        Of the tessellated surface at rest; see `MovingVertices`.
+    """
+
+    def __init__(self, atlas: Atlas, points: NDArray, directions: NDArray, normals: NDArray) -> None:
+        self._atlas, self._rest = atlas, (points, directions, normals)
+
+    @functools.cached_property
+    def vertices(self) -> MovingVertices:
+        """How the points ride on the mesh."""
+        mesh = self._atlas.mesh
+        return MovingVertices(mesh.V, mesh.F, *self._rest)
+
+    @functools.cached_property
+    def _gradients(self) -> MovedGradients:
+        return MovedGradients(self._atlas)
+
+    def __call__(self, height_map: NDArray[np.float32], V: NDArray[np.float64]) -> tuple[NDArray[np.float32], Moved]:
+        """The height map and the points where the vertices of the mesh are at V [vertex_count, 3] [m]."""
+        return self._gradients(height_map, V), self.vertices(V)

@@ -1,0 +1,212 @@
+"""Read-back: a ring of buffers, so that a frame is copied to memory while later ones are drawn.
+
+What kind of frames a renderer draws.
+
+The G-buffer: what is left of the visible surfaces, sample by sample, for deferred shading.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.solver.errors import RippleError
+from ripple_sim.solver.kernel import kernel
+
+from .contract import Unit
+from .resources import Resources
+
+
+@dataclass(frozen=True)
+class FrameFormat:
+    """Size and kind of a frame.
+
+    Attributes
+    ----------
+    size : (width, height)
+        [pixels].
+    samples : int
+        Samples a pixel for smooth edges; at most as many as the driver has. 0 or 1: none.
+    alpha : bool
+        Whether there is an alpha channel: the background is transparent, and only the shadows are left of the floor.
+    linear : bool
+        Whether colours are linear light in half floats, without tone mapping, in place of sRGB in bytes.
+    """
+
+    size: tuple[int, int]
+    samples: int = 4
+    alpha: bool = False
+    linear: bool = False
+
+    @property
+    def aspect(self) -> float:
+        """Width over height."""
+        return self.size[0] / self.size[1]
+
+    @property
+    def dtype(self) -> str:
+        """Of a channel on the GPU, as moderngl names it."""
+        return "f2" if self.linear else "f1"
+
+
+class GBuffer:
+    """Depths, normals and colours; g_buffer.glsl encodes them.
+
+    Parameters
+    ----------
+    resources : Resources
+    size : (width, height)
+        [pixels].
+    samples : int
+        A pixel; at most as many as the driver has.
+
+    Attributes
+    ----------
+    samples : int
+        1 or more.
+    """
+
+    def __init__(self, resources: Resources, size: tuple[int, int], samples: int) -> None:
+        with resources.gl as ctx:
+            samples = min(samples, ctx.max_samples)
+        many = samples if samples > 1 else 0
+        self.samples = max(many, 1)
+        depths = resources.depth_texture(size, samples=many)
+        normals, colors = (resources.texture(size, 4, samples=many, dtype="nu2") for _ in range(2))
+        self._textures = {Unit.DEPTHS: depths, Unit.NORMALS: normals, Unit.COLORS: colors}
+        if not many:
+            depths.compare_func = ""
+            for texture in self._textures.values():
+                texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._framebuffer = resources.framebuffer([normals, colors], depths)
+
+    def use(self, ctx: moderngl.Context) -> None:
+        """Draw into it from now on."""
+        self._framebuffer.use()
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+
+    def clear(self) -> None:
+        """Forget all surfaces."""
+        # the colours of samples without a surface are never read
+        self._framebuffer.color_mask = [(False,) * 4] * 2
+        self._framebuffer.clear(depth=1.0)
+        self._framebuffer.color_mask = [(True,) * 4] * 2
+
+    def bind(self) -> None:
+        """Bind the textures for the shaders."""
+        for unit, texture in self._textures.items():
+            texture.use(unit)
+
+
+_PACKED = 4  # pixels of three bytes that are whole words
+
+
+class Readback:
+    """Frames on their way from the GPU, first in, first out.
+
+    There are as many buffers as frames were ever on their way at a time: pixel buffers of the GPU, or plain memory
+    where the driver draws in that itself.
+
+    Parameters
+    ----------
+    resources : Resources
+    frame_format : FrameFormat
+    """
+
+    def __init__(self, resources: Resources, frame_format: FrameFormat) -> None:
+        self._gl, self._resources, self._format = resources.gl, resources, frame_format
+        width, height = frame_format.size
+        # always four channels: drivers copy those as they are, and convert any other number on the processor
+        self._pixels = np.empty((height, width, 4), np.uint16 if frame_format.linear else np.uint8)
+        self._free: list[moderngl.Buffer | NDArray] = []
+        self._pending: deque[tuple[moderngl.Buffer | NDArray, int]] = deque()
+
+    def submit(self, frame: moderngl.Framebuffer) -> None:
+        """Copy a frame as soon as it is drawn; the next one may be drawn over it.
+
+        Parameters
+        ----------
+        frame : moderngl.Framebuffer
+            RGBA8, or RGBA16F of linear light; bottom row first, multiplied by alpha.
+        """
+        with self._gl:
+            if self._gl.software:  # which would draw the frame in the next call, holding the interpreter's lock
+                self._gl.wait()
+            buffer = self._free.pop() if self._free else self._new_buffer()
+            frame.read_into(buffer, components=4, alignment=1, dtype=self._format.dtype)
+            self._pending.append((buffer, self._gl.put_fence()))
+
+    def fetch(self) -> NDArray:
+        """Wait for the earliest frame that is on its way.
+
+        Returns
+        -------
+        array, shape [height, width, 3], or [height, width, 4] with alpha
+            Top row first; a fresh array for every frame. uint8, alpha straight; or, of linear light, float16,
+            multiplied by alpha.
+
+        Raises
+        ------
+        RippleError
+            If none is on its way.
+        """
+        if not self._pending:
+            raise RippleError("no frame is on its way from the GPU; submit one before each that is fetched")
+        buffer, fence = self._pending.popleft()
+        self._gl.wait_for(fence)
+        if isinstance(buffer, np.ndarray):
+            pixels = buffer
+        else:
+            pixels = self._pixels
+            with self._gl:
+                buffer.read_into(pixels)
+        frame = np.empty((*pixels.shape[:2], 4 if self._format.alpha else 3), pixels.dtype)
+        _turn(pixels, frame)
+        self._free.append(buffer)
+        if self._format.linear:
+            return frame.view(np.float16)
+        if self._format.alpha:
+            _unpremultiply(frame)
+        return frame
+
+    def _new_buffer(self) -> moderngl.Buffer | NDArray:
+        if self._gl.software:
+            return np.empty_like(self._pixels)
+        return self._resources.buffer(reserve=self._pixels.nbytes, dynamic=True)
+
+
+def _turn(pixels: NDArray, frame: NDArray) -> None:
+    """Copy pixels [height, width, 4], bottom row first, to a frame [height, width, 3 or 4], top row first."""
+    width, channels = frame.shape[1:]
+    if channels == 3 and width % _PACKED == 0 and frame.dtype == np.uint8:
+        words = frame.reshape(len(frame), -1).view(np.uint32)
+        return _pack(pixels.view(np.uint32)[::-1, :, 0], words)
+    for channel in range(channels):  # all at once would be rows of three numbers, which are slow
+        frame[..., channel] = pixels[::-1, :, channel]
+
+
+@kernel
+def _pack(pixels: NDArray[np.uint32], words: NDArray[np.uint32]) -> None:
+    """Drop the fourth bytes of pixels [height, width]: every four of them become three words [height, 3 width / 4]."""
+    for row in range(pixels.shape[0]):
+        for group in range(pixels.shape[1] // _PACKED):
+            a, b = pixels[row, 4 * group], pixels[row, 4 * group + 1]
+            c, d = pixels[row, 4 * group + 2], pixels[row, 4 * group + 3]
+            words[row, 3 * group] = (a & np.uint32(0xFFFFFF)) | (b << np.uint32(24))
+            words[row, 3 * group + 1] = ((b >> np.uint32(8)) & np.uint32(0xFFFF)) | (c << np.uint32(16))
+            words[row, 3 * group + 2] = ((c >> np.uint32(16)) & np.uint32(0xFF)) | (d << np.uint32(8))
+
+
+@kernel
+def _unpremultiply(frame: NDArray[np.uint8]) -> None:
+    """Divide the colours of a frame [height, width, 4] by alpha."""
+    for row in range(frame.shape[0]):
+        for column in range(frame.shape[1]):
+            alpha = np.float32(max(frame[row, column, 3], 1)) / np.float32(255)
+            for channel in range(3):
+                color = np.float32(frame[row, column, channel]) / alpha + np.float32(0.5)
+                frame[row, column, channel] = np.uint8(min(color, np.float32(255)))

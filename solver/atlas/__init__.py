@@ -1,1 +1,0 @@
-"""From a mesh to its atlas: the layouts, the cache, the files."""

@@ -1,0 +1,209 @@
+"""What cannot fit into memory is refused before it is begun.
+
+Files that appear complete or not at all.
+
+Image files, read with pillow's limit against decompression bombs and a look at the memory they take.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import resource
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from .errors import RippleError, shown
+
+# Errors of the system that another name would have avoided.
+OF_THE_NAME = (
+    errno.ENAMETOOLONG,
+    errno.ENOENT,
+    errno.ENOTDIR,
+    errno.EISDIR,
+    errno.EINVAL,
+    errno.ELOOP,
+)
+
+# Those of them that hold in every folder.
+NO_NAME = (errno.ENAMETOOLONG, errno.ELOOP)
+
+# Errors of the disk, which no other input would have avoided.
+OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
+# What is written beside a file before it takes its name has a longer one.
+_LONGEST_SUFFIX = ".0123456789.part"
+
+
+def final_path(path: Path) -> Path:
+    """Where a path to be written leads, its symbolic links followed.
+
+    Raises
+    ------
+    OSError
+        If links lead in a circle, or the name is too long for the system, or too long to be written beside first.
+    """
+    final = Path(os.path.realpath(path))
+    if final.is_symlink():
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+    try:
+        final.with_name(final.name + _LONGEST_SUFFIX).lstat()
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise OSError(error.errno, error.strerror, str(path)) from error
+    return final
+
+
+@contextlib.contextmanager
+def atomic_write(path: Path) -> Iterator[Path]:
+    """Give a temporary path beside `path` to write to, renamed to `path` at the end, removed after an exception.
+
+    Symbolic links are followed, missing folders made.
+
+    Raises
+    ------
+    OSError
+        If the path exists and is not a regular file (renaming would destroy a device, say), or cannot be written.
+    """
+    path = final_path(path)
+    if path.exists() and not path.is_file():
+        raise FileExistsError(0, "it exists and is not a regular file")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield unfinished
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+# What is smaller always fits, and costs no look [bytes].
+_SMALL = 32e6
+
+# By cgroup version: folder of the memory controller, and the files of its limit and of what is taken.
+_CGROUPS = {
+    2: ("", "memory.max", "memory.current"),
+    1: ("memory", "memory.limit_in_bytes", "memory.usage_in_bytes"),
+}
+
+
+class Room(NamedTuple):
+    """Memory that is left [bytes], and by what."""
+
+    left: float
+    by: str
+
+
+def require_memory(error: type[RippleError], need: float, what: str, advice: str) -> None:
+    """Raise an error if something needs more memory [bytes] than is left, naming both and what sets the limit."""
+    if need < _SMALL:
+        return
+    room = min(rooms(), default=None)
+    if room is not None and need > room.left:
+        raise error(
+            f"{what} takes {_shown(need)} of memory, but {room.by} leaves {_shown(room.left)}; {advice}, or allow more"
+        )
+
+
+def rooms(root: Path = Path("/")) -> Iterator[Room]:
+    """What each limit leaves: the machine's free memory, the process's address space (`ulimit -v`), its cgroup's."""
+    free = _table(root / "proc/meminfo")
+    if "MemAvailable" in free:
+        yield Room(free["MemAvailable"] + free.get("SwapFree", 0.0), "the machine's free memory")
+    most = resource.getrlimit(resource.RLIMIT_AS)[0]
+    used = _table(root / "proc/self/status")
+    if most != resource.RLIM_INFINITY:
+        yield Room(most - used.get("VmSize", 0.0), f"the limit of the address space (ulimit -v, {_shown(most)})")
+    for line in _text(root / "proc/self/cgroup").splitlines():
+        _, controllers, name = line.split(":", 2)
+        if controllers in ("", "memory"):
+            yield from _of_cgroups(root, 1 if controllers else 2, name)
+
+
+def _of_cgroups(root: Path, version: int, name: str) -> Iterator[Room]:
+    """What the limits of a cgroup and of those above it leave; cached files, which make room, are not counted."""
+    controller, limit, usage = _CGROUPS[version]
+    top = root / "sys/fs/cgroup" / controller
+    for folder in (top / name.strip("/"), *(top / name.strip("/")).parents):
+        if not folder.is_relative_to(top):
+            return
+        most, used = _text(folder / limit).strip(), _text(folder / usage).strip()
+        if most.isdigit() and used.isdigit():
+            cached = _table(folder / "memory.stat", scale=1).get("inactive_file", 0.0)
+            yield Room(int(most) - int(used) + cached, f"the memory limit of the cgroup ({_shown(int(most))})")
+
+
+def _table(path: Path, scale: int = 1024) -> dict[str, float]:
+    """The numbers of a file of names and numbers, by name."""
+    rows = (line.replace(":", " ").split() for line in _text(path).splitlines())
+    return {row[0]: float(row[1]) * scale for row in rows if len(row) > 1 and row[1].isdigit()}
+
+
+def _text(path: Path) -> str:
+    """The text of a file, or nothing where there is none, as on other systems."""
+    try:
+        return path.read_text()
+    except OSError:
+        return ""
+
+
+def _shown(size: float) -> str:
+    return f"{max(size, 0) / 1e9:.2f} GB"
+
+
+# Of a pixel while an image is decoded, converted and uploaded [bytes].
+_PIXEL = 12
+
+
+def read_image(
+    error: type[RippleError], source: str | Path | Image.Image, what: str, mode: Callable[[str], str]
+) -> NDArray:
+    """Pixels of an image file, or of an image that pillow has opened but perhaps not read.
+
+    Parameters
+    ----------
+    error : type
+        What is raised.
+    source : path or PIL.Image.Image
+    what : str
+        What the image is, for messages.
+    mode : callable
+        From the file's mode, as pillow names it, to the one that is wanted.
+
+    Returns
+    -------
+    array [height, width] or [height, width, channels], top row first
+
+    Raises
+    ------
+    RippleError
+        If the file cannot be read, has more pixels than pillow allows, or these do not fit into memory.
+    """
+    image = open_image(error, source, what)
+    try:
+        return np.asarray(image.convert(mode(image.mode)))
+    except (OSError, ValueError, SyntaxError) as problem:
+        raise error(f"{what} {shown(str(source))} cannot be read: {problem}") from problem
+
+
+def open_image(error: type[RippleError], source: str | Path | Image.Image, what: str) -> Image.Image:
+    """The image of a file, as pillow opens it: nothing but its head is read; see `read_image`."""
+    name = f"{what} {shown(str(source))}"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # that half of the limit is reached
+            image = source if isinstance(source, Image.Image) else Image.open(source)
+    except Image.DecompressionBombError as bomb:
+        raise error(f"{name} cannot be read: {bomb} Scale it down") from bomb
+    except (OSError, ValueError, SyntaxError) as problem:
+        raise error(f"{name} cannot be read: {problem}") from problem
+    width, height = image.size
+    require_memory(error, _PIXEL * width * height, f"{name} of {width}x{height} pixels", "scale it down")
+    return image

@@ -1,0 +1,255 @@
+"""The equiangular cube map: where the texels of six N x N charts lie on the sphere, and how the charts are connected.
+
+Chart order is +x, -x, +y, -y, +z, -z. A chart has a normal n and two axes u (columns) and v (rows) with u x v = n.
+Texel (chart, row, column) looks along n + tan(pi/4 a) u + tan(pi/4 b) v with a = (2 column + 1)/N - 1 and
+b = (2 row + 1)/N - 1, so that texels are equally wide in angle along both axes. A grid line that leaves a chart goes on
+as a grid line of the next one.
+
+Area of the surface that belongs to each texel, from the sphere map: see `texels.areas`.
+
+The edges of the cube: where they cut triangles, and where directions lie in the charts between them.
+
+A triangle that crosses an edge of the cube is cut along it. One coordinate pair a corner cannot do instead: equiangular
+coordinates continue smoothly beyond an edge, but there they leave the neighbour's grid (its rows are not the
+continuation of this chart's rows), and at 90 degrees from the chart's middle they end: a long triangle has none.
+Cut pieces lie in one chart each, with coordinates in [0, 1] that any cube-map texture or array of six layers can be
+sampled at: with a halo round each layer the result is continuous everywhere.
+"""
+
+from __future__ import annotations
+
+import functools
+import numbers
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import AtlasError
+from ...files import require_memory
+from ...mesh.mesh import Mesh
+from ...texels.chart_map import ChartPieces
+from ...texels.texel_mesh import levelled_areas
+from ...texels.topology import TexelTopology, glue
+
+
+def texel_areas(
+    mesh: Mesh,
+    sphere: NDArray[np.float64],
+    topology: TexelTopology,
+    spanned: NDArray[np.float64],
+    triangles: NDArray[np.int64],
+    barycentrics: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Area of the surface that belongs to each texel [m^2], [6, N, N].
+
+    Parameters
+    ----------
+    mesh, sphere, topology
+        Surface, its sphere map [vertex_count, 3], and the cube's charts.
+    spanned : float64 [6, N, N]
+        Area that the texel mesh spans [m^2]; see `lumped_areas`.
+    triangles, barycentrics
+        Where the texels lie; see `Atlas`.
+    """
+    return levelled_areas(topology, spanned, _sampled_areas(mesh, sphere, triangles, barycentrics))
+
+
+def solid_angles(resolution: int) -> NDArray[np.float64]:
+    """Solid angle of every texel of a chart [sr], [N, N]; the six charts sum to 4 pi."""
+    edge = np.tan(np.pi / 4 * (2 * np.arange(resolution + 1) / resolution - 1))
+    a, b = edge[None, :], edge[:, None]
+    corner = np.arctan(a * b / np.sqrt(1 + a * a + b * b))
+    return np.diff(np.diff(corner, axis=0), axis=1)
+
+
+def _sampled_areas(
+    mesh: Mesh, sphere: NDArray[np.float64], triangles: NDArray[np.int64], barycentrics: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Solid angle of each texel times the real area for each unit of it at the texel's centre [m^2], [6, N, N].
+
+    That is 2 A |P|^3 / det(a, b, c) in a triangle of area A that is (a, b, c) on the sphere, where the texel's ray
+    meets its chord plane in P.
+    """
+    corners = sphere[mesh.F]
+    meeting = np.einsum("...k,...kj->...j", barycentrics, corners[triangles])
+    real = 2 * mesh.triangle_areas / np.linalg.det(corners)
+    return solid_angles(triangles.shape[1]) * real[triangles] * np.linalg.norm(meeting, axis=-1) ** 3
+
+
+CHART_NORMALS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
+CHART_U = np.array([[0, 1, 0], [0, -1, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0]])
+CHART_V = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 1, 0], [0, -1, 0]])
+
+MIN_RESOLUTION = 4
+MAX_RESOLUTION = 4096
+
+# Memory for each texel while an atlas is built, at least [bytes].
+_TEXEL = 200
+
+
+def check_resolution(resolution: int) -> int:
+    """Return the resolution N as an int, or raise `AtlasError` if it is not a whole number in the valid range."""
+    whole = isinstance(resolution, numbers.Real) and resolution % 1 == 0
+    if not whole or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
+        raise AtlasError(
+            f"resolution is {resolution!r}; valid is a whole number of texels along a chart's side "
+            f"from {MIN_RESOLUTION} to {MAX_RESOLUTION}"
+        )
+    return int(resolution)
+
+
+def check_memory(resolution: int) -> None:
+    """Raise `AtlasError` if an atlas of about 6 N^2 texels cannot fit into memory."""
+    what = f"an atlas of resolution {resolution}"
+    require_memory(AtlasError, _TEXEL * 6 * resolution**2, what, "take a lower resolution")
+
+
+def texel_directions(resolution: int) -> NDArray[np.float64]:
+    """Unit vectors through the texel centres, shape [6, N, N, 3]."""
+    half_width = resolution
+    offset = 2 * np.arange(resolution) + 1 - half_width
+    # tan is evaluated once per distance from the chart's middle, so that mirrored texels are mirrored to the last bit
+    tangent = np.sign(offset) * np.tan(np.pi / 4 * np.abs(offset) / half_width)
+    a = tangent[None, None, :, None]
+    b = tangent[None, :, None, None]
+    directions = CHART_NORMALS[:, None, None, :] + a * CHART_U[:, None, None, :] + b * CHART_V[:, None, None, :]
+    # the sum of squares in one order for all charts, for the same reason
+    return directions / np.sqrt(1.0 + np.minimum(a * a, b * b) + np.maximum(a * a, b * b))
+
+
+def cube_chart_points(
+    directions: NDArray[np.float64], resolution: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Chart, row and column of directions from the cube's centre (they need not be unit vectors).
+
+    Row and column are float64 in texel units; 0.0 is the centre of the first texel. Each result has shape [k].
+    """
+    d = np.asarray(directions, dtype=np.float64).reshape(-1, 3)
+    axis = np.argmax(np.abs(d), axis=1)
+    main = np.take_along_axis(d, axis[:, None], axis=1)[:, 0]
+    chart = 2 * axis + (main < 0)
+    a = np.arctan(np.einsum("ij,ij->i", d, CHART_U[chart]) / np.abs(main)) * (4 / np.pi)
+    b = np.arctan(np.einsum("ij,ij->i", d, CHART_V[chart]) / np.abs(main)) * (4 / np.pi)
+    return chart, ((b + 1) * resolution - 1) / 2, ((a + 1) * resolution - 1) / 2
+
+
+@functools.lru_cache(maxsize=8)
+def cube_topology(resolution: int) -> TexelTopology:
+    """The six charts of N x N texels, glued along the edges of the cube; at its eight corners three charts meet."""
+    # outward from a chart's south, east, north and west side
+    outward = np.stack([-CHART_V, CHART_U, CHART_V, -CHART_U], axis=1)
+    beyond = (outward[:, :, None] == CHART_NORMALS).all(axis=-1).argmax(axis=-1)
+    # the neighbour's side on which this chart lies
+    back = (outward[beyond] == CHART_NORMALS[:, None, None]).all(axis=-1).argmax(axis=-1)
+    return glue(np.stack([beyond, back], axis=-1), resolution)
+
+
+@functools.lru_cache(maxsize=1)
+def cube_rotations() -> NDArray[np.float64]:
+    """The 24 rotations that map the cube onto itself, shape [24, 3, 3]."""
+    rotations = []
+    for first in range(6):
+        for second in range(6):
+            x, y = CHART_NORMALS[first], CHART_NORMALS[second]
+            if x @ y == 0:
+                rotations.append(np.stack([x, y, np.cross(x, y)], axis=1))
+    return np.array(rotations, dtype=np.float64)
+
+
+def permute_texels(field: NDArray, transform: NDArray[np.float64]) -> NDArray:
+    """Move a field [6, N, N, ...] by one of the cube's 48 symmetries (a 3 x 3 signed permutation matrix).
+
+    The result r satisfies r(transform @ d) = field(d) for the texel directions d.
+    """
+    n = field.shape[1]
+    directions = texel_directions(n).reshape(-1, 3)
+    chart, row, column = cube_chart_points(directions @ transform.T, n)
+    flat = (chart * n + np.rint(row).astype(int)) * n + np.rint(column).astype(int)
+    result = np.empty_like(field)
+    result.reshape(6 * n * n, *field.shape[3:])[flat] = field.reshape(6 * n * n, *field.shape[3:])
+    return result
+
+
+# Relative to a triangle: what hangs over an edge by less counts as within, and smaller pieces are left out.
+_ROUND_OFF = 1e-12
+_MOST = 8  # places for a polygon's corners
+# The four planes through the cube's centre that bound each chart's share of space; inwards is positive.
+_SIDES = np.stack(
+    [CHART_NORMALS - CHART_U, CHART_NORMALS + CHART_U, CHART_NORMALS - CHART_V, CHART_NORMALS + CHART_V], axis=1
+).astype(np.float64)
+
+
+def split_at_edges(corners: NDArray[np.float64]) -> ChartPieces:
+    """Cut triangles with the directions [m, 3, 3] at their corners along the edges of the cube."""
+    chart = _chart_of(corners.sum(axis=1))
+    inside = (np.einsum("mki,msi->mks", corners, _SIDES[chart]) >= -_ROUND_OFF).all(axis=(1, 2))
+    whole, crossing = np.flatnonzero(inside), np.flatnonzero(~inside)
+    owner, piece_chart, pieces = _cut(corners[crossing], _SIDES)
+    triangle = np.concatenate([whole, crossing[owner]])
+    order = np.argsort(triangle, kind="stable")
+    barycentrics = np.concatenate([np.tile(np.eye(3), (len(whole), 1, 1)), pieces])[order]
+    return ChartPieces(triangle[order], barycentrics, np.concatenate([chart[whole], piece_chart])[order])
+
+
+def chart_uv(directions: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Equiangular place in charts [k], 0 to 1, of directions [k, ..., 3] that belong to them, [k, ..., 2]."""
+    depth = np.einsum("p...i,pi->p...", directions, CHART_NORMALS[chart])
+    sides = np.einsum("p...i,pij->p...j", directions, np.stack([CHART_U, CHART_V], axis=-1)[chart])
+    return np.clip(0.5 + np.arctan(sides / depth[..., None]) * (2 / np.pi), 0.0, 1.0)
+
+
+def _chart_of(directions: NDArray[np.float64]) -> NDArray[np.int64]:
+    axis = np.argmax(np.abs(directions), axis=1)
+    return 2 * axis + (np.take_along_axis(directions, axis[:, None], axis=1)[:, 0] < 0)
+
+
+def _cut(
+    corners: NDArray[np.float64], sides: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Cut triangles [k, 3, 3] into their parts in each chart: owner, chart, and barycentrics [pieces, 3, 3]."""
+    owner, chart = np.divmod(np.arange(6 * len(corners)), 6)
+    # a triangle that is cut by four planes has seven corners at most
+    polygons, sizes = np.zeros((len(owner), _MOST, 3)), np.full(len(owner), 3)
+    polygons[:, :3] = np.eye(3)
+    for s in range(4):
+        polygons, sizes = _clip(polygons, sizes, corners[owner], sides[chart, s])
+        left = sizes > 0
+        owner, chart, polygons, sizes = owner[left], chart[left], polygons[left], sizes[left]
+    fan, k = np.nonzero(np.arange(2, _MOST) < sizes[:, None])
+    pieces = np.stack([polygons[fan, 0], polygons[fan, k + 1], polygons[fan, k + 2]], axis=1)
+    a, b, c = pieces.transpose(1, 2, 0)
+    area = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    real = area > _ROUND_OFF
+    return owner[fan[real]], chart[fan[real]], pieces[real]
+
+
+def _clip(
+    polygons: NDArray[np.float64], sizes: NDArray[np.int64], corners: NDArray[np.float64], planes: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Keep the parts of convex polygons, [p, 8, 3], on the inner sides of planes (Sutherland and Hodgman 1974)."""
+    clipped, count, every = np.zeros_like(polygons), np.zeros_like(sizes), np.arange(len(sizes))
+    previous = polygons[every, sizes - 1]
+    p = _distance(previous, corners, planes)
+    for i in range(sizes.max(initial=0)):
+        here, there = polygons[:, i], i < sizes
+        q = _distance(here, corners, planes)
+        crossing = np.flatnonzero(there & ((p >= 0) != (q >= 0)))
+        before, after = p[crossing, None], q[crossing, None]
+        # the same to the last bit from whichever side it is looked at
+        cuts = (before * here[crossing] - after * previous[crossing]) / (before - after)
+        clipped[crossing, count[crossing]] = cuts
+        count[crossing] += 1
+        inside = np.flatnonzero(there & (q >= 0))
+        clipped[inside, count[inside]] = here[inside]
+        count[inside] += 1
+        previous, p = here, q
+    return clipped, count
+
+
+def _distance(
+    weights: NDArray[np.float64], corners: NDArray[np.float64], planes: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distance [p] of points in triangles, by barycentrics [p, 3] and corners [p, 3, 3], from planes [p, 3]."""
+    x, y, z = planes.T
+    a, b, c = (corners[:, i, 0] * x + corners[:, i, 1] * y + corners[:, i, 2] * z for i in range(3))
+    return weights[:, 0] * a + weights[:, 1] * b + weights[:, 2] * c

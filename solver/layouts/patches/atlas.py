@@ -1,0 +1,287 @@
+"""The patch layout's chart map: the mesh's triangles cut into pieces, on each of which it is linear.
+
+How evenly a map onto charts spreads area.
+
+The points of a rim beside the texels of charts that end there.
+
+The atlas of any mesh in the patch layout.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import time
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernel import Floats, Ints, kernel, variant
+from ...mesh.mesh import Mesh
+from ...texels.atlas import Atlas
+from ...texels.chart_map import ChartPieces, LinearParts, barycentrics_at, barycentrics_in, texel_on
+from ...texels.texel_mesh import TexelMesh, levelled_areas
+from ...texels.topology import TexelTopology, glue, stretch_summary
+from .layout import PatchMap, patch_map
+from .pieces import Pieces, chart_pieces, warped
+from .quads import CELLS
+from .samples import Sampler, corners_in_frame_of, untangled
+from .seamless import COLUMN, FIXED, SeamlessMap, Transitions, corner_places, follow, transitions
+
+
+def map_quality(mesh: Mesh, pieces: Pieces) -> dict[str, float]:
+    """Flipped pieces, quantiles of the stretch, starved share of the area; see `Atlas.quality`."""
+    u, v = pieces.places[:, 1] - pieces.places[:, 0], pieces.places[:, 2] - pieces.places[:, 0]
+    flat = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+    real = mesh.triangle_areas[pieces.triangle] * _shares(pieces.barycentrics)
+    even = flat * mesh.area / (int(pieces.chart.max()) + 1)
+    stretch = np.sqrt(real / np.maximum(even, np.finfo(np.float64).tiny))
+    return {"flipped": int((flat <= 0).sum()), **stretch_summary(stretch, real)}
+
+
+def _shares(barycentrics: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of its triangle that each piece has."""
+    return np.abs(np.linalg.det(barycentrics))
+
+
+class PatchCharts(NamedTuple):
+    """Triangles in space [m], [m, 3, 3], the first piece of each, one behind the last, and the pieces."""
+
+    triangles: Floats
+    first: Ints
+    pieces: Pieces
+    resolution: int
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PatchChartMap:
+    """Any mesh on charts; map coordinates are chart, column and row, the latter from 0 to 1. See `ChartMap`.
+
+    Attributes
+    ----------
+    pieces : Pieces
+    """
+
+    pieces: Pieces
+
+    @property
+    def layout(self) -> str:
+        """Name of the layout."""
+        return "patches"
+
+    @functools.cached_property
+    def _first(self) -> NDArray[np.int64]:
+        """Number of the first piece of each triangle, and one behind the last."""
+        return np.searchsorted(self.pieces.triangle, np.arange(self.pieces.triangle[-1] + 2))
+
+    def coordinates(self, mesh: Mesh, triangles: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Chart, column and row, [k, 3], of points [k, 3] [m] that lie on triangles [k]."""
+        weights = barycentrics_in(mesh.V[mesh.F[triangles]], points)
+        piece, inside = np.empty(len(weights), np.int64), np.empty((len(weights), 3))
+        _find(self._first, self.pieces.barycentrics, triangles, weights, piece, inside)
+        places = np.einsum("kc,kcj->kj", inside, self.pieces.places[piece])
+        return np.concatenate([self.pieces.chart[piece, None], places], axis=1)
+
+    def chart_points(
+        self, coordinates: NDArray[np.float64], resolution: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Chart, row and column, each [k]."""
+        chart, column, row = coordinates.T
+        return chart.astype(np.int64), row * resolution - 0.5, column * resolution - 0.5
+
+    def compiled(self, mesh: Mesh, topology: TexelTopology) -> PatchCharts:
+        """The triangles in space, and their pieces."""
+        return PatchCharts(mesh.V[mesh.F], self._first, self.pieces, topology.shape[1])
+
+    def linear_parts(self, mesh: Mesh) -> LinearParts:
+        """The pieces."""
+        chart = np.broadcast_to(self.pieces.chart[:, None, None], (len(self.pieces.chart), 3, 1))
+        coordinates = np.concatenate([chart, self.pieces.places], axis=2)
+        return LinearParts(self.pieces.triangle, self.pieces.barycentrics, coordinates)
+
+    def split(self, corners: NDArray[np.float64]) -> ChartPieces:
+        """Parts of pieces as they are: each lies in one chart."""
+        return ChartPieces.uncut(corners[:, 0, 0].astype(np.int64))
+
+    def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Place [k, ..., 2] in the charts, 0 to 1, of map coordinates [k, ..., 3]."""
+        return np.clip(coordinates[..., 1:], 0.0, 1.0)
+
+    def quality(self, mesh: Mesh) -> dict[str, float]:
+        """Folds and stretch."""
+        return map_quality(mesh, self.pieces)
+
+    def arrays(self) -> dict[str, NDArray]:
+        """The pieces."""
+        return {f"piece_{name}": array for name, array in self.pieces._asdict().items()}
+
+
+@kernel
+def _find(first: Ints, corners: Floats, triangles: Ints, weights: Floats, piece: Ints, inside: Floats) -> None:
+    """For points at barycentrics [k, 3] in triangles [k], the piece in which each lies, and barycentrics in that."""
+    for i in range(len(triangles)):
+        piece[i], s, t = _piece_at(first, corners, triangles[i], weights[i, 0], weights[i, 1])
+        inside[i, 0], inside[i, 1], inside[i, 2] = 1 - s - t, s, t
+
+
+@kernel
+def _piece_at(first: Ints, corners: Floats, triangle: int, x: float, y: float) -> tuple[int, float, float]:
+    """The piece of a triangle in which a point lies, and its second and third barycentric coordinate in that."""
+    best, piece, at_s, at_t = -np.inf, min(first[triangle], len(corners) - 1), 1 / 3, 1 / 3
+    for p in range(first[triangle], first[triangle + 1]):
+        a, b, c = corners[p]
+        ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
+        dx, dy = x - a[0], y - a[1]
+        area = ux * vy - uy * vx
+        if not area > 0:
+            continue
+        s, t = (dx * vy - dy * vx) / area, (ux * dy - uy * dx) / area
+        least = min(s, t, 1 - s - t)
+        if least > best:
+            best, piece = least, p
+            s, t = min(max(s, 0.0), 1.0), min(max(t, 0.0), 1.0)
+            excess = max(s + t, 1.0)
+            at_s, at_t = s / excess, t / excess
+    return piece, at_s, at_t
+
+
+@variant(texel_on, PatchCharts)
+def _texel_on_patches(charts: PatchCharts, triangle: int, x: float, y: float, z: float) -> int:
+    pieces, n = charts.pieces, charts.resolution
+    s, t = barycentrics_at(charts.triangles[triangle], x, y, z)
+    piece, s, t = _piece_at(charts.first, pieces.barycentrics, triangle, 1 - s - t, s)
+    texel = pieces.chart[piece]
+    for k in (1, 0):
+        place = (1 - s - t) * pieces.places[piece, 0, k]
+        place += s * pieces.places[piece, 1, k] + t * pieces.places[piece, 2, k]
+        texel = texel * n + min(max(int(np.rint(place * n - 0.5)), 0), n - 1)
+    return texel
+
+
+def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDArray) -> NDArray[np.float64] | None:
+    """Positions with halo [C, n + 2, n + 2, 3] [m]; beyond a rim lies its point opposite to each texel.
+
+    None if there is no rim. At the end of a rim, where that turns, lies its corner.
+    """
+    if not topology.rim.any():
+        return None
+    beyond = topology.with_halo(positions)
+    beyond[(topology.halo < 0) | topology.rim] = np.nan
+    sides = patches.surface.edges.sides[patches.surface.edges.rim, 0]
+    seamless = patches.seamless
+    _draw_rims(seamless, patches.surface.V, sides, transitions(seamless.glued), beyond)
+    n = topology.shape[1]
+    for chart, corner in np.argwhere(topology.valence == 0):
+        row, column = ((0, 0), (0, n + 1), (n + 1, n + 1), (n + 1, 0))[corner]
+        if not topology.rim[chart, row, column]:
+            continue
+        other, r, c = np.unravel_index(topology.halo[chart, row, column], topology.shape)
+        if other != chart:
+            out_r, out_c = (0 if x == 0 else n + 1 for x in (r, c))
+            along_rows = topology.rim[other, out_r, c + 1]
+            beyond[chart, row, column] = beyond[other, out_r, c + 1] if along_rows else beyond[other, r + 1, out_c]
+    _place_corners(patches, topology, beyond)
+    return beyond
+
+
+def _place_corners(patches: PatchMap, topology: TexelTopology, beyond: NDArray[np.float64]) -> None:
+    """Put the points in which a single chart ends at a rim into the corners of its halo."""
+    seamless, surface = patches.seamless, patches.surface
+    held = np.zeros(len(surface.V), bool)
+    held[surface.edges.ends[surface.edges.rim]] = True
+    held &= seamless.freedom == FIXED
+    triangle, k = np.nonzero(held[surface.F])
+    column, row = seamless.shift[triangle, k].T * (beyond.shape[1] - 1)
+    chart = seamless.frame[triangle]
+    alone = topology.rim[chart, row, column]
+    beyond[chart[alone], row[alone], column[alone]] = surface.V[surface.F[triangle, k]][alone]
+
+
+@kernel
+def _draw_rims(seamless: SeamlessMap, V: Floats, sides: Ints, across: Transitions, beyond: Floats) -> None:
+    n = beyond.shape[1] - 2
+    p = np.empty((3, 2))
+    for h in sides:
+        f, k = h // 3, h % 3
+        a, b = seamless.F[f, k], seamless.F[f, (k + 1) % 3]
+        anchor = k if seamless.freedom[a] != FIXED else (k + 1) % 3
+        v = seamless.F[f, anchor]
+        corners_in_frame_of(seamless, f, anchor, p)
+        axis = 0 if seamless.freedom[v] == COLUMN else 1
+        low, high = p[k, axis], p[(k + 1) % 3, axis]
+        first = int(np.ceil(min(low, high) * n - 0.5 - 1e-9))
+        last = int(np.floor(max(low, high) * n - 0.5 + 1e-9))
+        for i in range(first, last + 1):
+            along = (i + 0.5) / n
+            t = min(max((along - low) / (high - low), 0.0), 1.0)
+            qx, qy = (along, p[anchor, 1]) if axis == 0 else (p[anchor, 0], along)
+            chart, _, _, _, x, y = follow(seamless.chart[v], p[anchor, 0], p[anchor, 1], qx, qy, seamless.glued, across)
+            row, column = int(np.floor(y * n)) + 1, int(np.floor(x * n)) + 1
+            if abs(y) < 1e-9:
+                row = 0
+            elif abs(y - 1) < 1e-9:
+                row = n + 1
+            elif abs(x) < 1e-9:
+                column = 0
+            else:
+                column = n + 1
+            for j in range(3):
+                beyond[chart, row, column, j] = (1 - t) * V[a, j] + t * V[b, j]
+
+
+_LEAST_TEXELS = 4  # along a chart's side
+
+# Texels of a cell that is worth having: five charts of 7 x 7. A coarse atlas has fewer cells, but not below the least.
+_TEXELS_OF_CELL, _LEAST_CELLS = 245, 24
+
+
+def patch_atlas(mesh: Mesh, resolution: int) -> Atlas:
+    """Atlas of about 6 N^2 texels, for a resolution N.
+
+    Raises
+    ------
+    AtlasError
+        If the mesh cannot be laid out.
+    """
+    start = time.perf_counter()
+    patches = patch_map(mesh.V, mesh.F, cells_for(resolution))
+    mapped = time.perf_counter()
+    atlas = atlas_from_patch_map(mesh, patches, resolution)
+    atlas.timings.update(patch_map=mapped - start, texels=time.perf_counter() - mapped)
+    return atlas
+
+
+def cells_for(resolution: int) -> int:
+    """How many cells a mesh is cut into."""
+    return int(np.clip(6 * resolution**2 / _TEXELS_OF_CELL, _LEAST_CELLS, CELLS))
+
+
+def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atlas:
+    """Put texels on a mesh that is laid out on charts."""
+    glued = patches.seamless.glued
+    n = max(round(resolution * np.sqrt(6 / len(glued))), _LEAST_TEXELS)
+    sampler = Sampler(mesh, patches)
+    samples = sampler.everywhere(n)
+    topology = glue(glued, n)
+    beyond = positions_beyond(patches, topology, samples.positions)
+    samples, offsets = untangled(sampler, topology, samples, beyond)
+    pieces = chart_pieces(patches)
+    if offsets.any():
+        pieces, beyond = warped(pieces, offsets), positions_beyond(patches, topology, samples.positions)
+    spanned = TexelMesh.of(topology, samples.positions, normals=samples.normals, beyond=beyond)
+    areas = levelled_areas(topology, spanned.areas, _map_ratios(patches)[samples.small] / n**2)
+    return Atlas(
+        mesh=mesh,
+        texels=TexelMesh(topology, samples.positions, samples.normals, areas, beyond),
+        chart_map=PatchChartMap(pieces),
+        triangles=samples.triangles,
+        barycentrics=samples.barycentrics,
+    )
+
+
+def _map_ratios(patches: PatchMap) -> NDArray[np.float64]:
+    """Real area of each triangle for each unit of its area on the charts [m^2], [m]."""
+    places = corner_places(patches.seamless)
+    u, v = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
+    return patches.surface.areas / ((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2)

@@ -1,0 +1,338 @@
+"""Voronoi cells: every vertex of a surface belongs to the nearest of a few seeds, along the surface.
+
+Distances along a surface, between its vertices.
+
+Cells cut apart: smooth borders between them, and the corners and arcs of these.
+
+How large cells may be: smaller on limbs and round their ends, where a large one would be stretched.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from .surface import AB, BC, CA, MIDDLE, A, B, C, Surface, Triangle
+
+_LEAST = 1e-12  # of the longest link: graphs know no links of length 0
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Metric:
+    """Distances along a surface, in units of a length that differs from place to place.
+
+    Attributes
+    ----------
+    surface : Surface
+    graph : csr_array [n, n]
+        Links between near vertices with their lengths in these units.
+    unit : float64 [n]
+        At each vertex [m].
+    """
+
+    surface: Surface
+    graph: csr_array
+    unit: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, surface: Surface) -> Metric:
+        """Distances in metres."""
+        return cls(surface, distance_graph(surface), np.ones(len(surface.V)))
+
+    def in_units(self, unit: NDArray[np.float64]) -> Metric:
+        """The same distances in other units [n] [m]; a link takes the mean of both ends."""
+        row = np.repeat(np.arange(len(unit)), np.diff(self.graph.indptr))
+        column = self.graph.indices
+        lengths = self.graph.data * (self.unit[row] + self.unit[column]) / (unit[row] + unit[column])
+        return Metric(self.surface, csr_array((lengths, column, self.graph.indptr), self.graph.shape), unit)
+
+    @functools.cached_property
+    def edge_lengths(self) -> NDArray[np.float64]:
+        """Lengths of the surface's edges, none of them 0, [e]."""
+        lengths = self.surface.edge_lengths / self.unit[self.surface.edges.ends].mean(axis=1)
+        return np.maximum(lengths, np.finfo(np.float64).tiny)
+
+    @functools.cached_property
+    def masses(self) -> NDArray[np.float64]:
+        """Area that belongs to each vertex, [n]."""
+        surface = self.surface
+        lumped = np.bincount(surface.F.ravel(), np.repeat(surface.areas / 3, 3), len(surface.V))
+        return lumped / self.unit**2 + np.finfo(np.float64).tiny
+
+
+def distance_graph(surface: Surface) -> csr_array:
+    """Vertices linked along edges, and straight across each edge between the two vertices opposite to it [m]."""
+    edges, V, F = surface.edges, surface.V, surface.F
+    inner = np.flatnonzero(~edges.rim)
+    triangle, side = np.divmod(edges.sides[inner].T, 3)
+    p, q = F[triangle, (side + 2) % 3]
+    a, b = V[edges.ends[inner]].transpose(1, 0, 2)
+    length = surface.edge_lengths[inner]
+    along = (b - a) / np.maximum(length, np.finfo(np.float64).tiny)[:, None]
+    # laid flat about the edge, p lies on one side and q on the other
+    xp, yp = _along_and_across(V[p] - a, along)
+    xq, yq = _along_and_across(V[q] - a, along)
+    crossing = xp + (xq - xp) * yp / np.maximum(yp + yq, np.finfo(np.float64).tiny)
+    straight = (crossing > 0) & (crossing < length) & (p != q)
+    ends = np.concatenate([edges.ends, np.stack([p, q], axis=1)[straight]])
+    weights = np.concatenate([surface.edge_lengths, np.hypot(xp - xq, yp + yq)[straight]])
+    weights = np.maximum(weights, _LEAST * weights.max())
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    order = np.lexsort((weights, low * len(V) + high))
+    key = (low * len(V) + high)[order]
+    kept = order[np.concatenate([[True], key[1:] != key[:-1]])]
+    pairs = np.concatenate([low[kept], high[kept]]), np.concatenate([high[kept], low[kept]])
+    return csr_array(coo_array((np.tile(weights[kept], 2), pairs), shape=(len(V), len(V))))
+
+
+def _along_and_across(
+    offset: NDArray[np.float64], along: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Parts of offsets [k, 3] along a direction and across it."""
+    x = np.einsum("ij,ij->i", offset, along)
+    square = np.einsum("ij,ij->i", offset, offset)
+    return x, np.sqrt(np.maximum(square - x * x, 0.0))
+
+
+_LLOYD_STEPS = 8
+_MOST_PASSES = 50
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Cells:
+    """Vertices shared out among seeds.
+
+    Attributes
+    ----------
+    seeds : int64 [k]
+        Vertices.
+    label : int64 [n]
+        Number of the seed whose cell each vertex belongs to. A cell hangs together along edges.
+    distance : float64 [n]
+        From that seed, in the units of the metric.
+    """
+
+    seeds: NDArray[np.int64]
+    label: NDArray[np.int64]
+    distance: NDArray[np.float64]
+
+
+def spread_seeds(metric: Metric, reach: float) -> NDArray[np.int64]:
+    """Vertices of which one lies within reach of every vertex, on one connected component.
+
+    Each is the farthest from those before.
+    """
+    graph = metric.graph
+    seeds = [int(np.argmax(dijkstra(graph, indices=0)))]
+    distance = dijkstra(graph, indices=seeds[0])
+    while distance.max() > reach:
+        seeds.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, dijkstra(graph, indices=seeds[-1], limit=distance.max()))
+    return np.array(seeds)
+
+
+def voronoi_cells(metric: Metric, seeds: NDArray[np.int64]) -> Cells:
+    """The vertices nearest to each seed."""
+    distance, _, source = dijkstra(metric.graph, indices=seeds, min_only=True, return_predecessors=True)
+    number = np.full(len(metric.unit), -1)
+    number[seeds] = np.arange(len(seeds))
+    label = _gathered(metric.surface, number[source], seeds)
+    return Cells(seeds, label, distance)
+
+
+def centred_cells(metric: Metric, seeds: NDArray[np.int64]) -> Cells:
+    """Cells whose seeds moved to their middles a few times (Lloyd 1982)."""
+    V, mass = metric.surface.V, metric.masses
+    for _ in range(_LLOYD_STEPS):
+        cells = voronoi_cells(metric, seeds)
+        total = np.bincount(cells.label, mass)
+        middle = np.stack([np.bincount(cells.label, mass * V[:, k]) / total for k in range(3)], axis=1)
+        square = ((V - middle[cells.label]) ** 2).sum(axis=1)
+        order = np.lexsort((square, cells.label))
+        moved = order[np.searchsorted(cells.label[order], np.arange(len(seeds)))]
+        if (moved == seeds).all():
+            break
+        seeds = moved
+    return voronoi_cells(metric, seeds)
+
+
+def _gathered(surface: Surface, label: NDArray[np.int64], seeds: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Give vertices that hang on their cell by no edge to a neighbour's."""
+    ends, size = surface.edges.ends, len(surface.V)
+    for _ in range(_MOST_PASSES):
+        inner = label[ends[:, 0]] == label[ends[:, 1]]
+        links = coo_array((np.ones(inner.sum()), tuple(ends[inner].T)), shape=(size, size))
+        part = connected_components(links, directed=False)[1]
+        stray = part != part[seeds][label]
+        beside = stray[ends[:, 0]] != stray[ends[:, 1]]
+        if not beside.any():
+            break
+        first = stray[ends[beside, 0]]
+        lone, kept = np.where(first, ends[beside].T, ends[beside, ::-1].T)
+        label = label.copy()
+        label[lone] = label[kept]
+    return label
+
+
+# Triangles between two cells, the one vertex on its side of the border; and between three.
+_CUTS: dict[int, tuple[Triangle, ...]] = {
+    3: ((AB, B, BC), (A, AB, BC), (A, BC, C)),
+    6: ((BC, C, CA), (B, BC, CA), (B, CA, A)),
+    5: ((CA, A, AB), (C, CA, AB), (C, AB, B)),
+    7: ((A, AB, MIDDLE), (AB, B, MIDDLE), (B, BC, MIDDLE), (BC, C, MIDDLE), (C, CA, MIDDLE), (CA, A, MIDDLE)),
+}
+_LEAST_SHARE = 0.1  # of an edge on either side of a border
+_SHARP = np.radians(125)  # angles at the rim that get a corner
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class BorderedCells:
+    """A surface cut along the borders of cells.
+
+    Attributes
+    ----------
+    surface : Surface
+    cell : int64 [m]
+        To which each triangle belongs.
+    arcs : list of lists of int64 [l]
+        Of each cell, counter-clockwise, the vertices along its border from one corner to the next, both included.
+    uncut : int
+        How many vertices there were before the cut: the first ones.
+    """
+
+    surface: Surface
+    cell: NDArray[np.int64]
+    arcs: list[list[NDArray[np.int64]]]
+    uncut: int
+
+    def short_of_corners(self) -> NDArray[np.int64]:
+        """Cells with fewer than three corners."""
+        return np.flatnonzero([len(each) < 3 for each in self.arcs])
+
+
+def cut_borders(metric: Metric, cells: Cells) -> BorderedCells:
+    """Cut the triangles between cells that are disks, and find the cells' corners.
+
+    In an inner corner three cells meet, in one at the rim two; at the rim a cell has corners of its own where that is
+    sharp, and as many more as it lacks to three.
+    """
+    surface = metric.surface
+    ends = surface.edges.ends
+    label, distance = cells.label[ends], cells.distance[ends]
+    between = label[:, 0] != label[:, 1]
+    place = np.clip(0.5 + (distance[:, 1] - distance[:, 0]) / (2 * metric.edge_lengths), _LEAST_SHARE, 1 - _LEAST_SHARE)
+    cut = surface.subdivided(np.where(between, place, np.nan), _CUTS).surface
+    # each triangle has a vertex of the surface before, and all of those are of its cell
+    of_vertex = np.concatenate([cells.label, np.full(len(cut.V) - len(cells.label), -1)])
+    cell = of_vertex[cut.F].max(axis=1)
+    corner, rim_side = _corners(cut, cell), _rim_sides(cut)
+    arcs = []
+    for loop in _border_loops(cut, cell, len(cells.seeds)):
+        on_rim = rim_side[loop] == np.roll(loop, -1)
+        arcs.append(_arcs(cut.V, loop, corner[loop], on_rim))
+    return BorderedCells(cut, cell, arcs, len(surface.V))
+
+
+def _corners(surface: Surface, cell: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Vertices in which three cells meet, two at a rim, or one at a sharp corner of the rim."""
+    count = int(cell.max()) + 1
+    pairs = np.unique(surface.F * count + cell[:, None])
+    meeting = np.bincount(pairs // count, minlength=len(surface.V))
+    angle = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
+    return np.where(surface.at_rim, (meeting >= 2) | (angle < _SHARP), meeting >= 3)
+
+
+def _rim_sides(surface: Surface) -> NDArray[np.int64]:
+    """The vertex that follows each along the rim, counter-clockwise about the surface; -1 elsewhere."""
+    following = np.full(len(surface.V), -1)
+    triangle, side = np.divmod(surface.edges.sides[surface.edges.rim, 0], 3)
+    following[surface.F[triangle, side]] = surface.F[triangle, (side + 1) % 3]
+    return following
+
+
+def _border_loops(surface: Surface, cell: NDArray[np.int64], count: int) -> list[NDArray[np.int64]]:
+    """The vertices round each cell, counter-clockwise."""
+    sides = surface.edges.sides
+    beside = np.where(sides < 0, -1, cell[sides // 3])
+    border = sides[beside[:, 0] != beside[:, 1]].ravel()
+    triangle, side = np.divmod(border[border >= 0], 3)
+    tail, head = surface.F[triangle, side], surface.F[triangle, (side + 1) % 3]
+    following: list[dict[int, int]] = [{} for _ in range(count)]
+    for c, u, v in zip(cell[triangle].tolist(), tail.tolist(), head.tolist(), strict=True):
+        following[c][u] = v
+    loops = []
+    for step in following:
+        loop = [min(step)]
+        while (v := step[loop[-1]]) != loop[0]:
+            loop.append(v)
+        loops.append(np.array(loop))
+    return loops
+
+
+def _arcs(
+    V: NDArray[np.float64], loop: NDArray[np.int64], corner: NDArray[np.bool_], on_rim: NDArray[np.bool_]
+) -> list[NDArray[np.int64]]:
+    """Cut a loop at its corners; more are put on its rim, far from the others, where it has too few."""
+    corner = corner.copy()
+    length = np.linalg.norm(np.roll(V[loop], -1, axis=0) - V[loop], axis=1)
+    place, whole = np.cumsum(length) - length, length.sum()
+    free = on_rim & np.roll(on_rim, 1)
+    while corner.sum() < (4 if on_rim.all() else 3):
+        candidates = np.flatnonzero(free & ~corner)
+        if not len(candidates):
+            break
+        taken = place[corner] if corner.any() else place[:1]
+        gap = np.abs(place[candidates][:, None] - taken)
+        corner[candidates[np.minimum(gap, whole - gap).min(axis=1).argmax()]] = True
+    at = np.flatnonzero(corner)
+    if not len(at):
+        return []
+    turned = np.roll(loop, -at[0])
+    ends = [*(at[1:] - at[0]), len(loop)]
+    turned = np.append(turned, turned[0])
+    return [turned[start : end + 1] for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+
+
+_SAMPLES = 500
+_FULL = 0.5  # share of the area of a flat disk that a geodesic disk must have
+_FEWEST = 12  # samples in a disk before it is judged
+_GROWTH = 0.5  # of the size of cells along the surface
+
+
+def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> NDArray[np.float64]:
+    """Radius of the cells round each vertex [m], [n], between a least and a largest one.
+
+    A cell has at most the share `reach` of the radius at which a geodesic disk round its middle has much less area than
+    a flat one, being wrapped round a limb (of a tube that radius is nearly the girth) or over its end. The metric must
+    be in metres.
+    """
+    total = np.cumsum(metric.masses)
+    count = min(_SAMPLES, len(total))
+    seeds = np.unique(np.searchsorted(total, (np.arange(count) + 0.5) / count * total[-1]))
+    cells = voronoi_cells(metric, np.minimum(seeds, len(total) - 1))
+    distance = dijkstra(_coarse_graph(metric.surface, cells), directed=False)
+    order = np.argsort(distance, axis=1, kind="stable")
+    radius = np.take_along_axis(distance, order, axis=1)
+    area = np.cumsum(np.bincount(cells.label, metric.masses, len(seeds))[order], axis=1)
+    full = area >= _FULL * np.pi * radius**2
+    full[:, :_FEWEST] = True
+    wrapped = np.where(full.all(axis=1), np.inf, radius[np.arange(len(seeds)), full.argmin(axis=1)])
+    size = np.clip(reach * wrapped, *between)
+    return (size + _GROWTH * distance).min(axis=1)[cells.label]
+
+
+def _coarse_graph(surface: Surface, cells: Cells) -> csr_array:
+    """Cells linked to their neighbours, by the shortest way from seed to seed along an edge between them [m]."""
+    count, ends = len(cells.seeds), surface.edges.ends
+    between = cells.label[ends[:, 0]] != cells.label[ends[:, 1]]
+    pairs = np.sort(cells.label[ends[between]], axis=1)
+    length = cells.distance[ends[between]].sum(axis=1) + surface.edge_lengths[between]
+    order = np.lexsort((length, pairs[:, 1], pairs[:, 0]))
+    key = (pairs @ [count, 1])[order]
+    kept = order[np.concatenate([[True], key[1:] != key[:-1]])]
+    return csr_array(coo_array((length[kept], tuple(pairs[kept].T)), shape=(count, count)))

@@ -1,0 +1,214 @@
+"""Square charts: one for each corner of a polygon, from its middle to the middles of its sides.
+
+Sides and corners of charts are numbered as in `texels.topology`. Corner 0 of a chart lies in the middle of its cell,
+corner 2 in the corner of the cell, 1 and 3 in the middles of the cell's sides before and behind that corner.
+
+Cells laid out as regular polygons, and cut from their middles to the middles of their sides.
+
+Corners in which three cells meet, moved to the middle between the cells' middles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ...errors import AtlasError
+from .cells import BorderedCells
+from .disks import Border, along, flattened
+from .surface import Flat, Surface, central_vertices, cut_ray, halved, halved_chords
+
+Path = NDArray[np.int64]
+Halves = list[tuple[Path, Path]]  # of each arc of a part's border
+
+
+def with_middles(cells: BorderedCells) -> tuple[Surface, NDArray[np.int64], list[Halves]]:
+    """Cells [m] with a vertex in the middle of each arc, at which it is cut in half, and with inner vertices."""
+    surface = cells.surface
+    single = np.array([arc for each in cells.arcs for arc in each if len(arc) == 2]).reshape(-1, 2)
+    size = len(surface.V)
+    low_high = surface.edges.ends @ [size, 1]
+    chosen = np.isin(low_high, np.sort(single, axis=1) @ [size, 1])
+    finer = halved(surface, chosen)
+    middle = dict(zip(map(tuple, surface.edges.ends[chosen].tolist()), finer.middles[chosen].tolist(), strict=True))
+    arcs = [
+        [arc if len(arc) > 2 else np.insert(arc, 1, middle[min(arc), max(arc)]) for arc in each] for each in cells.arcs
+    ]
+    on_border = np.zeros(len(finer.surface.V), bool)
+    on_border[np.concatenate([arc for each in arcs for arc in each])] = True
+    cell = cells.cell[finer.origin]
+    split = halved_chords(finer.surface, cell, on_border)
+    halves = [[halves_of(split.surface.V, arc) for arc in each] for each in arcs]
+    return split.surface, cell[split.origin], halves
+
+
+def halves_of(V: NDArray[np.float64], arc: Path) -> tuple[Path, Path]:
+    """Cut an arc in two at the vertex nearest to its middle; the same from either side."""
+    flipped = arc[0] > arc[-1] or (arc[0] == arc[-1] and arc[1] > arc[-2])
+    way = arc[::-1] if flipped else arc
+    at = 1 + int(np.abs(along(V, [way])[1:-1] - 0.5).argmin())
+    return (way[: at + 1], way[at:]) if not flipped else (way[at:][::-1], way[: at + 1][::-1])
+
+
+def cut_polygons(surface: Surface, part: NDArray[np.int64], halves: list[Halves]) -> tuple[Flat, list[list[Path]]]:
+    """Lay out the first parts as regular polygons and cut them from their middles; return the paths of the cuts.
+
+    Parts beyond those that have a border are left alone.
+    """
+    on_border = np.zeros(len(surface.V), bool)
+    on_border[np.concatenate([half for each in halves for arc in each for half in arc])] = True
+    chosen = part < len(halves)
+    places = np.full((len(part), 3, 2), np.nan)
+    some = Surface(surface.V, surface.F[chosen], surface.parent[chosen], surface.inside[chosen])
+    places[chosen] = flattened(some, part[chosen], _polygon_border(surface, halves))
+    centre = central_vertices(Flat(some, part[chosen], places[chosen]), on_border)
+    count = int(part.max()) + 1
+    flat = Flat(surface, part, places)
+    paths: list[list[Path]] = [[] for _ in halves]
+    for i in range(max(map(len, halves), default=0)):
+        start, end = np.full(count, -1), np.full(count, -1)
+        for number, each in enumerate(halves):
+            if len(each) > i:
+                start[number], end[number] = centre[number], each[i][0][-1]
+        border = np.zeros(len(flat.surface.V), bool)
+        border[: len(on_border)] = on_border
+        flat, lines = cut_ray(flat, start, end, border)
+        for path, line in zip(paths, lines, strict=False):
+            if len(line):
+                path.append(line)
+    return flat, paths
+
+
+def _polygon_border(surface: Surface, halves: list[Halves]) -> Border:
+    """Cells as regular polygons: corners on the unit circle, arcs along the sides."""
+    paths, cells, ends = [], [], []
+    for cell, arcs in enumerate(halves):
+        tips = np.exp(2j * np.pi * np.arange(len(arcs) + 1) / len(arcs))
+        middles = (tips[:-1] + tips[1:]) / 2
+        for i, (first, second) in enumerate(arcs):
+            paths += [first, second]
+            cells += [cell, cell]
+            ends += [(tips[i], middles[i]), (middles[i], tips[i + 1])]
+    lengths = [len(path) for path in paths]
+    a, b = np.repeat(np.array(ends), lengths, axis=0).T
+    z = a + (b - a) * along(surface.V, paths)
+    return Border(np.repeat(cells, lengths), np.concatenate(paths), np.stack([z.real, z.imag], axis=1))
+
+
+# column and row of a chart's corners, counter-clockwise
+CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+
+Sides = tuple[Path, Path, Path, Path]
+Fans = list[list[int]]  # charts round a corner
+
+
+def chart_sides(halves: list[Halves], paths: list[list[Path]]) -> list[Sides]:
+    """The four sides of each chart, counter-clockwise; a chart lies at each corner of each part."""
+    sides = []
+    for arcs, rays in zip(halves, paths, strict=True):
+        for i in range(len(arcs)):
+            sides.append((rays[i - 1], arcs[i - 1][1], arcs[i][0], rays[i][::-1]))
+    return sides
+
+
+def charts_of(surface: Surface, sides: list[Sides]) -> tuple[Surface, NDArray[np.int64]]:
+    """The chart of each triangle: those not parted by a side of a chart hang together."""
+    size = len(surface.V)
+    walls = np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for each in sides for path in each])
+    wall = np.isin(surface.edges.ends @ [size, 1], np.sort(walls, axis=1) @ [size, 1])
+    beside = surface.edges.sides[~wall] // 3
+    links = coo_array((np.ones(len(beside)), tuple(beside.T)), shape=(len(surface.F),) * 2)
+    number, part = connected_components(links, directed=False)
+    if number != len(sides):
+        raise AtlasError(f"{len(sides)} charts came out as {number}: triangles of the surface are too thin")
+    # the triangle on the inner side of the first edge of a chart's second side
+    triangle, k = np.divmod(surface.edges.sides.ravel(), 3)
+    tail, head = surface.F[triangle, k], surface.F[triangle, (k + 1) % 3]
+    key = np.where(surface.edges.sides.ravel() >= 0, tail * size + head, -1)
+    order = np.argsort(key)
+    wanted = np.array([each[1][0] * size + each[1][1] for each in sides])
+    owner = triangle[order[np.searchsorted(key[order], wanted)]]
+    chart = np.full(number, -1)
+    chart[part[owner]] = np.arange(len(sides))
+    return surface, chart[part]
+
+
+def square_border(surface: Surface, sides: list[Sides]) -> Border:
+    """Charts as squares."""
+    paths = [path for each in sides for path in each]
+    lengths = [len(path) for path in paths]
+    side = np.repeat(np.arange(len(paths)), lengths)
+    a, b = CORNERS[side % 4], CORNERS[(side + 1) % 4]
+    return Border(side // 4, np.concatenate(paths), a + (b - a) * along(surface.V, paths)[:, None])
+
+
+def on_paths(surface: Surface, sides: list[Sides]) -> NDArray[np.bool_]:
+    """Vertices that lie on a side of a chart, [n]."""
+    on_path = np.zeros(len(surface.V), bool)
+    on_path[np.concatenate([path for each in sides for path in each])] = True
+    return on_path
+
+
+def glued_sides(sides: list[Sides]) -> NDArray[np.int64]:
+    """Charts that share a side have its first edge the other way round."""
+    table = np.full((len(sides), 4, 2), -1)
+    seen = {(int(path[0]), int(path[1])): (chart, s) for chart, each in enumerate(sides) for s, path in enumerate(each)}
+    for chart, each in enumerate(sides):
+        for s, path in enumerate(each):
+            other = seen.get((int(path[-1]), int(path[-2])))
+            if other is not None:
+                table[chart, s] = other
+    return table
+
+
+def fans_of(sides: list[Sides], glued: NDArray[np.int64]) -> tuple[Fans, list[int]]:
+    """The three charts round each corner where three cells meet, counter-clockwise, and all other charts."""
+    fans: Fans = []
+    used = np.zeros(len(sides), bool)
+    for a in range(len(sides)):
+        b = int(glued[a, 1, 0])
+        c = int(glued[b, 1, 0]) if b >= 0 else -1
+        if not used[a] and c >= 0 and glued[c, 1, 0] == a and len({a, b, c}) == 3:
+            fans.append([a, b, c])
+            used[[a, b, c]] = True
+    return fans, np.flatnonzero(~used).tolist()
+
+
+def with_even_corners(
+    surface: Surface, chart: NDArray[np.int64], sides: list[Sides]
+) -> tuple[Surface, NDArray[np.int64], list[Sides]]:
+    """Move the corners in which three cells meet to the middle between the cells' middles.
+
+    Voronoi cells often have very short sides, along which texels would be tiny. So the three charts round a corner,
+    a triangle between three cells' middles, are joined and cut anew as the cells were.
+    """
+    glued = glued_sides(sides)
+    fans, rest = fans_of(sides, glued)
+    if not fans:
+        return surface, chart, sides
+    part = np.empty(len(sides), np.int64)
+    for number, fan in enumerate([*fans, *([each] for each in rest)]):
+        part[fan] = number
+    inner = np.zeros(len(sides), bool)
+    inner[[each for fan in fans for each in fan]] = True
+    halves = []
+    for fan in fans:
+        following = [*fan[1:], fan[0]]
+        whole = [(sides[a][0], sides[b][3]) for a, b in zip(fan, following, strict=True)]
+        # the middle stays where the charts beyond do
+        shared = [inner[glued[a, 0, 0]] and inner[glued[b, 3, 0]] for a, b in zip(fan, following, strict=True)]
+        halves.append(
+            [
+                halves_of(surface.V, np.concatenate([first, second[1:]])) if both else (first, second)
+                for (first, second), both in zip(whole, shared, strict=True)
+            ]
+        )
+    on_border = on_paths(surface, sides)
+    split = halved_chords(surface, part[chart], on_border)
+    old = chart[split.origin]
+    flat, paths = cut_polygons(split.surface, part[old], halves)
+    new_sides = [*chart_sides(halves, paths), *(sides[each] for each in rest)]
+    surface, chart = charts_of(flat.surface, new_sides)
+    return surface, chart, new_sides

@@ -1,0 +1,242 @@
+"""Taking away vertices that only cuts have made, by half-edge collapses that fold nothing.
+
+Cuts along the borders of cells and charts leave three times as many triangles as there were, most of them slivers. Once
+the charts are known to the map, the cuts are not needed any more. In each round the best collapses are done, none of
+two neighbours, so that all are judged on the same triangles.
+
+Which vertices of a map may be merged with a neighbour, and how good that is.
+
+A half-edge collapse must meet the link condition, keep every triangle inside its parent on the mesh, and turn none
+over, neither there nor on the charts.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...kernel import Bools, Floats, Ints, kernel
+from .seamless import FIXED, FREE, SeamlessMap, after, corner_place, frame_of, inverse, stars, turned
+from .surface import Surface
+
+_FLATTEST = 0.05  # double area over squared length of a triangle on the charts after a collapse
+_LEAST_INSIDE = 1e-9  # double area of a triangle in its parent, in barycentric coordinates
+
+
+class Parents(NamedTuple):
+    """Where the triangles lie on the mesh."""
+
+    parent: Ints  # [m]
+    inside: Floats  # [m, 3, 3]
+
+
+@kernel
+def targets(seamless: SeamlessMap, parents: Parents, cut: Bools) -> tuple[Floats, Ints]:
+    """How good the best collapse of each vertex is, above 0 [n], and a corner 3 triangle + k: to where it goes."""
+    n = len(seamless.x)
+    worth, target, seen = np.zeros(n), np.full(n, -1), np.full(n, -1)
+    for u in range(n):
+        first, last = seamless.star_start[u], seamless.star_start[u + 1]
+        if not cut[u] or seamless.freedom[u] == FIXED or first == last:
+            continue
+        for i in range(first, last):
+            f, k = seamless.star[i] // 3, seamless.star[i] % 3
+            for j in (1, 2):
+                seen[seamless.F[f, (k + j) % 3]] = u
+        for i in range(first, last):
+            f, k = seamless.star[i] // 3, seamless.star[i] % 3
+            for j in range(1, 2 if seamless.freedom[u] == FREE else 3):  # each neighbour once
+                m = (k + j) % 3
+                good = _worth(seamless, parents, u, f, k, m)
+                if good > worth[u] and _meets(seamless, u, seamless.F[f, m], seen):
+                    worth[u], target[u] = good, 3 * f + m
+    return worth, target
+
+
+@kernel
+def _meets(seamless: SeamlessMap, u: int, v: int, seen: Ints) -> bool:
+    """The link condition: u, whose neighbours are marked in `seen`, shares as many of these with v as triangles."""
+    inner = seamless.freedom[u] == FREE
+    if seamless.freedom[v] == FREE and not inner:
+        return False
+    shared = beside = 0
+    first, last = seamless.star_start[v], seamless.star_start[v + 1]
+    for i in range(first, last):
+        f, k = seamless.star[i] // 3, seamless.star[i] % 3
+        for j in (1, 2):
+            w = seamless.F[f, (k + j) % 3]
+            beside += w == u
+            if seen[w] == u:  # each once
+                seen[w] = -2 - u
+                shared += 1
+    for i in range(first, last):
+        f, k = seamless.star[i] // 3, seamless.star[i] % 3
+        for j in (1, 2):
+            w = seamless.F[f, (k + j) % 3]
+            if seen[w] == -2 - u:
+                seen[w] = u
+    return shared == beside and beside == (2 if inner else 1)
+
+
+@kernel
+def _worth(seamless: SeamlessMap, parents: Parents, u: int, f: int, k: int, m: int) -> float:
+    """Width of the flattest triangle on the charts if u, corner k of triangle f, goes to corner m; 0 if it may not."""
+    v = seamless.F[f, m]
+    held = seamless.freedom[v] == FIXED
+    if held and _at_rim(seamless, v):
+        return 0.0  # the frames round a corner of a rim stay as they are
+    to_u = inverse(frame_of(seamless, f, k))
+    vx, vy = corner_place(seamless, f, m)
+    vx, vy = turned(vx, vy, to_u[0])
+    vx, vy = vx + to_u[1], vy + to_u[2]
+    flattest = np.inf
+    for i in range(seamless.star_start[u], seamless.star_start[u + 1]):
+        g, c = seamless.star[i] // 3, seamless.star[i] % 3
+        p, q = (c + 1) % 3, (c + 2) % 3
+        a, b = seamless.F[g, p], seamless.F[g, q]
+        if a == v or b == v:
+            continue
+        # two tips in a triangle would leave it no way to move
+        if held and (seamless.freedom[a] == FIXED or seamless.freedom[b] == FIXED):
+            return 0.0
+        if not _inside(seamless, parents, g, p, q, v):
+            return 0.0
+        to_u = inverse(frame_of(seamless, g, c))
+        ax, ay = corner_place(seamless, g, p)
+        bx, by = corner_place(seamless, g, q)
+        ax, ay = turned(ax, ay, to_u[0])
+        bx, by = turned(bx, by, to_u[0])
+        ax, ay, bx, by = ax + to_u[1] - vx, ay + to_u[2] - vy, bx + to_u[1] - vx, by + to_u[2] - vy
+        longest = max(ax * ax + ay * ay, bx * bx + by * by, (ax - bx) ** 2 + (ay - by) ** 2)
+        flattest = min(flattest, (ax * by - ay * bx) / longest)
+    return flattest if flattest > _FLATTEST else 0.0
+
+
+@kernel
+def _at_rim(seamless: SeamlessMap, v: int) -> bool:
+    """Whether the triangles of a vertex do not close round it: then some neighbour is seen once."""
+    first, last = seamless.star_start[v], seamless.star_start[v + 1]
+    for i in range(first, last):
+        w = seamless.F[seamless.star[i] // 3, (seamless.star[i] % 3 + 1) % 3]
+        again = False
+        for j in range(first, last):
+            again = again or seamless.F[seamless.star[j] // 3, (seamless.star[j] % 3 + 2) % 3] == w
+        if not again:
+            return True
+    return False
+
+
+@kernel
+def _inside(seamless: SeamlessMap, parents: Parents, g: int, p: int, q: int, v: int) -> bool:
+    """Whether v with corners p and q of triangle g makes a triangle inside of g's parent, as it is turned."""
+    for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
+        h, c = seamless.star[i] // 3, seamless.star[i] % 3
+        if parents.parent[h] == parents.parent[g]:
+            o, a, b = parents.inside[h, c], parents.inside[g, p], parents.inside[g, q]
+            ux, uy, vx, vy = a[1] - o[1], a[2] - o[2], b[1] - o[1], b[2] - o[2]
+            return ux * vy - uy * vx > _LEAST_INSIDE
+    return False
+
+
+_MOST_ROUNDS, _LEAST_SHARE = 20, 0.01  # of the vertices in question, in a round that is worth another
+
+
+def without_cuts(surface: Surface, seamless: SeamlessMap, cut: Bools) -> tuple[Surface, SeamlessMap]:
+    """The same map on fewer triangles: vertices `cut` [n] are gone where that folds nothing."""
+    parents = Parents(surface.parent, np.ascontiguousarray(surface.inside))
+    for _ in range(_MOST_ROUNDS):
+        worth, target = targets(seamless, parents, cut)
+        chosen = _chosen(seamless, np.argsort(-worth, kind="stable"), worth, target)
+        if chosen.sum() <= _LEAST_SHARE * cut.sum():
+            break
+        seamless, parents = _collapsed(seamless, parents, chosen, target)
+    used, F = np.unique(seamless.F, return_inverse=True)
+    F = F.reshape(-1, 3)
+    start, star = stars(F, len(used))
+    seamless = seamless._replace(
+        F=F,
+        chart=seamless.chart[used],
+        x=seamless.x[used],
+        freedom=seamless.freedom[used],
+        star_start=start,
+        star=star,
+    )
+    return Surface(surface.V[used], F, parents.parent, parents.inside), seamless
+
+
+@kernel
+def _chosen(seamless: SeamlessMap, order: Ints, worth: Floats, target: Ints) -> Bools:
+    """The best collapses, none of two neighbours, and none that make the same edge."""
+    n = len(order)
+    chosen, blocked, made = np.zeros(n, np.bool_), np.zeros(n, np.bool_), {np.int64(-1)}
+    for u in order:
+        if not worth[u] > 0.0:
+            break
+        if blocked[u]:
+            continue
+        v = seamless.F[target[u] // 3, target[u] % 3]
+        first, last = seamless.star_start[u], seamless.star_start[u + 1]
+        free = True
+        for i in range(first, last):
+            f, k = seamless.star[i] // 3, seamless.star[i] % 3
+            for j in (1, 2):
+                w = seamless.F[f, (k + j) % 3]
+                free = free and (min(v, w) * n + max(v, w)) not in made
+        if not free:
+            continue
+        for i in range(first, last):
+            f, k = seamless.star[i] // 3, seamless.star[i] % 3
+            for j in (1, 2):
+                w = seamless.F[f, (k + j) % 3]
+                blocked[w] = True
+                made.add(min(v, w) * n + max(v, w))
+        chosen[u] = True
+    return chosen
+
+
+@kernel
+def _collapsed(seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints) -> tuple[SeamlessMap, Parents]:
+    F, frame, turn, shift = seamless.F.copy(), seamless.frame.copy(), seamless.turn.copy(), seamless.shift.copy()
+    parent, inside = parents.parent.copy(), parents.inside.copy()
+    size = 0
+    for f in range(len(F)):
+        k = 0
+        while k < 3 and not chosen[seamless.F[f, k]]:
+            k += 1
+        F[size], turn[size], shift[size], frame[size] = (
+            seamless.F[f],
+            seamless.turn[f],
+            seamless.shift[f],
+            seamless.frame[f],
+        )
+        parent[size], inside[size] = parents.parent[f], parents.inside[f]
+        if k < 3:
+            u = seamless.F[f, k]
+            g, m = target[u] // 3, target[u] % 3
+            v = seamless.F[g, m]
+            if v == seamless.F[f, 0] or v == seamless.F[f, 1] or v == seamless.F[f, 2]:
+                continue
+            at_u = 0 if seamless.F[g, 0] == u else (1 if seamless.F[g, 1] == u else 2)
+            through_u = after(inverse(frame_of(seamless, g, at_u)), frame_of(seamless, f, k))
+            change = after(frame_of(seamless, g, m), through_u)
+            F[size, k], turn[size, k], shift[size, k, 0], shift[size, k, 1] = v, change[0], change[1], change[2]
+            for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
+                h, c = seamless.star[i] // 3, seamless.star[i] % 3
+                if parents.parent[h] == parents.parent[f]:
+                    inside[size, k] = parents.inside[h, c]
+        size += 1
+    start, star = stars(F[:size], len(seamless.x))
+    coarser = SeamlessMap(
+        F[:size],
+        frame[:size],
+        seamless.chart,
+        seamless.x,
+        seamless.freedom,
+        turn[:size],
+        shift[:size],
+        seamless.glued,
+        start,
+        star,
+    )
+    return coarser, Parents(parent[:size], inside[:size])

@@ -1,0 +1,251 @@
+"""Cells that are disks with three corners and more: seeds are added and taken away until all are.
+
+Disks laid out flat in convex polygons, without a fold.
+
+Each inner vertex is a mean of its neighbours with positive weights, so that the map is one to one (Tutte 1963, Floater
+2003), whatever the weights; mean-value weights follow the shape of the triangles.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.linalg import splu
+
+from ...errors import AtlasError
+from ...kernel import Bools, Floats, Ints, kernel
+from ..sphere_map.energy import dot, row, subtract
+from .cells import BorderedCells, Cells, Metric, centred_cells, cut_borders, voronoi_cells
+from .surface import Surface
+
+_MOST_ROUNDS = 200
+_FEWEST = 4  # cells of a closed surface
+
+
+def disk_cells(metric: Metric, cells: Cells) -> BorderedCells:
+    """Cells of one connected component, cut apart, each a disk with at least three corners.
+
+    A cell that is no disk gets a seed half-way round its shortest loop that does not shrink to a point; one with fewer
+    corners gets a further neighbour on its border or, if that was tried before, loses its seed. Cells with new
+    neighbours are centred anew, and mended once more.
+
+    Raises
+    ------
+    AtlasError
+        If none are found.
+    """
+    count = len(cells.seeds)
+    cells, bordered = _mended(metric, cells)
+    if len(cells.seeds) > count:
+        _, bordered = _mended(metric, centred_cells(metric, cells.seeds))
+    return bordered
+
+
+def _mended(metric: Metric, cells: Cells) -> tuple[Cells, BorderedCells]:
+    surface, tried = metric.surface, set[int]()
+    for _ in range(_MOST_ROUNDS):
+        bad = np.flatnonzero(_euler(surface, cells) != 1)
+        if len(bad):
+            new = np.setdiff1d([_far_side(surface, cells, int(cell)) for cell in bad], cells.seeds)
+            if not len(new):
+                break
+            cells = voronoi_cells(metric, np.concatenate([cells.seeds, new]))
+            continue
+        if len(cells.seeds) < _FEWEST and not surface.edges.rim.any():
+            cells = _with(metric, cells, int(np.argmax(cells.distance)))
+            continue
+        bordered = cut_borders(metric, cells)
+        few = bordered.short_of_corners()
+        if not len(few):
+            return cells, bordered
+        cells = _with_corners(metric, cells, few, tried)
+    raise AtlasError("no cells found that are disks with three corners")
+
+
+def _with_corners(metric: Metric, cells: Cells, few: NDArray[np.int64], tried: set[int]) -> Cells:
+    """Give cells with too few corners a neighbour each, or take away their seeds where that was `tried` before."""
+    new: list[int] = []
+    gone: list[int] = []
+    for cell in few.tolist():
+        seed = int(cells.seeds[cell])
+        if seed not in tried or len(cells.seeds) - len(gone) <= _FEWEST:
+            tried.add(seed)
+            farthest = np.where(_beside(metric.surface, cells, cell), cells.distance, -1.0)
+            new.append(int(np.argmax(farthest)))
+        else:
+            gone.append(cell)
+    return voronoi_cells(metric, np.union1d(np.delete(cells.seeds, gone), new).astype(np.int64))
+
+
+def _with(metric: Metric, cells: Cells, seed: int) -> Cells:
+    return voronoi_cells(metric, np.unique(np.append(cells.seeds, seed)))
+
+
+def _beside(surface: Surface, cells: Cells, cell: int) -> NDArray[np.bool_]:
+    """Vertices of other cells that have a neighbour in this one, [n]."""
+    ends = surface.edges.ends[(cells.label[surface.edges.ends] == cell).any(axis=1)]
+    beside = np.zeros(len(surface.V), bool)
+    beside[ends] = True
+    return beside & (cells.label != cell)
+
+
+def _euler(surface: Surface, cells: Cells) -> NDArray[np.int64]:
+    """Euler characteristic of the vertices of each cell with the edges and triangles between them."""
+    count, label = len(cells.seeds), cells.label
+    ends, corners = label[surface.edges.ends], label[surface.F]
+    edges = ends[ends[:, 0] == ends[:, 1], 0]
+    triangles = corners[(corners[:, 0] == corners[:, 1]) & (corners[:, 1] == corners[:, 2]), 0]
+    vertices, links, faces = (np.bincount(each, minlength=count) for each in (label, edges, triangles))
+    return vertices - links + faces
+
+
+def _far_side(surface: Surface, cells: Cells, cell: int) -> int:
+    """Vertex farthest along the shortest loop in a cell that does not shrink to a point.
+
+    Edges that close no such loop are those of a tree of shortest paths, and those of a tree of triangles, longest loops
+    first (Erickson and Whittlesey 2005). All that lies outside the cell counts as one triangle.
+    """
+    edges, own = surface.edges, cells.label == cell
+    links = np.flatnonzero(own[edges.ends].all(axis=1))
+    ends = edges.ends[links]
+    lengths = np.maximum(surface.edge_lengths[links], np.finfo(np.float64).tiny)
+    graph = csr_array(coo_array((lengths, tuple(ends.T)), shape=(len(own), len(own))))
+    distance, before = dijkstra(graph, directed=False, indices=cells.seeds[cell], return_predecessors=True)
+    tree = (before[ends[:, 0]] == ends[:, 1]) | (before[ends[:, 1]] == ends[:, 0])
+    loop = distance[ends].sum(axis=1) + lengths
+    number = np.full(len(surface.F) + 1, 0)  # 0: outside
+    inner = np.flatnonzero(own[surface.F].all(axis=1))
+    number[inner] = 1 + np.arange(len(inner))
+    sides = edges.sides[links]
+    beside = np.where(sides < 0, 0, number[sides // 3])
+    order = np.argsort(-loop, kind="stable")
+    closing = order[_closing(beside[order], tree[order], np.arange(len(inner) + 1))]
+    if not len(closing):
+        return int(np.argmax(np.where(own, cells.distance, -1.0)))
+    best = ends[closing[-1]]
+    return int(best[np.argmax(distance[best])])
+
+
+@kernel
+def _closing(beside: Ints, tree: Bools, root: Ints) -> Bools:
+    """Edges, in this order, whose two triangles are joined already; `root` [k] is room for union-find."""
+    closing = np.zeros(len(beside), np.bool_)
+    for e in range(len(beside)):
+        if tree[e]:
+            continue
+        a, b = beside[e, 0], beside[e, 1]
+        while root[a] != a:
+            root[a] = root[root[a]]
+            a = root[a]
+        while root[b] != b:
+            root[b] = root[root[b]]
+            b = root[b]
+        closing[e] = a == b
+        root[a] = b
+    return closing
+
+
+# half-angle tangents; beyond them triangles are so bad that round-off would fold them
+_LEAST, _MOST = 1e-3, 1e3
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Border:
+    """Places of the vertices on the borders of parts.
+
+    Attributes
+    ----------
+    part, vertex : int64 [b]
+    place : float64 [b, 2]
+    """
+
+    part: NDArray[np.int64]
+    vertex: NDArray[np.int64]
+    place: NDArray[np.float64]
+
+
+def flattened(surface: Surface, part: NDArray[np.int64], border: Border) -> NDArray[np.float64]:
+    """Places [m, 3, 2] of the triangles' corners, each part [m] laid out inside its border.
+
+    A part that round-off folds with mean-value weights is laid out with equal ones.
+    """
+    size = len(surface.V)
+    key, copies = np.unique(part[:, None] * size + surface.F, return_inverse=True)
+    corners = copies.reshape(-1, 3)
+    fixed = np.full(len(key), -1)
+    fixed[np.searchsorted(key, border.part * size + border.vertex)] = np.arange(len(border.part))
+    start = np.where(fixed[:, None] >= 0, border.place[fixed], np.nan)
+    weights = _mean_value_weights(surface)
+    places = _solved(corners, weights, start)[corners]
+    folded = np.isin(part, part[signed_areas(places) <= 0])
+    if folded.any():
+        weights[folded] = 1.0
+        places = _solved(corners, weights, start)[corners]
+    return places
+
+
+def signed_areas(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Areas [m] of flat triangles [m, 3, 2], positive where they are counter-clockwise."""
+    u, v = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
+    return (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+
+
+def along(V: NDArray[np.float64], paths: list[NDArray[np.int64]]) -> NDArray[np.float64]:
+    """How far along its path each vertex lies, from 0 to 1; the paths' one behind the other."""
+    last = np.cumsum([len(each) for each in paths])
+    return _along(V, np.concatenate(paths), last)
+
+
+@kernel
+def _along(V: Floats, vertices: Ints, last: Ints) -> Floats:
+    result, first = np.zeros(len(vertices)), 0
+    for end in last:
+        longest = 0.0
+        for i in range(first + 1, end):
+            step = subtract(row(V, vertices[i]), row(V, vertices[i - 1]))
+            result[i] = np.sqrt(dot(step, step))
+            longest = max(longest, result[i])
+        for i in range(first + 1, end):
+            result[i] = max(result[i], 1e-6 * longest + 1e-300) + result[i - 1]
+        total = result[end - 1]
+        for i in range(first + 1, end):
+            result[i] /= total
+        first = end
+    return result
+
+
+def _mean_value_weights(surface: Surface) -> NDArray[np.float64]:
+    """Weights [m, 3, 2], in corner k of a triangle, of its next vertex and of the one before."""
+    weights = np.empty((len(surface.F), 3, 2))
+    tiny = np.finfo(np.float64).tiny
+    for k in range(3):
+        x, y, z = (surface.V[surface.F[:, (k + j) % 3]] for j in range(3))
+        u, v = y - x, z - x
+        lu, lv = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
+        sine, cosine = np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v)
+        tangent = np.clip(np.tan(np.arctan2(sine, cosine) / 2), _LEAST, _MOST)
+        weights[:, k, 0], weights[:, k, 1] = tangent / np.maximum(lu, tiny), tangent / np.maximum(lv, tiny)
+    return weights
+
+
+def _solved(
+    corners: NDArray[np.int64], weights: NDArray[np.float64], start: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Places [n, 2] of all vertices; NaN in `start` is what is looked for."""
+    free = np.isnan(start[:, 0])
+    row = np.repeat(corners, 2, axis=1).ravel()
+    column = np.stack([np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)], axis=2).ravel()
+    chosen = free[row]
+    matrix = csr_array((weights.ravel()[chosen], (row[chosen], column[chosen])), shape=(len(start), len(start)))
+    total = np.asarray(matrix.sum(axis=1))
+    rows = matrix[free]
+    rows.data /= np.repeat(total[free], np.diff(rows.indptr))
+    system = csc_array(-rows[:, free])
+    system.setdiag(1.0)
+    places = start.copy()
+    places[free] = splu(system).solve(rows[:, ~free] @ start[~free])
+    return places

@@ -1,0 +1,362 @@
+"""The energy of a seamless map: what a triangle costs that is stretched, squeezed or sheared.
+
+For the map from a triangle of the surface (area A, scaled so that a chart has area 1 on average) to the charts, with
+singular values s1 >= s2, let D = s1^2 + s2^2 and J = s1 s2. The energy for each unit of area is
+
+    W = ((D / 2)^p + (D / 2 J^2)^p) / 2,
+
+the mean of the Dirichlet energies of the map and of its inverse, each to the power p: 1 for an isometry, infinite at a
+fold. With p = 1 a map is easily brought to its least energy; a larger p reduces the worst spots at the cost of others.
+
+Gradient and Hessian of the energy of a seamless map, the latter made positive semidefinite triangle by triangle.
+
+In the basis of its singular vectors, the Hessian of a function f(s1, s2) of a 2 x 2 matrix falls into a 2 x 2 block of
+second derivatives, and two numbers: for the antisymmetric change and for the symmetric one off the diagonal.
+
+Relaxing a seamless map one vertex after the other, each inside its star.
+
+Newton steps of all vertices at once are cut short by the first triangle that would fold; sweeps clear such spots.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...kernel import Floats, Ints, kernel
+from ..sphere_map.energy import cross, dot, row, subtract
+from .seamless import COLUMN, FIXED, FREE, ROW, SeamlessMap, corner_place, turned
+
+FOLDED = 1e-15  # the area of a triangle on the charts must exceed this
+_FLATTEST = 0.02  # least double area over squared length that the energy believes in
+_LEAST_AREA = 1e-6  # of a triangle, in units of their mean
+
+
+class Reference(NamedTuple):
+    """The triangles to resemble, and how much."""
+
+    area: Floats  # [m]
+    cotangent: Floats  # [m, 3], of their angles
+    power: int  # p
+
+
+@kernel
+def density(dirichlet: float, jacobian: float, power: int) -> float:
+    """Energy W of D and J for each unit of area."""
+    return 0.5 * (0.5 * dirichlet) ** power * (1.0 + (1.0 / (jacobian * jacobian)) ** power)
+
+
+@kernel
+def density_derivatives(
+    dirichlet: float, jacobian: float, power: int
+) -> tuple[float, float, float, float, float, float]:
+    """W and its derivatives W_D, W_J, W_DD, W_DJ, W_JJ."""
+    straight = 0.5 * (0.5 * dirichlet) ** power
+    inverse = straight * (1.0 / (jacobian * jacobian)) ** power
+    w, p = straight + inverse, float(power)
+    slope_d, slope_j = p * w / dirichlet, -2.0 * p * inverse / jacobian
+    bend_d, mixed = (p - 1.0) * slope_d / dirichlet, p * slope_j / dirichlet
+    return w, slope_d, slope_j, bend_d, mixed, 2.0 * p * (2.0 * p + 1.0) * inverse / (jacobian * jacobian)
+
+
+def reference_of(V: Floats, F: Ints, charts: int, power: int) -> Reference:
+    """The shapes of the triangles F [m, 3], their areas in units in which they add up to the number of charts."""
+    areas, cotangent = _shapes(V, F, np.finfo(np.float64).tiny)
+    areas = np.maximum(areas, _LEAST_AREA * areas.mean())
+    return Reference(areas * (charts / areas.sum()), cotangent, power)
+
+
+@kernel
+def _shapes(V: Floats, F: Ints, tiny: float) -> tuple[Floats, Floats]:
+    """Areas [m] and cotangents [m, 3] of triangles."""
+    areas, cotangent = np.empty(len(F)), np.empty((len(F), 3))
+    for f in range(len(F)):
+        a, b, c = row(V, F[f, 0]), row(V, F[f, 1]), row(V, F[f, 2])
+        ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
+        normal = cross(ab, ac)
+        double = np.sqrt(dot(normal, normal))
+        squares = (dot(bc, bc), dot(ac, ac), dot(ab, ab))
+        dots = (dot(ab, ac), -dot(ab, bc), dot(ac, bc))
+        top = 0 if squares[0] >= max(squares[1], squares[2]) else (1 if squares[1] >= squares[2] else 2)
+        left, right = (top + 1) % 3, (top + 2) % 3
+        areas[f] = max(double / 2, tiny)
+        # needles count as a little thicker: the corner opposite to their longest side stands higher
+        double = max(double, _FLATTEST * squares[top], tiny)
+        cotangent[f, left], cotangent[f, right] = dots[left] / double, dots[right] / double
+        total = max(cotangent[f, left] + cotangent[f, right], tiny)
+        cotangent[f, top] = (1.0 - cotangent[f, left] * cotangent[f, right]) / total
+    return areas, cotangent
+
+
+@kernel
+def shape_of(seamless: SeamlessMap, reference: Reference, f: int) -> tuple[float, float, float]:
+    """D and J of a triangle, and its area on the charts."""
+    ax, ay = corner_place(seamless, f, 0)
+    bx, by = corner_place(seamless, f, 1)
+    cx, cy = corner_place(seamless, f, 2)
+    ux, uy, vx, vy = bx - ax, by - ay, cx - ax, cy - ay
+    area = 0.5 * (ux * vy - uy * vx)
+    cotangent = reference.cotangent[f]
+    wx, wy = cx - bx, cy - by
+    dirichlet = (
+        cotangent[0] * (wx * wx + wy * wy) + cotangent[1] * (vx * vx + vy * vy) + cotangent[2] * (ux * ux + uy * uy)
+    )
+    return dirichlet / (2.0 * reference.area[f]), area / reference.area[f], area
+
+
+@kernel
+def total_energy(seamless: SeamlessMap, reference: Reference) -> float:
+    """Energy of the whole map; infinite if a triangle is folded."""
+    total = 0.0
+    for f in range(len(seamless.F)):
+        dirichlet, jacobian, area = shape_of(seamless, reference, f)
+        if not area > FOLDED:
+            return np.inf
+        total += reference.area[f] * density(dirichlet, jacobian, reference.power)
+    return total
+
+
+@kernel
+def assemble(
+    seamless: SeamlessMap,
+    reference: Reference,
+    edge: Ints,
+    ends: Ints,
+    gradient: Floats,
+    diagonal: Floats,
+    blocks: Floats,
+) -> None:
+    """Fill gradient [n, 2], and the Hessian's blocks of vertices [n, 3] and edges [e, 4]; see `conjugate_gradients`.
+
+    All are in the vertices' own frames.
+    """
+    gradient[:] = 0.0
+    diagonal[:] = 0.0
+    blocks[:] = 0.0
+    slopes, modes, curvature = np.empty((3, 2)), np.empty((4, 3, 2)), np.empty(4)
+    for f in range(len(seamless.F)):
+        _triangle(seamless, reference, f, slopes, modes, curvature)
+        for k in range(3):
+            v, back = seamless.F[f, k], (4 - seamless.turn[f, k]) % 4
+            x, y = turned(slopes[k, 0], slopes[k, 1], back)
+            gradient[v, 0] += x
+            gradient[v, 1] += y
+            for m in range(4):
+                x, y = turned(modes[m, k, 0], modes[m, k, 1], back)
+                modes[m, k, 0], modes[m, k, 1] = x, y
+                diagonal[v, 0] += curvature[m] * x * x
+                diagonal[v, 1] += curvature[m] * x * y
+                diagonal[v, 2] += curvature[m] * y * y
+        for k in range(3):
+            e, j = edge[f, k], (k + 1) % 3
+            p, q = (k, j) if ends[e, 0] == seamless.F[f, k] else (j, k)
+            for m in range(4):
+                a, b = modes[m, p], modes[m, q]
+                blocks[e, 0] += curvature[m] * a[0] * b[0]
+                blocks[e, 1] += curvature[m] * a[0] * b[1]
+                blocks[e, 2] += curvature[m] * a[1] * b[0]
+                blocks[e, 3] += curvature[m] * a[1] * b[1]
+    _hold(seamless, ends, gradient, diagonal, blocks)
+
+
+@kernel
+def _hold(seamless: SeamlessMap, ends: Ints, gradient: Floats, diagonal: Floats, blocks: Floats) -> None:
+    """Take out the directions in which vertices may not move."""
+    for v in range(len(gradient)):
+        freedom = seamless.freedom[v]
+        if freedom != FREE:
+            diagonal[v, 1] = 0.0
+            if freedom != COLUMN:
+                gradient[v, 0], diagonal[v, 0] = 0.0, 1.0
+            if freedom != ROW:
+                gradient[v, 1], diagonal[v, 2] = 0.0, 1.0
+    for e in range(len(ends)):
+        first, second = seamless.freedom[ends[e, 0]], seamless.freedom[ends[e, 1]]
+        for i in range(2):
+            for j in range(2):
+                if not ((first >> i) & 1 and (second >> j) & 1):
+                    blocks[e, 2 * i + j] = 0.0
+
+
+@kernel
+def _triangle(
+    seamless: SeamlessMap, reference: Reference, f: int, slopes: Floats, modes: Floats, curvature: Floats
+) -> None:
+    """Gradient [3, 2] at the corners of a triangle, and its Hessian: the sum of c m m', modes [4, 3, 2]."""
+    area, cotangent = reference.area[f], reference.cotangent[f]
+    # a flat copy of the triangle, by its cotangents: side ab along x
+    total = cotangent[0] + cotangent[1]
+    length = np.sqrt(2.0 * area * max(total, 1e-12))
+    height = 2.0 * area / length
+    foot = cotangent[0] * height
+    # gradients of the corners' hat functions
+    hats = np.empty((3, 2))
+    hats[1, 0], hats[1, 1] = 1.0 / length, -foot / (length * height)
+    hats[2, 0], hats[2, 1] = 0.0, 1.0 / height
+    hats[0, 0], hats[0, 1] = -hats[1, 0] - hats[2, 0], -hats[1, 1] - hats[2, 1]
+    a = b = c = d = 0.0
+    for k in range(3):
+        x, y = corner_place(seamless, f, k)
+        a, b = a + x * hats[k, 0], b + x * hats[k, 1]
+        c, d = c + y * hats[k, 0], d + y * hats[k, 1]
+    # singular values of (a b; c d) = U S V', rotations by half sums and differences of two angles
+    sum_length, sum_angle = np.hypot(a + d, c - b) / 2, np.arctan2(c - b, a + d)
+    rest_length, rest_angle = np.hypot(a - d, c + b) / 2, np.arctan2(c + b, a - d)
+    s1, s2 = sum_length + rest_length, sum_length - rest_length
+    left, right = (sum_angle + rest_angle) / 2, (rest_angle - sum_angle) / 2
+    cl, sl, cr, sr = np.cos(left), np.sin(left), np.cos(right), np.sin(right)
+    _, wd, wj, wdd, wdj, wjj = density_derivatives(s1 * s1 + s2 * s2, s1 * s2, reference.power)
+    f1, f2 = 2 * s1 * wd + s2 * wj, 2 * s2 * wd + s1 * wj
+    f11 = 2 * wd + 4 * s1 * s1 * wdd + 4 * s1 * s2 * wdj + s2 * s2 * wjj
+    f22 = 2 * wd + 4 * s2 * s2 * wdd + 4 * s1 * s2 * wdj + s1 * s1 * wjj
+    f12 = wj + 4 * s1 * s2 * wdd + 2 * (s1 * s1 + s2 * s2) * wdj + s1 * s2 * wjj
+    mean, half, angle = (f11 + f22) / 2, np.hypot((f11 - f22) / 2, f12), np.arctan2(2 * f12, f11 - f22) / 2
+    curvature[0], curvature[1] = area * max(mean + half, 0.0), area * max(mean - half, 0.0)
+    curvature[2] = area * max(wd + wj / 2, 0.0)
+    curvature[3] = area * max(wd - wj / 2, 0.0)
+    ca, sa = np.cos(angle), np.sin(angle)
+    for k in range(3):
+        # the hat's gradient along the right singular vectors
+        p, q = cr * hats[k, 0] + sr * hats[k, 1], -sr * hats[k, 0] + cr * hats[k, 1]
+        slopes[k, 0] = area * (cl * f1 * p - sl * f2 * q)
+        slopes[k, 1] = area * (sl * f1 * p + cl * f2 * q)
+        # changes (first: along U; second: across) of S for the four modes
+        for m, u, v in ((0, ca * p, sa * q), (1, -sa * p, ca * q), (2, -q, p), (3, q, p)):
+            modes[m, k, 0], modes[m, k, 1] = cl * u - sl * v, sl * u + cl * v
+
+
+_ARMIJO = 1e-4
+_REACH = 0.3  # of a chart
+_MOST_TRIALS = 14
+# what is known of a triangle of the star: the place of its next corner and of the one before, in the vertex's frame,
+# their cotangents, and its area
+TERMS = 7
+
+
+@kernel
+def sweep(seamless: SeamlessMap, reference: Reference, backwards: bool) -> float:
+    """Move every vertex once; return by how much the energy fell."""
+    count = len(seamless.x)
+    largest = 0
+    for v in range(count):
+        largest = max(largest, seamless.star_start[v + 1] - seamless.star_start[v])
+    star = np.empty((largest, TERMS))
+    fall = 0.0
+    for i in range(count):
+        v = count - 1 - i if backwards else i
+        if seamless.freedom[v] != FIXED:
+            fall += relax_vertex(seamless, reference, v, star)
+    return fall
+
+
+@kernel
+def relax_vertex(seamless: SeamlessMap, reference: Reference, v: int, star: Floats) -> float:
+    """Move one vertex by a Newton step inside its star; return by how much the energy fell. `star` is room."""
+    degree = gather(seamless, reference, v, star)
+    x, y, freedom = seamless.x[v, 0], seamless.x[v, 1], seamless.freedom[v]
+    energy, gx, gy, hxx, hxy, hyy = _slopes(star, degree, x, y, reference.power)
+    if not energy < np.inf:
+        return 0.0
+    if freedom == FREE:
+        sx, sy = _descent(gx, gy, hxx, hxy, hyy)
+    elif freedom == COLUMN:
+        sx, sy = -gx / max(abs(hxx), 1e-300), 0.0
+    else:
+        sx, sy = 0.0, -gy / max(abs(hyy), 1e-300)
+    descent = -(gx * sx + gy * sy)
+    if not descent > 1e-13 * energy:
+        return 0.0
+    step = min(1.0, _REACH / np.sqrt(sx * sx + sy * sy))
+    for _ in range(_MOST_TRIALS):
+        lower = star_energy(star, degree, x + step * sx, y + step * sy, reference.power)
+        if lower < energy - _ARMIJO * step * descent:
+            # high up a wall a Newton step is far too short
+            further = 2.0 * lower < energy
+            while further and step * np.hypot(sx, sy) < _REACH:
+                least = star_energy(star, degree, x + 2 * step * sx, y + 2 * step * sy, reference.power)
+                further = 2.0 * least < lower
+                if least < lower:
+                    step, lower = 2 * step, least
+                else:
+                    break
+            seamless.x[v, 0], seamless.x[v, 1] = x + step * sx, y + step * sy
+            return energy - lower
+        step *= 0.35
+    return 0.0
+
+
+@kernel
+def gather(seamless: SeamlessMap, reference: Reference, v: int, star: Floats) -> int:
+    """Fill in the star of a vertex, see above, and return how many triangles it has."""
+    first, last = seamless.star_start[v], seamless.star_start[v + 1]
+    for i in range(first, last):
+        f, k = seamless.star[i] // 3, seamless.star[i] % 3
+        back = (4 - seamless.turn[f, k]) % 4
+        dx, dy = float(seamless.shift[f, k, 0]), float(seamless.shift[f, k, 1])
+        for j in (1, 2):
+            px, py = corner_place(seamless, f, (k + j) % 3)
+            star[i - first, 2 * j - 2], star[i - first, 2 * j - 1] = turned(px - dx, py - dy, back)
+        star[i - first, 4] = reference.cotangent[f, (k + 1) % 3]
+        star[i - first, 5] = reference.cotangent[f, (k + 2) % 3]
+        # with the cotangent of the vertex itself the triangle is known: it follows from the other two
+        star[i - first, 6] = reference.area[f]
+    return last - first
+
+
+@kernel
+def star_energy(star: Floats, degree: int, x: float, y: float, power: int) -> float:
+    """Energy of a star whose vertex lies at x, y; infinite if a triangle is folded."""
+    total = 0.0
+    for i in range(degree):
+        bx, by, cx, cy, cot_b, cot_c, area = star[i]
+        ux, uy, vx, vy = bx - x, by - y, cx - x, cy - y
+        flat = 0.5 * (ux * vy - uy * vx)
+        if not flat > FOLDED:
+            return np.inf
+        cot_a = (1.0 - cot_b * cot_c) / (cot_b + cot_c)
+        wx, wy = cx - bx, cy - by
+        d = cot_a * (wx * wx + wy * wy) + cot_b * (vx * vx + vy * vy) + cot_c * (ux * ux + uy * uy)
+        total += area * density(d / (2.0 * area), flat / area, power)
+    return total
+
+
+@kernel
+def _slopes(
+    star: Floats, degree: int, x: float, y: float, power: int
+) -> tuple[float, float, float, float, float, float]:
+    energy = gx = gy = hxx = hxy = hyy = 0.0
+    for i in range(degree):
+        bx, by, cx, cy, cot_b, cot_c, area = star[i]
+        ux, uy, vx, vy = bx - x, by - y, cx - x, cy - y
+        flat = 0.5 * (ux * vy - uy * vx)
+        if not flat > FOLDED:
+            return np.inf, 0.0, 0.0, 0.0, 0.0, 0.0
+        half = 0.5 / area
+        cot_a = (1.0 - cot_b * cot_c) / (cot_b + cot_c)
+        wx, wy = cx - bx, cy - by
+        d = half * (cot_a * (wx * wx + wy * wy) + cot_b * (vx * vx + vy * vy) + cot_c * (ux * ux + uy * uy))
+        w, wd, wj, wdd, wdj, wjj = density_derivatives(d, flat / area, power)
+        dx, dy = -2.0 * half * (cot_b * vx + cot_c * ux), -2.0 * half * (cot_b * vy + cot_c * uy)
+        jx, jy = half * (by - cy), half * (cx - bx)
+        bend = 2.0 * half * (cot_b + cot_c) * wd
+        energy += area * w
+        gx += area * (wd * dx + wj * jx)
+        gy += area * (wd * dy + wj * jy)
+        hxx += area * (bend + wdd * dx * dx + 2.0 * wdj * dx * jx + wjj * jx * jx)
+        hyy += area * (bend + wdd * dy * dy + 2.0 * wdj * dy * jy + wjj * jy * jy)
+        hxy += area * (wdd * dx * dy + wdj * (dx * jy + dy * jx) + wjj * jx * jy)
+    return energy, gx, gy, hxx, hxy, hyy
+
+
+@kernel
+def _descent(gx: float, gy: float, hxx: float, hxy: float, hyy: float) -> tuple[float, float]:
+    """Newton direction with the Hessian's eigenvalues made positive."""
+    mean, radius = 0.5 * (hxx + hyy), np.hypot(0.5 * (hxx - hyy), hxy)
+    angle = 0.5 * np.arctan2(2.0 * hxy, hxx - hyy)
+    ux, uy = np.cos(angle), np.sin(angle)
+    first, second = abs(mean + radius), abs(mean - radius)
+    floor = 1e-4 * max(first, second)
+    along = -(gx * ux + gy * uy) / max(first, floor)
+    across = -(gy * ux - gx * uy) / max(second, floor)
+    return along * ux - across * uy, along * uy + across * ux

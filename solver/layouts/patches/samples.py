@@ -1,0 +1,371 @@
+"""Points of a surface that is laid out on charts: where they lie in space and on its mesh.
+
+Texels between their neighbours on a surface: how far from being folded.
+
+Where texels lie on a surface: the triangles of a seamless map, drawn on the charts as on a screen.
+
+Texels moved a little where the texel mesh is folded, though the map is not.
+
+Samples of a fold-free map may still lie in the wrong order on the surface: astride of a knife edge, whose two sides
+they see from above and from below, or round the tip of a cone. There each texel tries the other places of its square,
+on a fine lattice, and takes the one where the corners between its neighbours face outwards.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import AtlasError
+from ...kernel import Bools, Floats, Ints, kernel
+from ...mesh.mesh import Mesh
+from ...texels.topology import TexelTopology
+from .layout import PatchMap
+from .seamless import FIXED, SeamlessMap, Transitions, corner_place, follow, transitions, turned
+
+_MARGIN = 0.1  # sine of a corner that is wide enough
+
+
+class Texels(NamedTuple):
+    """Texels that move."""
+
+    halo: Ints  # [C, n + 2, n + 2]
+    rim: Bools
+    beyond: Floats  # [C, n + 2, n + 2, 3] [m]; beyond a rim, else NaN
+    positions: Floats  # [C n^2, 3] [m]
+    normals: Floats  # [C n^2, 3]
+    offsets: Ints  # [C, n + 2, n + 2, 2], column and row, in places of the lattice; 0 in the halo
+
+
+@kernel(inline="always")
+def _place(texels: Texels, chart: int, row: int, column: int) -> Floats:
+    if texels.rim[chart, row, column] or texels.halo[chart, row, column] < 0:
+        return texels.beyond[chart, row, column]
+    return texels.positions[texels.halo[chart, row, column]]
+
+
+@kernel
+def _fault(texels: Texels, flat: int) -> float:
+    """How badly the four corners of a texel between its neighbours face outwards: 1 and more if one is folded."""
+    n = texels.halo.shape[1] - 2
+    chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
+    o, normal = texels.positions[flat], texels.normals[flat]
+    fault = 0.0
+    for k in range(4):
+        i, j = (0, 1) if k == 0 else ((1, 0) if k == 1 else ((0, -1) if k == 2 else (-1, 0)))
+        p, q = _place(texels, chart, row + i, column + j), _place(texels, chart, row + j, column - i)
+        ax, ay, az, bx, by, bz = p[0] - o[0], p[1] - o[1], p[2] - o[2], q[0] - o[0], q[1] - o[1], q[2] - o[2]
+        facing = (ay * bz - az * by) * normal[0] + (az * bx - ax * bz) * normal[1] + (ax * by - ay * bx) * normal[2]
+        size = np.sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz))
+        # NaN, where there is no neighbour, is not below the margin
+        if facing < _MARGIN * size:
+            fault += (1.0 if facing < 0.0 else 0.0) + (_MARGIN - facing / max(size, 1e-300)) ** 2
+    return fault
+
+
+@kernel
+def faults(texels: Texels, flat: int) -> float:
+    """Of a texel and its four neighbours."""
+    n = texels.halo.shape[1] - 2
+    chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
+    total = _fault(texels, flat)
+    for k in range(4):
+        i, j = (0, 1) if k == 0 else ((1, 0) if k == 1 else ((0, -1) if k == 2 else (-1, 0)))
+        other = texels.halo[chart, row + i, column + j]
+        if other >= 0 and not texels.rim[chart, row + i, column + j]:
+            total += _fault(texels, other)
+    return total
+
+
+@kernel
+def folded(texels: Texels) -> Bools:
+    """Which texels are, [T]."""
+    result = np.zeros(len(texels.positions), np.bool_)
+    for flat in range(len(result)):
+        result[flat] = _fault(texels, flat) >= 1.0
+    return result
+
+
+_ROUND_OFF = 1e-7  # barycentric coordinates of a texel outside of all triangles may be so far below 0
+_REACH = 2  # of triangles, in charts beyond that in which they begin
+
+
+def locate_texels(seamless: SeamlessMap, n: int) -> tuple[Ints, Floats]:
+    """Triangle [C, n, n] of each of the n x n texels of a chart, and barycentric coordinates in it, [C, n, n, 3].
+
+    Raises
+    ------
+    AtlasError
+        If a texel lies in no triangle, which a map without a fold rules out.
+    """
+    triangles, barycentrics = locate_in_charts(seamless, n, np.arange(len(seamless.glued)))
+    missed = int((triangles < 0).sum())
+    if missed:
+        raise AtlasError(f"{missed} texels lie in no triangle of the map onto the charts")
+    return triangles, barycentrics
+
+
+def locate_in_charts(seamless: SeamlessMap, n: int, charts: Ints) -> tuple[Ints, Floats]:
+    """The same in some charts [k] alone; -1 where a triangle may be missed that reaches far over other charts."""
+    number = np.full(len(seamless.glued), -1)
+    number[charts] = np.arange(len(charts))
+    near, beside = number >= 0, seamless.glued[..., 0]
+    for _ in range(_REACH):
+        near |= (near[beside] & (beside >= 0)).any(axis=1)
+    triangles, barycentrics = np.full((len(charts), n, n), -1), np.zeros((len(charts), n, n, 3))
+    best = np.full((len(charts), n, n), -np.inf)
+    _draw(seamless, transitions(seamless.glued), n, number, near, triangles, barycentrics, best)
+    triangles[best < -_ROUND_OFF] = -1
+    return triangles, barycentrics
+
+
+@kernel
+def corners_in_frame_of(seamless: SeamlessMap, f: int, k: int, places: Floats) -> None:
+    """Fill in the places [3, 2] of a triangle's corners in the frame of the chart in which corner k lies."""
+    back = (4 - seamless.turn[f, k]) % 4
+    sx, sy = seamless.shift[f, k, 0], seamless.shift[f, k, 1]
+    for j in range(3):
+        x, y = corner_place(seamless, f, j)
+        places[j, 0], places[j, 1] = turned(x - sx, y - sy, back)
+
+
+@kernel
+def anchor(seamless: SeamlessMap, f: int) -> int:
+    """The first corner of a triangle that does not sit on the tip of a cone: it knows in which chart it lies."""
+    k = 0
+    while seamless.freedom[seamless.F[f, k]] == FIXED and k < 2:
+        k += 1
+    return k
+
+
+@kernel
+def _draw(
+    seamless: SeamlessMap,
+    across: Transitions,
+    n: int,
+    number: Ints,
+    near: Bools,
+    triangles: Ints,
+    barycentrics: Floats,
+    best: Floats,
+) -> None:
+    p = np.empty((3, 2))
+    slack = 1e-9
+    for f in range(len(seamless.F)):
+        k = anchor(seamless, f)
+        home = seamless.chart[seamless.F[f, k]]
+        if not near[home]:
+            continue
+        corners_in_frame_of(seamless, f, k, p)
+        ux, uy, vx, vy = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[2, 0] - p[0, 0], p[2, 1] - p[0, 1]
+        area = ux * vy - uy * vx
+        first = int(np.ceil((min(p[0, 1], p[1, 1], p[2, 1]) - slack) * n - 0.5))
+        last = int(np.floor((max(p[0, 1], p[1, 1], p[2, 1]) + slack) * n - 0.5))
+        left = int(np.ceil((min(p[0, 0], p[1, 0], p[2, 0]) - slack) * n - 0.5))
+        right = int(np.floor((max(p[0, 0], p[1, 0], p[2, 0]) + slack) * n - 0.5))
+        for i in range(first, last + 1):
+            y = (i + 0.5) / n
+            for j in range(left, right + 1):
+                x = (j + 0.5) / n
+                s = ((x - p[0, 0]) * vy - (y - p[0, 1]) * vx) / area
+                t = (ux * (y - p[0, 1]) - uy * (x - p[0, 0])) / area
+                least = min(s, t, 1 - s - t)
+                if least < -1e-6:
+                    continue
+                found, _, _, _, u, v = follow(home, p[k, 0], p[k, 1], x, y, seamless.glued, across)
+                chart, row, column = number[found], int(np.floor(v * n)), int(np.floor(u * n))
+                if chart < 0 or not (0 <= row < n and 0 <= column < n) or least <= best[chart, row, column]:
+                    continue
+                best[chart, row, column] = least
+                triangles[chart, row, column] = f
+                barycentrics[chart, row, column, 0] = 1 - s - t
+                barycentrics[chart, row, column, 1] = s
+                barycentrics[chart, row, column, 2] = t
+
+
+class Samples(NamedTuple):
+    """Points on a grid of charts.
+
+    Attributes
+    ----------
+    small : int64 [..., n, n]
+        Triangles of the surface that the charts are made of.
+    weights : float64 [..., n, n, 3]
+        Barycentric coordinates in them.
+    triangles : int64 [..., n, n]
+        Triangles of the mesh.
+    barycentrics : float64 [..., n, n, 3]
+        In those.
+    positions, normals : float64 [..., n, n, 3]
+        [m], and unit.
+    """
+
+    small: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    barycentrics: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    normals: NDArray[np.float64]
+
+
+class Sampler(NamedTuple):
+    """A mesh and its map onto charts."""
+
+    mesh: Mesh
+    patches: PatchMap
+
+    def everywhere(self, n: int) -> Samples:
+        """The centres of n x n squares of every chart."""
+        return self.samples(*locate_texels(self.patches.seamless, n))
+
+    def in_charts(self, n: int, charts: NDArray[np.int64]) -> Samples:
+        """The same in some charts alone; `small` is -1 where a point was not found."""
+        return self.samples(*locate_in_charts(self.patches.seamless, n, charts))
+
+    def samples(self, small: NDArray[np.int64], weights: NDArray[np.float64]) -> Samples:
+        """Points at barycentric coordinates in triangles of the surface."""
+        mesh, surface = self.mesh, self.patches.surface
+        positions = np.einsum("...k,...kj->...j", weights, surface.V[surface.F[small]])
+        triangles = surface.parent[small]
+        barycentrics = np.einsum("...k,...kj->...j", weights, surface.inside[small])
+        at_corners = mesh.vertex_normals[mesh.F[triangles]]
+        normals = np.einsum("...k,...kj->...j", barycentrics, at_corners)
+        length = np.linalg.norm(normals, axis=-1, keepdims=True)
+        normals = np.where(length > 1e-9, normals / np.maximum(length, 1e-9), at_corners[..., 0, :])
+        return Samples(small, weights, triangles, barycentrics, positions, normals)
+
+
+_LATTICE = 7  # places along a texel's side; odd, so that one is the centre
+_PULL = 0.02  # to the centre of its square, for each texel's width squared
+_FLATTEST = 0.2  # least corner of the moved lattice on its chart, in units of a square's
+_SWEEPS, _ROUNDS = 6, 6
+_AROUND = 2  # texels round a folded one that may move
+
+
+def untangled(
+    sampler: Sampler, topology: TexelTopology, samples: Samples, beyond: NDArray[np.float64] | None
+) -> tuple[Samples, NDArray[np.float64]]:
+    """Move texels at the centres of their squares to where fewer are folded.
+
+    Parameters
+    ----------
+    sampler : Sampler
+    topology : TexelTopology
+    samples : Samples
+        At the centres.
+    beyond : float64 [C, n + 2, n + 2, 3] or None
+        Points of rims [m]; see `TexelMesh`.
+
+    Returns
+    -------
+    Samples
+    offsets : float64 [C, n, n, 2]
+        Column and row by which each texel has moved, in texels; below 0.5.
+    """
+    charts, n, _ = topology.shape
+    outside = np.full((charts, n + 2, n + 2, 3), np.nan)
+    if beyond is not None:
+        outside[topology.rim] = beyond[topology.rim]
+    offsets = np.zeros((charts, n + 2, n + 2, 2), np.int64)
+    small, weights = samples.small.copy(), samples.weights.copy()
+    positions, normals = samples.positions.reshape(-1, 3).copy(), samples.normals.reshape(-1, 3).copy()
+    texels = Texels(topology.halo, topology.rim, outside, positions, normals, offsets)
+    for _ in range(_ROUNDS):
+        active = _around(topology, folded(texels))
+        if not len(active):
+            break
+        chosen, index = np.unique(active // (n * n), return_inverse=True)
+        places = sampler.in_charts(n * _LATTICE, chosen)
+        known = (places.small >= 0)[..., None]
+        number = np.full(charts, -1)
+        number[chosen] = np.arange(len(chosen))
+        candidates = Candidates(number, np.where(known, places.positions, np.nan), places.normals)
+        for i in range(_SWEEPS):
+            if not _improve(texels, candidates, active[:: 1 if i % 2 == 0 else -1].copy()):
+                break
+        chart, row, column = np.unravel_index(active, topology.shape)
+        moved = offsets[chart, row + 1, column + 1]
+        at = index, row * _LATTICE + _LATTICE // 2 + moved[:, 1], column * _LATTICE + _LATTICE // 2 + moved[:, 0]
+        changed = moved.any(axis=1)
+        small[chart[changed], row[changed], column[changed]] = places.small[at][changed]
+        weights[chart[changed], row[changed], column[changed]] = places.weights[at][changed]
+    return sampler.samples(small, weights), offsets[:, 1:-1, 1:-1] / _LATTICE
+
+
+def _around(topology: TexelTopology, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Flat indices of chosen texels [T] and of those round them."""
+    n = topology.shape[1]
+    for _ in range(_AROUND):
+        halo = topology.with_halo(chosen.reshape(topology.shape))
+        chosen = np.any([halo[:, i : i + n, j : j + n] for i in range(3) for j in range(3)], axis=0)
+    return np.flatnonzero(chosen)
+
+
+class Candidates(NamedTuple):
+    """Places that texels of some charts may take."""
+
+    number: Ints  # [C], of a chart among these; -1
+    positions: Floats  # [k, n m, n m, 3] [m]; NaN where unknown
+    normals: Floats  # [k, n m, n m, 3]
+
+
+@kernel
+def _fits(offsets: Floats, row: int, column: int) -> bool:
+    """Whether the four squares of the lattice round a texel have wide corners after its move, on its chart."""
+    n, least = offsets.shape[0] - 2, _FLATTEST * _LATTICE * _LATTICE
+    x, y = np.empty(4), np.empty(4)
+    for i in range(row - 1, row + 1):
+        for j in range(column - 1, column + 1):
+            for k in range(4):
+                r, c = i + (1 if k >= 2 else 0), j + (1 if k == 1 or k == 2 else 0)
+                # the border of the chart lies half a texel beyond the last ones, and does not move
+                x[k] = _LATTICE * min(max(float(c), 0.5), n + 0.5) + offsets[r, c, 0]
+                y[k] = _LATTICE * min(max(float(r), 0.5), n + 0.5) + offsets[r, c, 1]
+            share = 0.5 if i == 0 or i == n else 1.0
+            share *= 0.5 if j == 0 or j == n else 1.0
+            for k in range(4):
+                a, b = (k + 1) % 4, (k + 3) % 4
+                if (x[a] - x[k]) * (y[b] - y[k]) - (y[a] - y[k]) * (x[b] - x[k]) < least * share:
+                    return False
+    return True
+
+
+@kernel
+def _improve(texels: Texels, candidates: Candidates, active: Ints) -> int:
+    """Move each of these texels to its best place, one after the other; return how many moved."""
+    n, half = texels.halo.shape[1] - 2, _LATTICE // 2
+    moved = 0
+    for flat in active:
+        chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
+        index, offset = candidates.number[chart], texels.offsets[chart, row, column]
+        ox, oy = offset[0], offset[1]
+        point, normal = texels.positions[flat].copy(), texels.normals[flat].copy()
+        least = faults(texels, flat) + _PULL * (ox * ox + oy * oy) / (_LATTICE * _LATTICE)
+        if least < 1e-12:
+            continue
+        best_x, best_y = ox, oy
+        for i in range(-half, half + 1):
+            for j in range(-half, half + 1):
+                pull = _PULL * (i * i + j * j) / (_LATTICE * _LATTICE)
+                offset[0], offset[1] = j, i
+                r, c = (row - 1) * _LATTICE + half + i, (column - 1) * _LATTICE + half + j
+                if pull >= least or not _fits(texels.offsets[chart], row, column):
+                    continue
+                texels.positions[flat] = candidates.positions[index, r, c]
+                texels.normals[flat] = candidates.normals[index, r, c]
+                if not texels.positions[flat, 0] < np.inf:
+                    continue
+                fault = faults(texels, flat) + pull
+                if fault < least - 1e-9:
+                    least, best_x, best_y = fault, j, i
+        offset[0], offset[1] = best_x, best_y
+        if best_x == ox and best_y == oy:
+            texels.positions[flat], texels.normals[flat] = point, normal
+        else:
+            r, c = (row - 1) * _LATTICE + half + best_y, (column - 1) * _LATTICE + half + best_x
+            texels.positions[flat] = candidates.positions[index, r, c]
+            texels.normals[flat] = candidates.normals[index, r, c]
+            moved += 1
+    return moved

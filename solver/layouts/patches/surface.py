@@ -1,0 +1,352 @@
+"""The triangles of a mesh, cut into smaller ones that know where they came from.
+
+Cutting flat polygons from their middles to the middles of their sides.
+
+Splitting of edges in their middle: long ones, and those that join two points of a border.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernel import Ints, kernel
+
+# Of a triangle abc: its corners, a point on each of its sides, and one inside.
+A, B, C, AB, BC, CA, MIDDLE = range(7)
+
+Triangle = tuple[int, int, int]
+
+# For each set of cut sides of a triangle (see `Surface.subdivided`), the triangles that take its place.
+_SPLITS: dict[int, tuple[Triangle, ...]] = {
+    1: ((A, AB, C), (AB, B, C)),
+    2: ((B, BC, A), (BC, C, A)),
+    4: ((C, CA, B), (CA, A, B)),
+    3: ((AB, B, BC), (A, AB, BC), (A, BC, C)),
+    6: ((BC, C, CA), (B, BC, CA), (B, CA, A)),
+    5: ((CA, A, AB), (C, CA, AB), (C, AB, B)),
+    7: ((A, AB, CA), (AB, B, BC), (CA, BC, C), (AB, BC, CA)),
+}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Edges:
+    """The edges of triangles.
+
+    Attributes
+    ----------
+    ends : int64 [e, 2]
+    of : int64 [m, 3]
+        Of each triangle, the edges ab, bc, ca.
+    sides : int64 [e, 2]
+        The two sides that lie on each edge: 3 triangle + k for side k of a triangle; -1 beyond a rim.
+    """
+
+    ends: NDArray[np.int64]
+    of: NDArray[np.int64]
+    sides: NDArray[np.int64]
+
+    @property
+    def rim(self) -> NDArray[np.bool_]:
+        """Which edges lie at a rim, [e]."""
+        return self.sides[:, 1] < 0
+
+
+def edges_of(F: NDArray[np.int64]) -> Edges:
+    """Edges of the triangles F [m, 3], which form a manifold; sorted by their lower ends, then by the higher."""
+    tail, head = F.ravel(), np.roll(F, -1, axis=1).ravel()
+    low, high = np.minimum(tail, head), np.maximum(tail, head)
+    size = int(F.max()) + 1 if len(F) else 1
+    order = _sorted(low, _sorted(high, np.arange(len(low)), size), size)
+    first = np.ones(len(order), bool)
+    first[1:] = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
+    of = np.empty(len(order), np.int64)
+    of[order] = np.cumsum(first) - 1
+    sides = np.full((int(first.sum()), 2), -1)
+    sides[:, 0], sides[of[order[~first]], 1] = order[first], order[~first]
+    return Edges(np.stack([low[sides[:, 0]], high[sides[:, 0]]], axis=1), of.reshape(-1, 3), sides)
+
+
+@kernel
+def _sorted(key: Ints, order: Ints, size: int) -> Ints:
+    """An order [k] sorted by a key below `size`, stable (a counting sort: a third of the layout went into others)."""
+    start, result = np.zeros(size + 1, np.int64), np.empty(len(order), np.int64)
+    for i in order:
+        start[key[i] + 1] += 1
+    for j in range(size):
+        start[j + 1] += start[j]
+    for i in order:
+        result[start[key[i]]] = i
+        start[key[i]] += 1
+    return result
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles that cover a mesh; each is a part of one of its triangles, its parent.
+
+    Attributes
+    ----------
+    V : float64 [n, 3]
+        Points [m].
+    F : int64 [m, 3]
+    parent : int64 [m]
+        Triangle of the mesh in which each lies.
+    inside : float64 [m, 3, 3]
+        Barycentric coordinates in it, of the three corners.
+    """
+
+    V: NDArray[np.float64]
+    F: NDArray[np.int64]
+    parent: NDArray[np.int64]
+    inside: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> Surface:
+        """The triangles of a mesh as they are."""
+        return cls(V, F, np.arange(len(F)), np.broadcast_to(np.eye(3), (len(F), 3, 3)))
+
+    @functools.cached_property
+    def edges(self) -> Edges:
+        """Edges of the triangles."""
+        return edges_of(self.F)
+
+    @functools.cached_property
+    def edge_lengths(self) -> NDArray[np.float64]:
+        """Lengths of the edges [m], [e]."""
+        ends = self.V[self.edges.ends]
+        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+    @functools.cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """Areas of the triangles [m^2], [m]."""
+        a, b, c = (self.V[self.F[:, k]] for k in range(3))
+        return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+
+    @functools.cached_property
+    def angles(self) -> NDArray[np.float64]:
+        """Angles in the corners of the triangles, [m, 3]."""
+        corners = [self.V[self.F[:, k]] for k in range(3)]
+        angles = np.empty((len(self.F), 3))
+        for k in range(3):
+            u, v = (corners[(k + j) % 3] - corners[k] for j in (1, 2))
+            angles[:, k] = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v))
+        return angles
+
+    @functools.cached_property
+    def at_rim(self) -> NDArray[np.bool_]:
+        """Vertices at a rim, [n]."""
+        at_rim = np.zeros(len(self.V), bool)
+        at_rim[self.edges.ends[self.edges.rim]] = True
+        return at_rim
+
+    def subdivided(
+        self, places: NDArray[np.float64], patterns: dict[int, tuple[Triangle, ...]] = _SPLITS
+    ) -> Subdivision:
+        """Cut edges, and the triangles beside them.
+
+        Parameters
+        ----------
+        places : float64 [e]
+            Where each edge is cut, between 0 at its first end and 1; NaN where it is not.
+        patterns : dict, optional
+            For each set of cut sides of a triangle (1 for ab, 2 for bc, 4 for ca, added up) the triangles to put in
+            its place, by the seven points named in this module.
+        """
+        edges, count = self.edges, len(self.V)
+        cut = np.flatnonzero(~np.isnan(places))
+        middles = np.full(len(edges.ends), -1)
+        middles[cut] = count + np.arange(len(cut))
+        t = places[cut][:, None]
+        first, second = self.V[edges.ends[cut]].transpose(1, 0, 2)
+        points = [self.V, first * (1 - t) + second * t]
+        sets = ((middles[edges.of] >= 0) * (1, 2, 4)).sum(axis=1)
+        touched = np.flatnonzero(sets)
+        nodes, local = self._nodes(touched, middles, places)
+        central = np.flatnonzero([any(MIDDLE in each for each in patterns.get(int(s), ())) for s in range(8)])
+        inner = np.flatnonzero(np.isin(sets[touched], central))
+        nodes[inner, MIDDLE] = count + len(cut) + np.arange(len(inner))
+        points.append(np.einsum("ij,ijk->ik", local[inner, MIDDLE], self.V[self.F[touched[inner]]]))
+        whole = np.flatnonzero(sets == 0)
+        F, weights, origin = [self.F[whole]], [np.broadcast_to(np.eye(3), (len(whole), 3, 3))], [whole]
+        for number, triangles in patterns.items():
+            chosen = np.flatnonzero(sets[touched] == number)
+            for triangle in triangles:
+                F.append(nodes[chosen][:, triangle])
+                weights.append(local[chosen][:, triangle])
+                origin.append(touched[chosen])
+        source, share = np.concatenate(origin), np.concatenate(weights)
+        finer = Surface(np.concatenate(points), np.concatenate(F), self.parent[source], share @ self.inside[source])
+        return Subdivision(finer, middles, source, share)
+
+    def _nodes(
+        self, triangles: NDArray[np.int64], middles: NDArray[np.int64], places: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Vertices [k, 7] of the named points of triangles [k], and their barycentrics [k, 7, 3]."""
+        nodes, local = np.full((len(triangles), 7), -1), np.zeros((len(triangles), 7, 3))
+        nodes[:, :3], local[:, :3] = self.F[triangles], np.eye(3)
+        for k in range(3):
+            edge = self.edges.of[triangles, k]
+            nodes[:, 3 + k] = middles[edge]
+            forward = self.edges.ends[edge, 0] == self.F[triangles, k]
+            t = np.where(forward, places[edge], 1 - places[edge])
+            local[:, 3 + k, k], local[:, 3 + k, (k + 1) % 3] = 1 - t, t
+        corners = np.where(np.isnan(local[:, 3:6]), 0.0, local[:, 3:6]).sum(axis=1)
+        local[:, MIDDLE] = corners / np.maximum(corners.sum(axis=1, keepdims=True), 1e-300)
+        return nodes, local
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Subdivision:
+    """A surface whose edges were cut.
+
+    Attributes
+    ----------
+    surface : Surface
+        Its first vertices are those from before.
+    middles : int64 [e]
+        The new vertex on each edge from before; -1 where it was not cut.
+    origin : int64 [m]
+        Of each triangle, the one from before in which it lies.
+    weights : float64 [m, 3, 3]
+        Barycentric coordinates in that one, of its corners.
+    """
+
+    surface: Surface
+    middles: NDArray[np.int64]
+    origin: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+
+_ON_RAY = 1e-9  # of the size of a polygon
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Flat:
+    """Parts of a surface laid out in the plane.
+
+    Attributes
+    ----------
+    surface : Surface
+    part : int64 [m]
+    places : float64 [m, 3, 2]
+        Of the triangles' corners.
+    """
+
+    surface: Surface
+    part: NDArray[np.int64]
+    places: NDArray[np.float64]
+
+    def of(self, finer: Subdivision) -> Flat:
+        """The same on a subdivision of the surface."""
+        return Flat(finer.surface, self.part[finer.origin], finer.weights @ self.places[finer.origin])
+
+
+def central_vertices(flat: Flat, on_border: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Of each part the inner vertex nearest to the origin."""
+    distance = np.where(on_border[flat.surface.F], np.inf, (flat.places**2).sum(axis=2)).ravel()
+    part = np.repeat(flat.part, 3)
+    order = np.lexsort((distance, part))
+    first = order[np.searchsorted(part[order], np.arange(flat.part.max() + 1))]
+    return flat.surface.F.ravel()[first]
+
+
+def cut_ray(
+    flat: Flat, start: NDArray[np.int64], end: NDArray[np.int64], on_border: NDArray[np.bool_]
+) -> tuple[Flat, list[NDArray[np.int64]]]:
+    """Cut parts along a straight line each, from one of their vertices to one on their border.
+
+    Parameters
+    ----------
+    flat : Flat
+    start, end : int64 [parts]
+        Vertices; -1 where a part is not to be cut.
+    on_border : bool [n]
+
+    Returns
+    -------
+    Flat
+    list of int64 [l]
+        The vertices along each line, from start to end.
+    """
+    surface = flat.surface
+    origin, target = _place_of(flat, start), _place_of(flat, end)
+    direction = (target - origin) / np.linalg.norm(target - origin, axis=1, keepdims=True)
+    offset = flat.places - origin[flat.part][:, None]
+    toward = direction[flat.part][:, None]
+    reach = (offset * toward).sum(axis=2)
+    beside = toward[..., 0] * offset[..., 1] - toward[..., 1] * offset[..., 0]
+    ends_here = (start[flat.part][:, None] == surface.F) | (end[flat.part][:, None] == surface.F)
+    on_ray = (np.abs(beside) < _ON_RAY) & (reach > 0) & ~on_border[surface.F] | ends_here
+    beside[on_ray] = 0.0
+    sides = surface.edges.sides
+    triangle, k = np.divmod(sides[:, 0], 3)
+    p, q = beside[triangle, k], beside[triangle, (k + 1) % 3]
+    crossed = (p * q < 0) & (sides[:, 1] >= 0)
+    crossed &= flat.part[triangle] == flat.part[np.where(crossed, sides[:, 1], sides[:, 0]) // 3]
+    t = np.where(crossed, p / np.where(crossed, p - q, 1.0), np.nan)
+    crossed &= (1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3] > 0
+    forward = surface.edges.ends[:, 0] == surface.F[triangle, k]
+    finer = surface.subdivided(np.where(crossed, np.where(forward, t, 1 - t), np.nan))
+    touched = np.flatnonzero(on_ray.any(axis=1))
+    inner = np.stack([flat.part[touched].repeat(3), surface.F[touched].ravel(), reach[touched].ravel()])[
+        :, on_ray[touched].ravel()
+    ]
+    cut = np.flatnonzero(crossed)
+    distance = ((1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3])[cut]
+    points = np.concatenate([inner, np.stack([flat.part[triangle[cut]], finer.middles[cut], distance])], axis=1)
+    return flat.of(finer), _paths(points, len(start))
+
+
+def _place_of(flat: Flat, vertex: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Places [parts, 2] of one vertex of each part; NaN where that is -1."""
+    places = np.full((len(vertex), 2), np.nan)
+    triangle, k = np.nonzero(vertex[flat.part][:, None] == flat.surface.F)
+    places[flat.part[triangle]] = flat.places[triangle, k]
+    return places
+
+
+def _paths(points: NDArray[np.float64], parts: int) -> list[NDArray[np.int64]]:
+    """Vertices of each part in order, from rows part, vertex, and distance along the line."""
+    order = np.lexsort((points[2], points[0]))
+    part, vertex = points[:2, order].astype(np.int64)
+    first = np.concatenate([[True], (np.diff(part) != 0) | (np.diff(vertex) != 0)]) if len(part) else np.zeros(0, bool)
+    part, vertex = part[first], vertex[first]
+    return np.split(vertex, np.searchsorted(part, np.arange(1, parts)))
+
+
+_MOST_ROUNDS = 100
+_MOST_TRIANGLES, _MOST_GROWTH = 40_000, 3  # of a part; of one that has more to begin with, so many times as many
+
+
+def halved(surface: Surface, chosen: NDArray[np.bool_]) -> Subdivision:
+    """Split chosen edges [e] in their middle."""
+    return surface.subdivided(np.where(chosen, 0.5, np.nan))
+
+
+def halved_chords(surface: Surface, part: NDArray[np.int64], on_border: NDArray[np.bool_]) -> Subdivision:
+    """Split edges inside a part [m] of which both ends lie on its border: flattened, they could lie on one side."""
+    sides = surface.edges.sides
+    inner = (sides >= 0).all(axis=1) & (part[sides[:, 0] // 3] == part[sides[:, 1] // 3])
+    return halved(surface, inner & on_border[surface.edges.ends].all(axis=1))
+
+
+def refined(surface: Surface, longest: float) -> Surface:
+    """Split edges until none is longer than `longest` [m], that of a triangle first, so that needles lose length.
+
+    Where that would take too many triangles, longer ones are left.
+    """
+    most = max(_MOST_TRIANGLES, _MOST_GROWTH * len(surface.F))
+    for _ in range(_MOST_ROUNDS):
+        lengths = surface.edge_lengths
+        own = np.take_along_axis(surface.edges.of, lengths[surface.edges.of].argmax(axis=1)[:, None], axis=1)
+        chosen = np.zeros(len(lengths), bool)
+        chosen[own] = True
+        chosen &= lengths > longest
+        if not chosen.any() or len(surface.F) > most:
+            break
+        surface = halved(surface, chosen).surface
+    return surface

@@ -1,0 +1,313 @@
+"""The rows of a PLY file, element by element, text or binary.
+
+Polygons of a mesh file cut into triangles: by a fan, or by clipping ears where a fan folds.
+
+PLY files as triangles, text or binary: polygons of any size, texture coordinates of vertices or of corners.
+
+trimesh, which reads the other formats, fails on binary PLY files in which polygons of several sizes are mixed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MeshError
+from .corners import counted
+
+
+@dataclasses.dataclass
+class Element:
+    """A table of the file: so many rows of named values, of which some are lists (of a length type)."""
+
+    name: str
+    rows: int
+    names: list[str] = dataclasses.field(default_factory=list)
+    types: list[str] = dataclasses.field(default_factory=list)
+    lengths: list[str | None] = dataclasses.field(default_factory=list)
+
+
+def read_text(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
+    """Columns of an element by name, and the data after it.
+
+    Raises
+    ------
+    MeshError
+        If the data end early, or a row has something other than numbers.
+    """
+    parts = data.split(b"\n", element.rows) if element.rows <= len(data) else []
+    if len(parts) < element.rows or (len(parts) == element.rows and element.rows and not parts[-1].strip()):
+        raise _ends_early(element)
+    rest = parts[element.rows] if len(parts) > element.rows else b""
+    rows = [part.split() for part in parts[: element.rows]]
+    columns: dict[str, Any] = {}
+    try:
+        if not any(element.lengths):
+            table = np.array([row[: len(element.names)] for row in rows], dtype=np.float64)
+            table = table.reshape(element.rows, len(element.names))
+            return dict(zip(element.names, table.T, strict=True)), rest
+        at = [0] * len(rows)
+        for name, length in zip(element.names, element.lengths, strict=True):
+            sizes = [1] * len(rows) if length is None else [int(row[i]) for row, i in zip(rows, at, strict=True)]
+            first = [i + (length is not None) for i in at]
+            at = [i + size for i, size in zip(first, sizes, strict=True)]
+            if any(not i <= j <= len(row) for i, j, row in zip(first, at, rows, strict=True)):
+                raise _ends_early(element)
+            columns[name] = [np.array(row[i:j], dtype=np.float64) for row, i, j in zip(rows, first, at, strict=True)]
+    except (ValueError, IndexError) as error:
+        raise MeshError(f"a row of its element {element.name} is not understood") from error
+    return columns, rest
+
+
+def read_binary(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
+    """Columns of an element by name, and the data after it; `order` is "<" or ">".
+
+    Raises
+    ------
+    MeshError
+        If the data end early.
+    """
+    columns = _read_table(element, data, order)
+    if columns is not None:
+        return columns
+    return _read_rows(element, data, order)
+
+
+def _read_table(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes] | None:
+    """Read rows that are all of one length, in one go; None where their lists are not."""
+    if not element.names:
+        return {}, data
+    fields: list[Any] = []
+    sizes: dict[str, int] = {}
+    for name, kind, length in zip(element.names, element.types, element.lengths, strict=True):
+        if length is None:
+            fields.append((name, order + kind))
+            continue
+        first = np.dtype(fields).itemsize if fields else 0
+        kind_of_length = np.dtype(order + length)
+        if len(data) < first + kind_of_length.itemsize:
+            return None
+        sizes[name] = int(np.frombuffer(data, kind_of_length, 1, first)[0])
+        if not 0 <= sizes[name] * np.dtype(kind).itemsize <= len(data):
+            return None
+        fields += [(f"{name} length", kind_of_length), (name, order + kind, (sizes[name],))]
+    row = np.dtype(fields)
+    if element.rows * row.itemsize > len(data):
+        if sizes:
+            return None
+        raise _ends_early(element)
+    table = np.frombuffer(data, row, element.rows)
+    if any((table[f"{name} length"] != size).any() for name, size in sizes.items()):
+        return None
+    return {name: table[name] for name in element.names}, data[element.rows * row.itemsize :]
+
+
+def _read_rows(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes]:
+    columns: dict[str, list[NDArray]] = {name: [] for name in element.names}
+    kinds = [np.dtype(order + kind) for kind in element.types]
+    lengths = [None if length is None else np.dtype(order + length) for length in element.lengths]
+    at = 0
+    try:
+        for _ in range(element.rows):
+            for name, kind, length in zip(element.names, kinds, lengths, strict=True):
+                size = 1
+                if length is not None:
+                    size = int(np.frombuffer(data, length, 1, at)[0])
+                    at += length.itemsize
+                if not 0 <= size <= len(data):
+                    raise _ends_early(element)
+                columns[name].append(np.frombuffer(data, kind, size, at))
+                at += size * kind.itemsize
+    except ValueError as error:  # numpy, where bytes are missing
+        raise _ends_early(element) from error
+    return dict(columns), data[at:]
+
+
+def _ends_early(element: Element) -> MeshError:
+    return MeshError(f"it ends before the {element.rows} rows of its element {element.name}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Soup:
+    """Triangles read from a file, not validated.
+
+    Attributes
+    ----------
+    V : float64 [vertex_count, 3]
+    F : int64 [triangle_count, 3]
+    corner_uv : float64 [triangle_count, 3, 2] or None
+        Texture coordinates of the corners; 0 where the file has none for some of them.
+    notes : tuple of str
+        What was left out, one line each.
+    """
+
+    V: NDArray[np.float64]
+    F: NDArray[np.int64]
+    corner_uv: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
+
+
+def too_small(sizes: NDArray[np.int64]) -> tuple[str, ...]:
+    """Note on faces of fewer than three corners [face_count], if there are any."""
+    count = int((sizes < 3).sum())
+    return (f"{counted(count, 'face')} with fewer than three corners left out",) if count else ()
+
+
+def triangulate(points: NDArray[np.float64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Cut polygons into triangles of the same winding.
+
+    Parameters
+    ----------
+    points : [corner_count, 3]
+        Corners, polygon after polygon.
+    sizes : [polygon_count]
+        Corners of each polygon. Those of fewer than three (points and lines) give no triangle.
+
+    Returns
+    -------
+    int64 [triangle_count, 3]
+        Indices of corners, in the order of the polygons.
+    """
+    first = np.cumsum(sizes) - sizes
+    count = np.maximum(sizes - 2, 0)
+    owner = np.repeat(np.arange(len(sizes)), count)
+    step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    triangles = np.stack([first[owner], first[owner] + step + 1, first[owner] + step + 2], axis=1)
+    for polygon in _folded(points, triangles, owner, sizes):
+        corners = points[first[polygon] : first[polygon] + sizes[polygon]]
+        triangles[owner == polygon] = first[polygon] + _clip_ears(corners)
+    return triangles
+
+
+def _folded(
+    points: NDArray[np.float64], triangles: NDArray[np.int64], owner: NDArray[np.int64], sizes: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Polygons that are not convex: a triangle of their fan faces against the sum of all."""
+    many = np.flatnonzero(sizes[owner] > 3)
+    a, b, c = (points[triangles[many, k]] for k in range(3))
+    with np.errstate(over="ignore", invalid="ignore"):  # values that are not finite are refused later, by name
+        normals = np.cross(b - a, c - a)
+    polygon = owner[many]
+    total = np.stack([np.bincount(polygon, normals[:, k], minlength=len(sizes)) for k in range(3)], axis=1)
+    against = np.einsum("ij,ij->i", normals, total[polygon]) < 0
+    return np.unique(polygon[against])
+
+
+def _clip_ears(corners: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Triangles [n - 2, 3] of one simple polygon [n, 3], seen along its normal (Meisters 1975)."""
+    # Newell's normal is that of the best plane; an axis pair that suits it spares a rotation
+    normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+    axis = int(np.argmax(np.abs(normal)))
+    flat = np.delete(corners, axis, axis=1)
+    if (normal[axis] < 0) != (axis == 1):  # dropping y mirrors
+        flat = flat * [1, -1]
+    left = list(range(len(corners)))
+    triangles = []
+    while len(left) > 3:
+        at = next((i for i in range(len(left)) if _is_ear(flat, left, i)), 0)
+        triangles.append([left[at - 1], left[at], left[(at + 1) % len(left)]])
+        del left[at]
+    return np.array([*triangles, left])
+
+
+def _is_ear(flat: NDArray[np.float64], left: list[int], at: int) -> bool:
+    a, b, c = flat[left[at - 1]], flat[left[at]], flat[left[(at + 1) % len(left)]]
+    if _turn(a, b, c[None])[0] <= 0:
+        return False
+    others = flat[[k for k in left if k not in (left[at - 1], left[at], left[(at + 1) % len(left)])]]
+    inside = (_turn(a, b, others) >= 0) & (_turn(b, c, others) >= 0) & (_turn(c, a, others) >= 0)
+    return not inside.any()
+
+
+def _turn(a: NDArray[np.float64], b: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Twice the signed area of the triangles a, b, point."""
+    return (b[0] - a[0]) * (points[:, 1] - a[1]) - (b[1] - a[1]) * (points[:, 0] - a[0])
+
+
+_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+
+
+def read_ply(content: bytes) -> Soup:
+    """Triangles of a PLY file.
+
+    Raises
+    ------
+    MeshError
+        If the file is not a PLY file, ends early, or refers to a vertex that does not exist.
+    """
+    order, elements, data = _header(content)
+    columns: dict[str, dict[str, Any]] = {}
+    for element in elements:
+        read = read_text if order == "" else read_binary
+        columns[element.name], data = read(element, data, order)
+        if "face" in columns and "vertex" in columns:
+            break
+    vertex, faces = columns.get("vertex", {}), columns.get("face", {})
+    if any(name not in vertex for name in "xyz"):
+        raise MeshError("it has no vertices with x, y and z")
+    V = np.stack([np.asarray(vertex[name], dtype=np.float64) for name in "xyz"], axis=1)
+    polygons = faces.get("vertex_indices", faces.get("vertex_index", []))
+    sizes = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
+    corners = np.concatenate([np.empty(0), *polygons])
+    if len(corners) and not (corners.min() >= 0 and corners.max() < len(V)):
+        raise MeshError(
+            f"its faces refer to vertices {corners.min():g} to {corners.max():g}; valid is 0 to {len(V) - 1}"
+        )
+    index = corners.astype(np.int64)
+    triangles = triangulate(V[index], sizes)
+    uv = _corner_uv(vertex, faces, index, sizes)
+    return Soup(V, index[triangles], None if uv is None else uv[triangles], too_small(sizes))
+
+
+def _corner_uv(
+    vertex: dict[str, Any], faces: dict[str, Any], index: NDArray[np.int64], sizes: NDArray[np.int64]
+) -> NDArray[np.float64] | None:
+    pairs = faces.get("texcoord")
+    if pairs is not None and all(len(pair) == 2 * size for pair, size in zip(pairs, sizes, strict=True)):
+        return np.concatenate([np.empty(0), *pairs]).reshape(-1, 2)
+    for u, v in _UV_NAMES:
+        if u in vertex and v in vertex:
+            return np.stack([vertex[u], vertex[v]], axis=1).astype(np.float64)[index]
+    return None
+
+
+def _header(content: bytes) -> tuple[str, list[Element], bytes]:
+    head, found, data = content.partition(b"end_header")
+    lines = [line.split() for line in head.decode("ascii", errors="replace").splitlines()]
+    if not found or not lines or lines[0] != ["ply"]:
+        raise MeshError("it has no header from ply to end_header, as a PLY file does")
+    order, elements = None, []
+    try:
+        for words in lines[1:]:
+            match words:
+                case ["format", name, *_]:
+                    order = _ORDERS[name]
+                case ["element", name, rows]:
+                    elements.append(Element(name, int(rows)))
+                case ["property", "list", length, kind, name]:
+                    elements[-1].names.append(name)
+                    elements[-1].types.append(_TYPES[kind])
+                    elements[-1].lengths.append(_TYPES[length])
+                case ["property", kind, name]:
+                    elements[-1].names.append(name)
+                    elements[-1].types.append(_TYPES[kind])
+                    elements[-1].lengths.append(None)
+    except (KeyError, ValueError, IndexError) as error:
+        raise MeshError(f"the line {' '.join(words)[:60]!r} of its header is not understood") from error
+    if order is None or any(element.rows < 0 for element in elements):
+        raise MeshError("its header gives no format or a negative number of rows")
+    return order, elements, data[2:] if data.startswith(b"\r\n") else data[1:]

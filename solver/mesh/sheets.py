@@ -1,0 +1,309 @@
+"""Which sheets go on in which where more than two triangles meet along an edge.
+
+Sides of triangles that lie on the same edge, and which of them are joined.
+
+Surfaces cut apart where they touch themselves, so that what is left is manifold.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .corners import Corners, counted
+from .topology import labels, turned, undirected
+
+# Sides on one edge up to which every pair is weighed; beyond, only neighbours round the edge.
+_ALL_PAIRS = 12
+
+
+def matched(
+    V: NDArray[np.float64],
+    F: NDArray[np.int64],
+    sides: NDArray[np.int64],
+    sheet: NDArray[np.int64],
+    flip: NDArray[np.bool_],
+) -> NDArray[np.int64]:
+    """Join sides of crowded edges two by two, the best pairs first, none that would make the surface one-sided.
+
+    Parameters
+    ----------
+    V, F : [vertex_count, 3], [triangle_count, 3]
+    sides : [k]
+        Sides that are to be joined, numbered 3 x triangle + side.
+    sheet : [triangle_count]
+        Sheet to which each triangle belongs so far.
+    flip : bool [triangle_count]
+        Triangles to be turned for the windings of each sheet to agree.
+
+    Returns
+    -------
+    int64 [pair_count, 2]
+    """
+    if len(sides) == 0:
+        return np.empty((0, 2), dtype=np.int64)
+    key, forward = undirected(F)
+    forward = forward ^ np.repeat(flip, 3)
+    sides = sides[np.argsort(key[sides], kind="stable")]
+    angle = _angles(V, F, sides, key[sides])
+    order = np.lexsort((angle, key[sides]))
+    first, second = _candidates(key[sides])
+    first, second = order[first], order[second]
+    one, two = sides[first], sides[second]
+    differ = forward[one] == forward[two]
+    apart = sheet[one // 3] != sheet[two // 3]
+    # a side that runs forward has the inside on the side of smaller angles, the other one on that of larger ones
+    inside = np.where(forward[one], angle[first] - angle[second], angle[second] - angle[first]) % (2 * np.pi)
+    # 0 where they go on straight, 1 where one lies on the other; of two equal bends the convex one, so that bodies that
+    # touch along an edge stay two
+    cost = np.abs(np.pi - inside) / np.pi + 1e-6 * inside + apart + 2.0 * differ
+    best = np.argsort(cost, kind="stable")
+    return _chosen(np.stack([one, two], axis=1)[best], differ[best], sheet)
+
+
+def _angles(
+    V: NDArray[np.float64], F: NDArray[np.int64], sides: NDArray[np.int64], key: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Angles at which triangles lie round their common edge, counted from the first on it, seen against the edge.
+
+    Sides are sorted by `key`, the number of their edge.
+    """
+    triangle, k = sides // 3, sides % 3
+    a, b = F[triangle, k], F[triangle, (k + 1) % 3]
+    axis = V[np.maximum(a, b)] - V[np.minimum(a, b)]
+    axis = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), np.finfo(float).tiny)
+    across = V[F[triangle, (k + 2) % 3]] - V[a]
+    across = across - np.einsum("ij,ij->i", across, axis)[:, None] * axis
+    begins = np.append(True, key[1:] != key[:-1])
+    first = across[np.flatnonzero(begins)[np.cumsum(begins) - 1]]
+    turn = np.einsum("ij,ij->i", np.cross(first, across), axis)
+    return np.arctan2(turn, np.einsum("ij,ij->i", first, across)) % (2 * np.pi)
+
+
+def _candidates(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of places in a sorted list that have the same key: all, or, of very many, neighbours in turn."""
+    starts = np.flatnonzero(np.append(True, key[1:] != key[:-1]))
+    sizes = np.diff(np.append(starts, len(key)))
+    first, second = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+    for size in np.unique(sizes[sizes > 1]).tolist():
+        pairs = (
+            itertools.combinations(range(size), 2) if size <= _ALL_PAIRS else ((i, (i + 1) % size) for i in range(size))
+        )
+        i, j = np.array(list(pairs)).T
+        base = starts[sizes == size][:, None]
+        first.append((base + i).ravel())
+        second.append((base + j).ravel())
+    return np.concatenate(first), np.concatenate(second)
+
+
+def _chosen(pairs: NDArray[np.int64], against: NDArray[np.bool_], sheet: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The pairs taken one after the other, as long as their sides are free and windings can still be made to agree."""
+    parent = list(range(int(sheet.max()) + 1))
+    odd = [False] * len(parent)  # turned against the parent
+    size = [1] * len(parent)
+
+    def root(node: int) -> tuple[int, bool]:
+        flip = False
+        while parent[node] != node:
+            flip ^= odd[node]
+            node = parent[node]
+        return node, flip
+
+    taken: set[int] = set()
+    chosen = []
+    sheets = sheet[pairs // 3].tolist()
+    for (first, second), (one, two), differ in zip(pairs.tolist(), sheets, against.tolist(), strict=True):
+        if first in taken or second in taken:
+            continue
+        (a, flip_a), (b, flip_b) = root(one), root(two)
+        turn = differ ^ flip_a ^ flip_b
+        if a == b and turn:
+            continue
+        if a != b:
+            small, large = (a, b) if size[a] < size[b] else (b, a)
+            parent[small], odd[small] = large, turn
+            size[large] += size[small]
+        taken |= {first, second}
+        chosen.append((first, second))
+    return np.array(chosen, dtype=np.int64).reshape(-1, 2)
+
+
+# Joining in a way that the vertices as given do not show is the last choice when windings are made to agree.
+_APART = 1e6
+
+
+@dataclasses.dataclass(frozen=True)
+class Joints:
+    """Which sides of triangles are joined.
+
+    Attributes
+    ----------
+    pairs : int64 [k, 2]
+        Sides that are joined, numbered 3 x triangle + side. All others are rims.
+    crowded : int64 [j]
+        One side of every edge on which more than two lie.
+    one_sided : int64 [i]
+        Sides of pairs left apart, since joining them would make a one-sided surface.
+    """
+
+    pairs: NDArray[np.int64]
+    crowded: NDArray[np.int64]
+    one_sided: NDArray[np.int64]
+
+
+def join_sides(V: NDArray[np.float64], corners: Corners) -> Joints:
+    """Join the sides that lie on the same edge, two by two, to an orientable surface.
+
+    Two alone on an edge belong together. Where more meet, first those are joined that share both vertices as given;
+    then, pair by pair, those whose windings agree, that are parts of one sheet already, and between which the surface
+    bends least. What remains single becomes a rim. A one-sided surface stays open along a path.
+    """
+    edges = _Edges.of(corners.F)
+    firm, cost = edges.firm(corners.given)
+    middle = V[corners.F].mean(axis=1)
+    cost = cost + np.linalg.norm(np.diff(middle[firm // 3], axis=1)[:, 0], axis=1) / np.ptp(V, axis=0).max()
+    against = edges.forward[firm[:, 0]] == edges.forward[firm[:, 1]]
+    count = len(corners.F)
+    flip = turned(firm // 3, against, count, cost)
+    apart = against ^ flip[firm[:, 0] // 3] ^ flip[firm[:, 1] // 3]
+    pairs = firm[~apart]
+    crowded = np.flatnonzero(edges.size > 2)
+    if len(crowded):
+        free = np.ones(3 * count, dtype=bool)
+        free[pairs] = False
+        sheet = labels(pairs // 3, count)
+        sides = edges.order[np.repeat(edges.size > 2, edges.size)]
+        pairs = np.vstack([pairs, matched(V, corners.F, sides[free[sides]], sheet, _most_as_given(flip, sheet))])
+    return Joints(pairs, edges.order[edges.first[crowded]], firm[apart][:, 0])
+
+
+@dataclasses.dataclass(frozen=True)
+class _Edges:
+    """Sides sorted by edge: `order[first[e] : first[e] + size[e]]` lie on e; `forward` ones run up in number."""
+
+    order: NDArray[np.int64]
+    first: NDArray[np.int64]
+    size: NDArray[np.int64]
+    forward: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, F: NDArray[np.int64]) -> _Edges:
+        key, forward = undirected(F)
+        order = np.argsort(key, kind="stable")
+        ordered = key[order]
+        first = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
+        return cls(order, first, np.diff(np.append(first, len(key))), forward)
+
+    def firm(self, given: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Pairs that belong together without a choice, and what it costs to join them."""
+        twos = self.first[self.size == 2]
+        pairs = self.order[np.stack([twos, twos + 1], axis=1)]
+        key, _ = undirected(given)
+        together = key[pairs[:, 0]] == key[pairs[:, 1]]
+        cost = np.where(together, 0.0, _APART)
+        many = self.order[np.repeat(self.size > 2, self.size)]
+        if len(many) == 0:
+            return pairs, cost
+        by_given = many[np.argsort(key[many], kind="stable")]
+        ordered = key[by_given]
+        first = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
+        first = first[np.diff(np.append(first, len(by_given))) == 2]
+        shared = by_given[np.stack([first, first + 1], axis=1)]
+        return np.vstack([pairs, shared]), np.append(cost, np.zeros(len(shared)))
+
+
+def _most_as_given(flip: NDArray[np.bool_], sheet: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """The same agreement of windings, but with most triangles of every sheet as they are."""
+    size, flipped = np.bincount(sheet), np.bincount(sheet, weights=flip)
+    return flip ^ (2 * flipped > size)[sheet]
+
+
+# Where a vertex is put into an edge, counted from the lower one: not in the middle, where another may lie already.
+_BETWEEN = 0.382
+
+
+def cut_apart(
+    V: NDArray[np.float64], corners: Corners, first_given: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], Corners, list[str]]:
+    """Give every sheet vertices of its own where surfaces touch along an edge or at a vertex.
+
+    Parameters
+    ----------
+    V : [vertex_count, 3]
+    corners : Corners
+    first_given : [vertex_count]
+        Lowest number under which each vertex was given.
+
+    Returns
+    -------
+    V, corners
+        A manifold, orientable surface. Vertices keep their order, those of a vertex that was cut standing together.
+    notes : list of str
+        What was cut.
+    """
+    joints = join_sides(V, corners)
+    fan = _fans(corners.F, joints.pairs)
+    vertex = np.empty(fan.max() + 1, dtype=np.int64)
+    vertex[fan] = corners.F.ravel()
+    whole = np.bincount(vertex, minlength=len(V))[vertex] == 1
+    lowest = np.full(len(vertex), corners.given.max() + 1)
+    np.minimum.at(lowest, fan, corners.given.ravel())
+    order = np.argsort(np.where(whole, first_given[vertex], lowest), kind="stable")
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    cut = Corners(rank[fan].reshape(-1, 3), corners.given, corners.uv)
+    V, cut = _without_double_edges(V[vertex[order]], cut, joints.pairs)
+    notes = []
+    if len(joints.crowded):
+        notes.append(f"cut apart along {counted(len(joints.crowded), 'edge')} where more than two triangles met")
+    if len(joints.one_sided):
+        notes.append(f"cut open along {counted(len(joints.one_sided), 'edge')}: one-sided, like a Moebius band")
+    touched = _ends(corners.F, np.append(joints.crowded, joints.one_sided))
+    pinched = np.setdiff1d(vertex[~whole], touched)
+    if len(pinched):
+        notes.append(f"cut apart at {counted(len(pinched), 'vertex')} where the surface touched itself")
+    return V, cut, notes
+
+
+def _fans(F: NDArray[np.int64], pairs: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Fan of triangles to which each corner belongs, numbered by first occurrence: corners linked over joined sides."""
+    start = F.ravel()
+    next_corner = np.arange(len(start)).reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    one, two = pairs.T
+    same_way = start[one] == start[two]
+    ends = np.where(same_way, two, next_corner[two]), np.where(same_way, next_corner[two], two)
+    links = np.concatenate([np.stack([one, ends[0]], axis=1), np.stack([next_corner[one], ends[1]], axis=1)])
+    return labels(links, len(start))
+
+
+def _ends(F: NDArray[np.int64], sides: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.concatenate([F.ravel()[sides], np.roll(F, -1, axis=1).ravel()[sides]])
+
+
+def _without_double_edges(
+    V: NDArray[np.float64], corners: Corners, pairs: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], Corners]:
+    """Where two edges have both vertices in common, all but the first get a vertex of their own in between."""
+    F = corners.F
+    mate = np.arange(F.size)
+    mate[pairs[:, 0]], mate[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
+    leader = np.minimum(np.arange(F.size), mate)
+    a, b = F.ravel(), np.roll(F, -1, axis=1).ravel()
+    key = np.minimum(a, b) * len(V) + np.maximum(a, b)
+    order = np.lexsort((leader, key))
+    ordered, lead = key[order], leader[order]
+    begins = np.append(True, ordered[1:] != ordered[:-1])
+    first = lead[begins][np.cumsum(begins) - 1]
+    again = order[lead != first]
+    if len(again) == 0:
+        return V, corners
+    leaders, number = np.unique(leader[again], return_inverse=True)
+    point, given = np.full((2, *F.shape), -1)
+    point.flat[again] = len(V) + number
+    low, high = np.minimum(a, b)[leaders], np.maximum(a, b)[leaders]
+    between = (1 - _BETWEEN) * V[low] + _BETWEEN * V[high]
+    share = np.where(a < b, _BETWEEN, 1 - _BETWEEN).reshape(F.shape)
+    return np.vstack([V, between]), corners.split(point, given, share)

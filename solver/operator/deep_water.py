@@ -1,0 +1,150 @@
+"""The square root of a surface's Laplacian, which turns the height of deep water into the flow below it.
+
+The wave operator of a surface with deep fluid below: long waves move more of it than short ones.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import splu
+from scipy.special import ellipj, ellipk
+
+from ..errors import SolverError
+from ..texels.stencil import Stencil, largest_eigenvalue, stiffness_matrix
+from .wave_operator import SAFETY, WaveOperator
+
+# Shifted solves for each root: with 5 the error is below 0.1 % over the 10,000 by which the eigenvalues of 6 x 64 x 64
+# texels differ.
+_POLES = 5
+
+
+class HalfLaplacian:
+    """sqrt(A^-1 K) of the stiffness K and the areas A of the texels, of second order in their size.
+
+    The rational approximation of Hale, Higham and Trefethen (2008, SIAM Journal on Numerical Analysis 46, 2505, method
+    3): L sum w_i (L + s_i)^-1 with L = A^-1 K and weights and shifts from elliptic functions. Its error falls by
+    exp(-2 pi^2 / (3 + log(most / least))) with each pole. A field without waves, a constant, gives exactly 0, and the
+    operator is symmetric with areas as weights. Each shifted matrix is factorised once.
+
+    Parameters
+    ----------
+    stencil : Stencil
+        Of the Laplacian.
+    areas : float64 [C, n, n]
+        [m^2].
+
+    Attributes
+    ----------
+    most : float
+        Greatest eigenvalue, the square root's greatest wave number [1/m].
+    """
+
+    def __init__(self, stencil: Stencil, areas: NDArray[np.float64]) -> None:
+        self._areas = areas.ravel()
+        self._matrix = stiffness_matrix(stencil)
+        bound = float((2 * stencil.absolute_sums() / areas).max())
+        square = largest_eigenvalue(stencil, areas, np.ones(areas.shape, np.bool_), bound)
+        self.most = float(np.sqrt(square))
+        # few waves on a surface are longer than twice the way round a sphere of its area
+        self._weights, shifts = _poles(min(np.pi / areas.sum(), square / 4), square)
+        self._solvers = [_factorised(self._matrix + diags_array(shift * self._areas)) for shift in shifts]
+
+    def __call__(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Apply it to a field [C, n, n]: the unit times 1/m."""
+        return (self._matrix @ self._inverse(field.ravel()) / self._areas).reshape(field.shape)
+
+    def inverse(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The field [C, n, n] without a mean whose half Laplacian a field without a mean is: the unit times m."""
+        wanted = field.ravel()
+        found = self._inverse(wanted)
+        for _ in range(2):  # each corrects the approximation's error by itself
+            found += self._inverse(wanted - self._matrix @ self._inverse(found) / self._areas)
+        return (found - (self._areas @ found) / self._areas.sum()).reshape(field.shape)
+
+    def _inverse(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Approximate inverse root: sum w_i (L + s_i)^-1."""
+        load = self._areas * field
+        return sum(weight * solve(load) for weight, solve in zip(self._weights, self._solvers, strict=True))
+
+
+def _factorised(matrix: Any) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Solver of a symmetric positive matrix, which needs no pivots."""
+    solver = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return solver.solve
+
+
+def _poles(least: float, most: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weights and shifts of the inverse root's approximation between two eigenvalues."""
+    complement = 1 - least / most
+    quarter = ellipk(complement)
+    sn, cn, dn, _ = ellipj((np.arange(_POLES) + 0.5) / _POLES * quarter, complement)
+    return 2 * quarter * np.sqrt(least) / (np.pi * _POLES) * dn / cn**2, least * (sn / cn) ** 2
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class FluidOperator(WaveOperator):
+    """M (deep / root) h_tt = -(K + M k) h - M (deep / root) zeta h_t - ..., with the half Laplacian as the root.
+
+    Attributes
+    ----------
+    deep : float
+        Wave number at which the fluid weighs as much as `mass` says [1/m].
+    geometry : Stencil
+        Link weights of the Laplacian.
+    areas : float64 [C, n, n]
+        [m^2].
+    """
+
+    deep: float
+    geometry: Stencil
+    areas: NDArray[np.float64]
+
+    @functools.cached_property
+    def root(self) -> HalfLaplacian:
+        """The surface's half Laplacian, factorised when it is first needed."""
+        return HalfLaplacian(self.geometry, self.areas)
+
+    def acceleration(self, momentum: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What forces [N] make of the height [m/s^2], or momenta [N s] of the velocity [m/s], [C, n, n]."""
+        return np.where(self.free, self.root(np.where(self.free, momentum / self.mass, 0.0)) / self.deep, 0.0)
+
+    def momenta(self, velocity: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Momentum of the fluid that moves with the surface [N s], float64 [C, n, n]."""
+        return self.mass * self.deep * self.root.inverse(velocity)
+
+    @functools.cached_property
+    def stable_timestep(self) -> float:
+        """Largest stable step of the leapfrog scheme [s]; see `WaveOperator.stable_timestep`."""
+        wave = largest_eigenvalue(self.link_force, self.mass, self.free, self.stencil.fastest(self.mass))
+        square = (wave + self.stiffness.max()) * self.root.most / self.deep
+        viscous = 0.0
+        if self.viscous_stencil is not None:
+            bound = self.viscous_stencil.fastest(self.mass)
+            viscous = largest_eigenvalue(self.viscous_stencil, self.mass, self.free, bound)
+        return float(SAFETY * 4 / (viscous + np.sqrt(viscous**2 + 4 * square)))
+
+
+def over_fluid(operator: WaveOperator, deep: float, geometry: Stencil, areas: NDArray[np.float64]) -> FluidOperator:
+    """The operator of a surface with deep fluid below; see `FluidOperator`.
+
+    Raises
+    ------
+    SolverError
+        If the density varies, or the surface bends or yields.
+    """
+    for wrong, what in (
+        (operator.density is not None, "a density that varies"),
+        (operator.rigidity is not None, "bending"),
+        (operator.yield_height is not None, "a yield height"),
+    ):
+        if wrong:
+            raise SolverError(f"a material with deep fluid has {what}; valid is one density alone")
+    given = {field.name: getattr(operator, field.name) for field in dataclasses.fields(operator)}
+    return FluidOperator(**given, deep=deep, geometry=geometry, areas=areas)

@@ -1,0 +1,142 @@
+"""How forces inside a surface of uneven density change its volume, and the pressure that keeps it.
+
+Forces along links conserve momentum. Where the density varies that is not the volume: sum of area times velocity. An
+incompressible interior answers with a pressure, the Lagrange multiplier of that sum. It is linear in height and
+velocity, and moves the surface along the operator's `response`: the accelerations are projected with masses as weights,
+so that the operator stays symmetric and energy is conserved.
+
+What keeps the volume when sources act: a pressure on the whole surface, as of an incompressible interior.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .wave_operator import WaveOperator, damped_step
+
+
+class VolumeBalance:
+    """Takes the mean out of sources, one for each part of the surface that floats freely; see `floating_parts`.
+
+    A pressure moves each texel by one over its density. Taking that much of it out of a momentum leaves the sum of area
+    times velocity unchanged, and is the orthogonal projection with masses as weights: it adds no energy.
+
+    Parameters
+    ----------
+    operator : WaveOperator
+    """
+
+    def __init__(self, operator: WaveOperator) -> None:
+        self._operator = operator
+        self._parts = None if operator.parts is None else operator.parts.reshape(-1)
+        self._lightness = operator.lightness.reshape(-1)
+        self._least = self._sum(operator.mass * operator.lightness * operator.response)
+
+    def counterpart(self, texels: NDArray[np.int64], momenta: NDArray[np.float64]) -> float | NDArray[np.float64]:
+        """Amplitude of the operator's `response` that balances momenta [k] on some texels [k].
+
+        [m/s], or for forces [m/s^2]; a number, or one for each part.
+        """
+        weighed = self._lightness[texels] * momenta
+        if self._parts is None:
+            return -float(weighed.sum()) / float(self._least) if self._least else 0.0
+        # of no texels, bincount makes integers
+        sums = np.bincount(self._parts[texels], weighed, len(self._least)).astype(np.float64)
+        return np.divide(-sums, self._least, out=np.zeros_like(sums), where=self._least > 0)
+
+    def balanced_velocity(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A velocity field [C, n, n] without its volume rate."""
+        operator = self._operator
+        return field - operator.response * self._ratio(operator.mass * operator.lightness * field, self._least)
+
+    def balanced_height(self, field: NDArray[np.float64], areas: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A height field [C, n, n] without its mean."""
+        return field - self._operator.movable * self._ratio(areas * field, self._sum(areas))
+
+    def _sum(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sum over the movable texels of each part, [p]; a number where there is one."""
+        movable = self._operator.movable
+        if self._parts is None:
+            return field[movable].sum()
+        return np.bincount(self._parts, (field * movable).reshape(-1)).astype(np.float64)
+
+    def _ratio(self, field: NDArray[np.float64], total: NDArray[np.float64]) -> NDArray[np.float64] | float:
+        """Sum of a field over each part, over a total of that part: at every texel, [C, n, n]."""
+        if self._parts is None:
+            return float(field.sum()) / float(total) if total else 0.0
+        sums = np.bincount(self._parts, field.reshape(-1))
+        ratio = np.divide(sums, total, out=np.zeros_like(sums), where=total > 0)
+        return ratio[self._parts].reshape(field.shape)
+
+
+# What is smaller than this, against the greatest, is round-off.
+_NOTHING = 1e-12
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class VolumeRate:
+    """The pressure's acceleration of part p: the sum over its entries of `heights` h + `velocities` v.
+
+    Attributes
+    ----------
+    begins : int64 [p + 1]
+        The entries of part p are those from begins[p] to begins[p + 1].
+    texels : int64 [k]
+        Flat texel index of each entry: where the density varies, as a rule.
+    heights, velocities : float32 [k]
+        [1/s^2] and [1/s]; no velocities, [0], where none count.
+    """
+
+    begins: NDArray[np.int64]
+    texels: NDArray[np.int64]
+    heights: NDArray[np.float32]
+    velocities: NDArray[np.float32]
+
+
+def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
+    """What keeps the volume over a substep of dt [s]; None where nothing changes it, or it is not kept anyway.
+
+    It is not where a clamp holds a part of the surface, or the stiffness varies: those take up momentum themselves.
+    """
+    if operator.density is None:
+        return None
+    parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
+    count = int(parts.max()) + 1
+    kept = np.array([_is_kept(operator, parts == part) for part in range(count)])
+    decay, span = damped_step(operator, dt)
+    weight = operator.mass * operator.lightness
+    inertia = np.bincount(parts.reshape(-1), (weight * span * operator.response).reshape(-1), count)
+    scale = np.where(kept & (inertia > 0), -1 / np.where(inertia > 0, inertia, 1), 0)[parts]
+    # what an even surface has as well: its mean is damped, and swings on its spring
+    even_decay, even_span = _mean(decay), _mean(span)
+    moved = span * operator.lightness
+    heights = operator.link_force(moved) - weight * operator.stiffness * (span - even_span)
+    velocities = weight * (decay - even_decay)
+    if operator.viscous_stencil is not None:
+        velocities = velocities + operator.viscous_stencil(moved)
+    heights, velocities = (_cleared(scale * each).reshape(-1) for each in (heights, velocities))
+    texels = np.flatnonzero((heights != 0) | (velocities != 0))
+    texels = texels[np.argsort(parts.reshape(-1)[texels], kind="stable")]
+    begins = np.searchsorted(parts.reshape(-1)[texels], np.arange(count + 1))
+    if not len(texels):
+        return None
+    counting = velocities[texels] if velocities.any() else velocities[:0]
+    return VolumeRate(begins, texels, heights[texels].astype(np.float32), counting.astype(np.float32))
+
+
+def _is_kept(operator: WaveOperator, part: NDArray[np.bool_]) -> bool:
+    movable = part & operator.movable
+    return bool(movable.any() and not operator.anchored[part].any() and not np.ptp(operator.stiffness[movable]))
+
+
+def _mean(field: NDArray[np.float64]) -> float:
+    """Mean of a field; of a uniform one its value, to the last bit."""
+    return float(field.flat[0]) if not np.ptp(field) else float(field.mean())
+
+
+def _cleared(field: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A field without its round-off."""
+    return np.where(np.abs(field) > _NOTHING * np.abs(field).max(initial=0.0), field, 0.0)

@@ -1,1 +1,0 @@
-"""The patch layout: the texels of charts on any surface."""

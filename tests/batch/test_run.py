@@ -1,0 +1,255 @@
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Executor, Future
+from pathlib import Path
+
+import pyarrow.parquet
+import pytest
+from small_batch import PLAN, files, new_batch, small_plan
+
+from ripple_sim.batch import run
+from ripple_sim.batch import run as command
+from ripple_sim.batch.folder import BatchFolder
+from ripple_sim.batch.make_scene import Outcome, make_scene
+from ripple_sim.batch.report import status_text
+from ripple_sim.batch.run import RunOptions, run_batch
+from ripple_sim.errors import BatchError, SceneError
+
+DATA = 'video = "none"\nheights = true\n'
+
+
+class Here(Executor):
+    """Does the work in this process, at once."""
+
+    places = 2
+
+    def __init__(self, workers):
+        self.workers = workers
+
+    def submit(self, function, /, *arguments, **named):
+        future = Future()
+        try:
+            future.set_result(function(*arguments, **named))
+        except BaseException as error:
+            future.set_exception(error)
+        return future
+
+
+@pytest.fixture
+def here(monkeypatch):
+    monkeypatch.setattr(command, "LocalExecutor", Here)
+    monkeypatch.setattr(run, "_PATIENCE", 0.01)
+
+
+def same_scenes(batch, reference, numbers=range(5)):
+    """Whether these scenes, and no others, have the data of a reference."""
+    assert batch.finished() == set(numbers)
+    for number in numbers:
+        for name in ("heights.zarr.zip", "qpos.npy", "impulses.csv"):
+            assert (batch.scene(number) / name).read_bytes() == (reference.scene(number) / name).read_bytes()
+
+
+def test_shards_and_limits_share_out_the_scenes(here, unbroken, tmp_path):
+    plan, folder = small_plan(tmp_path, DATA), tmp_path / "out"
+    batch = BatchFolder(folder)
+    assert run_batch(plan, folder, RunOptions(shard=(2, 2), limit=1)).made == 1
+    assert batch.finished() == {1}
+    assert run_batch(plan, folder, RunOptions(shard=(2, 2))).made == 1
+    assert batch.finished() == {1, 3}
+    assert run_batch(plan, folder, RunOptions(shard=(1, 2))).made == 3
+    same_scenes(batch, unbroken)
+    times = {path: path.stat().st_mtime_ns for path in batch.scenes.rglob("*")}
+    assert run_batch(None, folder).made == 0
+    assert {path: path.stat().st_mtime_ns for path in batch.scenes.rglob("*")} == times
+    assert "5 of 5 scenes finished, 0 put aside" in status_text(folder)
+
+
+def test_the_index_has_a_row_a_scene(here, tmp_path):
+    run_batch(small_plan(tmp_path, DATA), tmp_path / "out", RunOptions(limit=2))
+    (tmp_path / "out" / "index.parquet").unlink()
+    run_batch(None, tmp_path / "out", RunOptions(limit=1))
+    table = pyarrow.parquet.read_table(tmp_path / "out" / "index.parquet").to_pylist()
+    assert [row["number"] for row in table] == [0, 1, 2]
+    assert all(row["status"] == "finished" and row["seconds"] > 0 and len(row["hash"]) == 32 for row in table)
+    assert len({row["camera.azimuth"] for row in table}) == 3
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert page.count("scenes/00000") == 3
+
+
+def test_a_scene_that_fails_three_times_is_put_aside_and_can_be_tried_again(here, tmp_path, monkeypatch):
+    tried = []
+
+    def make(folder, number):
+        tried.append(number)
+        if number == 1 and len(tried) < 20:
+            return Outcome(number, "failed", error="stone too soft", log="Traceback of it")
+        return make_scene(folder, number)
+
+    monkeypatch.setattr(run, "make_scene", make)
+    folder = tmp_path / "out"
+    progress = run_batch(small_plan(tmp_path, DATA), folder)
+    assert (progress.made, progress.aside, progress.failures) == (4, 1, 1)
+    assert tried.count(1) == 3
+    assert (folder / "failed" / "000001.log").read_text().count("Traceback of it") == 3
+    assert "scene 1 failed 3 times: stone too soft" in status_text(folder)
+    rows = pyarrow.parquet.read_table(folder / "index.parquet").to_pylist()
+    assert rows[1]["status"] == "failed"
+    assert rows[1]["error"] == "stone too soft"
+    run_batch(None, folder)
+    assert tried.count(1) == 3
+    tried += [0] * 20
+    assert run_batch(None, folder, RunOptions(retry_failed=True)).made == 1
+    assert "5 of 5 scenes finished, 0 put aside" in status_text(folder)
+    assert not list((folder / "failed").iterdir())
+
+
+def test_a_scene_whose_worker_dies_is_tried_nine_times(here, tmp_path, monkeypatch):
+    tried = []
+
+    def die(folder, number):
+        tried.append(number)
+        raise RuntimeError("terminated abruptly")
+
+    monkeypatch.setattr(run, "make_scene", die)
+    plan = small_plan(tmp_path, DATA, PLAN.replace("count = 5", "count = 1"))
+    assert run_batch(plan, tmp_path / "out").aside == 1
+    assert len(tried) == 9
+    assert "its worker died: terminated abruptly" in status_text(tmp_path / "out")
+
+
+def test_a_scene_that_another_process_makes_is_waited_for(here, tmp_path, monkeypatch):
+    answers = iter(["busy", "busy", "there"])
+    monkeypatch.setattr(run, "make_scene", lambda folder, number: Outcome(number, next(answers)))
+    plan = small_plan(tmp_path, DATA, PLAN.replace("count = 5", "count = 1"))
+    progress = run_batch(plan, tmp_path / "out")
+    assert (progress.made, progress.finished) == (0, 1)
+    assert next(answers, None) is None
+
+
+def test_a_full_disk_stops_the_batch_and_counts_as_no_failure(here, tmp_path, monkeypatch):
+    plan = small_plan(tmp_path, DATA)
+    with pytest.raises(BatchError, match="GB left, less than the 1e\\+06 GB to be kept free; make room"):
+        run_batch(plan, tmp_path / "out", RunOptions(keep_free=1e15))
+    monkeypatch.setattr(run, "make_scene", lambda folder, number: Outcome(number, "full", error="No space left"))
+    with pytest.raises(BatchError, match="the disk is full: No space left"):
+        run_batch(plan, tmp_path / "out")
+    assert BatchFolder(tmp_path / "out").failures() == {}
+
+
+def test_a_plan_that_has_changed_is_refused_with_what_changed(tmp_path):
+    new_batch(tmp_path)
+    for old, new, message in (
+        ("seed = 3", "seed = 4", "plan.seed was 3 and is 4"),
+        ("[0, 360]", "[0, 90]", "plan.vary.camera.azimuth was .*360"),
+        ("fps = 20", "fps = 25", "plan.store.fps was 20 and is 25"),
+    ):
+        with pytest.raises(BatchError, match=message):
+            run_batch(small_plan(tmp_path, text=PLAN.replace(old, new)), tmp_path / "out")
+    plan = small_plan(tmp_path)
+    (tmp_path / "scene.xml").write_text((tmp_path / "scene.xml").read_text().replace("0.25", "0.24"))
+    with pytest.raises(BatchError, match=r"files.scene.toml was .* take it back, or name another folder"):
+        run_batch(plan, tmp_path / "out")
+
+
+def test_a_key_that_fits_nothing_is_told_before_anything_is_made(tmp_path):
+    with pytest.raises(SceneError, match=r"no geom\[stoone\]"):
+        run_batch(small_plan(tmp_path, text=PLAN.replace("geom[stone]", "geom[stoone]")), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_with_other_files_is_left_alone(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "letters.txt").write_text("")
+    with pytest.raises(BatchError, match="holds other files"):
+        run_batch(small_plan(tmp_path), tmp_path / "out")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["letters.txt"]
+
+
+def workers_of(parent: int) -> list[int]:
+    """Processes that make scenes for a batch."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            if int(path.read_text().rsplit(")", 1)[1].split()[1]) == parent:
+                line = (path.parent / "cmdline").read_bytes()
+                found += [int(path.parent.name)] if b"spawn_main" in line else []
+        except (OSError, ValueError):
+            continue
+    return found
+
+
+def wait_for(condition):
+    for _ in range(6000):
+        if result := condition():
+            return result
+        time.sleep(0.05)
+    raise AssertionError("nothing happened for five minutes")
+
+
+def test_killed_workers_and_a_killed_parent_lose_and_change_nothing(unbroken, tmp_path):
+    small_plan(tmp_path, "heights = true\n")
+    folder = tmp_path / "out"
+    batch = BatchFolder(folder)
+    command = [sys.executable, "-m", "ripple_sim", "batch", str(tmp_path / "plan.toml"), "-o", str(folder)]
+    command += ["--workers", "1", "--keep-free", "0.001"]
+    parent = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    try:
+        wait_for(lambda: len(batch.finished()) >= 1)
+        worker = wait_for(lambda: workers_of(parent.pid))[0]
+        os.kill(worker, signal.SIGKILL)
+        replaced = wait_for(lambda: [each for each in workers_of(parent.pid) if each != worker])[0]
+        wait_for(lambda: list(batch.work.glob("0*")))
+    finally:
+        parent.kill()
+        parent.wait()
+    wait_for(lambda: not Path(f"/proc/{replaced}").exists())
+    before = {number: files(batch.scene(number)) for number in batch.finished()}
+    shutil.rmtree(batch.failed)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    assert batch.finished() == set(range(5))
+    for number in range(5):
+        assert files(batch.scene(number)) == files(unbroken.scene(number))
+    assert all(files(batch.scene(number)) == kept for number, kept in before.items())
+    assert not list(batch.work.glob("0*"))
+
+
+def test_tar_files_are_packed_as_they_fill_up(here, tmp_path):
+    plan = small_plan(tmp_path, 'video = "none"\nformat = "webdataset"\nscenes_per_tar = 2\n')
+    batch = BatchFolder(tmp_path / "out")
+    run_batch(plan, tmp_path / "out", RunOptions(limit=3))
+    assert ([tar.name for tar in batch.tar_files()], batch.loose()) == (["000000.tar"], {2})
+    run_batch(None, tmp_path / "out")
+    assert ([tar.name for tar in batch.tar_files()], batch.loose()) == (
+        ["000000.tar", "000002.tar", "000004.tar"],
+        set(),
+    )
+    assert batch.finished() == set(range(5))
+    rows = pyarrow.parquet.read_table(batch.index).to_pylist()
+    assert [row["number"] for row in rows] == list(range(5))
+    assert all(row["status"] == "finished" and row["seconds"] > 0 for row in rows)
+
+
+def test_a_dask_cluster_makes_the_same_scenes(unbroken, tmp_path):
+    from distributed import LocalCluster
+
+    plan = small_plan(tmp_path, DATA)
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None
+    ) as cluster:
+        assert run_batch(plan, tmp_path / "out", RunOptions(dask=cluster.scheduler_address)).made == 5
+    same_scenes(BatchFolder(tmp_path / "out"), unbroken)
+
+
+def test_a_scheduler_that_does_not_answer_is_named(tmp_path, monkeypatch):
+    import distributed
+
+    def refuse(*_, **__):
+        raise OSError("timed out")
+
+    monkeypatch.setattr(distributed, "Client", refuse)
+    with pytest.raises(BatchError, match=r"no Dask scheduler answers at 'tcp://nowhere:1' \(timed out\)"):
+        run_batch(small_plan(tmp_path, DATA), tmp_path / "out", RunOptions(dask="tcp://nowhere:1"))

@@ -1,0 +1,174 @@
+"""`ripple-sim atlas`: its report, its figure, its refusals."""
+
+import json
+import re
+import signal
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from ripple_sim.cli import main as cli
+from ripple_sim.figures import atlas_view
+from ripple_sim.solver import AtlasError, build_atlas
+
+
+@pytest.fixture(autouse=True)
+def _left_as_found(tmp_path_factory, monkeypatch):
+    """Keep the program's signal handler and its cache to these tests."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+    handler = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, handler)
+
+
+@pytest.fixture
+def coarse_pictures(monkeypatch):
+    """Pictures that are not averaged from finer ones, which takes most of their time."""
+    for module in (atlas_view, atlas_view, atlas_view):
+        monkeypatch.setattr(module, "OVERSAMPLING", 1)
+
+
+@pytest.fixture
+def ball_file(tmp_path):
+    """A ball of radius 2 with one triangle turned, one doubled and a vertex too many."""
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=2)
+    F = np.vstack([ball.faces[:1, ::-1], ball.faces[1:], ball.faces[:1]])
+    trimesh.Trimesh(np.vstack([ball.vertices, [[9, 9, 9]]]), F, process=False).export(tmp_path / "ball.off")
+    return tmp_path / "ball.off"
+
+
+def refusal(capsys, *argv: str) -> str:
+    assert cli.main(argv) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    return err
+
+
+def test_json_tells_size_area_quality_seconds_and_what_was_mended(capsys, ball_file):
+    assert cli.main(["atlas", str(ball_file), "--resolution", "8", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["mesh"] == str(ball_file)
+    assert (report["vertices"], report["triangles"], report["method"]) == (162, 320, "progressive")
+    np.testing.assert_allclose(report["size"], 4, rtol=0.02)
+    assert report["area"] == pytest.approx(16 * np.pi, rel=0.03)
+    assert report["volume"] == pytest.approx(32 / 3 * np.pi, rel=0.05)
+    assert report["notes"] == [
+        "1 unreferenced vertex dropped",
+        "1 repeated triangle dropped",
+        "1 triangle reversed (inconsistent winding)",
+    ]
+    assert {"flipped", "solid_angle", "q001", "q50", "q999", "starved", "coverage"} <= report["quality"].keys()
+    assert {"load", "sphere_map", "rays"} == report["seconds"].keys()
+    assert cli.main(["atlas", str(ball_file), "--resolution", "8", "--json"]) == 0
+    assert {"load", "cache"} == json.loads(capsys.readouterr().out)["seconds"].keys()
+
+
+def test_the_plain_report_says_the_same(capsys, ball_file):
+    assert cli.main(["atlas", str(ball_file), "--resolution", "8"]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^size +4 x .* m$", out, re.MULTILINE)
+    assert re.search(r"^area +4\d\.\d+ m\^2$", out, re.MULTILINE)
+    assert len(re.findall(r"^note +1 ", out, re.MULTILINE)) == 3
+    assert re.search(r"^sphere map time +\d+\.\d{3} s$", out, re.MULTILINE)
+
+
+@pytest.mark.usefixtures("coarse_pictures")
+def test_a_picture_is_written_and_is_not_blank(tmp_path, capsys, ball_file):
+    picture = tmp_path / "atlas.png"
+    assert cli.main(["atlas", str(ball_file), "--resolution", "8", "--json", "--plot", str(picture)]) == 0
+    assert "plot" in json.loads(capsys.readouterr().out)["seconds"]
+    pixels = np.asarray(Image.open(picture).convert("RGB"))
+    assert pixels.shape == (1080, 1920, 3)
+    assert (pixels[0] == 255).all()  # a white margin
+    for part in (pixels[200:900, 100:600], pixels[200:500, 1250:1800], pixels[600:1000, 820:1150]):
+        assert part.std() > 20  # mesh, cross and sphere
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ("atlas.bmp", r"'atlas\.bmp'.*valid are \.png"),
+        ("atlas", "valid are"),
+        ("missing/atlas.png", "folder that exists"),
+    ],
+)
+def test_a_picture_that_cannot_be_written_is_refused_before_the_mesh_is_read(capsys, monkeypatch, tmp_path, path, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mesh.obj").write_text("no mesh")
+    assert re.search(said, refusal(capsys, "atlas", "mesh.obj", "--plot", path))
+
+
+def test_the_axis_is_checked(capsys):
+    assert "'x'" in refusal(capsys, "atlas", "mesh.obj", "--up", "x")
+
+
+def test_repair_closes_or_says_what_to_install(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "pymeshfix", None)
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    trimesh.Trimesh(ball.vertices, ball.faces[3:], process=False).export(tmp_path / "open.off")
+    assert "boundary edges" in refusal(capsys, "atlas", "open.off", "--layout", "cube")
+    for command in (["atlas"], ["drop", "-o", "clip.mp4"]):
+        assert "pip install 'ripple-sim[repair]'" in refusal(capsys, *command, "open.off", "--repair")
+
+
+def test_repair_says_what_it_did(capsys, tmp_path):
+    pytest.importorskip("pymeshfix")
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    trimesh.Trimesh(ball.vertices, ball.faces[(ball.faces != 0).all(axis=1)], process=False).export(
+        tmp_path / "open.off"
+    )
+    assert cli.main(["atlas", str(tmp_path / "open.off"), "--resolution", "8", "--repair", "--json"]) == 0
+    assert [note[:11] for note in json.loads(capsys.readouterr().out)["notes"]] == ["1 unreferen", "hole closed"]
+
+
+def test_wrapped_balls_get_one_atlas_and_a_line_that_says_so(capsys, tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    trimesh.util.concatenate([ball, ball.copy().apply_translation([1, 0, 0])]).export(tmp_path / "balls.off")
+    command = ["atlas", str(tmp_path / "balls.off"), "--resolution", "8"]
+    assert "2 separate parts" in refusal(capsys, *command, "--layout", "cube")
+    assert cli.main([*command, "--wrap"]) == 0
+    assert re.search(
+        r"^note +wrapped, 0\.045 m off: 2 parts in 1 closed surface with 0 handles, [\d,]+ triangles$",
+        capsys.readouterr().out,
+        re.MULTILINE,
+    )
+
+
+def test_an_open_mesh_gets_patches(capsys, tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    trimesh.Trimesh(ball.vertices, ball.faces[3:], process=False).export(tmp_path / "open.off")
+    assert cli.main(["atlas", str(tmp_path / "open.off"), "--resolution", "64", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert (report["layout"], report["method"], report["quality"]["flipped"]) == ("patches", None, 0)
+    charts, n, _ = report["charts"]
+    assert charts * n * n == pytest.approx(6 * 64**2, rel=0.2)
+
+
+def test_a_layout_that_does_not_exist_is_refused(capsys, tmp_path):
+    message = refusal(capsys, "atlas", str(tmp_path / "any.off"), "--layout", "octahedron")
+    assert "'octahedron' is not valid; it must be auto, cube or patches" in message
+
+
+def test_a_wrong_method_is_refused(animal):
+    with pytest.raises(AtlasError, match="'progressive', 'conformal'"):
+        build_atlas(animal.mesh, 8, method="mercator")
+
+
+@pytest.mark.usefixtures("coarse_pictures")
+def test_the_thickness_over_what_is_inside_is_told_and_drawn(tmp_path, capsys, ball_file):
+    core, plot = tmp_path / "core.off", tmp_path / "thickness.png"
+    trimesh.creation.icosphere(subdivisions=3, radius=1.5).export(core)
+    argv = ["atlas", str(ball_file), "--resolution", "8", "--inside", str(core), "--plot", str(plot)]
+    assert cli.main([*argv, "--json"]) == 0
+    thickness = json.loads(capsys.readouterr().out)["thickness"]
+    assert thickness["least"] <= thickness["median"] <= thickness["greatest"]
+    assert thickness["median"] == pytest.approx(0.5, rel=0.08)  # over a ball of radius 2 with flat sides
+    pixels = np.asarray(Image.open(plot).convert("RGB"))
+    assert pixels[200:900, 200:800].std() > 20
+    assert refusal(capsys, *argv, "--threshold", "3").count("takes no threshold") == 1
+    assert "--inside" in refusal(capsys, "atlas", str(ball_file), "--threshold", "3")

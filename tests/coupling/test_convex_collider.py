@@ -1,0 +1,201 @@
+"""A mesh that collides as its convex parts: stable, in place, with all momentum, and undone without a trace."""
+
+import importlib.metadata
+
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+from mujoco_models import add_ball, mesh_spec
+
+from ripple_sim import Material, RippleError, Ripples, make_collidable
+from ripple_sim.coupling import convex_collider
+from ripple_sim.coupling.convex_collider import convex_parts
+from ripple_sim.coupling.model import CoupledModel
+from ripple_sim.scenes.shapes import peanut
+from ripple_sim.solver import Mesh
+
+pytest.importorskip("coacd")
+
+GEOM = mujoco.mjtGeom
+WAIST = peanut(0.06)
+
+
+def ell() -> tuple[np.ndarray, np.ndarray]:
+    """An L of 0.6 m: two boxes, exactly."""
+    outline = np.array([(0, 0), (0.6, 0), (0.6, 0.2), (0.2, 0.2), (0.2, 0.6), (0, 0.6)])
+    corners = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)])
+    solid = trimesh.creation.extrude_triangulation(outline, corners, 0.3)
+    return solid.subdivide_to_size(0.1).vertices, solid.subdivide_to_size(0.1).faces
+
+
+def test_parts_of_a_mesh_are_the_same_each_time_and_come_from_the_cache(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    mesh = Mesh.from_arrays(*ell())
+    first = convex_parts(mesh)
+    [file] = (tmp_path / "ripple-sim").iterdir()
+    file.unlink()
+    second = convex_parts(mesh)
+    assert len(first) == len(second) == 2
+    monkeypatch.setattr(convex_collider, "_decompose", lambda _: pytest.fail("the cache was not used"))
+    for one, two, three in zip(first, second, convex_parts(mesh), strict=True):
+        np.testing.assert_array_equal(one, two)
+        np.testing.assert_array_equal(one, three)
+    file.write_bytes(file.read_bytes()[:-100])
+    with pytest.raises(pytest.fail.Exception):
+        convex_parts(mesh)
+
+
+def test_parts_fill_the_solid_that_they_are_parts_of() -> None:
+    parts = convex_parts(Mesh.from_arrays(*ell()))
+    volume = sum(trimesh.convex.convex_hull(part).volume for part in parts)
+    assert volume == pytest.approx(0.3 * (0.36 - 0.16), rel=0.03)
+
+
+def test_a_missing_package_is_named_with_the_way_to_install_it(monkeypatch) -> None:
+    def missing(_: str) -> str:
+        raise importlib.metadata.PackageNotFoundError
+
+    monkeypatch.setattr(convex_collider.importlib.metadata, "version", missing)
+    with pytest.raises(RippleError, match=r"needs coacd.*pip install 'ripple-sim\[convex\]'.*'sdf'"):
+        make_collidable(mesh_spec(WAIST, route=None), "target", "convex")
+
+
+def test_the_geom_keeps_mass_and_looks_and_its_parts_collide_like_it() -> None:
+    settings = {"friction": [0.3, 0.01, 0.001], "solref": [0.015, 0.7], "condim": 4, "contype": 3, "conaffinity": 5}
+    plain = mesh_spec(WAIST, "free", None, **settings).compile()
+    model = mesh_spec(WAIST, "free", "convex", **settings).compile()
+    coupled = CoupledModel(model)
+    [(geom, parts)] = coupled.convex_colliders.items()
+    assert coupled.names[geom] == "target"
+    assert len(parts) > 1
+    body = model.body("base").id
+    for each in ("body_mass", "body_inertia", "body_ipos", "body_iquat"):
+        np.testing.assert_array_equal(getattr(model, each)[body], getattr(plain, each)[body])
+    assert model.geom_contype[geom] == model.geom_conaffinity[geom] == 0
+    for name, value in settings.items():
+        np.testing.assert_allclose(getattr(model, f"geom_{name}")[parts], np.tile(value, (len(parts), 1)).squeeze())
+    assert (model.geom_group[parts] == 3).all(), "a group that is not drawn"
+    assert not coupled.convex[geom]
+
+
+@pytest.mark.parametrize("route", ["sdf", "flex", "hull", "convex"])
+def test_another_route_undoes_this_one(route: str) -> None:
+    def content(spec: mujoco.MjSpec) -> list[tuple]:
+        model = spec.compile()
+        return [
+            (coupled.names[geom], model.geom_type[geom], model.geom_contype[geom], model.geom_pos[geom].tolist())
+            for coupled in [CoupledModel(model)]
+            for geom in range(model.ngeom)
+        ]
+
+    direct, detour = mesh_spec(WAIST, "free", None), mesh_spec(WAIST, "free", None)
+    make_collidable(direct, "target", route)
+    make_collidable(detour, "target", "convex")
+    make_collidable(detour, "target", route)
+    assert content(detour) == content(direct)
+
+
+@pytest.mark.parametrize("joint", [None, "free"])
+def test_balls_are_felt_where_they_hit_the_visible_surface_with_what_they_lose(joint: str | None) -> None:
+    spec = mesh_spec(WAIST, joint, "convex", condim=1)
+    spec.option.gravity = [0, 0, 0]
+    add_ball(spec, "ball", [0, 0, 0], condim=1)
+    model = spec.compile()
+    rng, off = np.random.default_rng(1), []
+    ripples = Ripples(model, {"target": Material(density=50)}, resolution=32, backend="cpu", conserve_volume=False)
+    atlas, data = ripples["target"].atlas, mujoco.MjData(model)
+    for _ in range(6):
+        mujoco.mj_resetData(model, data)
+        mujoco.mj_forward(model, data)
+        ripples.reset()
+        position, rotation = data.geom("target").xpos.copy(), data.geom("target").xmat.reshape(3, 3).copy()
+        aim = position + rotation @ rng.choice(atlas.positions.reshape(-1, 3))
+        way = rng.standard_normal(3)
+        way *= np.sign(way @ (aim - position)) / np.linalg.norm(way)
+        ball = data.joint(model.body("ball").jntadr[0])
+        ball.qpos[:3], ball.qvel[:3] = aim + 0.5 * way, -3.0 * way
+        given, lost = 0.0, 0.0
+        while data.time < 0.4:
+            before = ball.qvel[:3].copy()
+            mujoco.mj_step(model, data)
+            ripples.step(data)
+            lost += 0.2 * np.linalg.norm(ball.qvel[:3] - before)
+            for each in ripples.last_impulses:
+                assert (each.geom, each.other) == ("target", "ball")
+                given += each.impulse
+                local = (data.geom("ball").xpos - data.geom("target").xpos) @ data.geom("target").xmat.reshape(3, 3)
+                nearest, _ = atlas.project(local)
+                there = (each.point - data.geom("target").xpos) @ data.geom("target").xmat.reshape(3, 3)
+                off.append(np.linalg.norm(there - nearest[0]))
+        assert lost > 0.3
+        assert given == pytest.approx(lost, rel=0.01)
+    assert np.median(off) < 0.01 * np.ptp(atlas.mesh.V, axis=0).max()
+    assert np.quantile(off, 0.95) < 0.03 * np.ptp(atlas.mesh.V, axis=0).max()
+
+
+def test_boxes_stack_on_a_concave_target_and_weigh_what_they_weigh() -> None:
+    spec = mujoco.MjSpec()
+    V, F = ell()
+    spec.add_mesh(name="ell", uservert=V.ravel(), userface=F.ravel())
+    spec.worldbody.add_geom(name="target", type=GEOM.mjGEOM_MESH, meshname="ell", quat=[1, 0, 0, 0])
+    make_collidable(spec, "target", "convex")
+    for i in range(4):
+        add_ball(spec, f"box {i}", [0.1, 0.4, 0.35 + 0.1 * i], type=GEOM.mjGEOM_BOX, size=[0.05, 0.05, 0.05], mass=1.0)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    ripples = Ripples(model, {"target": Material(density=100)}, resolution=24, backend="cpu", conserve_volume=False)
+    weights = []
+    while data.time < 1.5:
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+        weights.append(sum(each.impulse for each in ripples.last_impulses) / model.opt.timestep)
+        for each in ripples.last_impulses:
+            assert each.point[2] == pytest.approx(0.3, abs=1e-6)
+    assert np.mean(weights[-200:]) == pytest.approx(4 * 9.81, rel=0.01)
+    assert np.abs(data.qpos.reshape(4, 7)[:, :2] - [0.1, 0.4]).max() < 0.01
+
+
+def test_an_unnamed_visual_geom_is_found_by_its_place_and_collides() -> None:
+    spec = mesh_spec(WAIST, "free", None, contype=0, conaffinity=0)
+    spec.geom("target").name = ""
+    geom = make_collidable(spec, "base/0", "hull")
+    assert (geom.name, geom.contype, geom.conaffinity) == ("base/0", 1, 1)
+    assert CoupledModel(spec.compile()).names == ["base/0"]
+
+
+def test_two_convex_targets_give_each_other_one_momentum() -> None:
+    spec = mesh_spec(WAIST, "free", "convex")
+    spec.option.gravity = [0, 0, 0]
+    body = spec.worldbody.add_body(name="other", pos=[0.1, -0.2, 1.2])
+    body.add_freejoint()
+    body.add_geom(name="other", type=GEOM.mjGEOM_MESH, meshname="shape", mass=2.0)
+    make_collidable(spec, "other", "convex")
+    model = spec.compile()
+    data, given = mujoco.MjData(model), {"target": 0.0, "other": 0.0}
+    data.qvel[8] = -2.0
+    ripples = Ripples(model, dict.fromkeys(given, Material()), resolution=12, backend="cpu", conserve_volume=False)
+    while data.time < 0.5:
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+        for each in ripples.last_impulses:
+            assert {each.geom, each.other} == set(given)
+            given[each.geom] += each.impulse
+    assert given["target"] > 0.5
+    assert given["target"] == pytest.approx(given["other"], rel=1e-9)
+
+
+def test_an_open_mesh_is_refused_with_the_routes_that_take_it() -> None:
+    V, F = ell()
+    lid = V[F].mean(axis=1)[:, 2] > 0.3 - 1e-9
+    with pytest.raises(RippleError, match=r"mesh of geom 'target' is open .* routes for it are 'flex' and 'hull'"):
+        make_collidable(mesh_spec((V, F[~lid]), None, None), "target", "convex")
+
+
+def test_parts_leave_the_hole_of_a_ring_open() -> None:
+    ring = trimesh.creation.torus(0.3, 0.1, major_sections=16, minor_sections=8)
+    V, F = np.array(ring.vertices), np.array(ring.faces)
+    parts = [trimesh.convex.convex_hull(part) for part in convex_parts(Mesh.from_arrays(V, F))]
+    assert len(parts) > 3
+    assert not any(part.contains([[0.0, 0.0, 0.0], [0.05, 0.05, 0.0]]).any() for part in parts)
+    assert sum(part.volume for part in parts) == pytest.approx(ring.volume, rel=0.2)

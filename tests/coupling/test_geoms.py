@@ -1,0 +1,254 @@
+"""Geoms go by one name each, however they are asked for; those that cannot ripple are refused by name.
+
+Which geoms collide for a target: those it names, itself, or those of its body.
+
+Arguments of `Ripples` that cannot be right.
+"""
+
+import copy
+import pickle
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco_models import BALL, model_of
+
+from ripple_sim import Material, RippleError, Ripples
+from ripple_sim.coupling.geoms import by_name, find_geom, geom_name, named_collision_geoms
+from ripple_sim.coupling.model import CoupledModel
+
+NAMELESS = """<geom type="plane" size="1 1 1"/>
+<body name="torso" pos="0 0 2"><geom name="chest" size="0.1"/><geom size="0.1"/><geom name="torso/3" size="0.1"/>
+<geom size="0.1"/><body pos="0 0 1"><geom size="0.1"/></body></body>"""
+
+
+@pytest.mark.parametrize(
+    ("geom", "message"),
+    [("nothing", "its geoms are 'target', 'ball'"), ("floor", "plane, which cannot ripple")],
+)
+def test_geoms_that_cannot_ripple_are_refused_by_name(geom: str, message: str) -> None:
+    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
+    if geom == "floor":
+        model = model_of('<geom name="floor" type="plane" size="1 1 1"/>' + BALL.format("0 0 2"))
+    with pytest.raises(RippleError, match=message):
+        Ripples(model, {geom: Material()}, resolution=8)
+
+
+def test_every_geom_has_a_name_of_its_own_by_which_it_is_found() -> None:
+    model = model_of(NAMELESS)
+    names = [geom_name(model, geom) for geom in range(model.ngeom)]
+    # the fourth geom of the torso would be "torso/3", but another one is called so
+    assert names == ["world/0", "chest", "torso/1", "torso/3", "geom 4", "geom 5"]
+    assert [find_geom(model, name) for name in names] == list(range(6))
+    assert find_geom(model, "torso/0") == find_geom(model, np.int64(1)) == 1
+
+
+def test_names_with_a_slash_as_dm_control_gives_them_are_found() -> None:
+    model = model_of('<body name="walker/arm"><geom size="0.1"/><geom name="walker/hand" size="0.1"/></body>')
+    assert [geom_name(model, geom) for geom in range(2)] == ["walker/arm/0", "walker/hand"]
+    assert [find_geom(model, key) for key in ("walker/arm/0", "walker/arm/1", "walker/hand")] == [0, 1, 1]
+
+
+@pytest.mark.parametrize("key", ["leg", "torso/4", "torso/-1", "torso/", "/0", 6, -1, None, 1.0, ("chest",)])
+def test_a_key_that_is_no_geom_is_named(key: object) -> None:
+    with pytest.raises(
+        RippleError, match=r"the model has no geom .*its geoms are 'world/0', 'chest', .*\"body/index\""
+    ):
+        find_geom(model_of(NAMELESS), key)
+
+
+def test_long_lists_of_geoms_are_cut() -> None:
+    model = model_of("".join(f'<geom name="{i:02}" pos="{i} 0 0" size="0.1"/>' for i in range(50)))
+    with pytest.raises(RippleError, match="'39' and 10 more"):
+        find_geom(model, "x")
+
+
+def test_a_geom_with_two_values_is_refused() -> None:
+    model = model_of(NAMELESS)
+    assert by_name(model, {"chest": 1, 2: 5}, "numbers") == {"chest": 1, "torso/1": 5}
+    with pytest.raises(RippleError, match="numbers has two entries for geom 'chest', one of them as 1"):
+        by_name(model, {"chest": 1, 1: 2}, "numbers")
+
+
+def test_targets_go_by_name_or_id_or_place() -> None:
+    """Ids and unnamed geoms once ended in a TypeError, or could not be asked for."""
+    model = model_of('<geom size="0.5"/><body name="b" pos="0.1 0 0.53"><freejoint/><geom size="0.05"/></body>')
+    data = mujoco.MjData(model)
+    ripples = Ripples(model, {0: Material(), "b/0": Material()}, resolution={"world/0": 8, 1: 12}, backend="cpu")
+    assert list(ripples) == ["world/0", "b/0"]
+    assert ripples[0] is ripples["world/0"]
+    assert ripples[np.int32(1)] is ripples["b/0"]
+    assert ripples[1].atlas.areas.shape[-1] == 12
+    mujoco.mj_step(model, data)
+    ripples.step(data)
+    assert [(each.geom, each.other) for each in ripples.last_impulses] == [("world/0", "b/0"), ("b/0", "world/0")]
+    ripples.change_material(0, speed=0.5)
+    ripples.make_rigid(1, [0, 0, 0.05], 0.02)
+    assert ripples[0].material.speed == 0.5
+
+
+SEEN = 'contype="0" conaffinity="0"'
+ROBOT = f"""<geom name="floor" type="plane" size="1 1 1"/>
+<geom name="statue" size="0.5" pos="3 0 0.5" {SEEN}/><geom name="core" size="0.4" pos="3 0 0.5"/>
+<geom name="wall" type="box" size="0.1 2 2" pos="-3 0 0"/>
+<body name="link" pos="0 0 1"><freejoint/>
+  <geom name="shell" size="0.2" {SEEN}/><geom name="cap" size="0.2" pos="0 0 0.2" {SEEN}/>
+  <geom name="hull0" size="0.19"/><geom name="hull1" size="0.1"/>
+  <body name="tool"><geom name="blade" size="0.1" {SEEN}/>
+    <body name="guard"><geom name="guard" size="0.05"/></body></body>
+  <body name="finger"><joint/><geom name="nail" size="0.1" {SEEN}/><geom name="pad" size="0.1"/></body>
+</body>"""
+
+
+@pytest.fixture(scope="module")
+def model() -> mujoco.MjModel:
+    return model_of(ROBOT)
+
+
+def colliders(model: mujoco.MjModel, targets: tuple[str, ...], **contacts: list[str]) -> list[list[str]]:
+    ids = [find_geom(model, name) for name in targets]
+    coupled = CoupledModel(model, ids, named_collision_geoms(model, targets, contacts))
+    return [[coupled.names[geom] for geom in coupled.collision_geoms(target)] for target in ids]
+
+
+@pytest.mark.parametrize(
+    ("targets", "contacts", "expected"),
+    [
+        (("shell",), {}, [["hull0", "hull1"]]),
+        (("shell", "cap"), {}, [["hull0", "hull1"], ["hull0", "hull1"]]),
+        (("hull0",), {}, [["hull0"]]),
+        # what ripples itself keeps its contacts, and what one target names is not for the others
+        (("shell", "hull0"), {}, [["hull1"], ["hull0"]]),
+        (("shell", "cap"), {"cap": ["hull1"]}, [["hull0"], ["hull1"]]),
+        (("shell",), {"shell": ["hull1", "link/3", "guard"]}, [["hull1", "guard"]]),
+        (("shell",), {"shell": []}, [[]]),
+        (("hull0",), {"hull0": ["hull1"]}, [["hull0", "hull1"]]),
+        # its body has none: those of bodies welded to it, which do not include the finger's
+        (("blade",), {}, [["hull0", "hull1", "guard"]]),
+        (("nail",), {}, [["pad"]]),
+        # geoms of the world need not belong together
+        (("statue",), {}, [["core"]]),
+        (("wall",), {}, [["wall"]]),
+    ],
+)
+def test_colliders_of_targets(model, targets, contacts, expected) -> None:
+    assert colliders(model, targets, **contacts) == expected
+
+
+def test_a_pair_collides_whatever_its_masks_say() -> None:
+    seen = f'<body name="a"><freejoint/><geom name="a" size="0.1" {SEEN}/></body>'
+    spec = mujoco.MjSpec.from_string(
+        f"""<mujoco><worldbody>{seen}<geom name="b" size="0.1" {SEEN}/><geom name="c" size="0.1" {SEEN}/></worldbody>
+        <contact><pair geom1="b" geom2="a"/></contact></mujoco>"""
+    )
+    coupled = CoupledModel(spec.compile(), [0, 1, 2])
+    a, b, c = (coupled.names.index(name) for name in "abc")
+    assert [coupled.collision_geoms(geom) for geom in (a, b, c)] == [(a,), (b,), ()]
+    np.testing.assert_array_equal(np.flatnonzero(coupled.can_collide(a)), [b])
+    assert not coupled.can_collide(c).any()
+
+
+@pytest.mark.parametrize(
+    ("contacts", "message"),
+    [
+        ({"shell": ["pad"]}, "names geom 'pad' on body 'finger', which moves by itself; valid are .* body 'link'"),
+        ({"shell": ["cap"]}, "names geom 'cap', which ripples itself"),
+        ({"shell": ["hull2"]}, "no geom 'hull2'; its geoms are"),
+        (
+            {"blade": ["guard"]},
+            "geom 'blade', which does not ripple; the rippling geoms are 'shell', 'cap'",
+        ),
+        ({"shell": "hull0"}, "contacts of geom 'shell' is 'hull0'; valid is a list"),
+        ({"shell": 3}, "contacts of geom 'shell' is 3; valid is a list"),
+        ({"shell": ["hull0"], 4: []}, "contacts has two entries for geom 'shell'"),
+        (["shell"], r"contacts is \['shell'\]; valid is a mapping"),
+    ],
+)
+def test_contacts_that_cannot_be_are_named(model, contacts, message: str) -> None:
+    with pytest.raises(RippleError, match=message):
+        Ripples(model, {"shell": Material(), "cap": Material()}, contacts=contacts, resolution=8, backend="cpu")
+
+
+def test_unknown_key_lists_the_rippling_geoms() -> None:
+    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
+    with pytest.raises(RippleError, match="'target'"):
+        Ripples(model, {"target": Material()}, resolution=8, backend="cpu")["ball"]
+
+
+@pytest.mark.parametrize(
+    ("materials", "options", "message"),
+    [
+        ({"target": 1.0}, {}, "material of geom 'target' is 1.0; valid is a Material"),
+        (["target"], {}, "materials is list; valid is a mapping of geom names to Material"),
+        ({"target": Material()}, {"resolution": {}}, "resolution has no entry for geom 'target'; it has none"),
+        ({"target": Material()}, {"resolution": {"ball": 8}}, "it has 'ball'"),
+        ({"target": Material()}, {"resolution": "fine"}, "resolution is 'fine'"),
+    ],
+)
+def test_arguments_of_a_wrong_kind_are_named(materials, options: dict, message: str) -> None:
+    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
+    with pytest.raises(RippleError, match=message):
+        Ripples(model, materials, backend="cpu", **options)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda ripples: ripples.make_rigid("target", "top", 0.1), "points are 'top'"),
+        (lambda ripples: ripples.poke("target", [0.0, np.nan, 0.0], 0.1), "points"),
+        (lambda ripples: ripples.to_geom("target", [1.0, 2.0]), "points have shape"),
+        (lambda ripples: ripples.hold("target", "all"), "region is 'all'"),
+    ],
+)
+def test_places_that_are_none_are_named(call, message: str) -> None:
+    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
+    with pytest.raises(RippleError, match=message):
+        call(Ripples(model, {"target": Material()}, resolution=8, backend="cpu"))
+
+
+SCENE = '<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2")
+
+
+def stepping(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Step the ripples of a model with some data."""
+    ripples = Ripples(model, {"target": Material(speed=1.0, density=100.0)}, resolution=8, backend="cpu")
+    mujoco.mj_step(model, data)
+    ripples.step(data)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "what"),
+    [('mass="0.3"', 'mass="0.6"', "body_"), ('size="0.5"', 'size="0.4"', "geom_"), ("0 0 2", "0 0 3", "body_pos")],
+)
+def test_data_of_a_model_compiled_with_another_number_is_refused(before: str, after: str, what: str) -> None:
+    other = model_of(SCENE.replace(before, after))
+    with pytest.raises(RippleError, match=f"belongs to another model .* of another {what}"):
+        stepping(model_of(SCENE), mujoco.MjData(other))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda model: mujoco.MjData(model_of(SCENE)),  # compiled again
+        lambda model: mujoco.MjData(copy.copy(model)),
+        lambda model: copy.copy(mujoco.MjData(model)),
+        lambda model: copy.deepcopy(mujoco.MjData(model)),
+        lambda model: pickle.loads(pickle.dumps(mujoco.MjData(model))),
+        lambda model: mujoco.MjData(pickle.loads(pickle.dumps(model))),
+    ],
+    ids=["compiled again", "copied model", "copied data", "deep copy", "pickled data", "pickled model"],
+)
+def test_data_of_a_copy_is_as_good_as_the_model_s_own(make) -> None:
+    model = model_of(SCENE)
+    stepping(model, make(model))
+
+
+def test_a_model_may_be_changed_in_place() -> None:
+    """As domain randomisation does; data of a copy that was taken once is taken on."""
+    model = model_of(SCENE)
+    ripples = Ripples(model, {"target": Material(speed=1.0, density=100.0)}, resolution=8, backend="cpu")
+    for data in (mujoco.MjData(model), mujoco.MjData(copy.copy(model))):
+        ripples.step(data)
+        model.body_mass[1] *= 1.1
+        ripples.step(data)
+        model.body_mass[1] /= 1.1

@@ -1,0 +1,259 @@
+"""The time between looks, when it goes on, stands still, or begins anew.
+
+MuJoCo's own warnings are ours, each once, and its errors say what helps.
+
+The mark stays through steps and copies, is wiped out by any reset, and is shared by those who look at it.
+
+Forces of the step before are not taken for those of the present contacts, whatever solves and integrates.
+"""
+
+import copy
+import pickle
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim.coupling.ripples import Ripples
+from ripple_sim.coupling.stepping import (
+    Passed,
+    ResetMark,
+    SolvedForces,
+    StepClock,
+    adopt_warnings,
+    missed_warning,
+    physics_errors,
+)
+from ripple_sim.errors import RippleWarning, SimulationError
+from ripple_sim.solver import Material
+
+DT = 0.002
+
+
+class Watch:
+    """A clock on data whose time is set by hand."""
+
+    def __init__(self) -> None:
+        self.model = mujoco.MjModel.from_xml_string(f'<mujoco><option timestep="{DT}"/></mujoco>')
+        self.data = mujoco.MjData(self.model)
+        self.clock = StepClock()
+
+    def at(self, time: float) -> Passed:
+        self.data.time = time
+        return self.clock.look(self.model, self.data)
+
+    def reset(self) -> None:
+        mujoco.mj_resetData(self.model, self.data)
+
+
+def test_first_look_counts_as_one_step_but_not_before_any() -> None:
+    assert Watch().at(3.7) == Passed(DT)
+    watch = Watch()
+    assert watch.at(0.0) == Passed(0.0)
+    assert watch.at(DT) == Passed(DT)
+
+
+def test_whole_steps_are_exact_and_others_are_kept() -> None:
+    watch = Watch()
+    watch.at(0.1)
+    assert watch.at(0.1 + DT) == Passed(DT)
+    assert watch.at(0.1 + DT) == Passed(0.0)
+    assert watch.at(0.1 + 1.5 * DT).elapsed == pytest.approx(0.5 * DT)
+
+
+def test_steps_that_nobody_saw_are_counted() -> None:
+    watch = Watch()
+    watch.at(0.1)
+    assert watch.at(0.1 + 5 * DT) == Passed(5 * DT, missed=4)
+    assert "5 physics steps" in str(missed_warning(4))
+    assert missed_warning(0) is None
+
+
+def test_a_shorter_time_step_is_no_missed_one() -> None:
+    watch = Watch()
+    watch.at(0.1)
+    watch.model.opt.timestep = DT / 4
+    assert watch.at(0.1 + DT).missed == 0
+    assert watch.at(0.1 + 2 * DT).missed == 3
+
+
+def test_time_set_back_begins_anew() -> None:
+    watch = Watch()
+    watch.at(1.0)
+    assert watch.at(0.5) == Passed(DT, reset=True)
+    assert watch.at(0.5 + DT) == Passed(DT)
+    watch.clock.restart()
+    assert watch.at(9.0) == Passed(DT)
+
+
+@pytest.mark.parametrize("after", [0.0, DT, 7 * DT, 500 * DT])
+def test_a_reset_is_seen_whatever_the_time_after_it(after: float) -> None:
+    watch = Watch()
+    watch.at(DT)
+    watch.reset()
+    assert watch.at(after) == Passed(DT if after else 0.0, reset=True)
+    assert watch.at(after + DT) == Passed(DT)
+
+
+BALL = '<body><freejoint/><geom size="1"/></body>'
+
+
+def crowd(memory: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Many balls in one place, whose contacts need more memory than they get."""
+    text = f'<mujoco><size memory="{memory}"/><worldbody>{40 * BALL}</worldbody></mujoco>'
+    model = mujoco.MjModel.from_xml_string(text)
+    return model, mujoco.MjData(model)
+
+
+def test_too_little_memory_names_what_to_enlarge() -> None:
+    with (
+        pytest.raises(
+            SimulationError, match=r'MuJoCo cannot go on: .*out of memory.*; enlarge <size memory="\.\.\."/>'
+        ),
+        physics_errors(),
+    ):
+        mujoco.mj_forward(*crowd("60K"))
+
+
+def test_a_warning_is_given_once_though_it_tells_another_time() -> None:
+    adopt_warnings()
+    model, data = crowd("300K")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        for _ in range(3):
+            mujoco.mj_step(model, data)
+    texts = [str(each.message) for each in said]
+    assert sum("Too many contacts" in text for text in texts) == 1
+    assert all(each.category is RippleWarning and str(each.message).startswith("MuJoCo: ") for each in said)
+
+
+def test_ripples_adopt_warnings_and_leave_a_handler_that_the_user_has_set() -> None:
+    model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom name="g" size="1"/></worldbody></mujoco>')
+    mujoco.set_mju_user_warning(None)
+    Ripples(model, {"g": Material()}, resolution=8)
+    with pytest.warns(RippleWarning, match="Too many contacts"):
+        mujoco.mj_forward(*crowd("300K"))
+    heard: list[str] = []
+    mujoco.set_mju_user_warning(heard.append)
+    try:
+        Ripples(model, {"g": Material()}, resolution=8)
+        mujoco.mj_forward(*crowd("300K"))
+    finally:
+        mujoco.set_mju_user_warning(None)
+    assert any("Too many contacts" in each for each in heard)
+
+
+def test_steps_taken_with_the_waves_name_what_to_enlarge() -> None:
+    model, data = crowd("60K")
+    ripples = Ripples(model, {0: Material(density=1.0)}, resolution=8)
+    with pytest.raises(SimulationError, match="enlarge <size memory"):
+        ripples.mj_step(data)
+
+
+MODEL = """<mujoco><option integrator="{}"><flag fwdinv="{}"/></option><worldbody><geom type="plane" size="1 1 1"/>
+<body pos="0 0 0.1"><freejoint/><geom size="0.1"/></body></worldbody>
+<keyframe><key time="3.5"/></keyframe></mujoco>"""
+
+
+def made(integrator: str = "Euler", fwdinv: str = "disable") -> tuple[mujoco.MjModel, mujoco.MjData, ResetMark]:
+    model = mujoco.MjModel.from_xml_string(MODEL.format(integrator, fwdinv))
+    data, mark = mujoco.MjData(model), ResetMark()
+    mujoco.mj_step(model, data)
+    assert mark.stands(model, data)
+    return model, data, mark
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast"])
+def test_it_stands_through_steps_and_copies(integrator: str) -> None:
+    model, data, mark = made(integrator)
+    mujoco.mj_step(model, data, 50)
+    mujoco.mj_forward(model, data)
+    assert mark.stands(model, data)
+    assert mark.stands(model, copy.copy(data))
+
+
+def test_every_kind_of_reset_wipes_it_out(in_tmp_path: None) -> None:
+    model, data, mark = made()
+    mujoco.mj_resetData(model, data)
+    assert not mark.stands(model, data)
+    assert mark.stands(model, data)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    assert not mark.stands(model, data)
+    data.qvel[0] = 1e12  # MuJoCo resets itself
+    mujoco.mj_step(model, data)
+    assert not mark.stands(model, data)
+    assert not mark.stands(model, mujoco.MjData(model))
+
+
+def test_several_who_look_see_the_same_resets() -> None:
+    model, data, first = made()
+    second = ResetMark()
+    assert second.stands(model, data)
+    for order in ((first, second), (second, first)):
+        mujoco.mj_resetData(model, data)
+        assert [mark.stands(model, data) for mark in order] == [False, False]
+        assert [mark.stands(model, data) for mark in order] == [True, True]
+
+
+def test_pickling_is_no_reset() -> None:
+    model, data, mark = made()
+    data, mark = pickle.loads(pickle.dumps((data, mark)))
+    assert mark.stands(model, data)
+    mujoco.mj_resetData(model, data)
+    assert not mark.stands(model, data)
+
+
+def test_there_is_none_where_mujoco_writes_there() -> None:
+    model, data, mark = made(fwdinv="enable")
+    mujoco.mj_step(model, data, 20)
+    assert mark.stands(model, data)
+    assert (data.solver_fwdinv >= 0).all()
+
+
+TUMBLING = """<mujoco><option solver="{}" integrator="{}" noslip_iterations="{}"><flag sleep="{}"/></option><worldbody>
+<geom type="plane" size="2 2 1"/><geom type="box" size="0.6 0.1 0.1" pos="0 0.2 0.1"/>
+<body pos="0 0 0.2"><freejoint/><geom type="box" size="0.1 0.08 0.06"/></body>
+<body pos="0.05 0 0.4"><freejoint/><geom type="capsule" size="0.05 0.1"/>
+<body pos="0 0 0.2"><joint/><geom size="0.06"/></body></body>
+<body mocap="true" pos="0.3 0.1 0.1"><geom size="0.1"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("solver", ["PGS", "CG", "Newton"])
+@pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast"])
+@pytest.mark.parametrize(("noslip", "sleep"), [(0, "disable"), (3, "disable"), (0, "enable")])
+def test_data_after_a_step_is_taken_as_it_is(solver: str, integrator: str, noslip: int, sleep: str) -> None:
+    model = mujoco.MjModel.from_xml_string(TUMBLING.format(solver, integrator, noslip, sleep))
+    data = mujoco.MjData(model)
+    solved = SolvedForces(model)
+    for step in range(400):
+        data.mocap_pos[0, 2] = 0.1 + 0.05 * np.sin(0.1 * step)
+        mujoco.mj_step(model, data)
+        assert solved.of(data) == (data, False)
+
+
+def test_forces_of_the_next_step_are_solved_for() -> None:
+    model = mujoco.MjModel.from_xml_string(TUMBLING.format("Newton", "Euler", 0, "disable"))
+    data, solved, found_unsolved = mujoco.MjData(model), SolvedForces(model), 0
+    mujoco.mj_step1(model, data)
+    for _ in range(200):
+        mujoco.mj_step2(model, data)
+        mujoco.mj_step1(model, data)
+        ahead, unsolved = solved.of(data)
+        found_unsolved += unsolved
+        forces = ahead.efc_force.copy()
+        mujoco.mj_step2(model, data)
+        np.testing.assert_allclose(forces, data.efc_force, rtol=1e-6, atol=1e-6)
+        mujoco.mj_step1(model, data)
+    assert found_unsolved > 20
+
+
+def test_forces_that_are_solved_come_out_the_same() -> None:
+    model = mujoco.MjModel.from_xml_string(TUMBLING.format("Newton", "Euler", 0, "disable"))
+    data, solved = mujoco.MjData(model), SolvedForces(model)
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+        mujoco.mj_forward(model, data)
+        found, unsolved = solved.of(data)
+        assert not unsolved
+        np.testing.assert_allclose(found.efc_force, data.efc_force, rtol=1e-6, atol=1e-6)

@@ -1,0 +1,182 @@
+"""Primitive geoms ripple on their own surface.
+
+Height fields: the triangles that MuJoCo collides, and waves on them.
+
+Triangles on primitives lie on the surface that MuJoCo collides, and nowhere else.
+"""
+
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+from mujoco_models import BALL, add_ball, model_of
+
+from ripple_sim import Material, Ripples
+from ripple_sim.coupling.target_mesh import height_field_triangles, primitive_triangles, target_atlas
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "volume", "half_extents"),
+    [
+        ("box", (0.2, 0.3, 0.1), 8 * 0.006, (0.2, 0.3, 0.1)),
+        ("capsule", (0.1, 0.2), np.pi * 0.01 * (0.4 + 0.4 / 3), (0.1, 0.1, 0.3)),
+        ("cylinder", (0.2, 0.1), 2 * np.pi * 0.004, (0.2, 0.2, 0.1)),
+        ("ellipsoid", (0.3, 0.2, 0.1), 4 / 3 * np.pi * 0.006, (0.3, 0.2, 0.1)),
+    ],
+)
+def test_primitives_ripple_on_their_own_surface(
+    kind: str, size: tuple[float, ...], volume: float, half_extents: tuple[float, ...]
+) -> None:
+    numbers = " ".join(map(str, size))
+    model = model_of(f'<geom name="target" type="{kind}" size="{numbers}"/>' + BALL.format("0 0 2"))
+    mesh = Ripples(model, {"target": Material()}, resolution=24, backend="cpu")["target"].atlas.mesh
+    assert mesh.volume == pytest.approx(volume, rel=0.005)
+    np.testing.assert_allclose(mesh.V.max(axis=0), half_extents, rtol=0.01)
+    np.testing.assert_allclose(mesh.V.min(axis=0), np.negative(half_extents), rtol=0.01)
+
+
+def test_equal_geoms_share_one_atlas_whatever_their_names() -> None:
+    kinds = ("sphere", "sphere", "ellipsoid", "ellipsoid")
+    geoms = (f'<geom name="target {i}" type="{kind}" size="0.1 0.2 0.3"/>' for i, kind in enumerate(kinds))
+    model = model_of("".join(geoms))
+    first, second, third, fourth = (target_atlas(model, model.geom(f"target {i}").id, 8) for i in range(4))
+    assert first is second
+    assert third is fourth
+    assert target_atlas(model, model.geom("target 0").id, 16) is not first
+
+
+def land(rows: int, columns: int) -> mujoco.MjSpec:
+    heights = np.random.default_rng(4).uniform(0.3, 0.6, (rows, columns))
+    heights[0, 0], heights[-1, -1] = 0.0, 1.0
+    spec = mujoco.MjSpec()
+    spec.option.timestep = 0.001
+    spec.add_hfield(name="land", nrow=rows, ncol=columns, size=[1.2, 0.8, 0.3, 0.1], userdata=heights.ravel())
+    spec.worldbody.add_geom(
+        name="land", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="land", pos=[0.1, 0.2, 0.3], condim=1
+    )
+    return spec
+
+
+def test_triangles_lie_where_mujocos_rays_meet_the_field_and_face_up() -> None:
+    model = land(9, 12).compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    V, F = height_field_triangles(model, 0)
+    rng = np.random.default_rng(0)
+    for corners in V[F[rng.permutation(len(F))[:60]]] + model.geom_pos[0]:
+        point = rng.dirichlet([1.0] * 3) @ corners
+        above, down = point + np.array([0, 0, 5.0]), np.array([0, 0, -1.0])
+        away = mujoco.mj_ray(model, data, above, down, None, 1, -1, np.zeros(1, np.int32))
+        assert 5.0 - away == pytest.approx(0.0, abs=1e-6)
+    assert (np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])[:, 2] > 0).all()
+
+
+def test_a_ball_that_falls_on_land_gives_it_its_momentum() -> None:
+    spec = land(9, 12)
+    add_ball(spec, "ball", [0.3, 0.2, 1.0], condim=1)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    ripples = Ripples(model, {"land": Material(speed=1.0, density=20.0)}, resolution=16, conserve_volume=False)
+    assert ripples["land"].atlas.layout == "patches"
+    given, before = np.zeros(3), data.qvel[:3].copy()
+    while data.time < 0.5:
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+        forces = np.zeros(6)
+        for i in range(data.ncon):
+            mujoco.mj_contactForce(model, data, i, forces)
+            given += forces[0] * data.contact[i].frame[:3] * model.opt.timestep
+    lost = 0.2 * (data.qvel[:3] - before - [0, 0, -9.81 * data.time])
+    np.testing.assert_allclose(given, lost, rtol=0.01, atol=1e-3)
+    assert ripples["land"].momentum() < -0.1
+
+
+SOLIDS = [
+    ("sphere", (0.2,)),
+    ("ellipsoid", (0.3, 0.2, 0.1)),
+    ("ellipsoid", (0.02, 0.5, 0.5)),
+    ("capsule", (0.1, 0.2)),
+    ("capsule", (0.2, 0.01)),
+    ("cylinder", (0.2, 0.1)),
+    ("cylinder", (0.05, 0.4)),
+    ("box", (0.2, 0.3, 0.1)),
+    ("box", (1.0, 1.0, 0.01)),
+]
+every_solid = pytest.mark.parametrize(("kind", "size"), SOLIDS)
+
+
+def triangles(kind: str, size: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    return primitive_triangles(kind, np.array([*size, 0.0, 0.0][:3]))
+
+
+def distances(kind: str, size: tuple[float, ...], points: np.ndarray) -> np.ndarray:
+    """Signed distances from the exact solid [m]; for an ellipsoid in units of its own half-axes."""
+    if kind in ("sphere", "ellipsoid"):
+        return np.linalg.norm(points / np.resize(size, 3), axis=1) - 1
+    around = np.linalg.norm(points[:, :2], axis=1)
+    if kind == "capsule":
+        along = np.maximum(np.abs(points[:, 2]) - size[1], 0)
+        return np.hypot(around, along) - size[0]
+    beyond = np.abs(points) - size if kind == "box" else np.column_stack([around, np.abs(points[:, 2])]) - size
+    return np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
+
+
+def mesh_of(kind: str, size: tuple[float, ...]) -> trimesh.Trimesh:
+    return trimesh.Trimesh(*triangles(kind, size), process=False, validate=False)
+
+
+@every_solid
+def test_vertices_lie_on_the_exact_surface(kind: str, size: tuple[float, ...]) -> None:
+    V, _ = triangles(kind, size)
+    np.testing.assert_allclose(distances(kind, size, V), 0, atol=1e-12)
+
+
+@every_solid
+def test_the_surface_is_closed_without_handles_and_faces_outwards(kind: str, size: tuple[float, ...]) -> None:
+    mesh = mesh_of(kind, size)
+    mesh.merge_vertices()
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    assert mesh.euler_number == 2
+    assert mesh.volume > 0
+
+
+@every_solid
+def test_no_edge_is_longer_than_a_24th_of_the_solid(kind: str, size: tuple[float, ...]) -> None:
+    V, F = triangles(kind, size)
+    edges = np.linalg.norm(V[F] - V[np.roll(F, -1, axis=1)], axis=2)
+    # moved outwards onto a round surface, an edge grows a little
+    assert edges.max() <= 1.02 * np.ptp(V, axis=0).max() / 24
+    assert np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1).min() > 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "volume", "area"),
+    [
+        ("box", (0.2, 0.3, 0.1), 0.048, 0.88),
+        ("capsule", (0.1, 0.2), np.pi * (0.004 + 0.004 / 3), np.pi * (0.08 + 0.04)),
+        ("cylinder", (0.2, 0.1), np.pi * 0.008, np.pi * (0.08 + 0.08)),
+        ("ellipsoid", (0.3, 0.3, 0.3), 4 / 3 * np.pi * 0.027, 4 * np.pi * 0.09),
+    ],
+)
+def test_volume_area_and_moments_are_those_of_the_solid(
+    kind: str, size: tuple[float, ...], volume: float, area: float
+) -> None:
+    mesh = mesh_of(kind, size)
+    assert mesh.volume == pytest.approx(volume, rel=3e-3)
+    assert mesh.area == pytest.approx(area, rel=3e-3)
+    np.testing.assert_allclose(mesh.center_mass, 0, atol=1e-6)
+    # MuJoCo's own inertia of the same solid, at a density of 1
+    geom = f'<geom type="{kind}" size="{" ".join(map(str, size))}" density="1"/>'
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody><body><freejoint/>{geom}</body></worldbody></mujoco>")
+    assert mesh.volume == pytest.approx(model.body_mass[1], rel=3e-3)
+    np.testing.assert_allclose(np.sort(np.diag(mesh.moment_inertia)), np.sort(model.body_inertia[1]), rtol=6e-3)
+
+
+@pytest.mark.parametrize("scale", [2.0**-17, 2.0**17])
+@every_solid
+def test_triangles_are_alike_at_every_scale(kind: str, size: tuple[float, ...], scale: float) -> None:
+    V, F = triangles(kind, size)
+    scaled, same = triangles(kind, tuple(scale * x for x in size))
+    np.testing.assert_array_equal(F, same)
+    np.testing.assert_allclose(scaled, scale * V, rtol=0, atol=1e-12 * scale)

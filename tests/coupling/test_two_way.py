@@ -1,0 +1,175 @@
+"""Two-way coupling: a passing ripple kicks a resting ball, and what one gains the other loses.
+
+Geoms within reach of a risen surface are pushed, and others are not.
+
+Support points of geoms against the definition: no point of the geom lies farther in the direction.
+"""
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+import pytest
+from ring_under_ball import GRAVITY, run
+
+from ripple_sim import Material, Ripples
+from ripple_sim.coupling.two_way import support_point
+
+
+def test_passing_ripple_kicks_a_resting_ball_only_if_it_may() -> None:
+    still, _, _ = run(two_way=False, speed=4.0, mass=0.05)
+    kicked, _, _ = run(two_way=True, speed=4.0, mass=0.05)
+    assert np.abs(still).max() < 1e-3
+    assert kicked.max() > 0.01
+    # not before the ring is there, 0.1 m away at 1 m/s less its width
+    assert kicked[:25].max() < 1e-3
+
+
+def test_ball_and_surface_exchange_momentum_and_keep_the_sum() -> None:
+    _, total, _ = run(two_way=True)
+    time, ball, surface, _ = total.T
+    # gravity is all that acts from outside: no springs, no damping. Until 0.1 s no long contact has a deficit.
+    early = time < 0.1
+    start = surface[0] + ball[0] + 0.2 * GRAVITY * time[0]
+    sums = surface + ball + 0.2 * GRAVITY * time
+    assert np.abs(sums[early] - start).max() < 1e-4 * abs(surface[0])
+    assert ball.max() > 0.02
+    late = time > 0.28
+    assert np.abs(sums[late] - start).max() < 0.02 * abs(surface[0])
+
+
+def test_free_target_recoils() -> None:
+    """The rigid bodies alone keep their momentum: what the ball gains, the block under it loses."""
+    _, total, _ = run(two_way=True, target="<freejoint/>")
+    time, bodies, _, _ = total.T
+    np.testing.assert_allclose(bodies, -5.2 * GRAVITY * time, atol=2e-3)
+
+
+def test_ball_is_never_thrown_faster_than_the_surface_moves() -> None:
+    _, total, _ = run(two_way=True, speed=3.0, mass=0.001)
+    fastest, surface = total[:, 1].max() / 0.001, total[:, 3].max()
+    assert 0.5 * surface < fastest < surface
+
+
+def pushed(force: Callable[[mujoco.MjData], None]) -> tuple[mujoco.MjData, Ripples]:
+    """A ball on a block whose surface comes up, and the same forces of others at each step."""
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><worldbody><geom name="block" type="box" size="0.5 0.5 0.2"/>
+        <body name="ball" pos="0 0 0.2499"><freejoint/><geom size="0.05" mass="0.2"/></body></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    ripples = Ripples(model, {"block": Material(density=20.0)}, resolution=16, backend="cpu", two_way=True)
+    ripples["block"].velocity = np.ones((6, 16, 16))
+    highest = 0.0
+    data.xfrc_applied[1] = FORCE
+    for _ in range(100):
+        force(data)
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+        highest = max(highest, data.qpos[2])
+    assert highest > 0.2505  # it was pushed
+    return data, ripples
+
+
+FORCE = np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_forces_of_others_stay_theirs() -> None:
+    """Set once, or assigned before each step, which wiped out the push, or taken back and added anew."""
+
+    def assigned(data: mujoco.MjData) -> None:
+        data.xfrc_applied[:] = 0.0
+        data.xfrc_applied[1] = FORCE
+
+    def added(data: mujoco.MjData) -> None:
+        data.xfrc_applied[1] -= FORCE
+        data.xfrc_applied[1] += FORCE
+
+    once, _ = pushed(lambda data: None)
+    for force in (assigned, added):
+        data, _ = pushed(force)
+        np.testing.assert_array_equal(data.qpos, once.qpos)
+        np.testing.assert_array_equal(data.xfrc_applied[1], FORCE)
+
+
+def test_nothing_is_left_after_a_reset() -> None:
+    data, ripples = pushed(lambda data: None)
+    ripples.reset()
+    np.testing.assert_array_equal(data.xfrc_applied, [[0.0] * 6, FORCE])
+    data.time = 0.001  # earlier than the ripples have seen
+    ripples.step(data)
+    np.testing.assert_array_equal(data.xfrc_applied, [[0.0] * 6, FORCE])
+
+
+def test_a_body_that_touches_twice_is_pushed_once() -> None:
+    """Two of its geoms on the same patch together do not make it faster than the surface."""
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><option gravity="0 0 0"/><worldbody><geom name="block" type="box" size="0.5 0.5 0.2"/>
+        <body name="ball" pos="0 0 0.2499"><freejoint/><geom size="0.05" mass="0.001"/><geom size="0.05" mass="0.001"/>
+        </body></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    ripples = Ripples(
+        model, {"block": Material(density=20.0)}, resolution=16, backend="cpu", two_way=True, conserve_volume=False
+    )
+    ripples["block"].velocity = np.ones((6, 16, 16))
+    mujoco.mj_step(model, data)
+    ripples.step(data)
+    assert 0.9 < data.qvel[2] <= 1.0
+
+
+def test_ripple_reaches_a_ball_above_it_only_as_high_as_the_wave() -> None:
+    """MuJoCo sees no contact; the ball is met by the displaced surface, and what it gains the surface loses."""
+    heights, total, _ = run(two_way=True, speed=4.0, mass=0.05, gap=0.004, gravity=0.0)
+    assert heights[-1] > 0.05
+    _, ball, surface, _ = total.T
+    np.testing.assert_allclose((ball + surface)[1:], surface[0], rtol=1e-4)
+    missed, _, _ = run(two_way=True, speed=4.0, mass=0.05, gap=0.5, gravity=0.0)
+    np.testing.assert_array_equal(missed, missed[0])
+
+
+GEOMS = {
+    "sphere": 'type="sphere" size="0.3"',
+    "ellipsoid": 'type="ellipsoid" size="0.3 0.2 0.1"',
+    "capsule": 'type="capsule" size="0.1 0.3"',
+    "cylinder": 'type="cylinder" size="0.2 0.3"',
+    "box": 'type="box" size="0.3 0.2 0.1"',
+    "mesh": 'type="mesh" mesh="tetrahedron"',
+}
+
+
+def geom_model(kind: str) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(
+        f"""<mujoco><asset><mesh name="tetrahedron" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/></asset>
+        <worldbody><geom {GEOMS[kind]}/></worldbody></mujoco>"""
+    )
+
+
+@pytest.mark.parametrize("kind", GEOMS)
+def test_rays_meet_no_point_that_lies_farther(kind: str) -> None:
+    model = geom_model(kind)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    rotation, origin = data.geom_xmat[0].reshape(3, 3), data.geom_xpos[0]
+    rng, geom = np.random.default_rng(3), np.zeros(1, dtype=np.int32)
+
+    def height(point: np.ndarray, direction: np.ndarray) -> float:
+        """Of what a ray against the direction through a point meets first; -inf if nothing."""
+        start = point + 3.0 * direction
+        away = mujoco.mj_ray(model, data, origin + rotation @ start, -rotation @ direction, None, 1, -1, geom)
+        return float(start @ direction) - away if away >= 0 else -np.inf
+
+    for direction in rng.standard_normal((20, 3)):
+        direction /= np.linalg.norm(direction)
+        farthest = support_point(model, 0, direction)
+        aside = rng.uniform(-0.5, 0.5, (200, 3))
+        assert max(height(farthest + offset, direction) for offset in aside) <= farthest @ direction + 1e-3
+        # and it is a point of the geom: a ray just inside its rim meets it
+        assert height(0.999 * farthest, direction) == pytest.approx(farthest @ direction, abs=5e-3)
+
+
+def test_middle_of_a_face_that_lies_flat() -> None:
+    down = np.array([0.005, -0.004, -1.0])
+    np.testing.assert_allclose(support_point(geom_model("box"), 0, down), [0, 0, -0.1])
+    np.testing.assert_allclose(support_point(geom_model("cylinder"), 0, down), [0, 0, -0.3])
+    np.testing.assert_allclose(support_point(geom_model("capsule"), 0, np.array([0.0, 1.0, 0.01])), [0, 0.1, 0.001])

@@ -1,0 +1,281 @@
+"""EXR frames: linear light as the shaders reckon it, whole in the file, and refused in time where it cannot be had."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from sphere_height_maps import cube_charts
+
+from ripple_sim.cli import main as cli
+from ripple_sim.encode import check_output, open_writer
+from ripple_sim.errors import VideoError
+from ripple_sim.overlay.notes import color_table
+from ripple_sim.render import Camera, Renderer, Surface
+from ripple_sim.render.visuals import shapes as meshes
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.scene import Scene
+from ripple_sim.solver import RippleError
+from ripple_sim.solver.gl import shared_context
+from ripple_sim.video.options import VideoOptions
+from ripple_sim.video.render_video import render_video
+
+WIDTH, HEIGHT = 64, 48
+FRONT = Camera((0.0, 0.0, 0.0), 5.0, 70.0, -20.0, 40.0)
+BODIES = """<body pos="1 0 0"><geom type="box" size=".3 .3 .5" rgba=".1 .2 .7 1"/></body>
+<body pos="-1 0 .2"><geom size=".4" rgba=".8 .3 .1 1"/></body>"""
+FLOOR = '<geom type="plane" size="0 0 1" pos="0 0 -.5"/>'
+MJCF = f"""<mujoco><option timestep="0.005"/><worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
+{FLOOR}<body name="stone" pos="0.05 0 0.3"><freejoint/><geom name="stone" size="0.05"/></body></worldbody></mujoco>"""
+TOML = """model = "scene.xml"
+duration = 0.4
+[[ripple]]
+geom = "egg"
+resolution = 12
+material = {speed = 0.3, density = 20.0}
+"""
+OPTIONS = {"size": (WIDTH, HEIGHT), "fps": 30, "frame_format": "exr"}
+
+
+@pytest.fixture(autouse=True)
+def _left_as_found() -> Iterator[None]:
+    """Keep the program's signal handlers to these tests."""
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+@pytest.fixture
+def exr() -> None:
+    """Skip where OpenEXR is not installed: it is an extra."""
+    pytest.importorskip("OpenEXR")
+
+
+@pytest.fixture
+def scene(tmp_path: Path, opengl: None) -> Scene:
+    (tmp_path / "scene.xml").write_text(MJCF)
+    (tmp_path / "scene.toml").write_text(TOML)
+    return load_scene(tmp_path / "scene.toml")
+
+
+def read(path: Path) -> np.ndarray:
+    import OpenEXR
+
+    [channels] = OpenEXR.File(str(path)).channels().values()
+    return channels.pixels
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def render(bodies: str = BODIES, asset: str = "", **options) -> np.ndarray:
+    model = mujoco.MjModel.from_xml_string(f"<mujoco>{asset}<worldbody>{bodies}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with Renderer(shared_context(), model, {}, size=(120, 90), **options) as renderer:
+        return renderer.render(data, {}, FRONT)
+
+
+def developed(light: np.ndarray) -> np.ndarray:
+    """The renderer's tone curve on linear light, 0 to 255: a shoulder towards white, then IEC 61966-2-1."""
+    peak = light.max(axis=-1, keepdims=True)
+    excess = np.maximum(peak - 0.72, 0)
+    compressed = np.minimum(peak, 0.72) + 0.28 * excess / (excess + 0.28)
+    white = 1 - 1 / (1 + 0.18 * excess)
+    value = (1 - white) * light * compressed / np.maximum(peak, 1e-4) + white * compressed
+    return 255 * np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
+
+
+@pytest.mark.usefixtures("exr")
+@pytest.mark.parametrize("channels", [3, 4])
+def test_values_come_back_bit_for_bit_under_a_header_that_names_their_colours(tmp_path: Path, channels: int) -> None:
+    import OpenEXR
+
+    rng = np.random.default_rng(3)
+    light = np.exp(rng.uniform(-9, 11, (3, HEIGHT, WIDTH, channels))).astype(np.float16)
+    for name in ("first", "second"):
+        options = {"transparent": channels == 4, "frame_format": "exr"}
+        with open_writer(tmp_path / name, width=WIDTH, height=HEIGHT, fps=24, **options) as writer:
+            for frame in light:
+                writer.write(frame)
+    files = sorted((tmp_path / "first").iterdir())
+    assert [file.name for file in files] == [f"frame_{number:05d}.exr" for number in range(3)]
+    np.testing.assert_array_equal([read(file) for file in files], light)
+    assert contents(tmp_path / "first") == contents(tmp_path / "second")
+    header = OpenEXR.File(str(files[0])).header()
+    assert header["framesPerSecond"] == Fraction(24)
+    bt709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+    assert header["chromaticities"] == pytest.approx(bt709)
+    assert not {"capDate", "owner", "comments"} & set(header)
+
+
+@pytest.mark.usefixtures("exr")
+def test_bytes_for_the_screen_are_no_linear_light(tmp_path: Path) -> None:
+    with (
+        pytest.raises(VideoError, match=r"frame is uint8 .*; valid is float16 \[48, 64, 3\]"),
+        open_writer(tmp_path / "frames", width=WIDTH, height=HEIGHT, fps=24, frame_format="exr") as writer,
+    ):
+        writer.write(np.zeros((HEIGHT, WIDTH, 3), np.uint8))
+
+
+@pytest.mark.usefixtures("exr")
+def test_a_disk_that_fills_up_with_the_last_bytes_is_noticed(tmp_path: Path) -> None:
+    """Half a frame of noise cannot be packed into less than it is: the file's end is cut off."""
+    program = (
+        "import resource, signal, sys\n"
+        "import numpy as np\n"
+        "from ripple_sim.errors import EncodingError\n"
+        "from ripple_sim.encode import open_writer\n"
+        "noise = np.random.default_rng(0).integers(0, 31743, (60, 60, 3), np.uint16).view(np.float16)\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (noise.nbytes - 1000,) * 2)\n"
+        "try:\n"
+        "    with open_writer(sys.argv[1], width=60, height=60, fps=25, frame_format='exr') as writer:\n"
+        "        writer.write(noise)\n"
+        "except EncodingError as error:\n"
+        "    print(error)\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", program, tmp_path / "frames"], capture_output=True, text=True, check=True
+    )
+    assert result.stdout == f"cannot write the video {tmp_path / 'frames'}: File too large\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("clip.mp4", {}, r"cannot write EXR frames to .*clip\.mp4: name a folder"),
+        ("frames", {"overlaid": True}, "linear light.*--overlay '', and no --compare.*PNG"),
+        ("frames", {"frame_format": "tiff"}, "frame format is 'tiff'; valid is 'png' or 'exr'"),
+    ],
+)
+@pytest.mark.usefixtures("exr")
+def test_what_cannot_be_is_refused_beforehand(tmp_path: Path, name: str, options: dict, message: str) -> None:
+    with pytest.raises(VideoError, match=message):
+        check_output(tmp_path / name, WIDTH, HEIGHT, 30, **{"frame_format": "exr", **options})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_openexr_the_extra_is_named(tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "OpenEXR", None)
+    options = ["-o", str(tmp_path / "frames"), "--frame-format", "exr"]
+    assert cli.main(["render", "duck", *options]) == 2
+    assert "pip install 'ripple-sim[exr]'" in capsys.readouterr().err
+    assert cli.main(["render", "missing", *options]) == 2  # what is asked for comes before what the machine lacks
+    assert "missing" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("exr")
+def test_overlays_and_comparisons_are_refused_whoever_asks_for_them(scene: Scene, tmp_path: Path, capsys) -> None:
+    frames = ["-o", str(tmp_path / "frames"), "--frame-format", "exr"]
+    for option in (["--overlay", "time"], ["--compare", "paper"]):
+        assert cli.main(["render", "duck", *frames, *option]) == 2
+        assert "linear light, without overlays" in capsys.readouterr().err
+    (tmp_path / "scene.toml").write_text('overlay = ["time"]\n' + TOML)
+    with pytest.raises(VideoError, match="linear light, without overlays"):
+        render_video(load_scene(tmp_path / "scene.toml"), tmp_path / "frames", VideoOptions(**OPTIONS))
+    assert not (tmp_path / "frames").exists()
+
+
+@pytest.mark.usefixtures("exr")
+def test_the_command_writes_a_folder_over_older_frames(scene: Scene, tmp_path: Path) -> None:
+    render_video(scene, tmp_path / "frames", VideoOptions(size=(WIDTH, HEIGHT), fps=30))
+    command = ["render", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "frames"), "--frame-format", "exr"]
+    assert cli.main([*command, "--size", f"{WIDTH}x{HEIGHT}", "--fps", "30", "--duration", "0.1"]) == 0
+    assert sorted(contents(tmp_path / "frames")) == [f"frame_{number:05d}.exr" for number in range(3)]
+
+
+@pytest.mark.usefixtures("exr")
+def test_an_interrupted_render_goes_on_to_the_same_frames(scene: Scene, tmp_path: Path) -> None:
+    def interrupt(done: int, total: int) -> None:
+        if done == 8:
+            raise KeyboardInterrupt
+
+    options = {**OPTIONS, "transparent": True}
+    render_video(scene, tmp_path / "whole", VideoOptions(**options))
+    with pytest.raises(KeyboardInterrupt):
+        render_video(scene, tmp_path / "broken", VideoOptions(**options), progress=interrupt)
+    with pytest.raises(VideoError, match="the frame format was exr and now is png"):
+        render_video(scene, tmp_path / "broken", VideoOptions(resume=True, **{**options, "frame_format": "png"}))
+    assert render_video(scene, tmp_path / "broken", VideoOptions(resume=True, **options)).frames == 12
+    assert contents(tmp_path / "broken") == contents(tmp_path / "whole")
+
+
+@pytest.mark.usefixtures("opengl")
+def test_the_tone_curve_makes_the_picture_of_linear_light() -> None:
+    light = render(BODIES + FLOOR, samples=1, linear=True)
+    picture = render(BODIES + FLOOR, samples=1)
+    assert light.dtype == np.float16
+    assert light.shape == picture.shape
+    # half a step of dithering, half a step of rounding, what half floats leave out, and that the smooth background is
+    # interpolated before the curve or after it
+    assert np.abs(developed(light.astype(float)) - picture).max() < 1.6
+
+
+@pytest.mark.usefixtures("opengl")
+def test_highlights_keep_what_the_screen_cannot_show() -> None:
+    metal = '<asset><material name="m" metallic="1" roughness=".2"/></asset>'
+    light, picture = (render('<geom size="1" material="m"/>', metal, samples=1, linear=way) for way in (True, False))
+    white = picture.min(axis=-1) >= 245
+    assert white.sum() > 20
+    assert light[white].min() > 1
+    assert light[white].max() > 10
+    assert np.isfinite(light).all()
+
+
+@pytest.mark.usefixtures("opengl")
+def test_reflections_and_clear_bodies_are_mixed_in_linear_light() -> None:
+    def floor(reflectance: float) -> np.ndarray:
+        asset = f'<asset><material name="f" rgba=".5 .5 .5 1" reflectance="{reflectance}"/></asset>'
+        return render(BODIES + FLOOR.replace("/>", ' material="f"/>'), asset, linear=True).astype(float)
+
+    def ball(opacity: float) -> np.ndarray:
+        return render(f'<geom size="1" rgba=".8 .3 .1 {opacity}"/>', samples=1, linear=True).astype(float)
+
+    for less, half, more in ([floor(r) for r in (0.25, 0.5, 0.75)], [ball(a) for a in (0.0, 0.5, 1.0)]):
+        assert np.abs(more - less).max() > 0.2
+        np.testing.assert_allclose(half, (less + more) / 2, atol=1e-3)
+
+
+@pytest.mark.usefixtures("opengl")
+def test_light_is_multiplied_by_opacity_so_that_it_lies_over_any_background() -> None:
+    """The frame is the cut-out over the empty scene, by the compositor's rule: a + (1 - alpha) b."""
+    whole, empty = (render(bodies, linear=True).astype(float) for bodies in (BODIES, "<geom size='1e-3'/>"))
+    cut_out = render(linear=True, alpha=True).astype(float)
+    light, opacity = cut_out[..., :3], cut_out[..., 3:]
+    assert opacity.min() == 0
+    assert opacity.max() == 1
+    edges = (opacity[..., 0] > 0) & (opacity[..., 0] < 1)
+    assert edges.sum() > 50
+    np.testing.assert_allclose(light + (1 - opacity) * empty, whole, rtol=3e-3, atol=1e-3)
+    assert (light[opacity[..., 0] == 0] == 0).all()
+
+
+@pytest.mark.usefixtures("opengl")
+def test_a_shadow_on_nothing_is_opacity_alone() -> None:
+    frame = render(BODIES + FLOOR, linear=True, alpha=True)
+    shadow = (frame[..., 3] > 0.2) & (frame[..., 3] < 0.95) & (frame[..., :3].max(axis=-1) == 0)
+    assert shadow.sum() > 100
+
+
+@pytest.mark.usefixtures("opengl")
+def test_linear_frames_of_the_same_scene_are_the_same() -> None:
+    np.testing.assert_array_equal(render(BODIES + FLOOR, linear=True), render(BODIES + FLOOR, linear=True))
+
+
+@pytest.mark.usefixtures("opengl")
+def test_fields_and_grids_are_refused_in_linear_light() -> None:
+    model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom size="1"/></worldbody></mujoco>')
+    ball = meshes.ball(8)
+    for paint in ({"heatmap_colors": color_table()}, {"grid": 4}):
+        surface = Surface(ball.shell, ball.faces, cube_charts(ball.shell, 8), "clay", **paint)
+        with pytest.raises(RippleError, match="linear=False"):
+            Renderer(shared_context(), model, {0: surface}, size=(32, 32), linear=True)

@@ -1,0 +1,170 @@
+"""The diverging colour map: even steps, a bright middle, for every colour vision.
+
+The runs of a comparison.
+
+A heatmap's texels, its range and the grid.
+
+Bounded histories.
+
+Limits that hold still, and short numbers.
+"""
+
+import numpy as np
+import pytest
+
+from ripple_sim.errors import SceneError
+from ripple_sim.overlay.notes import (
+    MOST_POINTS,
+    SIZE,
+    History,
+    Limit,
+    color_table,
+    colors,
+    compared_operators,
+    grid_spacing,
+    lab_to_srgb,
+    magnitude,
+    number,
+    readable,
+    round_up,
+)
+from ripple_sim.solver import HeightMap, sphere_atlas
+from ripple_sim.solver.texels.topology import with_filled_halo
+
+# Machado, Oliveira and Fernandes 2009, complete deuteranopia and protanopia, on linear RGB
+DEUTAN = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])
+PROTAN = np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]])
+RGB_TO_XYZ = np.array(
+    [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+)
+
+
+def linear_rgb(srgb: np.ndarray) -> np.ndarray:
+    value = srgb / 255
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+def lab(rgb: np.ndarray) -> np.ndarray:
+    xyz = np.clip(rgb, 0, 1) @ RGB_TO_XYZ.T / [0.95047, 1.0, 1.08883]
+    f = np.where(xyz > (6 / 29) ** 3, np.cbrt(xyz), xyz / (3 * (6 / 29) ** 2) + 4 / 29)
+    x, y, z = np.moveaxis(f, -1, 0)
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+
+
+def test_colors_diverge_evenly_from_a_bright_middle() -> None:
+    table = lab(linear_rgb(color_table().astype(float)))
+    middle = SIZE // 2
+    assert table[middle, 0] > 95
+    assert np.abs(table[middle, 1:]).max() < 1
+    np.testing.assert_allclose(table[:, 0], table[::-1, 0], atol=1.5)  # both arms equally light
+    lightness = table[middle:, 0]
+    assert (np.diff(lightness) < 0.3).all()
+    assert lightness[-1] < 40
+    # equal steps of 1/16 of the range look equally large, all through one arm and in both
+    steps = np.linalg.norm(np.diff(table[::16], axis=0), axis=1)
+    assert steps.max() / steps.min() < 1.25
+
+
+@pytest.mark.parametrize("vision", [np.eye(3), DEUTAN, PROTAN])
+def test_signs_are_told_apart_by_every_eye(vision: np.ndarray) -> None:
+    seen = lab(linear_rgb(color_table().astype(float)) @ vision.T)
+    apart = np.linalg.norm(seen - seen[::-1], axis=1)
+    middle = SIZE // 2
+    assert apart[middle + middle // 4] > 15  # a difference of 2 to 3 is just seen
+    assert apart[-1] > 50
+
+
+def test_lab_white_and_black() -> None:
+    np.testing.assert_allclose(lab_to_srgb(np.array([[100.0, 0, 0], [0, 0, 0]])), [[1, 1, 1], [0, 0, 0]], atol=1e-3)
+
+
+def test_colors_of_values() -> None:
+    table = color_table()
+    np.testing.assert_array_equal(colors([-3.0, -2.0, 0.0, 1.0, 2.0], 2.0), table[[0, 0, 256, 384, 512]])
+
+
+def test_comparison_names_its_baselines() -> None:
+    assert compared_operators(None) == ("fem",)
+    assert compared_operators("paper") == ("fem", "paper")
+    with pytest.raises(SceneError, match="paper, uncorrected, dynamic-paint"):
+        compared_operators("fem")
+
+
+def test_padding_is_that_of_a_height_map() -> None:
+    atlas = sphere_atlas(1.0, 12)
+    field = np.random.default_rng(0).standard_normal((6, 12, 12)).astype(np.float32)
+    around = with_filled_halo(atlas.texels.topology, field)
+    np.testing.assert_allclose(around, HeightMap(atlas.texels)(field)[..., 3], rtol=1e-6)
+
+
+def test_magnitude_is_that_of_waves_where_they_are() -> None:
+    field = np.zeros((6, 42, 42), np.float32)
+    assert magnitude(field) == 0
+    field[0, 10:20, 10:20] = -0.2
+    assert magnitude(field) == pytest.approx(0.2)  # however calm the rest is
+    field[1:4] = 0.1
+    assert magnitude(field) == pytest.approx((100 * 0.04 + 4800 * 0.01) / (100 * 0.2 + 4800 * 0.1))
+
+
+def test_grid_has_a_readable_number_of_cells() -> None:
+    assert [grid_spacing(n) for n in (8, 16, 24, 32, 96, 128, 256)] == [1, 1, 1, 2, 4, 8, 16]
+
+
+@pytest.mark.parametrize("frames", [1, 7, MOST_POINTS, MOST_POINTS + 1, 50 * MOST_POINTS + 3])
+def test_history_is_bounded_and_keeps_the_peaks(frames: int) -> None:
+    history, values = History(frames), np.random.default_rng(frames).random(frames)
+    for value in values:
+        history.add(value)
+    at, kept = history.curve()
+    assert len(at) == len(kept) <= MOST_POINTS
+    assert kept.max() == values.max()
+    assert at[-1] <= frames - 1
+    if frames <= MOST_POINTS:
+        np.testing.assert_array_equal(kept, values)
+
+
+def test_limit_grows_to_round_numbers_and_never_shrinks() -> None:
+    limit, seen = Limit(floor=0.0007), []
+    assert limit.value == limit.goal == 0.0008
+    rng = np.random.default_rng(3)
+    for magnitude_now in np.concatenate([0.0003 * rng.random(20), 0.0013 * np.ones(40), 0.0004 * rng.random(40)]):
+        seen.append(limit.follow(magnitude_now, 1 / 60))
+    assert seen[19] == 0.0008
+    assert seen[-1] == limit.goal == 0.0015
+    ratios = np.divide(seen[1:], seen[:-1])
+    assert (ratios >= 1).all()
+    assert ratios.max() < 1.15  # it glides
+    assert (np.diff(seen) > 0).sum() < 50  # and stands still again
+
+
+def test_limit_without_floor_starts_with_what_it_sees() -> None:
+    limit = Limit()
+    assert limit.follow(0.0, 0.1) == 0.0
+    assert limit.follow(0.035, 0.1) == 0.04
+    fixed = Limit(fixed=0.3)
+    assert fixed.follow(7.0, 0.1) == 0.3
+
+
+def test_limit_that_is_far_off_catches_up() -> None:
+    limit = Limit(floor=0.001)
+    assert 1.0 <= limit.follow(3.5, 1 / 60) < 1.5
+    assert limit.goal == 4
+
+
+def test_limit_with_a_memory_overlooks_what_is_short() -> None:
+    limit = Limit(floor=0.01, memory=0.25)
+    for _ in range(2):
+        limit.follow(0.05, 1 / 60)
+    for _ in range(100):
+        limit.follow(0.0, 1 / 60)
+    assert limit.goal == 0.01
+    for _ in range(100):
+        limit.follow(0.05, 1 / 60)
+    assert limit.goal == 0.05
+
+
+def test_numbers_are_short() -> None:
+    assert [round_up(x) for x in (0.001, 0.0011, 2.1, 81)] == [0.001, 0.0015, 3, 100]
+    assert [number(x) for x in (-20.0, 0.0, 2.5, -0.0)] == ["\N{MINUS SIGN}20", "0", "2.5", "0"]
+    assert [readable(x, "m")[1] for x in (2e-6, 0.02, 0.001, 3.0)] == ["\N{MICRO SIGN}m", "mm", "mm", "m"]
+    assert readable(0.02, "m")[0] * 0.02 == pytest.approx(20)

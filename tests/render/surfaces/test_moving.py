@@ -1,0 +1,143 @@
+"""Ambient occlusion and thickness of surfaces that move, against what is baked where they are."""
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from ripple_sim import Camera, Material, RippleRenderer, Ripples
+from ripple_sim.render.surfaces.moving import MovingOcclusion
+from ripple_sim.render.surfaces.vertices import coarse_mesh
+from ripple_sim.render.visuals import shapes
+from ripple_sim.render.visuals.corners import (
+    bake,
+    bounding_radius,
+    cast,
+    frames_about,
+    smooth_normals,
+    triangle_normals,
+)
+
+TURN = Rotation.from_rotvec([0.4, -1.1, 0.7])
+
+
+def occlusion(V, F):
+    """That of the vertices themselves, and what is baked at rest."""
+    normals = smooth_normals(V, F)
+    baked = np.stack(bake(V, F, normals), axis=1)
+    return MovingOcclusion(V, F, V, normals, baked), baked
+
+
+def sheet(n):
+    """Square sheet of n x n vertices, side 2, normals up."""
+    x, y = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n))
+    i = np.arange(n * n).reshape(n, n)
+    a, b, c, d = i[:-1, :-1].ravel(), i[:-1, 1:].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel()
+    F = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
+    return np.stack([x.ravel(), y.ravel(), np.zeros(n * n)], axis=1), F
+
+
+def dented(V):
+    """A unit ball with a hole from above, and how deep it is [n]."""
+    depth = 1.3 * np.exp(-(V[:, 0] ** 2 + V[:, 1] ** 2) / 0.15) * (V[:, 2] > 0)
+    return V - depth[:, None] * [0, 0, 1], depth
+
+
+def rms(values):
+    return float(np.sqrt((values**2).mean()))
+
+
+@pytest.mark.parametrize("divisions", [8, 24])
+def test_a_rigid_motion_changes_nothing(divisions):
+    ball = shapes.ball(divisions)
+    V = ball.shell * (0.4 + 0.6 * ball.shell[:, :1] ** 2)  # with a waist
+    moving, baked = occlusion(V, ball.faces)
+    assert_allclose(moving(V), baked, atol=1e-6)
+    assert_allclose(moving(TURN.apply(V) + np.array([30.0, -20.0, 10.0])), baked, atol=2e-3)
+
+
+@pytest.mark.parametrize("divisions", [10, 24])
+def test_a_dent_gets_as_dark_as_one_that_was_there_from_the_beginning(divisions):
+    ball = shapes.ball(divisions)
+    moving, baked = occlusion(ball.shell, ball.faces)
+    V, depth = dented(ball.shell)
+    from_scratch = np.stack(cast(V, ball.faces, frames_about(smooth_normals(V, ball.faces)), 64, 1.0), axis=1)
+    moved, cavity = moving(V), depth > 0.6
+    assert from_scratch[cavity, 0].mean() < baked[cavity, 0].mean() - 0.3
+    assert_allclose(moved[cavity, 0].mean(), from_scratch[cavity, 0].mean(), atol=0.09)
+    for column in range(3):
+        assert rms(moved[:, column] - from_scratch[:, column]) < 0.25 * rms(from_scratch[:, column] - baked[:, column])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_each_side_of_a_sheet_that_curls_has_its_own_light(side):
+    """Most of a tube, whose inside sees a part of the sky and whose outside sees all of it."""
+    V, F = sheet(40)
+    moving, baked = occlusion(V, F)
+    assert_allclose(baked[:, [0, 2]], 1.0)
+    angle = 2.4 * V[:, 0]
+    curled = np.stack([np.sin(angle), 2.4 * V[:, 1], side * (1 - np.cos(angle))], axis=1) / 2.4
+    moved = moving(curled)
+    inside, outside = (0, 2) if side > 0 else (2, 0)
+    middle = (np.abs(V[:, 0]) < 0.5) & (np.abs(V[:, 1]) < 0.5)
+    from_scratch = cast(curled, F, frames_about(smooth_normals(curled, F)), 64, bounding_radius(V))
+    assert moved[middle, inside].max() < 0.75
+    assert_allclose(moved[middle, outside], 1.0, atol=0.01)
+    assert rms(moved[:, inside] - from_scratch[inside]) < 0.03
+
+
+def test_light_does_not_flicker_on_a_surface_that_moves_slowly():
+    V, F = sheet(40)
+    moving, _ = occlusion(V, F)
+
+    def at(time):
+        return moving(V + np.sin(3 * V[:, :1] + time) * [0, 0, 0.4])[:, 0]
+
+    values = np.stack([at(0.01 * i) for i in range(8)])
+    assert np.abs(np.diff(values, axis=0)).max() < 0.02
+    assert rms(np.diff(values, 2, axis=0)) < 0.002
+
+
+def test_a_coarse_mesh_is_spread_evenly_and_has_no_holes():
+    ball = shapes.ball(40)
+    mesh = coarse_mesh(ball.faces, ball.shell, 600)
+    assert len(mesh.vertices) == len(np.unique(mesh.vertices)) == 600
+    V = ball.shell[mesh.vertices]
+    distance = np.linalg.norm(V[:, None] - V[None], axis=2) + 9 * np.eye(600)
+    assert distance.min() > 0.5 * distance.min(axis=0).max()
+    _, count = np.unique(np.sort(mesh.F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+    assert count.min() == 2
+    # now and then one is folded on another
+    outwards = (triangle_normals(V, mesh.F) * V[mesh.F].mean(axis=1)).sum(axis=1)
+    assert (outwards > 0.9).mean() > 0.99
+
+
+def test_two_sides_of_a_thin_plate_stay_apart():
+    plate = shapes.ball(30)
+    V = plate.shell * [1.0, 1.0, 0.02]
+    normals = smooth_normals(V, plate.faces)
+    moving, _ = occlusion(V, plate.faces)
+    # a bowl: above it gets darker, below it does not
+    moved = moving(V + (V[:, :1] ** 2 + V[:, 1:2] ** 2) * [0, 0, 0.8])[:, 0]
+    middle = (np.hypot(V[:, 0], V[:, 1]) < 0.5) & (np.abs(normals[:, 2]) > 0.9)
+    assert moved[middle & (V[:, 2] > 0)].max() < 0.93
+    assert moved[middle & (V[:, 2] < 0)].min() > 0.97
+
+
+def test_a_frame_shows_a_dent_darker_than_with_the_light_at_rest(monkeypatch):
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><worldbody><light pos="0 3 0" dir="0 -1 0"/><geom name="target" type="sphere" size=".2"
+        rgba=".2 .3 .5 1"/></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    ripples = Ripples(model, {"target": Material(speed=1.0, density=1.0)}, resolution=8)
+    ripples["target"].move(0.2 * dented(ripples["target"].rest.mesh.V / 0.2)[0])
+    renderer = RippleRenderer(model, ripples, width=64, height=48)
+    camera = Camera(lookat=(0.0, 0.0, 0.0), distance=0.5, azimuth=90.0, elevation=-60.0)
+    dark = renderer.render(data, camera).astype(float)
+    monkeypatch.setattr(MovingOcclusion, "__call__", lambda self, V: self._baked.astype(np.float32))
+    darker = (renderer.render(data, camera) - dark).mean(axis=2)
+    assert darker.min() >= -1
+    assert (darker > 1.5).sum() > 100

@@ -1,0 +1,141 @@
+"""What is drawn of a model: targets, geoms and sites; their bounds, their order, and messages.
+
+What lights a scene: the lights and skybox of the MJCF, or the studio.
+"""
+
+import mujoco
+import numpy as np
+import pytest
+from drawn import BALL, FLOOR, FRONT, SPOT, SUN, ball_surface, frame_of
+
+from ripple_sim.render.camera import Camera
+from ripple_sim.render.resources import Resources
+from ripple_sim.render.scene import DrawnScene
+from ripple_sim.render.visuals.instances import Assets
+from ripple_sim.solver import RippleError
+
+XML = """<mujoco><worldbody>
+<geom name="target" type="sphere" size=".5" pos="0 0 1"/>
+<geom name="far" type="box" size=".2 .2 .2" pos="0 5 0" rgba="1 0 0 .5"/>
+<geom name="near" type="sphere" size=".2" pos="0 -1 0" rgba="0 1 0 .5"/>
+<geom name="solid" type="capsule" size=".1 .3" pos="2 0 0"/>
+<geom name="wall" type="plane" size="1 1 .1" pos="0 0 -3"/>
+<site type="sphere" size=".1" pos="0 2 0" rgba="0 0 1 .5"/>
+</worldbody></mujoco>"""
+HEIGHT_MAP = np.zeros((6, 10, 10, 4), np.float32)
+POSE = Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0).pose()  # seen from -y
+
+
+class Owner:
+    pass
+
+
+@pytest.fixture(scope="module")
+def model():
+    return mujoco.MjModel.from_xml_string(XML)
+
+
+@pytest.fixture
+def data(model):
+    made = mujoco.MjData(model)
+    mujoco.mj_forward(model, made)
+    return made
+
+
+@pytest.fixture(scope="module", params=["clay", "water"])
+def scene(request, gl, model):
+    """A scene whose target is opaque, and one whose target is transparent."""
+    owner = Owner()
+    with gl:
+        resources = Resources(gl, owner)
+        target = model.geom("target").id
+        surfaces = {target: ball_surface(request.param)}
+        yield DrawnScene(
+            Assets.of(model, resources), surfaces, [g for g in range(model.ngeom) if g != target], (32, 24)
+        )
+        resources.release()
+
+
+def updated(gl, scene, data, height=0.0):
+    height_map = HEIGHT_MAP + np.array([0, 0, 0, height], dtype=np.float32)
+    with gl as ctx:
+        return scene.update(ctx, data, {0: height_map}, POSE)
+
+
+def test_transparent_things_come_with_the_furthest_first(gl, scene, data, model, request):
+    updated(gl, scene, data)
+    layers = scene.layers(data, POSE)
+    away = [np.linalg.norm(layer.balls.centres.mean(axis=0) - POSE.eye) for layer in layers]
+    assert away == sorted(away, reverse=True)
+    y = [round(float(layer.balls.centres[:, 1].mean()), 1) for layer in layers]
+    assert y == [5.0, 2.0, 0.0, -1.0] if len(layers) == 4 else [5.0, 2.0, -1.0]
+    assert len({layer.number for layer in layers}) == len(layers)
+
+
+def test_bounds_contain_the_waves_and_planes_are_without_end(gl, scene, data, model):
+    for height in (0.0, 0.2, -0.2):
+        updated(gl, scene, data, height)
+        balls = scene.balls(data)
+        assert np.isinf(balls.radii).sum() == 1
+        directions = np.random.default_rng(0).normal(size=(50, 3))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        finite = np.isfinite(balls.radii)
+        for point in np.array([0, 0, 1]) + (0.5 + height) * directions:
+            reach = np.linalg.norm(balls.centres[finite] - point, axis=1) - balls.radii[finite]
+            assert reach.min() < 0.01  # a facet's chord under the sphere
+
+
+def test_bounds_of_shadow_casters_stay_the_same_as_a_target_turns(gl, scene, model, data):
+    updated(gl, scene, data)
+    before = scene.casters(data)
+    data.geom_xmat[0] = [0, -1, 0, 1, 0, 0, 0, 0, 1]
+    updated(gl, scene, data)
+    for a, b in zip(before, scene.casters(data), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert np.isfinite(before.radii).all()  # planes cast no shadow
+
+
+def test_planes_and_sites_hide_no_sky(gl, scene, data):
+    updated(gl, scene, data)
+    assert len(scene._geoms.occluders._bound) == 3
+
+
+@pytest.mark.parametrize(
+    ("geom", "message"),
+    [(2, r"geom 2 is no target; the targets' geoms are: 0$"), (0, "has no heatmap; give its `Surf")],
+)
+def test_a_heatmap_needs_a_target_that_shows_one(scene, geom, message):
+    with pytest.raises(RippleError, match=message):
+        scene.set_heatmap(geom, np.zeros((6, 10, 10), np.float32), 1.0)
+
+
+@pytest.mark.parametrize("shape", [(6, 8, 8, 4), (6, 10, 10), (5, 10, 10, 4)])
+def test_a_height_map_of_another_shape_is_refused(gl, scene, data, shape):
+    with pytest.raises(RippleError, match=r"geom 0 has shape .* valid is \[6, 10, 10, 4\]"), gl as ctx:
+        scene.update(ctx, data, {0: np.zeros(shape, np.float32)}, POSE)
+
+
+def test_no_light_in_the_mjcf_means_the_studio_and_both_can_be_asked_for(gl):
+    dark = "<headlight active='0'/>"
+    sun = SUN.format(1.0, "true")
+    np.testing.assert_array_equal(frame_of(gl, FLOOR + BALL), frame_of(gl, FLOOR + BALL, lighting="studio"))
+    np.testing.assert_array_equal(frame_of(gl, FLOOR + BALL + sun), frame_of(gl, FLOOR + BALL + sun, lighting="model"))
+    assert frame_of(gl, FLOOR + BALL, visual=dark, lighting="model").mean() < 40
+    with pytest.raises(RippleError, match=r"'dusk'.*'auto', 'model', 'studio'"):
+        frame_of(gl, FLOOR, lighting="dusk")
+
+
+def test_a_scene_lit_by_a_spot_alone_is_dark_all_round(gl):
+    spot = SPOT.format(0.0, 0.0).replace('exponent="1"', 'exponent="20"')
+    dark = frame_of(gl, FLOOR + BALL + spot, visual='<headlight active="0"/>', camera=FRONT)
+    light = frame_of(gl, FLOOR + BALL + SUN.format(0.0, "true"), visual='<headlight active="0"/>', camera=FRONT)
+    assert dark[:10].mean() < 20 < 80 < light[:10].mean()
+    assert dark.max() > 100
+
+
+def test_skybox_fills_the_background(gl):
+    sky = '<texture type="skybox" builtin="flat" rgb1=".1 .2 .9" width="16" height="96"/>'
+    frame = frame_of(gl, SUN.format(0.0, "true"), asset=sky, camera=FRONT)
+    # bright colours pale a little
+    np.testing.assert_allclose(frame.mean(axis=(0, 1)), 255 * np.array([0.1, 0.2, 0.9]), atol=12)
+    assert frame.std(axis=(0, 1)).max() < 1

@@ -1,0 +1,177 @@
+"""What lies inside a target of a scene file: its thickness, wherever the geom is, and what is refused.
+
+Expressions of scene files: the arithmetic that they promise, and nothing of Python beside it.
+"""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+import trimesh
+
+from ripple_sim import RippleError
+from ripple_sim.errors import SceneError
+from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.target_maps import InsideEntry, evaluate, load_inside
+from ripple_sim.simulation import Simulation
+from ripple_sim.solver.operator.coefficients import STIFF
+
+RADIUS, CORE, SHIFT = 0.5, 0.3, 0.08  # m; the core is shifted towards the body's x
+MODULUS, DENSITY = 500.0, 1000.0
+VOXEL = 0.05
+
+MJCF = f"""<mujoco><worldbody><body pos="3 0 0" euler="0 0 90">
+<geom name="egg" type="sphere" size="{RADIUS}" pos="0 2 0" euler="0 90 0"/></body></worldbody></mujoco>"""
+TOML = """model = "egg.xml"
+[[ripple]]
+geom = "egg"
+resolution = 24
+[ripple.material]
+preset = {name = "layer", modulus = 500, density = 1000}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A scene of a sphere that stands apart and turned in its body, and its core in millimetres and in voxels."""
+    (tmp_path / "egg.xml").write_text(MJCF)
+    core = trimesh.creation.icosphere(subdivisions=4, radius=1e3 * CORE)
+    core.apply_translation([1e3 * SHIFT, 2e3, 0.0]).export(tmp_path / "core.stl")
+    nodes = np.arange(-0.5, 0.5 + VOXEL / 2, VOXEL)
+    x, y, z = np.meshgrid(nodes, nodes, nodes, indexing="ij")
+    np.save(tmp_path / "core.npy", CORE - np.sqrt((x - SHIFT) ** 2 + y**2 + z**2))
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        "mesh = 'core.stl'\nscale = 1e-3",
+        "volume = 'core.npy'\nthreshold = 0.0\nspacing = 0.05\norigin = [-0.5, 1.5, -0.5]",
+    ],
+    ids=["mesh", "volume"],
+)
+def test_the_layer_is_as_thick_as_what_is_inside_leaves_it(folder: Path, inside: str) -> None:
+    (folder / "egg.toml").write_text(TOML + f"[[ripple.inside]]\n{inside}\n")
+    simulation = Simulation(load_scene(folder / "egg.toml"), backend="cpu")
+    waves = simulation.ripples["egg"]
+    along = np.array([SHIFT, 2.0, 0.0])
+    middle = simulation.ripples.to_geom("egg", along)  # where the core is in the frame of the geom
+    to, n = middle - waves.atlas.positions, -waves.atlas.normals
+    near = (to * n).sum(axis=-1)
+    exact = near - np.sqrt(CORE**2 - (to**2).sum(axis=-1) + near**2)
+    thickness = np.sqrt(STIFF * MODULUS / DENSITY / waves.material.stiffness)
+    assert np.quantile(np.abs(thickness / exact - 1), 0.99) < 0.03
+    assert exact.max() > 2 * exact.min()
+    np.testing.assert_allclose(waves.material.density, 0.665 * DENSITY * thickness)
+
+
+def test_limits_hold(folder: Path) -> None:
+    limits = "thickness_limits = [0.15, 0.25]"
+    toml = TOML.replace("resolution = 24", f"resolution = 24\n{limits}")
+    (folder / "egg.toml").write_text(toml + "[[ripple.inside]]\nmesh = 'core.stl'\nscale = 1e-3\n")
+    density = np.asarray(Simulation(load_scene(folder / "egg.toml"), backend="cpu").ripples["egg"].material.density)
+    assert density.min() == pytest.approx(0.665 * DENSITY * 0.15)
+    assert density.max() == pytest.approx(0.665 * DENSITY * 0.25)
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ({}, "neither or both of mesh and volume"),
+        ({"mesh": "a.obj", "volume": "b.nii"}, "neither or both of mesh and volume"),
+        ({"volume": "b.nii"}, "needs a threshold"),
+        ({"mesh": "a.obj", "threshold": 1.0}, "takes no threshold"),
+        ({"mesh": "a.obj", "scale": 0.0}, "scale of a .* is 0.0; valid is a number greater than 0"),
+        ({"volume": "b.npy", "threshold": 1.0, "spacing": -1.0}, "spacing of a .* is -1.0"),
+    ],
+)
+def test_senseless_entries_are_refused(entry: dict, message: str) -> None:
+    with pytest.raises(RippleError, match=message):
+        msgspec.convert(entry, InsideEntry).check()
+
+
+@pytest.mark.parametrize(
+    ("toml", "message"),
+    [
+        (TOML.replace("preset", "#"), r"needs a layer; write preset = \{name = 'layer'"),
+        (TOML.replace('"layer", modulus = 500', '"plate", modulus = 500'), "not the preset 'plate'"),
+        (TOML.replace("resolution = 24", "thickness_limits = [2, 1]"), "the least first"),
+    ],
+    ids=["without-preset", "no-layer", "limits"],
+)
+def test_a_scene_without_a_layer_is_refused(folder: Path, toml: str, message: str) -> None:
+    (folder / "egg.toml").write_text(toml + "[[ripple.inside]]\nmesh = 'core.stl'\n")
+    with pytest.raises(RippleError, match=message):
+        load_scene(folder / "egg.toml")
+
+
+def test_files_are_told_apart_by_their_endings(folder: Path) -> None:
+    with pytest.raises(RippleError, match="is a volume, which needs a threshold"):
+        load_inside(folder / "core.npy")
+    with pytest.raises(RippleError, match="is a mesh, which takes no threshold"):
+        load_inside(folder / "core.stl", 0.5)
+    assert np.ptp(load_inside(folder / "core.npy", 0.0, VOXEL, scale=2.0).surface()[0][:, 0]) == pytest.approx(
+        4 * CORE, rel=0.02
+    )
+
+
+X, Y = np.linspace(-1, 1, 12).reshape(3, 4), np.linspace(0, 2, 12).reshape(3, 4)
+NAMES = {"x": X, "y": Y, "z": 0 * X}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("0.02", 0.02 + 0 * X),
+        ("x + 2*y - z", X + 2 * Y),
+        (" -x**2 / 4 ", -(X**2) / 4),
+        ("2**-x % 1", 2**-X % 1),
+        ("0.02 * exp(-(x**2 + y**2) / 0.1**2)", 0.02 * np.exp(-(X**2 + Y**2) / 0.01)),
+        ("sin(2*pi*x) * cos(y) + tan(z) + atan2(y, x)", np.sin(2 * np.pi * X) * np.cos(Y) + np.arctan2(Y, X)),
+        ("where(hypot(x, y) < 0.5, 1, minimum(x, y))", np.where(np.hypot(X, Y) < 0.5, 1, np.minimum(X, Y))),
+        ("maximum(sqrt(abs(x)), log(1 + y))", np.maximum(np.sqrt(np.abs(X)), np.log(1 + Y))),
+    ],
+)
+def test_they_are_what_they_say(text: str, value: np.ndarray) -> None:
+    np.testing.assert_allclose(evaluate(text, NAMES), value, rtol=1e-14, atol=1e-16)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "__import__('os').system('true')",
+        "x.__class__",
+        "(lambda: 1)()",
+        "[x for x in y]",
+        "x if y else z",
+        "open('a')",
+        "'a' * 9",
+        "x[0]",
+        "exp(x, y)",
+        "exp(x=1)",
+        "sin",
+        "w",
+        "x < y < z",
+        "x and y",
+        "True",
+        "1j",
+        "exp(*x)",
+        "x := 3",
+        "x; y",
+        "",
+        "(" * 300 + "x" + ")" * 300,
+        "-" * 990 + "x",
+        "x+" * 600 + "x",
+        "9**9**9**9",
+        "log(0)",
+        "1/x + 1/(x-x)",
+        "\0",
+    ],
+)
+def test_anything_else_is_refused_in_one_line(text: str) -> None:
+    with pytest.raises(SceneError, match="the expression") as error:
+        evaluate(text, NAMES)
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 600

@@ -1,0 +1,277 @@
+"""The cube map's geometry: directions, neighbours across edges, symmetries.
+
+Areas of the texels: all of the surface, where the texel mesh cuts corners as well, but no limb that it misses.
+
+Texture coordinates into the atlas: every triangle in one chart's [0, 1], sampling agrees with direct evaluation.
+"""
+
+import numpy as np
+import pytest
+import trimesh
+
+from ripple_sim.solver import Atlas, AtlasError, Mesh, build_atlas, sphere_atlas
+from ripple_sim.solver.layouts.build import atlas_from_sphere_map
+from ripple_sim.solver.layouts.cube.convention import (
+    CHART_NORMALS,
+    CHART_U,
+    CHART_V,
+    check_resolution,
+    cube_chart_points,
+    cube_rotations,
+    cube_topology,
+    permute_texels,
+    solid_angles,
+    texel_directions,
+)
+from ripple_sim.solver.texels.texel_mesh import TexelMesh
+
+
+@pytest.mark.parametrize("n", [4, 5, 16, 33])
+def test_cube_chart_points_invert_texel_directions(n: int) -> None:
+    chart, row, column = (x.reshape(6, n, n) for x in cube_chart_points(texel_directions(n), n))
+    assert (chart == np.arange(6)[:, None, None]).all()
+    np.testing.assert_allclose(row, np.broadcast_to(np.arange(n)[:, None], (6, n, n)), atol=1e-9)
+    np.testing.assert_allclose(column, np.broadcast_to(np.arange(n), (6, n, n)), atol=1e-9)
+
+
+@pytest.mark.parametrize("n", [4, 7, 16])
+def test_the_halo_holds_the_nearest_texels_across_the_edges(n: int) -> None:
+    directions = texel_directions(n).reshape(-1, 3)
+    index = cube_topology(n).halo
+    for chart in range(6):
+        for own, beside in (
+            (index[chart, 1, 1:-1], index[chart, 0, 1:-1]),
+            (index[chart, -2, 1:-1], index[chart, -1, 1:-1]),
+            (index[chart, 1:-1, 1], index[chart, 1:-1, 0]),
+            (index[chart, 1:-1, -2], index[chart, 1:-1, -1]),
+        ):
+            other = (directions[own] @ directions.T).copy()
+            same_chart = np.arange(6 * n * n) // (n * n) == chart
+            other[:, same_chart] = -1
+            # the outermost texels stand at a cube corner, equally near to two charts
+            np.testing.assert_array_equal(other.argmax(axis=1)[1:-1], beside[1:-1])
+            assert (other[np.arange(n), beside] > other.max(axis=1) - 1e-12).all()
+    assert (index < 0).sum() == 24
+
+
+def test_neighbourhood_is_symmetric() -> None:
+    n = 8
+    index = cube_topology(n).halo
+    pairs = set()
+    for dr, dc in ((0, 1), (1, 0), (0, -1), (-1, 0)):
+        a = index[:, 1:-1, 1:-1].ravel()
+        b = index[:, 1 + dr : n + 1 + dr, 1 + dc : n + 1 + dc].ravel()
+        pairs |= set(zip(a.tolist(), b.tolist(), strict=True))
+    assert all((b, a) in pairs for a, b in pairs)
+    assert len(pairs) == 4 * 6 * n * n
+
+
+def test_rotations_permute_texels_exactly() -> None:
+    directions = texel_directions(9)
+    rotations = cube_rotations()
+    assert len(rotations) == 24
+    assert len({rotation.tobytes() for rotation in rotations}) == 24
+    for rotation in rotations:
+        assert np.linalg.det(rotation) == pytest.approx(1)
+        # the texel at R d shows what stood at d: its own direction turned back
+        np.testing.assert_allclose(permute_texels(directions, rotation), directions @ rotation, atol=1e-15)
+
+
+@pytest.mark.parametrize("bad", [0, 3, 2.5, -8, 10_000])
+def test_invalid_resolution_is_named(bad: float) -> None:
+    with pytest.raises(AtlasError, match=r"valid is a whole number"):
+        check_resolution(bad)
+
+
+def spanned_areas(atlas: Atlas) -> np.ndarray:
+    return TexelMesh.of(atlas.texels.topology, atlas.positions).areas
+
+
+@pytest.fixture(scope="module")
+def creased() -> Atlas:
+    """A long box: all its curvature is in its edges, which lie anywhere between the texels."""
+    box = trimesh.creation.box(extents=[1.0, 0.6, 0.35]).subdivide().subdivide().subdivide()
+    return build_atlas(Mesh.from_arrays(box.vertices, box.faces), 48, cache=False)
+
+
+def test_solid_angles_fill_the_sphere() -> None:
+    for n in (4, 7, 64):
+        assert 6 * solid_angles(n).sum() == pytest.approx(4 * np.pi, rel=1e-12)
+        assert (solid_angles(n) > 0).all()
+
+
+def test_areas_sum_to_that_of_a_creased_surface(creased: Atlas) -> None:
+    area = creased.mesh.area
+    # the texel mesh alone cuts the box's edges off
+    assert spanned_areas(creased).sum() < 0.993 * area
+    assert creased.areas.sum() == pytest.approx(area, rel=1.5e-3)
+    assert creased.quality()["coverage"] == pytest.approx(1, abs=1.5e-3)
+
+
+def test_areas_are_those_of_the_texel_mesh_where_it_follows_the_surface(ball_mesh: Mesh) -> None:
+    atlas = build_atlas(ball_mesh, 48, cache=False)
+    np.testing.assert_allclose(atlas.areas, spanned_areas(atlas), rtol=0.03)
+    assert atlas.areas.sum() == pytest.approx(ball_mesh.area, rel=1e-3)
+
+
+def test_limbs_that_fall_between_the_texels_are_not_covered(animal: Atlas) -> None:
+    conformal = build_atlas(animal.mesh, 64, "conformal", cache=False)
+    spanned = spanned_areas(conformal).sum() / animal.mesh.area
+    assert spanned < 0.97
+    assert conformal.quality()["coverage"] < (1 + spanned) / 2
+    assert animal.quality()["coverage"] == pytest.approx(1, abs=3e-3)
+
+
+def test_areas_of_the_sphere_have_the_symmetries_of_the_cube() -> None:
+    areas = sphere_atlas(2.0, 12).areas
+    for rotation in cube_rotations():
+        np.testing.assert_allclose(permute_texels(areas, rotation), areas, rtol=1e-12)
+
+
+def ball(subdivisions: int, resolution: int) -> Atlas:
+    """A turned icosphere, so that its triangles cross the cube's edges anyhow, mapped onto itself."""
+    solid = trimesh.creation.icosphere(subdivisions=subdivisions)
+    turned = solid.vertices @ trimesh.transformations.rotation_matrix(0.7, [1, 2, 3])[:3, :3].T
+    mesh = Mesh.from_arrays(turned, solid.faces)
+    return atlas_from_sphere_map(mesh, mesh.V / np.linalg.norm(mesh.V, axis=1, keepdims=True), resolution)
+
+
+def smooth(directions: np.ndarray) -> np.ndarray:
+    x, y, z = np.moveaxis(directions, -1, 0)
+    return np.sin(2 * x + y) + x * y * z + 0.5 * z**2
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def direction_at(chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """The direction that a place in a chart stands for, by the definition of the equiangular cube map."""
+    a, b = np.tan(np.pi / 4 * (2 * uv - 1)).T
+    return unit(CHART_NORMALS[chart] + a[:, None] * CHART_U[chart] + b[:, None] * CHART_V[chart])
+
+
+def sample(field: np.ndarray, chart: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Bilinear interpolation in six layers with halo, as a GPU does it."""
+    n = field.shape[1]
+    index = cube_topology(n).halo
+    with_halo = field.reshape(-1)[index]
+    for r, r_in in ((0, 1), (n + 1, n)):
+        for c, c_in in ((0, 1), (n + 1, n)):
+            with_halo[:, r, c] = (with_halo[:, r_in, c_in] + with_halo[:, r, c_in] + with_halo[:, r_in, c]) / 3
+    column, row = (uv * n + 0.5).T
+    j, i = np.floor(column).astype(int).clip(0, n), np.floor(row).astype(int).clip(0, n)
+    s, t = column - j, row - i
+    return (
+        (1 - t) * ((1 - s) * with_halo[chart, i, j] + s * with_halo[chart, i, j + 1])
+        + t * ((1 - s) * with_halo[chart, i + 1, j] + s * with_halo[chart, i + 1, j + 1])
+    )  # fmt: skip
+
+
+def interior_points(atlas: Atlas, seed: int):
+    """One random point inside each piece: its chart, interpolated coordinates, and true direction."""
+    coordinates = atlas.texture_coordinates()
+    weights = np.random.default_rng(seed).dirichlet(np.ones(3), size=len(coordinates.chart))
+    uv = np.einsum("pi,pij->pj", weights, coordinates.uv)
+    corners = coordinates.carry(atlas.sphere[atlas.mesh.F])
+    return coordinates.chart, uv, unit(np.einsum("pi,pij->pj", weights, corners))
+
+
+def test_pieces_make_up_every_triangle_in_its_winding() -> None:
+    atlas = ball(2, 8)
+    coordinates = atlas.texture_coordinates()
+    share = np.linalg.det(coordinates.barycentrics)
+    assert (share > 0).all()
+    np.testing.assert_allclose(np.bincount(coordinates.triangle, share), 1, atol=1e-10)
+    assert (coordinates.barycentrics >= 0).all()
+    np.testing.assert_allclose(coordinates.barycentrics.sum(axis=2), 1)
+    assert (np.diff(coordinates.triangle) >= 0).all()
+    corners = coordinates.carry(atlas.mesh.V[atlas.mesh.F])
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    assert area == pytest.approx(atlas.mesh.area)
+
+
+def test_every_corner_of_the_mesh_has_exact_coordinates(animal: Atlas) -> None:
+    coordinates = animal.texture_coordinates()
+    at_corner = coordinates.barycentrics.max(axis=2) == 1
+    corner = coordinates.barycentrics.argmax(axis=2)
+    found = {(t, k) for t, ks, here in zip(coordinates.triangle, corner, at_corner, strict=True) for k in ks[here]}
+    assert len(found) == animal.mesh.F.size
+    assert coordinates.uv.min() >= 0
+    assert coordinates.uv.max() <= 1
+    directions = unit(coordinates.carry(animal.sphere[animal.mesh.F]))
+    for k in range(3):
+        np.testing.assert_allclose(direction_at(coordinates.chart, coordinates.uv[:, k]), directions[:, k], atol=1e-11)
+
+
+def test_triangles_are_cut_exactly_where_they_cross_a_cube_edge(animal: Atlas) -> None:
+    coordinates = animal.texture_coordinates()
+    pieces = np.bincount(coordinates.triangle)
+    corners = animal.sphere[animal.mesh.F]
+    axis = np.abs(corners).argmax(axis=2)
+    sign = np.sign(np.take_along_axis(corners, axis[..., None], axis=2))[..., 0]
+    one_face = (axis == axis[:, :1]).all(axis=1) & (sign == sign[:, :1]).all(axis=1)
+    assert (pieces[one_face] == 1).all()
+    assert (pieces[~one_face] > 1).all()
+    assert 0 < (~one_face).sum() < len(pieces) / 4
+
+
+def test_interpolated_coordinates_converge_at_second_order() -> None:
+    errors = []
+    for subdivisions in (3, 4, 5):
+        chart, uv, directions = interior_points(ball(subdivisions, 8), 0)
+        distance = np.linalg.norm(direction_at(chart, uv) - directions, axis=1)
+        assert distance.max() < 0.01
+        errors.append(np.sqrt((distance**2).mean()))
+    assert errors[0] / errors[1] == pytest.approx(4, abs=0.4)
+    assert errors[1] / errors[2] == pytest.approx(4, abs=0.4)
+
+
+def test_sampling_a_texture_with_halo_agrees_with_the_field_itself() -> None:
+    atlas = ball(5, 64)
+    chart, uv, directions = interior_points(atlas, 1)
+    texture = smooth(texel_directions(64))
+    error = np.abs(sample(texture, chart, uv) - smooth(directions))
+    texel = np.pi / 2 / 64
+    near_edge = np.abs(2 * uv - 1).max(axis=1) > 1 - 1 / 64
+    # bilinear interpolation is of second order; along cube edges the grid lines kink, which leaves a share of a texel
+    assert error[~near_edge].max() < 2 * texel**2
+    assert error.max() < texel
+    corners = atlas.texture_coordinates()
+    at_vertices = sample(texture, np.repeat(corners.chart, 3), corners.uv.reshape(-1, 2))
+    assert np.abs(at_vertices - smooth(unit(corners.carry(atlas.sphere[atlas.mesh.F]))).ravel()).max() < texel
+
+
+def test_a_sampled_texture_has_no_seam() -> None:
+    atlas = ball(3, 16)
+    coordinates = atlas.texture_coordinates()
+    texture = np.random.default_rng(2).standard_normal((6, 16, 16))
+    values = sample(texture, np.repeat(coordinates.chart, 3), coordinates.uv.reshape(-1, 2))
+    directions = unit(coordinates.carry(atlas.sphere[atlas.mesh.F])).reshape(-1, 3)
+    _, first, same = np.unique(directions.round(9) + 0.0, axis=0, return_index=True, return_inverse=True)
+    np.testing.assert_allclose(values, values[first][same.reshape(-1)], atol=1e-6)
+    charts = np.repeat(coordinates.chart, 3)
+    assert (charts != charts[first][same.reshape(-1)]).sum() > 100  # on edges, where the question arises
+
+
+def test_triangles_as_large_as_a_quarter_of_the_sphere_are_cut() -> None:
+    V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    atlas = build_atlas(Mesh.from_arrays(V, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]), 8, cache=False)
+    coordinates = atlas.texture_coordinates()
+    assert set(coordinates.chart) == set(range(6))
+    np.testing.assert_allclose(np.bincount(coordinates.triangle, np.linalg.det(coordinates.barycentrics)), 1)
+
+
+def test_the_objects_own_coordinates_are_carried_along_and_stay() -> None:
+    solid = trimesh.creation.icosphere(subdivisions=2)
+    own = np.random.default_rng(3).uniform(size=(len(solid.faces), 3, 2))
+    mesh = Mesh.from_arrays(solid.vertices, solid.faces, own)
+    atlas = atlas_from_sphere_map(mesh, mesh.V, 8)
+    coordinates = atlas.texture_coordinates()
+    np.testing.assert_array_equal(mesh.corner_uv, own)
+    carried = coordinates.carry(mesh.corner_uv)
+    whole = (coordinates.barycentrics == np.eye(3)).all(axis=(1, 2))
+    np.testing.assert_array_equal(carried[whole], own[coordinates.triangle[whole]])
+    low, high = own.min(axis=1)[coordinates.triangle], own.max(axis=1)[coordinates.triangle]
+    assert (carried >= low[:, None] - 1e-12).all()
+    assert (carried <= high[:, None] + 1e-12).all()

@@ -1,0 +1,201 @@
+"""Levels of detail renumber what is left of a mesh.
+
+Reference triangles: carried area, real shapes, and what slivers and points become.
+"""
+
+import numpy as np
+import pytest
+from genus_zero import TETRAHEDRON, bipyramid, crumpled, icosphere, stretched
+from levels import whole_level
+
+from ripple_sim.solver.layouts.sphere_map.decimation import collapse, corner_table, decimate, gather_star
+from ripple_sim.solver.layouts.sphere_map.energy import Reference
+from ripple_sim.solver.layouts.sphere_map.level import (
+    Source,
+    build_level,
+    carry,
+    star_shapes,
+    update_level,
+    update_load,
+    update_triangle,
+)
+
+
+def partial_level(V, F, count):
+    """The level with `count` vertices, their numbers in the mesh, and the triangles by these numbers."""
+    table = corner_table(F, len(V))
+    whole = corner_table(F, len(V))
+    log = decimate(whole, V)[: len(V) - count]
+    for h in log:
+        collapse(table, h)
+    vertices = np.setdiff1d(np.arange(len(V)), table.tail[log])
+    triangles = np.setdiff1d(np.arange(len(F)), np.concatenate([log // 3, table.twin[log] // 3]))
+    level = build_level(table, vertices, triangles)
+    return level, vertices, table.tail.reshape(-1, 3)[triangles]
+
+
+@pytest.mark.parametrize("count", [4, 5, 20, 42])
+def test_a_level_has_the_triangles_that_collapses_left(count):
+    level, vertices, triangles = partial_level(*icosphere(1), count)
+    assert len(vertices) == count and len(triangles) == 2 * count - 4
+    np.testing.assert_array_equal(vertices[level.tail.reshape(-1, 3)], triangles)
+    head = np.roll(level.tail.reshape(-1, 3), -1, axis=1).ravel()
+    np.testing.assert_array_equal(head[level.star], level.ring)
+    np.testing.assert_array_equal(level.tail[level.star], np.repeat(np.arange(count), np.diff(level.star_start)))
+
+
+@pytest.mark.parametrize("count", [4, 5, 20, 42])
+def test_every_edge_of_a_level_has_two_half_edges_and_the_ends_of_the_lower_one(count):
+    level, *_ = partial_level(*icosphere(1), count)
+    head = np.roll(level.tail.reshape(-1, 3), -1, axis=1).ravel()
+    assert len(level.ends) == 3 * count - 6
+    for e, (a, b) in enumerate(level.ends):
+        lower, upper = np.flatnonzero(level.edge == e)
+        assert (level.tail[lower], head[lower]) == (a, b)
+        assert (level.tail[upper], head[upper]) == (b, a)
+
+
+@pytest.mark.parametrize("shape", [TETRAHEDRON, bipyramid(3), bipyramid(60), icosphere(1)])
+def test_rings_go_counterclockwise_and_stars_lead_to_them(shape):
+    V, F = shape
+    level, _ = whole_level(V, F)
+    head = np.roll(level.tail.reshape(-1, 3), -1, axis=1).ravel()
+    np.testing.assert_array_equal(head[level.star], level.ring)
+    np.testing.assert_array_equal(level.tail[level.star], np.repeat(np.arange(len(V)), np.diff(level.star_start)))
+    for v in range(len(V)):
+        first, last = level.star_start[v : v + 2]
+        for a, b, h in zip(
+            level.ring[first:last], np.roll(level.ring[first:last], -1), level.star[first:last], strict=True
+        ):
+            assert {v, int(a), int(b)} == set(F[h // 3].tolist())
+            assert np.linalg.det(V[[v, a, b]]) > 0  # seen from outside
+
+
+def test_shapes_of_a_star_name_the_angles_at_the_vertex_and_at_its_neighbours():
+    V, F = icosphere(1)
+    V = V * [1.0, 2.0, 0.5]
+    level, reference = whole_level(V, F)
+    shapes = star_shapes(level.star, reference)
+    first, last = level.star_start[3:5]
+    for i in range(first, last):
+        neighbour = level.ring[i]
+        (apex,) = set(F[level.star[i] // 3].tolist()) - {3, int(neighbour)}
+        for at, (p, q, r) in enumerate([(3, neighbour, apex), (neighbour, apex, 3), (apex, 3, neighbour)], start=1):
+            e, f = V[q] - V[p], V[r] - V[p]
+            twice_area = np.linalg.norm(np.cross(e, f))
+            assert shapes[i, 0] == pytest.approx(twice_area / 2)
+            assert shapes[i, at] == pytest.approx(e @ f / twice_area / twice_area)
+
+
+EQUILATERAL = 1 / np.sqrt(3)
+
+
+def areas(V, F):
+    return np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1) / 2
+
+
+def source_of(V, F, *, trust=1.0, sliver=1e-9):
+    """A mesh scaled to the area of the sphere, with its own areas carried by its vertices."""
+    V = V * np.sqrt(4 * np.pi / max(areas(V, F).sum(), 1e-300))
+    carried = np.bincount(F.ravel(), np.repeat(areas(V, F) / 3, 3), len(V))
+    return Source(V, carried, np.ones(len(V)), trust, sliver, 4 * np.pi / len(F))
+
+
+def references(source, F):
+    """References of the whole mesh."""
+    table = corner_table(F, len(source.V))
+    reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)))
+    update_level(np.arange(len(source.V)), np.arange(len(F)), table, source, reference)
+    return reference
+
+
+def angle_cotangents(reference):
+    return reference.cotangent.reshape(-1, 3) * 2 * reference.area[:, None]
+
+
+def test_area_is_carried_on_through_a_chain_of_collapses_and_none_is_lost():
+    carried = np.array([1.0, 2.0, 4.0, 8.0])
+    carry(np.array([0, 1, 2]), np.array([1, 2, 3]), carried)
+    assert carried[3] == 15
+    V, F = crumpled()
+    source, table = source_of(V, F), corner_table(F, len(V))
+    log = decimate(table, source.V)
+    removed, kept = table.tail[log], table.tail[table.twin[log]]
+    carry(removed, kept, source.carried)
+    last = np.setdiff1d(np.arange(len(V)), removed)
+    assert source.carried[last].sum() == pytest.approx(4 * np.pi)
+    assert (source.carried[last] > 0).all()
+
+
+def test_full_trust_in_a_whole_mesh_gives_its_own_triangles():
+    V, F = stretched([1, 2, 3], subdivisions=2)
+    source = source_of(V, F)
+    expected, reference = whole_level(source.V, F)[1], references(source, F)
+    np.testing.assert_allclose(source.load, 1, rtol=1e-12)
+    np.testing.assert_allclose(reference.area, expected.area, rtol=1e-12)
+    np.testing.assert_allclose(reference.cotangent, expected.cotangent, rtol=1e-9, atol=1e-9)
+
+
+def test_no_trust_gives_equal_equilateral_triangles():
+    V, F = crumpled()
+    reference = references(source_of(V, F, trust=0.0), F)
+    np.testing.assert_allclose(reference.area, 4 * np.pi / len(F), rtol=1e-12)
+    np.testing.assert_allclose(angle_cotangents(reference), EQUILATERAL, rtol=1e-9)
+
+
+@pytest.mark.parametrize("trust", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("sliver", [0.15, 0.5])
+def test_references_of_any_trust_are_triangles_whose_areas_make_up_the_sphere(trust, sliver):
+    V, F = crumpled()
+    reference = references(source_of(V, F, trust=trust, sliver=sliver), F)
+    assert reference.area.sum() == pytest.approx(4 * np.pi, rel=1e-12)
+    assert (reference.area > 0).all()
+    a, b, c = angle_cotangents(reference).T
+    np.testing.assert_allclose(a * b + b * c + c * a, 1, rtol=1e-9)  # angles that add up to pi
+
+
+def test_load_is_the_area_carried_over_the_area_shown():
+    V, F = icosphere(1)
+    source, table = source_of(V, F), corner_table(F, len(V))
+    star = np.empty(len(V), np.int32)
+    for carried, load in ((source.carried[5], 1.0), (3 * source.carried[5], 3.0)):
+        source.carried[5] = carried
+        update_load(5, star, gather_star(table, 5, star), table.tail, source)
+        assert source.load[5] == pytest.approx(load)
+
+
+def test_a_vertex_with_more_area_to_carry_gets_larger_triangles():
+    V, F = icosphere(1)
+    source = source_of(V, F)
+    source.carried[5] *= 10
+    reference = references(source, F)
+    around = (F == 5).any(axis=1)
+    assert reference.area[around].min() > 2 * reference.area[~around].max()
+
+
+def one_triangle(corners, **options):
+    V, F = np.array(corners, dtype=float), np.array([[0, 1, 2]])
+    settings = {"trust": 1.0, "sliver": 0.5} | options
+    reference = Reference(np.zeros(1), np.zeros(3))
+    source = Source(V, np.ones(3), np.ones(3), settings["trust"], settings["sliver"], 1.0)
+    update_triangle(0, F.ravel().astype(np.int32), source, reference)
+    return reference
+
+
+def test_only_slivers_are_pulled_towards_equilateral():
+    good = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    np.testing.assert_allclose(angle_cotangents(one_triangle(good)), [[0, 1, 1]], atol=1e-12)
+    thin = [[0, 0, 0], [1, 0, 0], [0.5, 0.01, 0]]
+    steepest = [np.abs(angle_cotangents(one_triangle(thin, sliver=sliver))).max() for sliver in (1e-6, 0.15, 0.5)]
+    assert steepest[0] == pytest.approx(50, rel=1e-6)
+    assert steepest[0] > 5 * steepest[1] > 5 * steepest[2] > 5 * EQUILATERAL
+
+
+@pytest.mark.parametrize(
+    "corners", [[[1, 1, 1]] * 3, [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 0, 0], [0, 0, 0], [1, 0, 0]]]
+)
+def test_a_triangle_without_area_gets_the_smallest_share_and_finite_cotangents(corners):
+    reference = one_triangle(corners)
+    assert reference.area[0] == pytest.approx(1e-3)  # of the mean
+    a, b, c = angle_cotangents(reference)[0]
+    assert a * b + b * c + c * a == pytest.approx(1, rel=1e-6)

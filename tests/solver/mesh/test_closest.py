@@ -1,0 +1,110 @@
+"""The tree of boxes finds the nearest points of a mesh: those that libigl finds.
+
+Rays from above meet the highest point of a mesh.
+"""
+
+import igl
+import numpy as np
+import pytest
+import trimesh
+
+from ripple_sim.scenes.shapes import limbed
+from ripple_sim.solver.mesh.closest import TriangleTree, closest_points, downward_hits, refitted, triangle_tree
+from ripple_sim.solver.texels.chart_map import barycentrics_in
+
+
+def by_igl(V: np.ndarray, F: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    tree = igl.AABB()
+    tree.init(V, F)
+    squared, _, closest = tree.squared_distance(V, F, points)
+    return np.sqrt(squared), closest
+
+
+def check(V: np.ndarray, F: np.ndarray, points: np.ndarray, tree: TriangleTree | None = None) -> np.ndarray:
+    distances, expected = by_igl(V, F, points)
+    triangles, closest = closest_points(tree or triangle_tree(V, F), points)
+    np.testing.assert_allclose(np.linalg.norm(closest - points, axis=1), distances, rtol=1e-12, atol=1e-14)
+    corners = V[F[triangles]]
+    on_them = np.einsum("kc,kcj->kj", barycentrics_in(corners, closest), corners)
+    np.testing.assert_allclose(on_them, closest, atol=1e-9)
+    return np.linalg.norm(closest - expected, axis=1)
+
+
+@pytest.mark.parametrize("away", [0.0, 1e-3, 0.1])
+def test_nearest_points_are_those_of_libigl(away: float) -> None:
+    V, F = limbed()
+    rng = np.random.default_rng(0)
+    points = V[F[rng.integers(len(F), size=2000)]].mean(axis=1) + away * rng.standard_normal((2000, 3))
+    assert check(V, F, points).max() < 1e-9
+
+
+def test_the_tree_of_a_mesh_whose_vertices_moved_finds_its_points() -> None:
+    V, F = limbed()
+    rng = np.random.default_rng(1)
+    moved = V @ np.linalg.qr(rng.standard_normal((3, 3)))[0] + 0.2 * np.sin(5 * V[:, [1, 2, 0]])
+    points = rng.uniform(-1, 1, (500, 3))
+    assert check(moved, F, points, refitted(triangle_tree(V, F), moved, F)).max() < 1e-9
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 9, 100])
+def test_a_few_triangles_in_any_place(count: int) -> None:
+    rng = np.random.default_rng(count)
+    V, F = rng.uniform(-1, 1, (3 * count, 3)), np.arange(3 * count).reshape(-1, 3)
+    assert check(V, F, rng.uniform(-3, 3, (500, 3))).max() < 1e-9
+
+
+def test_triangles_without_area_and_triangles_in_one_place() -> None:
+    V = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
+    F = np.array([[0, 0, 0], [0, 1, 2], [1, 1, 2], *[[0, 1, 3]] * 9])
+    points = np.array([[0.0, 0, 1], [1.5, -1, 0], [3, 0, 0], [0.2, 0.2, -2], [-1, 5, 0]])
+    _, closest = closest_points(triangle_tree(V, F), points)
+    np.testing.assert_allclose(closest, [[0, 0, 0], [1.5, 0, 0], [2, 0, 0], [0.2, 0.2, 0], [0, 1, 0]], atol=1e-15)
+
+
+def hits(solid: trimesh.Trimesh, xy: list) -> np.ndarray:
+    return downward_hits(np.array(solid.vertices), np.array(solid.faces), np.array(xy, dtype=float).reshape(-1, 2))
+
+
+def test_heights_on_a_slope_are_those_of_its_plane() -> None:
+    V = np.array([[0.0, 0, 0], [4, 0, 2], [0, 4, -1]])
+    xy = np.random.default_rng(0).dirichlet([1, 1, 1], 50) @ V[:, :2]
+    z = downward_hits(V, np.array([[0, 1, 2]]), xy)
+    np.testing.assert_allclose(z, 0.5 * xy[:, 0] - 0.25 * xy[:, 1], atol=1e-5)
+
+
+def test_triangles_are_met_from_behind_too() -> None:
+    V = np.array([[0.0, 0, 1], [1, 0, 1], [0, 1, 1]])
+    for F in ([[0, 1, 2]], [[0, 2, 1]]):
+        assert downward_hits(V, np.array(F), np.array([[0.2, 0.3]])) == pytest.approx([1.0])
+
+
+def test_the_upper_of_two_surfaces_is_met() -> None:
+    low, high = (trimesh.creation.box(extents=[s, s, 1]) for s in (4, 2))
+    high.apply_translation([0, 0, 5])
+    assert hits(low + high, [[0.3, 0.2], [1.5, 0.2]]) == pytest.approx([5.5, 0.5])
+
+
+def test_rays_beside_the_mesh_give_no_number() -> None:
+    z = hits(trimesh.creation.box(), [[0.1, 0.2], [0.6, 0], [0, -50]])
+    assert z[0] == pytest.approx(0.5)
+    assert np.isnan(z[1:]).all()
+
+
+def test_without_points_there_are_no_heights() -> None:
+    assert hits(trimesh.creation.box(), []).shape == (0,)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("offset", [[0, 0, 0], [0, 0, -3], [2, -1, 7]])
+def test_heights_follow_size_and_place_of_the_mesh(size: float, offset: list[float]) -> None:
+    solid = trimesh.creation.box(extents=[1, 1, 1])
+    solid.apply_translation(offset)
+    solid.apply_scale(size)
+    x, y, z = offset
+    assert hits(solid, [[size * (x + 0.1), size * (y - 0.2)]]) == pytest.approx([size * (z + 0.5)], rel=1e-5)
+
+
+def test_heights_of_a_fine_ball_are_those_of_the_sphere() -> None:
+    xy = np.random.default_rng(1).uniform(-0.6, 0.6, (100, 2))
+    z = hits(trimesh.creation.icosphere(5), xy.tolist())
+    np.testing.assert_allclose(z, np.sqrt(1 - (xy**2).sum(axis=1)), atol=2e-3)

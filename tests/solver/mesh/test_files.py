@@ -1,0 +1,176 @@
+"""Mesh files: every format, nodes and transforms; known meshes; and what is refused, always with one line.
+
+OBJ and OFF files: polygons, seams, indices.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from all_kinds import crumbs
+from known_meshes import known_mesh
+from mesh_text import CORNERS, QUADS, obj, off, written
+from scipy.spatial import cKDTree
+from sound import assert_sound, assert_unchanged_when_read_again
+
+from ripple_sim.solver import MeshError, load_mesh
+from ripple_sim.solver.mesh.mesh import check_genus_zero
+
+
+def test_files_of_every_format_give_the_same_surface(tmp_path: Path) -> None:
+    solid = trimesh.creation.icosphere(subdivisions=2)
+    for ending in ("obj", "ply", "stl", "off", "glb"):
+        solid.export(tmp_path / f"ball.{ending}")
+        mesh = load_mesh(tmp_path / f"ball.{ending}")
+        assert (len(mesh.V), len(mesh.F)) == (162, 320), ending
+        assert mesh.volume == pytest.approx(solid.volume, rel=1e-5)
+
+
+def test_missing_and_broken_files_are_one_line_errors(tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match="does not exist"):
+        load_mesh(tmp_path / "nothing.obj")
+    broken = tmp_path / "broken.ply"
+    broken.write_bytes(b"\x00\x01 not a mesh")
+    with pytest.raises(MeshError) as error:
+        load_mesh(broken)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("file", "said"),
+    [
+        ("genus1-rocker-arm.obj", "genus 1"),
+        ("genus3-3holes.off", "genus 3"),
+        ("open-camelhead.off", "open: 56 boundary edges round 1 hole"),
+        ("several-parts-teapot.obj", "4 separate parts.*open: 160 boundary edges round 6 holes"),
+        ("suzanne.obj", "separate parts.*cut apart along 1 edge"),
+    ],
+)
+def test_public_meshes_that_the_cube_does_not_fit(file: str, said: str) -> None:
+    mesh = load_mesh(known_mesh(f"bad/{file}"))
+    assert_sound(mesh)
+    assert_unchanged_when_read_again(mesh)
+    with pytest.raises(MeshError, match=rf"{file}.*{said}"):
+        check_genus_zero(mesh)
+
+
+@pytest.mark.parametrize("file", ["nonmanifold-cow.obj", "nonmanifold-camel_b.obj"])
+def test_public_meshes_that_touch_themselves_in_one_vertex_fit_the_cube_once_cut(file: str) -> None:
+    mesh = load_mesh(known_mesh(f"bad/{file}"))
+    assert_unchanged_when_read_again(mesh)
+    assert mesh.notes[-1] == "cut apart at 1 vertex where the surface touched itself"
+    check_genus_zero(mesh)
+
+
+def test_many_parts_are_advised_to_be_wrapped(tmp_path: Path) -> None:
+    V, F = crumbs(101)
+    trimesh.Trimesh(V, F, process=False).export(tmp_path / "crumbs.off")
+    assert (
+        load_mesh(tmp_path / "crumbs.off").notes[-1] == "wrap (--wrap) would put one closed surface round its 101 parts"
+    )
+    assert load_mesh(tmp_path / "crumbs.off", wrap=True).notes[-1].startswith("wrapped, ")
+
+
+def test_nodes_of_a_scene_are_put_where_their_transforms_say(tmp_path: Path) -> None:
+    box = trimesh.creation.box()
+    lower = trimesh.Trimesh(box.vertices, box.faces[:5], process=False)
+    turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3]) @ trimesh.transformations.translation_matrix(
+        [5, 1, 2]
+    )
+    back = np.linalg.inv(turn)
+    upper = trimesh.Trimesh(trimesh.transform_points(box.vertices, back), box.faces[5:], process=False)
+    scene = trimesh.Scene()
+    scene.add_geometry(lower, node_name="lower")
+    scene.add_geometry(upper, node_name="upper", transform=turn)
+    scene.export(tmp_path / "two.glb")
+    mesh = load_mesh(tmp_path / "two.glb")
+    # the transform leaves round-off between the parts, which are joined all the same
+    assert (len(mesh.V), len(mesh.F)) == (8, 12)
+    assert mesh.volume == pytest.approx(1, rel=1e-5)
+
+
+def test_scaled_mirrored_and_nested_nodes(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    scene.add_geometry(
+        trimesh.creation.icosphere(subdivisions=1),
+        node_name="ball",
+        parent_node_name="arm",
+        transform=np.diag([-2, 1, 1, 1]),
+    )
+    scene.graph.update(frame_to="arm", frame_from="world", matrix=np.diag([1.0, 3.0, 1.0, 1.0]))
+    scene.export(tmp_path / "nested.glb")
+    mesh = load_mesh(tmp_path / "nested.glb")
+    np.testing.assert_allclose(np.ptp(mesh.V, axis=0), [4, 6, 2], rtol=0.2)
+    assert mesh.volume == pytest.approx(6 * trimesh.creation.icosphere(subdivisions=1).volume, rel=1e-5)
+
+
+def test_texture_of_a_glb_is_kept(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    uv = np.random.default_rng(0).uniform(size=(len(ball.vertices), 2))
+    ball.visual = trimesh.visual.TextureVisuals(uv=uv)
+    ball.export(tmp_path / "ball.glb")
+    mesh = load_mesh(tmp_path / "ball.glb")
+    assert mesh.uv is not None
+    distance, same = cKDTree(ball.vertices).query(mesh.V)
+    assert distance.max() < 1e-6
+    np.testing.assert_allclose(mesh.uv, uv[same], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("quads.obj", obj(CORNERS, QUADS)),
+        ("crlf.obj", obj(CORNERS, QUADS).replace("\n", "\r\n")),
+        ("marked.obj", "\ufeff" + obj(CORNERS, QUADS)),
+        ("UPPER.OBJ", obj(CORNERS, QUADS)),
+        ("continued.obj", obj(CORNERS, QUADS).replace("f 1 2", "f 1 \\\n2")),
+        ("comments.obj", "# box\n" + obj(CORNERS, QUADS).replace("\n", " # corner\n")),
+        ("colours.obj", obj([(*c, 0.5, 0.5, 0.5) for c in CORNERS], QUADS)),
+        ("groups.obj", obj(CORNERS, QUADS, "mtllib none.mtl", "o box", "g side", "usemtl red", "s 1")),
+        ("quads.off", off(CORNERS, QUADS)),
+        ("marked.off", "\ufeff" + off(CORNERS, QUADS)),
+        ("one_line.off", off(CORNERS, QUADS).replace("OFF\n", "OFF ")),
+        ("comments.off", "# box\n" + off(CORNERS, QUADS).replace("OFF\n", "OFF # text\n\n# counts\n")),
+        ("colours.off", off([(*c, 255, 0, 0, 255) for c in CORNERS], QUADS, "COFF")),
+        ("normals.off", off([(*c, 0, 0, 1) for c in CORNERS], QUADS, "NOFF")),
+    ],
+)
+def test_a_box_of_quads_is_read(tmp_path: Path, name: str, text: str) -> None:
+    mesh = load_mesh(written(tmp_path, name, text))
+    assert (len(mesh.V), len(mesh.F)) == (8, 12)
+    assert mesh.volume == pytest.approx(1)
+    assert mesh.notes == ()
+
+
+def test_negative_indices_count_back_from_their_own_line(tmp_path: Path) -> None:
+    text = "".join(obj([CORNERS[i] for i in quad], []) + "f -4 -3 -2 -1\n" for quad in QUADS)
+    mesh = load_mesh(written(tmp_path, "relative.obj", text))
+    assert (len(mesh.V), mesh.volume) == (8, pytest.approx(1))
+
+
+def test_materials_and_uv_seams_keep_every_corners_coordinates(tmp_path: Path) -> None:
+    text = [f"v {x} {y} {z}" for x, y, z in CORNERS] + ["mtllib some.mtl"]
+    for k, quad in enumerate(QUADS):
+        text += [f"vt {k + u} {v}" for u, v in ((0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5))]
+        text += [f"usemtl material{k}", "f " + " ".join(f"{i + 1}/{4 * k + j + 1}" for j, i in enumerate(quad))]
+    mesh = load_mesh(written(tmp_path, "seams.obj", "\n".join(text)))
+    assert mesh.corner_uv is not None and mesh.uv is not None
+    assert (len(mesh.V), mesh.corner_uv.shape, mesh.uv.shape) == (8, (12, 3, 2), (8, 2))
+    for triangle, pairs in zip(mesh.F, mesh.corner_uv, strict=True):
+        [k] = np.unique(np.floor(pairs[:, 0]))
+        quad = QUADS[int(k)]
+        for vertex, pair in zip(triangle, pairs, strict=True):
+            j = quad.index(CORNERS.index(tuple(mesh.V[vertex])))
+            np.testing.assert_array_equal(pair - [k, 0], [(0, 0), (0.5, 0), (0.5, 0.5), (0, 0.5)][j])
+
+
+def test_faces_without_texture_coordinates_among_others_are_read(tmp_path: Path) -> None:
+    text = obj(CORNERS, QUADS[:3], "vt 0.5 0.5") + "".join(
+        "f " + " ".join(f"{i + 1}/1" for i in quad) + "\n" for quad in QUADS[3:]
+    )
+    mesh = load_mesh(written(tmp_path, "mixed.obj", text))
+    assert mesh.corner_uv is not None
+    assert sorted(np.unique(mesh.corner_uv)) == [0, 0.5]

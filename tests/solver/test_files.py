@@ -1,0 +1,297 @@
+"""What cannot fit into memory is refused before it is begun, in a message that names how much, and which limit.
+
+Files appear complete or not at all.
+
+Images beyond pillow's limit are refused wherever one is read, and the message names the limit.
+"""
+
+import contextlib
+import os
+import resource
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from ripple_sim.scene.drop import load_image, mesh_image
+from ripple_sim.scene.load_scene import check_files
+from ripple_sim.solver import (
+    AtlasError,
+    HeightMap,
+    Mesh,
+    RippleError,
+    SolverError,
+    WaveSolver,
+    build_atlas,
+    load_mesh,
+    sphere_atlas,
+)
+from ripple_sim.solver.files import OF_THE_NAME, atomic_write, final_path, read_image, require_memory, rooms
+from ripple_sim.solver.texels.maps import texture_map
+
+
+@contextlib.contextmanager
+def address_space(more: int) -> Iterator[None]:
+    """So many bytes more than the process has now."""
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + more, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def tetrahedron() -> Mesh:
+    return Mesh.from_arrays(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]))
+
+
+def test_an_atlas_that_cannot_fit_is_refused_at_once() -> None:
+    said = r"resolution 2048 takes 5\.03 GB of memory, but the limit of the address space \(ulimit -v, .* leaves 0\.06"
+    mesh = tetrahedron()
+    with address_space(64_000_000):
+        for make in (lambda: build_atlas(mesh, 2048), lambda: sphere_atlas(resolution=2048)):
+            with pytest.raises(AtlasError, match=f"{said} GB; take a lower resolution, or allow more"):
+                make()
+
+
+def test_waves_and_height_maps_that_cannot_fit_are_refused() -> None:
+    atlas = sphere_atlas(resolution=240)
+    with address_space(35_000_000):
+        with pytest.raises(SolverError, match=r"a wave solver of 345,600 texels takes 0\.10 GB .* lower resolution"):
+            WaveSolver(atlas, backend="cpu")
+        with pytest.raises(SolverError, match=r"the height map of 345,600 texels takes 0\.04 GB"):
+            HeightMap(atlas.texels)
+
+
+def test_frames_that_cannot_fit_are_refused(opengl: None) -> None:
+    import mujoco
+
+    from ripple_sim.render import Renderer
+    from ripple_sim.solver.gl import shared_context
+
+    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    gl = shared_context()
+    if gl.software:
+        with (
+            address_space(64_000_000),
+            pytest.raises(RippleError, match=r"frames of 4096x4096 pixels takes 1\.48 GB .* take smaller frames"),
+        ):
+            Renderer(gl, model, {}, size=(4096, 4096))
+
+
+def test_a_mesh_file_that_cannot_fit_is_refused(tmp_path: Path) -> None:
+    from ripple_sim.solver import MeshError, load_mesh
+
+    path = tmp_path / "huge.stl"
+    with path.open("wb") as file:
+        file.truncate(10**12)  # a hole: no disk is taken
+    with pytest.raises(MeshError, match=r"huge\.stl.* takes 3000\.00 GB of memory"):
+        load_mesh(path)
+
+
+def machine(root: Path, **files: str) -> Path:
+    """A folder like that of a machine's root, with some of the files that tell of memory."""
+    for name, text in {"proc/meminfo": "MemAvailable: 3000000 kB\nSwapFree: 0 kB\n", **files}.items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return root
+
+
+CGROUPS = {
+    "version 2": {
+        "proc/self/cgroup": "0::/a/b\n",
+        "sys/fs/cgroup/a/memory.max": "1000000000\n",
+        "sys/fs/cgroup/a/memory.current": "900000000\n",
+        "sys/fs/cgroup/a/memory.stat": "anon 5\ninactive_file 100000000\n",
+        "sys/fs/cgroup/a/b/memory.max": "max\n",
+    },
+    "version 1": {
+        "proc/self/cgroup": "3:cpu:/\n2:memory:/docker/x\n",
+        "sys/fs/cgroup/memory/memory.limit_in_bytes": "1000000000\n",
+        "sys/fs/cgroup/memory/memory.usage_in_bytes": "800000000\n",
+    },
+    "none": {},
+}
+
+
+@pytest.mark.parametrize("version", CGROUPS)
+def test_the_limits_of_cgroups_and_of_those_above_count(version: str, tmp_path: Path) -> None:
+    least = min(rooms(machine(tmp_path, **CGROUPS[version])))
+    if version == "none":
+        assert (least.left, least.by) == (3_072_000_000, "the machine's free memory")
+    else:
+        assert (least.left, least.by) == (200_000_000, "the memory limit of the cgroup (1.00 GB)")
+
+
+def test_where_nothing_is_known_nothing_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert list(rooms(tmp_path)) == []
+    monkeypatch.setattr("ripple_sim.solver.files.rooms", lambda: iter(()))
+    require_memory(SolverError, 1e15, "this", "do that")
+
+
+def test_what_is_small_costs_no_look(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ripple_sim.solver.files.rooms", lambda: pytest.fail("looked"))
+    require_memory(SolverError, 1e6, "this", "do that")
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(each.name for each in folder.iterdir())
+
+
+def test_a_file_appears_at_the_end_and_nothing_else_stays(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "folders" / "a.bin"
+    with atomic_write(path) as unfinished:
+        unfinished.write_bytes(b"whole")
+        assert not path.exists()
+        assert unfinished.parent == path.parent  # on the same file system, so that renaming is one step
+    assert path.read_bytes() == b"whole"
+    assert names(path.parent) == ["a.bin"]
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_an_old_file_stays_as_it_was_where_writing_fails(tmp_path: Path, error: type[BaseException]) -> None:
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"old")
+
+    def write() -> None:
+        with atomic_write(path) as unfinished:
+            unfinished.write_bytes(b"half of the n")
+            raise error
+
+    with pytest.raises(error):
+        write()
+    assert path.read_bytes() == b"old"
+    assert names(tmp_path) == ["a.bin"]
+
+
+def test_a_file_replaces_an_old_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.bin"
+    for content in (b"old", b"new"):
+        with atomic_write(path) as unfinished:
+            unfinished.write_bytes(content)
+    assert path.read_bytes() == b"new"
+
+
+def test_the_file_behind_a_symbolic_link_is_written_and_the_link_stays(tmp_path: Path) -> None:
+    target, link = tmp_path / "there" / "a.bin", tmp_path / "link.bin"
+    target.parent.mkdir()
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    with atomic_write(link) as unfinished:
+        unfinished.write_bytes(b"new")
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+    assert names(target.parent) == ["a.bin"]
+
+
+@pytest.mark.parametrize("kind", ["folder", "pipe"])
+def test_what_is_not_a_regular_file_is_refused_and_left_alone(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "taken"
+    path.mkdir() if kind == "folder" else os.mkfifo(path)
+    with pytest.raises(FileExistsError, match="not a regular file"), atomic_write(path):
+        pytest.fail("nothing may be written")
+    assert names(tmp_path) == ["taken"]
+    assert not path.is_file()
+
+
+def test_nothing_written_is_an_error_and_no_empty_file(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError), atomic_write(tmp_path / "a.bin"):
+        pass
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("kind", ["circle", "long"])
+def test_a_name_that_cannot_be_written_is_refused_before_anything_is(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / (250 * "a" if kind == "long" else "circle")
+    if kind == "circle":
+        path.symlink_to("other")
+        (tmp_path / "other").symlink_to("circle")
+    with pytest.raises(OSError, match=r"too long|symbolic links") as refusal:
+        final_path(path)
+    assert refusal.value.errno in OF_THE_NAME
+    with pytest.raises(OSError, match=r"too long|symbolic links"), atomic_write(path):
+        pytest.fail("nothing may be written")
+
+
+def test_a_link_to_what_is_not_there_yet_is_followed(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to("folder/new")
+    assert final_path(tmp_path / "link") == tmp_path.resolve() / "folder" / "new"
+
+
+def png(width: int, height: int) -> bytes:
+    """A file of a few hundred bytes that says it has so many pixels."""
+    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    chunks = [(b"IHDR", head), (b"IDAT", zlib.compress(bytes(1000))), (b"IEND", b"")]
+    packed = [
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    ]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(packed)
+
+
+def glb(path: Path, image: bytes) -> Path:
+    """A ball whose image is replaced by another file of the same length."""
+    ball = trimesh.creation.icosphere(subdivisions=0)
+    small = path.with_name("small.png")
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (64, 64, 3), np.uint8)).save(small)
+    with Image.open(small) as texture:
+        material = trimesh.visual.material.PBRMaterial(baseColorTexture=texture)
+        ball.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(ball.vertices), 2)), material=material)
+        content = ball.export(file_type="glb")
+    begin = content.index(b"\x89PNG")
+    path.write_bytes(content[:begin] + image + content[begin + len(image) :])
+    return path
+
+
+def with_coordinates() -> Any:
+    atlas = sphere_atlas(resolution=4)
+    object.__setattr__(atlas.mesh, "corner_uv", np.zeros((len(atlas.mesh.F), 3, 2)))
+    return atlas
+
+
+def model(path: Path) -> Path:
+    xml = path.with_name("model.xml")
+    xml.write_text(f'<mujoco><asset><texture name="t" type="2d" file="{path.name}"/></asset></mujoco>')
+    return xml
+
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "texture of the command line": load_image,
+    "map of a material": lambda path: texture_map(with_coordinates(), path, 0.0, 1.0),
+    "texture of a model": lambda path: check_files(model(path)),
+    "image in a GLB": lambda path: mesh_image(glb(path.with_name("ball.glb"), path.read_bytes())),
+    "image of a look": lambda path: read_image(RippleError, path, "texture image", lambda mode: "RGB"),
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_a_decompression_bomb_is_refused_wherever_images_are_read(reader: str, tmp_path: Path) -> None:
+    (tmp_path / "bomb.png").write_bytes(png(20_000, 20_000))
+    with pytest.raises(
+        RippleError, match=r"cannot be read: Image size \(400000000 pixels\) exceeds limit of 178956970"
+    ):
+        READERS[reader](tmp_path / "bomb.png")
+
+
+def test_an_image_that_does_not_fit_into_memory_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from ripple_sim.solver import files
+
+    (tmp_path / "large.png").write_bytes(png(10_000, 10_000))
+    monkeypatch.setattr(files, "rooms", lambda: iter([files.Room(5e8, "a small machine")]))
+    with pytest.raises(SolverError, match=r"large\.png' of 10000x10000 pixels takes 1\.20 GB .* leaves 0\.50"):
+        read_image(SolverError, tmp_path / "large.png", "image", lambda mode: "RGB")
+
+
+@pytest.mark.parametrize("ending", ["zip", "bz2"])
+def test_archives_are_not_unpacked(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"ball.{ending}"
+    path.write_bytes(b"PK\x03\x04")
+    with pytest.raises(RippleError, match=r"unknown ending; valid are .* unpacked"):
+        load_mesh(path)

@@ -1,0 +1,138 @@
+"""What `ripple-sim info` says where OpenGL does not run, or not on the GPU: each cause is provoked."""
+
+import grp
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from ripple_sim.diagnostics import find_problems
+from ripple_sim.solver.errors import RippleError
+from ripple_sim.solver.gl import shared_context
+
+NOBODY = 65534
+
+
+def info(**environment: str) -> dict:
+    """Report of a process with other environment variables."""
+    result = subprocess.run(
+        [sys.executable, "-m", "ripple_sim", "info", "--json"],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(result.stdout)
+
+
+@pytest.fixture(autouse=True)
+def _needs_opengl() -> None:
+    """What is to be taken away must be there."""
+    try:
+        shared_context()
+    except RippleError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def devices(tmp_path: Path) -> Path:
+    """A folder of device files with a render node."""
+    (tmp_path / "dri").mkdir()
+    (tmp_path / "dri" / "renderD128").touch()
+    return tmp_path
+
+
+@pytest.fixture
+def plain_user(tmp_path: Path) -> Iterator[None]:
+    """For root everything is permitted: be nobody for a while."""
+    root = os.geteuid() == 0
+    if root:
+        # up to the folder of the user's tests; a process among several has one of its own below
+        for folder in (tmp_path, *list(tmp_path.parents)[: 3 if "PYTEST_XDIST_WORKER" in os.environ else 2]):
+            folder.chmod(0o755)
+        os.seteuid(NOBODY)
+    yield
+    if root:
+        os.seteuid(0)
+
+
+def test_no_vendor_file(tmp_path: Path) -> None:
+    report = info(__EGL_VENDOR_LIBRARY_DIRS=str(tmp_path))
+    assert report["opengl"] is None
+    assert f"there is no EGL vendor file (*.json) in {tmp_path}" in report["advice"]
+    assert "apt-get install libegl-mesa0" in report["advice"]
+
+
+def test_a_vendor_file_whose_library_is_missing(tmp_path: Path) -> None:
+    file = tmp_path / "10_nvidia.json"
+    file.write_text('{"file_format_version": "1.0.0", "ICD": {"library_path": "libEGL_nvidia_gone.so.0"}}')
+    report = info(__EGL_VENDOR_LIBRARY_FILENAMES=str(file))
+    assert report["opengl"] is None
+    assert f"{file} names libEGL_nvidia_gone.so.0, which cannot be loaded" in report["advice"]
+    assert "apt-get install libnvidia-gl-" in report["advice"]
+
+
+def test_a_damaged_vendor_file(tmp_path: Path) -> None:
+    file = tmp_path / "50_mesa.json"
+    file.write_text("{")
+    report = info(__EGL_VENDOR_LIBRARY_DIRS=str(tmp_path))
+    assert report["opengl"] is None
+    assert f"{file} is damaged" in report["advice"]
+
+
+@pytest.mark.parametrize("library", ["libEGL.so.1", "libGL.so.1"])
+def test_a_broken_library(tmp_path: Path, library: str) -> None:
+    # found before the real one, and no library
+    (tmp_path / library).write_bytes(b"\x7fELF nothing")
+    report = info(LD_LIBRARY_PATH=str(tmp_path))
+    assert report["opengl"] is None
+    assert f"the library {library} cannot be loaded" in report["advice"]
+    assert f"apt-get install --reinstall {library.partition('.')[0].lower()}1" in report["advice"]
+
+
+def test_a_missing_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ripple_sim.diagnostics._LIBRARIES", {"libEGL-gone.so.1": "libegl1"})
+    [finding] = find_problems(None)
+    assert str(finding) == "the library libEGL-gone.so.1 is missing: apt-get install libegl1"
+
+
+def test_software_where_there_is_no_gpu(tmp_path: Path) -> None:
+    [finding] = find_problems(True, tmp_path)
+    assert "OpenGL runs in software" in finding.problem
+    assert "there is no GPU" in finding.problem
+
+
+def test_no_permission_on_the_render_node(devices: Path, plain_user: None) -> None:
+    node = devices / "dri" / "renderD128"
+    mode = node.stat().st_mode & 0o777
+    group_of_node = node.stat().st_gid
+    assert mode & 0o006 != 0o006  # the umask has kept others out
+    if os.geteuid() != NOBODY:
+        node.chmod(0)
+    for software in (True, None):
+        [finding] = find_problems(software, devices)
+        assert finding.problem == f"this user has no access to the GPU's render node {node}"
+        assert finding.fix.startswith("sudo usermod -aG ")
+        assert f" {grp.getgrgid(group_of_node).gr_name} $USER" in finding.fix
+
+
+def test_an_nvidia_gpu_without_its_egl_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "nvidia0").touch()
+    (tmp_path / "version").write_text("NVRM version: NVIDIA UNIX x86_64 Kernel Module  550.54.15  Tue Mar 5\n")
+    monkeypatch.setattr("ripple_sim.diagnostics._NVIDIA_VERSION", tmp_path / "version")
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", str(tmp_path))
+    (tmp_path / "50_mesa.json").write_text('{"ICD": {"library_path": "libEGL_mesa.so.0"}}')
+    [finding] = find_problems(True, tmp_path)
+    assert "no EGL vendor file of its driver" in finding.problem
+    assert "apt-get install libnvidia-gl-550" in finding.fix
+    assert "NVIDIA_DRIVER_CAPABILITIES=all" in finding.fix
+    (tmp_path / "10_nvidia.json").write_text('{"ICD": {"library_path": "libEGL_nvidia.so.0"}}')
+    assert find_problems(True, tmp_path) == []
+
+
+def test_on_a_gpu_there_is_nothing_to_say(devices: Path) -> None:
+    assert find_problems(False, devices) == []

@@ -1,0 +1,119 @@
+"""Options of a video: what the scene and the output decide, what is refused, and how many frames there are."""
+
+import dataclasses
+from pathlib import Path
+
+import msgspec
+import mujoco
+import pytest
+
+from ripple_sim.errors import RippleError, SceneError
+from ripple_sim.scene.scene import MAX_DURATION, Scene
+from ripple_sim.scene.scene_file import CameraEntry, MapEntry, MaterialEntry, RippleEntry
+from ripple_sim.video.options import MAX_SLOW_MOTION, VideoOptions, check_options, frame_count, scene_digest, settled
+
+MJCF = '<mujoco><worldbody><geom name="egg" size="{}"/></worldbody></mujoco>'
+
+
+def made(size: float = 0.3, **fields: object) -> Scene:
+    entry = RippleEntry(geom="egg", material=MaterialEntry())
+    standard = {"name": "egg", "targets": (entry,), "camera": CameraEntry(), "duration": 2.5}
+    return Scene(model=mujoco.MjModel.from_xml_string(MJCF.format(size)), **(standard | fields))
+
+
+def test_none_is_left_to_the_scene_and_to_the_output() -> None:
+    scene = made(overlay=("time", "contacts"))
+    options = settled(VideoOptions(), scene, Path("clip.gif"))
+    assert (options.fps, options.duration, options.overlay) == (25, 2.5, ("time", "contacts"))
+    assert options.backend in ("gl", "cpu")
+    assert settled(options, made(duration=9.0), Path("clip.mp4")) == options  # nothing is left to settle
+
+
+def test_what_the_user_chose_stays() -> None:
+    chosen = VideoOptions(fps=30, duration=0.5, overlay=(), backend="cpu", shutter=90.0, resolution=24)
+    assert settled(chosen, made(overlay=("time",)), Path("clip.gif")) == chosen
+
+
+@pytest.mark.parametrize(
+    ("duration", "fps", "slow_motion", "frames"),
+    [(2.0, 60, 1.0, 120), (2.0, 60, 4.0, 480), (2.0, 60, 0.5, 60), (0.1, 24, 1.0, 2), (1e-6, 60, 1.0, 1), (1, 1, 1, 1)],
+)
+def test_frames_fill_the_duration_and_there_is_at_least_one(
+    duration: float, fps: int, slow_motion: float, frames: int
+) -> None:
+    options = VideoOptions(duration=duration, fps=fps, slow_motion=slow_motion)
+    assert frame_count(options) == frames
+    assert options.rate == fps * slow_motion
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, float("nan"), float("inf"), MAX_DURATION])
+def test_a_duration_out_of_range_is_named(duration: float) -> None:
+    with pytest.raises(SceneError, match=f"duration is .*{duration!r} s; valid is a positive number, less than 86400"):
+        frame_count(VideoOptions(duration=duration, fps=60))
+
+
+@pytest.mark.parametrize("factor", [0.0, -2.0, float("nan"), MAX_SLOW_MOTION + 1])
+def test_a_slow_motion_out_of_range_is_named(factor: float) -> None:
+    with pytest.raises(SceneError, match=f"slow motion is {factor!r}; valid is a positive number up to 1000"):
+        frame_count(VideoOptions(duration=1.0, fps=60, slow_motion=factor))
+    assert frame_count(VideoOptions(duration=0.1, fps=10, slow_motion=MAX_SLOW_MOTION)) == 1000
+
+
+def test_a_rate_that_is_not_settled_is_no_rate() -> None:
+    with pytest.raises(ValueError, match="settle the options first"):
+        _ = VideoOptions().rate
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "said"),
+    [
+        ("clip.mp4", {"overlay": ["hight"]}, "there is no overlay 'hight'"),
+        ("clip.mp4", {"compare": "fem"}, "there is no operator 'fem'"),
+        ("clip.gif", {"fps": 60}, "a GIF's frame rate is 60"),
+        ("clip.mp4", {"size": (33, 32)}, "33x32; .mp4 needs an even"),
+        ("clip.mp4", {"transparent": True}, "cannot be transparent"),
+        ("clip.mp4", {"frame_format": "exr"}, "name a folder"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_and_leaves_nothing(
+    tmp_path: Path, name: str, options: dict, said: str
+) -> None:
+    with pytest.raises(RippleError, match=said):
+        check_options(VideoOptions(**options), tmp_path / name)
+    check_options(VideoOptions(), tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_same_scene_has_the_same_fingerprint_whatever_its_name_and_length() -> None:
+    digest = scene_digest(made())
+    assert len(digest) == 16
+    assert int(digest, 16) >= 0
+    assert scene_digest(made(name="other", duration=9.0, overlay=("time",))) == digest
+
+
+def test_everything_that_moves_or_shows_changes_the_fingerprint() -> None:
+    base = made()
+    entry = base.targets[0]
+    others = [
+        made(size=0.3000001),
+        dataclasses.replace(base, two_way=True),
+        dataclasses.replace(base, camera=CameraEntry(shutter=90.0)),
+        *(
+            dataclasses.replace(base, targets=(msgspec.structs.replace(entry, **change),))
+            for change in ({"resolution": 64}, {"look": "clay"}, {"material": MaterialEntry(speed=0.9)})
+        ),
+    ]
+    digests = {scene_digest(scene) for scene in (base, *others)}
+    assert len(digests) == 1 + len(others)
+
+
+def test_the_content_of_a_picture_counts(tmp_path: Path) -> None:
+    speed, still = tmp_path / "speed.png", tmp_path / "still.png"
+    entry = RippleEntry(geom="egg", material=MaterialEntry(speed=MapEntry(map=str(speed))), still_map=str(still))
+    digests = []
+    for contents in ((b"a", b"b"), (b"A", b"b"), (b"a", b"B"), (b"a", b"b")):
+        for path, content in zip((speed, still), contents, strict=True):
+            path.write_bytes(content)
+        digests.append(scene_digest(made(targets=(entry,))))
+    assert digests[0] == digests[3]
+    assert len(set(digests)) == 3

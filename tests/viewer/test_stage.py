@@ -1,0 +1,81 @@
+"""Which plane is the floor, and how a large one is drawn. The plotter of these tests keeps what it is given."""
+
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+import pytest
+import pyvista as pv
+
+from ripple_sim.viewer.stage import BACKGROUND, _round_up, add_floor, find_floor, geom_mesh, is_endless
+
+
+def state(body: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def test_the_floor_is_the_highest_plane_that_faces_up() -> None:
+    low, high = '<geom type="plane" size="0 0 1" pos="0 0 -1"/>', '<geom type="plane" size="0 0 1" pos="0 0 .2"/>'
+    wall = '<geom type="plane" size="0 0 1" pos="0 0 5" euler="90 0 0"/>'
+    ceiling = '<geom type="plane" size="0 0 1" pos="0 0 9" euler="180 0 0"/>'
+    assert find_floor(*state(low + wall + high + ceiling)) == 2
+    assert find_floor(*state(high + low)) == 0
+    assert find_floor(*state(wall + ceiling + '<geom size="1"/>')) is None
+
+
+@pytest.mark.parametrize(
+    ("geom", "endless"),
+    [
+        ('type="plane" size="0 0 1"', True),
+        ('type="plane" size="6 6 1"', True),
+        ('type="plane" size="0 6 1"', True),
+        ('type="plane" size="6 4 1"', False),
+        ('type="plane" size="1 1 1"', False),
+        ('type="box" size="9 9 9"', False),
+    ],
+)
+def test_a_plane_beyond_the_view_is_endless(geom: str, endless: bool) -> None:
+    assert is_endless(state(f"<geom {geom}/>")[0], 0, 10.0) is endless
+
+
+def test_a_large_floor_fades_from_its_colour_to_the_background() -> None:
+    plotter = SimpleNamespace(add_mesh=lambda mesh, **style: mesh)
+    color, middle = np.array([0.2, 0.4, 0.6, 1.0]), np.array([3.0, -2.0, 7.0])
+    disc = add_floor(plotter, middle, 5.0, color)
+    away = np.linalg.norm(disc.points[:, :2] - middle[:2], axis=1)
+    assert away.max() == pytest.approx(5.0, rel=1e-3)
+    np.testing.assert_array_equal(disc.points[:, 2], 0)
+    shown = disc.point_data["color"] / 255
+    np.testing.assert_allclose(shown[away < 0.4], np.tile(color[:3], (int((away < 0.4).sum()), 1)), atol=2e-3)
+    np.testing.assert_allclose(shown[away > 4.5], np.tile(BACKGROUND, (int((away > 4.5).sum()), 1)), atol=2e-3)
+    order = np.argsort(away)
+    assert (np.diff(shown[order, 0]) >= -1e-6).all()
+
+
+@pytest.mark.parametrize(
+    ("geom", "volume"),
+    [
+        ('type="box" size=".1 .2 .3"', 8 * 0.006),
+        ('type="sphere" size=".2"', 4 / 3 * np.pi * 0.2**3),
+        ('type="ellipsoid" size=".1 .2 .3"', 4 / 3 * np.pi * 0.006),
+        ('type="cylinder" size=".1 .3"', np.pi * 0.01 * 0.6),
+        ('type="capsule" size=".1 .3"', np.pi * 0.01 * 0.6 + 4 / 3 * np.pi * 0.001),
+    ],
+)
+def test_a_geom_is_drawn_in_its_size_with_its_outside_out(geom: str, volume: float) -> None:
+    mesh = geom_mesh(state(f"<geom {geom}/>")[0], 0)
+    assert isinstance(mesh, pv.PolyData)
+    corners = mesh.points[mesh.regular_faces].astype(float)
+    signed = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+    assert signed == pytest.approx(volume, rel=0.04)
+    normals = np.asarray(mesh.point_data.active_normals)
+    assert (np.einsum("ij,ij->i", normals, mesh.points) > 0).all()
+
+
+@pytest.mark.parametrize(("value", "limit"), [(1.0, 1), (1.01, 2), (2.0, 2), (3e-4, 5e-4), (5.1e-3, 1e-2), (70, 100)])
+def test_a_limit_is_rounded_up_to_one_two_or_five(value: float, limit: float) -> None:
+    assert _round_up(value) == pytest.approx(limit)
+    assert _round_up(_round_up(value)) == pytest.approx(limit)
