@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from ripple_sim.solver import Material, Mesh
-from ripple_sim.solver.operator.response import stiffness_after, stiffness_under
+from ripple_sim.solver.operator.response import density_after, density_under, stiffness_after, stiffness_under
 from ripple_sim.solver.operator.suited import BOUNCE, damping_for, narrow_stiffness
 
 from .coupled_model import CoupledModel
@@ -33,8 +33,12 @@ _PULSE = 0.4
 # Footprints smaller than this share of the target's size count as of this size.
 _FOOTPRINT = 0.025
 
-# A stiffness beyond (this / time step)^2 would take more substeps than the waves.
-_STIFFEST = 4.0
+# Wave number of the longest wave on a ball, times its size: sqrt(8).
+_LONGEST = 8**0.5
+
+# Of the stiffness alone, sqrt(k) times the time step at most: a swing takes twelve steps or more. What swings faster
+# is not resolved, and takes up energy from contacts that last a step.
+_STIFFEST = 0.5
 
 
 class Extent(NamedTuple):
@@ -77,14 +81,18 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     """
     if not material.unset:
         return material
-    fall = _fall(coupled.model, extent)
-    speed = max(extent.size / _CROSSING, fall) if "speed" in material.unset else _greatest(material.speed)
+    burden = _burden(coupled, geom, extent)
+    speed = max(extent.size / _CROSSING, burden.fall) if "speed" in material.unset else _greatest(material.speed)
     density = _density(coupled.model, geom, extent)
+    if "stiffness" in material.unset:
+        stiffness = min(_stiffness(burden, extent, speed, density), _stiffest(coupled.model))
+    else:
+        stiffness = float(np.min(material.stiffness))
     suited = {
         "speed": speed,
         "damping": damping_for(_DECAY),
-        "stiffness": _stiffness(coupled, geom, extent, speed, density),
-        "density": density,
+        "stiffness": stiffness,
+        "density": float(np.clip(max(density, _density_under(burden, extent, speed, stiffness)), 1e-12, 1e12)),
     }
     return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
 
@@ -97,31 +105,69 @@ def suited_soft_material(model: mujoco.MjModel, extent: Extent, mass: float, mat
     suited = {
         "speed": speed,
         "damping": damping_for(_DECAY),
-        "stiffness": narrow_stiffness(extent.size, speed),
+        "stiffness": min(narrow_stiffness(extent.size, speed), _stiffest(model)),
         "density": float(np.clip((mass if mass > 0 else _DENSITY * extent.volume) / extent.area, 1e-12, 1e12)),
     }
     return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
 
 
-def _density(model: mujoco.MjModel, geom: int, extent: Extent) -> float:
-    mass = float(model.body_mass[model.geom_bodyid[geom]])
-    density = (mass if mass > 0 else _DENSITY * extent.volume) / extent.area
-    return float(np.clip(density, 1e-12, 1e12))
+class _Burden(NamedTuple):
+    """What a target has to bear: a weight at rest [N], and a hit [N s] in a time [s], both on a radius [m].
+
+    And how fast the latter's body is [m/s], and how deep they may dent it [m].
+    """
+
+    weight: float
+    impulse: float
+    duration: float
+    radius: float
+    fall: float
+    rest_depth: float
+    hit_depth: float
 
 
-def _stiffness(coupled: CoupledModel, geom: int, extent: Extent, speed: float, density: float) -> float:
+def _burden(coupled: CoupledModel, geom: int, extent: Extent) -> _Burden:
     model = coupled.model
     mass, footprint = heaviest(coupled, geom)
-    radius = max(footprint, _FOOTPRINT * extent.size)
-    depth = _RADIUS * extent.volume / extent.area
-    pulse = _PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep)
-    of = {"radius": radius, "density": density, "speed": speed}
-    stiffness = max(
-        narrow_stiffness(extent.size, speed),
-        stiffness_under(mass * float(np.linalg.norm(model.opt.gravity)), _REST * depth, **of),
-        stiffness_after(BOUNCE * mass * _fall(model, extent), _HIT * depth, duration=pulse, **of) if mass else 0.0,
+    fall, depth = _fall(model, extent), _RADIUS * extent.volume / extent.area
+    return _Burden(
+        weight=mass * float(np.linalg.norm(model.opt.gravity)),
+        impulse=BOUNCE * mass * fall,
+        duration=max(_PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep), model.opt.timestep),
+        radius=max(footprint, _FOOTPRINT * extent.size),
+        fall=fall,
+        rest_depth=_REST * depth,
+        hit_depth=_HIT * depth,
     )
-    return float(min(stiffness, (_STIFFEST / model.opt.timestep) ** 2, 1e12))
+
+
+def _stiffness(burden: _Burden, extent: Extent, speed: float, density: float) -> float:
+    of = {"radius": burden.radius, "density": density, "speed": speed}
+    return max(
+        narrow_stiffness(extent.size, speed),
+        stiffness_under(burden.weight, burden.rest_depth, **of),
+        stiffness_after(burden.impulse, burden.hit_depth, duration=burden.duration, **of),
+    )
+
+
+def _density_under(burden: _Burden, extent: Extent, speed: float, stiffness: float) -> float:
+    """The least with which the surface bears it: that of the body alone, if the stiffness may be what it takes."""
+    # the whole target gives way no further than its longest wave
+    of = {"radius": burden.radius, "speed": speed, "stiffness": max(stiffness, (_LONGEST * speed / extent.size) ** 2)}
+    return max(
+        density_under(burden.weight, burden.rest_depth, **of),
+        density_after(burden.impulse, burden.hit_depth, duration=burden.duration, **of),
+    )
+
+
+def _stiffest(model: mujoco.MjModel) -> float:
+    """Greatest stiffness that the time step resolves [1/s^2]."""
+    return float(min((_STIFFEST / model.opt.timestep) ** 2, 1e12))
+
+
+def _density(model: mujoco.MjModel, geom: int, extent: Extent) -> float:
+    mass = float(model.body_mass[model.geom_bodyid[geom]])
+    return (mass if mass > 0 else _DENSITY * extent.volume) / extent.area
 
 
 def _fall(model: mujoco.MjModel, extent: Extent) -> float:
