@@ -73,6 +73,13 @@ class WaveField:
         self._note_height(height)
         self._backend.set_height(height)
 
+    def crests(self) -> NDArray[np.float32]:
+        """Greatest size that each height has had after any step since the last call, or has now [m], [C, n, n].
+
+        Kept from the first call on, where the waves are; a copy of the solver begins anew.
+        """
+        return self._backend.crests()
+
     def snapshot(self) -> NDArray[np.float32] | DeviceField:
         """A copy of the height [m], [C, n, n], where the waves are: on hardware GL it stays on the GPU.
 

@@ -62,9 +62,9 @@ def scales_of(atlas: Atlas) -> Scales:
     return Scales(per_limit, per_row, per_column, share, thinnest, float(calm))
 
 
-def highest(height: NDArray[np.float32], scales: Scales) -> tuple[float, int]:
-    """The greatest height over what is allowed there, and its texel."""
-    share = (np.abs(height) * scales.per_limit).reshape(-1)
+def highest(crests: NDArray[np.float32], scales: Scales) -> tuple[float, int]:
+    """The greatest crest over what is allowed there, and its texel; crests are sizes of heights, see `crests`."""
+    share = (crests * scales.per_limit).reshape(-1)
     texel = int(share.argmax())
     return float(share[texel]), texel
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.solver import Material, Mesh
 from ripple_sim.solver.operator.response import density_after, density_under, stiffness_after, stiffness_under
@@ -82,7 +83,10 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     if not material.unset:
         return material
     burden = _burden(coupled, geom, extent)
-    speed = max(extent.size / _CROSSING, burden.fall) if "speed" in material.unset else _greatest(material.speed)
+    if "speed" in material.unset:
+        speed = _speed(coupled.model, extent)
+    else:
+        speed = _greatest(material.speed)
     density = _density(coupled.model, geom, extent)
     if "stiffness" in material.unset:
         stiffness = min(_stiffness(burden, extent, speed, density), _stiffest(coupled.model))
@@ -97,11 +101,22 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
 
 
+def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> float:
+    """Density with which a target bears what may lie on it and hit it, as `suited_material` has it [kg/m^2].
+
+    The least speed and stiffness of the material count. 0 where it resists by bending, or has deep fluid below.
+    """
+    if np.any(material.bending) or material.deep:
+        return 0.0
+    speed, stiffness = float(np.min(material.speed)), float(np.min(material.stiffness))
+    return min(_density_under(_burden(coupled, geom, extent), extent, speed, stiffness), 1e12)
+
+
 def suited_soft_material(model: mujoco.MjModel, extent: Extent, mass: float, material: Material) -> Material:
     """The same for a flex or a skin, by its size and the mass of its bodies [kg]: what may hit it is not looked at."""
     if not material.unset:
         return material
-    speed = max(extent.size / _CROSSING, _fall(model, extent))
+    speed = _speed(model, extent)
     suited = {
         "speed": speed,
         "damping": damping_for(_DECAY),
@@ -112,16 +127,15 @@ def suited_soft_material(model: mujoco.MjModel, extent: Extent, mass: float, mat
 
 
 class _Burden(NamedTuple):
-    """What a target has to bear: a weight at rest [N], and a hit [N s] in a time [s], both on a radius [m].
+    """What a target has to bear: a weight at rest [N] and a hit [N s] in a time [s], both on a footprint radius [m].
 
-    And how fast the latter's body is [m/s], and how deep they may dent it [m].
+    And how deep they may dent it [m].
     """
 
     weight: float
     impulse: float
     duration: float
     radius: float
-    fall: float
     rest_depth: float
     hit_depth: float
 
@@ -129,13 +143,12 @@ class _Burden(NamedTuple):
 def _burden(coupled: CoupledModel, geom: int, extent: Extent) -> _Burden:
     model = coupled.model
     mass, footprint = heaviest(coupled, geom)
-    fall, depth = _fall(model, extent), _RADIUS * extent.volume / extent.area
+    fall, depth = _fall(model, max(extent.size, _height(coupled, geom))), _RADIUS * extent.volume / extent.area
     return _Burden(
-        weight=mass * float(np.linalg.norm(model.opt.gravity)),
+        weight=_resting(coupled, geom) * float(np.linalg.norm(model.opt.gravity)),
         impulse=BOUNCE * mass * fall,
         duration=max(_PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep), model.opt.timestep),
         radius=max(footprint, _FOOTPRINT * extent.size),
-        fall=fall,
         rest_depth=_REST * depth,
         hit_depth=_HIT * depth,
     )
@@ -170,9 +183,38 @@ def _density(model: mujoco.MjModel, geom: int, extent: Extent) -> float:
     return (mass if mass > 0 else _DENSITY * extent.volume) / extent.area
 
 
-def _fall(model: mujoco.MjModel, extent: Extent) -> float:
-    """Speed of a body that has fallen from a height of the target's size [m/s]; without gravity, a size a second."""
-    return float(max(np.sqrt(2 * np.linalg.norm(model.opt.gravity) * extent.size), extent.size))
+def _speed(model: mujoco.MjModel, extent: Extent) -> float:
+    return max(extent.size / _CROSSING, _fall(model, extent.size))
+
+
+def _fall(model: mujoco.MjModel, height: float) -> float:
+    """Speed of a body that has fallen from a height [m/s]; without gravity, a height a second."""
+    return float(max(np.sqrt(2 * np.linalg.norm(model.opt.gravity) * height), height))
+
+
+def _height(coupled: CoupledModel, geom: int) -> float:
+    """From how high bodies fall on a target at the model's beginning, or it on them [m]."""
+    model, data = coupled.model, mujoco.MjData(coupled.model)
+    mujoco.mj_kinematics(model, data)
+    up = -model.opt.gravity / max(float(np.linalg.norm(model.opt.gravity)), 1e-300)
+    above = (data.geom_xpos - data.geom_xpos[geom]) @ up
+    moves = _moves(model)
+    falls = np.where(above > 0, moves, moves[geom]) & coupled.can_collide(geom)
+    return float(np.abs(above[falls]).max(initial=0.0))
+
+
+def _resting(coupled: CoupledModel, geom: int) -> float:
+    """Mass of the heaviest body that can lie on a target, or that lies on it with others below [kg]."""
+    model = coupled.model
+    masses = np.where(_moves(model), model.body_subtreemass[model.body_rootid][model.geom_bodyid], 0.0)
+    touching = coupled.can_collide(geom)
+    return float(max(masses[touching].max(), masses[geom])) if touching.any() else 0.0
+
+
+def _moves(model: mujoco.MjModel) -> NDArray[np.bool_]:
+    """Geoms that are not fixed to the world."""
+    moves: NDArray[np.bool_] = model.body_weldid[model.geom_bodyid] != 0
+    return moves
 
 
 def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:
