@@ -192,9 +192,9 @@ class CPUBackend:
             return bool(np.isfinite(self._h.sum()))
 
     def _raise_crests(self, crests: NDArray[np.float32]) -> None:
-        # over whole fields, halo and all, which is faster; the next height is but scratch between steps
+        # the next height is but scratch between steps
         height = self._h if self._dent is None else np.add(self._h, self._dent, out=self._h_next)
-        np.maximum(crests, np.abs(height, out=self._h_next), out=crests)
+        kernels.raise_crests(height, crests)
 
     def _drift(self, dt: float) -> None:
         if dt or np.any(self._shift):

@@ -1,4 +1,4 @@
-"""How far a surface gives way under a load or a hit, and the stiffness or density that keeps it from giving way further.
+"""How far a surface gives way under a load or a hit, and what stiffness or density keeps it from giving way further.
 
 A load F that is spread like a Gaussian of standard deviation s presses a membrane with a restoring stiffness in by
 

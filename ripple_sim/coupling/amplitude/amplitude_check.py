@@ -85,16 +85,16 @@ class AmplitudeCheck:
         )
 
     def _advice(self, geom: int, waves: WaveSolver, factor: float) -> str:
-        """What would do, with a density that is at least so many times as high."""
-        material, extent = waves.material, Extent.of(waves.rest.mesh)
-        least = float(np.min(material.density))
-        factor = max(factor, bearing_density(self._coupled, geom, extent, material) / least)
+        """A material that would do: the same with a density that is so many times as high, or higher."""
+        material = waves.material
         given = {each.name: getattr(material, each.name) for each in _PRINTED}
         if any(np.ndim(value) for value in given.values()):
             target = repr(self._coupled.names[geom])
             density = f"{_rounded_up(factor):g} * ripples[{target}].material.density"
-            return f"A higher density would do: ripples.change_material({target}, density={density})"
-        given["density"] = _rounded_up(factor * least)
+            return f"This would do: ripples.change_material({target}, density={density})"
+        # what was seen may be the first of many hits
+        bearing = bearing_density(self._coupled, geom, Extent.of(waves.rest.mesh), material)
+        given["density"] = _rounded_up(max(factor * given["density"], bearing))
         pairs = [
             (each.name, repr(float(f"{given[each.name]:.4g}")))
             for each in _PRINTED
@@ -129,9 +129,9 @@ class _Watch:
     def look(self) -> bool:
         """Whether the waves are too high or too steep, and it is time to say so."""
         excess = 0.0
-        crests, height = self.waves.crests(), self.waves.height
+        crests = self.waves.crests()
         if float(crests.max()) > self._calm:
-            excess = self._measure(crests, height)
+            excess = self._measure(crests, self.waves.height)
         if self.excess > 1:
             self._looks += 1
         return self.excess > 1 and (excess < self.excess or self._looks >= _FOLLOWED)

@@ -21,9 +21,9 @@ _CROSSING, _DECAY = 0.25, 1.5
 # MuJoCo's default, in place of that of a geom without a mass: those of the world have none [kg/m^3].
 _DENSITY = 1000.0
 
-# By this share of its radius a typical hit may dent a target, and a body at rest. Dents of more than a quarter are
-# warned of; those seen are half of what the estimate allows, which takes the whole impulse in the shortest time.
-_HIT, _REST = 0.5, 0.1
+# By this share of its radius a fall may dent a target, and a body at rest; more than a quarter is warned of. The
+# estimates are up to half of what a hard, short hit does, and many times what the slow push of a limb does.
+_HIT, _REST = 0.3, 0.1
 
 # A ball has the radius 3 V / A and a tube 2 V / A; a plate has half the thickness V / A.
 _RADIUS = 1.5
@@ -65,11 +65,13 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     - speed: waves cross the target in a quarter of a second, or as fast as a body is that has fallen from a height of
       the target's size, which is faster on targets smaller than 1 m;
     - damping: they fall to a tenth in 1.5 s;
-    - density: the mass of the target's body over the area of the target; of a geom without a mass, 1000 kg/m^3 times
-      its volume over its area;
     - stiffness: (16 c / size)^2, or more: under the heaviest body that can touch the target, at rest, the surface sinks
-      by a tenth of the target's radius at most, and a fall from a height of the target's size leaves a dent of about a
-      quarter.
+      by a tenth of the target's radius at most, and a fall leaves a dent of less than a quarter; but no more than
+      (0.5 / dt)^2, which the time step dt resolves. The fall is from a height of the target's size, or from where
+      bodies are above the target, or it above them, in the model as it begins;
+    - density: the mass of the target's body over the area of the target; of a geom without a mass, 1000 kg/m^3 times
+      its volume over its area. More where the stiffness is not all that this would take: what can touch the target
+      then sinks and dents no deeper.
 
     Parameters
     ----------
@@ -83,10 +85,7 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     if not material.unset:
         return material
     burden = _burden(coupled, geom, extent)
-    if "speed" in material.unset:
-        speed = _speed(coupled.model, extent)
-    else:
-        speed = _greatest(material.speed)
+    speed = _speed(coupled.model, extent) if "speed" in material.unset else _greatest(material.speed)
     density = _density(coupled.model, geom, extent)
     if "stiffness" in material.unset:
         stiffness = min(_stiffness(burden, extent, speed, density), _stiffest(coupled.model))
@@ -104,12 +103,17 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
 def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> float:
     """Density with which a target bears what may lie on it and hit it, as `suited_material` has it [kg/m^2].
 
-    The least speed and stiffness of the material count. 0 where it resists by bending, or has deep fluid below.
+    The least speed and stiffness of the material count. Bending b resists all waves as a speed q sqrt(b) would, or
+    more, with q the wave number of the longest. What yields is to stay elastic. Over deep fluid it is not known: 0.
     """
-    if np.any(material.bending) or material.deep:
+    if material.deep:
         return 0.0
-    speed, stiffness = float(np.min(material.speed)), float(np.min(material.stiffness))
-    return min(_density_under(_burden(coupled, geom, extent), extent, speed, stiffness), 1e12)
+    speed, bending, stiffness, limit = (
+        float(np.min(getattr(material, name))) for name in ("speed", "bending", "stiffness", "yield_height")
+    )
+    burden, longest = _burden(coupled, geom, extent), _LONGEST / extent.size
+    burden = burden._replace(rest_depth=min(burden.rest_depth, limit), hit_depth=min(burden.hit_depth, limit))
+    return min(_density_under(burden, extent, float(np.hypot(speed, longest * bending**0.5)), stiffness), 1e12)
 
 
 def suited_soft_material(model: mujoco.MjModel, extent: Extent, mass: float, material: Material) -> Material:

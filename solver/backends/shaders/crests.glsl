@@ -1,5 +1,6 @@
 #version 430
-// Raise the crests to the size of the height, with what is permanent of it.
+// Raise the crests to the size of the height, with what is permanent of it. Bits of positive floats are in the order of
+// the floats, and those of what is no number are beyond.
 layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) readonly buffer Height { dvec4 h[]; };
 layout(std430, binding = 1) buffer Crests { dvec4 crests[]; };
@@ -20,7 +21,7 @@ void main() {
 #ifdef DENT
         height[i] += stays[i];
 #endif
-        crest[i] = max(crest[i], abs(height[i]));
+        crest[i] = uintBitsToFloat(max(floatBitsToUint(crest[i]), floatBitsToUint(abs(height[i]))));
     }
     crests[eight] = pack(crest);
 }
