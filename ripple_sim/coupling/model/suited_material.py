@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ripple_sim.solver import Material, Mesh
 from ripple_sim.solver.operator.response import density_after, density_under, stiffness_after, stiffness_under
 from ripple_sim.solver.operator.suited import BOUNCE, damping_for, narrow_stiffness
+from ripple_sim.solver.texels.thickness import half_thickness_at
 
 from .coupled_model import CoupledModel
 
@@ -22,11 +23,11 @@ _CROSSING, _DECAY = 0.25, 1.5
 _DENSITY = 1000.0
 
 # By this share of its radius a fall may dent a target, and a body at rest; more than a quarter is warned of. The
-# estimates are up to half of what a hard, short hit does, and many times what the slow push of a limb does.
-_HIT, _REST = 0.3, 0.1
+# estimates are half of what a hard, short hit does, and many times what the slow push of a limb does.
+_HIT, _REST = 0.1, 0.05
 
-# A ball has the radius 3 V / A and a tube 2 V / A; a plate has half the thickness V / A.
-_RADIUS = 1.5
+# The radius of a target is that of its thinnest part; this share of its area may be thinner.
+_THINNER = 0.1
 
 # How long most of a contact's impulse takes, over the time constant of its `solref`.
 _PULSE = 0.4
@@ -43,20 +44,28 @@ _STIFFEST = 0.5
 
 
 class Extent(NamedTuple):
-    """How large a target is: its longest extent [m], its area [m^2] and its volume [m^3]."""
+    """How large a target is: its longest extent [m], its area [m^2], its volume [m^3] and its radius [m]."""
 
     size: float
     area: float
     volume: float
+    radius: float
 
     @classmethod
     def of(cls, mesh: Mesh) -> Extent:
         """Extent of a mesh; where that is open, as if its rims were closed from the middle."""
-        a, b, c = np.moveaxis((mesh.V - mesh.V.mean(axis=0))[mesh.F], 1, 0)
-        area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+        middle = mesh.V.mean(axis=0)
+        a, b, c = np.moveaxis((mesh.V - middle)[mesh.F], 1, 0)
+        normals = np.cross(b - a, c - a)
+        areas = np.linalg.norm(normals, axis=1) / 2
+        area = float(areas.sum())
         volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6))
         size = float(np.ptp(mesh.V, axis=0).max())
-        return cls(size, area, max(volume, 1e-3 * size * area))
+        normals /= np.maximum(2 * areas, 1e-300)[:, None]
+        radii = half_thickness_at(mesh, (a + b + c) / 3 + middle, normals)
+        order = np.argsort(radii)
+        thin = np.searchsorted(np.cumsum(areas[order]), _THINNER * area)
+        return cls(size, area, max(volume, 1e-3 * size * area), float(radii[order[thin]]))
 
 
 def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> Material:
@@ -66,7 +75,7 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
       the target's size, which is faster on targets smaller than 1 m;
     - damping: they fall to a tenth in 1.5 s;
     - stiffness: (16 c / size)^2, or more: under the heaviest body that can touch the target, at rest, the surface sinks
-      by a tenth of the target's radius at most, and a fall leaves a dent of less than a quarter; but no more than
+      by a twentieth of the target's radius at most, and a fall leaves a dent of less than a quarter; but no more than
       (0.5 / dt)^2, which the time step dt resolves. The fall is from a height of the target's size, or from where
       bodies are above the target, or it above them, in the model as it begins;
     - density: the mass of the target's body over the area of the target; of a geom without a mass, 1000 kg/m^3 times
@@ -147,14 +156,14 @@ class _Burden(NamedTuple):
 def _burden(coupled: CoupledModel, geom: int, extent: Extent) -> _Burden:
     model = coupled.model
     mass, footprint = heaviest(coupled, geom)
-    fall, depth = _fall(model, max(extent.size, _height(coupled, geom))), _RADIUS * extent.volume / extent.area
+    fall = _fall(model, max(extent.size, _height(coupled, geom)))
     return _Burden(
         weight=_resting(coupled, geom) * float(np.linalg.norm(model.opt.gravity)),
         impulse=BOUNCE * mass * fall,
         duration=max(_PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep), model.opt.timestep),
         radius=max(footprint, _FOOTPRINT * extent.size),
-        rest_depth=_REST * depth,
-        hit_depth=_HIT * depth,
+        rest_depth=_REST * extent.radius,
+        hit_depth=_HIT * extent.radius,
     )
 
 
