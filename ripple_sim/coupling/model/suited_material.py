@@ -26,9 +26,6 @@ _DENSITY = 1000.0
 # estimates are half of what a hard, short hit does, and many times what the slow push of a limb does.
 _HIT, _REST = 0.1, 0.05
 
-# The radius of a target is that of its thinnest part; this share of its area may be thinner.
-_THINNER = 0.1
-
 # How long most of a contact's impulse takes, over the time constant of its `solref`.
 _PULSE = 0.4
 
@@ -44,7 +41,7 @@ _STIFFEST = 0.5
 
 
 class Extent(NamedTuple):
-    """How large a target is: its longest extent [m], its area [m^2], its volume [m^3] and its radius [m]."""
+    """How large a target is: its longest extent [m], area [m^2], volume [m^3], and half its usual thickness [m]."""
 
     size: float
     area: float
@@ -64,8 +61,8 @@ class Extent(NamedTuple):
         normals /= np.maximum(2 * areas, 1e-300)[:, None]
         radii = half_thickness_at(mesh, (a + b + c) / 3 + middle, normals)
         order = np.argsort(radii)
-        thin = np.searchsorted(np.cumsum(areas[order]), _THINNER * area)
-        return cls(size, area, max(volume, 1e-3 * size * area), float(radii[order[thin]]))
+        middle_one = order[np.searchsorted(np.cumsum(areas[order]), area / 2)]
+        return cls(size, area, max(volume, 1e-3 * size * area), float(radii[middle_one]))
 
 
 def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> Material:
@@ -211,9 +208,10 @@ def _height(coupled: CoupledModel, geom: int) -> float:
     mujoco.mj_kinematics(model, data)
     up = -model.opt.gravity / max(float(np.linalg.norm(model.opt.gravity)), 1e-300)
     above = (data.geom_xpos - data.geom_xpos[geom]) @ up
+    between = np.abs(above) - model.geom_rbound - model.geom_rbound[geom]
     moves = _moves(model)
     falls = np.where(above > 0, moves, moves[geom]) & coupled.can_collide(geom)
-    return float(np.abs(above[falls]).max(initial=0.0))
+    return float(between[falls].max(initial=0.0))
 
 
 def _resting(coupled: CoupledModel, geom: int) -> float:
