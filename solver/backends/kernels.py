@@ -158,6 +158,15 @@ def drift(h: Floats32, v: Floats32, drift: Drift) -> None:
 
 
 @kernel
+def raise_crests(h: Floats32, crests: Floats32) -> None:
+    """Raise the crests to the size of the height, of any shape, halo and all; to what is no number as well."""
+    heights, tops = h.reshape(-1), crests.reshape(-1)
+    for i in range(len(tops)):
+        size = abs(heights[i])
+        tops[i] = tops[i] if size <= tops[i] else size
+
+
+@kernel
 def flow(h: Floats32, plasticity: Plasticity) -> None:
     """Hand the part of the elastic height that is beyond the yield height over to the permanent one."""
     n = h.shape[1] - 2

@@ -77,6 +77,14 @@ class WaveField:
         self._note_height(height)
         self._backend.set_height(height)
 
+    def crests(self) -> NDArray[np.float32]:
+        """Greatest size that each height has had after any step since the last call, or has now [m], [C, n, n].
+
+        Kept from the first call on, where the waves are; a copy of the solver begins anew. As with `height`, raises
+        `SolverError` once if one is not finite.
+        """
+        return self._finite(self._backend.crests(), "height")
+
     def snapshot(self) -> NDArray[np.float32] | DeviceField:
         """A copy of the height [m], [C, n, n], where the waves are: on hardware GL it stays on the GPU.
 
