@@ -40,7 +40,7 @@ _DENSITY = 1000.0
 
 # By this share of its radius a fall may dent a target, and a body at rest; more than a quarter is warned of. The
 # estimates are half of what a hard, short hit does, and many times what the slow push of a limb does.
-_HIT, _REST = 0.08, 0.05
+_HIT, _REST = 0.085, 0.05
 
 # How long most of a contact's impulse takes, over the time constant of its `solref`.
 _PULSE = 0.4
