@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any, TypeAlias
 
-from ripple_sim.solver.gl.shader import Struct, numbered
+import numpy as np
 
 from . import camera
 
@@ -90,6 +91,53 @@ LEVELS = {
     "SOLID": 0.25,  # solids in all of them
     "LAYER": 0.125,  # the transparent object that is being drawn
 }
+
+# Shapes of what std140 and std430 lay out alike, in float32: the columns of a mat3 are padded to four.
+_SHAPES: dict[str, tuple[int, ...]] = {"vec4": (4,), "mat3": (3, 4), "mat4": (4, 4)}
+
+Member: TypeAlias = "str | Struct | tuple[str | Struct, int]"
+
+
+class Struct:
+    """A struct in GLSL and the NumPy dtype of the same layout, in uniform blocks (std140) and storage buffers (std430).
+
+    Parameters
+    ----------
+    name : str
+        In GLSL.
+    **members
+        "vec4", "mat3", "mat4" or another struct, or a pair of one of these and the length of an array of them.
+
+    Attributes
+    ----------
+    dtype : numpy.dtype
+        Matrices are stored column by column: a mat4 is [column, row], a mat3 [column, row and padding].
+    members : str
+        The declarations, to be put between the braces of a struct or block.
+    """
+
+    def __init__(self, name: str, /, **members: Member) -> None:
+        self.name = name
+        fields: list[tuple[Any, ...]] = []
+        declarations = []
+        for member, given in members.items():
+            kind, count = given if isinstance(given, tuple) else (given, None)
+            word = kind if isinstance(kind, str) else kind.name
+            declarations.append(f"{word} {member};" if count is None else f"{word} {member}[{count}];")
+            base, shape = ("f4", _SHAPES[kind]) if isinstance(kind, str) else (kind.dtype, ())
+            fields.append((member, base, shape if count is None else (count, *shape)))
+        self.dtype: np.dtype[Any] = np.dtype(fields)
+        self.members = " ".join(declarations)
+
+    def defines(self) -> dict[str, str]:
+        """`NAME_MEMBERS`: the declarations."""
+        return {f"{self.name.upper()}_MEMBERS": self.members}
+
+
+def numbered(names: type[IntEnum], suffix: str = "") -> dict[str, int]:
+    """Defines of an enumeration's names, each with a suffix."""
+    return {f"{each.name}{suffix}": each.value for each in names}
+
 
 LIGHT = Struct(
     "Light",

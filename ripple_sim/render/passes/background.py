@@ -50,17 +50,15 @@ class SortedTiles:
         self._corners = resources.buffer(reserve=8 * len(Kind) * tiles[0] * tiles[1])
         self._empty = np.array([[4, 0, 0, kind * tiles[0] * tiles[1], 0] for kind in Kind], dtype=np.uint32).tobytes()
         self._commands = resources.buffer(self._empty)
-        self._sort = resources.compute_shader("passes/sort_tiles", TILE=_BLOCKS, GROUP=_GROUP)
+        self._sort = resources.compute_shader("passes/background_tiles", TILE=_BLOCKS, GROUP=_GROUP)
         self._sort["tiles"] = tiles
         plain, smooth, rough = (
-            resources.program("passes/coarse_tile_vertex", fragment, **options, PLAIN=plain)
-            for fragment, plain in (
-                ("passes/tile_fragment", 1),
-                ("passes/tile_fragment", 0),
-                ("passes/background_fill_fragment", 0),
+            resources.program(
+                "passes/background_tiles", **options, PLAIN=int(kind == Kind.PLAIN), ROUGH=int(kind == Kind.ROUGH)
             )
+            for kind in Kind
         )
-        shade = resources.program("passes/view_tile_vertex", "passes/background_fragment", **options, SHADOW=1, BLOCK=1)
+        shade = resources.program("passes/background", **options, SHADOW=1, BLOCK=1, TILES=1)
         extent = 2.0 * edge / size[0], 2.0 * edge / size[1]
         self._sort["extent"] = extent
         for program in (plain, smooth, rough, shade):
@@ -125,7 +123,7 @@ class Background:
     ) -> None:
         blocks = -(-size[0] // block), -(-size[1] // block)
         self._passes = [
-            FramePass(resources, "passes/background_fragment", blocks, **options, SHADOW=shadow, BLOCK=block)
+            FramePass(resources, "passes/background", blocks, **options, SHADOW=shadow, BLOCK=block)
             for shadow in (0, 1)
         ]
         for each in self._passes:

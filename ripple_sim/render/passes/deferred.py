@@ -105,10 +105,11 @@ class DeferredShading:
         }
         smooth = not any(options[name] for name in ("CUT_OUT", "TILED", "MIRROR", "SKYBOX"))
         self._background = (CoarseBackground if smooth else Background)(resources, size, options, floor)
-        self._solids = FramePass(resources, "passes/deferred_fragment", size, **options, LAYER=0)
+        self._solids = FramePass(resources, "passes/deferred", size, **options, LAYER=0)
         self.layers = TransparentLayers(resources, frame_format, self._g_buffer, self.frame, options)
         self._tiles = Tiles(resources, size)
-        classify = resources.program("passes/tiles_vertex", "passes/classify_fragment", **options, LAYER=0)
+        classify = resources.program("passes/classify", **options, LAYER=0, TILES=1)
+        classify["level"] = 0.5  # any will do
         classify["extent"] = self._tiles.extent
         self._classify = resources.vertex_array(classify, [(self._tiles.buffer, "2f/i", "in_corner")])
 

@@ -147,7 +147,7 @@ class FloorOcclusion:
             self._seen = resources.texture((1, 1), 4, bytes([255] * 4))
             self._bounce = resources.texture((1, 1), 4, bytes(8), dtype="f2")
             return
-        program = resources.program("glsl/view_vertex", "passes/floor_occlusion_fragment", **options)
+        program = resources.program("passes/floor_occlusion", **options, TILES=0)
         self._pass = resources.vertex_array(program, [])
         ceiling = _CEILING_SIZE, _CEILING_SIZE
         self._ceiling = resources.texture(ceiling, 4, dtype="nu2")

@@ -28,7 +28,7 @@ class FramePass:
     Parameters
     ----------
     resources : Resources
-    fragment : str
+    name : str
         Path of the shader.
     size : (width, height)
         Of the framebuffer [pixels].
@@ -40,13 +40,13 @@ class FramePass:
     program : moderngl.Program
     """
 
-    def __init__(self, resources: Resources, fragment: str, size: tuple[int, int], **options: object) -> None:
+    def __init__(self, resources: Resources, name: str, size: tuple[int, int], **options: object) -> None:
         with resources.gl as ctx:
             widest = min(ctx.info["GL_MAX_VIEWPORT_DIMS"])
         # The triangle over the frame lies within a viewport twice as large: where a driver clips it in two, derivatives
         # along the cut would be undefined.
         self._reach = 2 if 2 * max(size) <= widest else 1
-        self.program = resources.program("glsl/view_vertex", fragment, **options)
+        self.program = resources.program(name, **options, TILES=0)
         self._triangle = resources.vertex_array(self.program, [])
 
     def run(self, framebuffer: moderngl.Framebuffer, level: float) -> None:
@@ -135,8 +135,8 @@ class TransparentLayers:
         self._behind.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         self._behind.repeat_x = self._behind.repeat_y = False
         self._behind_framebuffer = resources.framebuffer([self._behind])
-        self._classify = FramePass(resources, "passes/classify_fragment", size, **options, LAYER=1)
-        self._shade = FramePass(resources, "passes/deferred_fragment", size, **options, LAYER=1)
+        self._classify = FramePass(resources, "passes/classify", size, **options, LAYER=1)
+        self._shade = FramePass(resources, "passes/deferred", size, **options, LAYER=1)
 
     def add(self, ctx: moderngl.Context, number: int, draw: Callable[[], None], boxes: NDArray[np.int64]) -> None:
         """Draw and shade a single transparent object over the frame.
@@ -222,7 +222,7 @@ class SurfaceBuffers:
         self._g_buffer = GBuffer(resources, size, 1)
         self._images = [resources.texture(size, 4, dtype="f4") for _ in range(3)]
         self._framebuffer = resources.framebuffer(self._images, resources.depth_renderbuffer(size))
-        self._resolve = FramePass(resources, "passes/surface_buffers_fragment", size, SAMPLES=1)
+        self._resolve = FramePass(resources, "passes/surface_buffers", size, SAMPLES=1)
         self._resolve.program["floor_geom"] = float(floor_geom)
 
     def draw(self, ctx: moderngl.Context, draw: Callable[[], None]) -> SurfaceImage:

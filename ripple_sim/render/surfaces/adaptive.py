@@ -252,8 +252,8 @@ class DeviceTessellation:
             Splitting.COMMAND: self.command,
         }
         self._split_edges, self._count, self._add, self._write = (
-            resources.compute_shader(f"surfaces/{name}", GROUP=_GROUP, FIRST_MIDPOINT=adaptive.base_count)
-            for name in ("split_edges", "count_triangles", "add_counts", "write_triangles")
+            resources.compute_shader("surfaces/adaptive", stage, GROUP=_GROUP, FIRST_MIDPOINT=adaptive.base_count)
+            for stage in ("split", "count", "add", "write")
         )
 
     def run(self, ctx: moderngl.Context) -> None:

@@ -70,8 +70,8 @@ class SurfaceDrawing:
         resources, surface, mapping = assets.resources, paint.surface, paint.mapping
         heatmap, self._paint = surface.heatmap_colors is not None, paint
         options = {"MAPPING": mapping.kind, "HEATMAP": int(heatmap), "GRID": int(surface.grid > 0)}
-        self._program = resources.program("surfaces/surface_vertex", "surfaces/surface_fragment", **options)
-        depth = resources.program("surfaces/surface_depth_vertex", "glsl/depth_fragment")
+        self._program = resources.program("surfaces/surface", **options)
+        depth = resources.program("passes/casters", MOVED=1, ALBEDO_MAP=0, TRANSMISSION_MAP=0)
         vertices, attributes = bounded.vertices, bounded.vertices.attributes
         mapped = mapped_coordinates(attributes, mapping)
         self._normals = resources.buffer(attributes[:, NORMAL].astype("f4").tobytes())
@@ -88,11 +88,11 @@ class SurfaceDrawing:
         # whoever looks from afar, or for shapes alone, need not see every wave split in its triangles
         whole, coarse = (resources.buffer(each.astype("i4").tobytes()) for each in (vertices.F, bounded.coarse))
         self._depth = resources.vertex_array(depth, content[:1], whole)
-        albedo = resources.program("surfaces/surface_depth_vertex", "glsl/albedo_fragment")
+        albedo = resources.program("passes/casters", MOVED=1, ALBEDO_MAP=1, TRANSMISSION_MAP=0)
         albedo["color"] = tuple(paint.color[:3] - paint.transmission)
         self._albedo = resources.vertex_array(albedo, content[:1], coarse)
         transmission = resources.program(
-            "surfaces/surface_depth_vertex", "passes/transmission_fragment", SOLID=int(not surface.open), REFRACTING=1
+            "passes/casters", MOVED=1, ALBEDO_MAP=0, TRANSMISSION_MAP=1, SOLID=int(not surface.open)
         )
         transmission["transmission"] = tuple(paint.transmission)
         self._transmission = resources.vertex_array(transmission, content[:1], indices)

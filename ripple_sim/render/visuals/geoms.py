@@ -136,8 +136,8 @@ class GeomVisuals:
         self._shapes: dict[str, ShapeLevels] = {}
         self._programs: dict[tuple[int, bool], moderngl.Program] = {}
         self._depth, self._albedo, self._transmission = (
-            assets.resources.program("visuals/geom_depth_vertex", fragment, REFRACTING=0)
-            for fragment in ("glsl/depth_fragment", "glsl/albedo_fragment", "passes/transmission_fragment")
+            assets.resources.program("passes/casters", MOVED=0, ALBEDO_MAP=albedo, TRANSMISSION_MAP=transmission)
+            for albedo, transmission in ((0, 0), (1, 0), (0, 1))
         )
         model = assets.model
         visuals = [geom_visual(model, geom) for geom in geoms] + [site_visual(model, i) for i in visible_sites(model)]
@@ -228,9 +228,7 @@ class GeomVisuals:
     def _program(self, kind: int, own: bool) -> moderngl.Program:
         """Program of a kind of mapping, with the mesh's own texture coordinates or without."""
         if (kind, own) not in self._programs:
-            self._programs[kind, own] = self._assets.resources.program(
-                "visuals/geom_vertex", "visuals/geom_fragment", MAPPING=kind, OWN=int(own)
-            )
+            self._programs[kind, own] = self._assets.resources.program("visuals/geom", MAPPING=kind, OWN=int(own))
         return self._programs[kind, own]
 
 

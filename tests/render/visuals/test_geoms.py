@@ -117,7 +117,7 @@ def test_an_object_has_the_bits_of_all_that_darken_it_by_a_hundredth_but_not_its
 
 def visibility(gl, points, normal, near=1):
     expression = f"vec4(occluder_visibility(x.xyz, vec3({normal}), {near}))"
-    return evaluated(gl, "visuals/occluders.glsl", expression, np.atleast_2d(points))[:, 0]
+    return evaluated(gl, "glsl/occluders.glsl", expression, np.atleast_2d(points))[:, 0]
 
 
 def test_a_geom_hides_more_of_the_sky_the_nearer_it_is_and_none_from_itself_or_from_behind(gl, resources):

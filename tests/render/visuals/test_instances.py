@@ -87,7 +87,7 @@ def read(gl, table, expression, count=1) -> np.ndarray:
     """An expression of an object `object_at(int(x.x))`, for all rows."""
     with gl:
         table.bind()
-    return evaluated(gl, "visuals/object_table.glsl", expression, np.arange(count)[:, None])
+    return evaluated(gl, "glsl/objects.glsl", expression, np.arange(count)[:, None])
 
 
 def test_shaders_find_a_look_in_its_row(gl, table):
