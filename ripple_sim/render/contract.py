@@ -1,4 +1,7 @@
-"""What the renderer and its shaders agree on. Every shader gets all of this as defines; see `DEFINES`."""
+"""What the renderer and its shaders agree on: units and bindings, struct layouts, the sRGB curve.
+
+Every shader gets all of this as defines; see `DEFINES`.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,7 @@ from enum import IntEnum
 from typing import Any, TypeAlias
 
 import numpy as np
-
-from . import camera
+from numpy.typing import ArrayLike, NDArray
 
 MAX_LIGHTS, MAX_SHADOWS, MAX_OCCLUDERS, SOFT_BOXES = 8, 4, 16, 3
 HELD_LIGHTS = 2  # that come to fragments as varyings
@@ -42,18 +44,18 @@ class Unit(IntEnum):
 
 
 class Binding(IntEnum):
-    """Bindings of storage buffers and of the one uniform block; `NAME_BINDING` in GLSL."""
+    """Bindings of storage buffers and uniform blocks; `NAME_BINDING` in GLSL.
 
+    OpenGL promises eight: passes that never run at the same time share some, which makes the later names aliases.
+    """
+
+    # displacement, the frame and its shading
     REST_VERTICES = 0
     MOVED_VERTICES = 1
     MIDPOINTS = 2
     FRAME = 3
     OCCLUDERS = 4
-
-
-class Splitting(IntEnum):
-    """Bindings of the storage buffers of adaptive tessellation, all before those above; `NAME_BINDING` in GLSL."""
-
+    # adaptive tessellation, before all of those
     SPLIT = 0
     LONG_EDGES = 1
     LOOKUPS = 2
@@ -62,11 +64,7 @@ class Splitting(IntEnum):
     TOTALS = 5
     INDICES = 6
     COMMAND = 7
-
-
-class BackgroundTiles(IntEnum):
-    """Bindings of the storage buffers of the background's tiles; `NAME_BINDING` in GLSL."""
-
+    # tiles of the background
     TILES = 0
     COMMANDS = 1
 
@@ -135,8 +133,8 @@ class Struct:
 
 
 def numbered(names: type[IntEnum], suffix: str = "") -> dict[str, int]:
-    """Defines of an enumeration's names, each with a suffix."""
-    return {f"{each.name}{suffix}": each.value for each in names}
+    """Defines of an enumeration's names, aliases too, each with a suffix."""
+    return {f"{name}{suffix}": each.value for name, each in names.__members__.items()}
 
 
 LIGHT = Struct(
@@ -191,6 +189,25 @@ OBJECT = Struct(
     rotation="mat3",  # of the height map's gradients, into the world
 )
 
+# The sRGB transfer curve (IEC 61966-2-1): SLOPE x up to BREAK, and (1 + OFFSET) x^(1 / EXPONENT) - OFFSET above it.
+_BREAK, _SLOPE, _OFFSET, _EXPONENT = 0.0031308, 12.92, 0.055, 2.4
+_ENCODED_BREAK = 0.04045
+
+
+def srgb_to_linear(srgb: ArrayLike) -> NDArray[np.float64]:
+    """Linear values of sRGB values, 0 to 1 both, any shape."""
+    value = np.asarray(srgb, dtype=np.float64)
+    above = np.maximum(value, _ENCODED_BREAK)
+    return np.where(value <= _ENCODED_BREAK, value / _SLOPE, ((above + _OFFSET) / (1 + _OFFSET)) ** _EXPONENT)
+
+
+def linear_to_srgb(linear: ArrayLike) -> NDArray[np.float64]:
+    """Inverse of `srgb_to_linear`; values beyond 0 to 1 continue the curve."""
+    value = np.asarray(linear, dtype=np.float64)
+    above = np.maximum(value, _BREAK)
+    return np.where(value <= _BREAK, _SLOPE * value, (1 + _OFFSET) * above ** (1 / _EXPONENT) - _OFFSET)
+
+
 DEFINES: dict[str, object] = {
     "MAX_LIGHTS": MAX_LIGHTS,
     "MAX_OCCLUDERS": MAX_OCCLUDERS,
@@ -199,8 +216,6 @@ DEFINES: dict[str, object] = {
     "VERTEX_GROUP": VERTEX_GROUP,
     **numbered(Unit, "_UNIT"),
     **numbered(Binding, "_BINDING"),
-    **numbered(Splitting, "_BINDING"),
-    **numbered(BackgroundTiles, "_BINDING"),
     **numbered(MappingKind),
     **{f"{name}_LEVEL": level for name, level in LEVELS.items()},
     **LIGHT.defines(),
@@ -209,8 +224,8 @@ DEFINES: dict[str, object] = {
     **OBJECT.defines(),
     "OBJECT_TEXELS": OBJECT.dtype.itemsize // 16,
     "OBJECT_COLUMNS": OBJECT_COLUMNS,
-    "SRGB_BREAK": camera.BREAK,
-    "SRGB_SLOPE": camera.SLOPE,
-    "SRGB_OFFSET": camera.OFFSET,
-    "SRGB_EXPONENT": camera.EXPONENT,
+    "SRGB_BREAK": _BREAK,
+    "SRGB_SLOPE": _SLOPE,
+    "SRGB_OFFSET": _OFFSET,
+    "SRGB_EXPONENT": _EXPONENT,
 }

@@ -316,7 +316,7 @@ class GLContext:
 
     def shared_compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
         """Compile a compute shader once and share it: set all uniforms before each use."""
-        source = load_shader(package, name, **defines)
+        source = load_shader(package, name, "compute", **defines)
         if source not in self._shared_shaders:
             self._shared_shaders[source] = self._compute_shader(name, source)
         return self._shared_shaders[source]

@@ -1,5 +1,6 @@
 """The first frame is as good as any, and any as the first: nothing is read from the GPU before it is drawn."""
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +11,6 @@ import pytest
 from drawn import BALL, FLOOR, FRONT, SIZE, SUN, ball_surface
 
 from ripple_sim.render import Renderer
-from ripple_sim.render.camera import ThroughLens
 from ripple_sim.render.resources import Resources
 
 SKY = '<texture type="skybox" builtin="gradient" rgb1=".3 .5 .7" rgb2="0 0 0" width="16" height="96"/>'
@@ -48,7 +48,8 @@ def shown(renderer: Renderer, data: mujoco.MjData) -> np.ndarray:
 
 def blurred(renderer: Renderer, data: mujoco.MjData) -> np.ndarray:
     """Through two points of the lens, as frames with depth of field are made."""
-    eyes = (ThroughLens(FRONT, lens, 3.0) for lens in ((0.1, 0.0), (-0.05, 0.08)))
+    lenses = (0.1, 0.0), (-0.05, 0.08)
+    eyes = (dataclasses.replace(FRONT.pose(), lens=lens, focal_distance=3.0) for lens in lenses)
     return np.stack([renderer.render(data, {}, eye, number) for number, eye in enumerate(eyes)])
 
 

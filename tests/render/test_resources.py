@@ -16,7 +16,8 @@ from shader_functions import evaluated
 
 from ripple_sim.errors import RippleWarning
 from ripple_sim.render import Renderer
-from ripple_sim.render.camera import Camera, Pose, srgb_to_linear
+from ripple_sim.render.camera import Camera, Pose
+from ripple_sim.render.contract import srgb_to_linear
 from ripple_sim.render.resources import fitted, srgb_cube, srgb_texture
 
 
