@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib.resources
+import re
 from importlib.resources.abc import Traversable
 
 from ..errors import GLError
@@ -24,7 +25,7 @@ def load_shader(package: str, name: str, stage: str = "", **defines: object) -> 
         Which of the shaders in the file, if there are several: lines behind `#stage vertex` belong to the stage
         "vertex" alone, up to the next such line; those before the first belong to all. So it is in files included.
     **defines
-        Constants, written as `#define NAME value`.
+        Constants, written as `#define NAME value` where the text has the name.
 
     Raises
     ------
@@ -35,7 +36,9 @@ def load_shader(package: str, name: str, stage: str = "", **defines: object) -> 
     head, _, body = text.partition("\n")
     if not head.startswith("#version"):
         raise GLError(f"shader {name}.glsl of {package} must start with #version, found {head!r}")
-    lines = "".join(f"#define {key} {value}\n" for key, value in defines.items())
+    # only those that it knows: shaders that do not differ in them are the same, and compiled once
+    known = set(re.findall(r"\w+", " ".join([body, *map(str, defines.values())])))
+    lines = "".join(f"#define {key} {value}\n" for key, value in defines.items() if key in known)
     return f"{head}\n{lines}{body}"
 
 

@@ -19,8 +19,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.delitem(sys.modules, "some_shaders", raising=False)
     files = {
         "passes/one.glsl": '#version 430\n#include "shared/outer.glsl"\n#include "shared/inner.glsl"\nvoid main() {}\n',
-        "shared/outer.glsl": '#include "shared/inner.glsl"\n// outer\n',
-        "shared/inner.glsl": "// inner\n",
+        "shared/outer.glsl": '#include "shared/inner.glsl"\n// outer, HALF\n',
+        "shared/inner.glsl": "// inner, N\n",
         "passes/lost.glsl": '#version 430\n#include "shared/none.glsl"\n',
         "passes/bare.glsl": "void main() {}\n",
     }
@@ -30,8 +30,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_includes_are_put_in_once_and_defines_at_the_top(package: str) -> None:
-    text = load_shader(package, "passes/one", N=8, HALF=0.5)
-    assert text == "#version 430\n#define N 8\n#define HALF 0.5\n// inner\n\n// outer\n\n\nvoid main() {}\n"
+    text = load_shader(package, "passes/one", N=8, HALF=0.5, OTHER=1)
+    assert text == "#version 430\n#define N 8\n#define HALF 0.5\n// inner, N\n\n// outer, HALF\n\n\nvoid main() {}\n"
 
 
 def test_a_missing_file_is_named(package: str) -> None:
