@@ -233,7 +233,7 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
 )
 @pytest.mark.parametrize("where", ["cli._parse = meet_signal", "info.Info.run = meet_signal"])
 def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_path, number, status, word, where):
-    (tmp_path / "slow.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\nfor _ in range(10**9): pass\n")
+    (tmp_path / "slow.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\n")
     code = (
         "import signal, sys\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # which a job in the background has ignored
@@ -241,6 +241,7 @@ def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_
         "from ripple_sim.cli import main as cli\n"
         "def meet_signal(argument):\n"
         "    import slow\n"
+        "    for _ in range(10**9): pass\n"
         f"{where}\n"
         "sys.exit(cli.main(['info']))\n"
     )
