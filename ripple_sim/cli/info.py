@@ -1,18 +1,8 @@
-"""`ripple-sim materials`.
-
-`ripple-sim bench`.
-
-`ripple-sim cache`.
-
-`ripple-sim completion`.
-
-`ripple-sim info`.
-"""
+"""Commands that tell something and write no file: `bench`, `cache`, `completion`, `info` and `materials`."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import json as json_format
 import math
 import sys
@@ -101,9 +91,9 @@ class Materials:
         """Print the table."""
         from ripple_sim.solver.operator.presets import PRESETS
 
-        table = {name: _told(name) for name in PRESETS}
+        table = {name: _facts(name) for name in PRESETS}
         if self.json:
-            print(json.dumps(table, indent=2))
+            print(json_format.dumps(table, indent=2))
             return
         width = max(map(len, table))
         for name, row in table.items():
@@ -114,11 +104,11 @@ class Materials:
             print(f"{'':{width}}  source{'' if row['checked'] else ', not checked'}: {row['source']}")
 
 
-def _told(name: str) -> dict[str, Any]:
+def _facts(name: str) -> dict[str, Any]:
     from ripple_sim.solver import Material
     from ripple_sim.solver.operator.material import decay_time, phase_speed
     from ripple_sim.solver.operator.presets import PRESETS
 
     material, q = Material.preset(name), 2 * math.pi / _WAVELENGTH
-    told = {"speed [m/s]": phase_speed(material, q), "decay [s]": decay_time(material, q)}
-    return told | dataclasses.asdict(PRESETS[name])
+    facts = {"speed [m/s]": phase_speed(material, q), "decay [s]": decay_time(material, q)}
+    return facts | dataclasses.asdict(PRESETS[name])

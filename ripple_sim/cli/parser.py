@@ -1,9 +1,7 @@
 """From the words of a command line to a command.
 
 A command is a class: its fields are the arguments, the docstrings the help, and `run` does the work. Heavy imports are
-inside `run`, so that `--help` and usage errors are answered at once.
-
-`ripple-sim view`.
+inside `run`, so that `--help` and usage errors are answered at once. `ripple-sim view` is here as well.
 """
 
 from __future__ import annotations
