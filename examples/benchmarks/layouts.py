@@ -18,9 +18,8 @@ from ripple_sim import Camera
 from ripple_sim.bench import backend_advance, race
 from ripple_sim.render import Renderer, Surface
 from ripple_sim.render.surfaces.surface import Charts
-from ripple_sim.solver import Atlas, GLError, HeightMap, Material, Mesh, build_atlas, load_mesh
+from ripple_sim.solver import Atlas, GLError, HeightMap, Material, Mesh, build_atlas, build_operator, load_mesh
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.operator.assembly import build_operator
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
 

@@ -19,10 +19,9 @@ import numpy as np
 from scipy.sparse import diags_array
 
 from ripple_sim.bench import Advance, backend_advance, memory_fields, memory_stream, race, table
-from ripple_sim.solver import GLError, Material, sphere_atlas
+from ripple_sim.solver import GLError, Material, build_operator, sphere_atlas
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.kernel import Floats32, Ints, kernel
-from ripple_sim.solver.operator.assembly import build_operator
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 from ripple_sim.solver.texels.stencil import stiffness_matrix
 

@@ -12,11 +12,10 @@ import msgspec
 from page import Part
 from stills import strip
 
-from ripple_sim.scene.drop import drop_scene
+from ripple_sim import drop_scene
 from ripple_sim.scene.events import Events, PokeEntry
 from ripple_sim.scenes.shapes import LIMBED_FILE
-from ripple_sim.solver import Material, build_atlas, load_mesh
-from ripple_sim.solver.operator.assembly import build_operator
+from ripple_sim.solver import Material, build_atlas, build_operator, load_mesh
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 from arrival import arrivals

@@ -16,8 +16,7 @@ import msgspec
 import numpy as np
 from figure import FAINT, FOLDER, TEXT, plain, save, sheet
 
-from ripple_sim import Simulation, load_scene
-from ripple_sim.scene.scene import Scene
+from ripple_sim import Scene, Simulation, load_scene
 from ripple_sim.scene.target_maps import InsideEntry
 
 sys.path.append(str(Path(__file__).parents[1] / "scene_meshes"))

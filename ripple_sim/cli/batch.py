@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Batch:
+class BatchCommand:
     """Make many scenes by one plan, each varied by its own seed."""
 
     plan: Annotated[Positional[Path], arg(metavar="PLAN|DIR")]

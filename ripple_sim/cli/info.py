@@ -13,7 +13,7 @@ from tyro.conf import Positional, arg
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Bench:
+class BenchCommand:
     """Measure the wave solver: speed beside the bound of memory, cost of the coupling, accuracy against theory."""
 
     meshes: Annotated[Positional[tuple[Path, ...]], arg(metavar="[MESH ...]", help_behavior_hint="(optional)")] = ()
@@ -30,7 +30,7 @@ class Bench:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Cache:
+class CacheCommand:
     """Show where atlases are kept, and how much room they take: at most RIPPLE_SIM_CACHE_LIMIT megabytes, or 500."""
 
     clear: bool = False
@@ -54,7 +54,7 @@ def _megabytes(size: int) -> str:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Completion:
+class CompletionCommand:
     """Print a shell completion script. To use it: source <(ripple-sim completion bash)."""
 
     shell: Annotated[Positional[Literal["bash", "zsh"]], arg(metavar="SHELL")]
@@ -62,7 +62,7 @@ class Completion:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Info:
+class InfoCommand:
     """Show versions, the OpenGL driver and the wave solver, and what to install if rendering is not possible."""
 
     json: bool = False
@@ -81,7 +81,7 @@ _WAVELENGTH = 0.05
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Materials:
+class MaterialsCommand:
     """List the real materials by name, with speed and decay of a wave of 5 cm, sources, and where they hold."""
 
     json: bool = False

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Export(ExportOptions):
+class ExportCommand(ExportOptions):
     """Simulate a scene, and write it to the file of another program."""
 
     fps: Count = ExportOptions.fps
@@ -216,7 +216,7 @@ class _VideoCommand(VideoArguments):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Render(_VideoCommand):
+class RenderCommand(_VideoCommand):
     """Render a scene to a video."""
 
     scene: Annotated[Positional[str], arg(metavar="SCENE")]
@@ -238,7 +238,7 @@ class Render(_VideoCommand):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Drop(_VideoCommand):
+class DropCommand(_VideoCommand):
     """Put a mesh on a floor, drop bodies on it, and render a video."""
 
     mesh: Annotated[Positional[Path], arg(metavar="MESH")]

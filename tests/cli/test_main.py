@@ -212,7 +212,7 @@ def test_the_exit_status_tells_what_kind_of_error_it_was(monkeypatch, capsys, er
     def run(self):
         raise error
 
-    monkeypatch.setattr(info.Info, "run", run)
+    monkeypatch.setattr(info.InfoCommand, "run", run)
     assert cli.main(["info"]) == status
     line = capsys.readouterr().err
     assert line.startswith("ripple-sim: ")
@@ -223,7 +223,7 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
     def run(self):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(info.Info, "run", run)
+    monkeypatch.setattr(info.InfoCommand, "run", run)
     with pytest.raises(ZeroDivisionError):
         cli.main(["info"])
 
@@ -231,7 +231,7 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
 @pytest.mark.parametrize(
     ("number", "status", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
 )
-@pytest.mark.parametrize("where", ["cli._parse = meet_signal", "info.Info.run = meet_signal"])
+@pytest.mark.parametrize("where", ["cli._parse = meet_signal", "info.InfoCommand.run = meet_signal"])
 def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_path, number, status, word, where):
     (tmp_path / "slow.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\n")
     code = (
@@ -257,7 +257,7 @@ def test_an_interrupted_command_says_what_is_left(monkeypatch, capsys):
         ending.add_note("48 frames are kept")
         raise ending
 
-    monkeypatch.setattr(info.Info, "run", run)
+    monkeypatch.setattr(info.InfoCommand, "run", run)
     assert cli.main(["info"]) == 130
     assert capsys.readouterr().err == "ripple-sim: interrupted; 48 frames are kept\n"
 
@@ -267,7 +267,7 @@ def test_a_warning_is_one_line_and_the_handler_is_given_back(monkeypatch, capsys
         warnings.warn("the hull is\noff the surface", RippleWarning, stacklevel=1)
 
     before = warnings.showwarning
-    monkeypatch.setattr(info.Info, "run", run)
+    monkeypatch.setattr(info.InfoCommand, "run", run)
     assert cli.main(["info"]) == 0
     assert capsys.readouterr().err == "ripple-sim: warning: the hull is off the surface\n"
     assert warnings.showwarning is before
