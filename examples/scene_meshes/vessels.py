@@ -1,6 +1,6 @@
 """Shipped target meshes that are no closed surface of genus 0: a teapot, a pretzel.
 
-`python -m ripple_sim.scenes.vessels` writes `meshes/teapot.obj` and `meshes/pretzel.obj` again.
+`python examples/scene_meshes/vessels.py` writes `scenes/meshes/teapot.obj` and `scenes/meshes/pretzel.obj` again.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from .shapes import (
+from ripple_sim.scenes.shapes import (
     Array,
     Sdf,
     Triangles,
@@ -27,7 +27,7 @@ from .shapes import (
     write_obj,
 )
 
-TEAPOT_FILE = Path(__file__).parent / "meshes" / "teapot.obj"
+TEAPOT_FILE = Path(__file__).parents[2] / "scenes" / "meshes" / "teapot.obj"
 PRETZEL_FILE = TEAPOT_FILE.with_name("pretzel.obj")
 
 _RIM = 0.42  # height of the teapot's opening [m]

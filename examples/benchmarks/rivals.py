@@ -1,20 +1,16 @@
-"""The naive compiled loop: the nine-point stencil over charts with halo, as a competent user of numba writes it first.
+"""How fast is the wave step against what one would write oneself? One line a resolution, ratios and rates.
 
-It has the solver's own weights, and no tuning: no alignment, no slices, nothing fused but the update itself. This is
-the rival that counts, since anyone has it in a quarter of an hour.
+    python examples/benchmarks/rivals.py [--resolutions 128,256,512]
 
-The memory bound: a loop that reads and writes as many bytes as one substep, and computes next to nothing.
-
-A plain compute shader: one thread a texel, everything in storage buffers, no tiles and nothing packed.
-
-SciPy's sparse matrix and NumPy: waves as one would write them in an afternoon. SciPy multiplies in one thread.
+The naive loop is the nine-point stencil over charts with halo, as a competent user of numba writes it first, in one
+thread or, with `prange`, in all: it has the solver's own weights, and no tuning. This is the rival that counts, since
+anyone has it in a quarter of an hour. SciPy's sparse matrix, in one thread, is what one would write in an afternoon.
+The plain compute shader has one thread a texel, everything in storage buffers, no tiles and nothing packed. All take
+turns, so that a busy machine slows all alike; rates are texel updates a second, in millions.
 """
 
-from __future__ import annotations
-
-import functools
-import itertools
-from concurrent.futures import ThreadPoolExecutor
+import argparse
+from pathlib import Path
 from typing import NamedTuple
 
 import moderngl
@@ -22,72 +18,12 @@ import numba
 import numpy as np
 from scipy.sparse import diags_array
 
+from ripple_sim.bench import Advance, backend_advance, memory_fields, memory_stream, race, table
+from ripple_sim.solver import GLError, Material, build_operator, sphere_atlas
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.kernel import Floats32, Ints, kernel
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 from ripple_sim.solver.texels.stencil import stiffness_matrix
-
-# Streams of float32 that one substep reads at every texel: 4 link weights, gain, height and velocity; and those that
-# it writes: velocity and the next height.
-READS, WRITES = 7, 2
-
-# Floats of a page of memory. A store and a load at the same place of a page are taken for a conflict: each stream
-# begins elsewhere in its page, as in the solver.
-_PAGE = 1024
-
-# The compiler makes vector code of short slices, as the solver's kernel has them.
-_SLICE = 1024
-
-
-class Streams(NamedTuple):
-    """Arrays of one float32 a texel, [texels]; only the last two are written, and all but the last are read."""
-
-    east: Floats32
-    north: Floats32
-    northeast: Floats32
-    northwest: Floats32
-    gain: Floats32
-    height: Floats32
-    velocity: Floats32
-    next_height: Floats32
-
-
-class MemoryStream:
-    """Streams the bytes of a substep through memory, each thread its own share; no thread waits for another."""
-
-    def __init__(self, texels: int, threads: int = 1) -> None:
-        count = len(Streams._fields)
-        pitch = -(-texels // _PAGE) * _PAGE + _PAGE // count
-        # filled, since untouched pages are all one page, which a cache holds
-        memory = np.full((count, pitch), 1e-3, np.float32)
-        self.streams = Streams(*memory[:, :texels])
-        bounds = np.linspace(0, texels, threads + 1).astype(np.int64)
-        self._shares = list(itertools.pairwise(bounds))
-        self._pool = ThreadPoolExecutor(threads)
-
-    def advance(self, substeps: int, dt: float) -> None:
-        """Read and write every stream once a substep; this thread takes the first share itself."""
-        passes = functools.partial(_stream, self.streams, substeps, np.float32(dt))
-        helpers = [self._pool.submit(passes, *share) for share in self._shares[1:]]
-        passes(*self._shares[0])
-        for helper in helpers:
-            helper.result()
-
-
-@kernel
-def _stream(s: Streams, substeps: int, dt: np.float32, first: int, last: int) -> None:
-    """Kick and drift the texels from `first` to `last` by the sum of their weights."""
-    for _ in range(substeps):
-        for start in range(first, last, _SLICE):
-            stop = min(start + _SLICE, last)
-            east, north = s.east[start:stop], s.north[start:stop]
-            northeast, northwest = s.northeast[start:stop], s.northwest[start:stop]
-            gain, height = s.gain[start:stop], s.height[start:stop]
-            velocity, next_height = s.velocity[start:stop], s.next_height[start:stop]
-            for i in range(stop - start):
-                kicked = velocity[i] + dt * gain[i] * (east[i] + north[i] + northeast[i] + northwest[i])
-                velocity[i] = kicked
-                next_height[i] = height[i] + dt * kicked
 
 
 class NaiveLoop:
@@ -166,6 +102,20 @@ def _update_parallel(fields: Fields, dt: np.float32) -> None:
 _GROUP = 64
 
 
+UPDATE = Path(__file__).with_name("plain_update.glsl")
+_HALO = """#version 430
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) buffer Field { float x[]; };
+layout(std430, binding = 1) readonly buffer Pairs { ivec2 pairs[]; };  // (place in the halo, texel it shows)
+uniform int count;
+
+void main() {
+    int i = int(gl_GlobalInvocationID.x);
+    if (i < count) x[pairs[i].x] = x[pairs[i].y];
+}
+"""
+
+
 class PlainShader:
     """Leapfrog with a dispatch for the charts' halos and one for the update, each substep."""
 
@@ -180,9 +130,10 @@ class PlainShader:
             self._stencil = ctx.buffer(operator.stencil.weights.astype(np.float32).tobytes())
             self._gain = ctx.buffer((1 / operator.mass).astype(np.float32).tobytes())
             self._pairs = ctx.buffer(np.stack([addresses.ghosts, addresses.sources], axis=1).astype(np.int32).tobytes())
+            version = "#version 430\n"
+            update = UPDATE.read_text().replace(version, f"{version}#define N {n}\n")
+            self._update, self._halo = ctx.compute_shader(update), ctx.compute_shader(_HALO)
         self._count = len(addresses.ghosts)
-        self._update = self._gl.compute_shader("ripple_sim.bench.shaders", "plain_update", N=n)
-        self._halo = self._gl.compute_shader("ripple_sim.solver.backends.shaders", "halo", LIST_GROUP=_GROUP)
 
     def set_height(self, height: Floats32) -> None:
         """Replace the height [m], [C, n, n]."""
@@ -238,3 +189,44 @@ class SparseLeapfrog:
         for _ in range(substeps):
             self._v += np.float32(dt) * (self._matrix @ self._h)
             self._h += np.float32(dt) * self._v
+
+
+def rates(resolution: int) -> tuple[list[str], list[str]]:
+    """Rows of the two tables: on the processor, and in OpenGL."""
+    operator = build_operator(sphere_atlas(1.0, resolution), Material(), "fem")
+    texels = operator.mass.size
+    contestants: dict[str, Advance] = {
+        "cpu": backend_advance("cpu", operator),
+        "naive": NaiveLoop(operator).advance,
+        "prange": NaiveLoop(operator, parallel=True).advance,
+        "scipy": SparseLeapfrog(operator).advance,
+        "stream": memory_stream(memory_fields(texels), texels, 1),
+    }
+    try:
+        contestants |= {"gl": backend_advance("gl", operator), "plain": PlainShader(operator).advance}
+    except GLError as error:
+        print(error)
+    seconds = race(contestants)
+
+    def rate(name: str) -> str:
+        return f"{texels / np.median(seconds[name]) / 1e6:,.0f}" if name in seconds else ""
+
+    def over(name: str, rival: str) -> str:
+        return f"{np.median(seconds[rival] / seconds[name]):.2f}" if name in seconds else ""
+
+    ratios = [over("cpu", name) for name in ("naive", "prange", "scipy", "stream")]
+    processor = [f"{resolution}", rate("cpu"), *ratios, *map(rate, ("naive", "prange", "scipy", "stream"))]
+    return processor, [f"{resolution}", over("gl", "plain"), rate("gl"), rate("plain")]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="The wave step against loops that one would write oneself.")
+    parser.add_argument("--resolutions", default="128,256,512")
+    processor, opengl = zip(*(rates(int(n)) for n in parser.parse_args().resolutions.split(",")), strict=True)
+    names = ["naive loop", "prange", "scipy", "memory, one thread"]
+    print(table(["N", "ripple-sim", *(f"over {name}" for name in names), *names], processor))
+    print("\n" + table(["N", "over plain shader", "ripple-sim, OpenGL", "plain shader"], opengl))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,6 +1,6 @@
 """Shipped skin of an arm over two bones: a tube with round ends.
 
-`python -m ripple_sim.scenes.arm` writes `meshes/arm.skn` again.
+`python examples/scene_meshes/arm.py` writes `scenes/meshes/arm.skn` again.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .shapes import Array, Triangles
+from ripple_sim.scenes.shapes import Array, Triangles
 
-SKIN_FILE = Path(__file__).parent / "meshes" / "arm.skn"
+SKIN_FILE = Path(__file__).parents[2] / "scenes" / "meshes" / "arm.skn"
 
 LENGTH, ELBOW, RADIUS = 0.7, 0.35, 0.07  # from the shoulder down, and of the tube [m]
 _BEND = 0.06  # half the length over which the skin turns from one bone to the other [m]

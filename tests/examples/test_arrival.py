@@ -1,10 +1,7 @@
 """Times of arrival: against exact geodesics, and the same for the same object however it lies, is scaled or meshed.
 
-Calibration finds a known speed, and the paper's map stands beside ours.
-
-Front and first crest of signals whose crests are known.
-
-The bump's wave on the plane against another way to compute it: Poisson's integral of the initial value problem.
+Front and first crest are found in signals whose crests are known, calibration finds a known speed, and the bump's wave
+on the plane is that of another way to compute it: Poisson's integral of the initial value problem.
 """
 
 from pathlib import Path
@@ -12,18 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from known_meshes import known_mesh
-from scipy.integrate import simpson
-from scipy.special import i0e
-from surfaces import disk, joined, moved, torus
-
-from ripple_sim.bench.arrival import (
+from arrival import (
     CALIBRATED,
     CONFORMAL,
     NEAREST,
     Arrival,
     arrival,
-    arrival_error,
     arrival_times,
     arrivals,
     front_and_crest,
@@ -34,6 +25,11 @@ from ripple_sim.bench.arrival import (
     speed_factor,
     spread_sources,
 )
+from known_meshes import known_mesh
+from scipy.integrate import simpson
+from scipy.special import i0e
+from surfaces import disk, joined, moved, torus
+
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas, load_mesh, sphere_atlas
 
@@ -54,19 +50,19 @@ def test_front_on_a_sphere_arrives_at_the_distance() -> None:
 def test_waves_arrive_in_time_on_a_body_with_limbs() -> None:
     atlas = build_atlas(Mesh.from_arrays(*limbed()), 96, cache=False)
     for source in spread_sources(atlas, 1):
-        error = arrival_error(atlas, source)
+        error = arrival(atlas, source).error()
         assert error.front_median < 0.005
         assert error.front_under_3_percent > 0.97
         assert error.crest_median < 0.01
         assert error.crest_under_3_percent > 0.95
     # the paper's formula on the same texels
-    assert arrival_error(atlas, source, "paper").crest_median > 0.05
+    assert arrival(atlas, source, "paper").error().crest_median > 0.05
 
 
 @pytest.mark.parametrize("name", ["spot.obj", "bunny.off", "elephant.obj"])
 def test_waves_arrive_in_time_on_known_meshes(name: str) -> None:
     atlas = build_atlas(load_mesh(known_mesh(f"good/{name}")), 96, cache=False)
-    errors = [arrival_error(atlas, source) for source in spread_sources(atlas, 3)]
+    errors = [arrival(atlas, source).error() for source in spread_sources(atlas, 3)]
     assert np.mean([error.front_median for error in errors]) < 0.01
     # a crest lags by what texels disperse, and by what limbs and furrows bend, however narrow the texels
     assert np.mean([error.crest_median for error in errors]) < 0.012

@@ -1,6 +1,6 @@
 """Shipped meshes of a drum: a flat skin, and the wall that it is stretched over.
 
-`python -m ripple_sim.scenes.drum` writes `meshes/drum_skin.obj` and `meshes/drum_shell.obj` again.
+`python examples/scene_meshes/drum.py` writes `scenes/meshes/drum_skin.obj` and `scenes/meshes/drum_shell.obj` again.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import Delaunay
 
-from .shapes import Array, Triangles, write_obj
+from ripple_sim.scenes.shapes import Array, Triangles, write_obj
 
-SKIN_FILE = Path(__file__).parent / "meshes" / "drum_skin.obj"
+SKIN_FILE = Path(__file__).parents[2] / "scenes" / "meshes" / "drum_skin.obj"
 WALL_FILE = SKIN_FILE.with_name("drum_shell.obj")
 
 RADIUS, HEIGHT = 0.4, 0.32  # of the skin's rim, and where it lies [m]

@@ -1,6 +1,6 @@
 """The shipped landscape: heights on a grid, as MuJoCo reads them.
 
-`python -m ripple_sim.scenes.terrain` writes `meshes/terrain.bin` again.
+`python examples/scene_meshes/terrain.py` writes `scenes/meshes/terrain.bin` again.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .shapes import Array
+from ripple_sim.scenes.shapes import Array
 
-TERRAIN_FILE = Path(__file__).parent / "meshes" / "terrain.bin"
+TERRAIN_FILE = Path(__file__).parents[2] / "scenes" / "meshes" / "terrain.bin"
 
 _HILLS = ((-0.55, 0.45, 0.30, 1.0), (0.65, 0.55, 0.32, 0.8), (-0.75, -0.55, 0.28, 0.5), (0.60, -0.70, 0.26, 0.45))
 

@@ -1,19 +1,22 @@
-"""A cartoon head: its mesh with texture coordinates, its colours, and the image that tells where waves run.
+"""A cartoon head and its skull: meshes and images of the scenes `face` and `skull`.
 
-`python -m ripple_sim.scenes.face` writes `meshes/face.obj`, `meshes/face.png` and `meshes/face_waves.png` again.
+    python examples/scene_meshes/head.py
+
+writes `face.obj` with texture coordinates, its colours `face.png`, the image `face_waves.png` that tells where waves
+run, and `skull.obj` to scenes/meshes again; `--volume FILE` writes the whole head as voxels instead, a .npy, as a
+scanner would see it.
 """
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ripple_sim.solver.files import atomic_write
-
-from .shapes import (
+from ripple_sim.scenes.shapes import (
     Array,
     Sdf,
     capsule,
@@ -25,9 +28,11 @@ from .shapes import (
     smooth_intersection,
     smooth_union,
     sphere,
+    write_obj,
 )
+from ripple_sim.solver.files import atomic_write
 
-FOLDER = Path(__file__).parent / "meshes"
+FOLDER = Path(__file__).parents[2] / "scenes" / "meshes"
 
 _MIDDLE = np.array([0.0, 0.0, 0.52])  # texture coordinates are longitude and latitude about this point [m]
 _HEIGHT = 512  # of the images [pixels]; they are twice as wide
@@ -43,6 +48,13 @@ _WHITE, _BLUE, _BLACK = (250, 250, 246), (58, 128, 150), (24, 24, 30)
 FOOT = 0.13  # height at which the neck is cut off [m]
 # ears stand off the head towards the back
 _FLARED = np.array([[np.cos(0.45), np.sin(0.45), 0.0], [-np.sin(0.45), np.cos(0.45), 0.0], [0.0, 0.0, 1.0]])
+
+LOW, HIGH = np.array([-0.42, -0.42, 0.10]), np.array([0.45, 0.42, 0.95])  # a box round the head [m]
+
+# What a scanner makes of air, soft tissue and bone [Hounsfield units], the thresholds between them, and its noise.
+AIR, TISSUE, BONE = -1000.0, 40.0, 1000.0
+SKIN_THRESHOLD, BONE_THRESHOLD = (AIR + TISSUE) / 2, (TISSUE + BONE) / 2
+_NOISE = 25.0
 
 _LIPS = smooth_union(
     0.02,
@@ -83,7 +95,7 @@ def write_mesh(path: Path) -> None:
     # triangles across the end of the image go on into its next repetition
     uv[..., 0] += uv[..., 0] < uv[..., 0].max(axis=1, keepdims=True) - 0.5
     unique, index = np.unique(np.round(uv.reshape(-1, 2), 5), axis=0, return_inverse=True)
-    lines = ["# made by python -m ripple_sim.scenes.face"]
+    lines = ["# made by python examples/scene_meshes/head.py"]
     lines += [f"v {x:.5g} {y:.5g} {z:.5g}" for x, y, z in V]
     lines += [f"vt {u:.5g} {v:.5g}" for u, v in unique]
     corners = np.stack([F, index.reshape(F.shape)], axis=2) + 1
@@ -146,6 +158,55 @@ def _is_eye(points: Array) -> NDArray[np.bool_]:
     return eye(points.reshape(-1, 3)).reshape(points.shape[:-1]) < 0.0015
 
 
+def skull(cell: float = 0.02) -> tuple[Array, NDArray[np.int64]]:
+    """Model the skull in the head, in its frame: close under the forehead, deep under cheeks and nose."""
+    V, F = polygonise(_skull_solid(), (LOW, HIGH), cell)
+    return V - [0.0, 0.0, FOOT], F
+
+
+def _skull_solid() -> Sdf:
+    cranium = ellipsoid((-0.032, 0.0, 0.60), (0.268, 0.236, 0.258))
+    upper_jaw = ellipsoid((0.125, 0.0, 0.455), (0.125, 0.125, 0.075))
+    chin = ellipsoid((0.075, 0.0, 0.315), (0.105, 0.10, 0.07))
+    branch = capsule((0.05, 0.115, 0.31), (-0.02, 0.125, 0.47), 0.035)
+    cheekbone = capsule((0.135, 0.115, 0.50), (0.02, 0.17, 0.51), 0.025)
+    spine = rounded_cone((-0.05, 0.0, 0.36), (-0.05, 0.0, 0.23), 0.06, 0.07)
+    nose = capsule((0.222, 0.0, 0.575), (0.245, 0.0, 0.545), 0.018)
+    socket = sphere((0.205, 0.108, 0.575), 0.075)
+    solid = smooth_union(0.05, cranium, upper_jaw, chin, mirrored(branch), mirrored(cheekbone), spine)
+    solid = smooth_intersection(0.02, solid, lambda points: -mirrored(socket)(points))
+    return smooth_union(0.015, solid, nose)
+
+
+def head_volume(spacing: float = 0.01, seed: int = 0) -> tuple[NDArray[np.int16], Array]:
+    """Scan the head: voxels [i, j, k] along x, y and z [Hounsfield units], and where the first one is [m].
+
+    The scanner blurs over a voxel and is noisy.
+    """
+    counts = np.ceil((HIGH - LOW) / spacing).astype(int) + 1
+    nodes = np.moveaxis(np.indices(tuple(counts)), 0, -1).reshape(-1, 3) * spacing + LOW
+    values = np.full(len(nodes), AIR)
+    for solid, step in ((head_solid(), TISSUE - AIR), (_skull_solid(), BONE - TISSUE)):
+        values += step / (1 + np.exp(np.clip(4 / spacing * solid(nodes), -50, 50)))
+    values += np.random.default_rng(seed).normal(0.0, _NOISE, len(values))
+    return values.round().astype(np.int16).reshape(tuple(counts)), LOW - [0.0, 0.0, FOOT]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="The head of the scenes face and skull.")
+    parser.add_argument("--volume", type=Path, help="write the head's voxels to this .npy instead")
+    parser.add_argument("--spacing", type=float, default=0.01, help="of the voxels [m]")
+    chosen = parser.parse_args()
+    if chosen.volume is None:
+        write_mesh(FOLDER / "face.obj")
+        write_images(FOLDER / "face.png", FOLDER / "face_waves.png")
+        write_obj(FOLDER / "skull.obj", *skull())
+        return
+    values, origin = head_volume(chosen.spacing)
+    with atomic_write(chosen.volume) as unfinished, unfinished.open("wb") as file:
+        np.save(file, values)
+    print(f"{chosen.volume}: spacing {chosen.spacing:g} m, origin {origin.tolist()} m, bone from {BONE_THRESHOLD:g} on")
+
+
 if __name__ == "__main__":
-    write_mesh(FOLDER / "face.obj")
-    write_images(FOLDER / "face.png", FOLDER / "face_waves.png")
+    main()
