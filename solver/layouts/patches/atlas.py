@@ -165,11 +165,9 @@ def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDAr
     sides = patches.surface.edges.sides[patches.surface.edges.rim, 0]
     seamless = patches.seamless
     f, k = np.divmod(sides, 3)
-    corner = np.zeros(len(seamless.F), np.int64)
-    corner[f] = np.where(seamless.freedom[seamless.F[f, k]] != FIXED, k, (k + 1) % 3)
-    homes, places = places_seen_from(seamless, corner)
-    across = transitions(seamless.glued)
-    _draw_rims(seamless, patches.surface.V, sides, across, corner, homes, places, beyond)
+    corner = np.where(seamless.freedom[seamless.F[f, k]] != FIXED, k, (k + 1) % 3)
+    homes, places = places_seen_from(seamless, f, corner)
+    _draw_rims(seamless, patches.surface.V, sides, transitions(seamless.glued), corner, homes, places, beyond)
     n = topology.shape[1]
     for chart, corner in np.argwhere(topology.valence == 0):
         row, column = ((0, 0), (0, n + 1), (n + 1, n + 1), (n + 1, 0))[corner]
@@ -210,10 +208,10 @@ def _draw_rims(
 ) -> None:
     """Put the points of sides at a rim beyond the texels opposite to them; see `places_seen_from`."""
     n = beyond.shape[1] - 2
-    for h in sides:
-        f, k = h // 3, h % 3
+    for side in range(len(sides)):
+        f, k = sides[side] // 3, sides[side] % 3
         a, b = seamless.F[f, k], seamless.F[f, (k + 1) % 3]
-        anchor, p = corner[f], places[f]
+        anchor, p = corner[side], places[side]
         v = seamless.F[f, anchor]
         axis = 0 if seamless.freedom[v] == COLUMN else 1
         low, high = p[k, axis], p[(k + 1) % 3, axis]
@@ -223,7 +221,7 @@ def _draw_rims(
             along = (i + 0.5) / n
             t = min(max((along - low) / (high - low), 0.0), 1.0)
             qx, qy = (along, p[anchor, 1]) if axis == 0 else (p[anchor, 0], along)
-            chart, _, _, _, x, y = follow(homes[f], p[anchor, 0], p[anchor, 1], qx, qy, seamless.glued, across)
+            chart, _, _, _, x, y = follow(homes[side], p[anchor, 0], p[anchor, 1], qx, qy, seamless.glued, across)
             row, column = int(np.floor(y * n)) + 1, int(np.floor(x * n)) + 1
             if abs(y) < 1e-9:
                 row = 0

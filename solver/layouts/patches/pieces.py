@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...kernel import Bools, Floats, Ints, kernel
 from .layout import PatchMap
-from .seamless import Transitions, first_free, follow, places_seen_from, transitions, turned
+from .seamless import Transitions, follow, places_on_charts, transitions, turned
 
 LEAST = 1e-12  # area on a chart below which a piece is left out
 MOST_CORNERS = 12
@@ -41,8 +41,8 @@ class Pieces(NamedTuple):
 
 def chart_pieces(patches: PatchMap) -> Pieces:
     """Cut a map's triangles where they leave a chart."""
-    seamless, corner = patches.seamless, first_free(patches.seamless)
-    homes, places = places_seen_from(seamless, corner)
+    seamless = patches.seamless
+    corner, homes, places = places_on_charts(seamless)
     # squares of the plane that each reaches into, from one to that before another; whole numbers lie on borders
     first = np.floor(places.min(axis=1) + 1e-12).astype(np.int64)
     last = np.maximum(np.ceil(places.max(axis=1) - 1e-12).astype(np.int64), first + 1)

@@ -18,7 +18,7 @@ from ...kernel import Bools, Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...texels.topology import TexelTopology
 from .layout import PatchMap
-from .seamless import SeamlessMap, Transitions, first_free, follow, places_seen_from, transitions
+from .seamless import SeamlessMap, Transitions, follow, places_on_charts, transitions
 
 _MARGIN = 0.1  # sine of a corner that is wide enough
 
@@ -111,8 +111,7 @@ def locate_in_charts(seamless: SeamlessMap, n: int, charts: Ints) -> tuple[Ints,
         near |= (near[beside] & (beside >= 0)).any(axis=1)
     triangles, barycentrics = np.full((len(charts), n, n), -1), np.zeros((len(charts), n, n, 3))
     best = np.full((len(charts), n, n), -np.inf)
-    corner = first_free(seamless)
-    homes, places = places_seen_from(seamless, corner)
+    corner, homes, places = places_on_charts(seamless)
     chosen = np.flatnonzero(near[homes])
     across = transitions(seamless.glued)
     _draw(seamless.glued, across, chosen, corner, homes, places, number, triangles, barycentrics, best)
@@ -133,7 +132,7 @@ def _draw(
     barycentrics: Floats,
     best: Floats,
 ) -> None:
-    """Fill in the texels of the charts that have a number, from chosen triangles; see `places_seen_from`."""
+    """Fill in the texels of the charts that have a number, from chosen triangles; see `places_on_charts`."""
     n, slack = best.shape[1], 1e-9
     for f in chosen:
         home, k, p = homes[f], corner[f], places[f]

@@ -137,18 +137,25 @@ def corner_places(seamless: SeamlessMap) -> Floats:
     return np.einsum("fkij,fkj->fki", _TURNS[seamless.turn], seamless.x[seamless.F]) + seamless.shift
 
 
-def first_free(seamless: SeamlessMap) -> Ints:
-    """The first corner of each triangle that does not sit on the tip of a cone: it knows in which chart it lies."""
+def places_seen_from(seamless: SeamlessMap, triangles: Ints, corner: Ints) -> tuple[Ints, Floats]:
+    """Chart in which a corner [k] of each of some triangles [k] lies, and the places of all three in its frame."""
+    offset = corner_places(seamless)[triangles] - seamless.shift[triangles, corner][:, None]
+    places = np.einsum("fij,fkj->fki", _TURNS[(4 - seamless.turn[triangles, corner]) % 4], offset)
+    return seamless.chart[seamless.F[triangles, corner]], places
+
+
+def places_on_charts(seamless: SeamlessMap) -> tuple[Ints, Ints, Floats]:
+    """Of each triangle the first corner that sits on no cone's tip: it knows in which chart it lies; see above.
+
+    Returns
+    -------
+    corner : int64 [m]
+    chart : int64 [m]
+    places : float64 [m, 3, 2]
+    """
     free = seamless.freedom[seamless.F] != FIXED
-    return np.where(free.any(axis=1), free.argmax(axis=1), 2)
-
-
-def places_seen_from(seamless: SeamlessMap, corner: Ints) -> tuple[Ints, Floats]:
-    """Chart in which a corner [m] of each triangle lies, [m], and the places of all corners in its frame, [m, 3, 2]."""
-    f = np.arange(len(corner))
-    offset = corner_places(seamless) - seamless.shift[f, corner][:, None]
-    places = np.einsum("fij,fkj->fki", _TURNS[(4 - seamless.turn[f, corner]) % 4], offset)
-    return seamless.chart[seamless.F[f, corner]], places
+    corner = np.where(free.any(axis=1), free.argmax(axis=1), 2)
+    return corner, *places_seen_from(seamless, np.arange(len(corner)), corner)
 
 
 @kernel
