@@ -168,7 +168,7 @@ def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, sta
 
     # nearby walls hide the light, those further than a radius away reflect some themselves
     outer, inner = distances(1.0), distances(-1.0)
-    values, (edges, _) = (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0)), edges_of(F)
+    values, edges = (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0)), edges_of(F).ends
     return np.stack([_smoothed(each.mean(axis=1), edges) for each in values], axis=1)
 
 
