@@ -1,8 +1,6 @@
 """From an atlas and a material to the wave operator: finite elements, or a baseline to compare them with.
 
-What waves do at the rims of an open surface.
-
-The wave operator of a surface that moves: masses stay with the texels, stiffness follows their positions.
+On a surface that moves masses stay with the texels, and stiffness follows their positions.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ from .deep_water import FluidOperator, over_fluid
 from .material import Material
 from .wave_operator import WaveOperator
 
-# They come back upright from a free rim, inverted from a fixed one.
+# Waves come back upright from a free rim, inverted from a fixed one.
 RIMS = ("free", "fixed")
 
 
