@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..gl import GLContext
 from ..kernel import Ints
-from ..texels.cells import EVEN, MOST_FOLDED, PER_HOURGLASS, PER_TINY, SHARE, TINY
+from ..texels.cells import EVEN, LEAST_AREA, PER_HOURGLASS, PER_TINY, SHARE, TINY
 from ..texels.moving import MovedStencil, Ride
 from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, crossing_links, missing_links
 from ..texels.stiffness import LEAST_RATIO
@@ -25,7 +25,7 @@ _LAW = {
         "PER_HOURGLASS": PER_HOURGLASS,
         "SHARE": SHARE,
         "EVEN": EVEN,
-        "MOST_FOLDED": MOST_FOLDED,
+        "LEAST_AREA": LEAST_AREA,
         "TINY": TINY,
         "PER_TINY": PER_TINY,
         "LEAST_RATIO": LEAST_RATIO,

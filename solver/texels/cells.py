@@ -26,7 +26,7 @@ from ..kernel import Floats, kernel, shared
 Numbers: TypeAlias = Any  # a float, or an array of them
 Vectors: TypeAlias = Any  # coordinates [3] of a vector, or [3, ...] of many
 
-# Single precision holds all of these exactly, and does not make single numbers double.
+# In single precision, which holds these exactly, they do not make single numbers double.
 _QUARTER, _HALF, _ONE, _TWO, _THREE, _FOUR = map(np.float32, (0.25, 0.5, 1, 2, 3, 4))
 
 # One over the stiffness of a square against the hourglass, which is 0.4. At 1 waves lag along its sides as much as they
@@ -41,8 +41,8 @@ SHARE = np.float32(0.75)
 # of the waves' lag: on the sphere N = 64 is a third more exact with it.
 EVEN = np.float32(1000)
 
-# A cell folded to a line would ask for an infinitely short time step: a square has at most so many times its area.
-MOST_FOLDED = np.float32(50)
+# A cell folded to a line would ask for an infinitely short time step: least area, in units of a square's as large.
+LEAST_AREA = np.float32(0.02)
 
 _TINY = 1e-12  # area of a cell in one point
 TINY, PER_TINY = np.float32(_TINY), np.float32(1 / _TINY)
@@ -79,7 +79,7 @@ def quad(e: Vectors, n: Vectors, p: Vectors) -> tuple[Numbers, ...]:
     """
     q = between(e, n)
     pp, qq, pq = dot(p, p), dot(q, q), dot(p, q)
-    twice = np.maximum(_TWO * np.maximum(cross_length(p, q), _HALF * (pp + qq) / MOST_FOLDED), TINY)
+    twice = np.maximum(_TWO * np.maximum(cross_length(p, q), _HALF * LEAST_AREA * (pp + qq)), TINY)
     # the way between the diagonals' middles, twice; in a convex quad a and b lie between -1 and 1
     way = between(e, between(n, p))
     along_p, along_q, square = dot(way, p), dot(way, q), _QUARTER * twice * twice
@@ -133,7 +133,7 @@ def triangle(a: Vectors, b: Vectors, c: Vectors) -> tuple[Numbers, Numbers, Numb
     ab, ac, bc = between(a, b), between(a, c), between(b, c)
     double_area = cross_length(ab, ac)
     longest = np.maximum(np.maximum(dot(ab, ab), dot(ac, ac)), dot(bc, bc))
-    twice = np.maximum(2 * np.maximum(double_area, longest / MOST_FOLDED), _TINY)
+    twice = np.maximum(2 * np.maximum(double_area, LEAST_AREA * longest), _TINY)
     return dot(ab, ac) / twice, -dot(ab, bc) / twice, dot(ac, bc) / twice, double_area / 2
 
 
@@ -146,7 +146,7 @@ def strip(a: Vectors, b: Vectors, beside_a: Vectors, beside_b: Vectors) -> Float
     rim, link = between(beside_a, beside_b), between(a, b)
     squared = dot(rim, rim)
     along = dot(rim, link) ** 2 / np.maximum(squared, _TINY)
-    least = np.maximum(squared, dot(link, link)) / MOST_FOLDED
+    least = LEAST_AREA * np.maximum(squared, dot(link, link))
     area = quad_area(link, between(a, beside_a), between(a, beside_b))
     return np.where(squared > 0, area / np.maximum(np.maximum(along, least), _TINY), 0.0)
 

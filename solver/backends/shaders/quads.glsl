@@ -29,7 +29,7 @@ float quad_area(vec3 e, vec3 n, vec3 p) {
 void quad(vec3 e, vec3 n, vec3 p, out float links[6]) {
     vec3 q = n - e;
     float pp = dot(p, p), qq = dot(q, q), pq = dot(p, q);
-    float twice = max(2.0 * max(cross_length(p, q), 0.5 * (pp + qq) / MOST_FOLDED), TINY);
+    float twice = max(2.0 * max(cross_length(p, q), 0.5 * LEAST_AREA * (pp + qq)), TINY);
     vec3 way = p - n - e;
     float along_p = dot(way, p), along_q = dot(way, q), square = 0.25 * twice * twice;
     float a = (along_p * qq - along_q * pq) / square, b = (along_q * pp - along_p * pq) / square;
