@@ -1,15 +1,12 @@
-"""Real materials by name: a law of `Material`, its parameters, where they come from, and where they hold.
+"""Coefficients of materials: of real ones, by name, and those that suit an object's size and what hits it.
 
-How far a surface gives way under a load or a hit, and what stiffness or density keeps it from giving way further.
-
-A load F that is spread like a Gaussian of standard deviation s presses a membrane with a restoring stiffness in by
+How far a surface gives way, and what stiffness or density keeps it from giving way further: a load F that is spread
+like a Gaussian of standard deviation s presses a membrane with a restoring stiffness in by
 
     h = F / (4 pi sigma c^2) exp(z) E1(z),    z = s^2 k / (2 c^2),
 
 the integral of exp(-q^2 s^2 / 2) / (c^2 q^2 + k) over all wave numbers q. For the exponential integral this takes
 ln(1 + 1/z), which is an upper bound and can be inverted (Abramowitz and Stegun 1964, 5.1.20).
-
-Coefficients that suit an object's size and what hits it.
 """
 
 from __future__ import annotations
