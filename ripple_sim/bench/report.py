@@ -23,7 +23,6 @@ from scipy.spatial import ConvexHull
 
 from ripple_sim.diagnostics import Info, collect
 from ripple_sim.solver import GLError, Material, Mesh, WaveSolver, build_atlas, load_mesh, sphere_atlas
-from ripple_sim.solver.backends import blocks
 from ripple_sim.solver.backends.backend import Backend, make_backend
 from ripple_sim.solver.backends.cpu import CPUBackend
 from ripple_sim.solver.layouts.build import atlas_from_sphere_map
@@ -150,12 +149,11 @@ def as_text(report: Mapping[str, Any]) -> str:
 
 
 def _naive(table: Mapping[str, Mapping[str, float]]) -> str:
-    head = ["N", "over naive loop", "one thread each", "all threads each", "ripple-sim", "its threads", "naive loop"]
+    head = ["N", "over naive loop", "one thread each", "ripple-sim", "naive loop"]
     rows = [
         [
             n,
-            *(_ratio(row[key]) for key in ("over naive", "one thread over naive", "all threads over naive")),
-            *(_millions(row["cpu"]), str(row["threads"])),
+            *(_ratio(row["over naive"]), _ratio(row["one thread over naive"]), _millions(row["cpu"])),
             f"{_millions(row['naive'])} ({'prange' if row['naive'] > row['naive 1'] else 'one thread'})",
         ]
         for n, row in table.items()
@@ -167,18 +165,18 @@ def _naive(table: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def _bounds(table: Mapping[str, Mapping[str, float]]) -> str:
-    head = ["N", "of memory bound", "memory bound", "one thread of it", "ripple-sim, one thread", "scipy", "over scipy"]
+    head = ["N", "of memory bound", "memory bound", "ripple-sim", "scipy", "over scipy"]
     rows = [
         [
             n,
-            *(_ratio(row["of stream"]), _millions(row["stream"]), _ratio(row["one thread of stream"])),
-            *(_millions(row["cpu 1"]), _millions(row["scipy"]), _ratio(row["one thread over scipy"])),
+            *(_ratio(row["of stream"]), _millions(row["stream"])),
+            *(_millions(row["cpu"]), _millions(row["scipy"]), _ratio(row["one thread over scipy"])),
         ]
         for n, row in table.items()
     ]
     return _title(
-        "CPU against the memory bound (28 bytes read and 8 written a texel, in as many threads),\n"
-        "and in one thread against scipy's sparse matrix, which has one thread"
+        "CPU against the memory bound (28 bytes read and 8 written a texel) and scipy's sparse matrix,\n"
+        "in one thread each"
     ) + _grid(head, rows)
 
 
@@ -332,36 +330,30 @@ def race(contestants: Mapping[str, Advances], texels: int, rounds: int = _ROUNDS
 
 
 def cpu_speed(resolution: int) -> dict[str, float | int]:
-    """CPU backend against rivals of as many threads, and against the naive loop as it is fastest.
+    """CPU backend against rivals of one thread, and against the naive loop as it is fastest.
 
-    "cpu" is the backend as the solver takes it, "cpu 1" in one thread, "cpu all" in as many as the machine has cores;
-    likewise "stream", the memory bound. "naive" is
-    the faster of the naive loop in one thread, "naive 1", and in the threads of `numba.prange`, "naive prange". SciPy
+    "cpu" is the backend, which takes one thread; "stream" is the memory bound of one. "naive" is the faster of the naive
+    loop in one thread, "naive 1", and in the threads of `numba.prange`, "naive prange". SciPy
     has one thread. Rates are texel updates a second, and ratios those of `Race`.
     """
     operator = _operator(resolution)
-    texels, backend = operator.mass.size, CPUBackend(operator)
+    texels = operator.mass.size
     contestants: dict[str, Advances] = {
-        "cpu": backend,
-        "cpu 1": CPUBackend(operator, 1),
-        "cpu all": CPUBackend(operator, blocks.available()),
+        "cpu": CPUBackend(operator),
         "naive 1": NaiveLoop(operator),
         "naive prange": NaiveLoop(operator, parallel=True),
-        "stream": MemoryStream(texels, backend.thread_count),
-        "stream 1": MemoryStream(texels),
+        "stream": MemoryStream(texels),
         "scipy": SparseLeapfrog(operator),
     }
     run = race(contestants, texels)
     rates = run.rates()
     naive = max("naive 1", "naive prange", key=lambda name: rates[name])
-    return {"threads": backend.thread_count, **rates} | {
+    return rates | {
         "naive": rates[naive],
         "over naive": run.ratio("cpu", naive),
-        "one thread over naive": run.ratio("cpu 1", "naive 1"),
-        "all threads over naive": run.ratio("cpu all", "naive prange"),
+        "one thread over naive": run.ratio("cpu", "naive 1"),
         "of stream": run.ratio("cpu", "stream"),
-        "one thread of stream": run.ratio("cpu 1", "stream 1"),
-        "one thread over scipy": run.ratio("cpu 1", "scipy"),
+        "one thread over scipy": run.ratio("cpu", "scipy"),
     }
 
 

@@ -32,10 +32,10 @@ from ripple_sim.bench.report import (
 )
 from ripple_sim.solver.operator.assembly import OPERATORS
 
-CPU_ROW = {"threads": 2, "cpu": 6e8, "cpu 1": 3.75e8, "naive": 5e8, "naive 1": 2.5e8, "naive prange": 5e8}
-CPU_ROW |= {"stream": 8e8, "stream 1": 4e8, "scipy": 3e7}
-CPU_ROW |= {"over naive": 1.2, "one thread over naive": 1.5, "all threads over naive": 1.21}
-CPU_ROW |= {"of stream": 0.75, "one thread of stream": 0.94}
+CPU_ROW = {"cpu": 6e8, "naive": 5e8, "naive 1": 2.5e8, "naive prange": 5e8}
+CPU_ROW |= {"stream": 8e8, "scipy": 3e7}
+CPU_ROW |= {"over naive": 1.2, "one thread over naive": 1.5}
+CPU_ROW |= {"of stream": 0.75}
 CPU_ROW |= {"one thread over scipy": 12.5}
 ERROR = dataclasses.asdict(ArrivalError(0.004, 0.01, 0.99, 0.01, 0.02, 0.95))
 
@@ -57,7 +57,7 @@ def test_report_reads_as_text() -> None:
         }
     )
     assert text.index("naive") < text.index("memory bound") < text.index("scipy")  # the true rival first
-    cpu = ("1.20", "1.21", "500 (prange)", "0.94", "12.50")
+    cpu = ("1.20", "1.50", "500 (prange)", "0.75", "12.50")
     for figure in (*cpu, "0.300", "1,234", "1.0e-07", "0.40 %", "paper", "x 1.270", "folds"):
         assert figure in text
 
@@ -99,7 +99,7 @@ def test_columns_are_aligned_the_first_to_the_left_and_the_others_to_the_right()
 
 @pytest.mark.parametrize(("one", "parallel", "said"), [(4e6, 5e6, "5 (prange)"), (6e6, 5e6, "6 (one thread)")])
 def test_the_faster_of_the_naive_loops_is_named(one: float, parallel: float, said: str) -> None:
-    row = {"over naive": 1.0, "one thread over naive": 1.0, "all threads over naive": 1.0, "cpu": 9e6, "threads": 2}
+    row = {"over naive": 1.0, "one thread over naive": 1.0, "cpu": 9e6}
     text = report._naive({"64": row | {"naive 1": one, "naive": max(one, parallel), "naive prange": parallel}})
     assert text.splitlines()[-1].endswith(said)
 
