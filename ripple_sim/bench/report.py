@@ -332,9 +332,9 @@ def race(contestants: Mapping[str, Advances], texels: int, rounds: int = _ROUNDS
 def cpu_speed(resolution: int) -> dict[str, float | int]:
     """CPU backend against rivals of one thread, and against the naive loop as it is fastest.
 
-    "cpu" is the backend, which takes one thread; "stream" is the memory bound of one. "naive" is the faster of the naive
-    loop in one thread, "naive 1", and in the threads of `numba.prange`, "naive prange". SciPy
-    has one thread. Rates are texel updates a second, and ratios those of `Race`.
+    "cpu" is the backend, which takes one thread; "stream" is the memory bound of one. "naive" is the faster of
+    the naive loop in one thread, "naive 1", and in the threads of `numba.prange`, "naive prange". SciPy has one thread.
+    Rates are texel updates a second, and ratios those of `Race`.
     """
     operator = _operator(resolution)
     texels = operator.mass.size
