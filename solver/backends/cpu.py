@@ -288,11 +288,10 @@ class CPUBackend:
         acceleration = self._pressure(self._acceleration) if balance is None else balance.pressure
         kick = Kick(self._stencil.rows, k.gain, k.decay, k.spring, k.span, self._extra, acceleration)
         self._drift(dt / 2)
-        features, viscous = self._features, None
+        features = self._features
         if len(features.dent):
             kernels.flow(self._h, features.limit, features.dent)
-        if self._plain:
-            features, viscous = None, features.viscous if len(features.viscous.rows) else None
+        drags = self._plain and len(features.viscous.rows) > 0
         kernels.advance(
             substeps,
             np.float32(dt),
@@ -301,8 +300,8 @@ class CPUBackend:
             kick,
             self._stencil.irregular,
             *self._kicks,
-            viscous,
-            features,
+            features.viscous if drags else None,
+            None if self._plain else features,
         )
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h

@@ -70,7 +70,12 @@ class Features(NamedTuple):
 
 _NO_INTS, _NO_FLOATS, _NO_FIELD = np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((0, 0, 0), np.float32)
 NO_WEIGHTS = Weights(np.zeros((0, 4, 0, 0), np.float32), 0, Links(_NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, _NO_FLOATS))
-NO_BALANCE = Balance(*[_NO_INTS] * 3, *[_NO_FLOATS] * 4, _NO_FIELD, *[_NO_INTS] * 2)
+NO_BALANCE = Balance(
+    *(_NO_INTS, _NO_INTS, _NO_INTS),
+    *(_NO_FLOATS, _NO_FLOATS, _NO_FLOATS, _NO_FLOATS),
+    _NO_FIELD,
+    *(_NO_INTS, _NO_INTS),
+)
 NO_FEATURES = Features(NO_WEIGHTS, NO_WEIGHTS, _NO_FIELD, _NO_FIELD, _NO_FIELD, _NO_FIELD, NO_BALANCE)
 
 
