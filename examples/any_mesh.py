@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from ripple_sim.figures.atlas_plot import plot_atlas
+from ripple_sim import plot_atlas
 from ripple_sim.scenes.shapes import LIMBED_FILE
 from ripple_sim.solver import Material, WaveSolver, build_atlas, load_mesh
 

@@ -13,9 +13,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from ripple_sim import load_batch
-from ripple_sim.batch.plan import read_plan
-from ripple_sim.batch.run import RunOptions, run_batch
+from ripple_sim import RunOptions, load_batch, read_plan, run_batch
 
 MODEL = """<mujoco>
   <option timestep="0.002"/>

@@ -10,8 +10,7 @@ pods can write to and that is mounted at /data, where PLAN.toml and DIR lie, als
 import argparse
 from pathlib import Path
 
-from ripple_sim.batch.plan import read_plan
-from ripple_sim.batch.run import RunOptions, run_batch
+from ripple_sim import RunOptions, read_plan, run_batch
 
 
 def main() -> None:

@@ -10,8 +10,7 @@ its time limit gives way to the next one: scenes that were not finished are made
 import argparse
 from pathlib import Path
 
-from ripple_sim.batch.plan import read_plan
-from ripple_sim.batch.run import RunOptions, run_batch
+from ripple_sim import RunOptions, read_plan, run_batch
 
 
 def main() -> None:

@@ -5,15 +5,18 @@
 writes out/compare_operators.png. The ring's crest should lie on the dashed circle, all the way round.
 """
 
+import sys
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw
 
-from ripple_sim.bench.arrival import arrivals, plane_arrival
-from ripple_sim.bench.report import sphere_modes
+from ripple_sim.bench import sphere_modes
 from ripple_sim.solver import WaveSolver, sphere_atlas
 from ripple_sim.solver.operator.assembly import OPERATORS
+
+sys.path.append(str(Path(__file__).parents[0] / "benchmarks"))
+from arrival import arrivals, plane_arrival
 
 SIZE, CAPTION, SMOOTH = 360, 76, 2
 RESOLUTION, TIME, WIDTH, SOURCE = 96, 0.8, 0.09, np.array([0.45, 0.25, 0.86])

@@ -6,15 +6,20 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .batch.plan import read_plan
     from .batch.report import load_batch
+    from .batch.run import RunOptions, run_batch
     from .coupling.colliders import make_collidable
     from .coupling.ripples import Impulse, Ripples
     from .errors import RippleWarning
     from .export.exporter import Exporter, RippleRenderer
     from .export.options import ExportOptions
     from .export.scene import export_scene
+    from .figures.atlas_plot import plot_atlas
     from .render import Camera
+    from .scene.drop import drop_scene
     from .scene.load_scene import load_scene
+    from .scene.scene import Scene
     from .simulation import Simulation
     from .solver import Material, RippleError
     from .video.options import VideoOptions
@@ -31,13 +36,19 @@ __all__ = [
     "RippleRenderer",
     "RippleWarning",
     "Ripples",
+    "RunOptions",
+    "Scene",
     "Simulation",
     "VideoOptions",
+    "drop_scene",
     "export_scene",
     "load_batch",
     "load_scene",
     "make_collidable",
+    "plot_atlas",
+    "read_plan",
     "render_video",
+    "run_batch",
 ]
 
 _HOMES = {
@@ -50,13 +61,19 @@ _HOMES = {
     "RippleRenderer": ".export.exporter",
     "RippleWarning": ".errors",
     "Ripples": ".coupling.ripples",
+    "RunOptions": ".batch.run",
+    "Scene": ".scene.scene",
     "Simulation": ".simulation",
     "VideoOptions": ".video.options",
+    "drop_scene": ".scene.drop",
     "export_scene": ".export.scene",
     "load_batch": ".batch.report",
     "load_scene": ".scene.load_scene",
     "make_collidable": ".coupling.colliders",
+    "plot_atlas": ".figures.atlas_plot",
+    "read_plan": ".batch.plan",
     "render_video": ".video.render_video",
+    "run_batch": ".batch.run",
 }
 
 

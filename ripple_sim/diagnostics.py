@@ -1,10 +1,8 @@
-"""Why OpenGL does not run headless, or not on the GPU: common reasons on Linux, each with its fix.
+"""The report of `ripple-sim info`: versions, OpenGL driver, wave solver; and what to install to render.
 
-An OpenGL program without a window uses libEGL.so.1 (of libglvnd), which reads the vendor files: small JSON files that
-name each driver's own EGL library. Mesa's driver then opens a render node, /dev/dri/renderD*; NVIDIA's opens
-/dev/nvidia*.
-
-The report of `ripple-sim info`: versions, OpenGL driver, wave solver; and what to install to render.
+It names common reasons on Linux why OpenGL does not run headless, or not on the GPU, each with its fix. An OpenGL
+program without a window uses libEGL.so.1 (of libglvnd), which reads the vendor files: small JSON files that name each
+driver's own EGL library. Mesa's driver then opens a render node, /dev/dri/renderD*; NVIDIA's opens /dev/nvidia*.
 """
 
 from __future__ import annotations
@@ -30,18 +28,7 @@ _NVIDIA_VERSION = Path("/proc/driver/nvidia/version")
 _CONTAINER = "in a container, start that with NVIDIA_DRIVER_CAPABILITIES=all"
 
 
-@dataclasses.dataclass(frozen=True)
-class Finding:
-    """A problem and its fix."""
-
-    problem: str
-    fix: str
-
-    def __str__(self) -> str:
-        return f"{self.problem}: {self.fix}"
-
-
-def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[Finding]:
+def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[str]:
     """Find what keeps OpenGL off the GPU, or from running at all.
 
     Parameters
@@ -53,8 +40,8 @@ def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[F
 
     Returns
     -------
-    list of Finding
-        The likeliest cause first; empty if OpenGL runs on a GPU, or for an unknown cause.
+    list of str
+        Problems, each with its fix, the likeliest cause first; empty if OpenGL runs on a GPU, or for an unknown cause.
     """
     if software is False:
         return []
@@ -65,67 +52,60 @@ def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[F
     if found or any(_gpus(devices)):
         return found
     return [
-        Finding(
-            f"OpenGL runs in software, on the processor: there is no GPU ({devices}/dri/renderD* or {devices}/nvidia*)",
-            "nothing to fix; rendering is faster on a machine with a GPU (in a container, pass it through with "
-            "--device /dev/dri or --gpus all)",
-        )
+        f"OpenGL runs in software, on the processor: there is no GPU ({devices}/dri/renderD* or {devices}/nvidia*): "
+        "nothing to fix; rendering is faster on a machine with a GPU (in a container, pass it through with "
+        "--device /dev/dri or --gpus all)"
     ]
 
 
-def _library_problems() -> Iterator[Finding]:
+def _library_problems() -> Iterator[str]:
     for library, package in _LIBRARIES.items():
         try:
             ctypes.CDLL(library)
         except OSError as error:
-            missing = "No such file" in str(error)
-            yield Finding(
-                f"the library {library} is missing" if missing else f"the library {library} cannot be loaded ({error})",
-                f"apt-get install {package}" if missing else f"apt-get install --reinstall {package}",
-            )
+            if "No such file" in str(error):
+                yield f"the library {library} is missing: apt-get install {package}"
+            else:
+                yield f"the library {library} cannot be loaded ({error}): apt-get install --reinstall {package}"
 
 
-def _vendor_problems() -> Iterator[Finding]:
+def _vendor_problems() -> Iterator[str]:
     files, where = _vendor_files()
     if not files:
-        yield Finding(
-            f"there is no EGL vendor file (*.json) in {where}",
+        yield (
+            f"there is no EGL vendor file (*.json) in {where}: "
             "apt-get install libegl-mesa0 libgl1-mesa-dri; for an NVIDIA GPU install libnvidia-gl of the driver's "
-            f"version, or, {_CONTAINER}",
+            f"version, or, {_CONTAINER}"
         )
     for file in files:
         library = _library_of(file)
         if library is None:
-            yield Finding(
-                f"the EGL vendor file {file} is damaged", f"reinstall the package it belongs to: dpkg -S {file}"
-            )
+            yield f"the EGL vendor file {file} is damaged: reinstall the package it belongs to: dpkg -S {file}"
             continue
         try:
             ctypes.CDLL(library)
         except OSError:
-            nvidia = "nvidia" in library
-            yield Finding(
-                f"the EGL vendor file {file} names {library}, which cannot be loaded",
-                _install_nvidia() if nvidia else "apt-get install --reinstall libegl-mesa0 libgl1-mesa-dri",
-            )
+            mesa = "apt-get install --reinstall libegl-mesa0 libgl1-mesa-dri"
+            fix = _install_nvidia() if "nvidia" in library else mesa
+            yield f"the EGL vendor file {file} names {library}, which cannot be loaded: {fix}"
 
 
-def _device_problems(devices: Path) -> Iterator[Finding]:
+def _device_problems(devices: Path) -> Iterator[str]:
     for node in _render_nodes(devices):
         if not os.access(node, os.R_OK | os.W_OK, effective_ids=True):
             group = _group_of(node)
-            yield Finding(
-                f"this user has no access to the GPU's render node {node}",
-                f"sudo usermod -aG {group} $USER, then log in again (in a container: --group-add {group})",
+            yield (
+                f"this user has no access to the GPU's render node {node}: "
+                f"sudo usermod -aG {group} $USER, then log in again (in a container: --group-add {group})"
             )
 
 
-def _nvidia_problems(devices: Path) -> Iterator[Finding]:
+def _nvidia_problems(devices: Path) -> Iterator[str]:
     """An NVIDIA driver in the kernel without its EGL library beside it."""
     if (devices / "nvidia0").exists() and not any("nvidia" in (_library_of(f) or "") for f in _vendor_files()[0]):
-        yield Finding(
-            "there is an NVIDIA GPU, but no EGL vendor file of its driver, so OpenGL runs in software",
-            _install_nvidia(),
+        yield (
+            "there is an NVIDIA GPU, but no EGL vendor file of its driver, so OpenGL runs in software: "
+            f"{_install_nvidia()}"
         )
 
 
@@ -241,7 +221,7 @@ def collect() -> Info:
         opengl=opengl,
         backend=auto_backend(),
         measured=str(measured(context)) if opengl and not opengl.software else "",
-        advice="\n".join(map(str, findings)) or failure,
+        advice="\n".join(findings) or failure,
     )
 
 

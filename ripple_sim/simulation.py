@@ -22,7 +22,7 @@ from ripple_sim.solver.kernel import work_clock
 _MOST_STEPS_PER_FRAME = 100_000
 
 
-class RunOptions(Protocol):
+class SimulationOptions(Protocol):
     """What the options of a video, an export or a batch say of the simulation itself; see `Simulation`."""
 
     @property
@@ -122,7 +122,7 @@ class Simulation:
     def of(
         cls,
         scene: Scene,
-        options: RunOptions,
+        options: SimulationOptions,
         *,
         operator: str = "fem",
         on_step: Callable[[Simulation], None] | None = None,

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .mesh.mesh import Mesh
     from .mesh.volume import Volume, load_volume
     from .mesh.wrap import Wrap, wrap
+    from .operator.assembly import build_operator
     from .operator.material import Material
     from .operator.regions import absorbing_damping, hold
     from .texels.atlas import Atlas
@@ -50,6 +51,7 @@ _HOME = {
     "Wrap": "mesh.wrap",
     "absorbing_damping": "operator.regions",
     "build_atlas": "layouts.build",
+    "build_operator": "operator.assembly",
     "glue": "texels.topology",
     "hold": "operator.regions",
     "load_atlas": "layouts.build",
@@ -84,6 +86,7 @@ __all__ = [
     "Wrap",
     "absorbing_damping",
     "build_atlas",
+    "build_operator",
     "glue",
     "hold",
     "load_atlas",

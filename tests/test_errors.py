@@ -10,7 +10,12 @@ from ripple_sim.solver import errors as of_solver
 from ripple_sim.solver.errors import RippleError
 
 CLASSES = sorted(
-    {each for module in (of_solver, of_application) for _, each in inspect.getmembers(module, inspect.isclass)},
+    {
+        each
+        for module in (of_solver, of_application)
+        for _, each in inspect.getmembers(module, inspect.isclass)
+        if issubclass(each, Exception)
+    },
     key=lambda each: each.__name__,
 )
 ERRORS = [each for each in CLASSES if not issubclass(each, Warning)]

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from sample_batch import write_plan
 
+from ripple_sim import read_plan
 from ripple_sim.batch.folder import BatchFolder, keep_plan, stored
 from ripple_sim.batch.make_scene import make_scene
-from ripple_sim.batch.plan import read_plan
 
 
 def resident() -> float:

@@ -11,14 +11,32 @@ import time
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from ripple_sim import Camera
-from ripple_sim.bench.report import POLYGONS, RESOLUTIONS, knobbly_body
 from ripple_sim.render import Renderer, Surface
 from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.solver import Atlas, HeightMap, Material, Mesh, WaveSolver, build_atlas
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.layouts.build import atlas_from_sphere_map
+
+RESOLUTIONS = (20, 28, 40, 56, 128, 256, 512)
+POLYGONS = (2_700, 5_700, 10_700, 21_300)
+
+
+def knobbly_body(polygons: int) -> Mesh:
+    """A body with knobs and exactly this (even) number of triangles."""
+    points = _spiral(polygons // 2 + 2)
+    radius = 1 + 0.25 * np.sin(4 * points[:, :1]) * np.sin(3 * points[:, 1:2] + 1) * np.sin(4 * points[:, 2:] + 2)
+    return Mesh.from_arrays(points * radius, ConvexHull(points).simplices, name="knobbly body")
+
+
+def _spiral(count: int) -> NDArray[np.float64]:
+    """Points spread evenly on the unit sphere (the golden spiral)."""
+    k = np.arange(count) + 0.5
+    z, angle = 1 - 2 * k / count, k * np.pi * (3 - np.sqrt(5))
+    return np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z], axis=1)
 
 
 def posed(mesh: Mesh) -> mujoco.MjModel:

@@ -21,8 +21,7 @@ from scipy.sparse.linalg import eigsh
 from scipy.spatial import Delaunay
 from scipy.special import jn_zeros, jnp_zeros
 
-from ripple_sim.solver import Atlas, Material, Mesh, TexelMesh, build_atlas
-from ripple_sim.solver.operator.assembly import build_operator
+from ripple_sim.solver import Atlas, Material, Mesh, TexelMesh, build_atlas, build_operator
 from ripple_sim.solver.texels.stencil import stiffness_matrix
 
 COUNT = 20

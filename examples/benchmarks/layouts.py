@@ -15,13 +15,11 @@ import mujoco
 import numpy as np
 
 from ripple_sim import Camera
-from ripple_sim.bench.report import Advances, Waited, race
+from ripple_sim.bench import backend_advance, race
 from ripple_sim.render import Renderer, Surface
 from ripple_sim.render.surfaces.surface import Charts
-from ripple_sim.solver import Atlas, GLError, HeightMap, Material, Mesh, build_atlas, load_mesh
-from ripple_sim.solver.backends.backend import make_backend
+from ripple_sim.solver import Atlas, GLError, HeightMap, Material, Mesh, build_atlas, build_operator, load_mesh
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.operator.assembly import build_operator
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
 
@@ -74,11 +72,11 @@ def main() -> None:
         print(f"{name:<8} {' x '.join(map(str, atlas.areas.shape))} texels")
     for backend in ("cpu", "gl"):
         try:
-            rivals: dict[str, Advances] = {k: Waited(make_backend(backend, each)) for k, each in operators.items()}
+            rivals = {name: backend_advance(backend, each) for name, each in operators.items()}
         except GLError as error:
             print(f"{backend}: {error}")
             continue
-        seconds = race(rivals, 1).seconds
+        seconds = race(rivals)
         ratios = np.divide(seconds["patches"], seconds["cube"])
         ratio = np.median(ratios) * atlases["cube"].areas.size / atlases["patches"].areas.size
         print(f"{backend}: patches over cube, a texel: {ratio:.2f}")

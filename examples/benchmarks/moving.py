@@ -18,8 +18,7 @@ from ripple_sim import Camera, Material, RippleRenderer, Ripples, Simulation, lo
 from ripple_sim.coupling.soft import coarse_motions
 from ripple_sim.solver import WaveSolver, build_atlas, sphere_atlas
 from ripple_sim.solver.operator.assembly import MovingOperator
-from ripple_sim.solver.texels.moving import MovedPlaces
-from ripple_sim.solver.texels.riding import SurfaceRide
+from ripple_sim.solver.texels.moving import MovedPlaces, SurfaceRide
 
 SPEED = Material(speed=1.0)
 # Blender's Dynamic Paint on a canvas of 160,000 vertices that moves, a frame [ms]

@@ -18,11 +18,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TypeVar
 
+import arrival as arrivals
 import numpy as np
 import trimesh
 
 import ripple_sim.scenes
-from ripple_sim.bench.arrival import arrival_error, spread_sources
 from ripple_sim.solver import Atlas, Mesh, RippleError, build_atlas, load_mesh
 from ripple_sim.solver.layouts.patches.atlas import atlas_from_patch_map, cells_for
 from ripple_sim.solver.layouts.patches.layout import patch_map
@@ -98,7 +98,7 @@ def cached_seconds(mesh: Mesh) -> float:
 
 
 def arrival(atlas: Atlas, sources: int) -> str:
-    errors = [arrival_error(atlas, source) for source in spread_sources(atlas, sources)]
+    errors = [arrivals.arrival(atlas, source).error() for source in arrivals.spread_sources(atlas, sources)]
     median, q90 = (100 * np.mean([getattr(each, name) for each in errors]) for name in ("front_median", "front_q90"))
     return f"{median:.2f} / {q90:.2f}"
 

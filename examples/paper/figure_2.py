@@ -7,7 +7,7 @@ from pathlib import Path
 
 from page import Part
 
-from ripple_sim.figures.atlas_plot import plot_atlas
+from ripple_sim import plot_atlas
 from ripple_sim.scenes.shapes import LIMBED_FILE
 from ripple_sim.solver import build_atlas, load_mesh
 

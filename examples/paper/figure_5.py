@@ -10,7 +10,7 @@ from pathlib import Path
 from page import Part
 from stills import strip
 
-from ripple_sim.scene.drop import drop_scene
+from ripple_sim import drop_scene
 from ripple_sim.scenes.shapes import duck, write_obj
 from ripple_sim.solver import build_atlas, load_mesh
 

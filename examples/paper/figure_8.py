@@ -12,8 +12,7 @@ from page import Part
 from PIL import Image
 from stills import strip
 
-from ripple_sim import load_scene
-from ripple_sim.scene.scene import Scene
+from ripple_sim import Scene, load_scene
 from ripple_sim.scene.scene_file import MapEntry, MaterialEntry
 
 TIMES, SIZE = [0.25, 0.4, 0.6, 0.8], (400, 400)

@@ -4,6 +4,7 @@ python examples/paper/figures_6_7.py
 """
 
 import dataclasses
+import sys
 import time
 from pathlib import Path
 
@@ -11,12 +12,13 @@ import msgspec
 from page import Part
 from stills import strip
 
-from ripple_sim.bench.arrival import arrivals
-from ripple_sim.scene.drop import drop_scene
+from ripple_sim import drop_scene
 from ripple_sim.scene.events import Events, PokeEntry
 from ripple_sim.scenes.shapes import LIMBED_FILE
-from ripple_sim.solver import Material, build_atlas, load_mesh
-from ripple_sim.solver.operator.assembly import build_operator
+from ripple_sim.solver import Material, build_atlas, build_operator, load_mesh
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from arrival import arrivals
 
 TIMES, SIZE, RESOLUTION = [0.25, 0.5], (1000, 420), 96
 BASELINES = {"uncorrected": "figure_6", "paper": "figure_7"}

@@ -16,11 +16,13 @@ import trimesh
 from page import Part
 from stills import strip
 
-from ripple_sim.bench.arrival import arrival, mean_error, spread_sources
-from ripple_sim.scene.drop import drop_scene
+from ripple_sim import drop_scene
 from ripple_sim.scene.events import Events, PokeEntry
 from ripple_sim.scenes.shapes import pebble, polygonise, rounded_cone, smooth_intersection, smooth_union
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from arrival import arrival, mean_error, spread_sources
 
 PRETZEL = Path(__file__).parents[2] / "scenes" / "meshes" / "pretzel.obj"
 TIMES, SIZE, RESOLUTION, SOURCES = [0.2, 0.4, 0.8, 1.2], (480, 400), 96, 2

@@ -7,8 +7,7 @@ from typing import Any
 
 from PIL import Image
 
-from ripple_sim import VideoOptions, render_video
-from ripple_sim.scene.scene import Scene
+from ripple_sim import Scene, VideoOptions, render_video
 
 RATE = 20  # frames a second, the grid of times to choose from
 

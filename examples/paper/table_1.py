@@ -3,13 +3,52 @@
 python examples/paper/table_1.py
 """
 
+import sys
+import time
 from pathlib import Path
 
+import numpy as np
 from page import Part
 
-from ripple_sim.bench.report import RESOLUTIONS, steps_per_second
+from ripple_sim.solver import Material, build_atlas, build_operator
+from ripple_sim.solver.backends.backend import make_backend
+from ripple_sim.solver.layouts.build import atlas_from_sphere_map
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from drawn_steps import POLYGONS, RESOLUTIONS, knobbly_body
 
 PAPER = {"polygons": "21,338", "texels": "15,000", "seconds": "177"}
+
+_SECONDS = 0.1
+
+
+def steps_per_second(
+    resolutions: tuple[int, ...] = RESOLUTIONS, polygons: tuple[int, ...] = POLYGONS, backend: str = "cpu"
+) -> dict[str, dict[str, float]]:
+    """Substeps a second, and seconds for the atlas, by polygon count and resolution."""
+    table = {}
+    for count in polygons:
+        start = time.perf_counter()
+        atlas = build_atlas(knobbly_body(count), resolutions[0], cache=False)
+        row = {"sphere map [s]": time.perf_counter() - start}
+        for n in resolutions:
+            start = time.perf_counter()
+            texels = atlas_from_sphere_map(atlas.mesh, atlas.sphere, n)
+            operator = build_operator(texels, Material(), "fem")
+            row[f"atlas {n} [s]"] = time.perf_counter() - start
+            solver = make_backend(backend, operator)
+            solver.advance(4, 1e-6)
+            steps, best = 4, np.inf
+            until = time.perf_counter() + _SECONDS
+            while time.perf_counter() < until:
+                start = time.perf_counter()
+                solver.advance(steps, 1e-6)
+                solver.wait()
+                best = min(best, (time.perf_counter() - start) / steps)
+                steps = max(4, min(200, int(_SECONDS / 5 / best)))
+            row[f"steps/s {n}"] = 1 / best
+        table[str(count)] = row
+    return table
 
 
 def make(folder: Path) -> Part:

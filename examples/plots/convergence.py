@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from figure import COLORS, FAINT, FOLDER, NAMES, TEXT, plain, save, sheet
 
-from ripple_sim.bench.report import sphere_mode_error
+from ripple_sim.bench import sphere_mode_error
 
 LIFT = {"uncorrected": 9, "paper": -9}  # of the names that would touch [points]
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 from figure import COLORS, FOLDER, TEXT, plain, save, sheet
+from layer_mode import lowest_square
 from matplotlib.axes import Axes
 from scipy.special import eval_legendre
 from standing_wave import flat_torus, plane_wave, swung
 
 from ripple_sim.solver import Material, sphere_atlas
-from ripple_sim.solver.operator.material import lowest_square
 
 DAMPINGS, VISCOSITIES = (0.25, 0.5, 1.0, 2.0, 4.0), (0.002, 0.005, 0.01, 0.02)  # 1/s, m^2/s
 MODULUS, VISCOSITY, DENSITY = 2010.0, 0.6, 1000.0  # gelatine of 3 %

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 from figure import COLORS, FOLDER, TEXT, plain, save, sheet
+from layer_mode import lowest_square
 from standing_wave import flat_torus, plane_wave
 
 from ripple_sim.solver import Material
-from ripple_sim.solver.operator.material import lowest_square
 
 ACROSS = (1, 2, 3, 4, 6, 8, 10)  # waves on the side of the square
 Theory = Callable[[float], float]

@@ -8,6 +8,7 @@ with noise.
 
 import argparse
 import dataclasses
+import sys
 import tempfile
 from pathlib import Path
 
@@ -15,10 +16,11 @@ import msgspec
 import numpy as np
 from figure import FAINT, FOLDER, TEXT, plain, save, sheet
 
-from ripple_sim import Simulation, load_scene
-from ripple_sim.scene.scene import Scene
+from ripple_sim import Scene, Simulation, load_scene
 from ripple_sim.scene.target_maps import InsideEntry
-from ripple_sim.scenes.skull import BONE_THRESHOLD, head_volume
+
+sys.path.append(str(Path(__file__).parents[1] / "scene_meshes"))
+from head import BONE_THRESHOLD, head_volume
 
 FPS, SHOWN, VOXEL = 240, 1.2, 0.01  # 1/s, s, m
 NAMES = {"forehead": "forehead", "cheek": "cheek", "nose": "nose tip"}

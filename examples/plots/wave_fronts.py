@@ -7,18 +7,21 @@ of exact geodesic distance that they should run along; colour tells where a fron
 """
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
 from figure import FAINT, FOLDER, NAMES, TEXT, save, sheet
 from matplotlib.colors import ListedColormap
 
-from ripple_sim.bench.arrival import NEAREST, arrival_times, geodesic_distance, ideal_width, plane_arrival
 from ripple_sim.figures.atlas_view import AtlasPainter, View
 from ripple_sim.overlay.notes import color_table, colors
 from ripple_sim.scene.drop import usual_up
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
 from ripple_sim.solver.texels.topology import sampling_matrix
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from arrival import NEAREST, arrival_times, geodesic_distance, ideal_width, plane_arrival
 
 MESH = Path(__file__).parents[2] / "scenes" / "meshes" / "duck.obj"
 VIEW = {"azimuth": 38.0, "elevation": 24.0}

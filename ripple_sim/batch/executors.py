@@ -1,7 +1,4 @@
-"""Scenes made by processes of this machine.
-
-Scenes made by the workers of a Dask cluster, which share the batch's folder with this process.
-"""
+"""Who makes scenes: processes of this machine, or the workers of a Dask cluster, which share the batch's folder."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""A finished scene and its files, in a folder or in a tar file.
-
-Frames and passes of a finished scene, read back.
-
-All finished scenes of a batch.
-
-Finished scenes put into tar files.
-"""
+"""The finished scenes of a batch, read back from folders and tar files, and packed into tar files."""
 
 from __future__ import annotations
 
@@ -17,7 +10,7 @@ import shutil
 from collections.abc import Container, Iterator
 from pathlib import Path
 from tarfile import TarInfo
-from typing import Any, Protocol
+from typing import Any
 
 import av
 import msgspec
@@ -32,145 +25,48 @@ from ripple_sim.solver.files import atomic_write
 from .folder import BatchFolder, member_name, members, times_of, write_tar
 from .records import HEIGHTS, IMPULSES, POSITIONS, read_heights
 
-
-class Files(Protocol):
-    """The files of a scene."""
-
-    number: int
-
-    def names(self) -> list[str]:
-        """Their names."""
-
-    def read(self, name: str) -> bytes:
-        """Content of one of them."""
-
-
-def stored_frames(scene: Files) -> Iterator[NDArray[np.uint8]]:
-    """The frames of a scene's video or folder of PNG frames, [height, width, 3].
-
-    Raises
-    ------
-    BatchError
-        If there are none.
-    """
-    images = [name for name in scene.names() if name.startswith("frames") and name.endswith(".png")]
-    for name in images:
-        yield np.asarray(Image.open(io.BytesIO(scene.read(name))).convert("RGB"))
-    if images:
-        return
-    video = next((name for name in scene.names() if name.startswith("video.") and name.count(".") == 1), None)
-    if video is None:
-        raise BatchError(f"scene {scene.number} has no video and no PNG frames; it has {', '.join(scene.names())}")
-    content = io.BytesIO(scene.read(video))
-    if video.endswith((".gif", ".webp")):
-        for frame in ImageSequence.Iterator(Image.open(content)):
-            yield np.asarray(frame.convert("RGB"))
-        return
-    with av.open(content) as container:
-        for decoded in container.decode(video=0):
-            yield decoded.to_ndarray(format="rgb24")
-
-
-def stored_passes(scene: Files) -> Iterator[dict[str, NDArray]]:
-    """The passes of each frame of a scene by their names.
-
-    Raises
-    ------
-    BatchError
-        If there are none.
-    """
-    names = [name for name in scene.names() if "passes" in name and name.endswith(".npz")]
-    if not names:
-        raise BatchError(f"scene {scene.number} has no passes in .npz files; it has {', '.join(scene.names())}")
-    for name in names:
-        with np.load(io.BytesIO(scene.read(name))) as arrays:
-            yield {each: arrays[each] for each in arrays.files}
-
-
 FACTS, TIMES = "scene.json", "times.json"
 
 _KINDS = {"int64": "i8", "float64": "f8", "bool": "?", "string": "U64"}
 
 
-class SceneFiles(Protocol):
-    """Where the files of a scene are."""
-
-    def names(self) -> list[str]:
-        """Their names, with slashes for folders, or dots in a tar file."""
-
-    def read(self, name: str) -> bytes:
-        """Content of a file."""
-
-    def times(self) -> dict[str, Any]:
-        """Who made the scene, and how long it took."""
-
-
-class FolderFiles:
-    """Files in a folder."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-
-    def names(self) -> list[str]:
-        """Their names, with slashes for folders."""
-        found = sorted(path.relative_to(self.folder).as_posix() for path in self.folder.rglob("*") if path.is_file())
-        return [name for name in found if name != TIMES]
-
-    def read(self, name: str) -> bytes:
-        """Content of a file."""
-        return (self.folder / name).read_bytes()
-
-    def times(self) -> dict[str, Any]:
-        """Who made the scene, and how long it took."""
-        return msgspec.json.decode((self.folder / TIMES).read_bytes())
-
-
-class TarFiles:
-    """Files in a tar file, by the parts of their names behind the scene's number."""
-
-    def __init__(self, tar: Path, number: int, found: dict[str, TarInfo]) -> None:
-        self.tar, self.number, self._members = tar, number, found
-
-    def names(self) -> list[str]:
-        """Their names, with dots for folders."""
-        return sorted(self._members)
-
-    def read(self, name: str) -> bytes:
-        """Content of a file."""
-        member = self._members[name]
-        with self.tar.open("rb") as file:
-            file.seek(member.offset_data)
-            return file.read(member.size)
-
-    def times(self) -> dict[str, Any]:
-        """Who made the scene, and how long it took."""
-        return msgspec.json.decode(times_of(self.tar).read_bytes())[str(self.number)]
-
-
 class FinishedScene:
     """A scene of a batch.
 
-    Attributes
+    Parameters
     ----------
     number : int
+        Of the scene.
+    path : path
+        Its folder, or the tar file that it is in.
+    members : dict, optional
+        Its files in the tar file, by the parts of their names behind the scene's number.
     """
 
-    def __init__(self, number: int, files: SceneFiles) -> None:
-        self.number, self._files = number, files
+    def __init__(self, number: int, path: Path, members: dict[str, TarInfo] | None = None) -> None:
+        self.number, self._path, self._members = number, path, members
 
     def __repr__(self) -> str:
         return f"FinishedScene({self.number})"
 
     def names(self) -> list[str]:
         """Names of its files; in a tar file with dots in place of slashes."""
-        return self._files.names()
+        if self._members is not None:
+            return sorted(self._members)
+        found = sorted(path.relative_to(self._path).as_posix() for path in self._path.rglob("*") if path.is_file())
+        return [name for name in found if name != TIMES]
 
     def read(self, name: str) -> bytes:
         """Content of one of its files; raises `BatchError` with the names of all."""
-        for given in (name, name.replace("/", ".")):
-            if given in self.names():
-                return self._files.read(given)
-        raise BatchError(f"scene {self.number} has no file {name!r}; it has {', '.join(self.names())}")
+        names = self.names()
+        found = next((each for each in (name, name.replace("/", ".")) if each in names), None)
+        if found is None:
+            raise BatchError(f"scene {self.number} has no file {name!r}; it has {', '.join(names)}")
+        if self._members is None:
+            return (self._path / found).read_bytes()
+        with self._path.open("rb") as file:
+            file.seek(self._members[found].offset_data)
+            return file.read(self._members[found].size)
 
     def facts(self) -> dict[str, Any]:
         """What is known of it: seed, source, values drawn, counts, energies [J], files and their hashes."""
@@ -178,7 +74,9 @@ class FinishedScene:
 
     def times(self) -> dict[str, Any]:
         """How long it took [s], and where it was made."""
-        return self._files.times()
+        if self._members is None:
+            return msgspec.json.decode((self._path / TIMES).read_bytes())
+        return msgspec.json.decode(times_of(self._path).read_bytes())[str(self.number)]
 
     def positions(self) -> NDArray[np.float64]:
         """MuJoCo's generalised positions at every frame, [frames, nq]."""
@@ -195,18 +93,50 @@ class FinishedScene:
         return np.array([(*line[:-1], line[-1] == "True") for line in lines], dtype)
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
-        """The frames of its video, [height, width, 3]; of EXR frames there are none."""
-        yield from stored_frames(self)
+        """The frames of its video or folder of PNG frames, [height, width, 3].
+
+        Raises
+        ------
+        BatchError
+            If there are none, as with EXR frames.
+        """
+        images = [name for name in self.names() if name.startswith("frames") and name.endswith(".png")]
+        for name in images:
+            yield np.asarray(Image.open(io.BytesIO(self.read(name))).convert("RGB"))
+        if images:
+            return
+        video = next((name for name in self.names() if name.startswith("video.") and name.count(".") == 1), None)
+        if video is None:
+            raise BatchError(f"scene {self.number} has no video and no PNG frames; it has {', '.join(self.names())}")
+        content = io.BytesIO(self.read(video))
+        if video.endswith((".gif", ".webp")):
+            for frame in ImageSequence.Iterator(Image.open(content)):
+                yield np.asarray(frame.convert("RGB"))
+            return
+        with av.open(content) as container:
+            for decoded in container.decode(video=0):
+                yield decoded.to_ndarray(format="rgb24")
 
     def passes(self) -> Iterator[dict[str, NDArray]]:
-        """The passes of each frame by their names, from .npz files."""
-        yield from stored_passes(self)
+        """The passes of each frame by their names, from .npz files.
+
+        Raises
+        ------
+        BatchError
+            If there are none.
+        """
+        names = [name for name in self.names() if "passes" in name and name.endswith(".npz")]
+        if not names:
+            raise BatchError(f"scene {self.number} has no passes in .npz files; it has {', '.join(self.names())}")
+        for name in names:
+            with np.load(io.BytesIO(self.read(name))) as arrays:
+                yield {each: arrays[each] for each in arrays.files}
 
 
 def scenes_in_tar(tar: Path) -> Iterator[FinishedScene]:
     """The scenes in a tar file, in the order of their numbers."""
     for number, found in sorted(members(tar).items()):
-        yield FinishedScene(number, TarFiles(tar, number, found))
+        yield FinishedScene(number, tar, found)
 
 
 def finished_scenes(batch: BatchFolder, known: Container[int] = ()) -> Iterator[FinishedScene]:
@@ -220,7 +150,7 @@ def finished_scenes(batch: BatchFolder, known: Container[int] = ()) -> Iterator[
                 yield scene
     for number in loose:
         if number not in packed and number not in known:
-            yield FinishedScene(number, FolderFiles(batch.scene(number)))
+            yield FinishedScene(number, batch.scene(number))
 
 
 def pack(batch: BatchFolder, first: int, end: int) -> None:
@@ -234,7 +164,7 @@ def pack(batch: BatchFolder, first: int, end: int) -> None:
             return
         tar = batch.tar(first)
         before = {each.number: each for each in scenes_in_tar(tar)} if tar.exists() else {}
-        now = {number: FinishedScene(number, FolderFiles(batch.scene(number))) for number in loose}
+        now = {number: FinishedScene(number, batch.scene(number)) for number in loose}
         scenes = dict(sorted((before | now).items()))
         times = {str(number): scene.times() for number, scene in scenes.items()}
         with atomic_write(times_of(tar)) as path:

@@ -3,10 +3,7 @@
 `plan.json` is what the scenes are made by; `scenes/000012` is a finished scene, or a member of `tars/000000.tar`;
 `work/000012` is one that is being made, locked by whoever makes it; `failed/000012.json` and `.log` tell what went
 wrong. A scene is finished when its folder is renamed from `work` to `scenes`: nothing else has to be kept in step.
-
-Tar files of finished scenes, as WebDataset reads them: files of one scene one after another, named by its number.
-
-The plan as it stands in the folder of a batch, and how another differs from it.
+Tar files are as WebDataset reads them: files of one scene one after another, named by its number.
 """
 
 from __future__ import annotations
@@ -23,7 +20,7 @@ import tarfile
 from collections.abc import Iterable, Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
@@ -46,11 +43,6 @@ def member_name(number: int, name: str) -> str:
 def times_of(tar: Path) -> Path:
     """The file that tells who made the scenes of a tar file and how long each took, which is not in their bytes."""
     return tar.with_suffix(".times.json")
-
-
-def packed(tar: Path) -> set[int]:
-    """Numbers of the scenes in a tar file."""
-    return set(members(tar))
 
 
 def members(tar: Path) -> dict[int, dict[str, tarfile.TarInfo]]:
@@ -94,23 +86,6 @@ class Failure(msgspec.Struct):
         return self.errors >= ERRORS or self.deaths >= DEATHS
 
 
-class Claim(NamedTuple):
-    """A scene that this process makes: the folder to make it in, and where it goes when it is finished."""
-
-    work: Path
-    finished: Path
-
-    def finish(self) -> None:
-        """Put the scene in its place, whole and on the disk."""
-        for path in (*self.work.rglob("*"), self.work):
-            handle = os.open(path, os.O_RDONLY)
-            try:
-                os.fsync(handle)
-            finally:
-                os.close(handle)
-        self.work.rename(self.finished)
-
-
 class BatchFolder:
     """The folder of a batch on the disk."""
 
@@ -135,7 +110,7 @@ class BatchFolder:
 
     def finished(self) -> set[int]:
         """Numbers of the scenes that are there."""
-        return self.loose().union(*map(packed, self.tar_files()))  # in this order: scenes move into tar files
+        return self.loose().union(*map(members, self.tar_files()))  # in this order: scenes move into tar files
 
     def loose(self) -> set[int]:
         """Numbers of the scenes that have a folder."""
@@ -146,7 +121,7 @@ class BatchFolder:
         if self.scene(number).exists():
             return True
         tars = [tar for tar in self.tar_files() if int(tar.stem) <= number]  # named by their first scene
-        return bool(tars) and number in packed(tars[-1])
+        return bool(tars) and number in members(tars[-1])
 
     def tar(self, first: int) -> Path:
         """Tar file of the scenes from a number on."""
@@ -157,10 +132,10 @@ class BatchFolder:
         return sorted(path for path in _entries(self.tars) if path.suffix == ".tar" and path.stem.isdecimal())
 
     @contextlib.contextmanager
-    def claimed(self, number: int) -> Iterator[Claim | None]:
-        """Lock a scene against other processes; None if another one makes it now, or it is finished.
+    def claimed(self, number: int) -> Iterator[Path | None]:
+        """Lock a scene against other processes; yields the folder to make it in, see `finish`.
 
-        A process that dies leaves no lock behind.
+        None if another process makes it now, or it is finished. A process that dies leaves no lock behind.
         """
         work = self.work / f"{number:06d}"
         work.mkdir(parents=True, exist_ok=True)
@@ -175,9 +150,19 @@ class BatchFolder:
                 _remove_empty(work)
                 yield None
             else:
-                yield Claim(work, self.scene(number))
+                yield work
         finally:
             os.close(handle)
+
+    def finish(self, number: int, work: Path) -> None:
+        """Put a scene that was made in `work` in its place, whole and on the disk."""
+        for path in (*work.rglob("*"), work):
+            handle = os.open(path, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
+        work.rename(self.scene(number))
 
     def failures(self) -> dict[int, Failure]:
         """The scenes that have failed, also those that may yet succeed."""

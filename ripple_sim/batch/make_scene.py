@@ -1,7 +1,4 @@
-"""`make_scene`: one scene of a batch, made in a folder of its own by whatever process is told to.
-
-A small image of a scene, from the middle of its video.
-"""
+"""`make_scene`: one scene of a batch, made in a folder of its own by whatever process is told to."""
 
 from __future__ import annotations
 
@@ -27,7 +24,7 @@ from ripple_sim.video.options import frame_count, settled
 from ripple_sim.video.render_video import render_video
 
 from .finished import FACTS, TIMES
-from .folder import BatchFolder, Claim, clear, load_plan
+from .folder import BatchFolder, clear, load_plan
 from .plan import Plan, StoreEntry, options_of, video_name
 from .records import FrameRecord
 from .variation import Variation
@@ -98,29 +95,29 @@ def make_scene(folder: str, number: int) -> Outcome:
     """
     batch = BatchFolder(Path(folder))
     start, work = time.perf_counter(), time.process_time()
-    with _one_at_a_time, batch.claimed(number) as claim:
-        if claim is None:
+    with _one_at_a_time, batch.claimed(number) as place:
+        if place is None:
             return Outcome(number, "there" if batch.is_finished(number) else "busy")
         try:
-            facts = _make(load_plan(batch.plan), number, claim, batch)
+            facts = _make(load_plan(batch.plan), number, place, batch)
         except Exception as error:  # of any kind: the batch goes on without this scene
-            clear(claim.work)
+            clear(place)
             state: Literal["full", "failed"] = "full" if _is_full(error) else "failed"
             reason = " ".join(str(error).split()) or type(error).__name__
             return Outcome(number, state, error=reason, log=traceback.format_exc())
         seconds = time.perf_counter() - start
         times = {"seconds": seconds, "cpu_seconds": time.process_time() - work}
-        _write_json(claim.work / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()})
-        claim.finish()
+        _write_json(place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()})
+        batch.finish(number, place)
     return Outcome(number, "made", times, facts)
 
 
-def _make(plan: Plan, number: int, claim: Claim, batch: BatchFolder) -> dict[str, Any]:
+def _make(plan: Plan, number: int, folder: Path, batch: BatchFolder) -> dict[str, Any]:
     """Fill the folder of a scene; return what is to be known of it."""
-    clear(claim.work)  # of one that was killed
+    clear(folder)  # of one that was killed
     variation = Variation(plan, number)
     scene, values = variation.load()
-    record, video = render_scene(scene, plan.store, claim.work)
+    record, video = render_scene(scene, plan.store, folder)
     facts = {
         "number": number,
         "seed": variation.seed,
@@ -129,10 +126,10 @@ def _make(plan: Plan, number: int, claim: Claim, batch: BatchFolder) -> dict[str
         "values": values,
         **record.finish(),
     }
-    facts["files"] = {path.relative_to(claim.work).as_posix(): _digest(path) for path in _files(claim.work)}
-    facts["bytes"] = sum(path.stat().st_size for path in _files(claim.work))
+    facts["files"] = {path.relative_to(folder).as_posix(): _digest(path) for path in _files(folder)}
+    facts["bytes"] = sum(path.stat().st_size for path in _files(folder))
     facts["hash"] = hashlib.blake2b(msgspec.json.encode(facts), digest_size=16).hexdigest()
-    _write_json(claim.work / FACTS, facts)
+    _write_json(folder / FACTS, facts)
     if video is not None:
         write_thumbnail(video, batch.thumbnail(number))
     return facts

@@ -1,10 +1,6 @@
-"""The TOML file of a batch: what varies, how often, and what is stored.
+"""The TOML file of a batch: what varies, from what it is drawn, how often, and what is kept of each scene.
 
-What a value of a plan may be drawn from.
-
-Keys of a plan: `camera.azimuth`, `ripple[duck].material.speed`, `geom[ball*].size[0]`.
-
-`[store]` of a plan: what is kept of each scene.
+Keys of a plan are such as `camera.azimuth`, `ripple[duck].material.speed`, `geom[ball*].size[0]`.
 """
 
 from __future__ import annotations

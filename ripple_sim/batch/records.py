@@ -1,7 +1,4 @@
-"""What is recorded of a running scene beside its frames: impulses, heights, positions, energies.
-
-The heights of a scene's targets over time: a Zarr group in a zip file.
-"""
+"""What is recorded of a running scene beside its frames: impulses, heights, positions, energies."""
 
 from __future__ import annotations
 

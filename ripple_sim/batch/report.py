@@ -1,12 +1,6 @@
-"""The index of a batch: a Parquet table with a row a scene.
+"""What is told of a batch: its index, a Parquet table with a row a scene, and its page; how far it is; and a trial.
 
-The summary page of a batch.
-
-`load_batch`: the finished scenes of a batch, one after another or by number.
-
-How far a batch is, from its folder alone.
-
-A batch tried before it is made: the first scenes' values, and what one scene takes.
+`load_batch` reads its finished scenes, one after another or by number.
 """
 
 from __future__ import annotations
@@ -241,7 +235,7 @@ def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
     lines = []
     for number in range(min(_SHOWN, plan.count)):
         variation = Variation(plan, number)
-        values = ", ".join(f"{key} = {value}" for key, value in variation.load().values.items()) or "nothing varies"
+        values = ", ".join(f"{key} = {value}" for key, value in variation.load()[1].items()) or "nothing varies"
         lines.append(f"scene {number} ({Path(variation.source).name}, seed {variation.seed}): {values}")
     with tempfile.TemporaryDirectory(prefix="ripple-sim-trial-") as name:
         batch = BatchFolder(Path(name))

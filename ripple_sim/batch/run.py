@@ -1,8 +1,6 @@
-"""One run of a batch: what is to be made is given out, and what comes back is noted.
+"""`run_batch`: makes the scenes of a plan that are not there yet, whoever works on them.
 
-How a batch is run, and how far a run is.
-
-`run_batch`: makes the scenes of a plan that are not there yet, whoever works on them.
+A run gives out what is to be made, and notes what comes back.
 """
 
 from __future__ import annotations

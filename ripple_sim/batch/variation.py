@@ -1,8 +1,6 @@
 """One scene of a batch: its seed, its values, and the scene that they make.
 
-Values put into the table of a scene file.
-
-Values put into a MuJoCo model before it is compiled.
+Values go into the table of a scene file, and into a MuJoCo model before it is compiled.
 """
 
 from __future__ import annotations
@@ -11,7 +9,7 @@ import dataclasses
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import mujoco
@@ -33,14 +31,6 @@ Stream = Callable[[str], np.random.Generator]
 _NAMES = ("geom", "body", "actuator")  # what an entry of a list goes by
 
 
-class Place(NamedTuple):
-    """Where a value stands: the table or list that holds it, the key or number there, and the whole key."""
-
-    holder: Any
-    key: Any
-    name: str
-
-
 def vary_table(table: dict[str, Any], entries: Mapping[str, Distribution], stream: Stream) -> dict[str, Any]:
     """Draw values for the keys of a scene file's table and put them there.
 
@@ -56,18 +46,19 @@ def vary_table(table: dict[str, Any], entries: Mapping[str, Distribution], strea
     """
     values = {}
     for key, distribution in entries.items():
-        for place in _places(table, parse_key(key), ""):
-            value = distribution.draw(stream(key if distribution.together else place.name))
-            values[place.name] = value
-            _put(place, value, distribution)
+        for holder, place, name in _places(table, parse_key(key), ""):
+            value = distribution.draw(stream(key if distribution.together else name))
+            values[name] = value
+            _put(holder, place, name, value, distribution.apply)
     return values
 
 
-def _places(table: dict[str, Any], steps: Sequence[Step], before: str) -> Iterator[Place]:
+def _places(table: dict[str, Any], steps: Sequence[Step], before: str) -> Iterator[tuple[Any, Any, str]]:
+    """Where values stand: the table or list that holds each, the key or number there, and the whole key."""
     step, rest = steps[0], steps[1:]
     here = f"{before}.{step.name}" if before else step.name
     if not rest and step.chosen is None:
-        yield Place(table, step.name, here)
+        yield table, step.name, here
         return
     inner = table.get(step.name)
     if inner is None and step.chosen is None:
@@ -80,26 +71,26 @@ def _places(table: dict[str, Any], steps: Sequence[Step], before: str) -> Iterat
                 raise SceneError(f"plan: {item} is a table; name one of its keys")
             yield from _places(inner[number], rest, item)
     elif isinstance(inner, list) and not rest and step.index is not None and step.index < len(inner):
-        yield Place(inner, step.index, f"{here}[{step.index}]")
+        yield inner, step.index, f"{here}[{step.index}]"
     elif isinstance(inner, dict) and step.chosen is None:
         yield from _places(inner, rest, here)
     else:
         raise SceneError(f"plan: the scene has no {'.'.join([here, *(each.name for each in rest)])} to vary")
 
 
-def _put(place: Place, value: Any, distribution: Distribution) -> None:
-    if distribution.apply != "set":
-        old = place.holder.get(place.key) if isinstance(place.holder, dict) else place.holder[place.key]
+def _put(holder: Any, place: Any, name: str, value: Any, apply: str) -> None:
+    if apply != "set":
+        old = holder.get(place) if isinstance(holder, dict) else holder[place]
         try:
             if old is None:  # left out, which numpy takes for NaN
                 raise TypeError
-            value = combined(np.asarray(old, float), value, distribution.apply).tolist()
+            value = combined(np.asarray(old, float), value, apply).tolist()
         except (TypeError, ValueError) as error:
             raise SceneError(
-                f"plan: {place.name} is {old!r} in the scene, which {value!r} cannot {distribution.apply}; write a "
+                f"plan: {name} is {old!r} in the scene, which {value!r} cannot {apply}; write a "
                 "number into the scene file, or set the value"
             ) from error
-    place.holder[place.key] = value
+    holder[place] = value
 
 
 def combined(old: Any, value: Any, apply: str) -> Any:
@@ -198,13 +189,6 @@ _SEED_BITS = 29  # so that `ripple-sim render --seed` takes it: nine digits
 _EVENTS = tuple(field.name for field in dataclasses.fields(Events))
 
 
-class Varied(NamedTuple):
-    """A scene, and the values drawn for it by their keys."""
-
-    scene: Scene
-    values: dict[str, Any]
-
-
 class Variation:
     """The scene of a number, which is the same whoever makes it, and in whatever order.
 
@@ -227,8 +211,8 @@ class Variation:
         spawned = np.random.SeedSequence(self.plan.seed, spawn_key=(self.number, zlib.crc32(key.encode())))
         return np.random.Generator(np.random.PCG64(spawned))
 
-    def load(self) -> Varied:
-        """Load the scene with its values.
+    def load(self) -> tuple[Scene, dict[str, Any]]:
+        """Load the scene, and the values drawn for it by their keys.
 
         Raises
         ------
@@ -264,7 +248,7 @@ class Variation:
             table = _table(scene)
             change(table)
             scene = _scene(scene, table)
-        return Varied(scene, dict(sorted(values.items())))
+        return scene, dict(sorted(values.items()))
 
     def _bodies(self) -> int:
         bodies = self.plan.meshes.bodies if self.plan.meshes else 0

@@ -9,6 +9,7 @@ Viewpoint of a scene's camera at a given time, free or fixed, orbiting or tracki
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 
 import mujoco
@@ -16,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
-from ripple_sim.render.camera import Pose, ThroughLens, Viewpoint, linear_to_srgb, srgb_to_linear
+from ripple_sim.render.camera import Pose, Viewpoint
+from ripple_sim.render.contract import linear_to_srgb, srgb_to_linear
 from ripple_sim.render.resources import AnyHeightMap, MovedHeightMap
 from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.scene.scene_file import CameraEntry
@@ -263,8 +265,9 @@ class FrameSource:
         lens = self._exposures.offsets[snapshot.exposure]
         if lens.any():
             sim = self._simulation
-            focus = focal_distance(sim.model, snapshot.data, sim.scene.camera, camera.pose())
-            camera = ThroughLens(camera, tuple(lens), focus)
+            pose = camera.pose()
+            focus = focal_distance(sim.model, snapshot.data, sim.scene.camera, pose)
+            camera = dataclasses.replace(pose, lens=tuple(lens), focal_distance=focus)
         self.renderer.submit(snapshot.data, height_maps, camera, snapshot.exposure)
 
     def fetch(self) -> NDArray | None:

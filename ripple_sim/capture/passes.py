@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.coupling.soft import first_skin
 from ripple_sim.render.camera import Pose
-from ripple_sim.render.passes.layers import SurfaceImage
+from ripple_sim.render.passes.surface_buffers import SurfaceImage
 from ripple_sim.render.surfaces.adaptive import spline_heights, spline_samples
 from ripple_sim.render.surfaces.moving import MovingVertices
 from ripple_sim.solver.texels.texel_atlas import ChartPage
@@ -113,8 +113,8 @@ def _ridden(mesh: SeenMesh, later: SeenMesh, points: NDArray, directions: NDArra
     """Points of a mesh and the directions in which waves move them, both [k, 3], once the mesh has moved on."""
     if np.array_equal(mesh.V, later.V):
         return points, directions
-    moved = MovingVertices(mesh.V, mesh.F, points, directions, directions)(later.V)
-    return moved.points.astype(np.float64), moved.directions.astype(np.float64)
+    points, directions, _ = MovingVertices(mesh.V, mesh.F, points, directions, directions)(later.V)
+    return points.astype(np.float64), directions.astype(np.float64)
 
 
 def passes_of(sighting: Sighting, later: Sighting | None, names: tuple[str, ...]) -> dict[str, NDArray]:

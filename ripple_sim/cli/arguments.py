@@ -1,6 +1,6 @@
 """Types of command line arguments: how a word is parsed, and the message if it is invalid.
 
-The command line's form of `VideoOptions`: its fields, defaults and help, with the words that the user types.
+`VideoArguments` is `VideoOptions` with these types: its fields, defaults and help are the options'.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from tyro.conf import arg
 from tyro.constructors import PrimitiveConstructorSpec
@@ -190,33 +190,6 @@ SceneLayout = Annotated[
 Rim = Annotated[str | None, _one_word(parse_rim, "{free,fixed}"), arg(help_behavior_hint="(default: the scene's)")]
 
 
-# By field: how its word on the command line is read. The others are read as their types say.
-_WORDS: dict[str, Any] = {
-    "size": Size,
-    "fps": FrameRate,
-    "duration": Duration,
-    "slow_motion": Factor,
-    "supersample": Supersample,
-    "shutter": Shutter,
-    "aperture": Aperture,
-    "focus": Focus,
-    "exposures": Exposures,
-    "overlay": Overlay,
-    "passes": Passes,
-    "compare": Baseline,
-    "resolution": Resolution,
-    "layout": SceneLayout,
-    "rim": Rim,
-}
-
-if TYPE_CHECKING:
-    _VideoFields = VideoOptions
-else:
-    _VideoFields = dataclasses.make_dataclass(
-        "_VideoFields", list(_WORDS.items()), bases=(VideoOptions,), frozen=True, kw_only=True
-    )
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class _Output:
     output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
@@ -224,8 +197,24 @@ class _Output:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class VideoArguments(_VideoFields, _Output):
-    """The arguments of every command that renders a video."""
+class VideoArguments(VideoOptions, _Output):
+    """Arguments of every command that renders a video; options not named here are read as their types say."""
+
+    size: Size = VideoOptions.size
+    fps: FrameRate = VideoOptions.fps
+    duration: Duration = VideoOptions.duration
+    slow_motion: Factor = VideoOptions.slow_motion
+    supersample: Supersample = VideoOptions.supersample
+    shutter: Shutter = VideoOptions.shutter
+    aperture: Aperture = VideoOptions.aperture
+    focus: Focus = None
+    exposures: Exposures = VideoOptions.exposures
+    passes: Passes = ()
+    overlay: Overlay = None
+    compare: Baseline = VideoOptions.compare
+    resolution: Resolution = VideoOptions.resolution
+    layout: SceneLayout = VideoOptions.layout
+    rim: Rim = VideoOptions.rim
 
     def options(self) -> VideoOptions:
         """Options that the user chose."""

@@ -1,7 +1,4 @@
-"""`ripple-sim atlas`.
-
-The report of `ripple-sim atlas`: the mesh, what was done to it, the quality of the atlas, the time of each stage.
-"""
+"""`ripple-sim atlas` and its report: the mesh, what was done to it, quality of the atlas, time of each stage."""
 
 from __future__ import annotations
 
@@ -62,8 +59,6 @@ class AtlasCommand:
         """Build the atlas, save and plot it if asked to, and print its figures."""
         from ripple_sim.solver import build_atlas, load_mesh, thickness_map
 
-        pass
-
         self._check()
         inside = None
         if self.inside is not None:
@@ -113,8 +108,6 @@ class AtlasCommand:
     def _plot(self, path: Path, atlas: SolverAtlas, thickness: NDArray[np.float64] | None) -> None:
         from ripple_sim.figures.atlas_plot import plot_atlas, plot_thickness
         from ripple_sim.scene.drop import usual_up
-
-        pass
 
         mesh, up = atlas.mesh, self.up or usual_up(self.mesh)
         method = self.method if atlas.layout == "cube" else None

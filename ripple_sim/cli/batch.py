@@ -1,7 +1,4 @@
-"""`ripple-sim batch`.
-
-How far a batch is: a bar on a terminal, a line a minute in a log.
-"""
+"""`ripple-sim batch`; it shows how far the batch is by a bar on a terminal, and by a line a minute in a log."""
 
 from __future__ import annotations
 
@@ -26,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Batch:
+class BatchCommand:
     """Make many scenes by one plan, each varied by its own seed."""
 
     plan: Annotated[Positional[Path], arg(metavar="PLAN|DIR")]
@@ -84,8 +81,6 @@ class Batch:
     def _make(self, plan: Plan | None, folder: Path) -> None:
         from ripple_sim.batch.report import status_text
         from ripple_sim.batch.run import RunOptions, run_batch
-
-        pass
 
         options = RunOptions(
             workers=self.workers,

@@ -1,18 +1,8 @@
-"""`ripple-sim materials`.
-
-`ripple-sim bench`.
-
-`ripple-sim cache`.
-
-`ripple-sim completion`.
-
-`ripple-sim info`.
-"""
+"""Commands that tell something and write no file: `bench`, `cache`, `completion`, `info` and `materials`."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import json as json_format
 import math
 import sys
@@ -23,24 +13,24 @@ from tyro.conf import Positional, arg
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Bench:
-    """Measure the wave solver: speed against rivals and the bound of memory, accuracy against exact solutions."""
+class BenchCommand:
+    """Measure the wave solver: speed beside the bound of memory, cost of the coupling, accuracy against theory."""
 
     meshes: Annotated[Positional[tuple[Path, ...]], arg(metavar="[MESH ...]", help_behavior_hint="(optional)")] = ()
-    """Meshes on which to measure arrival times, in addition to the built-in one."""
+    """Meshes of which to time the atlas and the wave step, in addition to the duck."""
     json: bool = False
     """Print JSON."""
 
     def run(self) -> None:
         """Measure and print; the stages are announced on stderr."""
-        from ripple_sim.bench.report import as_text, measure
+        from ripple_sim.bench import as_text, measure
 
         report = measure(list(self.meshes), lambda stage: print(f"measuring {stage} ...", file=sys.stderr))
         print(json_format.dumps(report, indent=2) if self.json else as_text(report))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Cache:
+class CacheCommand:
     """Show where atlases are kept, and how much room they take: at most RIPPLE_SIM_CACHE_LIMIT megabytes, or 500."""
 
     clear: bool = False
@@ -64,7 +54,7 @@ def _megabytes(size: int) -> str:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Completion:
+class CompletionCommand:
     """Print a shell completion script. To use it: source <(ripple-sim completion bash)."""
 
     shell: Annotated[Positional[Literal["bash", "zsh"]], arg(metavar="SHELL")]
@@ -72,7 +62,7 @@ class Completion:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Info:
+class InfoCommand:
     """Show versions, the OpenGL driver and the wave solver, and what to install if rendering is not possible."""
 
     json: bool = False
@@ -91,7 +81,7 @@ _WAVELENGTH = 0.05
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Materials:
+class MaterialsCommand:
     """List the real materials by name, with speed and decay of a wave of 5 cm, sources, and where they hold."""
 
     json: bool = False
@@ -101,9 +91,9 @@ class Materials:
         """Print the table."""
         from ripple_sim.solver.operator.presets import PRESETS
 
-        table = {name: _told(name) for name in PRESETS}
+        table = {name: _facts(name) for name in PRESETS}
         if self.json:
-            print(json.dumps(table, indent=2))
+            print(json_format.dumps(table, indent=2))
             return
         width = max(map(len, table))
         for name, row in table.items():
@@ -114,11 +104,11 @@ class Materials:
             print(f"{'':{width}}  source{'' if row['checked'] else ', not checked'}: {row['source']}")
 
 
-def _told(name: str) -> dict[str, Any]:
+def _facts(name: str) -> dict[str, Any]:
     from ripple_sim.solver import Material
     from ripple_sim.solver.operator.material import decay_time, phase_speed
     from ripple_sim.solver.operator.presets import PRESETS
 
     material, q = Material.preset(name), 2 * math.pi / _WAVELENGTH
-    told = {"speed [m/s]": phase_speed(material, q), "decay [s]": decay_time(material, q)}
-    return told | dataclasses.asdict(PRESETS[name])
+    facts = {"speed [m/s]": phase_speed(material, q), "decay [s]": decay_time(material, q)}
+    return facts | dataclasses.asdict(PRESETS[name])

@@ -1,9 +1,7 @@
 """From the words of a command line to a command.
 
 A command is a class: its fields are the arguments, the docstrings the help, and `run` does the work. Heavy imports are
-inside `run`, so that `--help` and usage errors are answered at once.
-
-`ripple-sim view`.
+inside `run`, so that `--help` and usage errors are answered at once. `ripple-sim view` is here as well.
 """
 
 from __future__ import annotations
@@ -22,16 +20,16 @@ from tyro.conf import Positional, arg
 
 from .arguments import Count, Seed, Size, UpAxis
 from .atlas import AtlasCommand
-from .batch import Batch
-from .info import Bench, Cache, Completion, Info, Materials
-from .render import Drop, Export, Render
+from .batch import BatchCommand
+from .info import BenchCommand, CacheCommand, CompletionCommand, InfoCommand, MaterialsCommand
+from .render import DropCommand, ExportCommand, RenderCommand
 
 if TYPE_CHECKING:
     from ripple_sim.viewer.window import Window
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class View:
+class ViewCommand:
     """Open a scene or a mesh in an interactive window.
 
     Click: poke the surface. Drag: orbit; with shift: pan; wheel: zoom. Space: pause or resume. N: next frame. R: reset.
@@ -105,17 +103,17 @@ class View:
 
 
 COMMANDS: dict[str, Callable[..., Any]] = {
-    "render": Render,
-    "drop": Drop,
-    "export": Export,
-    "batch": Batch,
+    "render": RenderCommand,
+    "drop": DropCommand,
+    "export": ExportCommand,
+    "batch": BatchCommand,
     "atlas": AtlasCommand,
-    "info": Info,
-    "bench": Bench,
-    "view": View,
-    "materials": Materials,
-    "cache": Cache,
-    "completion": Completion,
+    "info": InfoCommand,
+    "bench": BenchCommand,
+    "view": ViewCommand,
+    "materials": MaterialsCommand,
+    "cache": CacheCommand,
+    "completion": CompletionCommand,
 }
 
 _DESCRIPTION = "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation."
@@ -133,7 +131,7 @@ def parse(argv: Sequence[str]) -> Any:
     UsageError
     """
     command = _parse(argv)
-    if isinstance(command, Completion):  # which tyro makes from all the commands
+    if isinstance(command, CompletionCommand):  # which tyro makes from all the commands
         command = _parse(["--tyro-print-completion", command.shell])
     return command
 

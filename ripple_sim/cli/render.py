@@ -1,8 +1,6 @@
-"""`ripple-sim render` and `ripple-sim drop`.
+"""Commands that make a film or a file of a scene: `render`, `drop` and `export`.
 
-`ripple-sim export`.
-
-A progress bar for a terminal, which tells what is being compiled; silence for a pipe or a log.
+On a terminal they show a progress bar, which tells what is being compiled; a pipe or a log stays silent.
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ import dataclasses
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
@@ -42,31 +40,20 @@ if TYPE_CHECKING:
     from ripple_sim.scene.scene import Scene
     from ripple_sim.video.render_video import Summary
 
-# By field: how its word on the command line is read. The others are read as their types say.
-_WORDS: dict[str, Any] = {
-    "fps": Count,
-    "duration": Duration,
-    "slow_motion": Factor,
-    "triangles": Count,
-    "chunk": Limit,
-    "size": Size,
-    "resolution": Resolution,
-    "layout": SceneLayout,
-    "rim": Rim,
-}
-
-if TYPE_CHECKING:
-    _ExportFields = ExportOptions
-else:
-    _ExportFields = dataclasses.make_dataclass(
-        "_ExportFields", list(_WORDS.items()), bases=(ExportOptions,), frozen=True, kw_only=True
-    )
-
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Export(_ExportFields):
+class ExportCommand(ExportOptions):
     """Simulate a scene, and write it to the file of another program."""
 
+    fps: Count = ExportOptions.fps
+    duration: Duration = ExportOptions.duration
+    slow_motion: Factor = ExportOptions.slow_motion
+    triangles: Count = ExportOptions.triangles
+    size: Size = ExportOptions.size
+    resolution: Resolution = ExportOptions.resolution
+    layout: SceneLayout = ExportOptions.layout
+    rim: Rim = ExportOptions.rim
+    chunk: Limit = ExportOptions.chunk
     scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
     """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...), on which bodies
     then drop."""
@@ -92,8 +79,6 @@ class Export(_ExportFields):
         from ripple_sim.export.options import frame_count
         from ripple_sim.export.scene import export_scene
         from ripple_sim.scene.scene import through_camera
-
-        pass
 
         scene = find_scene(self.scene, seed=self.seed)
         for note in scene.notes:
@@ -199,8 +184,6 @@ class _VideoCommand(VideoArguments):
         from ripple_sim.video.options import frame_count, settled
         from ripple_sim.video.render_video import render_video
 
-        pass
-
         if self.device is not None:
             select_device(self.device)
         scene = self._seen()
@@ -216,8 +199,6 @@ class _VideoCommand(VideoArguments):
         check_cycles(self.options(), self.output, self.samples)  # before anything that takes time
 
         from ripple_sim.video.options import frame_count, settled
-
-        pass
 
         scene = self._seen()
         frames = frame_count(settled(self.options(), scene, self.output))
@@ -235,7 +216,7 @@ class _VideoCommand(VideoArguments):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Render(_VideoCommand):
+class RenderCommand(_VideoCommand):
     """Render a scene to a video."""
 
     scene: Annotated[Positional[str], arg(metavar="SCENE")]
@@ -257,7 +238,7 @@ class Render(_VideoCommand):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Drop(_VideoCommand):
+class DropCommand(_VideoCommand):
     """Put a mesh on a floor, drop bodies on it, and render a video."""
 
     mesh: Annotated[Positional[Path], arg(metavar="MESH")]

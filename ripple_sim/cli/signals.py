@@ -1,38 +1,37 @@
 """Ctrl-C, SIGTERM and SIGHUP: one line, status 128 + the signal's number, and what is unfinished is cleaned up.
 
-Before a command begins, and during imports, where an exception could be taken for an import error, there is nothing to
-clean up, and the process ends at once. Later the signal becomes an exception, but never within a call of moderngl's or
-LLVM's, which would end in a segmentation fault, nor within VTK's, which swallows exceptions of what it calls back or
-exits by itself, nor within zarr's, whose threads would go on to write into a folder that is being removed, nor while a
-video is being opened: then a timer tries again until it is over.
+Before a command begins there is nothing to clean up, and the process ends at once. Later the signal becomes an
+exception. Where that would do harm a timer tries again until it is over: within calls of moderngl's or LLVM's it would
+end in a segmentation fault; VTK swallows exceptions of what it calls back, or exits by itself; zarr's threads would go
+on to write into a folder that is being removed; a package may take it for an import error; Python swallows it in a
+finalizer; and a video that is being opened has nobody yet who would clean it up.
 A second signal ends the process at once; what is left is then as whole as after a kill. One that comes after the
 command, while the interpreter shuts down, changes nothing.
 """
 
 from __future__ import annotations
 
-import functools
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from types import CodeType, FrameType
-from typing import Any
+from collections.abc import Callable
+from types import FrameType
 
 _WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated", signal.SIGHUP: "hung up"}
 INTERRUPTED, TERMINATED, HUNG_UP = (128 + number for number in _WORDS)
 
-# Files within whose calls no exception is raised, by parts of their paths.
+# Code within which no exception is raised, by the beginnings of its dotted names.
 _NEVER_IN = (
-    "moderngl/__init__.py",
-    "/llvmlite/binding/",
-    "numba/core/codegen.py",
-    "/pyvista/plotting/",
-    "encode/open_writer.py",
-    "zarr/core/sync.py",
+    "moderngl.",
+    "llvmlite.",
+    "numba.core.codegen.",
+    "pyvista.plotting.",
+    "zarr.core.sync.",
+    "importlib._bootstrap",
+    "_frozen_importlib",
+    "weakref.",
+    "ripple_sim.encode.writer.open_writer",
 )
-# In whose functions an import may be under way and there is something to clean up.
-_AT_STAKE = ("video/render_video.py", "export/export_scene.py", "cycles/render_cycles.py")
 
 _RETRY = 0.02  # [s]
 
@@ -50,8 +49,6 @@ def end_at_once() -> None:
 
 def end_in_good_order() -> None:
     """Let the signals raise `KeyboardInterrupt` or `SystemExit`; a signal ignored by the parent stays ignored."""
-    if getattr(sys.unraisablehook, "func", None) is not _retry_what_got_lost:
-        sys.unraisablehook = functools.partial(_retry_what_got_lost, sys.unraisablehook)
     _handle(_raise)
 
 
@@ -75,14 +72,9 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
-    running = list(_running(frame))
-    files = [code.co_filename for code in running]
-    importing = any(file.startswith("<frozen importlib") for file in files)
-    at_stake = any(code.co_filename.endswith(_AT_STAKE) and code.co_name != "<module>" for code in running)
-    if importing and not at_stake:
-        _end(number, frame)
-    if importing or any(part in file for file in files for part in _NEVER_IN):
-        _retry(number)
+    if _does_harm(frame):
+        signal.signal(signal.SIGALRM, lambda _, then: _raise(number, then))
+        signal.setitimer(signal.ITIMER_REAL, _RETRY)
         return
     end_at_once()
     if number == signal.SIGINT:
@@ -90,24 +82,11 @@ def _raise(number: int, frame: FrameType | None) -> None:
     sys.exit(128 + number)
 
 
-def _retry(number: int) -> None:
-    signal.signal(signal.SIGALRM, lambda _, frame: _raise(number, frame))
-    signal.setitimer(signal.ITIMER_REAL, _RETRY)
-
-
-def _retry_what_got_lost(before: Callable[[Any], object], unraisable: Any) -> None:
-    """An exception in a finalizer goes no further: raise it again outside."""
-    error = unraisable.exc_value
-    if isinstance(error, KeyboardInterrupt):
-        _retry(signal.SIGINT)
-    elif isinstance(error, SystemExit) and isinstance(error.code, int) and word_of(error.code):
-        _retry(error.code - 128)
-    else:
-        before(unraisable)
-
-
-def _running(frame: FrameType | None) -> Iterator[CodeType]:
-    """The functions that are running, from the innermost."""
+def _does_harm(frame: FrameType | None) -> bool:
+    """Whether an exception does harm in one of the functions that are running, from the innermost."""
     while frame is not None:
-        yield frame.f_code
+        name = f"{frame.f_globals.get('__name__', '')}.{frame.f_code.co_qualname}"
+        if frame.f_code.co_name == "__del__" or name.startswith(_NEVER_IN):
+            return True
         frame = frame.f_back
+    return False

@@ -1,22 +1,26 @@
-"""Waves too high or too steep for the object that carries them are reported once a target.
+"""Waves too high or too steep for the object that carries them are reported once a target, with what would do.
 
 How high and how steep waves are, beside what the object allows.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import RippleWarning
-from ripple_sim.solver import Atlas, WaveSolver
+from ripple_sim.solver import Atlas, Material, WaveSolver
 from ripple_sim.solver.kernel import Floats32, kernel
 from ripple_sim.solver.texels.thickness import half_thickness
+
+from .model import CoupledModel
+from .suited import Extent, bearing_density
 
 # The height allowed over the local radius.
 HIGH = 0.25
@@ -69,9 +73,9 @@ def scales_of(atlas: Atlas) -> Scales:
     return Scales(per_limit, per_row, per_column, share, thinnest, float(calm))
 
 
-def highest(height: NDArray[np.float32], scales: Scales) -> tuple[float, int]:
-    """The greatest height over what is allowed there, and its texel."""
-    share = (np.abs(height) * scales.per_limit).reshape(-1)
+def highest(crests: NDArray[np.float32], scales: Scales) -> tuple[float, int]:
+    """The greatest crest over what is allowed there, and its texel; crests are sizes of heights, see `crests`."""
+    share = (crests * scales.per_limit).reshape(-1)
     texel = int(share.argmax())
     return float(share[texel]), texel
 
@@ -106,7 +110,8 @@ def slope_of_share(height: NDArray[np.float32], scales: Scales, share: float) ->
 # small.
 _STEEP_AREA = 0.01
 
-# Heights are looked at once in so many steps. They are read back from a GPU for that, which lets it run dry.
+# The crests of all steps, and the slopes of one, are looked at once in so many steps. They are read back from a GPU for
+# that, which lets it run dry.
 _EVERY = {"cpu": 16, "gl": 128}
 
 # A wave that is too high is followed for so many looks, or until it falls again, so that the advice is based on its
@@ -117,53 +122,75 @@ _FOLLOWED = 4
 # height that has spread to where the object is thinnest.
 _MARGIN, _SPREAD = 2.0, 0.3
 
+# What a material is printed with; the others change no wave.
+_PRINTED = tuple(each for each in dataclasses.fields(Material) if isinstance(each.default, float | bool))
+
 
 class AmplitudeCheck:
     """Compares the heights of all targets with their local radii (`half_thickness`), and their slopes with 1.
 
     Parameters
     ----------
+    coupled : CoupledModel
     waves : mapping of int to WaveSolver
-        By geom; others may put new ones in.
-    names : sequence of str
-        Of all geoms.
+        By geom; see `waves_changed`.
     """
 
-    def __init__(self, waves: Mapping[int, WaveSolver], names: Sequence[str]) -> None:
-        self._waves, self._names = waves, names
-        self._watched = {geom: _Watch(each.rest) for geom, each in waves.items()}
+    def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
+        self._coupled = coupled
+        self._watched = {geom: _Watch(each) for geom, each in waves.items()}
         self._steps = 0
 
     def __call__(self) -> None:
         """Look at the heights, if it is time to. Call it after each step of the waves."""
-        self._steps += 1
         for geom, watch in list(self._watched.items()):
-            waves = self._waves[geom]
-            if self._steps % _EVERY[waves.backend] == 0 and watch.look(waves.height):
+            if self._steps % _EVERY[watch.waves.backend] == 0 and watch.look():
                 self._warn(geom)
+        self._steps += 1
 
     def ignore(self, geom: int) -> None:
         """Give no warning of a geom."""
         self._watched.pop(geom, None)
 
+    def waves_changed(self, geom: int, waves: WaveSolver) -> None:
+        """Go on with the new waves of a geom."""
+        if geom in self._watched:
+            self._watched[geom].go_on_with(waves)
+
     def flush(self) -> None:
         """Look at the heights a last time, and warn of all that has been seen: the waves are about to end."""
         for geom, watch in list(self._watched.items()):
-            watch.look(self._waves[geom].height)
+            watch.look()
             if watch.excess > 1:
                 self._warn(geom)
 
     def _warn(self, geom: int) -> None:
-        watch, waves = self._watched.pop(geom), self._waves[geom]
-        factor = _rounded_up(_MARGIN * watch.needed)
-        density = np.asarray(waves.material.density, dtype=np.float64)
-        advice = f"{_rounded_up(factor * float(density)):g} kg/m^2 or more" if not density.ndim else "as much more"
+        watch = self._watched.pop(geom)
         warnings.warn(
-            f"the waves on geom {self._names[geom]!r} are {watch.what}; pictures show them limited. A density "
-            f"{factor:g} times as high would do: {advice}",
+            f"the waves on geom {self._coupled.names[geom]!r} are {watch.what}; pictures show them limited. "
+            + self._advice(geom, watch.waves, _MARGIN * watch.needed),
             RippleWarning,
             stacklevel=5,
         )
+
+    def _advice(self, geom: int, waves: WaveSolver, factor: float) -> str:
+        """A material that would do: the same with a density that is so many times as high, or higher."""
+        material = waves.material
+        given = {each.name: getattr(material, each.name) for each in _PRINTED}
+        if any(np.ndim(value) for value in given.values()):
+            target = repr(self._coupled.names[geom])
+            density = f"{_rounded_up(factor):g} * ripples[{target}].material.density"
+            return f"This would do: ripples.change_material({target}, density={density})"
+        # what was seen may be the first of many hits
+        bearing = bearing_density(self._coupled, geom, Extent.of(waves.rest.mesh), material)
+        given["density"] = _rounded_up(max(factor * given["density"], bearing))
+        pairs = [
+            (each.name, repr(float(f"{given[each.name]:.4g}")))
+            for each in _PRINTED
+            if given[each.name] != each.default or each.name == "density"
+        ]
+        python, toml = (", ".join(f"{name}{sign}{value}" for name, value in pairs) for sign in ("=", " = "))
+        return f"This would do: Material({python}), in a scene file material = {{{toml}}}"
 
 
 class _Watch:
@@ -171,6 +198,7 @@ class _Watch:
 
     Attributes
     ----------
+    waves : WaveSolver
     excess : float
         The most, over what is allowed, of heights and slopes.
     needed : float
@@ -179,30 +207,36 @@ class _Watch:
         What was too large, how large, and where.
     """
 
-    def __init__(self, atlas: Atlas) -> None:
-        self._atlas = atlas
-        size = float(np.ptp(atlas.mesh.V, axis=0).max())
+    def __init__(self, waves: WaveSolver) -> None:
+        self.waves = waves
         # lower waves are right anywhere, or too small to matter
-        self._calm = 1e-3 * size
+        self._calm = 1e-3 * float(np.ptp(waves.rest.mesh.V, axis=0).max())
         self._scales: Scales | None = None
         self.excess, self.needed, self.what = 0.0, 0.0, ""
         self._looks = 0
 
-    def look(self, height: NDArray[np.float32]) -> bool:
+    def look(self) -> bool:
         """Whether the waves are too high or too steep, and it is time to say so."""
         excess = 0.0
-        if max(float(height.max()), -float(height.min())) > self._calm:
-            excess = self._measure(height)
+        crests = self.waves.crests()
+        if float(crests.max()) > self._calm:
+            excess = self._measure(crests, self.waves.height)
         if self.excess > 1:
             self._looks += 1
         return self.excess > 1 and (excess < self.excess or self._looks >= _FOLLOWED)
 
-    def _measure(self, height: NDArray[np.float32]) -> float:
+    def go_on_with(self, waves: WaveSolver) -> None:
+        """Take new waves on the same surface in place of the old ones, which are looked at a last time."""
+        self.look()
+        self.waves = waves
+        waves.crests()
+
+    def _measure(self, crests: NDArray[np.float32], height: NDArray[np.float32]) -> float:
         if self._scales is None:
-            self._scales = scales_of(self._atlas)
+            self._scales = scales_of(self.waves.rest)
             self._calm = self._scales.calm
         scales = self._scales
-        high, texel = highest(height, scales)
+        high, texel = highest(crests, scales)
         steep_share = steep_area(height, scales.per_row, scales.per_column, scales.share)
         excess, what = high, ""
         if steep_share > _STEEP_AREA:
@@ -210,13 +244,13 @@ class _Watch:
             excess, what = max(excess, steep), f"too steep: a slope of {steep:.2g} or more on {steep_share:.1%} of it"
         if excess > max(self.excess, 1.0):
             if high == excess:
-                where = ", ".join(f"{x:.3g}" for x in self._atlas.positions.reshape(-1, 3)[texel])
+                where = ", ".join(f"{x:.3g}" for x in self.waves.rest.positions.reshape(-1, 3)[texel])
                 radius = 1 / (HIGH * float(scales.per_limit.reshape(-1)[texel]))
-                here = abs(float(height.reshape(-1)[texel]))
+                here = float(crests.reshape(-1)[texel])
                 what = f"too high: {here:.2g} m at ({where}) m, where the object's radius is {radius:.2g} m"
             self.what = what
         self.excess = max(self.excess, excess)
-        spread = _SPREAD * float(np.abs(height).max()) * scales.per_thinnest
+        spread = _SPREAD * float(crests.max()) * scales.per_thinnest
         self.needed = max(self.needed, excess, spread)
         return excess
 

@@ -136,9 +136,7 @@ class Ripples(Targets):
         _warn(integrator_warning(self.model))
         self._loads = ContactLoads(coupled, self._waves)
         self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
-        self._check_amplitude = AmplitudeCheck(self._waves, coupled.names)
-        for target in coupled.soft:
-            self._check_amplitude.ignore(target)
+        self._check_amplitude = AmplitudeCheck(coupled, rigid)
         self._push_back = PushBack(coupled, self._waves) if two_way else None
         self._clock, self._solved = StepClock(), SolvedForces(self.model)
         self._warned: set[str] = set()
@@ -258,6 +256,7 @@ class Ripples(Targets):
         super()._waves_changed(name)
         target = self._target(name)
         self._loads.waves_changed(target.geom)
+        self._check_amplitude.waves_changed(target.geom, target.waves)
         if target.geom in self._high_pass:
             self._high_pass[target.geom] = HighPass(target.waves, self._soft[target.geom])
 

@@ -13,9 +13,19 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.solver import Material, Mesh
-from ripple_sim.solver.operator.presets import BOUNCE, damping_for, narrow_stiffness, stiffness_after, stiffness_under
+from ripple_sim.solver.operator.presets import (
+    BOUNCE,
+    damping_for,
+    density_after,
+    density_under,
+    narrow_stiffness,
+    stiffness_after,
+    stiffness_under,
+)
+from ripple_sim.solver.texels.thickness import half_thickness_at
 
 from .geoms import find_target
 from .model import CoupledModel
@@ -28,12 +38,9 @@ _CROSSING, _DECAY = 0.25, 1.5
 # MuJoCo's default, in place of that of a geom without a mass: those of the world have none [kg/m^3].
 _DENSITY = 1000.0
 
-# By this share of its radius a typical hit may dent a target, and a body at rest. Dents of more than a quarter are
-# warned of; those seen are half of what the estimate allows, which takes the whole impulse in the shortest time.
-_HIT, _REST = 0.5, 0.1
-
-# A ball has the radius 3 V / A and a tube 2 V / A; a plate has half the thickness V / A.
-_RADIUS = 1.5
+# By this share of its radius a fall may dent a target, and a body at rest; more than a quarter is warned of. The
+# estimates are half of what a hard, short hit does, and many times what the slow push of a limb does.
+_HIT, _REST = 0.085, 0.05
 
 # How long most of a contact's impulse takes, over the time constant of its `solref`.
 _PULSE = 0.4
@@ -41,25 +48,37 @@ _PULSE = 0.4
 # Footprints smaller than this share of the target's size count as of this size.
 _FOOTPRINT = 0.025
 
-# A stiffness beyond (this / time step)^2 would take more substeps than the waves.
-_STIFFEST = 4.0
+# Wave number of the longest wave on a ball, times its size: sqrt(8).
+_LONGEST = 8**0.5
+
+# Of the stiffness alone, sqrt(k) times the time step at most: a swing takes twelve steps or more. What swings faster
+# is not resolved, and takes up energy from contacts that last a step.
+_STIFFEST = 0.5
 
 
 class Extent(NamedTuple):
-    """How large a target is: its longest extent [m], its area [m^2] and its volume [m^3]."""
+    """How large a target is: its longest extent [m], area [m^2], volume [m^3], and half its usual thickness [m]."""
 
     size: float
     area: float
     volume: float
+    radius: float
 
     @classmethod
     def of(cls, mesh: Mesh) -> Extent:
         """Extent of a mesh; where that is open, as if its rims were closed from the middle."""
-        a, b, c = np.moveaxis((mesh.V - mesh.V.mean(axis=0))[mesh.F], 1, 0)
-        area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+        middle = mesh.V.mean(axis=0)
+        a, b, c = np.moveaxis((mesh.V - middle)[mesh.F], 1, 0)
+        normals = np.cross(b - a, c - a)
+        areas = np.linalg.norm(normals, axis=1) / 2
+        area = float(areas.sum())
         volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6))
         size = float(np.ptp(mesh.V, axis=0).max())
-        return cls(size, area, max(volume, 1e-3 * size * area))
+        normals /= np.maximum(2 * areas, 1e-300)[:, None]
+        radii = half_thickness_at(mesh, (a + b + c) / 3 + middle, normals)
+        order = np.argsort(radii)
+        middle_one = order[np.searchsorted(np.cumsum(areas[order]), area / 2)]
+        return cls(size, area, max(volume, 1e-3 * size * area), float(radii[middle_one]))
 
 
 def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> Material:
@@ -68,11 +87,13 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     - speed: waves cross the target in a quarter of a second, or as fast as a body is that has fallen from a height of
       the target's size, which is faster on targets smaller than 1 m;
     - damping: they fall to a tenth in 1.5 s;
-    - density: the mass of the target's body over the area of the target; of a geom without a mass, 1000 kg/m^3 times
-      its volume over its area;
     - stiffness: (16 c / size)^2, or more: under the heaviest body that can touch the target, at rest, the surface sinks
-      by a tenth of the target's radius at most, and a fall from a height of the target's size leaves a dent of about a
-      quarter.
+      by a twentieth of the target's radius at most, and a fall leaves a dent of less than a quarter; but no more than
+      (0.5 / dt)^2, which the time step dt resolves. The fall is from a height of the target's size, or from where
+      bodies are above the target, or it above them, in the model as it begins;
+    - density: the mass of the target's body over the area of the target; of a geom without a mass, 1000 kg/m^3 times
+      its volume over its area. More where the stiffness is not all that this would take: what can touch the target
+      then sinks and dents no deeper.
 
     Parameters
     ----------
@@ -85,56 +106,142 @@ def suited_material(coupled: CoupledModel, geom: int, extent: Extent, material: 
     """
     if not material.unset:
         return material
-    fall = _fall(coupled.model, extent)
-    speed = max(extent.size / _CROSSING, fall) if "speed" in material.unset else _greatest(material.speed)
+    burden = _burden(coupled, geom, extent)
+    speed = _speed(coupled.model, extent) if "speed" in material.unset else _greatest(material.speed)
     density = _density(coupled.model, geom, extent)
+    if "stiffness" in material.unset:
+        stiffness = min(_stiffness(burden, extent, speed, density), _stiffest(coupled.model))
+    else:
+        stiffness = float(np.min(material.stiffness))
     suited = {
         "speed": speed,
         "damping": damping_for(_DECAY),
-        "stiffness": _stiffness(coupled, geom, extent, speed, density),
-        "density": density,
+        "stiffness": stiffness,
+        "density": float(np.clip(max(density, _density_under(burden, extent, speed, stiffness)), 1e-12, 1e12)),
     }
     return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
+
+
+def bearing_density(coupled: CoupledModel, geom: int, extent: Extent, material: Material) -> float:
+    """Density with which a target bears what may lie on it and hit it, as `suited_material` has it [kg/m^2].
+
+    The least speed and stiffness of the material count. Bending b resists all waves as a speed q sqrt(b) would, or
+    more, with q the wave number of the longest. What yields is to stay elastic. Over deep fluid it is not known: 0.
+    """
+    if material.deep:
+        return 0.0
+    speed, bending, stiffness, limit = (
+        float(np.min(getattr(material, name))) for name in ("speed", "bending", "stiffness", "yield_height")
+    )
+    burden, longest = _burden(coupled, geom, extent), _LONGEST / extent.size
+    burden = burden._replace(rest_depth=min(burden.rest_depth, limit), hit_depth=min(burden.hit_depth, limit))
+    return min(_density_under(burden, extent, float(np.hypot(speed, longest * bending**0.5)), stiffness), 1e12)
 
 
 def suited_soft_material(model: mujoco.MjModel, extent: Extent, mass: float, material: Material) -> Material:
     """The same for a flex or a skin, by its size and the mass of its bodies [kg]: what may hit it is not looked at."""
     if not material.unset:
         return material
-    speed = max(extent.size / _CROSSING, _fall(model, extent))
+    speed = _speed(model, extent)
     suited = {
         "speed": speed,
         "damping": damping_for(_DECAY),
-        "stiffness": narrow_stiffness(extent.size, speed),
+        "stiffness": min(narrow_stiffness(extent.size, speed), _stiffest(model)),
         "density": float(np.clip((mass if mass > 0 else _DENSITY * extent.volume) / extent.area, 1e-12, 1e12)),
     }
     return dataclasses.replace(material, **{name: suited[name] for name in material.unset})
 
 
-def _density(model: mujoco.MjModel, geom: int, extent: Extent) -> float:
-    mass = float(model.body_mass[model.geom_bodyid[geom]])
-    density = (mass if mass > 0 else _DENSITY * extent.volume) / extent.area
-    return float(np.clip(density, 1e-12, 1e12))
+class _Burden(NamedTuple):
+    """What a target has to bear: a weight at rest [N] and a hit [N s] in a time [s], both on a footprint radius [m].
+
+    And how deep they may dent it [m].
+    """
+
+    weight: float
+    impulse: float
+    duration: float
+    radius: float
+    rest_depth: float
+    hit_depth: float
 
 
-def _stiffness(coupled: CoupledModel, geom: int, extent: Extent, speed: float, density: float) -> float:
+def _burden(coupled: CoupledModel, geom: int, extent: Extent) -> _Burden:
     model = coupled.model
     mass, footprint = heaviest(coupled, geom)
-    radius = max(footprint, _FOOTPRINT * extent.size)
-    depth = _RADIUS * extent.volume / extent.area
-    pulse = _PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep)
-    of = {"radius": radius, "density": density, "speed": speed}
-    stiffness = max(
-        narrow_stiffness(extent.size, speed),
-        stiffness_under(mass * float(np.linalg.norm(model.opt.gravity)), _REST * depth, **of),
-        stiffness_after(BOUNCE * mass * _fall(model, extent), _HIT * depth, duration=pulse, **of) if mass else 0.0,
+    fall = _fall(model, max(extent.size, _height(coupled, geom)))
+    return _Burden(
+        weight=_resting(coupled, geom) * float(np.linalg.norm(model.opt.gravity)),
+        impulse=BOUNCE * mass * fall,
+        duration=max(_PULSE * max(float(coupled.solref[geom, 0]), 2 * model.opt.timestep), model.opt.timestep),
+        radius=max(footprint, _FOOTPRINT * extent.size),
+        rest_depth=_REST * extent.radius,
+        hit_depth=_HIT * extent.radius,
     )
-    return float(min(stiffness, (_STIFFEST / model.opt.timestep) ** 2, 1e12))
 
 
-def _fall(model: mujoco.MjModel, extent: Extent) -> float:
-    """Speed of a body that has fallen from a height of the target's size [m/s]; without gravity, a size a second."""
-    return float(max(np.sqrt(2 * np.linalg.norm(model.opt.gravity) * extent.size), extent.size))
+def _stiffness(burden: _Burden, extent: Extent, speed: float, density: float) -> float:
+    of = {"radius": burden.radius, "density": density, "speed": speed}
+    return max(
+        narrow_stiffness(extent.size, speed),
+        stiffness_under(burden.weight, burden.rest_depth, **of),
+        stiffness_after(burden.impulse, burden.hit_depth, duration=burden.duration, **of),
+    )
+
+
+def _density_under(burden: _Burden, extent: Extent, speed: float, stiffness: float) -> float:
+    """The least with which the surface bears it: that of the body alone, if the stiffness may be what it takes."""
+    # the whole target gives way no further than its longest wave
+    of = {"radius": burden.radius, "speed": speed, "stiffness": max(stiffness, (_LONGEST * speed / extent.size) ** 2)}
+    return max(
+        density_under(burden.weight, burden.rest_depth, **of),
+        density_after(burden.impulse, burden.hit_depth, duration=burden.duration, **of),
+    )
+
+
+def _stiffest(model: mujoco.MjModel) -> float:
+    """Greatest stiffness that the time step resolves [1/s^2]."""
+    return float(min((_STIFFEST / model.opt.timestep) ** 2, 1e12))
+
+
+def _density(model: mujoco.MjModel, geom: int, extent: Extent) -> float:
+    mass = float(model.body_mass[model.geom_bodyid[geom]])
+    return (mass if mass > 0 else _DENSITY * extent.volume) / extent.area
+
+
+def _speed(model: mujoco.MjModel, extent: Extent) -> float:
+    return max(extent.size / _CROSSING, _fall(model, extent.size))
+
+
+def _fall(model: mujoco.MjModel, height: float) -> float:
+    """Speed of a body that has fallen from a height [m/s]; without gravity, a height a second."""
+    return float(max(np.sqrt(2 * np.linalg.norm(model.opt.gravity) * height), height))
+
+
+def _height(coupled: CoupledModel, geom: int) -> float:
+    """From how high bodies fall on a target at the model's beginning, or it on them [m]."""
+    model, data = coupled.model, mujoco.MjData(coupled.model)
+    mujoco.mj_kinematics(model, data)
+    up = -model.opt.gravity / max(float(np.linalg.norm(model.opt.gravity)), 1e-300)
+    above = (data.geom_xpos - data.geom_xpos[geom]) @ up
+    between = np.abs(above) - model.geom_rbound - model.geom_rbound[geom]
+    moves = _moves(model)
+    falls = np.where(above > 0, moves, moves[geom]) & coupled.can_collide(geom)
+    return float(between[falls].max(initial=0.0))
+
+
+def _resting(coupled: CoupledModel, geom: int) -> float:
+    """Mass of the heaviest body that can lie on a target, or that lies on it with others below [kg]."""
+    model = coupled.model
+    masses = np.where(_moves(model), model.body_subtreemass[model.body_rootid][model.geom_bodyid], 0.0)
+    touching = coupled.can_collide(geom)
+    return float(max(masses[touching].max(), masses[geom])) if touching.any() else 0.0
+
+
+def _moves(model: mujoco.MjModel) -> NDArray[np.bool_]:
+    """Geoms that are not fixed to the world."""
+    moves: NDArray[np.bool_] = model.body_weldid[model.geom_bodyid] != 0
+    return moves
 
 
 def heaviest(coupled: CoupledModel, geom: int) -> tuple[float, float]:

@@ -161,16 +161,16 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     if floor is not None:
         visual = geom_visual(model, floor)
         albedo = visual.color * mean_color(model, mapping_of(model, visual))
-    sky = sky_colors(lighting, pose, albedo, None)
+    horizon, zenith, sky = sky_colors(lighting, pose, albedo, None)
     strength = 1.0 if studio else BESIDE_LIGHTS
     return {
         "size": list(source.size),
         "fps": source.fps,
         "shutter": source.camera.shutter / 360,
         "distance": pose.distance,
-        "horizon": sky.horizon.tolist(),
-        "zenith": sky.zenith.tolist(),
-        "sky": sky.light.tolist(),
+        "horizon": horizon.tolist(),
+        "zenith": zenith.tolist(),
+        "sky": sky.tolist(),
         "floor": None
         if floor is None
         else mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, floor) or f"geom_{floor}",

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.encode.replace import MARK
-from ripple_sim.solver.texels.riding import SurfaceRide
+from ripple_sim.solver.texels.moving import SurfaceRide
 
 from .source import Moment, Source
 from .tables import COLUMNS, rows

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.surfaces.moving import MovingSurface, Riding
+from ripple_sim.render.surfaces.moving import Attachment, MovingSurface
 from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.render.surfaces.vertices import COORDINATES, DIRECTION, NORMAL, POSITION, UV, tessellated
 from ripple_sim.render.visuals.corners import normalized, smooth_normals, split_corners
@@ -81,7 +81,7 @@ class MovingMesh:
         self._moving = MovingSurface(atlas, self.rest, self.directions, normals)
 
     @property
-    def riding(self) -> Riding:
+    def riding(self) -> Attachment:
         """How the points ride on the mesh's own vertices."""
         return self._moving.vertices.rest
 
@@ -98,8 +98,8 @@ class MovingMesh:
         height_map, rates = self._height_map(height), self._height_map.rates(height, velocity)
         rest = self._rest
         if V is not None:
-            height_map, moved = self._moving(height_map, V)
-            rest = rest._replace(points=moved.points, directions=moved.directions, normals=moved.normals)
+            height_map, (points, directions, normals) = self._moving(height_map, V)
+            rest = rest._replace(points=points, directions=directions, normals=normals)
         _displace(height_map, rates, rest, shape)
         return shape
 

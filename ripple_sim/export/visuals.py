@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import srgb_to_linear
-from ripple_sim.render.contract import MappingKind
+from ripple_sim.render.contract import MappingKind, srgb_to_linear
 from ripple_sim.render.visuals.shapes import shape_of, sizes
 from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of
 from ripple_sim.render.visuals.visual import (

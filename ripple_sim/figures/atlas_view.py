@@ -17,7 +17,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from ripple_sim.render.visuals.corners import Baked, bake, corner_normals
+from ripple_sim.render.visuals.corners import bake, corner_normals
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points
 
@@ -120,7 +120,7 @@ class AtlasPainter:
         # an open surface shows its inner side too
         flat = np.cross(*np.moveaxis(self._vertices[corners[:, 1:]] - self._vertices[corners[:, :1]], 1, 0))
         inner = flat @ eye < 0
-        baked = np.where(inner[:, None], self._baked.inner_visibility[corners], self._baked.visibility[corners])
+        baked = np.where(inner[:, None], self._baked[corners, 2], self._baked[corners, 0])
         normals[inner] *= -1
         coordinates = self._atlas.chart_map.coordinates(mesh, triangle, points)
         colors = self.paint(*self._atlas.chart_map.chart_points(coordinates, self._atlas.resolution))
@@ -167,7 +167,7 @@ class AtlasPainter:
         return corner_normals(self._vertices, self._atlas.mesh.F)
 
     @functools.cached_property
-    def _baked(self) -> Baked:
+    def _baked(self) -> NDArray[np.float64]:
         return bake(self._vertices, self._atlas.mesh.F, self._atlas.mesh.vertex_normals)
 
     @functools.cached_property

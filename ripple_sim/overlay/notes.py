@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.render.camera import linear_to_srgb
+from ripple_sim.render.contract import linear_to_srgb
 from ripple_sim.scene.scene import Request
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.texels.topology import with_filled_halo

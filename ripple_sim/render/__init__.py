@@ -2,8 +2,8 @@
 
 from .camera import Camera, FixedCamera
 from .renderer import Renderer
-from .scene import LIGHTING
 from .surfaces.surface import Surface
+from .visuals.lights import LIGHTING
 from .visuals.visual import LOOKS
 
 __all__ = ["LIGHTING", "LOOKS", "Camera", "FixedCamera", "Renderer", "Surface"]

@@ -1,18 +1,15 @@
-"""Cameras: MuJoCo's free camera, a camera fixed in the model, or a point of its lens.
+"""Cameras and what they see of the world.
 
-Bounding balls: of visuals, of parts of a mesh, of all shadow casters.
-
-The sRGB transfer curve (IEC 61966-2-1), both ways.
-
-View and projection matrices, for column vectors, in OpenGL's conventions.
+MuJoCo's free camera and cameras fixed in a model, which have a pose; matrices of view and projection, for column
+vectors, in OpenGL's conventions; and bounding balls, with the boxes about them in a frame. Balls are float64 [k, 4]:
+centre in the world and radius [m], which may be infinite.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import numbers
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
@@ -20,55 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver.errors import RippleError
-
-
-class Balls(NamedTuple):
-    """Centres [k, 3] and radii [k] in the world [m]; a radius may be infinite."""
-
-    centres: NDArray[np.float64]
-    radii: NDArray[np.float64]
-
-
-def join(*balls: Balls) -> Balls:
-    """All balls in one list."""
-    return Balls(np.concatenate([each.centres for each in balls]), np.concatenate([each.radii for each in balls]))
-
-
-def within(balls: Balls, point: NDArray[np.float64], reach: float) -> Balls:
-    """Those balls that any point within `reach` [m] of a point [3] touches."""
-    near = np.linalg.norm(balls.centres - point, axis=1) - balls.radii < reach
-    return Balls(balls.centres[near], balls.radii[near])
-
-
-def enclosing(balls: Balls) -> tuple[NDArray[np.float64], float]:
-    """Centre [3] and radius of a ball that contains others."""
-    centres, radii = balls
-    centre = ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0)) / 2
-    return centre, float((np.linalg.norm(centres - centre, axis=1) + radii).max())
-
-
-def balls_about(triangles: NDArray[np.float64], count: int) -> Balls:
-    """Balls that each contain a share of some triangles, which are close together.
-
-    Parameters
-    ----------
-    triangles : array, shape [m, 3, 3]
-        Corners [m].
-    count : int
-        The least number of balls, unless there are fewer triangles.
-    """
-    groups = [triangles]
-    while len(groups) < min(count, len(triangles)):
-        halves = []
-        for group in groups:
-            middles = group.mean(axis=1)
-            order = np.argsort(middles[:, np.ptp(middles, axis=0).argmax()], kind="stable")
-            halves += [group[half] for half in np.array_split(order, 2) if len(half)]
-        groups = halves
-    corners = [group.reshape(-1, 3) for group in groups]
-    centres = np.array([(each.min(axis=0) + each.max(axis=0)) / 2 for each in corners])
-    radii = [np.linalg.norm(each - centre, axis=1).max() for each, centre in zip(corners, centres, strict=True)]
-    return Balls(centres, np.array(radii))
 
 
 @dataclass(frozen=True)
@@ -97,6 +45,10 @@ class Pose:
     def shear(self) -> NDArray[np.float64]:
         """How far the ray through the middle of the frame goes right and up, a metre in front of the eye."""
         return -np.divide(self.lens, self.focal_distance)
+
+    def pose(self) -> Pose:
+        """Itself: a pose is a viewpoint."""
+        return self
 
     @property
     def focus(self) -> NDArray[np.float64]:
@@ -177,19 +129,6 @@ class FixedCamera:
         return Pose(self.position, self.rotation, self.distance, self.fovy)
 
 
-@dataclass(frozen=True)
-class ThroughLens:
-    """A camera whose eye is at a point of its lens (to the right, up) [m], focused on a distance [m]."""
-
-    camera: Viewpoint
-    lens: tuple[float, float]
-    focal_distance: float
-
-    def pose(self) -> Pose:
-        """Return position and axes in the world."""
-        return dataclasses.replace(self.camera.pose(), lens=self.lens, focal_distance=self.focal_distance)
-
-
 def find_viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: Any) -> Viewpoint:
     """The viewpoint of whatever stands for a camera, as posed in `data`.
 
@@ -251,25 +190,6 @@ def _placed(model: mujoco.MjModel, data: mujoco.MjData, camera: mujoco.MjvCamera
     )
 
 
-# sRGB is SLOPE x up to BREAK, and (1 + OFFSET) x^(1 / EXPONENT) - OFFSET above it
-BREAK, SLOPE, OFFSET, EXPONENT = 0.0031308, 12.92, 0.055, 2.4
-_ENCODED_BREAK = 0.04045
-
-
-def srgb_to_linear(srgb: ArrayLike) -> NDArray[np.float64]:
-    """Linear values of sRGB values, 0 to 1 both, any shape."""
-    value = np.asarray(srgb, dtype=np.float64)
-    above = np.maximum(value, _ENCODED_BREAK)
-    return np.where(value <= _ENCODED_BREAK, value / SLOPE, ((above + OFFSET) / (1 + OFFSET)) ** EXPONENT)
-
-
-def linear_to_srgb(linear: ArrayLike) -> NDArray[np.float64]:
-    """Inverse of `srgb_to_linear`; values beyond 0 to 1 continue the curve."""
-    value = np.asarray(linear, dtype=np.float64)
-    above = np.maximum(value, BREAK)
-    return np.where(value <= BREAK, SLOPE * value, (1 + OFFSET) * above ** (1 / EXPONENT) - OFFSET)
-
-
 def view_matrix(pose: Pose) -> NDArray[np.float64]:
     """World to eye coordinates, shape [4, 4]."""
     view = np.eye(4)
@@ -301,3 +221,79 @@ def orthographic(half_width: float, depth: float) -> NDArray[np.float64]:
     return np.diag([1 / half_width, 1 / half_width, -2 / depth, 1.0]) + np.array(
         [[0.0] * 4, [0.0] * 4, [0.0, 0.0, 0.0, -1.0], [0.0] * 4]
     )
+
+
+def within(balls: NDArray[np.float64], point: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
+    """Those balls that any point within `reach` [m] of a point [3] touches."""
+    return balls[np.linalg.norm(balls[:, :3] - point, axis=1) - balls[:, 3] < reach]
+
+
+def enclosing(balls: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Centre [3] and radius of a ball that contains others."""
+    centres, radii = balls[:, :3], balls[:, 3]
+    centre = ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0)) / 2
+    return centre, float((np.linalg.norm(centres - centre, axis=1) + radii).max())
+
+
+def balls_about(triangles: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Balls that each contain a share of some triangles, which are close together.
+
+    Parameters
+    ----------
+    triangles : array, shape [m, 3, 3]
+        Corners [m].
+    count : int
+        The least number of balls, unless there are fewer triangles.
+    """
+    groups = [triangles]
+    while len(groups) < min(count, len(triangles)):
+        halves = []
+        for group in groups:
+            middles = group.mean(axis=1)
+            order = np.argsort(middles[:, np.ptp(middles, axis=0).argmax()], kind="stable")
+            halves += [group[half] for half in np.array_split(order, 2) if len(half)]
+        groups = halves
+    corners = [group.reshape(-1, 3) for group in groups]
+    centres = np.array([(each.min(axis=0) + each.max(axis=0)) / 2 for each in corners])
+    radii = [np.linalg.norm(each - centre, axis=1).max() for each, centre in zip(corners, centres, strict=True)]
+    return np.column_stack([centres, radii])
+
+
+_CLOSEST = 0.01  # gap between the eye and a ball, in radii, below which it may show anywhere
+
+
+def boxes_of(balls: NDArray[np.float64], pose: Pose, size: tuple[int, int]) -> NDArray[np.int64]:
+    """Boxes about balls in a frame of a size (width, height) [pixels].
+
+    Returns
+    -------
+    int64 [k, 4]
+        Left, lower, right and upper edge [pixels], counted from the lower left. Balls behind the camera have a box of
+        size 0.
+    """
+    centres, radii = balls[:, :3], balls[:, 3]
+    local = (centres - pose.eye) @ pose.rotation
+    middle = -local[:, 2]
+    near, far = middle - radii, middle + radii
+    seen = near > _CLOSEST * radii
+    scale = size[1] / (2 * np.tan(np.radians(pose.fovy) / 2))
+    # the nearest point of the ball's box is seen under the widest angle
+    corners = np.stack(
+        [(local[seen, :2] + side * radii[seen, None]) / depth[seen, None] for side in (-1, 1) for depth in (near, far)]
+    )
+    origin = np.array(size) / 2 - scale * pose.shear
+    boxes = np.tile([0, 0, *size], (len(radii), 1))
+    boxes[seen, :2] = np.clip(np.floor(origin + scale * corners.min(axis=0)), 0, size)
+    boxes[seen, 2:] = np.clip(np.ceil(origin + scale * corners.max(axis=0)), 0, size)
+    boxes[far <= 0] = 0
+    return boxes
+
+
+def scissor_of(boxes: NDArray[np.int64]) -> tuple[int, int, int, int] | None:
+    """Smallest scissor (left, lower, width, height) about boxes [k, 4]; None if all are empty."""
+    boxes = boxes[(boxes[:, :2] < boxes[:, 2:]).all(axis=1)]
+    if not len(boxes):
+        return None
+    left, lower = (int(edge) for edge in boxes[:, :2].min(axis=0))
+    right, upper = (int(edge) for edge in boxes[:, 2:].max(axis=0))
+    return left, lower, right - left, upper - lower

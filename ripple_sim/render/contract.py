@@ -1,12 +1,15 @@
-"""What the renderer and its shaders agree on. Every shader gets all of this as defines; see `DEFINES`."""
+"""What the renderer and its shaders agree on: units and bindings, struct layouts, the sRGB curve.
+
+Every shader gets all of this as defines; see `DEFINES`.
+"""
 
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any, TypeAlias
 
-from ripple_sim.solver.gl.shader import Struct, numbered
-
-from . import camera
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 MAX_LIGHTS, MAX_SHADOWS, MAX_OCCLUDERS, SOFT_BOXES = 8, 4, 16, 3
 HELD_LIGHTS = 2  # that come to fragments as varyings
@@ -41,18 +44,18 @@ class Unit(IntEnum):
 
 
 class Binding(IntEnum):
-    """Bindings of storage buffers and of the one uniform block; `NAME_BINDING` in GLSL."""
+    """Bindings of storage buffers and uniform blocks; `NAME_BINDING` in GLSL.
 
+    OpenGL promises eight: passes that never run at the same time share some, which makes the later names aliases.
+    """
+
+    # displacement, the frame and its shading
     REST_VERTICES = 0
     MOVED_VERTICES = 1
     MIDPOINTS = 2
     FRAME = 3
     OCCLUDERS = 4
-
-
-class Splitting(IntEnum):
-    """Bindings of the storage buffers of adaptive tessellation, all before those above; `NAME_BINDING` in GLSL."""
-
+    # adaptive tessellation, before all of those
     SPLIT = 0
     LONG_EDGES = 1
     LOOKUPS = 2
@@ -61,11 +64,7 @@ class Splitting(IntEnum):
     TOTALS = 5
     INDICES = 6
     COMMAND = 7
-
-
-class BackgroundTiles(IntEnum):
-    """Bindings of the storage buffers of the background's tiles; `NAME_BINDING` in GLSL."""
-
+    # tiles of the background
     TILES = 0
     COMMANDS = 1
 
@@ -90,6 +89,53 @@ LEVELS = {
     "SOLID": 0.25,  # solids in all of them
     "LAYER": 0.125,  # the transparent object that is being drawn
 }
+
+# Shapes of what std140 and std430 lay out alike, in float32: the columns of a mat3 are padded to four.
+_SHAPES: dict[str, tuple[int, ...]] = {"vec4": (4,), "mat3": (3, 4), "mat4": (4, 4)}
+
+Member: TypeAlias = "str | Struct | tuple[str | Struct, int]"
+
+
+class Struct:
+    """A struct in GLSL and the NumPy dtype of the same layout, in uniform blocks (std140) and storage buffers (std430).
+
+    Parameters
+    ----------
+    name : str
+        In GLSL.
+    **members
+        "vec4", "mat3", "mat4" or another struct, or a pair of one of these and the length of an array of them.
+
+    Attributes
+    ----------
+    dtype : numpy.dtype
+        Matrices are stored column by column: a mat4 is [column, row], a mat3 [column, row and padding].
+    members : str
+        The declarations, to be put between the braces of a struct or block.
+    """
+
+    def __init__(self, name: str, /, **members: Member) -> None:
+        self.name = name
+        fields: list[tuple[Any, ...]] = []
+        declarations = []
+        for member, given in members.items():
+            kind, count = given if isinstance(given, tuple) else (given, None)
+            word = kind if isinstance(kind, str) else kind.name
+            declarations.append(f"{word} {member};" if count is None else f"{word} {member}[{count}];")
+            base, shape = ("f4", _SHAPES[kind]) if isinstance(kind, str) else (kind.dtype, ())
+            fields.append((member, base, shape if count is None else (count, *shape)))
+        self.dtype: np.dtype[Any] = np.dtype(fields)
+        self.members = " ".join(declarations)
+
+    def defines(self) -> dict[str, str]:
+        """`NAME_MEMBERS`: the declarations."""
+        return {f"{self.name.upper()}_MEMBERS": self.members}
+
+
+def numbered(names: type[IntEnum], suffix: str = "") -> dict[str, int]:
+    """Defines of an enumeration's names, aliases too, each with a suffix."""
+    return {f"{name}{suffix}": each.value for name, each in names.__members__.items()}
+
 
 LIGHT = Struct(
     "Light",
@@ -143,6 +189,25 @@ OBJECT = Struct(
     rotation="mat3",  # of the height map's gradients, into the world
 )
 
+# The sRGB transfer curve (IEC 61966-2-1): SLOPE x up to BREAK, and (1 + OFFSET) x^(1 / EXPONENT) - OFFSET above it.
+_BREAK, _SLOPE, _OFFSET, _EXPONENT = 0.0031308, 12.92, 0.055, 2.4
+_ENCODED_BREAK = 0.04045
+
+
+def srgb_to_linear(srgb: ArrayLike) -> NDArray[np.float64]:
+    """Linear values of sRGB values, 0 to 1 both, any shape."""
+    value = np.asarray(srgb, dtype=np.float64)
+    above = np.maximum(value, _ENCODED_BREAK)
+    return np.where(value <= _ENCODED_BREAK, value / _SLOPE, ((above + _OFFSET) / (1 + _OFFSET)) ** _EXPONENT)
+
+
+def linear_to_srgb(linear: ArrayLike) -> NDArray[np.float64]:
+    """Inverse of `srgb_to_linear`; values beyond 0 to 1 continue the curve."""
+    value = np.asarray(linear, dtype=np.float64)
+    above = np.maximum(value, _BREAK)
+    return np.where(value <= _BREAK, _SLOPE * value, (1 + _OFFSET) * above ** (1 / _EXPONENT) - _OFFSET)
+
+
 DEFINES: dict[str, object] = {
     "MAX_LIGHTS": MAX_LIGHTS,
     "MAX_OCCLUDERS": MAX_OCCLUDERS,
@@ -151,8 +216,6 @@ DEFINES: dict[str, object] = {
     "VERTEX_GROUP": VERTEX_GROUP,
     **numbered(Unit, "_UNIT"),
     **numbered(Binding, "_BINDING"),
-    **numbered(Splitting, "_BINDING"),
-    **numbered(BackgroundTiles, "_BINDING"),
     **numbered(MappingKind),
     **{f"{name}_LEVEL": level for name, level in LEVELS.items()},
     **LIGHT.defines(),
@@ -161,8 +224,8 @@ DEFINES: dict[str, object] = {
     **OBJECT.defines(),
     "OBJECT_TEXELS": OBJECT.dtype.itemsize // 16,
     "OBJECT_COLUMNS": OBJECT_COLUMNS,
-    "SRGB_BREAK": camera.BREAK,
-    "SRGB_SLOPE": camera.SLOPE,
-    "SRGB_OFFSET": camera.OFFSET,
-    "SRGB_EXPONENT": camera.EXPONENT,
+    "SRGB_BREAK": _BREAK,
+    "SRGB_SLOPE": _SLOPE,
+    "SRGB_OFFSET": _OFFSET,
+    "SRGB_EXPONENT": _EXPONENT,
 }

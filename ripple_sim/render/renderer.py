@@ -10,151 +10,140 @@ from types import TracebackType
 from typing import Any
 
 import moderngl
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.passes.deferred import DeferredShading, Mirror
+from ripple_sim.coupling.soft import target_pose
+from ripple_sim.render.passes.deferred import DeferredShading, Mirror, TransparentLayers
 from ripple_sim.render.passes.floor import Floor, FloorOcclusion, find_floor
-from ripple_sim.render.passes.layers import SurfaceBuffers, SurfaceImage, boxes_of
 from ripple_sim.render.passes.shadow import ShadowMaps, TransmissionMaps
+from ripple_sim.render.passes.surface_buffers import SurfaceBuffers, SurfaceImage
 from ripple_sim.render.surfaces.surface import Surface
-from ripple_sim.render.visuals.geoms import warn_of_unsupported
-from ripple_sim.render.visuals.instances import Assets
-from ripple_sim.render.visuals.visual import visible_geoms
+from ripple_sim.render.surfaces.surface_mesh import SurfaceMesh
+from ripple_sim.render.visuals.geoms import Instances, instances_of, visuals_of, warn_of_unsupported
+from ripple_sim.render.visuals.lights import SceneLight
+from ripple_sim.render.visuals.objects import Assets, Occluders
+from ripple_sim.render.visuals.visual import ball_of, visible_geoms
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.files import require_memory
 from ripple_sim.solver.gl import GLContext
 
-from .camera import Pose, Viewpoint, enclosing, within
-from .resources import AnyHeightMap, FrameUniforms, Resources
-from .scene import DrawnScene, SceneLight
+from .camera import Pose, Viewpoint, boxes_of, enclosing, within
+from .resources import AnyHeightMap, FrameUniforms, HeightMapTextures, Resources
 from .targets import FrameFormat, Readback
 
 _TRANSMISSION_TEXEL = 4  # of the transmission maps, in texels of the shadow maps
 _SHADOW_REACH = 2.5  # casters further than that from the focus, in camera distances, cast no shadow
 
 
-class FramePasses:
-    """Draws frames of a scene on the GPU.
+class DrawnScene:
+    """Everything of a model that is rasterised: its targets as rippled surfaces, the other geoms, and its sites.
 
     Parameters
     ----------
-    resources : Resources
-    frame_format : FrameFormat
-    scene : DrawnScene
-    floor : Floor, optional
-    light : SceneLight
+    assets : Assets
+    targets : mapping
+        Geom id to the surface that is drawn in place of the geom.
+    geoms : list of int
+        The other geoms, without the floor.
+    size : (width, height)
+        Of the frame [pixels].
+
+    Attributes
+    ----------
+    targets : list of SurfaceMesh
+    opaque, transparent : list of SurfaceMesh and Instances
+        Each can draw itself: into the G-buffer, or its depth, colour or transmission under a matrix.
     """
 
-    def __init__(
-        self,
-        resources: Resources,
-        frame_format: FrameFormat,
-        scene: DrawnScene,
-        floor: Floor | None,
-        light: SceneLight,
-    ) -> None:
-        self._resources, self._gl, self._format = resources, resources.gl, frame_format
-        self._scene, self._floor, self._light = scene, floor, light
-        self._frame = FrameUniforms(resources)
-        self._shadows = ShadowMaps(resources, light.shadows, frame_format.size[1])
-        self._transmission = None
-        if scene.transparent:
-            size = self._shadows.size // _TRANSMISSION_TEXEL
-            self._transmission = TransmissionMaps(resources, light.shadows, size)
-        options = {**light.options, "TRANSMISSION": int(scene.transparent)}
-        self._occlusion = FloorOcclusion(resources, options, floor)
-        self._shading = DeferredShading(resources, frame_format, floor, options)
-        self._buffers: SurfaceBuffers | None = None
-        self._mirror = None
-        if floor is not None and floor.reflects and not frame_format.alpha:
-            self._mirror = Mirror(resources, frame_format, floor, options)
+    def __init__(self, assets: Assets, targets: Mapping[int, Surface], geoms: list[int], size: tuple[int, int]) -> None:
+        self._assets, self._model, self._height = assets, assets.model, size[1]
+        ordered = sorted(targets.items())
+        self.height_maps = HeightMapTextures(assets.resources, [surface.charts.page for _, surface in ordered])
+        self.targets = [
+            SurfaceMesh(assets, geom, surface, self.height_maps, index, size)
+            for index, (geom, surface) in enumerate(ordered)
+        ]
+        visuals = visuals_of(assets.model, geoms)
+        plane = mujoco.mjtGeom.mjGEOM_PLANE
+        solid = [visual.index for visual in visuals if not visual.site and visual.kind != plane]
+        self._planes = [visual for visual in visuals if not visual.site and visual.kind == plane]
+        self._sites = [visual for visual in visuals if visual.site]
+        self._occluders = Occluders(assets.resources, assets.model, np.array(solid, dtype=np.int64))
+        self._instances = instances_of(assets, visuals)
+        drawn: list[SurfaceMesh | Instances] = [*self.targets, *self._instances]
+        self.opaque = [each for each in drawn if not each.transparent]
+        self.transparent = [each for each in drawn if each.transparent]
+        self._occluding = [each for each in drawn if each.occludes]
 
-    def draw(
-        self, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose, exposure: int
-    ) -> moderngl.Framebuffer:
-        """Draw a frame and leave it on the GPU; see `Renderer.draw`."""
-        scene, shading = self._scene, self._shading
-        with self._gl as ctx:
-            scene.update(ctx, data, height_maps, pose)
-            shading.clear(ctx)  # which a software driver does during what follows
-            self._update(data, pose, exposure)
-            self._draw_maps(ctx)
-            shading.begin(ctx)
-            scene.draw()
-            balls = scene.balls(data)
-            boxes = boxes_of(balls, pose, self._format.size)
-            if self._gl.software:  # which would draw all this in the next call, holding the interpreter's lock
-                self._gl.wait()
-            self._occlusion.average()
-            if self._mirror is not None:
-                self._mirror.draw(ctx, self._frame, pose, balls, scene.draw, self._bind)
-            self._bind()
-            shading.shade(ctx, boxes)
-            for layer in scene.layers(data, pose):
-                shading.layers.add(ctx, layer.number, layer.draw, boxes_of(layer.balls, pose, self._format.size))
-        return shading.frame
+    def target(self, geom: int) -> SurfaceMesh:
+        """The target of a geom.
 
-    def surfaces(
-        self, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose, size: tuple[int, int]
-    ) -> SurfaceImage:
-        """Draw what each pixel shows, without light; see `Renderer.surfaces`."""
-        scene = self._scene
-        with self._gl as ctx:
-            if self._buffers is None or self._buffers.size != size:
-                floor_geom = -1 if self._floor is None else self._floor.geom
-                self._buffers = SurfaceBuffers(self._resources, size, floor_geom)
-            scene.update(ctx, data, height_maps, pose)
-            self._update(data, pose, 0)
-            scene.bind()
+        Raises
+        ------
+        RippleError
+            If the geom is no target.
+        """
+        for target in self.targets:
+            if target.geom == geom:
+                return target
+        geoms = ", ".join(str(target.geom) for target in self.targets) or "none"
+        raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
 
-            def draw() -> None:
-                scene.draw()
-                for layer in scene.layers(data, pose):
-                    layer.draw()
+    def update(self, ctx: moderngl.Context, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose) -> None:
+        """Bring everything on the GPU up to date."""
+        for target in self.targets:
+            target.ripple(ctx, height_maps.get(target.geom))
+        self._occluders.bind(data, pose.focus)
+        for target in self.targets:
+            origin, rotation = target_pose(data, target.geom)
+            target.update(ctx, rotation, origin, self._occluders)
+        pixels = self._height / (2 * np.tan(np.radians(pose.fovy) / 2))
+        for instances in self._instances:
+            instances.update(data, pose.position, pixels, self._occluders)
+        self._assets.objects.bind()
 
-            return self._buffers.draw(ctx, draw)
+    def balls(self, data: Any) -> NDArray[np.float64]:
+        """Balls [k, 4] that contain everything."""
+        planes = [ball_of(self._model, data, visual) for visual in self._planes]
+        return np.concatenate([*self._geom_balls(data), *planes, *(target.bounds() for target in self.targets)])
 
-    def _update(self, data: Any, pose: Pose, exposure: int) -> None:
-        """Bring the frame's uniforms up to date."""
-        frame, floor = self._frame, self._floor
-        frame.set_camera(pose, self._format.aspect)
-        casters = within(self._scene.casters(data), pose.focus, _SHADOW_REACH * pose.distance)
-        centre, radius = enclosing(casters) if len(casters.radii) else (pose.focus, pose.distance)
-        if floor is not None:
-            floor.place(frame, data, centre, radius)
-        lights = self._light.set(frame, data, pose, floor)
-        casting = self._shadows.fit(frame, lights, centre, radius)
-        if floor is not None and len(casters.radii):
-            floor.shade(frame, casting, casters)
-        frame.set_vector("counts", [0, len(lights), exposure], len(casting))
-        frame.bind()
+    def casters(self, data: Any) -> NDArray[np.float64]:
+        """Balls that contain everything that may cast a shadow.
 
-    def _draw_maps(self, ctx: moderngl.Context) -> None:
-        """Draw what shading looks up. A software driver stops for each texture that it is still drawing to."""
-        scene, shadows = self._scene, self._shadows
-        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        ctx.depth_func = "<="
-        shadows.draw(scene.draw_shadow)
-        self._occlusion.look_up(ctx, scene.draw_occluders)
-        shadows.find_blockers(ctx)
-        if self._transmission is not None:
-            self._transmission.draw(shadows.views, scene.draw_transmission)
-            self._transmission.bind()
-        self._occlusion.shade(ctx, shadows)
+        They do not change their size as a target turns, so that shadow maps stay as they are.
+        """
+        return np.concatenate([*self._geom_balls(data), *(target.ball() for target in self.targets)])
 
-    def _bind(self) -> None:
-        """Bind what shading needs."""
-        self._scene.bind()
-        self._shadows.bind()
-        if self._transmission is not None:
-            self._transmission.bind()
-        self._occlusion.bind()
-        if self._floor is not None:
-            self._floor.bind()
-        self._light.bind()
-        if self._mirror is not None:
-            self._mirror.bind()
+    def _geom_balls(self, data: Any) -> list[NDArray[np.float64]]:
+        """Of everything but the targets that may cast a shadow."""
+        return [self._occluders.balls(data), *(ball_of(self._model, data, site) for site in self._sites)]
+
+    def draw(self) -> None:
+        """Draw everything opaque into the G-buffer."""
+        for each in self.opaque:
+            each.draw()
+
+    def draw_shadow(self, view_projection: tuple[float, ...]) -> None:
+        """Draw the depth of everything opaque, which casts shadows, under a matrix of 16 numbers, column by column."""
+        for each in self.opaque:
+            each.draw_depth(view_projection)
+
+    def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
+        """Draw everything transparent into the transmission map of a light, likewise."""
+        for each in self.transparent:
+            each.draw_transmission(view_projection, light)
+
+    def draw_occluders(self, view_projection: tuple[float, ...]) -> None:
+        """Draw everything that occludes the sky in its linear colour, likewise."""
+        for each in self._occluding:
+            each.draw_albedo(view_projection)
+
+    def layers(self, data: Any, pose: Pose) -> list[tuple[NDArray[np.float64], SurfaceMesh | Instances]]:
+        """Everything transparent with the balls about it, the furthest first."""
+        layers = [(each.bounds(data), each) for each in self.transparent]
+        return sorted(layers, key=lambda layer: -np.linalg.norm(layer[0][:, :3].mean(axis=0) - pose.eye))
 
 
 # Memory for a pixel and for each of its samples, at least [bytes].
@@ -208,16 +197,29 @@ class Renderer:
         warn_of_unsupported(model, targets)
         self._gl, self._size = gl, size
         self._resources = resources = Resources(gl, self)
-        frame_format = FrameFormat(size, samples, alpha, linear)
+        self._format = frame_format = FrameFormat(size, samples, alpha, linear)
         _check_memory(gl, frame_format)
         with gl:
-            assets = Assets.of(model, resources)
-            light = SceneLight(assets, lighting)
+            assets = Assets(model, resources)
+            self._light = light = SceneLight(assets, lighting)
             geoms = [geom for geom in visible_geoms(model) if geom not in targets]
             plane = find_floor(model, geoms)
-            floor = None if plane is None else Floor(assets, plane)
-            self._scene = DrawnScene(assets, targets, [geom for geom in geoms if geom != plane], size)
-            self._passes = FramePasses(resources, frame_format, self._scene, floor, light)
+            self._floor = floor = None if plane is None else Floor(assets, plane)
+            self._scene = scene = DrawnScene(assets, targets, [geom for geom in geoms if geom != plane], size)
+            self._frame = FrameUniforms(resources)
+            count = light.options["SHADOWS"]
+            self._shadows = ShadowMaps(resources, count, size[1])
+            options = {**light.options, "TRANSMISSION": int(bool(scene.transparent))}
+            self._occlusion = FloorOcclusion(resources, options, floor)
+            self._shading = DeferredShading(resources, frame_format, floor, options)
+            self._transmission, self._layers = None, None
+            if scene.transparent:
+                self._transmission = TransmissionMaps(resources, count, self._shadows.size // _TRANSMISSION_TEXEL)
+                self._layers = TransparentLayers(resources, frame_format, self._shading)
+            self._mirror = None
+            if floor is not None and floor.reflects and not alpha:
+                self._mirror = Mirror(resources, frame_format, floor, options)
+            self._buffers: SurfaceBuffers | None = None
         self._readback = Readback(resources, frame_format)
 
     def __enter__(self) -> Renderer:
@@ -250,7 +252,7 @@ class Renderer:
             If the geom is no target or has no heatmap, or the values or the limit are invalid.
         """
         with self._gl:
-            self._scene.set_heatmap(geom, values, limit)
+            self._scene.target(geom).set_heatmap(values, limit)
 
     def render(
         self, data: Any, height_maps: Mapping[int, AnyHeightMap], camera: Viewpoint, exposure: int = 0
@@ -287,6 +289,39 @@ class Renderer:
         """Wait for the earliest submitted frame, and return it as `render` does."""
         return self._readback.fetch()
 
+    def draw(
+        self, data: Any, height_maps: Mapping[int, AnyHeightMap], camera: Viewpoint, exposure: int = 0
+    ) -> moderngl.Framebuffer:
+        """Draw one frame and leave it on the GPU.
+
+        Returns
+        -------
+        moderngl.Framebuffer
+            RGBA8 in sRGB, or RGBA16F of linear light; bottom row first, multiplied by alpha. The next frame is drawn
+            over it.
+        """
+        scene, shading, pose = self._scene, self._shading, camera.pose()
+        with self._gl as ctx:
+            scene.update(ctx, data, height_maps, pose)
+            shading.clear(ctx)  # which a software driver does during what follows
+            self._update(data, pose, exposure)
+            self._draw_maps(ctx)
+            shading.begin(ctx)
+            scene.draw()
+            balls = scene.balls(data)
+            boxes = boxes_of(balls, pose, self._size)
+            if self._gl.software:  # which would draw all this in the next call, holding the interpreter's lock
+                self._gl.wait()
+            self._occlusion.average()
+            if self._mirror is not None:
+                self._mirror.draw(ctx, self._frame, pose, balls, scene.draw, self._bind)
+            self._bind()
+            shading.shade(ctx, boxes)
+            if self._layers is not None:
+                for bounds, layer in scene.layers(data, pose):
+                    self._layers.add(ctx, layer.numbers[0], layer.draw, boxes_of(bounds, pose, self._size))
+        return shading.frame
+
     def surfaces(
         self,
         data: Any,
@@ -299,20 +334,63 @@ class Renderer:
         Transparent objects count as solid. Arguments are as for `render`; `size` (width, height) may be another than
         that of the frames, of the same shape.
         """
-        return self._passes.surfaces(data, height_maps, camera.pose(), size or self._size)
+        scene, pose, size = self._scene, camera.pose(), size or self._size
+        with self._gl as ctx:
+            if self._buffers is None or self._buffers.size != size:
+                floor_geom = -1 if self._floor is None else self._floor.geom
+                self._buffers = SurfaceBuffers(self._resources, size, floor_geom)
+            scene.update(ctx, data, height_maps, pose)
+            self._update(data, pose, 0)
+            scene.height_maps.bind()
 
-    def draw(
-        self, data: Any, height_maps: Mapping[int, AnyHeightMap], camera: Viewpoint, exposure: int = 0
-    ) -> moderngl.Framebuffer:
-        """Draw one frame and leave it on the GPU.
+            def draw() -> None:
+                for each in (*scene.opaque, *scene.transparent):
+                    each.draw()
 
-        Returns
-        -------
-        moderngl.Framebuffer
-            RGBA8 in sRGB, or RGBA16F of linear light; bottom row first, multiplied by alpha. The next frame is drawn
-            over it.
-        """
-        return self._passes.draw(data, height_maps, camera.pose(), exposure)
+            return self._buffers.draw(ctx, draw)
+
+    def _update(self, data: Any, pose: Pose, exposure: int) -> None:
+        """Bring the frame's uniforms up to date."""
+        frame, floor = self._frame, self._floor
+        frame.set_camera(pose, self._format.aspect)
+        casters = within(self._scene.casters(data), pose.focus, _SHADOW_REACH * pose.distance)
+        centre, radius = enclosing(casters) if len(casters) else (pose.focus, pose.distance)
+        if floor is not None:
+            floor.place(frame, data, centre, radius)
+            lights = self._light.set(frame, data, pose, floor.albedo, floor.normal)
+        else:
+            lights = self._light.set(frame, data, pose)
+        casting = self._shadows.fit(frame, lights, centre, radius)
+        if floor is not None and len(casters):
+            floor.shade(frame, casting, casters)
+        frame.set_vector("counts", [0, len(lights), exposure], len(casting))
+        frame.bind()
+
+    def _draw_maps(self, ctx: moderngl.Context) -> None:
+        """Draw what shading looks up. A software driver stops for each texture that it is still drawing to."""
+        scene, shadows = self._scene, self._shadows
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        ctx.depth_func = "<="
+        shadows.draw(scene.draw_shadow)
+        self._occlusion.look_up(ctx, scene.draw_occluders)
+        shadows.find_blockers(ctx)
+        if self._transmission is not None:
+            self._transmission.draw(shadows.views, scene.draw_transmission)
+            self._transmission.bind()
+        self._occlusion.shade(ctx, shadows)
+
+    def _bind(self) -> None:
+        """Bind what shading needs."""
+        self._scene.height_maps.bind()
+        self._shadows.bind()
+        if self._transmission is not None:
+            self._transmission.bind()
+        self._occlusion.bind()
+        if self._floor is not None:
+            self._floor.bind()
+        self._light.bind()
+        if self._mirror is not None:
+            self._mirror.bind()
 
 
 def _check_memory(gl: GLContext, frame: FrameFormat) -> None:

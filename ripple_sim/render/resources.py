@@ -61,14 +61,14 @@ class Resources:
 
         return create
 
-    def program(self, vertex: str, fragment: str, **options: object) -> moderngl.Program:
-        """Program of two of the renderer's shaders, by their paths; `options` are defines beside the contract."""
+    def program(self, name: str, **options: object) -> moderngl.Program:
+        """Program of one of the renderer's files, by its path; `options` are defines beside the contract."""
         defines = {"HOLD_UNIFORMS": int(self.gl.software), **DEFINES, **options}
-        return self._own(self.gl.program(_PACKAGE, vertex, fragment, **defines))
+        return self._own(self.gl.program(_PACKAGE, name, **defines))
 
-    def compute_shader(self, name: str, **options: object) -> moderngl.ComputeShader:
+    def compute_shader(self, name: str, stage: str = "compute", **options: object) -> moderngl.ComputeShader:
         """One of the renderer's compute shaders, likewise."""
-        return self._own(self.gl.compute_shader(_PACKAGE, name, **DEFINES, **options))
+        return self._own(self.gl.compute_shader(_PACKAGE, name, stage, **DEFINES, **options))
 
     def release(self) -> None:
         """Release everything; a second time does nothing."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +21,6 @@ from ripple_sim.solver.operator.presets import PRESETS
 # Constructors of `Material`; the presets of a scene file are these and the real materials by name.
 LAWS = ("membrane", "layer", "jelly", "plate", "dent", "water")
 _LAYERED = ("layer", "jelly")
-
-# The numbers among `Material`'s fields; the others are flags.
-COEFFICIENTS = tuple(field.name for field in dataclasses.fields(Material) if isinstance(field.default, float))
-
-
-# Those of them that are the same everywhere: no map gives them.
-_UNIFORM = ("deep", "tightening")
 
 
 class MapEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -49,27 +41,25 @@ Coefficient = float | str | MapEntry
 _LAYER = "write preset = {name = 'layer', modulus = ...} or another of a layer under [ripple.material]"
 
 
-def _struct(fields: Iterable[str], kind: Any, *required: tuple[str, type]) -> Any:
-    """A struct with fields of one kind that may be left out (None)."""
-    optional = [(field, (float if field in _UNIFORM else kind) | None, None) for field in fields]
-    return msgspec.defstruct("_Fields", [*required, *optional], forbid_unknown_fields=True)
-
-
-def _parameters(law: str) -> dict[str, inspect.Parameter]:
-    return dict(inspect.signature(getattr(Material, law)).parameters)
-
-
-_OfPresets: Any = _struct({name: None for law in LAWS for name in _parameters(law)}, float, ("name", str))
-_OfMaterial: Any = _struct(COEFFICIENTS, Coefficient)
-_Numbers: Any = _struct(COEFFICIENTS, float)
-
-
-class PresetEntry(_OfPresets):
+class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
     """A preset by name, with its parameters in their units.
 
     The name is a constructor of `Material`, membrane, layer, jelly, plate, dent or water, or that of a real material,
-    see `PRESETS`.
+    see `PRESETS`. The other fields are parameters of these constructors; each takes some of them.
     """
+
+    name: str
+    tension: float | None = None
+    density: float | None = None
+    damping: float | None = None
+    modulus: float | None = None
+    viscosity: float | None = None
+    thickness: float | None = None
+    poisson: float | None = None
+    yield_height: float | None = None
+    stiffness: float | None = None
+    speed: float | None = None
+    gravity: float | None = None
 
     def material(self, thickness: NDArray[np.float64] | None = None) -> Material:
         """The preset's material; its layer's thickness may be one at every texel [m], [C, n, n].
@@ -85,7 +75,7 @@ class PresetEntry(_OfPresets):
             )
         given, real = given_fields(self, without="name"), self.name in PRESETS
         law = PRESETS[self.name].law if real else self.name
-        parameters = _parameters(law)
+        parameters = inspect.signature(getattr(Material, law)).parameters
         if thickness is not None:
             if law not in _LAYERED:
                 raise SceneError(
@@ -107,13 +97,22 @@ class PresetEntry(_OfPresets):
         return getattr(Material, self.name)(**given)
 
 
-class MaterialEntry(_OfMaterial):
+class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True):
     """`[ripple.material]`: the wave equation's coefficients, by their names and in their units in `Material`.
 
     Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}. Without a preset, those that
-    are left out are those of `Material()`.
+    are left out are those of `Material()`. Two are the same everywhere: no map gives them.
     """
 
+    speed: Coefficient | None = None
+    damping: Coefficient | None = None
+    stiffness: Coefficient | None = None
+    viscosity: Coefficient | None = None
+    density: Coefficient | None = None
+    bending: Coefficient | None = None
+    yield_height: Coefficient | None = None
+    deep: float | None = None
+    tightening: float | None = None
     preset: str | PresetEntry | None = None
     """Gives the coefficients that are left out; by its name, or as a table with its parameters."""
 
@@ -158,8 +157,21 @@ class MaterialEntry(_OfMaterial):
         )
 
 
-class MaterialChange(_Numbers):
+class MaterialChange(msgspec.Struct, forbid_unknown_fields=True):
     """`[change.material]`: the coefficients that change; the others stay as they are."""
+
+    speed: float | None = None
+    damping: float | None = None
+    stiffness: float | None = None
+    viscosity: float | None = None
+    density: float | None = None
+    bending: float | None = None
+    yield_height: float | None = None
+    deep: float | None = None
+    tightening: float | None = None
+
+
+COEFFICIENTS = MaterialChange.__struct_fields__
 
 
 def given_fields(entry: msgspec.Struct, without: str = "") -> dict[str, Any]:

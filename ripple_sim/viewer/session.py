@@ -149,8 +149,8 @@ class Skin:
         """Follow a height field, float32 [C, n, n], and the vertices of the mesh, [vertex_count, 3], in metres."""
         height_map, rest = self._height_map(height), self._rest
         if V is not None:
-            height_map, moved = self._moving(height_map, V)
-            rest = rest._replace(points=moved.points, directions=moved.directions, normals=moved.normals)
+            height_map, (points, directions, normals) = self._moving(height_map, V)
+            rest = rest._replace(points=points, directions=directions, normals=normals)
         _displace(height_map.reshape(-1, 4), rest, self.points, self.normals, self.height)
 
 

@@ -47,6 +47,7 @@ class Backend(Protocol):
 
     def height(self) -> NDArray[np.float32]: ...  # noqa: D102
     def snapshot(self) -> NDArray[np.float32] | DeviceField: ...  # noqa: D102
+    def crests(self) -> NDArray[np.float32]: ...  # noqa: D102
     def velocity(self) -> NDArray[np.float32]: ...  # noqa: D102
     def elastic(self) -> NDArray[np.float32]: ...  # noqa: D102
     def dent(self) -> NDArray[np.float32]: ...  # noqa: D102

@@ -226,6 +226,7 @@ class CPUBackend:
         self._balance: Balance | None = None
         self._extra: Coefficient = np.float32(0)
         self._shift: Amplitude = 0.0
+        self._crests: NDArray[np.float32] | None = None
         self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
 
@@ -252,6 +253,15 @@ class CPUBackend:
         """Copy of the velocity [m/s], [C, n, n]."""
         self._drift(0.0)
         return self._fields.texels(self._v).copy()
+
+    def crests(self) -> NDArray[np.float32]:
+        """Greatest size of the height after any `advance` since the last call, or now [m], [C, n, n]."""
+        if self._crests is None:
+            self._crests = self._fields.zeros()
+        self._raise_crests(self._crests)
+        crests = self._fields.texels(self._crests).copy()
+        self._crests[:] = 0
+        return crests
 
     def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
         """Replace the elastic height, and the permanent one: 0 unless given."""
@@ -305,6 +315,8 @@ class CPUBackend:
         )
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
+        if self._crests is not None:
+            self._raise_crests(self._crests)
 
     def move(self, operator: WaveOperator) -> None:
         """Take over the stencils of the same surface with its texels elsewhere."""
@@ -328,6 +340,11 @@ class CPUBackend:
         """Whether all heights are finite."""
         with np.errstate(over="ignore", invalid="ignore"):
             return bool(np.isfinite(self._h.sum()))
+
+    def _raise_crests(self, crests: NDArray[np.float32]) -> None:
+        # the next height is but scratch between steps
+        height = self._h if self._dent is None else np.add(self._h, self._dent, out=self._h_next)
+        np.maximum(crests, np.abs(height, out=self._h_next), out=crests)
 
     def _drift(self, dt: float) -> None:
         """The drift by which a step begins; the noted shift is in it."""

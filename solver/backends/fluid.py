@@ -27,6 +27,7 @@ class FluidBackend:
         self.keeps_volume = keeps_volume
         self._h, self._v, self._dent = np.zeros((3, *operator.mass.shape), np.float32)
         self._forces = np.zeros(operator.mass.size)
+        self._crests = np.zeros_like(self._h)
 
     def height(self) -> NDArray[np.float32]:
         """Copy of the height [m], [C, n, n]."""
@@ -51,6 +52,12 @@ class FluidBackend:
     def move(self, operator: WaveOperator) -> None:
         """It cannot; see `MovingOperator`."""
         raise NotImplementedError
+
+    def crests(self) -> NDArray[np.float32]:
+        """Greatest size of the height after any `advance` since the last call, or now [m], [C, n, n]."""
+        crests = np.maximum(self._crests, np.abs(self.height()))
+        self._crests[:] = 0
+        return crests
 
     def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
         """Replace the elastic height, and the permanent one: 0 unless given."""
@@ -88,6 +95,7 @@ class FluidBackend:
             v = decay * v + span * change
             h += (dt if step < substeps - 1 else dt / 2) * v
         self._h[:], self._v[:] = h, v
+        np.maximum(self._crests, np.abs(self.height()), out=self._crests)
 
     def wait(self) -> None:
         """Return when all steps are done: at once, they are."""

@@ -115,6 +115,7 @@ class GLBackend:
             self._dent, self._yield = fields.zeros(), fields.upload(operator.yield_height)
         self._compile()
         self._shift: Amplitude = 0.0
+        self._crests: moderngl.Buffer | None = None
         self._prepared = (0.0, keeps_volume)
         self._waiting: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = []
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
@@ -144,6 +145,20 @@ class GLBackend:
         with self._gl:
             self._start(0.0)
         return self._fields.read(self._v)
+
+    def crests(self) -> NDArray[np.float32]:
+        """Greatest size of the height after any `advance` since the last call, or now [m], [C, n, n].
+
+        They are kept on the GPU.
+        """
+        if self._crests is None:
+            self._crests = self._fields.zeros()
+        with self._gl:
+            self._raise_crests(self._crests)
+        crests = self._fields.read(self._crests)
+        with self._gl:
+            self._crests.clear()
+        return crests
 
     def set_height(self, height: NDArray[np.float32], dent: NDArray[np.float32] | None = None) -> None:
         """Replace the elastic height, and the permanent one: 0 unless given."""
@@ -200,6 +215,8 @@ class GLBackend:
                 self._h, self._h_next = self._h_next, self._h
                 self._kick_texels(self._forces, drift)
                 self._flow()
+            if self._crests is not None:
+                self._raise_crests(self._crests)
 
     def move(self, operator: WaveOperator) -> None:
         """Take over the stencils of the same surface with its texels elsewhere."""
@@ -249,6 +266,11 @@ class GLBackend:
         if self._dent is not None and self._yield is not None:
             self._dispatch.bind(self._h, self._dent, self._yield)
             self._dispatch.run_texels(self._yielding)
+
+    def _raise_crests(self, crests: moderngl.Buffer) -> None:
+        shader = self._dispatch.texel_shader("crests", **({} if self._dent is None else {"DENT": 1}))
+        self._dispatch.bind(self._h, crests, self._dent)
+        self._dispatch.run_texels(shader)
 
     def _kick_irregular(self, dt: float) -> None:
         """What the irregular links add to a substep."""

@@ -11,21 +11,25 @@ from numpy.typing import NDArray
 
 from ..gl import GLContext
 from ..kernel import Ints
-from ..texels.assembly import LEAST_RATIO
-from ..texels.cells import HOURGLASS, LEAST_AREA, SHARE, UNEVEN
-from ..texels.moving import MovedStencil
-from ..texels.riding import Ride
-from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil
+from ..texels.cells import EVEN, LEAST_AREA, PER_HOURGLASS, PER_TINY, SHARE, TINY
+from ..texels.moving import MovedStencil, Ride
+from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, crossing_links, missing_links
+from ..texels.stiffness import LEAST_RATIO
 from ..texels.topology import TexelTopology
 from .gl_dispatch import Dispatch
 from .gl_fields import FieldLayout
 
-_CELLS: dict[str, float] = {
-    "HOURGLASS": HOURGLASS,
-    "SHARE": SHARE,
-    "UNEVEN": UNEVEN,
-    "LEAST_AREA": LEAST_AREA,
-    "LEAST_RATIO": float(LEAST_RATIO),
+_LAW = {
+    name: float(value)
+    for name, value in {
+        "PER_HOURGLASS": PER_HOURGLASS,
+        "SHARE": SHARE,
+        "EVEN": EVEN,
+        "LEAST_AREA": LEAST_AREA,
+        "TINY": TINY,
+        "PER_TINY": PER_TINY,
+        "LEAST_RATIO": LEAST_RATIO,
+    }.items()
 }
 
 
@@ -59,8 +63,9 @@ class DeviceStiffness:
         self._special: Ride = ride.of_each(cells.special_places)
         self._around = np.zeros((3, self._count))
         self._added = DeviceLinks(gl, topology, cells.special_links, np.arange(len(cells.special_links) + 1))
-        self._copies = DeviceLinks(gl, topology, cells.borders.copies, cells.borders.begins)
-        self._missing = DeviceLinks(gl, topology, cells.borders.missing, np.arange(len(cells.borders.missing) + 1))
+        crossing, missing = crossing_links(topology), missing_links(topology)
+        self._copies = DeviceLinks(gl, topology, crossing.copies, crossing.begins)
+        self._missing = DeviceLinks(gl, topology, missing, np.arange(len(missing) + 1))
         shares = np.where(topology.rim, 0.5, 1.0) if topology.fixed_rim else np.ones(self._count)
         pairs, quads = fields.link_addresses(), stencil.coefficient.quads
         self._laid = len(pairs)
@@ -83,7 +88,7 @@ class DeviceStiffness:
         self._beside = _upload(gl, np.zeros(mass.size), np.float32)
         names = ("ride", "quad_links", "close_links", "add_links", "lay_links", "link_rates")
         self._shaders = {name: dispatch.shader(name) for name in names}
-        self._shaders["quads"] = dispatch.shader("quads", **_CELLS)
+        self._shaders["quads"] = dispatch.shader("quads", **_LAW)
 
     @staticmethod
     def suits(stencil: Stencil) -> bool:

@@ -306,28 +306,33 @@ class GLContext:
             if not reached:
                 time.sleep(_PAUSE)
 
-    def compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
+    def compute_shader(
+        self, package: str, name: str, stage: str = "compute", **defines: object
+    ) -> moderngl.ComputeShader:
         """Compile `{name}.glsl` below `package` as a compute shader; see `load_shader`."""
-        source = load_shader(package, name, **defines)
+        source = load_shader(package, name, stage, **defines)
         with self:
             return self._pool.take((source,), lambda: self._compute_shader(name, source))
 
     def shared_compute_shader(self, package: str, name: str, **defines: object) -> moderngl.ComputeShader:
         """Compile a compute shader once and share it: set all uniforms before each use."""
-        source = load_shader(package, name, **defines)
+        source = load_shader(package, name, "compute", **defines)
         if source not in self._shared_shaders:
             self._shared_shaders[source] = self._compute_shader(name, source)
         return self._shared_shaders[source]
 
-    def program(self, package: str, vertex: str, fragment: str, **defines: object) -> moderngl.Program:
-        """Compile and link a vertex and a fragment shader from below `package`; see `load_shader`."""
-        vertex_source = load_shader(package, vertex, **defines)
-        fragment_source = load_shader(package, fragment, **defines)
+    def program(self, package: str, name: str, **defines: object) -> moderngl.Program:
+        """Compile and link the stages "vertex" and "fragment" of `{name}.glsl` below `package`; see `load_shader`.
+
+        `VARYING` is what the one hands to the other: `out` and `in`.
+        """
+        vertex_source = load_shader(package, name, "vertex", VARYING="out", **defines)
+        fragment_source = load_shader(package, name, "fragment", VARYING="in", **defines)
         with self as ctx:
             return self._pool.take(
                 (vertex_source, fragment_source),
                 lambda: _compiled(
-                    f"{vertex} + {fragment}",
+                    name,
                     lambda: ctx.program(vertex_shader=vertex_source, fragment_shader=fragment_source),
                 ),
             )

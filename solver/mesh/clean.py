@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from ..errors import MeshError
 from .corners import Corners, counted, oriented
 from .sheets import cut_apart
-from .topology import distinct, edges_of
+from .topology import distinct, undirected
 
 # Relative to the size of the mesh: above the round-off of a file in float32, far below any gap that is meant.
 _CRACK = 1e-6
@@ -60,8 +60,9 @@ def _joined_cracks(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.i
 
     Closed surfaces never change: only boundaries are examined.
     """
-    edges, counts = edges_of(F)
-    rim = np.unique(edges[(counts == 1) & (edges[:, 0] != edges[:, 1])])
+    edge, counts = np.unique(undirected(F)[0], return_counts=True)
+    low, high = np.divmod(edge[counts == 1], F.max() + 1)
+    rim = np.union1d(low[low != high], high[low != high])
     if len(rim) == 0:
         return F
     width = _CRACK * np.ptp(V[F.ravel()], axis=0).max()

@@ -1,9 +1,4 @@
-"""Triangles on their way through cleaning, with what belongs to each of their corners.
-
-Numbers and places in messages.
-
-Triangles wound alike: outward where a part is closed, as most of them were where it is open.
-"""
+"""Triangles on their way through cleaning, with what belongs to each of their corners, and wound alike."""
 
 from __future__ import annotations
 
@@ -12,7 +7,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from .topology import labels, sides_of, turned
+from .topology import labels, sides_of, split_triangles, turned
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +47,7 @@ class Corners:
         share : [triangle_count, 3]
             Where it lies, from 0 at the side's first corner to 1 at the other.
         """
-        parent, corner = _pieces(point >= 0)
+        parent, corner = split_triangles(point >= 0)
         columns = np.arange(3)
         F, numbers = np.hstack([self.F, point]), np.hstack([self.given, given])
         uv = None
@@ -60,34 +55,6 @@ class Corners:
             along = self.uv + share[..., None] * (self.uv[:, (columns + 1) % 3] - self.uv)
             uv = np.concatenate([self.uv, along], axis=1)[parent[:, None], corner]
         return Corners(F[parent[:, None], corner], numbers[parent[:, None], corner], uv)
-
-
-def _pieces(cut: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangle of which each piece is a part, and its corners: 0 to 2 those of the triangle, 3 to 5 points on sides."""
-    parents, corners = [], []
-    for code in range(8):
-        chosen = np.flatnonzero(cut @ [1, 2, 4] == code)
-        pattern = _PATTERNS[code]
-        parents.append(np.repeat(chosen, len(pattern)))
-        corners.append(np.tile(pattern, (len(chosen), 1)))
-    parent, corner = np.concatenate(parents), np.concatenate(corners)
-    order = np.argsort(parent, kind="stable")
-    return parent[order], corner[order]
-
-
-def _turned(pattern: list[list[int]], k: int) -> list[list[int]]:
-    """The pattern for a triangle that is turned by k corners."""
-    return [[(x + k) % 3 + 3 * (x >= 3) for x in piece] for piece in pattern]
-
-
-_ONE = [[0, 3, 2], [3, 1, 2]]  # side 0 is cut
-_TWO = [[3, 1, 4], [0, 3, 4], [0, 4, 2]]  # sides 0 and 1
-_PATTERNS = {
-    0: [[0, 1, 2]],
-    **{1 << k: _turned(_ONE, k) for k in range(3)},
-    **{(1 << k) + (1 << (k + 1) % 3): _turned(_TWO, k) for k in range(3)},
-    7: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
-}
 
 
 _PLURALS = {"vertex": "vertices"}

@@ -1,8 +1,6 @@
 """From an atlas and a material to the wave operator: finite elements, or a baseline to compare them with.
 
-What waves do at the rims of an open surface.
-
-The wave operator of a surface that moves: masses stay with the texels, stiffness follows their positions.
+On a surface that moves masses stay with the texels, and stiffness follows their positions.
 """
 
 from __future__ import annotations
@@ -15,15 +13,15 @@ from numpy.typing import NDArray
 
 from ..errors import SolverError
 from ..texels.atlas import Atlas
-from ..texels.moving import MovedPlaces, MovedStencil, MovingCells
-from ..texels.stencil import EAST, LINK_ENDS, NORTH, Stencil, link_lengths, mean_of_copies
+from ..texels.moving import MovedPlaces, MovedStencil
+from ..texels.stencil import EAST, LINK_ENDS, NORTH, Stencil, crossing_links, link_lengths
 from ..texels.texel_mesh import TexelMesh, softening
 from .coefficients import LIMITS
 from .deep_water import FluidOperator, over_fluid
 from .material import Material
 from .wave_operator import WaveOperator
 
-# They come back upright from a free rim, inverted from a fixed one.
+# Waves come back upright from a free rim, inverted from a fixed one.
 RIMS = ("free", "fixed")
 
 
@@ -121,7 +119,9 @@ def _difference_stencil(texels: TexelMesh, kind: str, area: float, coefficient: 
     lengths[lengths == 0] = np.inf
     c = texels.topology.with_halo(coefficient)
     means = np.stack([(c[a] + c[b]) / 2 for a, b in LINK_ENDS], axis=1)
-    return Stencil(texels.topology, mean_of_copies(texels.topology, area * means / lengths**2))
+    weights = area * means / lengths**2
+    crossing_links(texels.topology).level(weights)
+    return Stencil(texels.topology, weights)
 
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -153,7 +153,7 @@ class MovingOperator:
             raise SolverError("a surface with deep fluid below cannot move; take a material without `deep`")
         rim = "fixed" if operator.topology.fixed_rim else "free"
         texels, field = texel_fields(atlas, material, rim)
-        self._rest, self._cells = operator, MovingCells(texels)
+        self._rest, self._cells = operator, texels.cells
         soft, density = softening(texels), field["density"]
         self._tension = self._cells.coefficient(density * field["speed"] ** 2, soft, material.tightening - 1.0)
         self._viscous = self._laplace = None
@@ -163,7 +163,7 @@ class MovingOperator:
             self._viscous = self._cells.coefficient(density * field["viscosity"], soft, -1.0)
         if operator.laplace_stencil is not None:
             self._laplace = self._cells.coefficient(np.ones_like(density), soft, 0.0)
-        self._level = atlas.areas / self._cells.assemble(_coordinates(texels.halo_positions), self._tension)[1]
+        self._level = atlas.areas / self._cells.moved(_coordinates(texels.halo_positions), self._tension)[1]
         self._areas = atlas.areas
 
     def at(self, places: MovedPlaces) -> WaveOperator:

@@ -1,21 +1,11 @@
-"""The coefficients of a material: their units, limits and shapes.
-
-A soft layer on a rigid core: the coefficients of the waves that normal impacts drive over it.
-
-Coefficients that nobody gave.
-
-The coefficients of the wave equation as one object: numbers or maps, checked.
-"""
+"""The coefficients of a material: their units, limits and shapes."""
 
 from __future__ import annotations
-
-import dataclasses
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import POSITIVE, SolverError, is_finite, shown
+from ..errors import POSITIVE, SolverError, shown
 
 # name: unit, least value, whether the least value itself is excluded, whether infinity is allowed
 LIMITS = {
@@ -85,112 +75,3 @@ def require_positive(**values: tuple[float, str]) -> None:
     for name, (value, unit) in values.items():
         if not POSITIVE.holds(value):
             raise SolverError(f"{name} is {shown(value)} {unit}; valid is {POSITIVE.words}")
-
-
-# omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2 is the even fit, for 1.3 <= q d <= 8, to the lowest normal mode of an
-# incompressible layer bonded to a rigid base: its frequency is within 3.0 % of the root of the mode's determinant.
-STIFF, FAST = 6.527, 0.7668
-
-# The mode's kinetic energy is that of MASS rho d moving as the surface does: 0.56 to 0.95 in that range, the least at
-# its short end; this is the geometric mean.
-MASS = 0.665
-
-# Shortest and longest wave, over the thickness, for which the fit holds.
-SHORTEST, LONGEST = 2 * np.pi / 8, 2 * np.pi / 1.3
-
-
-def layer_coefficients(modulus: float, viscosity: float, density: float, thickness: ArrayLike) -> dict[str, Any]:
-    """Coefficients of `Material` by their names; see `Material.layer`."""
-    require_positive(modulus=(modulus, "Pa"), density=(density, "kg/m^3"))
-    if not (is_finite(viscosity) and viscosity >= 0):
-        raise SolverError(f"viscosity is {shown(viscosity)} Pa s; valid is a finite number, 0 or greater")
-    depth = _thickness(thickness)
-    square, kinematic = modulus / density, viscosity / density
-    return {
-        "speed": (FAST * square) ** 0.5,
-        "stiffness": STIFF * square / depth**2,
-        "viscosity": FAST * kinematic,
-        "damping": STIFF * kinematic / depth**2,
-        "density": MASS * density * depth,
-    }
-
-
-def layer_wavelengths(thickness: ArrayLike) -> tuple[float, float]:
-    """Shortest and longest wave [m] that the fit holds for somewhere: at the thinnest and at the thickest place."""
-    depth = _thickness(thickness)
-    return SHORTEST * float(np.min(depth)), LONGEST * float(np.max(depth))
-
-
-def _thickness(value: Any) -> float | NDArray[np.float64]:
-    if np.ndim(value) == 0:  # a word, too
-        require_positive(thickness=(value, "m"))
-        return float(value)
-    depth = np.asarray(value)
-    wrong = ~(np.isfinite(depth) & (depth > 0)) if np.issubdtype(depth.dtype, np.number) else np.ones(1, np.bool_)
-    if wrong.any():
-        worst = depth.tolist() if depth.size == 0 else depth.flat[np.argmax(wrong)].item()
-        raise SolverError(f"thickness is {shown(worst)} m; valid is {POSITIVE.words}, or one at every texel")
-    return depth.astype(np.float64)
-
-
-class Unset(float):
-    """A default value: it counts as the number that it is, until someone who knows better replaces it.
-
-    `WaveSolver` takes it as it stands. `Ripples` knows the model, and puts in what suits its target.
-    """
-
-    __slots__ = ()
-
-
-_ZERO, _ONE = Unset(0.0), Unset(1.0)
-
-_STEEPEST = 8.0  # power with which tension may follow the area
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class MaterialFields:
-    """The fields of `Material`, which says what each of them is: checked, and read at every texel."""
-
-    speed: float | ArrayLike = _ONE
-    damping: float | ArrayLike = _ZERO
-    stiffness: float | ArrayLike = _ZERO
-    viscosity: float | ArrayLike = 0.0
-    density: float | ArrayLike = _ONE
-    bending: float | ArrayLike = 0.0
-    yield_height: float | ArrayLike = np.inf
-    deep: float = 0.0
-    fixed: bool | ArrayLike = False
-    tightening: float = 0.0
-    wavelengths: ArrayLike = (0.0, np.inf)
-
-    def __post_init__(self) -> None:
-        for name in LIMITS:
-            check_numbers(name, getattr(self, name))
-        check_mask("fixed", self.fixed)
-        if not (is_finite(self.tightening) and -_STEEPEST <= self.tightening <= _STEEPEST):
-            raise SolverError(
-                f"material tightening is {shown(self.tightening)}; valid is from {-_STEEPEST:g} to {_STEEPEST:g}"
-            )
-        if np.ndim(self.deep):
-            raise SolverError(f"material deep has shape {np.shape(self.deep)}; valid is one number")
-        check_wavelengths(self.wavelengths)
-
-    @property
-    def unset(self) -> tuple[str, ...]:
-        """Names of the coefficients that are left to the model: none where the density is given."""
-        if not isinstance(self.density, Unset):
-            return ()
-        return tuple(name for name in LIMITS if isinstance(getattr(self, name), Unset))
-
-    def texels(self, name: str, shape: tuple[int, int, int]) -> NDArray:
-        """One coefficient at every texel, [C, n, n], float64 (bool for `fixed`).
-
-        Raises
-        ------
-        SolverError
-            If the coefficient was given for another atlas.
-        """
-        value = np.asarray(getattr(self, name), dtype=bool if name == "fixed" else np.float64)
-        if value.ndim and value.shape != shape:
-            raise SolverError(f"material {name} has shape {value.shape}, the atlas needs a number or {shape}")
-        return np.array(np.broadcast_to(value, shape))

@@ -1,6 +1,6 @@
-"""The square root of a surface's Laplacian, which turns the height of deep water into the flow below it.
+"""The wave operator of a surface with deep fluid below: long waves move more of it than short ones.
 
-The wave operator of a surface with deep fluid below: long waves move more of it than short ones.
+The square root of the surface's Laplacian turns the height of deep water into the flow below it.
 """
 
 from __future__ import annotations

@@ -1,33 +1,136 @@
 """Materials: the coefficients of the wave equation, from laws, from what is seen, and as presets.
 
-Materials from the laws of physics: a membrane, a layer, a liquid, a plate, plastic ground.
-
-Theory of plane waves on a flat surface of a uniform material: phase speed and decay.
-
-Exact waves over an incompressible layer on a rigid base, which `Material.layer` is a fit to.
-
-Shear modulus, density and thickness are 1, so that frequencies are in c_T / d and wave numbers in 1 / d.
-
-Whether an atlas has room for the waves that a material's coefficients stand for.
+With them theory of plane waves on a flat surface of a uniform material, and whether an atlas has room for the waves
+that a material's coefficients stand for.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.optimize import brentq
+from numpy.typing import ArrayLike, NDArray
 
-from ..errors import RippleWarning, SolverError, is_finite, shown
+from ..errors import POSITIVE, RippleWarning, SolverError, is_finite, shown
 from ..texels.atlas import Atlas
-from .coefficients import MaterialFields, layer_coefficients, layer_wavelengths, require_positive
+from .coefficients import LIMITS, check_mask, check_numbers, check_wavelengths, require_positive
 from .presets import preset_named, suited_coefficients
 
+# omega^2 = STIFF G / (rho d^2) + FAST G / rho q^2 is the even fit, for 1.3 <= q d <= 8, to the lowest normal mode of an
+# incompressible layer bonded to a rigid base: its frequency is within 3.0 % of the root of the mode's determinant.
+STIFF, FAST = 6.527, 0.7668
 
-class MaterialLaws(MaterialFields):
-    """Constructors of `Material`, one for each law."""
+# The mode's kinetic energy is that of MASS rho d moving as the surface does: 0.56 to 0.95 in that range, the least at
+# its short end; this is the geometric mean.
+MASS = 0.665
+
+# Shortest and longest wave, over the thickness, for which the fit holds.
+SHORTEST, LONGEST = 2 * np.pi / 8, 2 * np.pi / 1.3
+
+_STEEPEST = 8.0  # power with which tension may follow the area
+
+
+class Default(float):
+    """A coefficient that nobody gave: it counts as the number that it is, until someone who knows better replaces it.
+
+    `WaveSolver` takes it as it stands. `Ripples` knows the model, and puts in what suits its target.
+    """
+
+    __slots__ = ()
+
+
+_ZERO, _ONE = Default(0.0), Default(1.0)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Material:
+    """Coefficients of the wave equation; each is a number or one value a texel, shape [C, n, n].
+
+    sigma h_tt = div(sigma c^2 grad h) - lap(sigma b lap h) - sigma zeta h_t - sigma k h + div(sigma nu grad h_t) - p,
+    with p the pressure from outside. A wave of wave number q has omega^2 = c^2 q^2 + b q^4 + k - (zeta + nu q^2)^2 / 4
+    and dies as exp(-(zeta + nu q^2) t / 2).
+
+    Attributes
+    ----------
+    speed : c [m/s]
+        Wave speed of tension. Where it is 0 nothing propagates: waves reflect as from a free rim, and a region
+        without tension, bending and stiffness is rigid, so that sources do not move it. Where it fades below 3 % of the
+        greatest, with the other two, so does the share of a source that moves the surface; what lies below takes the
+        rest, and loads do not sink in for ever.
+    damping : zeta [1/s]
+        The amplitude of every wave falls as exp(-zeta t / 2).
+    stiffness : k [1/s^2]
+        Pull back to the undeformed surface, for each kg/m^2; a lone texel would swing at sqrt(k).
+    viscosity : nu [m^2/s]
+        Damps a wave of wave number q as exp(-nu q^2 t / 2): short ripples first.
+    density : sigma [kg/m^2]
+        Mass that takes part in the motion, for each area. An impulse J raises the momentum of the surface by J.
+    bending : b [m^4/s^2]
+        Resistance of a plate to being bent, rigidity over density: omega = sqrt(b) q^2, short ripples are faster.
+    yield_height : [m]
+        Deformation beyond it is permanent (see `dent`). Infinite: fully elastic.
+    fixed : bool
+        Where True, the surface is clamped: its height stays 0 and waves come back inverted.
+    deep : [1/m]
+        With deep fluid below, whose flow makes long waves heavier: the wave number q_0 at which it weighs sigma. Of
+        another wave number q it weighs sigma q_0 / q, so that omega^2 is q / q_0 times the one above. 0: no fluid. One
+        number, with one density; see `water`.
+    tightening : float
+        On a surface that moves, see `WaveSolver.move`: c^2 grows as this power of the area over that at rest. 0: waves
+        stay as fast as they are; 1: the tension stays, as of a soap film; more: the tension grows, as of rubber.
+    wavelengths : (float, float)
+        Shortest and longest wave for which the coefficients stand for the real material [m]. `WaveSolver` warns where
+        an atlas has room for none of them.
+
+    A density that is not given is 1 to `WaveSolver`, which knows nothing of a scale. `Ripples` takes it from the model,
+    and with it those of speed, damping and stiffness that are not given; see `suited_material`.
+    """
+
+    speed: float | ArrayLike = _ONE
+    damping: float | ArrayLike = _ZERO
+    stiffness: float | ArrayLike = _ZERO
+    viscosity: float | ArrayLike = 0.0
+    density: float | ArrayLike = _ONE
+    bending: float | ArrayLike = 0.0
+    yield_height: float | ArrayLike = np.inf
+    deep: float = 0.0
+    fixed: bool | ArrayLike = False
+    tightening: float = 0.0
+    wavelengths: ArrayLike = (0.0, np.inf)
+
+    def __post_init__(self) -> None:
+        for name in LIMITS:
+            check_numbers(name, getattr(self, name))
+        check_mask("fixed", self.fixed)
+        if not (is_finite(self.tightening) and -_STEEPEST <= self.tightening <= _STEEPEST):
+            raise SolverError(
+                f"material tightening is {shown(self.tightening)}; valid is from {-_STEEPEST:g} to {_STEEPEST:g}"
+            )
+        if np.ndim(self.deep):
+            raise SolverError(f"material deep has shape {np.shape(self.deep)}; valid is one number")
+        check_wavelengths(self.wavelengths)
+
+    @property
+    def unset(self) -> tuple[str, ...]:
+        """Names of the coefficients that are left to the model: none where the density is given."""
+        if not isinstance(self.density, Default):
+            return ()
+        return tuple(name for name in LIMITS if isinstance(getattr(self, name), Default))
+
+    def texels(self, name: str, shape: tuple[int, int, int]) -> NDArray:
+        """One coefficient at every texel, [C, n, n], float64 (bool for `fixed`).
+
+        Raises
+        ------
+        SolverError
+            If the coefficient was given for another atlas.
+        """
+        value = np.asarray(getattr(self, name), dtype=bool if name == "fixed" else np.float64)
+        if value.ndim and value.shape != shape:
+            raise SolverError(f"material {name} has shape {value.shape}, the atlas needs a number or {shape}")
+        return np.array(np.broadcast_to(value, shape))
 
     @classmethod
     def membrane(cls, tension: float = 1.0, density: float = 1.0, damping: float = 0.0) -> Self:
@@ -69,8 +172,20 @@ class MaterialLaws(MaterialFields):
         SolverError
             If a number is not finite and greater than 0; the viscosity may be 0.
         """
-        coefficients = layer_coefficients(modulus, viscosity, density, thickness)
-        return cls(**coefficients, wavelengths=layer_wavelengths(thickness))
+        require_positive(modulus=(modulus, "Pa"), density=(density, "kg/m^3"))
+        if not (is_finite(viscosity) and viscosity >= 0):
+            raise SolverError(f"viscosity is {shown(viscosity)} Pa s; valid is a finite number, 0 or greater")
+        depth = _thickness(thickness)
+        square, kinematic = modulus / density, viscosity / density
+        return cls(
+            speed=(FAST * square) ** 0.5,
+            stiffness=STIFF * square / depth**2,
+            viscosity=FAST * kinematic,
+            damping=STIFF * kinematic / depth**2,
+            density=MASS * density * depth,
+            # those that the fit holds for somewhere: at the thinnest and at the thickest place
+            wavelengths=(SHORTEST * float(np.min(depth)), LONGEST * float(np.max(depth))),
+        )
 
     @classmethod
     def water(
@@ -161,50 +276,6 @@ class MaterialLaws(MaterialFields):
         """
         return cls(speed=speed, damping=damping, stiffness=stiffness, density=density, yield_height=yield_height)
 
-
-class Material(MaterialLaws):
-    """Coefficients of the wave equation; each is a number or one value a texel, shape [C, n, n].
-
-    sigma h_tt = div(sigma c^2 grad h) - lap(sigma b lap h) - sigma zeta h_t - sigma k h + div(sigma nu grad h_t) - p,
-    with p the pressure from outside. A wave of wave number q has omega^2 = c^2 q^2 + b q^4 + k - (zeta + nu q^2)^2 / 4
-    and dies as exp(-(zeta + nu q^2) t / 2).
-
-    Attributes
-    ----------
-    speed : c [m/s]
-        Wave speed of tension. Where it is 0 nothing propagates: waves reflect as from a free rim, and a region
-        without tension, bending and stiffness is rigid, so that sources do not move it. Where it fades below 3 % of the
-        greatest, with the other two, so does the share of a source that moves the surface; what lies below takes the
-        rest, and loads do not sink in for ever.
-    damping : zeta [1/s]
-        The amplitude of every wave falls as exp(-zeta t / 2).
-    stiffness : k [1/s^2]
-        Pull back to the undeformed surface, for each kg/m^2; a lone texel would swing at sqrt(k).
-    viscosity : nu [m^2/s]
-        Damps a wave of wave number q as exp(-nu q^2 t / 2): short ripples first.
-    density : sigma [kg/m^2]
-        Mass that takes part in the motion, for each area. An impulse J raises the momentum of the surface by J.
-    bending : b [m^4/s^2]
-        Resistance of a plate to being bent, rigidity over density: omega = sqrt(b) q^2, short ripples are faster.
-    yield_height : [m]
-        Deformation beyond it is permanent (see `dent`). Infinite: fully elastic.
-    fixed : bool
-        Where True, the surface is clamped: its height stays 0 and waves come back inverted.
-    deep : [1/m]
-        With deep fluid below, whose flow makes long waves heavier: the wave number q_0 at which it weighs sigma. Of
-        another wave number q it weighs sigma q_0 / q, so that omega^2 is q / q_0 times the one above. 0: no fluid. One
-        number, with one density; see `water`.
-    tightening : float
-        On a surface that moves, see `WaveSolver.move`: c^2 grows as this power of the area over that at rest. 0: waves
-        stay as fast as they are; 1: the tension stays, as of a soap film; more: the tension grows, as of rubber.
-    wavelengths : (float, float)
-        Shortest and longest wave for which the coefficients stand for the real material [m]. `WaveSolver` warns where
-        an atlas has room for none of them.
-
-    A density that is not given is 1 to `WaveSolver`, which knows nothing of a scale. `Ripples` takes it from the model,
-    and with it those of speed, damping and stiffness that are not given; see `suited_material`.
-    """
-
     @classmethod
     def suited(
         cls,
@@ -284,6 +355,18 @@ class Material(MaterialLaws):
         return getattr(cls, chosen.law)(**{**chosen.parameters, **parameters})
 
 
+def _thickness(value: Any) -> float | NDArray[np.float64]:
+    if np.ndim(value) == 0:  # a word, too
+        require_positive(thickness=(value, "m"))
+        return float(value)
+    depth = np.asarray(value)
+    wrong = ~(np.isfinite(depth) & (depth > 0)) if np.issubdtype(depth.dtype, np.number) else np.ones(1, np.bool_)
+    if wrong.any():
+        worst = depth.tolist() if depth.size == 0 else depth.flat[np.argmax(wrong)].item()
+        raise SolverError(f"thickness is {shown(worst)} m; valid is {POSITIVE.words}, or one at every texel")
+    return depth.astype(np.float64)
+
+
 def frequency(material: Material, wave_number: float) -> float:
     """Angular frequency of a wave [1/s], 0 where it creeps back without swinging; of a wave number [1/m]."""
     q2, rate = wave_number**2, 1 / decay_time(material, wave_number)
@@ -307,32 +390,6 @@ def decay_time(material: Material, wave_number: float) -> float:
 
 def _number(material: Material, name: str) -> float:
     return float(np.asarray(getattr(material, name)))
-
-
-def lowest_square(q: float) -> float:
-    """Square of the angular frequency of the lowest normal mode, of a wave number from 1 to 10."""
-    # the determinant is 0 at 0 as well, where s is q
-    squares = np.linspace(1.0, q**2 + 20.0, 800)
-    signs = np.sign([determinant(q, square) for square in squares])
-    first = int(np.flatnonzero(np.diff(signs) != 0)[0])
-    return float(brentq(lambda square: determinant(q, square), squares[first], squares[first + 1], xtol=1e-12))
-
-
-def determinant(q: float, square: float) -> float:
-    """Of the lowest modes' conditions: no motion at the base, no shear and no pressure at the surface.
-
-    The normal displacement is a sum of cosh and sinh of q z, which carry the pressure, and of s z with
-    s^2 = q^2 - omega^2, which do not; the tangential one follows, since the volume is kept. Conditions are in rows.
-    """
-    s = np.sqrt(complex(q**2 - square, 1e-30))
-    start = [1, 0, 1, 0]
-    start_slope = [0, q, 0, 1]
-    displacement = np.array([np.cosh(q), np.sinh(q), np.cosh(s), np.sinh(s) / s])
-    slope = np.array([q * np.sinh(q), q * np.cosh(q), s * np.sinh(s), np.cosh(s)])
-    curvature = np.array([q**2, q**2, s**2, s**2]) * displacement
-    pressure = square * np.array([np.sinh(q) / q, np.cosh(q) / q, 0, 0])
-    rows = np.array([start, start_slope, curvature + q**2 * displacement, 2 * slope - pressure])
-    return float(np.linalg.det(rows / np.abs(rows).max(axis=0)).real)
 
 
 # A wave of fewer texels is slower than it should be by more than a twentieth.

@@ -1,15 +1,12 @@
-"""Real materials by name: a law of `Material`, its parameters, where they come from, and where they hold.
+"""Coefficients of materials: of real ones, by name, and those that suit an object's size and what hits it.
 
-How far a surface gives way under a load or a hit, and the stiffness that keeps it from giving way further.
-
-A load F that is spread like a Gaussian of standard deviation s presses a membrane with a restoring stiffness in by
+How far a surface gives way, and what stiffness or density keeps it from giving way further: a load F that is spread
+like a Gaussian of standard deviation s presses a membrane with a restoring stiffness in by
 
     h = F / (4 pi sigma c^2) exp(z) E1(z),    z = s^2 k / (2 c^2),
 
 the integral of exp(-q^2 s^2 / 2) / (c^2 q^2 + k) over all wave numbers q. For the exponential integral this takes
 ln(1 + 1/z), which is an upper bound and can be inverted (Abramowitz and Stegun 1964, 5.1.20).
-
-Coefficients that suit an object's size and what hits it.
 """
 
 from __future__ import annotations
@@ -185,9 +182,41 @@ def stiffness_after(
     depth, radius, density, speed : float
         As for `stiffness_under`.
     """
-    time = max(duration, SPREAD * radius / speed if speed > 0 else 0.0)
+    time = _time(duration, radius, speed)
     whole = stiffness_under(impulse / time, depth, radius=radius, density=density, speed=speed)
     return max(whole - 1 / time**2, 0.0)
+
+
+def density_under(force: float, depth: float, *, radius: float, speed: float, stiffness: float) -> float:
+    """Density with which a resting load sinks by a depth at most [kg/m^2]; infinite without speed and stiffness.
+
+    Parameters
+    ----------
+    force, depth, radius, speed : float
+        As for `stiffness_under`.
+    stiffness : float
+        Of the material [1/s^2].
+    """
+    if not force > 0:
+        return 0.0
+    if not stiffness > 0:
+        return math.inf
+    ratio = 2 * speed**2 / ((SPREAD * radius) ** 2 * stiffness)
+    share = math.log1p(ratio) / ratio if ratio > 0 else 1.0  # of what the stiffness alone would let it sink
+    return share * force / (2 * math.pi * (SPREAD * radius) ** 2 * stiffness * depth)
+
+
+def density_after(
+    impulse: float, depth: float, *, duration: float, radius: float, speed: float, stiffness: float
+) -> float:
+    """Density with which a hit dents the surface by about a depth at most [kg/m^2]; see `stiffness_after`."""
+    time = _time(duration, radius, speed)
+    return density_under(impulse / time, depth, radius=radius, speed=speed, stiffness=stiffness + 1 / time**2)
+
+
+def _time(duration: float, radius: float, speed: float) -> float:
+    """How long a hit counts as a load [s]."""
+    return max(duration, SPREAD * radius / speed if speed > 0 else 0.0)
 
 
 def density_for(impulse: float, depth: float, *, radius: float, speed: float) -> float:

@@ -1,7 +1,4 @@
-"""Regions held still, whose rim follows their outline rather than the texels' staircase.
-
-Absorbing regions: waves enter and do not return.
-"""
+"""Regions of a surface: held still along their outline, or absorbing, so that waves enter and do not return."""
 
 from __future__ import annotations
 

@@ -1,11 +1,9 @@
-"""How forces inside a surface of uneven density change its volume, and the pressure that keeps it.
+"""What keeps a surface's volume: a pressure on the whole of it, as of an incompressible interior.
 
-Forces along links conserve momentum. Where the density varies that is not the volume: sum of area times velocity. An
-incompressible interior answers with a pressure, the Lagrange multiplier of that sum. It is linear in height and
-velocity, and moves the surface along the operator's `response`: the accelerations are projected with masses as weights,
-so that the operator stays symmetric and energy is conserved.
-
-What keeps the volume when sources act: a pressure on the whole surface, as of an incompressible interior.
+It balances sources, and the forces inside a surface of uneven density. Those along links conserve momentum, which is
+not the volume where the density varies: the sum of area times velocity. The pressure is the Lagrange multiplier of that
+sum. It is linear in height and velocity, and moves the surface along the operator's `response`: the accelerations are
+projected with masses as weights, so that the operator stays symmetric and energy is conserved.
 """
 
 from __future__ import annotations
@@ -32,15 +30,15 @@ class VolumeBalance:
     def __init__(self, operator: WaveOperator) -> None:
         self._operator = operator
         self._parts = None if operator.parts is None else operator.parts.reshape(-1)
-        self._lightness = operator.lightness.reshape(-1)
-        self._least = self._sum(operator.mass * operator.lightness * operator.response)
+        self._inverse_density = operator.inverse_density.reshape(-1)
+        self._least = self._sum(operator.mass * operator.inverse_density * operator.response)
 
     def counterpart(self, texels: NDArray[np.int64], momenta: NDArray[np.float64]) -> float | NDArray[np.float64]:
         """Amplitude of the operator's `response` that balances momenta [k] on some texels [k].
 
         [m/s], or for forces [m/s^2]; a number, or one for each part.
         """
-        weighed = self._lightness[texels] * momenta
+        weighed = self._inverse_density[texels] * momenta
         if self._parts is None:
             return -float(weighed.sum()) / float(self._least) if self._least else 0.0
         # of no texels, bincount makes integers
@@ -50,7 +48,7 @@ class VolumeBalance:
     def balanced_velocity(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
         """A velocity field [C, n, n] without its volume rate."""
         operator = self._operator
-        return field - operator.response * self._ratio(operator.mass * operator.lightness * field, self._least)
+        return field - operator.response * self._ratio(operator.mass * operator.inverse_density * field, self._least)
 
     def balanced_height(self, field: NDArray[np.float64], areas: NDArray[np.float64]) -> NDArray[np.float64]:
         """A height field [C, n, n] without its mean."""
@@ -107,12 +105,12 @@ def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
     count = int(parts.max()) + 1
     kept = np.array([_is_kept(operator, parts == part) for part in range(count)])
     decay, span = damped_step(operator, dt)
-    weight = operator.mass * operator.lightness
+    weight = operator.mass * operator.inverse_density
     inertia = np.bincount(parts.reshape(-1), (weight * span * operator.response).reshape(-1), count)
     scale = np.where(kept & (inertia > 0), -1 / np.where(inertia > 0, inertia, 1), 0)[parts]
     # what an even surface has as well: its mean is damped, and swings on its spring
     even_decay, even_span = _mean(decay), _mean(span)
-    moved = span * operator.lightness
+    moved = span * operator.inverse_density
     heights = operator.link_force(moved) - weight * operator.stiffness * (span - even_span)
     velocities = weight * (decay - even_decay)
     if operator.viscous_stencil is not None:

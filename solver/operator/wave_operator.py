@@ -1,8 +1,6 @@
-"""The discrete wave operator: stencil weights, masses, and the largest time step they allow.
+"""The discrete wave operator: stencil weights, masses, the largest time step they allow, and what a substep needs.
 
-The parts of a surface that float freely: each has a mean height of its own that nothing pulls back.
-
-The coefficients of one substep of a wave operator.
+The surface falls into parts that float freely: each has a mean height of its own that nothing pulls back.
 """
 
 from __future__ import annotations
@@ -10,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,16 +19,12 @@ from ..errors import SolverError
 from ..texels.stencil import EAST, NORTH, Stencil, largest_eigenvalue, link_exists, stiffness_matrix
 from ..texels.topology import TexelTopology
 
-
-class Ties(NamedTuple):
-    """What joins texels: the links of a stencil; of a texel that bends, with `rigidity` [C, n, n], all neighbours."""
-
-    stencil: Stencil
-    rigidity: NDArray[np.float64] | None = None
+# What joins texels: the links of a stencil; of one that bends, with its rigidity [C, n, n], all neighbours.
+Tie: TypeAlias = tuple[Stencil, NDArray[np.float64] | None]
 
 
 def floating_parts(
-    ties: Sequence[Ties], held: NDArray[np.bool_], movable: NDArray[np.bool_]
+    ties: Sequence[Tie], held: NDArray[np.bool_], movable: NDArray[np.bool_]
 ) -> NDArray[np.int32] | None:
     """Number of the part to which each texel belongs, [C, n, n]; None where there is one part only.
 
@@ -39,13 +33,14 @@ def floating_parts(
 
     Parameters
     ----------
-    ties : sequence of Ties
+    ties : sequence of (Stencil, rigidity or None)
+        What joins texels.
     held : bool [C, n, n]
         Texels that a spring or a clamp holds.
     movable : bool [C, n, n]
         The others are rigid, and belong to any part.
     """
-    topology = ties[0].stencil.topology
+    topology = ties[0][0].topology
     of_chart = _chart_parts(topology)
     if any(_joins_all(tie) for tie in ties):
         charts = of_chart[:, None, None]
@@ -75,18 +70,19 @@ def _chart_parts(topology: TexelTopology) -> NDArray[np.int64]:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _joins_all(tie: Ties) -> bool:
+def _joins_all(tie: Tie) -> bool:
     """Whether the sides of all quads are links, so that every part of the mesh is one."""
     stencil, rigidity = tie
     sides = (stencil.weights[:, link][link_exists(stencil.topology, link)] for link in (EAST, NORTH))
     return (rigidity is None or bool((rigidity > 0).all())) and all(side.all() for side in sides)
 
 
-def _graph(tie: Ties) -> csr_array:
+def _graph(tie: Tie) -> csr_array:
     """Texels that are joined, [C n^2, C n^2]; not symmetric."""
-    graph = abs(stiffness_matrix(tie.stencil))
-    if tie.rigidity is not None:
-        graph = csr_array(graph.multiply((tie.rigidity.reshape(-1, 1) > 0).astype(np.float64)))
+    stencil, rigidity = tie
+    graph = abs(stiffness_matrix(stencil))
+    if rigidity is not None:
+        graph = csr_array(graph.multiply((rigidity.reshape(-1, 1) > 0).astype(np.float64)))
     graph.eliminate_zeros()
     return graph
 
@@ -95,7 +91,7 @@ def _graph(tie: Ties) -> csr_array:
 SAFETY = 0.99
 
 # What does not change as the surface moves.
-_OF_REST = ("free", "movable", "anchored", "source_share", "lightness", "response", "parts")
+_OF_REST = ("free", "movable", "anchored", "source_share", "inverse_density", "response", "parts")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -175,21 +171,21 @@ class WaveOperator:
         return np.where(self.movable, 1.0 if self.grip is None else self.grip, 0.0)
 
     @functools.cached_property
-    def lightness(self) -> NDArray[np.float64]:
+    def inverse_density(self) -> NDArray[np.float64]:
         """Greatest density over that of each texel, [C, n, n]: how much more a pressure moves it."""
         return np.ones(self.mass.shape) if self.density is None else self.density.max() / self.density
 
     @functools.cached_property
     def response(self) -> NDArray[np.float64]:
         """How the surface moves under a pressure that acts everywhere, [C, n, n]; 1 where all of it is alike."""
-        return self.source_share * self.lightness
+        return self.source_share * self.inverse_density
 
     @functools.cached_property
     def parts(self) -> NDArray[np.int32] | None:
         """Number of the freely floating part to which each texel belongs, [C, n, n], or None: `floating_parts`."""
-        ties = [Ties(self.stencil)]
+        ties: list[Tie] = [(self.stencil, None)]
         if self.laplace_stencil is not None and self.rigidity is not None:
-            ties.append(Ties(self.laplace_stencil, self.rigidity))
+            ties.append((self.laplace_stencil, self.rigidity))
         return floating_parts(ties, (self.stiffness > 0) | self.anchored, self.movable)
 
     def moved(
@@ -209,7 +205,7 @@ class WaveOperator:
             bounded=True,
         )
         for name in _OF_REST:
-            moved.__dict__[name] = getattr(self, name)
+            object.__setattr__(moved, name, getattr(self, name))
         return moved
 
     def momenta(self, velocity: NDArray[np.float64]) -> NDArray[np.float64]:

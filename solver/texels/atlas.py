@@ -1,23 +1,15 @@
-"""The atlas: a texel mesh on the surface of a mesh, each texel with its surface point.
+"""The atlas: a texel mesh on the surface of a mesh, each texel with its surface point; and its file.
 
-Named arrays in one file: an uncompressed NumPy archive, read at the speed of memory and verified.
-
-NumPy's own reader goes through the zip module in small pieces. Here every array is read straight into place, on several
-threads, and verified against the archive's checksum before use.
-
-Atlases on disk: one verified file format, for users and for the cache.
+One verified file format, an uncompressed NumPy archive, is for users and for the cache.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-import io
-import os
 import struct
 import zipfile
 import zlib
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -33,9 +25,6 @@ from .chart_map import ChartMap, MeshPlaces, TextureCoordinates, nearest_places,
 from .texel_mesh import TexelMesh, texel_quality
 from .topology import sampling_matrix
 
-_LOCAL_HEADER = struct.Struct("<26xHH")  # how long the name and the extra field are that follow
-_LONGEST_HEAD = 4096  # of an array: its shape and type
-
 
 def write_arrays(file: BinaryIO, arrays: dict[str, NDArray]) -> None:
     """Write an archive that `read_arrays` and `numpy.load` read."""
@@ -43,7 +32,7 @@ def write_arrays(file: BinaryIO, arrays: dict[str, NDArray]) -> None:
 
 
 def read_arrays(path: Path) -> dict[str, NDArray]:
-    """Read all arrays of an archive.
+    """Read all arrays of an archive, whole: each is compared with its checksum.
 
     Raises
     ------
@@ -52,36 +41,18 @@ def read_arrays(path: Path) -> dict[str, NDArray]:
     OSError
         If it cannot be read.
     """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = archive.infolist()
-    except (zipfile.BadZipFile, NotImplementedError, struct.error) as error:
-        raise ValueError(str(error)) from error
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
-        arrays = list(threads.map(lambda member: _read_array(path, member), members))
-    return {member.filename.removesuffix(".npy"): array for member, array in zip(members, arrays, strict=True)}
-
-
-def _read_array(path: Path, member: zipfile.ZipInfo) -> NDArray:
-    damaged = ValueError(f"{member.filename!r} is damaged")
-    size = member.file_size
-    if member.header_offset < 0 or size > path.stat().st_size:
-        raise damaged
+    arrays, damage = {}, (zipfile.BadZipFile, EOFError, MemoryError, OSError, RuntimeError, struct.error, zlib.error)
     with path.open("rb") as file:
-        file.seek(member.header_offset)
-        start = file.read(_LOCAL_HEADER.size)
-        if len(start) < _LOCAL_HEADER.size:
-            raise damaged
-        file.seek(sum(_LOCAL_HEADER.unpack(start)), os.SEEK_CUR)
-        content = np.empty(size, np.uint8)
-        if file.readinto(content.data) != size or zlib.crc32(content.data) != member.CRC:
-            raise damaged
-    head = io.BytesIO(content[:_LONGEST_HEAD].tobytes())
-    version = npy.read_magic(head)
-    shape, fortran_order, dtype = npy.read_array_header_1_0(head)
-    if version != (1, 0) or fortran_order or dtype.hasobject:
-        raise damaged
-    return content[head.tell() :].view(dtype).reshape(shape)
+        try:
+            with zipfile.ZipFile(file) as archive:
+                for name in archive.namelist():
+                    with archive.open(name) as member:
+                        arrays[name.removesuffix(".npy")] = npy.read_array(member, allow_pickle=False)
+                        if member.read(1):  # the checksum is compared at the end
+                            raise ValueError(f"{name!r} is damaged")
+        except damage as error:
+            raise ValueError(str(error)) from error
+    return arrays
 
 
 # Raise it when a layout's map or the file's contents change: older files are rebuilt.

@@ -93,7 +93,8 @@ def link_lengths(topology: TexelTopology, halo_positions: NDArray[np.float64]) -
     for link, (a, b) in enumerate(LINK_ENDS):
         exists = link_exists(topology, link) | ties_to_rim(topology, link)
         lengths[:, link][exists] = np.linalg.norm(halo_positions[a] - halo_positions[b], axis=-1)[exists]
-    return mean_of_copies(topology, lengths)
+    crossing_links(topology).level(lengths)
+    return lengths
 
 
 def link_exists(topology: TexelTopology, link: int) -> NDArray[np.bool_]:
@@ -124,61 +125,77 @@ def rim_ties(topology: TexelTopology) -> tuple[NDArray[np.int64], NDArray[np.int
     return np.concatenate(texels), np.concatenate(places)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class CrossingLinks:
+class CrossingLinks(NamedTuple):
     """The links across glued sides; each is stored on two charts.
 
     Attributes
     ----------
     keys : int64 [k]
-        Of the two texels that a copy joins, see `key`.
-    places : tuple of int64 [k]
-        Index of the copy in a stencil's weights.
+        Of the two texels that each joins, ascending: the lesser one times the number of texels, plus the other.
+    copies : int64 [m]
+        Flat places of the copies among a stencil's weights, those of each link together.
+    begins : int64 [k + 1]
+        Where the copies of each link begin.
     size : int
         Number of texels.
     """
 
-    keys: NDArray[np.int64]
-    places: tuple[NDArray[np.int64], ...]
+    keys: Ints
+    copies: Ints
+    begins: Ints
     size: int
 
-    @classmethod
-    def of(cls, topology: TexelTopology) -> CrossingLinks:
-        """The crossing links of a topology."""
-        keys, places = [], []
-        for link, (a, b) in enumerate(LINK_ENDS):
-            crossing = link_exists(topology, link) & (topology.own[a] != topology.own[b])
-            keys.append(_key(topology.halo[a][crossing], topology.halo[b][crossing], topology.texel_count))
-            chart, row, column = np.nonzero(crossing)
-            places.append(np.stack([chart, np.full_like(chart, link), row, column]))
-        return cls(np.concatenate(keys), tuple(np.concatenate(places, axis=1)), topology.texel_count)
+    def between(self, pairs: Ints) -> tuple[Ints, Ints]:
+        """Copies of the links between pairs of texels [m, 2]: the pair, and the flat place; some pairs have none."""
+        wanted = pairs.min(axis=1) * self.size + pairs.max(axis=1)
+        link = np.searchsorted(self.keys, wanted)
+        pair = np.flatnonzero(np.append(self.keys, -1)[link] == wanted)
+        first, count = self.begins[link[pair]], np.diff(self.begins)[link[pair]]
+        nth = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        return np.repeat(pair, count), self.copies[np.repeat(first, count) + nth]
 
-    def add(
-        self, weights: NDArray[np.float64], pairs: NDArray[np.int64], values: NDArray[np.float64]
-    ) -> NDArray[np.bool_]:
-        """Add values [m] to both copies of the links between pairs of texels [m, 2]; return which pairs have none."""
-        keys = _key(pairs[:, 0], pairs[:, 1], self.size)
-        for key, value in zip(keys, values, strict=True):
-            weights[tuple(index[self.keys == key] for index in self.places)] += value
-        return ~np.isin(keys, self.keys)
+    def level(self, weights: Floats) -> None:
+        """Give all copies of each link their mean, in a stencil's weights."""
+        _level(weights.reshape(-1), self.copies, self.begins)
 
 
-def mean_of_copies(topology: TexelTopology, weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give both copies of every link that crosses a glued side their mean; clear entries that are not links."""
+@kernel
+def _level(weights: Floats, copies: Ints, begins: Ints) -> None:
+    """Give the copies of each link their mean, in flat weights; those of link i are from begins[i] to begins[i + 1]."""
+    for link in range(len(begins) - 1):
+        first, last = begins[link], begins[link + 1]
+        total = 0.0
+        for i in range(first, last):
+            total += weights[copies[i]]
+        for i in range(first, last):
+            weights[copies[i]] = total / (last - first)
+
+
+@functools.lru_cache(maxsize=4)  # like the other tables of a topology: asked for by everything on one surface
+def crossing_links(topology: TexelTopology) -> CrossingLinks:
+    """The links across glued sides of a topology."""
+    keys, places, size = [], [], topology.texel_count
+    n = topology.shape[1]
+    for link, (a, b) in enumerate(LINK_ENDS):
+        crossing = link_exists(topology, link) & (topology.own[a] != topology.own[b])
+        first, second = topology.halo[a][crossing], topology.halo[b][crossing]
+        keys.append(np.minimum(first, second) * size + np.maximum(first, second))
+        chart, row, column = np.nonzero(crossing)
+        places.append(((4 * chart + link) * (n + 1) + row) * (n + 1) + column)
+    key = np.concatenate(keys)
+    order = np.argsort(key, kind="stable")
+    unique, begins = np.unique(key[order], return_index=True)
+    return CrossingLinks(unique, np.concatenate(places)[order], np.append(begins, len(key)), size)
+
+
+@functools.lru_cache(maxsize=4)
+def missing_links(topology: TexelTopology) -> Ints:
+    """Flat places, among a stencil's weights, of what is no link."""
+    charts, n, _ = topology.shape
+    missing = np.zeros((charts, 4, n + 1, n + 1), bool)
     for link in range(4):
-        exists = link_exists(topology, link) | ties_to_rim(topology, link)
-        weights[:, link][~exists & np.isfinite(weights[:, link])] = 0
-    crossing = CrossingLinks.of(topology)
-    if not len(crossing.keys):
-        return weights
-    _, pair = np.unique(crossing.keys, return_inverse=True)
-    copies = weights[crossing.places]
-    weights[crossing.places] = (np.bincount(pair, copies) / np.bincount(pair))[pair]
-    return weights
-
-
-def _key(a: NDArray[np.int64], b: NDArray[np.int64], size: int) -> NDArray[np.int64]:
-    return np.minimum(a, b) * size + np.maximum(a, b)
+        missing[:, link] = ~(link_exists(topology, link) | ties_to_rim(topology, link))
+    return np.flatnonzero(missing)
 
 
 # Largest eigenvalue of an even grid's stencil times its spacing squared: that of the chessboard pattern.
@@ -245,7 +262,7 @@ def _lanczos(multiply: Callable[[NDArray], NDArray], start: NDArray[np.float64],
     return bound
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(eq=False)
 class Stencil:
     """Link weights w of a symmetric operator: the sum over links of w (h_j - h_i) is its value at texel i.
 

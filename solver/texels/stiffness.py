@@ -1,272 +1,316 @@
-"""Stiffness weights and lumped areas of a texel mesh.
+"""Stiffness weights and lumped areas of a texel mesh, at rest or wherever its texels have moved.
 
-Vertices are the texel centres. Cells are the quads between four texels, also across glued sides, a triangle in each
-corner of three charts, and a polygon in corners of five and more. Only real-space coordinates enter. Between the last
-texels and a rim lies a strip of half a texel: where the rim is free, heights in it change along the rim only.
-
-The cells of a texel mesh, added up: link weights and areas.
-
-Plain numpy, block by block: it runs a few times, and a compiled loop takes longer to compile than this takes on most
-meshes. Every place collects its cells row by row, so that the sums do not depend on the blocks.
+Vertices are the texel centres. Cells are the quads between four texels, also across glued sides, strips at rims, and a
+triangle or a polygon in corners of other than four charts. Only real-space coordinates enter. What stays while texels
+move is worked out once. The few special cells are NumPy's. So are the quads at rest, in double precision, which a
+compiled loop would take longer to compile than to work out on most meshes; those of a surface that moves are wanted
+anew in every step, and have a compiled loop in single precision.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import polygon, quad, strip, triangle
-from .stencil import CrossingLinks, IrregularLinks, Stencil, mean_of_copies
-from .topology import TRIANGLE, TexelTopology
+from ..kernel import Floats, Floats32, Ints, kernel
+from .cells import conductance, quad, quad_area
+from .special_cells import CORNERS, special_cells
+from .stencil import IrregularLinks, Stencil, crossing_links, missing_links
+from .topology import TexelTopology
 
-Floats: TypeAlias = NDArray[np.float64]
-Ints: TypeAlias = NDArray[np.int64]
-Bools: TypeAlias = NDArray[np.bool_]
-Place: TypeAlias = tuple[NDArray[np.integer], ...]  # chart, row, column of some cells of a block
+# Area of a cell over that at rest, at least: no density grows beyond a thousand times that at rest.
+LEAST_RATIO = np.float32(1e-3)
 
-_BLOCK = 2**13  # cells; what is computed of them stays in the processor's cache
+_BLOCK = 2**13  # cells at rest that are worked out at once: they stay in the processor's cache
+_BAND = 1024  # places of moving texels, in whole rows: they stay in the fastest memory
 
-# The four corners of a cell and its six links: what the cell at (r, c) adds to at (r + dr, c + dc). In this order a
-# place collects its cells row by row.
-_CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))
-_COLLECTED = (3, 2, 1, 0)
-_NORTH, _SOUTH, _EAST, _WEST, _RISING, _FALLING = range(6)
-_LINKS = ((0, 1, 0), (0, 0, 0), (1, 0, 1), (1, 0, 0), (2, 0, 0), (3, 0, 0))  # link, dr, dc
-_BETWEEN = {(0, 1): _SOUTH, (2, 3): _NORTH, (0, 2): _WEST, (1, 3): _EAST}
+_ONE, _QUARTER, _ZERO = np.float32(1), np.float32(0.25), np.float32(0)
 
 
-class Cells(NamedTuple):
-    """What the assembly reads, each with halo: positions, coefficients, softening, halo table, rims, corners."""
+class QuadCells(NamedTuple):
+    """What does not change while the quads move.
 
-    positions: Floats
-    coefficient: Floats
-    softening: Floats
-    halo: Ints
-    rim: Bools
-    valence: Ints
-    fixed_rim: bool
-
-
-class _Sums(NamedTuple):
-    """What the cells of a block, [k, b, n + 1], add to links and corners: quads everywhere, other cells in places."""
-
-    links: list[Floats]
-    corner: Floats
-    other_links: list[tuple[int, Place, Floats]]
-    other_corners: list[tuple[int, Place, Floats]]
-
-
-def assemble(cells: Cells, weights: Floats, areas: Floats) -> None:
-    """Add up the cells of each chart with halo: weights [C, 4, n + 1, n + 1], areas [C, n, n], both 0 before."""
-    around = np.zeros(cells.halo.shape)
-    with np.errstate(divide="ignore", invalid="ignore"):  # beyond rims there may be no positions
-        for charts, rows in _blocks(len(areas), weights.shape[-1]):
-            sums = _add_up(cells, charts, rows)
-            for kind, (link, dr, dc) in enumerate(_LINKS):
-                target = weights[charts, link, rows.start + dr : rows.stop + dr, dc:]
-                _collect(target, sums.links[kind], [each for each in sums.other_links if each[0] == kind])
-            for corner in _COLLECTED:
-                dr, dc = _CORNERS[corner]
-                target = around[charts, rows.start + dr : rows.stop + dr, dc : dc + weights.shape[-1]]
-                _collect(target, sums.corner, [each for each in sums.other_corners if each[0] == corner])
-    areas[:] = around[:, 1:-1, 1:-1]
-
-
-def _blocks(charts: int, size: int) -> Iterator[tuple[slice, slice]]:
-    """Charts, and rows of the cells in them, `size` x `size`."""
-    together, high = max(1, _BLOCK // size**2), max(1, _BLOCK // size)
-    for chart in range(0, charts, together):
-        for row in range(0, size, high):
-            yield slice(chart, min(chart + together, charts)), slice(row, min(row + high, size))
-
-
-def _collect(target: Floats, everywhere: Floats, others: list[tuple[int, Place, Floats]]) -> None:
-    """Add what cells hold for their places; links inside the halo, which have none, are left behind."""
-    _, height, width = target.shape
-    target += everywhere[:, :height, :width]
-    for _, (chart, r, c), value in others:
-        kept = (r < height) & (c < width)
-        target[chart[kept], r[kept], c[kept]] += value[kept]
-
-
-def _add_up(cells: Cells, charts: slice, rows: slice) -> _Sums:
-    """What the cells of a block add to links and corners."""
-    size = cells.halo.shape[-1] - 1
-
-    def corners(field: NDArray) -> list[NDArray]:
-        return [field[..., i : i + rows.stop - rows.start, j : j + size] for i, j in _CORNERS]
-
-    part = charts, slice(rows.start, rows.stop + 1)
-    x = corners(np.ascontiguousarray(np.moveaxis(cells.positions[part], -1, 0)))
-    k, s, halo, rim = (corners(field[part]) for field in (cells.coefficient, cells.softening, cells.halo, cells.rim))
-    exists = (np.minimum(np.minimum(halo[0], halo[1]), np.minimum(halo[2], halo[3]))) >= 0
-    at_rim = rim[0] | rim[1] | rim[2] | rim[3]
-    *sides, rising, falling, whole = quad(*x)
-    conductance = conductances(k, s)
-    inner = exists & ~at_rim
-    south, north, west, east = sides
-    weights = [conductance * weight for weight in (north, south, east, west, rising, falling)]
-    sums = _Sums([np.where(inner, weight, 0.0) for weight in weights], np.where(inner, whole / 4, 0.0), [], [])
-    strips = np.nonzero(exists & at_rim & np.isfinite(whole))
-    if len(strips[0]):
-        around = tuple(np.stack([field[strips] for field in corner], axis=1) for corner in (halo, rim))
-        _share_strips(sums, strips, around, (whole / 4)[strips])
-        if cells.fixed_rim:
-            sums.other_links.extend((kind, strips, weight[strips]) for kind, weight in enumerate(weights))
-        else:
-            _link_strips(
-                sums,
-                strips,
-                around[1],
-                [np.stack([axis[strips] for axis in corner]) for corner in x],
-                conductance[strips],
-            )
-    _add_triangles(sums, cells, charts, rows)
-    return sums
-
-
-def conductances(k: list[Floats], s: list[Floats]) -> Floats:
-    """Harmonic mean of the coefficients at the corners of cells, 0 where one is, softened by the least factor."""
-    product, resistance, softest = k[0], 1 / k[0], s[0]
-    for other, factor in zip(k[1:], s[1:], strict=True):
-        product, resistance, softest = product * other, resistance + 1 / other, np.minimum(softest, factor)
-    return np.where(product > 0, len(k) / resistance, 0.0) * softest
-
-
-def _add_triangles(sums: _Sums, cells: Cells, charts: slice, rows: slice) -> None:
-    """The cells in corners of three charts: the halo's corner does not exist; triangles of the other three."""
-    n = cells.halo.shape[-1] - 2
-    for corner, (r, c) in enumerate(((0, 0), (0, n), (n, n), (n, 0))):
-        chart = np.flatnonzero(cells.valence[charts, corner] == TRIANGLE)
-        if not len(chart) or not rows.start <= r < rows.stop:
-            continue
-        # the chart's own texel is at r0, c0
-        r0, r1 = (1, 0) if r == 0 else (r, r + 1)
-        c0, c1 = (1, 0) if c == 0 else (c, c + 1)
-        places = [(charts.start + chart, row, column) for row, column in ((r0, c0), (r0, c1), (r1, c0))]
-        _, vertical, horizontal, whole = triangle(*(cells.positions[place].T for place in places))
-        conductance = conductances([cells.coefficient[p] for p in places], [cells.softening[p] for p in places])
-        place = chart, np.full_like(chart, r - rows.start), np.full_like(chart, c)
-        sums.other_corners.append((_CORNERS.index((r0 - r, c0 - c)), place, whole / 3))
-        sums.other_links.append((_EAST if c == 0 else _WEST, place, conductance * vertical))
-        sums.other_links.append((_NORTH if r == 0 else _SOUTH, place, conductance * horizontal))
-
-
-def _share_strips(sums: _Sums, strips: Place, around: tuple[NDArray, ...], share: Floats) -> None:
-    """The areas of cells at a rim: each of their corners beyond the rim has its own go to the texel beside it.
-
-    Nothing is known of a strip where the rim has no positions.
-
-    Parameters
+    Attributes
     ----------
-    strips
-        The cells, [k].
-    around
-        Halo table and rim at their corners, [k, 4].
-    share
-        Quarter of their area [m^2], [k].
+    conductance : float32 [C, n + 2, n + 2]
+        Coefficient at rest of the quad whose south-west corner is at each place, 0 where there is none.
+    per_area : float32 [C, n + 2, n + 2]
+        One over its area at rest, in units of 1 / scale^2.
+    scale : float
+        One over about the length of a quad at rest [1/m]: all that is computed is then about 1.
+    power : float
+        With which the coefficient goes with the area.
     """
-    halo, rim = around
-    for i in range(4):
-        belongs = np.full(len(share), i)
-        for j in range(4):
-            belongs[rim[:, i] & ~rim[:, j] & (halo[:, i] == halo[:, j])] = j
-        for corner in range(4):
-            here = belongs == corner
-            sums.other_corners.append((corner, tuple(index[here] for index in strips), share[here]))
+
+    conductance: Floats32
+    per_area: Floats32
+    scale: float
+    power: float
 
 
-def _link_strips(sums: _Sums, strips: Place, rim: Bools, x: list[Floats], conductance: Floats) -> None:
-    """The links between two texels beside a free rim, for the cells from them to that; rim [k, 4], corners [3, k]."""
-    for (i, j), kind in _BETWEEN.items():
-        p, q = 3 - j, 3 - i  # opposite
-        here = ~rim[:, i] & ~rim[:, j] & rim[:, p] & rim[:, q]
-        weight = strip(*(x[corner][:, here] for corner in (i, j, p, q)))
-        sums.other_links.append((kind, tuple(index[here] for index in strips), conductance[here] * weight))
+class CellCoefficient(NamedTuple):
+    """A coefficient at rest: of the quads, and of the special cells, kind by kind, each [k]."""
+
+    quads: QuadCells
+    special: tuple[Floats, ...]
 
 
-def lumped_areas(topology: TexelTopology, halo_positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Area of the texel mesh that belongs to each texel [m^2], [C, n, n]; for the positions see `TexelMesh`."""
-    return _assembled(topology, halo_positions, None, None)[1]
+class TexelCells:
+    """The cells of a texel mesh, added up to stencils and areas.
 
-
-def stiffness_stencil(
-    topology: TexelTopology,
-    halo_positions: NDArray[np.float64],
-    coefficient: NDArray[np.float64],
-    softening: NDArray[np.float64] | None = None,
-) -> Stencil:
-    """Stiffness weights of -div(coefficient grad).
+    A coefficient of a surface that moves goes with a power of each cell's area over that at rest: with -1 what is
+    spread over the surface, such as its density, gets thinner as that stretches.
 
     Parameters
     ----------
     topology : TexelTopology
-    halo_positions : [C, n + 2, n + 2, 3]
-        Texel positions with halo [m], see `TexelMesh`.
-    coefficient : [C, n, n]
-        Averaged harmonically over the corners of every cell, as media in series: the operator stays symmetric, and a
-        region where it is 0 is cut off at its edge.
-    softening : [C, n, n], optional
-        Factors up to 1: the stiffness of every cell is multiplied by the least of those at its corners.
-
-    Returns
-    -------
-    Stencil
-        Its value at a texel is the area integral of div(coefficient grad h).
+    halo_positions : float64 [C, n + 2, n + 2, 3]
+        Of the texels at rest, with halo [m]; see `TexelMesh`.
     """
-    weights = _assembled(topology, halo_positions, coefficient, softening)[0]
-    weights = mean_of_copies(topology, weights)
-    if not topology.polygons:
-        return Stencil(topology, weights)
-    soft = np.ones(topology.shape) if softening is None else softening
-    return _with_polygons(topology, halo_positions, coefficient.reshape(-1), soft.reshape(-1), weights)
+
+    def __init__(self, topology: TexelTopology, halo_positions: Floats) -> None:
+        self.topology, self._positions = topology, halo_positions
+        charts, n, _ = topology.shape
+        self._shape, self._special = (charts, 4, n + 1, n + 1), special_cells(topology, halo_positions)
+        there = (topology.halo >= 0) & ~topology.rim
+        self._whole = functools.reduce(np.logical_and, self._at_corners(there))
+        extent = float(np.ptp(halo_positions[:, 1:-1, 1:-1], axis=(0, 1, 2)).max())
+        self._scale = float(np.float32(np.sqrt(topology.texel_count) / extent)) if extent > 0 else 1.0
+        ends = np.concatenate([np.zeros((0, 2), np.int64), *(each.irregular[1] for each in self._special)])
+        self._links = IrregularLinks.of(ends, np.arange(len(ends), dtype=np.float64))
+
+    def at_rest(self, values: Floats, softening: Floats) -> tuple[Stencil, Floats]:
+        """Stencil of values [C, n, n], see `TexelMesh.stencil`, and the area that belongs to each texel [m^2]."""
+        weights, areas = np.zeros(self._shape), np.zeros(self._positions.shape[:3])
+        fields = [self.topology.with_halo(each) for each in (values, softening)]
+        for charts, rows in self._blocks():
+            # with the row of texels above
+            part, above = (charts, slice(rows.start, rows.stop + 1)), slice(rows.start + 1, rows.stop + 1)
+            x = self._at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
+            factor = conductance(*(self._at_corners(each[part]) for each in fields))
+            with np.errstate(invalid="ignore"):  # beyond rims there may be no positions
+                cells = np.where(self._whole[charts, rows], np.stack(quad(*(each - x[0] for each in x[1:]))), 0.0)
+            south, north, west, east, rising, falling = factor * cells[:6]
+            link, quarter = weights[charts], cells[6] / (4 * self._scale**2)
+            link[:, 0, above] += north[:, : len(link[0, 0, above])]
+            link[:, 0, rows] += south
+            link[:, 1, rows, 1:] += east[:, :, :-1]
+            link[:, 1, rows] += west
+            link[:, 2, rows], link[:, 3, rows] = rising, falling
+            for corner in self._at_corners(areas[part])[::-1]:
+                corner += quarter
+        inner = np.ascontiguousarray(areas[:, 1:-1, 1:-1])
+        factors = self._special_coefficient(*fields)
+        links = self._add_special(self._positions.reshape(-1, 3).T, factors, 0.0, weights, inner)
+        return Stencil(self.topology, weights, links), inner
+
+    def coefficient(self, values: Floats, softening: Floats, power: float) -> CellCoefficient:
+        """Coefficient of a surface that moves, of values at the texels at rest [C, n, n]; see `TexelMesh.stencil`."""
+        fields = [self.topology.with_halo(each) for each in (values, softening)]
+        quads = np.where(self._per_area > 0, _padded(conductance(*map(self._at_corners, fields))), _ZERO)
+        return CellCoefficient(QuadCells(quads, self._per_area, self._scale, power), self._special_coefficient(*fields))
+
+    def moved(self, around: Floats, coefficient: CellCoefficient) -> tuple[Stencil, Floats]:
+        """Stencil of texels that have moved, and the area that belongs to each [m^2], [C, n, n].
+
+        Parameters
+        ----------
+        around : float64 [3, C, n + 2, n + 2]
+            Coordinates of the texels with halo [m].
+        coefficient : CellCoefficient
+        """
+        weights, areas = np.empty(self._shape), np.empty(self.topology.shape)
+        quad_pass(around, coefficient.quads, weights, areas)
+        power = coefficient.quads.power
+        links = self._add_special(around.reshape(3, -1), coefficient.special, power, weights, areas)
+        return Stencil(self.topology, weights, links), areas
+
+    def special(self, around: Floats, coefficient: CellCoefficient) -> tuple[Floats, IrregularLinks | None]:
+        """What all cells but the quads give to the links at `special_links`, and the irregular links.
+
+        Only the places at `special_places` of those around are looked at.
+        """
+        weights, areas, power = self._empty, np.zeros(self.topology.shape), coefficient.quads.power
+        links = self._add_special(around.reshape(3, -1), coefficient.special, power, weights, areas)
+        values = weights.reshape(-1)[self.special_links]
+        weights.reshape(-1)[self.special_links] = 0.0
+        return values, links
+
+    @functools.cached_property
+    def special_places(self) -> Ints:
+        """Flat places, of a field with halo, of the corners of all cells but the quads."""
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *(each.corners.ravel() for each in self._special)]))
+
+    @functools.cached_property
+    def special_links(self) -> Ints:
+        """Flat places, among a stencil's weights, of the links to which other cells than quads add, with all copies."""
+        touched, crossing = np.zeros(self._shape), crossing_links(self.topology)
+        for cells in self._special:
+            touched.reshape(-1)[cells.links[1]] = 1.0
+        crossing.level(touched)
+        return np.flatnonzero(touched)
+
+    @functools.cached_property
+    def _empty(self) -> Floats:
+        return np.zeros(self._shape)
+
+    @functools.cached_property
+    def _per_area(self) -> Floats32:
+        """One over the areas of whole quads at rest, see `QuadCells`; 0 where there is none."""
+        x = self._at_corners(self._scale * np.moveaxis(self._positions, -1, 0))
+        with np.errstate(invalid="ignore"):
+            areas = np.where(self._whole, quad_area(*(each - x[0] for each in x[1:])), 0.0)
+        return _padded(np.divide(1, areas, out=np.zeros_like(areas), where=areas > 0))
+
+    @functools.cached_property
+    def _special_per_area(self) -> list[Floats]:
+        """One over the areas of the special cells at rest [1/m^2], kind by kind; 1 for those without."""
+        areas = [each.weigh(self._positions.reshape(-1, 3).T, self._scale)[2] for each in self._special]
+        return [1 / np.where(each > 0, each, 1.0) for each in areas]
+
+    def _special_coefficient(self, values: Floats, softening: Floats) -> tuple[Floats, ...]:
+        """Coefficient of the special cells, kind by kind, from fields with halo."""
+        return tuple(
+            conductance(*(list(field.reshape(-1)[each.corners]) for field in (values, softening)))
+            for each in self._special
+        )
+
+    def _add_special(
+        self, places: Floats, factors: tuple[Floats, ...], power: float, weights: Floats, areas: Floats
+    ) -> IrregularLinks | None:
+        """Add the special cells to weights and areas, and make the copies of each link agree; the irregular links."""
+        flat, irregular, of_polygons = weights.reshape(-1), [np.zeros(0)], []
+        for kind, (cells, factor) in enumerate(zip(self._special, factors, strict=True)):
+            links, shares, area = cells.weigh(places, self._scale)
+            if power:
+                factor = factor * np.maximum(area * self._special_per_area[kind], LEAST_RATIO) ** power
+            values = (factor * links).ravel()
+            np.add.at(areas.reshape(-1), cells.shares[1], shares.ravel()[cells.shares[0]])
+            irregular.append(values[cells.irregular[0]])
+            if cells.on_all_copies:
+                of_polygons.append((cells.links[1], values[cells.links[0]]))
+            else:
+                np.add.at(flat, cells.links[1], values[cells.links[0]])
+        flat[missing_links(self.topology)] = 0.0
+        crossing_links(self.topology).level(weights)
+        for link_places, values in of_polygons:
+            np.add.at(flat, link_places, values)
+        if self._links is None:
+            return None
+        return self._links._replace(weights=np.concatenate(irregular)[self._links.weights.astype(np.int64)])
+
+    def _blocks(self) -> Iterator[tuple[slice, slice]]:
+        """Charts, and rows of the cells in them."""
+        charts, _, size, _ = self._shape
+        together, high = max(1, _BLOCK // size**2), max(1, _BLOCK // size)
+        for chart in range(0, charts, together):
+            for row in range(0, size, high):
+                yield slice(chart, min(chart + together, charts)), slice(row, min(row + high, size))
+
+    @staticmethod
+    def _at_corners(field: NDArray) -> list[NDArray]:
+        """A field [..., r + 1, c + 1] at the four corners of each of r x c cells."""
+        rows, columns = field.shape[-2] - 1, field.shape[-1] - 1
+        return [field[..., r : rows + r, c : columns + c] for r, c in CORNERS]
 
 
-def _assembled(
-    topology: TexelTopology,
-    halo_positions: NDArray[np.float64],
-    coefficient: NDArray[np.float64] | None,
-    softening: NDArray[np.float64] | None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Weights [C, 4, n + 1, n + 1], each copy of a link with what its own chart sees, and areas [C, n, n]."""
-    charts, n, _ = topology.shape
-    weights, areas = np.zeros((charts, 4, n + 1, n + 1)), np.zeros((charts, n, n))
-    ones = np.ones(topology.halo.shape)
-    k, s = (ones if field is None else topology.with_halo(field) for field in (coefficient, softening))
-    assemble(
-        Cells(halo_positions, k, s, topology.halo, topology.rim, topology.valence, topology.fixed_rim), weights, areas
-    )
-    if topology.polygons:
-        points = _texel_positions(halo_positions)
-        for texels in topology.polygons:
-            areas.reshape(-1)[texels] += polygon(points[texels])[1]
-    return weights, areas
+def _padded(quads: Floats) -> Floats32:
+    """Values of quads [C, n + 1, n + 1] at their south-west corners among the places of a field with halo."""
+    return np.pad(quads, ((0, 0), (0, 1), (0, 1))).astype(np.float32)
 
 
-def _texel_positions(halo_positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    return halo_positions[:, 1:-1, 1:-1].reshape(-1, 3)
+_quad = kernel(inline="always")(quad)  # a loop over it is wide only if it is all in one piece
 
 
-def _with_polygons(
-    topology: TexelTopology,
-    halo_positions: NDArray[np.float64],
-    coefficient: NDArray[np.float64],
-    softening: NDArray[np.float64],
-    weights: NDArray[np.float64],
-) -> Stencil:
-    """Add the polygons' links: their sides to the stencil, their diagonals beside it."""
-    points, crossing = _texel_positions(halo_positions), CrossingLinks.of(topology)
-    ends, values = [], []
-    for texels in topology.polygons:
-        k = coefficient[texels]
-        conductance = len(k) / (1 / k).sum() if k.all() else 0.0
-        first, second = np.triu_indices(len(texels), 1)
-        links = conductance * softening[texels].min() * polygon(points[texels])[0][first, second]
-        pairs = np.stack([texels[first], texels[second]], axis=1)
-        beside = crossing.add(weights, pairs, links)
-        ends.append(pairs[beside])
-        values.append(links[beside])
-    return Stencil(topology, weights, IrregularLinks.of(np.concatenate(ends), np.concatenate(values)))
+@kernel
+def quad_pass(around: Floats, cells: QuadCells, weights: Floats, areas: Floats) -> None:
+    """Fill in what the quads give to the weights [C, 4, n + 1, n + 1] and the texels' areas [m^2], [C, n, n].
+
+    Coordinates are [3, C, n + 2, n + 2], with halo. Rows and charts follow one another in memory, so that a band is one
+    loop over places; those at the end of a row are no quads.
+    """
+    charts, width = cells.conductance.shape[:2]
+    rows = max(_BAND // width, 1)
+    places, sides = around.reshape(3, -1), np.zeros((7, rows * width), np.float32)
+    below = np.zeros((2, width - 1), np.float32)
+    factor = np.zeros(rows * width, np.float32)  # not one of the sides: loops over both would not be wide
+    for first in range(0, charts * width, rows):
+        begin, last = first * width, min(first + rows, charts * width)
+        count = min(last * width, charts * width**2 - width - 1) - begin
+        _weigh(places, begin, count, cells, sides)
+        _scale(sides, cells, begin, count, factor)
+        for row in range(first, last):
+            chart, r = row // width, row % width
+            if r == 0:
+                below[:] = 0
+            if r < width - 1:
+                _add_row(sides, row * width - begin, below, weights[chart], areas[chart], r, cells.scale**2)
+
+
+@kernel
+def _weigh(places: Floats, first: int, count: int, cells: QuadCells, sides: Floats32) -> None:
+    """Geometric weights of the six links of the quads of consecutive places, and their areas times scale squared.
+
+    Differences are taken in double precision, so that a surface far from the origin loses nothing.
+    """
+    scale, above = cells.scale, first + cells.conductance.shape[1]
+    x, y, z = places[0, first:], places[1, first:], places[2, first:]
+    x_above, y_above, z_above = places[0, above:], places[1, above:], places[2, above:]
+    for c in range(count):
+        ox, oy, oz = x[c], y[c], z[c]
+        ex, ey, ez = scale * (x[c + 1] - ox), scale * (y[c + 1] - oy), scale * (z[c + 1] - oz)
+        nx, ny, nz = scale * (x_above[c] - ox), scale * (y_above[c] - oy), scale * (z_above[c] - oz)
+        px, py, pz = scale * (x_above[c + 1] - ox), scale * (y_above[c + 1] - oy), scale * (z_above[c + 1] - oz)
+        south, north, west, east, rising, falling, area = _quad(
+            (np.float32(ex), np.float32(ey), np.float32(ez)),
+            (np.float32(nx), np.float32(ny), np.float32(nz)),
+            (np.float32(px), np.float32(py), np.float32(pz)),
+        )
+        sides[0, c], sides[1, c], sides[2, c], sides[3, c] = south, north, west, east
+        sides[4, c], sides[5, c], sides[6, c] = rising, falling, area
+
+
+@kernel
+def _scale(sides: Floats32, cells: QuadCells, first: int, count: int, factor: Floats32) -> None:
+    """Multiply the weights of a band by what the coefficient has become; leave a quarter of the areas.
+
+    Both are cleared where there is no quad.
+    """
+    conductance, per_area = cells.conductance.reshape(-1)[first:], cells.per_area.reshape(-1)[first:]
+    area, power = sides[6], np.float32(cells.power)
+    for c in range(count):
+        ratio = max(area[c] * per_area[c], LEAST_RATIO)
+        factor[c] = conductance[c] / ratio if power == -_ONE else conductance[c] * ratio**power
+        area[c] = _QUARTER * area[c] if per_area[c] > 0 else _ZERO
+    for k in range(6):
+        row = sides[k]
+        for c in range(count):
+            row[c] = factor[c] * row[c] if conductance[c] > 0 else _ZERO
+
+
+@kernel
+def _add_row(sides: Floats32, begin: int, below: Floats32, weights: Floats, areas: Floats, r: int, unit: float) -> None:
+    """Give a chart's row of weights and areas to links and texels; `below` has north sides and areas of the last.
+
+    Areas are in units of 1 / unit.
+    """
+    size = below.shape[1]
+    for c in range(size):
+        i = begin + c
+        weights[0, r, c] = below[0, c] + sides[0, i]
+        weights[2, r, c], weights[3, r, c] = sides[4, i], sides[5, i]
+    weights[1, r, 0] = sides[2, begin]
+    for c in range(1, size):
+        i = begin + c
+        weights[1, r, c] = sides[3, i - 1] + sides[2, i]
+    if r > 0:
+        for c in range(1, size):
+            i = begin + c
+            areas[r - 1, c - 1] = ((below[1, c - 1] + below[1, c]) + (sides[6, i - 1] + sides[6, i])) / unit
+    for c in range(size):
+        i = begin + c
+        below[0, c], below[1, c] = sides[1, i], sides[6, i]

@@ -29,7 +29,7 @@ from ..errors import AtlasError, shown
 from ..kernel import Floats, Ints
 from ..mesh.mesh import Mesh
 from .stencil import EAST, EVEN_RATE, NORTH, Stencil, largest_eigenvalue, link_lengths, stiffness_matrix
-from .stiffness import lumped_areas, stiffness_stencil
+from .stiffness import TexelCells
 from .topology import TexelTopology
 
 # Passes of the smoothing: a neighbourhood has a standard deviation of 1.4 texels.
@@ -65,7 +65,7 @@ def levelled_areas(
     ----------
     topology : TexelTopology
     spanned : float64 [C, n, n]
-        Area that the texel mesh spans [m^2]; see `lumped_areas`.
+        Area that the texel mesh spans [m^2]; see `TexelMesh.spanned_areas`.
     sampled : float64 [C, n, n]
         What the map onto the charts says of each texel [m^2].
     """
@@ -117,7 +117,8 @@ class TexelMesh:
         around = _with_halo(topology, points, beyond)
         if normals is None:
             normals = _grid_normals(around)
-        return cls(topology, points, normals, lumped_areas(topology, around), beyond)
+        ones = np.ones(topology.shape)
+        return cls(topology, points, normals, TexelCells(topology, around).at_rest(ones, ones)[1], beyond)
 
     def with_positions(
         self,
@@ -131,7 +132,7 @@ class TexelMesh:
         Areas change in proportion to what the texel mesh spans, so that a level taken from a finer mesh is kept.
         """
         moved = TexelMesh.of(self.topology, positions, normals=normals, beyond=beyond)
-        spanned = lumped_areas(self.topology, self.halo_positions)
+        spanned = self.spanned_areas
         level = np.divide(self.areas, spanned, out=np.ones_like(spanned), where=spanned > 0)
         return dataclasses.replace(moved, areas=moved.areas * level)
 
@@ -149,6 +150,16 @@ class TexelMesh:
     def halo_positions(self) -> NDArray[np.float64]:
         """Positions with halo [m], [C, n + 2, n + 2, 3]; NaN where there is nothing."""
         return _with_halo(self.topology, self.positions, self.beyond)
+
+    @functools.cached_property
+    def cells(self) -> TexelCells:
+        """The cells between the texels."""
+        return TexelCells(self.topology, self.halo_positions)
+
+    @property
+    def spanned_areas(self) -> NDArray[np.float64]:
+        """Area of the mesh of texel centres that belongs to each [m^2], [C, n, n]."""
+        return self.cells.at_rest(np.ones(self.shape), np.ones(self.shape))[1]
 
     @functools.cached_property
     def grid(self) -> TexelGrid:
@@ -173,8 +184,17 @@ class TexelMesh:
         return ends
 
     def stencil(self, coefficient: NDArray[np.float64], softening: NDArray[np.float64] | None = None) -> Stencil:
-        """Stiffness weights of -div(coefficient grad); see `stiffness_stencil`."""
-        return stiffness_stencil(self.topology, self.halo_positions, coefficient, softening)
+        """Stiffness weights of -div(coefficient grad): at a texel, the area integral of div(coefficient grad h).
+
+        Parameters
+        ----------
+        coefficient : [C, n, n]
+            Averaged harmonically over the corners of every cell, as media in series: the operator stays symmetric, and
+            a region where it is 0 is cut off at its edge.
+        softening : [C, n, n], optional
+            Factors up to 1: the stiffness of every cell is multiplied by the least of those at its corners.
+        """
+        return self.cells.at_rest(coefficient, np.ones(self.shape) if softening is None else softening)[0]
 
     def stiffness(self, speed: float | NDArray[np.float64] = 1.0) -> csr_array:
         """Stiffness matrix [T, T], T = C n^2, of the area integral of c^2 grad . grad for a wave speed c [m/s].
@@ -280,7 +300,7 @@ def texel_quality(texels: TexelMesh, mesh: Mesh) -> dict[str, float]:
         "edge_max": float(edges.max()),
         "folded": folded_texels(texels),
         "coverage": float(texels.areas.sum() / mesh.area),
-        "spanned": float(lumped_areas(texels.topology, texels.halo_positions).sum() / mesh.area),
+        "spanned": float(texels.spanned_areas.sum() / mesh.area),
         "timestep": _timestep(texels, mesh.area),
     }
 

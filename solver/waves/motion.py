@@ -20,8 +20,7 @@ from ..operator.assembly import MovingOperator
 from ..operator.material import Material
 from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
-from ..texels.moving import MovedPlaces
-from ..texels.riding import SurfaceRide
+from ..texels.moving import MovedPlaces, SurfaceRide
 from ..texels.texel_mesh import TexelMesh
 from ..texels.topology import fill_halo
 from .height_map import mirror_at_rim

@@ -79,6 +79,8 @@ class WaveSolver:
 
     Attributes
     ----------
+    rest : Atlas
+        Of the surface before it moved.
     operator : WaveOperator
     time : float
         [s].
@@ -116,7 +118,7 @@ class WaveSolver:
 
     def _begin(self, atlas: Atlas, operator: WaveOperator, backend: str, conserve_volume: bool) -> None:
         """At rest, at time 0."""
-        self._rest, self.operator = atlas, operator
+        self.rest, self.operator = atlas, operator
         self._motion: Motion | None = None
         self.time, self.substeps_taken, self._substep = 0.0, 0, 0.0
         self._backend = make_backend(backend, operator, keeps_volume=conserve_volume)
@@ -128,12 +130,7 @@ class WaveSolver:
     @property
     def atlas(self) -> Atlas:
         """The surface where it is now."""
-        return self._rest if self._motion is None else self._motion.atlas
-
-    @property
-    def rest(self) -> Atlas:
-        """The atlas of the surface before it moved."""
-        return self._rest
+        return self.rest if self._motion is None else self._motion.atlas
 
     @property
     def vertices(self) -> NDArray[np.float64] | None:
@@ -187,9 +184,7 @@ class WaveSolver:
 
     def reset(self) -> None:
         """Flatten the surface, end all pressure, and set the time back to 0."""
-        shape = self.operator.mass.shape
-        self.height = np.zeros(shape, np.float32)
-        self.velocity = np.zeros(shape, np.float32)
+        self.height = self.velocity = 0.0
         self.pressure = 0.0
         self.time, self.substeps_taken = 0.0, 0
         self._guard.clear()
@@ -215,7 +210,7 @@ class WaveSolver:
         if self._motion is None:
             if self._kind != "fem":
                 raise SolverError(f"a surface with the operator {self._kind!r} cannot move; valid is 'fem'")
-            self._motion = Motion(self._rest, self.material, self.operator)
+            self._motion = Motion(self.rest, self.material, self.operator)
         operator = self._motion.to(V)
         if operator is not None:
             self.operator = operator
@@ -302,9 +297,7 @@ class WaveSolver:
 
     def add_pressure(self, pressure: ArrayLike) -> None:
         """Add a pressure field [Pa], a number or [C, n, n], positive inwards, that is held from now on."""
-        shape = self.operator.mass.shape
-        field = as_field(pressure, "pressure", shape)
-        force = (field * self._areas).reshape(-1)
+        force = (as_field(pressure, "pressure", self.operator.mass.shape) * self._areas).reshape(-1)
         texels = np.flatnonzero(force)
         self._held.add(Load(texels, force[texels]))
 
@@ -340,6 +333,13 @@ class WaveSolver:
         height = as_field(value, "height", self.operator.mass.shape) * self.operator.free
         self._note("height", height)
         self._backend.set_height(height)
+
+    def crests(self) -> NDArray[np.float32]:
+        """Greatest size that each height has had after any step since the last call, or has now [m], [C, n, n].
+
+        Kept from the first call on, where the waves are; a copy begins anew. Not finite, they raise as `height` does.
+        """
+        return self._finite(self._backend.crests(), "height")
 
     def snapshot(self) -> NDArray[np.float32] | DeviceField:
         """A copy of the height [m], [C, n, n], where the waves are: on hardware GL it stays on the GPU.
@@ -394,7 +394,7 @@ class WaveSolver:
 
     def __getstate__(self) -> tuple[Any, ...]:
         """What `copy` and `pickle` keep: a copy goes on as the original does, bit for bit."""
-        made_of = self._rest, self.material, self._kind, self.operator, self._motion
+        made_of = self.rest, self.material, self._kind, self.operator, self._motion
         return made_of, self.backend, self.conserve_volume, self.state
 
     def __setstate__(self, kept: tuple[Any, ...]) -> None:
@@ -436,7 +436,7 @@ class WaveSolver:
 
     @property
     def _areas(self) -> NDArray[np.float64]:
-        return self._rest.areas if self._motion is None else self._motion.areas
+        return self.rest.areas if self._motion is None else self._motion.areas
 
     def _finite(self, field: NDArray[np.float32], name: str) -> NDArray[np.float32]:
         """A field, which is looked at; see `FiniteGuard.check`."""

@@ -5,6 +5,7 @@ Averaging pixels: in linear light, weighted by opacity.
 Where the camera of a scene stands: free, fixed, orbiting, tracking a body.
 """
 
+import dataclasses
 from typing import Any
 
 import mujoco
@@ -17,7 +18,7 @@ from ripple_sim.capture.frame_source import FrameSource, Sensor, focal_distance,
 from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.errors import SceneError, VideoError
 from ripple_sim.render import Camera
-from ripple_sim.render.camera import ThroughLens, perspective, view_matrix
+from ripple_sim.render.camera import perspective, view_matrix
 from ripple_sim.scene.scene import Scene, with_exposure
 from ripple_sim.scene.scene_file import CameraEntry, check_camera
 from ripple_sim.simulation import Simulation
@@ -327,7 +328,7 @@ def test_a_camera_focuses_on_what_it_is_told_to(world):
 def test_the_eye_goes_over_the_lens_and_the_focal_plane_stays(world):
     camera = Camera((0.1, 0.2, 0.3), distance=3.0, azimuth=130.0, elevation=-25.0, fovy=40.0)
     lens, focus, aspect = (0.05, -0.02), 2.0, 1.5
-    middle, pose = camera.pose(), ThroughLens(camera, lens, focus).pose()
+    middle, pose = camera.pose(), dataclasses.replace(camera.pose(), lens=lens, focal_distance=focus)
     half = np.tan(np.radians(20.0))
     for depth in (0.5, focus, 9.0):
         point = middle.position + middle.rotation @ [0.3, -0.2, -depth]

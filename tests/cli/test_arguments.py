@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from ripple_sim.cli import arguments
-from ripple_sim.cli.parser import UsageError, View, parse
-from ripple_sim.cli.render import Drop, Render
+from ripple_sim.cli.parser import UsageError, ViewCommand, parse
+from ripple_sim.cli.render import DropCommand, RenderCommand
 from ripple_sim.video.options import VideoOptions
 
 
@@ -101,7 +101,7 @@ WORDS = {
     "resume": (None, True),
     "overwrite": (None, True),
 }
-COMMANDS = {"render": ("duck", Render), "drop": ("mesh.obj", Drop)}
+COMMANDS = {"render": ("duck", RenderCommand), "drop": ("mesh.obj", DropCommand)}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -159,7 +159,7 @@ def test_the_commands_have_their_own_arguments() -> None:
     render = parse(["render", "duck", "-o", "a.mp4", "--camera", "side", "--device", "1"])
     assert (render.scene, render.camera, render.device) == ("duck", "side", 1)
     view = parse(["view", "duck", "--bodies", "0", "--size", "320x200", "--web", "--port", "9000"])
-    assert isinstance(view, View)
+    assert isinstance(view, ViewCommand)
     assert (view.bodies, view.size, view.web, view.port, view.benchmark) == (0, (320, 200), True, 9000, False)
     assert view.folder == Path()
 

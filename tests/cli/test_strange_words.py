@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from ripple_sim.bench import report
+from ripple_sim import bench
 from ripple_sim.cli import main as cli
 
 LONG = "a" * 5000
@@ -46,7 +46,7 @@ def test_strange_words_are_refused_in_a_line(
 def test_the_meshes_of_a_benchmark_are_read_before_anything_is_measured(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(report, "collect", lambda: pytest.fail("it measures"))
+    monkeypatch.setattr(bench, "collect", lambda: pytest.fail("it measures"))
     assert "'missing.obj' does not exist" in refusal(capsys, "bench", "missing.obj")
 
 
@@ -56,7 +56,7 @@ def test_memory_that_does_not_suffice_is_one_line(
     def starved(*_: object) -> None:
         raise MemoryError("Unable to allocate 9 TiB")
 
-    monkeypatch.setattr(report, "load_mesh", starved)
+    monkeypatch.setattr(bench, "load_mesh", starved)
     assert cli.main(["bench", "mesh.obj"]) == 1
     assert capsys.readouterr().err == (
         "ripple-sim: not enough memory: Unable to allocate 9 TiB; ask for a lower resolution or size\n"

@@ -1,9 +1,13 @@
-"""Waves too high or too steep: a warning once a target, with a density that would do."""
+"""Waves too high or too steep: a warning once a target, with a material that would do."""
 
 import dataclasses
 import re
+import tomllib
 import warnings
+from pathlib import Path
 
+import gymnasium
+import msgspec
 import mujoco
 import numpy as np
 import pytest
@@ -11,6 +15,7 @@ from mujoco_models import limbed_asset
 
 from ripple_sim import Material, Ripples
 from ripple_sim.errors import RippleWarning
+from ripple_sim.scene.material_entry import MaterialEntry
 
 BALL = """<mujoco><option timestep="0.002"/><worldbody>
     <geom name="target" type="sphere" size="0.5"/>
@@ -40,20 +45,95 @@ def warned(xml: str, material: Material, seconds: float = 0.5, backend: str = "c
     return [str(each.message) for each in caught], ripples
 
 
-def named_density(message: str) -> float:
-    found = re.search(r"would do: ([\d.e+]+) kg/m\^2", message)
+def advised(message: str) -> Material:
+    """The material that a warning names, in Python and in TOML alike."""
+    found = re.search(r"would do: Material\((.*)\), in a scene file (material = .*)$", message)
     assert found is not None, message
-    return float(found[1])
+    coefficients = dict(pair.split("=") for pair in found[1].split(", "))
+    entry = tomllib.loads(found[2])["material"]
+    assert entry == {name: float(value) for name, value in coefficients.items()}
+    return msgspec.convert(entry, MaterialEntry).material()
 
 
-@pytest.mark.parametrize(("xml", "material"), [(BALL, WEAK), (ON_ANIMAL, Material.jelly())])
-def test_a_hard_hit_is_reported_once_and_the_named_density_would_do(xml: str, material: Material) -> None:
-    [message], _ = warned(xml, material)
+@pytest.mark.parametrize(
+    ("xml", "material"),
+    [
+        (BALL, WEAK),
+        (BALL, Material(density=1.0)),
+        (BALL, Material.plate(modulus=1e4)),
+        (BALL, Material(speed=0.6, stiffness=100.0, density=1.0, yield_height=0.01)),
+        (ON_ANIMAL, Material.jelly()),
+    ],
+    ids=["weak", "density alone", "plate", "plastic", "jelly"],
+)
+def test_a_hard_hit_is_reported_once_and_the_named_material_would_do(xml: str, material: Material) -> None:
+    [message], light = warned(xml, material)
     assert "geom 'target' are too high" in message
-    heavier = dataclasses.replace(material, density=named_density(message))
+    heavier = advised(message)
+    given = light["target"].material
+    for name in ("speed", "damping", "stiffness", "viscosity", "bending", "yield_height"):
+        assert getattr(heavier, name) == pytest.approx(getattr(given, name), rel=1e-3)
     messages, ripples = warned(xml, heavier)
     assert messages == []
     assert ripples["target"].height.any()
+
+
+@pytest.mark.filterwarnings("ignore:MuJoCo. compiler attribute 'settotalmass'")
+@pytest.mark.parametrize("material", [Material(density=1.0), Material(speed=0.3, damping=1, stiffness=300, density=5)])
+def test_what_is_named_for_a_foot_holds_under_other_steps_too(material: Material) -> None:
+    assets = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
+    model = mujoco.MjModel.from_xml_path(str(assets / "half_cheetah.xml"))
+
+    def messages(material: Material, seed: int) -> list[str]:
+        data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            ripples = Ripples(model, {"ffoot": material}, resolution=16, backend="cpu")
+            for _ in range(30):
+                data.ctrl[:] = rng.uniform(-1, 1, model.nu)
+                ripples.mj_step(data, 5)
+            ripples.reset()
+        return [str(each.message) for each in caught if "the waves on" in str(each.message)]
+
+    [message] = messages(material, seed=0)
+    heavier = advised(message)
+    assert all(messages(heavier, seed) == [] for seed in range(3))
+
+
+def test_what_is_named_is_whole_where_the_model_chose_the_material() -> None:
+    model, data, ripples = still_ripples(Material())
+    ripples.poke("target", [0, 0, 0.5], 200.0, 0.1)
+    with pytest.warns(RippleWarning) as caught:
+        run(model, data, ripples, 80)
+    heavier, chosen = advised(str(caught[0].message)), ripples["target"].material
+    for name in ("speed", "damping", "stiffness"):
+        assert getattr(heavier, name) == pytest.approx(getattr(chosen, name), rel=1e-3)
+    model, data, ripples = still_ripples(heavier)
+    ripples.poke("target", [0, 0, 0.5], 200.0, 0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run(model, data, ripples, 80)
+
+
+def test_a_crest_of_any_step_is_reported() -> None:
+    model, data, ripples = still_ripples()
+    run(model, data, ripples, 18)
+    ripples["target"].height = 0.4
+    run(model, data, ripples, 1)
+    ripples["target"].height = 0.0
+    with pytest.warns(RippleWarning, match="0.4 m at .* radius is 0.5 m"):
+        run(model, data, ripples, 40)
+
+
+def test_crests_of_waves_with_an_old_material_are_reported() -> None:
+    model, data, ripples = still_ripples()
+    run(model, data, ripples, 2)
+    ripples["target"].height = 0.4
+    run(model, data, ripples, 1)
+    ripples.change_material("target", damping=2.0)
+    ripples["target"].height = 0.0
+    with pytest.warns(RippleWarning, match="0.4 m at .* radius is 0.5 m"):
+        run(model, data, ripples, 40)
 
 
 def test_gl_is_looked_at_too(opengl: None) -> None:
@@ -111,9 +191,15 @@ def test_a_target_may_have_any_height_if_that_is_wanted() -> None:
         run(model, data, ripples, 80)
 
 
-def test_a_density_map_is_named_by_its_factor() -> None:
+def test_of_a_map_a_factor_is_named() -> None:
     model, data, ripples = still_ripples()
     ripples.change_material("target", density=np.full(ripples["target"].atlas.areas.shape, 2.0))
     ripples["target"].height = 0.4
-    with pytest.warns(RippleWarning, match="as high would do: as much more"):
+    with pytest.warns(RippleWarning) as caught:
         run(model, data, ripples, 80)
+    [message] = [str(each.message) for each in caught]
+    call = re.search(r"would do: (ripples\.change_material\('target', density=[\d.]+ \* .*)$", message)
+    assert call is not None, message
+    before = ripples["target"].material.density
+    exec(call[1], {"ripples": ripples})
+    assert (ripples["target"].material.density > 4 * before).all()

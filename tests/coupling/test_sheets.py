@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 import trimesh
 from mujoco_models import add_ball
+from vessels import opened
 
 from ripple_sim import Material, Ripples, make_collidable
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scenes.shapes import polygonise, sphere
-from ripple_sim.scenes.vessels import opened
 
 MASS, SPEED = 0.2, 1.5
 

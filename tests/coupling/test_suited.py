@@ -5,7 +5,10 @@ The resolution that a model chooses: by what touches the target, and by the time
 
 import math
 import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
+import gymnasium
 import mujoco
 import numpy as np
 import pytest
@@ -13,6 +16,7 @@ from known_meshes import known_mesh
 
 from ripple_sim import Material, Ripples, Simulation, load_scene
 from ripple_sim.solver import load_mesh
+from ripple_sim.solver.texels.thickness import half_thickness
 
 BOX = """<mujoco><option timestep="0.002"/><worldbody><geom name="target" type="box" size="0.5 0.5 0.25"/>
     <body pos="0 0 0.36"><freejoint/><geom type="box" size="0.15 0.15 0.1" mass="{mass}"/></body>
@@ -75,15 +79,80 @@ def test_waves_suit_the_target_at_every_scale(size: float) -> None:
     assert 1e-4 * size < top < 0.1 * size
 
 
-def test_density_is_the_bodys_mass_over_the_targets_area() -> None:
-    xml = """<mujoco><worldbody><geom name="still" type="sphere" size="0.3"/><body pos="0 0 2"><freejoint/>
-    <geom name="free" type="sphere" size="0.5" mass="7"/></body></worldbody></mujoco>"""
+def test_density_is_the_bodys_mass_over_the_targets_area_if_steps_are_short() -> None:
+    xml = """<mujoco><option timestep="1e-5"/><worldbody><geom name="still" type="sphere" size="0.3"/>
+    <body pos="0 0 2"><freejoint/><geom name="free" type="sphere" size="0.5" mass="7"/></body></worldbody></mujoco>"""
     ripples = Ripples(
         mujoco.MjModel.from_xml_string(xml), {"still": Material(), "free": Material()}, resolution=8, backend="cpu"
     )
     assert ripples["free"].material.density == pytest.approx(7 / (4 * np.pi * 0.25), rel=0.01)
     # the world has no mass: 1000 kg/m^3 times volume over area
     assert ripples["still"].material.density == pytest.approx(1000 * 0.3 / 3, rel=0.01)
+
+
+def test_long_steps_have_less_stiffness_and_more_density() -> None:
+    found = []
+    for dt in (1e-5, 1e-3, 1e-2):
+        model = mujoco.MjModel.from_xml_string(BOX.format(mass=20))
+        model.opt.timestep = dt
+        found.append(Ripples(model, {"target": Material()}, resolution=8, backend="cpu")["target"].material)
+        assert math.sqrt(found[-1].stiffness) * dt < 0.5001
+    free, short, long = found
+    assert free.density == pytest.approx(1000 * 0.5 / 4, rel=0.01)
+    assert free.stiffness > short.stiffness > long.stiffness
+    assert short.density < long.density
+
+
+def test_a_given_stiffness_is_made_up_for_by_the_density() -> None:
+    model = mujoco.MjModel.from_xml_string(BOX.format(mass=20))
+    top, ripples = highest(model, Material(stiffness=0.0), 0.5, resolution=24)
+    assert ripples["target"].material.stiffness == 0.0
+    assert top < 0.25 * 0.25
+
+
+# a ball that falls hard, from many times its size, on something heavy
+FROM_HIGH = """<mujoco><option timestep="{dt}"/><worldbody><geom type="plane" size="9 9 1"/>
+    <body pos="0 0 3"><freejoint/><geom name="target" size="0.15" density="1000" solref="0.004 0.5"/></body>
+    <body pos="0.05 0 0.6"><freejoint/><geom type="box" size="0.4 0.4 0.2" mass="90"/></body></worldbody></mujoco>"""
+
+
+def cheetah(dt: float) -> mujoco.MjModel:
+    """Gymnasium's, with another time step."""
+    model = mujoco.MjModel.from_xml_path(
+        str(Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "half_cheetah.xml")
+    )
+    model.opt.timestep = dt
+    return model
+
+
+@pytest.mark.parametrize("dt", [5e-4, 2e-3, 1e-2])
+@pytest.mark.parametrize(
+    ("make", "targets", "seconds"),
+    [
+        (cheetah, ("ffoot", "bfoot"), 0.6),
+        (lambda dt: mujoco.MjModel.from_xml_string(FROM_HIGH.format(dt=dt)), ("target",), 1.2),
+    ],
+    ids=["cheetah", "ball"],
+)
+@pytest.mark.filterwarnings("ignore:MuJoCo. compiler attribute 'settotalmass'")
+def test_heights_stay_within_a_quarter_of_the_radius_at_every_time_step(
+    make: Callable[[float], mujoco.MjModel], targets: Sequence[str], seconds: float, dt: float
+) -> None:
+    model, rng = make(dt), np.random.default_rng(3)
+    data, ripples = (
+        mujoco.MjData(model),
+        Ripples(model, dict.fromkeys(targets, Material()), resolution=16, backend="cpu"),
+    )
+    for name in targets:
+        ripples.allow_any_height(name)
+        ripples[name].crests()
+    radii = {name: half_thickness(ripples[name].atlas) for name in targets}
+    for step in range(round(seconds / dt)):
+        if step % max(1, round(0.05 / dt)) == 0:
+            data.ctrl[:] = rng.uniform(-1, 1, model.nu)
+        ripples.mj_step(data)
+    for name in targets:
+        assert 0 < (np.abs(ripples[name].crests()) / radii[name]).max() < 0.25
 
 
 def test_what_is_given_stays_and_a_density_says_that_all_is_given() -> None:
@@ -103,6 +172,7 @@ def test_a_heavier_body_is_met_by_a_stiffer_surface_and_no_body_by_the_least_sti
     found = []
     for mass in (1e-6, 20.0, 1000.0):
         model = mujoco.MjModel.from_xml_string(BOX.format(mass=mass))
+        model.opt.timestep = 1e-4
         found.append(Ripples(model, {"target": Material()}, resolution=8, backend="cpu")["target"].material.stiffness)
     assert found[0] == pytest.approx((16 * 4.43 / 1.0) ** 2, rel=0.01)
     assert found[0] < found[1] < found[2]

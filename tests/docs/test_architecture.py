@@ -33,9 +33,19 @@ def test_the_walk_names_modules_that_exist_once_each() -> None:
     assert len(set(named)) == len(named)
 
 
-def test_every_file_that_the_page_names_exists() -> None:
-    named = re.findall(r"`(?:python )?((?:examples|tests|ripple_sim|solver)/[\w/]+\.py)", PAGE.read_text("utf-8"))
+@pytest.mark.parametrize("page", [PAGE, ROOT / "CONTRIBUTING.md"], ids=lambda each: each.stem)
+def test_every_file_that_a_page_names_exists(page: Path) -> None:
+    named = re.findall(r"`(?:python )?((?:examples|tests|ripple_sim|solver)/[\w/]+\.py)", page.read_text("utf-8"))
+    assert len(named) >= 5
     assert not [path for path in named if not (ROOT / path).is_file()]
+
+
+def test_the_house_stays_small(structure) -> None:
+    modules = structure.read()
+    lengths = {name: each.text.count("\n") for name, each in modules.items()}
+    assert len(modules) <= structure.MOST_MODULES
+    assert not {name: length for name, length in lengths.items() if length > structure.MOST_LINES}
+    assert structure.with_one_importer(modules) <= structure.MOST_WITH_ONE_IMPORTER
 
 
 def test_the_drawing_has_the_arrows_of_the_source(architecture) -> None:

@@ -71,9 +71,12 @@ ALLOWED = [
     ("solver/", "piece", "part of a triangle, cut at the edges of the cube"),
     ("solver/", "pieces", "parts of a triangle"),
     ("ripple_sim/cli/", "shell", "bash, zsh, fish"),
-    ("ripple_sim/coupling/colliders/", "shell", "MuJoCo's name for the inertia of a hollow mesh"),
+    (
+        "ripple_sim/coupling/",
+        "shell",
+        "MuJoCo's name for the outside of a soft flex, and for the inertia of a hollow mesh",
+    ),
     ("ripple_sim/scene/drop_model", "shell", "likewise"),
-    ("ripple_sim/coupling/model/", "shell", "MuJoCo's name for the outside of a soft flex"),
     (
         "ripple_sim/render/",
         "shell",

@@ -1,5 +1,6 @@
 """Videos: what goes in comes out, and what cannot be written is refused before anything is rendered."""
 
+import dataclasses
 import itertools
 import threading
 from pathlib import Path
@@ -8,10 +9,11 @@ import av
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
+from unfinished_videos import contents
 
 from ripple_sim.encode import FrameWriter, check_output, default_fps, open_writer
 from ripple_sim.encode.clip import Stream
-from ripple_sim.encode.output import FORMATS, FRAMES_IN_CLIP, Format
+from ripple_sim.encode.output import FORMATS, FRAMES_IN_CLIP, Format, Segments
 from ripple_sim.errors import EncodingError, VideoError
 from ripple_sim.solver.errors import RippleError
 
@@ -280,6 +282,43 @@ def test_an_error_of_the_encoder_reaches_the_caller(tmp_path, gate):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("fails_at", [0, 3, 4, 6])
+def test_after_an_error_of_the_encoder_whole_segments_can_be_resumed(tmp_path, gate, fails_at):
+    gate.open.set()
+    gate._fails_at = fails_at
+    (tmp_path / "clip.mp4").touch()
+    size = {"width": WIDTH, "height": HEIGHT, "fps": FPS}
+    with pytest.raises(EncodingError), open_writer(tmp_path / "clip.mp4", **size, settings={"a": 1}) as writer:
+        for _ in range(100):
+            writer.write(frames(1)[0])
+    assert (tmp_path / "clip.mp4").read_bytes() == b""
+    gate._fails_at = None
+    with open_writer(tmp_path / "clip.mp4", **size, settings={"a": 1}, resume=True) as writer:
+        assert writer.frames == fails_at // 4 * 4
+        writer.write(frames(1)[0])
+
+
+def test_an_error_while_joining_leaves_the_older_video_and_every_segment(tmp_path, gate, monkeypatch):
+    def torn(segments: Segments, path: Path, stream: Stream) -> None:
+        path.write_text("half")
+        raise OSError(28, "No space left on device")
+
+    gate.open.set()
+    monkeypatch.setitem(FORMATS, ".mp4", dataclasses.replace(FORMATS[".mp4"], join=torn))
+    (tmp_path / "clip.mp4").write_bytes(b"older")
+    size = {"width": WIDTH, "height": HEIGHT, "fps": FPS, "settings": {"a": 1}}
+    with (
+        pytest.raises(EncodingError, match="No space"),
+        open_writer(tmp_path / "clip.mp4", **size, overwrite=True) as w,
+    ):
+        for _ in range(5):
+            w.write(frames(1)[0])
+    assert (tmp_path / "clip.mp4").read_bytes() == b"older"
+    with open_writer(tmp_path / "clip.mp4", **size, resume=True, overwrite=True) as writer:
+        assert writer.frames == 5
+        writer.discard()
+
+
 def test_the_time_spent_encoding_is_recorded(tmp_path):
     assert write(tmp_path / "clip.mp4").encode_seconds > 0
 
@@ -358,3 +397,30 @@ def test_a_place_that_cannot_be_written_is_refused(tmp_path):
 def test_the_usual_rate_depends_on_the_format():
     assert default_fps(Path("clip.mp4")) == 60
     assert default_fps(Path("clip.gif")) <= 50
+
+
+def test_without_settings_nothing_survives_an_interruption_and_with_them_it_goes_on(tmp_path: Path) -> None:
+    frame = np.full((16, 24, 3), 77, np.uint8)
+    for settings, left in ((None, []), ({"the scene": "a"}, ["frames.part"])):
+        with (
+            pytest.raises(KeyboardInterrupt),
+            open_writer(tmp_path / "frames", width=24, height=16, fps=25, settings=settings) as writer,
+        ):
+            writer.write(frame)
+            while not writer._part.frames:
+                writer._encoder._thread.join(0.001)
+            raise KeyboardInterrupt
+        assert [path.name for path in tmp_path.iterdir()] == left
+    with open_writer(
+        tmp_path / "frames", width=24, height=16, fps=25, settings={"the scene": "a"}, resume=True
+    ) as writer:
+        assert writer.frames == 1
+        writer.write(frame)
+    assert sorted(contents(tmp_path)) == ["frames/frame_00000.png", "frames/frame_00001.png"]
+
+
+def test_a_file_in_the_place_of_a_parent_folder_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(EncodingError, match=r"cannot write .*file/clip\.mp4: Not a directory"):
+        open_writer(tmp_path / "file" / "clip.mp4", width=24, height=16, fps=25)
+    assert (tmp_path / "file").read_text() == "mine"

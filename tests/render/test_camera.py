@@ -1,9 +1,4 @@
-"""Cameras agree with MuJoCo's.
-
-Bounding balls.
-
-The sRGB transfer curve.
-"""
+"""Cameras agree with MuJoCo's; bounding balls, and their boxes in the frame, hold what they shall; the sRGB curve."""
 
 import mujoco
 import numpy as np
@@ -12,17 +7,16 @@ import pytest
 from ripple_sim.errors import SceneError
 from ripple_sim.render import Camera
 from ripple_sim.render.camera import (
-    Balls,
+    Pose,
     balls_about,
+    boxes_of,
     enclosing,
     find_viewpoint,
-    join,
-    linear_to_srgb,
     perspective,
-    srgb_to_linear,
     view_matrix,
     within,
 )
+from ripple_sim.render.contract import linear_to_srgb, srgb_to_linear
 from ripple_sim.solver import RippleError
 
 MJCF = """<mujoco><worldbody>
@@ -137,39 +131,39 @@ def test_balls_about_triangles_hold_each_and_are_small() -> None:
     angle = random.uniform(0, 2 * np.pi, 300)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(300)], axis=1)
     triangles = ring[:, None] + random.normal(size=(300, 3, 3)) * 0.02
-    centres, radii = balls_about(triangles, 16)
-    inside = np.linalg.norm(triangles[:, :, None] - centres, axis=3) <= radii + 1e-12
+    balls = balls_about(triangles, 16)
+    inside = np.linalg.norm(triangles[:, :, None] - balls[:, :3], axis=3) <= balls[:, 3] + 1e-12
     assert inside.all(axis=1).any(axis=1).all()
-    assert len(radii) == 16
-    assert radii.max() < 0.4
+    assert len(balls) == 16
+    assert balls[:, 3].max() < 0.4
 
 
 def test_fewer_triangles_than_balls() -> None:
     triangles = np.random.default_rng(6).normal(size=(3, 3, 3))
-    centres, radii = balls_about(triangles, 16)
+    balls = balls_about(triangles, 16)
     middles = (triangles.min(axis=1) + triangles.max(axis=1)) / 2
-    np.testing.assert_allclose(np.sort(centres, axis=0), np.sort(middles, axis=0))
-    assert len(radii) == 3
+    np.testing.assert_allclose(np.sort(balls[:, :3], axis=0), np.sort(middles, axis=0))
+    assert len(balls) == 3
 
 
-def random_balls(count: int) -> Balls:
+def random_balls(count: int) -> np.ndarray:
     random = np.random.default_rng(7)
-    return Balls(random.normal(size=(count, 3)), random.uniform(0.1, 0.5, count))
+    return np.column_stack([random.normal(size=(count, 3)), random.uniform(0.1, 0.5, count)])
 
 
 def test_the_enclosing_ball_contains_every_ball() -> None:
     balls = random_balls(9)
     centre, radius = enclosing(balls)
-    assert (np.linalg.norm(balls.centres - centre, axis=1) + balls.radii <= radius + 1e-12).all()
-    assert enclosing(Balls(balls.centres[:1], balls.radii[:1]))[1] == balls.radii[0]
+    assert (np.linalg.norm(balls[:, :3] - centre, axis=1) + balls[:, 3] <= radius + 1e-12).all()
+    assert enclosing(balls[:1])[1] == balls[0, 3]
 
 
 def test_balls_within_reach_are_those_that_it_touches() -> None:
-    balls = join(random_balls(40), Balls(np.array([[9.0, 0.0, 0.0]]), np.array([np.inf])))
+    balls = np.concatenate([random_balls(40), [[9.0, 0.0, 0.0, np.inf]]])
     near = within(balls, np.zeros(3), 1.0)
-    gap = np.linalg.norm(balls.centres, axis=1) - balls.radii
-    np.testing.assert_array_equal(near.radii, balls.radii[gap < 1.0])
-    assert 1 < len(near.radii) < 40
+    gap = np.linalg.norm(balls[:, :3], axis=1) - balls[:, 3]
+    np.testing.assert_array_equal(near, balls[gap < 1.0])
+    assert 1 < len(near) < 40
 
 
 def test_the_curves_are_inverse_to_one_another() -> None:
@@ -182,3 +176,51 @@ def test_the_curves_are_inverse_to_one_another() -> None:
 def test_known_values() -> None:
     np.testing.assert_allclose(srgb_to_linear([0.0, 0.04045, 0.5, 1.0]), [0.0, 0.0031308, 0.21404, 1.0], atol=1e-5)
     np.testing.assert_allclose(linear_to_srgb([0.0, 0.18, 0.5, 1.0]), [0.0, 0.46136, 0.73536, 1.0], atol=1e-5)
+
+
+SIZE = (200, 120)
+
+
+def pose(seed: int, lens: tuple[float, float] = (0.0, 0.0)) -> Pose:
+    rotation, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    rotation[:, 0] *= np.sign(np.linalg.det(rotation))
+    return Pose(np.array([0.3, -0.2, 0.5]), rotation, 2.0, 50.0, lens, 2.0)
+
+
+def pixels(points: np.ndarray, camera: Pose) -> np.ndarray:
+    """Where points show [pixels], [k, 2], and how far away along the camera's axis they lie."""
+    matrix = perspective(camera.fovy, SIZE[0] / SIZE[1], 0.01, 100.0, camera.shear) @ view_matrix(camera)
+    clip = np.c_[points, np.ones(len(points))] @ matrix.T
+    return (0.5 + 0.5 * clip[:, :2] / clip[:, 3:]) * SIZE
+
+
+@pytest.mark.parametrize("lens", [(0.0, 0.0), (0.2, -0.1)])
+def test_box_holds_the_ball(lens: tuple[float, float]) -> None:
+    camera, random = pose(1, lens), np.random.default_rng(2)
+    local = np.stack([random.uniform(-2, 2, 40), random.uniform(-2, 2, 40), random.uniform(-6, -1, 40)], axis=1)
+    radii = random.uniform(0.05, 0.6, 40)
+    centres = camera.eye + local @ camera.rotation.T
+    directions = random.normal(size=(500, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    for centre, radius, box in zip(
+        centres, radii, boxes_of(np.column_stack([centres, radii]), camera, SIZE), strict=True
+    ):
+        shown = np.clip(pixels(centre + radius * directions, camera), 0, SIZE)
+        assert (shown >= box[:2]).all() and (shown <= box[2:]).all()
+
+
+def test_box_of_a_small_ball_is_tight() -> None:
+    camera = pose(3)
+    centre = camera.eye - 3.0 * camera.rotation[:, 2]
+    (box,) = boxes_of(np.array([[*centre, 0.1]]), camera, SIZE)
+    middle, radius = np.array(SIZE) / 2, 0.1 / 3.0 * SIZE[1] / (2 * np.tan(np.radians(25.0)))
+    np.testing.assert_allclose(box, [*(middle - radius), *(middle + radius)], atol=1.3)
+
+
+def test_the_whole_frame_for_a_ball_about_the_eye_or_an_infinite_one_and_nothing_for_one_behind() -> None:
+    camera = pose(4)
+    behind = camera.eye + 2.0 * camera.rotation[:, 2]
+    centres = np.stack([camera.eye, camera.eye + camera.rotation[:, 0], behind])
+    boxes = boxes_of(np.column_stack([centres, [0.5, np.inf, 0.5]]), camera, SIZE)
+    np.testing.assert_array_equal(boxes[:2], [[0, 0, *SIZE]] * 2)
+    assert (boxes[2, :2] == boxes[2, 2:]).all()

@@ -16,7 +16,8 @@ from shader_functions import evaluated
 
 from ripple_sim.errors import RippleWarning
 from ripple_sim.render import Renderer
-from ripple_sim.render.camera import Camera, Pose, srgb_to_linear
+from ripple_sim.render.camera import Camera, Pose
+from ripple_sim.render.contract import srgb_to_linear
 from ripple_sim.render.resources import fitted, srgb_cube, srgb_texture
 
 
@@ -77,7 +78,7 @@ def test_shaders_read_what_was_set(gl, frame, pose):
     with gl:
         frame.bind()
     points = np.column_stack([np.random.default_rng(2).normal(size=(50, 3)), np.ones(50)])
-    file = "gpu/frame_uniforms.glsl"
+    file = "glsl/frame.glsl"
     expected = points @ frame.values["view_projection"].astype(np.float64)
     np.testing.assert_allclose(evaluated(gl, file, "view_projection * x", points), expected, atol=1e-3)
     one = np.zeros((1, 1))

@@ -7,7 +7,7 @@ from shader_functions import evaluated
 
 from ripple_sim.render.targets import GBuffer
 
-FILE = "gpu/g_buffer.glsl"
+FILE = "glsl/g_buffer.glsl"
 BITS = 65535
 
 

@@ -1,10 +1,12 @@
 """Presets in scene files: the same material as in Python, with coefficients on top, and strictly checked."""
 
 import dataclasses
+import inspect
 
 import pytest
 
 from ripple_sim import Material, RippleError
+from ripple_sim.scene.material_entry import LAWS, MaterialChange, MaterialEntry, PresetEntry
 from ripple_sim.scene.scene_file import parse_scene
 
 
@@ -69,3 +71,11 @@ def test_wrong_presets_are_refused_with_what_is_valid(table: dict, message: str)
 def test_what_is_the_same_everywhere_takes_no_map(name: str) -> None:
     with pytest.raises(RippleError, match=rf"Expected `float \| null`, got `str` - at `ripple\[0\].material.{name}`"):
         material_of({name: "map.png"})
+
+
+def test_entries_have_the_coefficients_and_parameters_of_the_solver() -> None:
+    coefficients = {each.name for each in dataclasses.fields(Material) if isinstance(each.default, float)}
+    assert set(MaterialChange.__struct_fields__) == coefficients
+    assert set(MaterialEntry.__struct_fields__) == coefficients | {"preset"}
+    parameters = {name for law in LAWS for name in inspect.signature(getattr(Material, law)).parameters}
+    assert set(PresetEntry.__struct_fields__) == parameters | {"name"}

@@ -15,7 +15,7 @@ from ripple_sim.errors import SceneError
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.scene.target_maps import InsideEntry, evaluate, load_inside
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.operator.coefficients import STIFF
+from ripple_sim.solver.operator.material import STIFF
 
 RADIUS, CORE, SHIFT = 0.5, 0.3, 0.08  # m; the core is shifted towards the body's x
 MODULUS, DENSITY = 500.0, 1000.0

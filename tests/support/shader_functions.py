@@ -46,7 +46,7 @@ def _source(include: str, expression: str, defines: dict[str, object]) -> str:
     text = _FRAGMENT.format(include=f'#include "{include}"', expression=expression)
     name = f"under_test_{next(_numbers)}"  # sources are read once
     (package / f"{name}.glsl").write_text(text)
-    return load_shader(_PACKAGE, name, **{**DEFINES, **defines})
+    return load_shader(_PACKAGE, name, "fragment", VARYING="in", **{**DEFINES, **defines})
 
 
 def evaluated(gl: GLContext, include: str, expression: str, inputs: np.ndarray, **defines: object) -> np.ndarray:

@@ -1,6 +1,6 @@
 "use strict";
 // The light of the studio's soft boxes by direction, as maps, which turn with the camera about the vertical: what surfaces
-// reflect of them, with the share of the sky against that of the floor, and their diffuse light (render/visuals/environment.glsl).
+// reflect of them, with the share of the sky against that of the floor, and their diffuse light (render/glsl/lights.glsl).
 const COAT_ROUGHNESS = 0.06;
 
 class Environment {

@@ -1,5 +1,5 @@
 // From linear radiance to the frame's colours; with LINEAR these are the radiance itself.
-#include "glsl/noise.glsl"
+#include "glsl/sampling.glsl"
 
 #if LINEAR
 vec3 tone_mapped(vec3 radiance)

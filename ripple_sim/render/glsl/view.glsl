@@ -1,21 +1,91 @@
-// What shaders of the view need at a vertex: its ray, and what is the same all over the floor.
-#include "glsl/ray_cast.glsl"
-#include "gpu/hold_uniforms.glsl"
-#include "visuals/environment.glsl"
+// Rays from the eye through the frame, and where they meet the plane of the floor. What varies linearly over the frame is
+// computed at the corners of what is drawn: one triangle over the whole framebuffer, or with TILES squares of the frame.
+#include "glsl/held_uniforms.glsl"
 
-flat out vec3 focus_local;
-flat out vec3 around;   // ambient light on the open floor, without the soft box of the key light
-flat out vec3 key_box;  // and that
-flat out vec3 floor_lit, floor_surround;  // radiance of the open floor by the lights, and by what is around
+VARYING vec2 screen;          // position in the frame, from -1 to 1
+VARYING vec3 way;             // along the ray, one metre along the camera's axis
+VARYING vec3 way_local;       // the same along the floor's axes, and down to it
+flat VARYING vec3 eye_local;  // along the floor's axes from its origin, and up; below it where there is no floor
+flat VARYING vec4 limits;     // half sizes of the floor, near and far plane [m]
+flat VARYING vec3 focus_local;
+flat VARYING vec3 around;   // ambient light on the open floor, without the soft box of the key light
+flat VARYING vec3 key_box;  // and that
+flat VARYING vec3 floor_lit, floor_surround;  // radiance of the open floor by the lights, and by what is around
 
-// `place` is the position in the frame, from -1 to 1.
-void set_view(vec2 place)
+#stage vertex
+#include "glsl/lights.glsl"
+
+uniform float level;  // depth of what is drawn
+#if TILES
+in vec2 in_corner;    // the tile's lower left
+uniform vec2 extent;  // of a tile
+#else
+uniform vec2 span = vec2(1.0);  // of the framebuffer, in frames
+uniform float reach = 1.0;      // of the viewport, in framebuffers
+#endif
+
+vec3 along_floor(vec3 v)
 {
-    cast_ray(place);
+    return vec3(dot(v, floor_u.xyz), dot(v, floor_v.xyz), dot(v, floor_normal.xyz));
+}
+
+void main()
+{
+#if TILES
+    screen = in_corner + extent * vec2(gl_VertexID & 1, gl_VertexID >> 1);
+    vec2 drawn = screen;
+#else
+    vec2 corner = 4.0 * vec2(gl_VertexID == 1, gl_VertexID == 2), drawn = corner / reach - 1.0;
+    screen = corner * span - 1.0;
+#endif
+    way = ray.xyz + screen.x * ray_right.xyz + screen.y * ray_up.xyz;
+    way_local = along_floor(way) * vec3(1.0, 1.0, -1.0);
+    eye_local = along_floor(eye.xyz - floor_origin.xyz);
+    eye_local.z = floor_origin.w > 0.0 ? eye_local.z : -1.0;
+    limits = vec4(floor_u.w, floor_v.w, ray.w, ray_right.w);
     focus_local = along_floor(focus.xyz - floor_origin.xyz);
     around = ambient(floor_normal.xyz, vec3(0.0), vec3(0.0));
     key_box = diffuse_box(0, floor_normal.xyz);
     floor_lit = floor_albedo.rgb * (floor_light.rgb + key_box);
     floor_surround = floor_albedo.rgb * around;
     hold_uniforms();
+    gl_Position = vec4(drawn, 2.0 * level - 1.0, 1.0);
+}
+
+#stage fragment
+// Negative where the ray meets the floor's plane between two of the floor's edges; varies linearly across them.
+vec2 beside_edges()
+{
+    return abs(way_local.z * eye_local.xy + eye_local.z * way_local.xy) - way_local.z * limits.xy;
+}
+
+// Negative where the ray meets the floor's upper side; varies linearly across the edges.
+float beside_floor()
+{
+    vec2 beside = beside_edges();
+    return max(max(beside.x, beside.y), 1e-6 * eye_local.z - way_local.z);
+}
+
+bool meets_floor()
+{
+    return eye_local.z > 0.0 && beside_floor() < 0.0;
+}
+
+// How far along `way` the floor's plane lies.
+float floor_distance()
+{
+    return min(eye_local.z / max(way_local.z, 1e-9), 1e6);
+}
+
+// Distance along the camera's axis of a depth in the buffer.
+float eye_distance(float depth)
+{
+    return limits.z * limits.w / (limits.w - depth * (limits.w - limits.z));
+}
+
+// Depth of the floor in the buffer; 1 where the ray misses it.
+float floor_depth()
+{
+    float met = (limits.w - limits.z * limits.w * way_local.z / eye_local.z) / (limits.w - limits.z);
+    return meets_floor() ? met : 1.0;
 }

@@ -1,38 +1,34 @@
-// What blocks the light, from means over parts of the shadow maps.
-#include "passes/shadow_map.glsl"
+#version 430
+// What may block a light: how much of the shadow map is covered, and that times the distance from the light [m] and times
+// its square. Mipmaps of it are means over as much as the search for blockers steps over.
+#include "glsl/frame.glsl"
 
-layout(binding = BLOCKERS_UNIT) uniform sampler2D blockers;  // see blockers_fragment.glsl
+VARYING vec2 screen;  // from -1 to 1
 
-// Level of `blockers` whose texels are so wide a share of the map, or the finest.
-float blockers_level(float footprint)
+#stage vertex
+void main()
 {
-    return log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
+    screen = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+    gl_Position = vec4(screen, -1.0, 1.0);
 }
 
-// The same for one of the points of a disc, by its place in their order, 0 to 1. `whole` levels cost half of those between,
-// of which two are read: in place of them some points take the lower and some the higher. On the floor it would be seen.
-float point_level(float footprint, float order, bool whole)
-{
-    float level = blockers_level(footprint);
-    return whole ? floor(level + order) : level;
-}
+#stage fragment
+layout(binding = SHADOW_MAPS_UNIT) uniform sampler2D shadow_maps;
 
-// Mean of what covers a map about a point, over so much of the map: see blockers_fragment.glsl.
-vec3 blockers_mean(int light, vec2 point, float footprint)
-{
-    return textureLod(blockers, in_maps(light, point), blockers_level(footprint)).rgb;
-}
+out vec4 fragment;
 
-// What covers a map about a point and lies before a surface: a share of the map, its distance from the light [m], and how
-// far before the surface the mean of all is [m].
-struct Blockers { float share, distance, before; };
-
-// What covers the map is in part the surface itself; the rest blocks: two distances with that mean and that variance
-// (Yang et al., Variance Soft Shadow Mapping, 2010).
-Blockers blockers_about(int light, vec2 point, float level, float behind)
+void main()
 {
-    vec3 mean = textureLod(blockers, in_maps(light, point), level).rgb;
-    float usual = mean.y / max(mean.x, 1e-4), variance = max(mean.z / max(mean.x, 1e-4) - usual * usual, 0.0);
-    float before = max(behind - usual, 1e-6);
-    return Blockers(mean.x * before * before / (before * before + variance), usual - variance / before, before);
+    vec2 place = 0.5 * screen + 0.5;
+    int light = int(place.x * float(SHADOWS));
+    // all of its 4 x 4 texels: with fewer, edges of shadows are ragged where penumbras are narrow
+    vec4 depths[4] = vec4[](
+        textureGatherOffset(shadow_maps, place, ivec2(-1, -1)), textureGatherOffset(shadow_maps, place, ivec2(1, -1)),
+        textureGatherOffset(shadow_maps, place, ivec2(-1, 1)), textureGatherOffset(shadow_maps, place, ivec2(1, 1)));
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < 4; ++i) {
+        vec4 covers = 1.0 - step(1.0, depths[i]), away = light_distance(shadows[light].depth, depths[i]);
+        sum += vec3(dot(covers, vec4(1.0)), dot(covers, away), dot(covers, away * away));
+    }
+    fragment = vec4(sum / 16.0, 1.0);
 }

@@ -1,62 +1,28 @@
 """Deferred shading: the G-buffer is lit, each visible surface of a pixel once, with the floor and the background.
 
-The tiles of the frame in which something may show.
-
-The reflection in the floor: the scene as a camera below the floor sees it.
+What is transparent follows layer by layer. The reflection in the floor is shaded likewise, as a camera below sees it.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from typing import Any, cast
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import Balls, Pose
+from ripple_sim.render.camera import Pose, boxes_of, scissor_of
 from ripple_sim.render.contract import LEVELS, Unit
-from ripple_sim.render.resources import FrameUniforms, Resources
-from ripple_sim.render.targets import FrameFormat, GBuffer
+from ripple_sim.render.resources import SRGB8_ALPHA8, FrameUniforms, Resources
+from ripple_sim.render.targets import FrameFormat, FramePass, GBuffer
 from ripple_sim.solver.errors import RippleError
 
 from .background import Background, CoarseBackground
 from .floor import Floor
-from .layers import FramePass, TransparentLayers, boxes_of, scissor_of
 
 _TILE = 32  # [pixels]
-
-
-class Tiles:
-    """The square tiles of the frame that any of some boxes touches, as instances for a shader.
-
-    Parameters
-    ----------
-    resources : Resources
-    size : (width, height)
-        Of the frame [pixels].
-    """
-
-    def __init__(self, resources: Resources, size: tuple[int, int]) -> None:
-        self._mask = np.zeros((-(-size[1] // _TILE), -(-size[0] // _TILE)), dtype=bool)
-        self._scale = 2.0 * _TILE / np.array(size)
-        self.buffer: moderngl.Buffer = resources.buffer(reserve=8 * self._mask.size, dynamic=True)
-        self.count = 0
-
-    @property
-    def extent(self) -> tuple[float, float]:
-        """Width and height of a tile, where the frame extends from -1 to 1."""
-        return float(self._scale[0]), float(self._scale[1])
-
-    def cover(self, boxes: NDArray[np.int64]) -> None:
-        """Select the tiles that any of some boxes [k, 4] touches; see `boxes_of`."""
-        self._mask[...] = False
-        for left, lower, right, upper in boxes[(boxes[:, :2] < boxes[:, 2:]).all(axis=1)]:
-            self._mask[lower // _TILE : -(-upper // _TILE), left // _TILE : -(-right // _TILE)] = True
-        tiles = np.argwhere(self._mask)[:, ::-1]
-        self.count = len(tiles)
-        if self.count:
-            self.buffer.write((tiles * self._scale - 1.0).astype("f4").tobytes())
 
 
 class DeferredShading:
@@ -78,7 +44,9 @@ class DeferredShading:
     ----------
     frame : moderngl.Framebuffer
         Multiplied by alpha.
-    layers : TransparentLayers
+    g_buffer : GBuffer
+    options : dict
+        Defines of the shaders that read it.
 
     Raises
     ------
@@ -91,36 +59,39 @@ class DeferredShading:
     ) -> None:
         size = frame_format.size
         _check_size(resources, size)
-        self._g_buffer = GBuffer(resources, size, frame_format.samples)
+        self.g_buffer = GBuffer(resources, size, frame_format.samples)
         self.frame: moderngl.Framebuffer = resources.framebuffer(
             [resources.renderbuffer(size, 4, dtype=frame_format.dtype)], resources.depth_renderbuffer(size)
         )
-        options = {
+        self.options = options = {
             **light_options,
             "LINEAR": int(frame_format.linear),
-            "SAMPLES": self._g_buffer.samples,
+            "SAMPLES": self.g_buffer.samples,
             "CUT_OUT": int(frame_format.alpha),
             "TILED": int(floor is not None and floor.tiled),
             "MIRROR": int(floor is not None and floor.reflects and not frame_format.alpha),
         }
         smooth = not any(options[name] for name in ("CUT_OUT", "TILED", "MIRROR", "SKYBOX"))
         self._background = (CoarseBackground if smooth else Background)(resources, size, options, floor)
-        self._solids = FramePass(resources, "passes/deferred_fragment", size, **options, LAYER=0)
-        self.layers = TransparentLayers(resources, frame_format, self._g_buffer, self.frame, options)
-        self._tiles = Tiles(resources, size)
-        classify = resources.program("passes/tiles_vertex", "passes/classify_fragment", **options, LAYER=0)
-        classify["extent"] = self._tiles.extent
-        self._classify = resources.vertex_array(classify, [(self._tiles.buffer, "2f/i", "in_corner")])
+        self._solids = FramePass(resources, "passes/deferred", size, **options, LAYER=0)
+        # where solids may show, square tiles are classified, as instances
+        self._mask = np.zeros((-(-size[1] // _TILE), -(-size[0] // _TILE)), dtype=bool)
+        self._extent = 2.0 * _TILE / np.array(size)  # of a tile, where the frame extends from -1 to 1
+        self._corners = resources.buffer(reserve=8 * self._mask.size, dynamic=True)
+        classify = resources.program("passes/classify", **options, LAYER=0, TILES=1)
+        classify["level"] = 0.5  # any will do
+        classify["extent"] = tuple(self._extent)
+        self._classify = resources.vertex_array(classify, [(self._corners, "2f/i", "in_corner")])
 
     def clear(self, ctx: moderngl.Context) -> None:
         """Forget the last frame's surfaces."""
-        self._g_buffer.use(ctx)
-        self._g_buffer.clear()
+        self.g_buffer.use(ctx)
+        self.g_buffer.clear()
 
     def begin(self, ctx: moderngl.Context) -> None:
         """Draw into the cleared G-buffer from now on."""
         ctx.depth_func = "<="
-        self._g_buffer.use(ctx)
+        self.g_buffer.use(ctx)
 
     def shade(self, ctx: moderngl.Context, boxes: NDArray[np.int64]) -> None:
         """Shade what was drawn, with the floor and the background.
@@ -131,8 +102,7 @@ class DeferredShading:
         boxes : int64 [k, 4]
             Where solids may show; see `boxes_of`.
         """
-        self._g_buffer.bind()
-        self._tiles.cover(boxes)
+        self.g_buffer.bind()
         self._background.prepare(ctx)
         self.frame.use()  # clearing keeps within the scissor in use, which the reflection's frame may have left
         # every pixel gets its colour from the background, or the classification
@@ -142,13 +112,22 @@ class DeferredShading:
         self.frame.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
         ctx.depth_func = "1"
-        if self._tiles.count:
-            self._classify.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=self._tiles.count)
+        self._classify_tiles(boxes)
         self._background.draw(ctx, self.frame)
         self.frame.depth_mask = False
         self._shade_solids(ctx, scissor_of(boxes))
         self.frame.depth_mask = True
         ctx.depth_func = "<="
+
+    def _classify_tiles(self, boxes: NDArray[np.int64]) -> None:
+        """Mark pixels by what their samples show, in the tiles that any of some boxes [k, 4] touches."""
+        self._mask[...] = False
+        for left, lower, right, upper in boxes[(boxes[:, :2] < boxes[:, 2:]).all(axis=1)]:
+            self._mask[lower // _TILE : -(-upper // _TILE), left // _TILE : -(-right // _TILE)] = True
+        tiles = np.argwhere(self._mask)[:, ::-1]
+        if len(tiles):
+            self._corners.write((tiles * self._extent - 1.0).astype("f4").tobytes())
+            self._classify.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
 
     def _shade_solids(self, ctx: moderngl.Context, scissor: tuple[int, int, int, int] | None) -> None:
         """Shade pixels with solids, over the background."""
@@ -172,6 +151,67 @@ def _check_size(resources: Resources, size: tuple[int, int]) -> None:
             f"frame size is {width}x{height} pixels; valid with this driver are 1 to {limit} along each side: choose a "
             "size within that"
         )
+
+
+class TransparentLayers:
+    """Adds layers to a frame, which has been shaded, and whose G-buffer still holds what is opaque.
+
+    Parameters
+    ----------
+    resources : Resources
+    frame_format : FrameFormat
+    shading : DeferredShading
+        Of the frame.
+    """
+
+    def __init__(self, resources: Resources, frame_format: FrameFormat, shading: DeferredShading) -> None:
+        size = frame_format.size
+        self._g_buffer, self._frame = shading.g_buffer, cast(Any, shading.frame)  # its scissor may be None
+        kind = {"dtype": "f2"} if frame_format.linear else {"internal_format": SRGB8_ALPHA8}
+        self._behind = resources.texture(size, 4, **kind)
+        self._behind.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        self._behind.repeat_x = self._behind.repeat_y = False
+        self._behind_framebuffer = resources.framebuffer([self._behind])
+        self._classify = FramePass(resources, "passes/classify", size, **shading.options, LAYER=1)
+        self._shade = FramePass(resources, "passes/deferred", size, **shading.options, LAYER=1)
+
+    def add(self, ctx: moderngl.Context, number: int, draw: Callable[[], None], boxes: NDArray[np.int64]) -> None:
+        """Draw and shade a single transparent object over the frame.
+
+        Parameters
+        ----------
+        ctx : moderngl.Context
+        number : int
+            In the table of objects.
+        draw : callable
+            Draws it into the G-buffer.
+        boxes : int64 [k, 4]
+            Where it may show; see `boxes_of`.
+        """
+        scissor = scissor_of(boxes)
+        if scissor is None:
+            return
+        self._g_buffer.use(ctx)
+        draw()
+        frame = self._frame
+        ctx.copy_framebuffer(self._behind_framebuffer, frame)
+        self._behind.build_mipmaps()
+        frame.use()
+        ctx.enable_only(moderngl.BLEND | moderngl.DEPTH_TEST)
+        ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+        frame.scissor = scissor
+        self._behind.use(Unit.BEHIND)
+        for each in (self._classify, self._shade):
+            each.program["layer"] = number
+        ctx.depth_func = "1"
+        self._classify.run(frame, 0.0)
+        ctx.depth_func = "=="
+        frame.depth_mask = False
+        self._shade.run(frame, LEVELS["LAYER"])
+        frame.depth_mask = True
+        ctx.depth_func = "<="
+        frame.scissor = None
+        ctx.disable(moderngl.BLEND)
 
 
 class Mirror:
@@ -205,7 +245,7 @@ class Mirror:
         ctx: moderngl.Context,
         frame: FrameUniforms,
         pose: Pose,
-        balls: Balls,
+        balls: NDArray[np.float64],
         draw_solids: Callable[[], None],
         bind_maps: Callable[[], None],
     ) -> None:
@@ -217,7 +257,7 @@ class Mirror:
         frame : FrameUniforms
         pose : Pose
             Of the camera above the floor.
-        balls : Balls
+        balls : float64 [k, 4]
             That contain all solids.
         draw_solids, bind_maps : callable
             Draw the solids into the G-buffer; bind what shading needs.

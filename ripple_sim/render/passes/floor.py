@@ -1,7 +1,4 @@
-"""The floor: a plane that fades into the background.
-
-Ambient occlusion of the floor by what is above it.
-"""
+"""The floor: a plane that fades into the background, and its ambient occlusion by what is above it."""
 
 from __future__ import annotations
 
@@ -13,11 +10,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import Balls, orthographic, srgb_to_linear
-from ripple_sim.render.contract import MappingKind, Unit
+from ripple_sim.render.camera import orthographic
+from ripple_sim.render.contract import MappingKind, Unit, srgb_to_linear
 from ripple_sim.render.resources import FrameUniforms, Resources
-from ripple_sim.render.visuals.instances import Assets
 from ripple_sim.render.visuals.lights import Light
+from ripple_sim.render.visuals.objects import Assets
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual, texture_pixels
 
@@ -67,7 +64,7 @@ class Floor:
         mapping = mapping_of(model, visual)
         self.tiled = mapping.kind == MappingKind.FLAT_IMAGE
         self.tiling, self.albedo, self.tint = mapping.tiling, visual.color, visual.color
-        self._image = assets.textures.get(mapping.texture) if self.tiled else None
+        self._image = assets.texture(mapping.texture) if self.tiled else None
         if self.tiled:
             texels = srgb_to_linear(texture_pixels(model, mapping.texture) / 255.0)
             self.albedo = self.tint * texels.mean(axis=(0, 1))
@@ -97,9 +94,9 @@ class Floor:
         frame.set_vector("floor_albedo", self.albedo)
         frame.set_vector("floor_map", [local[0], local[1], half_width])
 
-    def shade(self, frame: FrameUniforms, lights: list[Light], casters: Balls) -> None:
+    def shade(self, frame: FrameUniforms, lights: list[Light], casters: NDArray[np.float64]) -> None:
         """Set the parts of the floor on which the shadows of some balls may fall, for each light."""
-        points = casters.centres[:, None] + casters.radii[:, None, None] * _CORNERS
+        points = casters[:, None, :3] + casters[:, 3:, None] * _CORNERS
         for shadow, light in zip(frame.values["shadows"], lights, strict=False):
             shadow["floor"] = self._shaded_box(light, points)
 
@@ -147,7 +144,7 @@ class FloorOcclusion:
             self._seen = resources.texture((1, 1), 4, bytes([255] * 4))
             self._bounce = resources.texture((1, 1), 4, bytes(8), dtype="f2")
             return
-        program = resources.program("glsl/view_vertex", "passes/floor_occlusion_fragment", **options)
+        program = resources.program("passes/floor_occlusion", **options, TILES=0)
         self._pass = resources.vertex_array(program, [])
         ceiling = _CEILING_SIZE, _CEILING_SIZE
         self._ceiling = resources.texture(ceiling, 4, dtype="nu2")

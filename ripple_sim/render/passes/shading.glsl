@@ -1,13 +1,9 @@
 // How a solid surface reflects light: GGX highlights with Schlick's Fresnel term over a diffuse, translucent base, under
 // a clear coat.
-#include "glsl/pixel_block.glsl"
-#include "passes/floor_map.glsl"
-#include "passes/transmission.glsl"
-#include "visuals/environment.glsl"
-#include "visuals/lights.glsl"
-#include "visuals/occluders.glsl"
-
-flat in vec3 floor_lit, floor_surround;  // radiance of the open floor by the lights, and by what is around
+#include "glsl/floor_map.glsl"
+#include "glsl/lights.glsl"
+#include "glsl/occluders.glsl"
+#include "glsl/soft_shadows.glsl"
 
 struct Material {
     vec3 albedo;

@@ -66,7 +66,7 @@ class ShadowMaps:
         self._blockers.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         self._blockers.repeat_x = self._blockers.repeat_y = False
         self._blockers_target = resources.framebuffer([self._blockers])
-        program = resources.program("glsl/screen_vertex", "passes/blockers_fragment", SHADOWS=count)
+        program = resources.program("passes/blockers", SHADOWS=count)
         self._find_blockers = resources.vertex_array(program, [])
 
     def fit(self, frame: FrameUniforms, lights: list[Light], centre: NDArray, radius: float) -> list[Light]:

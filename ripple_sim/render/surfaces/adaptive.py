@@ -1,10 +1,7 @@
 """Adaptive tessellation: for each frame, triangles are split at the edges from which the waves depart.
 
-Heights between the texels on the processor, by the quadratic B-spline of spline.glsl.
-
-Adaptive tessellation on the GPU: the triangles of `AdaptiveTessellation`, in its order, from a texture's heights.
-
-The triangles of a target in one frame: fine where its waves are sharp.
+Either on the processor, from heights in its memory, or on the GPU, from a texture's heights: the same triangles in the
+same order. Heights between the texels are those of a quadratic B-spline (glsl/height_maps.glsl).
 """
 
 from __future__ import annotations
@@ -13,13 +10,11 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.contract import Splitting
+from ripple_sim.render.contract import Binding
 from ripple_sim.render.resources import Resources
-from ripple_sim.solver.kernel import Bools, Floats, Floats32, Ints32, kernel
+from ripple_sim.solver.kernel import Floats, Floats32, Ints32, kernel
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 
-from .surface import Charts
-from .tessellation import Edges
 from .vertices import POSITION, SurfaceVertices
 
 
@@ -39,30 +34,32 @@ def spline_samples(page: ChartPage, places: NDArray) -> tuple[NDArray[np.int32],
     return np.column_stack([chart, nearest]).astype(np.int32), (place - nearest).astype(np.float32)
 
 
+@kernel(inline="always")
+def spline_weights(t: np.float32) -> tuple[np.float32, np.float32, np.float32]:
+    """Weights of the texels before, at and after the nearest one at a distance from its centre, along an axis.
+
+    glsl/height_maps.glsl has the same for both axes.
+    """
+    half = np.float32(0.5)
+    return half * (half - t) * (half - t), np.float32(0.75) - t * t, half * (half + t) * (half + t)
+
+
 @kernel
 def spline_heights(height_map: Floats32, texel: Ints32, offset: Floats32) -> Floats32:
     """Heights [k] of a height map [C, n + 2, n + 2, 4] at offsets [k, 2] in texels [k, 3]; see `spline_samples`."""
     height = np.empty(len(texel), np.float32)
-    half, most = np.float32(0.5), np.float32(0.75)
     for i in range(len(texel)):
         # number by number: unpacking rows takes longer than all the rest
         chart, row, column = texel[i, 0], texel[i, 1], texel[i, 2]
-        s, t = offset[i, 0], offset[i, 1]
-        left, right = half * (half - t) * (half - t), half * (half + t) * (half + t)
-        middle = most - t * t
-        low, mean, high = height_map[chart, row], height_map[chart, row + 1], height_map[chart, row + 2]
-        height[i] = (
-            half * (half - s) * (half - s) * _across(low, column, left, middle, right)
-            + (most - s * s) * _across(mean, column, left, middle, right)
-            + half * (half + s) * (half + s) * _across(high, column, left, middle, right)
-        )
+        down, across = spline_weights(offset[i, 0]), spline_weights(offset[i, 1])
+        total = np.float32(0)
+        for j in range(3):
+            line = height_map[chart, row + j]
+            total += down[j] * (
+                across[0] * line[column, 3] + across[1] * line[column + 1, 3] + across[2] * line[column + 2, 3]
+            )
+        height[i] = total
     return height
-
-
-@kernel(inline="always")
-def _across(texels: Floats32, column: int, left: np.float32, middle: np.float32, right: np.float32) -> np.float32:
-    """Weighted height of three texels of a row [n + 2, 4], from a column on."""
-    return left * texels[column, 3] + middle * texels[column + 1, 3] + right * texels[column + 2, 3]
 
 
 class AdaptiveTessellation:
@@ -73,14 +70,7 @@ class AdaptiveTessellation:
 
     Parameters
     ----------
-    F : array, shape [m, 3]
-        Triangles.
-    edges : Edges
-        Of the triangles, k of them.
-    positions : array, shape [n + k, 3]
-        Of the vertices, followed by the edges' midpoints [m].
-    places : array, shape [n + k, 2]
-        Where the height map is looked up, on the page of charts [texels].
+    vertices : SurfaceVertices
     page : ChartPage
     tolerance : float
         How far the height at a midpoint may differ from the mean of those at the ends [m].
@@ -104,25 +94,19 @@ class AdaptiveTessellation:
         how far it is off their centre, in rows and columns.
     """
 
-    def __init__(
-        self,
-        F: NDArray,
-        edges: Edges,
-        positions: NDArray,
-        places: NDArray,
-        page: ChartPage,
-        tolerance: float,
-        min_length: float,
-    ) -> None:
+    def __init__(self, vertices: SurfaceVertices, page: ChartPage, tolerance: float, min_length: float) -> None:
+        edges, positions = vertices.edges, vertices.attributes[:, POSITION]
         self.base_count = len(positions) - len(edges.ends)
-        self.faces, self.sides = np.asarray(F, np.int32), np.asarray(edges.of_side, np.int32)
+        self.faces, self.sides = np.asarray(vertices.F, np.int32), np.asarray(edges.of_side, np.int32)
         self.length = np.linalg.norm(positions[edges.ends[:, 1]] - positions[edges.ends[:, 0]], axis=1)
         self.tolerance = np.float32(tolerance)
         # heights are looked up at the ends of the edges that may be split, and then at these edges' midpoints
         self.long = np.flatnonzero(self.length >= min_length).astype(np.int32)
         ends, index = np.unique(edges.ends[self.long], return_inverse=True)
         self.ends = index.reshape(-1, 2).astype(np.int32)
-        self.texel, self.offset = spline_samples(page, places[np.concatenate([ends, self.base_count + self.long])])
+        self.texel, self.offset = spline_samples(
+            page, vertices.lookups[np.concatenate([ends, self.base_count + self.long])]
+        )
 
     def __call__(self, height_map: NDArray[np.float32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Triangles [t, 3] for a height map [C, n + 2, n + 2, 4], and the midpoints [s], as vertices, that they use.
@@ -132,23 +116,14 @@ class AdaptiveTessellation:
         whole = self.faces, np.empty(0, np.int32)
         if not len(self.long) or not height_map[..., 3].any():
             return whole
-        split = self.long[_departing(spline_heights(height_map, self.texel, self.offset), self.ends, self.tolerance)]
+        height = spline_heights(height_map, self.texel, self.offset)
+        middle, ends = height[-len(self.long) :], height[self.ends]
+        split = self.long[np.abs(middle - np.float32(0.5) * (ends[:, 0] + ends[:, 1])) > self.tolerance]
         if not len(split):
             return whole
         midpoint = np.full(len(self.length), -1, np.int32)
         midpoint[split] = used = np.int32(self.base_count) + split
         return _triangles(self.faces, self.sides, midpoint, self.length), used
-
-
-@kernel
-def _departing(height: Floats32, ends: Ints32, tolerance: np.float32) -> Bools:
-    """Which edges' midpoints, the last k of the heights, are off the mean of their ends [k, 2]."""
-    departing = np.empty(len(ends), np.bool_)
-    first = len(height) - len(ends)
-    for i in range(len(ends)):
-        mean = np.float32(0.5) * (height[ends[i, 0]] + height[ends[i, 1]])
-        departing[i] = abs(height[first + i] - mean) > tolerance
-    return departing
 
 
 @kernel
@@ -242,18 +217,18 @@ class DeviceTessellation:
         sides = adaptive.sides
         faces = np.concatenate([adaptive.faces, adaptive.base_count + sides, rank.ravel()[sides]], axis=1)
         self._buffers = {
-            Splitting.SPLIT: self.split,
-            Splitting.LONG_EDGES: buffer(np.column_stack([adaptive.long, adaptive.ends, middles])),
-            Splitting.LOOKUPS: buffer(places, "f4"),
-            Splitting.FACES: buffer(faces),
-            Splitting.BEFORE: buffer(np.zeros(len(faces))),
-            Splitting.TOTALS: buffer(np.zeros(groups)),
-            Splitting.INDICES: indices,
-            Splitting.COMMAND: self.command,
+            Binding.SPLIT: self.split,
+            Binding.LONG_EDGES: buffer(np.column_stack([adaptive.long, adaptive.ends, middles])),
+            Binding.LOOKUPS: buffer(places, "f4"),
+            Binding.FACES: buffer(faces),
+            Binding.BEFORE: buffer(np.zeros(len(faces))),
+            Binding.TOTALS: buffer(np.zeros(groups)),
+            Binding.INDICES: indices,
+            Binding.COMMAND: self.command,
         }
         self._split_edges, self._count, self._add, self._write = (
-            resources.compute_shader(f"surfaces/{name}", GROUP=_GROUP, FIRST_MIDPOINT=adaptive.base_count)
-            for name in ("split_edges", "count_triangles", "add_counts", "write_triangles")
+            resources.compute_shader("surfaces/adaptive", stage, GROUP=_GROUP, FIRST_MIDPOINT=adaptive.base_count)
+            for stage in ("split", "count", "add", "write")
         )
 
     def run(self, ctx: moderngl.Context) -> None:
@@ -269,68 +244,3 @@ class DeviceTessellation:
                     shader["count"] = count
                 shader.run(-(-count // _GROUP))
                 ctx.memory_barrier()
-
-
-PIXELS = 5.6  # length of an edge where the target fills the frame's height
-_TOLERANCE = 0.25  # [pixels], likewise: edges from which the waves depart further are split
-
-
-class SurfaceTriangles:
-    """Triangles of a target on the GPU, found by the host from its copy of the heights, or by the device from its own.
-
-    Parameters
-    ----------
-    resources : Resources
-    vertices : SurfaceVertices
-    charts : Charts
-    layer : int
-        Of the height map.
-    pixel : float
-        Size of a pixel on the target where it fills the frame's height [m].
-
-    Attributes
-    ----------
-    indices : moderngl.Buffer
-        Three vertices a triangle.
-    count : int or moderngl.Buffer
-        Of the indices in use; the device's is an indirect draw call.
-    midpoints : int32 array or moderngl.Buffer
-        Edges whose midpoints are in use; the device's has a flag for every edge.
-    """
-
-    count: int | moderngl.Buffer
-    midpoints: NDArray[np.int32] | moderngl.Buffer
-
-    def __init__(
-        self, resources: Resources, vertices: SurfaceVertices, charts: Charts, layer: int, pixel: float
-    ) -> None:
-        self._resources, self._page, self._layer = resources, charts.page, layer
-        self._tessellation = AdaptiveTessellation(
-            vertices.F,
-            vertices.edges,
-            vertices.attributes[:, POSITION],
-            vertices.lookups,
-            charts.page,
-            tolerance=_TOLERANCE * pixel,
-            min_length=1.5 * PIXELS * pixel,
-        )
-        self.indices = resources.buffer(reserve=4 * 12 * len(vertices.F), dynamic=True)
-        self._written: NDArray[np.int32] | None = None
-        self._on_device: DeviceTessellation | None = None
-
-    def find(self, height_map: NDArray[np.float32]) -> None:
-        """Find the triangles for heights, [C, n + 2, n + 2, 4], and write those that are not there yet."""
-        triangles, self.midpoints = self._tessellation(height_map)
-        if triangles is not self._written:
-            self.indices.write(triangles)
-            self._written = triangles
-        self.count = triangles.size
-
-    def find_on_device(self, ctx: moderngl.Context) -> None:
-        """Have the device find the triangles for the heights that are bound; storage buffers are bound for that."""
-        if self._on_device is None:
-            self._on_device = DeviceTessellation(
-                self._resources, self._tessellation, self._page, self._layer, self.indices
-            )
-        self._on_device.run(ctx)
-        self.midpoints, self.count, self._written = self._on_device.split, self._on_device.command, None

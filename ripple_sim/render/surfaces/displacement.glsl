@@ -3,8 +3,8 @@
 // leave them: once a frame for all passes.
 layout(local_size_x = VERTEX_GROUP) in;
 
-#include "surfaces/height_maps.glsl"
-#include "visuals/occluders.glsl"
+#include "glsl/height_maps.glsl"
+#include "glsl/occluders.glsl"
 
 struct Vertex { float position[3], direction[3], place[2]; };
 layout(std430, binding = REST_VERTICES_BINDING) readonly buffer RestVertices { Vertex rest[]; };

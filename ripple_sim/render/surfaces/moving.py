@@ -1,14 +1,9 @@
-"""Points and normals of a tessellated surface whose own vertices move.
-
-Ambient occlusion and thickness of a surface that moves.
-
-A tessellated surface and its height map, wherever its mesh is.
-"""
+"""A tessellated surface whose own vertices move: its points and normals, ambient occlusion, and height map."""
 
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,22 +18,28 @@ from ripple_sim.solver.waves.motion import MovedGradients
 
 from .vertices import coarse_mesh
 
-
-class Moved(NamedTuple):
-    """Points [m], directions of displacement and normals, float32 [n, 3] each, and a mesh's vertices [k, 3] [m]."""
-
-    points: Floats32
-    directions: Floats32
-    normals: Floats32
-    V: Floats
+# where points are [m], directions of displacement, and normals, float32 [n, 3] each
+Moved: TypeAlias = tuple[Floats32, Floats32, Floats32]
 
 
-class Riding(NamedTuple):
-    """Points at rest: vertices and weights of their triangles [n, 3], way from there, directions, normals [n, 3]."""
+class Attachment(NamedTuple):
+    """How points hang on the triangles of a mesh at rest.
+
+    Attributes
+    ----------
+    corners : int64 [n, 3]
+        Vertices of the nearest triangle.
+    weights : float64 [n, 3]
+        Of these, at the nearest place.
+    offset : float64 [n, 3]
+        Way from there to the point [m].
+    directions, normals : float64 [n, 3]
+        At the point.
+    """
 
     corners: Ints
     weights: Floats
-    off: Floats
+    offset: Floats
     directions: Floats
     normals: Floats
 
@@ -59,7 +60,7 @@ class MovingVertices:
 
     Attributes
     ----------
-    rest : Riding
+    rest : Attachment
     """
 
     def __init__(self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, normals: NDArray) -> None:
@@ -68,16 +69,16 @@ class MovingVertices:
         triangle, closest = closest_points(triangle_tree(self._V, self._F), rest[0])
         corners = self._F[triangle]
         weights = barycentrics_in(self._V[corners], closest)
-        off = rest[0] - np.einsum("ij,ijk->ik", weights, self._V[corners])
-        self.rest = Riding(corners, weights, off, *rest[1:])
+        offset = rest[0] - np.einsum("ij,ijk->ik", weights, self._V[corners])
+        self.rest = Attachment(corners, weights, offset, *rest[1:])
 
     def __call__(self, V: NDArray[np.float64]) -> Moved:
         """Where the points are for vertices [k, 3] [m]."""
         V = np.ascontiguousarray(V, np.float64)
         maps = _vertex_maps(self._V, V, self._F)
-        points, directions, normals = (np.empty((len(self.rest.off), 3), np.float32) for _ in range(3))
+        points, directions, normals = (np.empty((len(self.rest.offset), 3), np.float32) for _ in range(3))
         _move(V, maps, self.rest, points, directions, normals)
-        return Moved(points, directions, normals, V)
+        return points, directions, normals
 
 
 @kernel
@@ -144,7 +145,7 @@ def _turn(mean: Floats, rest: Floats, i: int, out: Floats32) -> None:
 
 
 @kernel
-def _move(V: Floats, maps: Floats, rest: Riding, points: Floats32, directions: Floats32, normals: Floats32) -> None:
+def _move(V: Floats, maps: Floats, rest: Attachment, points: Floats32, directions: Floats32, normals: Floats32) -> None:
     mean = np.empty((3, 3))
     for i in range(len(points)):
         mean[:] = 0
@@ -157,7 +158,7 @@ def _move(V: Floats, maps: Floats, rest: Riding, points: Floats32, directions: F
             for j in range(3):
                 place += rest.weights[i, j] * V[rest.corners[i, j], a]
             for b in range(3):
-                place += mean[a, b] * rest.off[i, b]
+                place += mean[a, b] * rest.offset[i, b]
             points[i, a] = place
         _turn(mean, rest.directions, i, directions)
         _turn(mean, rest.normals, i, normals)
@@ -183,22 +184,22 @@ class MovingOcclusion:
     points, directions : float64 [n, 3]
         Of the drawn surface at rest, and its smooth normals.
     baked : float64 [n, 3]
-        Ambient visibility, thickness and inner ambient visibility of the points, see `Baked`.
+        Ambient visibility, thickness and inner ambient visibility of the points, see `bake`.
     """
 
     def __init__(self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, baked: NDArray) -> None:
         count, normals = min(_SAMPLES, len(V)), smooth_normals(V, F)
         spacing = float(np.sqrt(_area(V, F) / count))
         apart = 2 * spacing * normals  # so that the two sides of a thin body are far from each other
-        mesh = coarse_mesh(F, np.hstack([V, apart]), count)
-        near = np.hstack([V, apart])[mesh.vertices], np.hstack([points, 2 * spacing * directions])
+        vertices, coarse = coarse_mesh(F, np.hstack([V, apart]), count)
+        near = np.hstack([V, apart])[vertices], np.hstack([points, 2 * spacing * directions])
         self._baked, (self._near, self._weights) = baked, _nearest(*near)
-        self._vertices, self._F, self._radius = mesh.vertices, mesh.F, bounding_radius(V)
+        self._vertices, self._F, self._radius = vertices, coarse, bounding_radius(V)
         # triangles of a coarse mesh may lie slightly over its vertices
         self._start = 0.3 * spacing if count < len(V) else 0.0
         self._count = int(np.clip(_RAYS // (2 * count), 16, 64))
-        at_rest, normals = self._of(V), normals[mesh.vertices]
-        self._frames = MovingVertices(at_rest, mesh.F, at_rest, frames_about(normals)[:, 1], normals)
+        at_rest, normals = self._of(V), normals[vertices]
+        self._frames = MovingVertices(at_rest, coarse, at_rest, frames_about(normals)[:, 1], normals)
         self._rest = self._measured(V)
 
     def __call__(self, V: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -214,9 +215,8 @@ class MovingOcclusion:
 
     def _measured(self, V: NDArray[np.float64]) -> NDArray[np.float64]:
         V = self._of(V)
-        moved = self._frames(V)
-        frames = frames_about(moved.normals, moved.directions)
-        return np.stack(cast(V, self._F, frames, self._count, self._radius, self._start), axis=1)
+        _, directions, normals = self._frames(V)
+        return cast(V, self._F, frames_about(normals, directions), self._count, self._radius, self._start)
 
 
 def _area(V: NDArray, F: NDArray) -> float:
@@ -247,7 +247,7 @@ class MovingSurface:
 
     @functools.cached_property
     def vertices(self) -> MovingVertices:
-        """How the points ride on the mesh."""
+        """How the points hang on the mesh."""
         mesh = self._atlas.mesh
         return MovingVertices(mesh.V, mesh.F, *self._rest)
 

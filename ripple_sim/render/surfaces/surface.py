@@ -1,8 +1,6 @@
-"""The surface of a target as it is drawn: geometry, look and texture.
+"""The surface of a target as it is drawn: geometry, its place on the charts of its atlas, look and texture.
 
-Where a target's surface lies on the charts of its atlas.
-
-A heatmap: one of the solver's fields on a target, in false colours.
+A heatmap shows one of the solver's fields on it in false colours.
 """
 
 from __future__ import annotations
@@ -15,8 +13,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import srgb_to_linear
-from ripple_sim.render.contract import MappingKind, Unit
+from ripple_sim.render.contract import MappingKind, Unit, srgb_to_linear
 from ripple_sim.render.resources import Resources, srgb_texture, write_page
 from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of
 from ripple_sim.render.visuals.visual import MODEL_LOOK, Look, find_look, geom_visual, look_of
@@ -61,49 +58,42 @@ class Charts(NamedTuple):
         return count, n + 2, n + 2
 
 
-class VertexColumns(NamedTuple):
-    """Columns of vertex attributes: what cut points share where they are one, unit normals, map coordinates."""
-
-    position: slice
-    normal: slice
-    coordinates: slice
-
-
-class ChartedMesh(NamedTuple):
-    """A mesh of which every triangle lies in one chart; vertices on the borders stand once for each chart.
-
-    Attributes
-    ----------
-    F : int64 [m, 3]
-    attributes : float64 [n, ...]
-        Of the vertices.
-    same : int64 [n]
-        Equal for vertices that differ in their texture coordinates and charts at most; see `tessellate`.
-    chart : int64 [n]
-    """
-
-    F: NDArray[np.int64]
-    attributes: NDArray[np.float64]
-    same: NDArray[np.int64]
-    chart: NDArray[np.int64]
-
-
 def split_at_charts(
-    mesh: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]], columns: VertexColumns, charts: Charts
-) -> ChartedMesh:
-    """Cut the triangles of a mesh (F, attributes, same; see `tessellate`) where they leave a chart.
+    mesh: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]],
+    charts: Charts,
+    position: slice,
+    normal: slice,
+    coordinates: slice,
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """Cut the triangles of a mesh where they leave a chart.
 
     What the vertices have is linear in each triangle.
+
+    Parameters
+    ----------
+    mesh : (F, attributes, same)
+        See `tessellate`.
+    charts : Charts
+    position, normal, coordinates : slice
+        Columns of the attributes: what cut points share where they are one, unit normals, map coordinates.
+
+    Returns
+    -------
+    F, attributes, same
+        The mesh, of which every triangle lies in one chart; vertices on the borders stand once for each chart, and
+        `same` is equal for those that differ in their texture coordinates and charts at most.
+    chart : int64 [n]
+        Of each vertex.
     """
     F, attributes, same = mesh
-    triangle, barycentrics, chart = charts.map.split(attributes[F][:, :, columns.coordinates])
+    triangle, barycentrics, chart = charts.map.split(attributes[F][:, :, coordinates])
     whole, corner = barycentrics.max(axis=2) == 1, barycentrics.argmax(axis=2)
     vertex = np.take_along_axis(F[triangle], corner, axis=1)
     part, place = np.nonzero(~whole)
     cut = np.einsum("ci,cij->cj", barycentrics[part, place], attributes[F[triangle[part]]])
-    cut[:, columns.normal] /= np.maximum(np.linalg.norm(cut[:, columns.normal], axis=1, keepdims=True), 1e-12)
+    cut[:, normal] /= np.maximum(np.linalg.norm(cut[:, normal], axis=1, keepdims=True), 1e-12)
     cut = _snapped(cut, attributes)
-    _, point = np.unique(cut[:, [*_range(columns.position), *_range(columns.normal)]], axis=0, return_inverse=True)
+    _, point = np.unique(np.hstack([cut[:, position], cut[:, normal]]), axis=0, return_inverse=True)
     _, distinct = np.unique(cut, axis=0, return_inverse=True)
     source, alike = np.where(whole, vertex, 0), np.where(whole, vertex, 0)
     source[part, place] = len(attributes) + np.arange(len(cut))
@@ -111,7 +101,7 @@ def split_at_charts(
     key = alike * charts.shape[0] + chart[:, None]
     _, where, index = np.unique(key, return_index=True, return_inverse=True)
     row = source.ravel()[where]
-    return ChartedMesh(
+    return (
         index.reshape(-1, 3),
         np.concatenate([attributes, cut])[row],
         np.concatenate([same, int(same.max()) + 1 + point.ravel()])[row],
@@ -124,10 +114,6 @@ def _snapped(cut: NDArray[np.float64], attributes: NDArray[np.float64]) -> NDArr
     exponent = np.frexp(np.abs(attributes).max(axis=0))[1]
     step = np.ldexp(1.0, exponent - _BITS)
     return np.round(cut / step) * step
-
-
-def _range(columns: slice) -> range:
-    return range(columns.start, columns.stop)
 
 
 def shared_places(uv: NDArray[np.float64], places: NDArray[np.float64], points: NDArray) -> NDArray[np.float64]:
@@ -148,7 +134,7 @@ UNDER_HEATMAP = Look(color=(0.81, 0.81, 0.81), roughness=0.8)
 
 
 class HeatmapTexture:
-    """A field's values and their colours on the GPU, for heatmap.glsl.
+    """A field's values and their colours on the GPU, for surface.glsl.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.mesh.topology import undirected
+from ripple_sim.solver.mesh import topology
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,13 +94,12 @@ def tessellate(
 
 def edges_of(F: NDArray[np.int64], same: NDArray[np.int64]) -> Edges:
     """Edges of triangles, [m, 3]; `same` as for `tessellate`."""
-    keys, edge_of_side = np.unique(undirected(F)[0], return_inverse=True)
-    ends = np.stack(np.divmod(keys, F.max() + 1), axis=1)
-    _, weld_of_side = np.unique(undirected(same[F])[0], return_inverse=True)
-    weld = np.empty(len(ends), dtype=np.int64)
-    weld[edge_of_side] = weld_of_side
+    edges = topology.edges_of(F)
+    _, weld_of_side = np.unique(topology.undirected(same[F])[0], return_inverse=True)
+    weld = np.empty(len(edges.ends), dtype=np.int64)
+    weld[edges.of.ravel()] = weld_of_side
     inner = np.bincount(weld_of_side)[weld] == 2
-    return Edges(ends, edge_of_side.reshape(-1, 3), weld, inner)
+    return Edges(edges.ends, edges.of, weld, inner)
 
 
 def midpoints(edges: Edges, attributes: NDArray, position: slice, normal: slice) -> NDArray[np.float64]:

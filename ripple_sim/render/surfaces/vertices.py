@@ -1,12 +1,7 @@
 """The triangles and vertices that a target is drawn with: small, round in outline, split at creases and seams.
 
-A mesh with few of the vertices of another one, spread evenly, that moves with it.
-
-A mesh cut into the parts of its chart map, as round as before it was cut.
-
-Order of triangles and vertices in memory, for the vertex caches of GPUs and software drivers.
-
-What a target is drawn with, kept for the next scene: in a batch it mostly has the same surfaces.
+`surface_vertices` makes them of a `Surface`: its mesh is cut into the parts of its chart map, tessellated, cut where
+its triangles leave a chart, and ordered for vertex caches. `coarse_mesh` has few of the vertices, spread evenly.
 """
 
 from __future__ import annotations
@@ -16,34 +11,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import Balls, balls_about
-from ripple_sim.render.visuals import corners as occlusion
-from ripple_sim.render.visuals.corners import corner_normals, normalized, smooth_normals, split_corners
+from ripple_sim.render.camera import balls_about
+from ripple_sim.render.visuals.corners import bake, corner_normals, normalized, smooth_normals, split_corners
 from ripple_sim.render.visuals.texture_mapping import Mapping
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.cache import Kept, content_key
 from ripple_sim.solver.texels.chart_map import ChartMap, PartsMesh, parts_mesh
 
-from .surface import ChartedMesh, Charts, Surface, VertexColumns, shared_places, split_at_charts
+from .surface import Charts, Surface, shared_places, split_at_charts
 from .tessellation import Edges, bulges, edges_of, midpoints, tessellate
 
 
-class CoarseMesh(NamedTuple):
-    """Some of the vertices of a mesh.
-
-    Attributes
-    ----------
-    vertices : int64 [k]
-        Of the mesh.
-    F : int64 [m, 3]
-        Triangles between them.
-    """
-
-    vertices: NDArray[np.int64]
-    F: NDArray[np.int64]
-
-
-def coarse_mesh(F: NDArray[np.int64], features: NDArray[np.float64], count: int) -> CoarseMesh:
+def coarse_mesh(
+    F: NDArray[np.int64], features: NDArray[np.float64], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Merge every vertex with the nearest of `count` that are far from one another (Rossignac and Borrel 1993).
 
     Parameters
@@ -52,15 +33,22 @@ def coarse_mesh(F: NDArray[np.int64], features: NDArray[np.float64], count: int)
     features : float64 [n, d]
         Of the vertices; near is what is near in them.
     count : int
+
+    Returns
+    -------
+    vertices : int64 [k]
+        Those that are left.
+    F : int64 [m, 3]
+        Triangles between them.
     """
     if len(features) <= count:
-        return CoarseMesh(np.arange(len(features)), np.asarray(F))
+        return np.arange(len(features)), np.asarray(F)
     chosen, owner = _spread(features, count)
     merged = owner[F]
     merged = merged[(merged != np.roll(merged, 1, axis=1)).all(axis=1)]
     # each begins with its least vertex, so that the same triangle is the same row
     first = merged.argmin(axis=1)[:, None]
-    return CoarseMesh(chosen, np.unique(np.take_along_axis(merged, (first + np.arange(3)) % 3, axis=1), axis=0))
+    return chosen, np.unique(np.take_along_axis(merged, (first + np.arange(3)) % 3, axis=1), axis=0)
 
 
 def _spread(features: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -87,26 +75,21 @@ def _spread(features: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64
 _ALIKE = 1e-4  # normals at a vertex that differ by less are one
 
 
-class RoundedParts(NamedTuple):
-    """Parts, the places of their vertices [m], float64 [n, 3], and the normals of their corners, [m, 3, 3]."""
+def rounded_parts(mesh: Mesh, chart_map: ChartMap) -> tuple[PartsMesh, NDArray[np.float64], NDArray[np.float64]]:
+    """Cut a mesh into the parts of its chart map, as round as before; return also their vertices and corner normals.
 
-    parts: PartsMesh
-    V: NDArray[np.float64]
-    normals: NDArray[np.float64]
-
-
-def rounded_parts(mesh: Mesh, chart_map: ChartMap) -> RoundedParts:
-    """Cut a mesh; normals go over from the mesh's triangles, whose parts bulge out as the triangles themselves would.
+    Vertices are [n, 3] [m], normals [m, 3, 3]. These go over from the mesh's triangles, whose parts bulge out as the
+    triangles themselves would.
 
     A triangle is the quadratic patch whose edges have the midpoints of `tessellate`: flat where its normals say so.
     """
     parts, normals = parts_mesh(chart_map, mesh), corner_normals(mesh.V, mesh.F)
     if parts.V is mesh.V:
-        return RoundedParts(parts, mesh.V, normals)
+        return parts, mesh.V, normals
     w, out = parts.barycentrics, _bulges_of_sides(mesh)[parts.triangle]
     V = parts.V.copy()
     V[parts.F] += 4 * np.einsum("pck,pck,pkj->pcj", w, np.roll(w, -1, axis=2), out)
-    return RoundedParts(parts, V, _unified(parts.F, normalized(parts.carry(normals))))
+    return parts, V, _unified(parts.F, normalized(parts.carry(normals)))
 
 
 def _bulges_of_sides(mesh: Mesh) -> NDArray[np.float64]:
@@ -127,17 +110,18 @@ def _unified(F: NDArray[np.int64], normals: NDArray[np.float64]) -> NDArray[np.f
 _BITS = 10  # of a coordinate
 
 
-def in_memory_order(mesh: ChartedMesh, position: slice) -> ChartedMesh:
-    """The same mesh with neighbours close in memory: its triangles along a Morton curve, its vertices as they use them.
+def memory_order(F: NDArray[np.int64], points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles along a Morton curve, and the order of the vertices in which they use them.
 
-    `position` are the attributes' columns that hold the vertices' positions.
+    Neighbours are then close in memory, for the vertex caches of GPUs and software drivers. The triangles [m, 3] have
+    the vertices' new numbers; `points` [n, 3] are their positions.
     """
-    F = mesh.F[morton_order(mesh.attributes[:, position][mesh.F].mean(axis=1))]
+    F = F[morton_order(points[F].mean(axis=1))]
     used, first = np.unique(F, return_index=True)
     vertices = used[np.argsort(first)]
-    number = np.empty(len(mesh.attributes), dtype=np.int64)
+    number = np.empty(len(points), dtype=np.int64)
     number[vertices] = np.arange(len(vertices))
-    return ChartedMesh(number[F], mesh.attributes[vertices], mesh.same[vertices], mesh.chart[vertices])
+    return number[F], vertices
 
 
 def morton_order(points: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -230,6 +214,10 @@ class SurfaceVertices(NamedTuple):
         On the page of charts [texels].
     lookups : float64 [n + k, 2]
         Where heights are looked up: the same for all vertices at one point.
+    balls : float64 [b, 4]
+        That together contain the surface without waves.
+    coarse : int64 [c, 3]
+        Few triangles of the same shape.
     """
 
     F: NDArray[np.int64]
@@ -237,10 +225,11 @@ class SurfaceVertices(NamedTuple):
     edges: Edges
     places: NDArray[np.float64]
     lookups: NDArray[np.float64]
+    balls: NDArray[np.float64]
+    coarse: NDArray[np.int64]
 
 
-def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> SurfaceVertices:
-    """Tessellate a surface."""
+def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> SurfaceVertices:
     V, F = np.asarray(surface.V, dtype=np.float64), np.asarray(surface.F, dtype=np.int64)
     smooth, charts = smooth_normals(V, F), surface.charts
     uv = np.zeros((len(V), 2)) if surface.uv is None else np.asarray(surface.uv, dtype=np.float64)
@@ -251,11 +240,12 @@ def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Sur
         max_length=max_length,
         max_faces=int(np.clip(max_faces, _LEAST_FACES, _MOST_FACES)),
         crease_length=max(_CREASE * _texel_size(V, F, charts), max_length / _CREASE_PARTS),
-        baked=np.stack(occlusion.bake(V, F, smooth), axis=1),
+        baked=bake(V, F, smooth),
         corner_uv=uv[F] if uv.ndim == 2 else uv,
     )
-    cut = split_at_charts(finer, VertexColumns(POSITION, NORMAL, COORDINATES), charts)
-    faces, attributes, same, chart = in_memory_order(cut, POSITION)
+    faces, attributes, same, chart = split_at_charts(finer, charts, POSITION, NORMAL, COORDINATES)
+    faces, order = memory_order(faces, attributes[:, POSITION])
+    attributes, same, chart = attributes[order], same[order], chart[order]
     edges = edges_of(faces, same)
     attributes = np.concatenate([attributes, midpoints(edges, attributes, POSITION, NORMAL)])
     length = np.linalg.norm(attributes[:, DIRECTION], axis=1, keepdims=True)
@@ -264,7 +254,10 @@ def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Sur
     chart_uv = charts.map.uv(attributes[:, COORDINATES], chart)
     places = charts.page.places(chart, chart_uv)
     points = attributes[:, [*range(POSITION.start, DIRECTION.stop)]]
-    return SurfaceVertices(faces, attributes, edges, places, shared_places(chart_uv, places, points))
+    lookups = shared_places(chart_uv, places, points)
+    corners = np.concatenate([faces, len(chart) - len(edges.ends) + edges.of_side])
+    balls = balls_about(attributes[:, POSITION][corners], _BALLS)
+    return SurfaceVertices(faces, attributes, edges, places, lookups, balls, _coarse(faces, attributes, len(same)))
 
 
 def _texel_size(V: NDArray, F: NDArray, charts: Charts) -> float:
@@ -288,39 +281,31 @@ _APART = 0.1  # of the bounding radius: how far from each other the two sides of
 _MOST_KEPT_FACES = 100_000  # of a surface that is kept: 30 MB
 
 
-class BoundedVertices(NamedTuple):
-    """The vertices of a surface, whose arrays cannot be written to, balls about it, and few triangles of its shape."""
-
-    vertices: SurfaceVertices
-    balls: Balls
-    coarse: NDArray[np.int64]
+_kept: Kept[SurfaceVertices] = Kept(4, lambda each: len(each.F) <= _MOST_KEPT_FACES)
 
 
-_kept: Kept[BoundedVertices] = Kept(4, lambda each: len(each.vertices.F) <= _MOST_KEPT_FACES)
+def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> SurfaceVertices:
+    """Tessellate a surface, or take what came of it before; the arrays cannot be written to.
 
-
-def bounded_vertices(surface: Surface, max_length: float, max_faces: int) -> BoundedVertices:
-    """Tessellate a surface as `surface_vertices` does, or take what came of it before."""
+    In a batch the next scene mostly has the same surfaces.
+    """
     charts, uv = surface.charts, np.zeros(0) if surface.uv is None else np.asarray(surface.uv)
     arrays = charts.map.arrays()
     name = f"{charts.map.layout} {charts.shape} {list(arrays)} {max_length!r} {max_faces}"
     key = content_key(name, [surface.V, surface.F, uv, *arrays.values()])
-    return _kept.get(key, lambda: _bounded(surface_vertices(surface, max_length, max_faces)))
+    return _kept.get(key, lambda: _read_only(_surface_vertices(surface, max_length, max_faces)))
 
 
-def _bounded(vertices: SurfaceVertices) -> BoundedVertices:
-    for array in (*vars(vertices.edges).values(), *vertices._asdict().values()):
+def _read_only(vertices: SurfaceVertices) -> SurfaceVertices:
+    for array in (*vars(vertices.edges).values(), *vertices):
         if isinstance(array, np.ndarray):
             array.flags.writeable = False
-    middle = len(vertices.attributes) - len(vertices.edges.ends) + vertices.edges.of_side
-    corners = np.concatenate([vertices.F, middle])
-    points = vertices.attributes[:, POSITION]
-    return BoundedVertices(vertices, balls_about(points[corners], _BALLS), _coarse(vertices, points))
+    return vertices
 
 
-def _coarse(vertices: SurfaceVertices, points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Triangles [m, 3] between few of the vertices."""
-    base = len(points) - len(vertices.edges.ends)
-    apart = _APART * np.ptp(points, axis=0).max() / 2 * vertices.attributes[:base, DIRECTION]
-    mesh = coarse_mesh(vertices.F, np.hstack([points[:base], apart]), _COARSE)
-    return mesh.vertices[mesh.F]
+def _coarse(F: NDArray[np.int64], attributes: NDArray[np.float64], count: int) -> NDArray[np.int64]:
+    """Triangles [m, 3] between few of the first `count` vertices."""
+    points = attributes[:, POSITION]
+    apart = _APART * np.ptp(points, axis=0).max() / 2 * attributes[:count, DIRECTION]
+    vertices, coarse = coarse_mesh(F, np.hstack([points[:count], apart]), _COARSE)
+    return vertices[coarse]

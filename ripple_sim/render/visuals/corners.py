@@ -1,7 +1,4 @@
-"""Corners of a mesh's triangles: their normals, and vertices that are split where normals jump.
-
-Ambient occlusion and thickness of a mesh, found with rays.
-"""
+"""What the vertices of a mesh get for being drawn: normals, split where they jump, ambient occlusion and thickness."""
 
 from __future__ import annotations
 
@@ -125,26 +122,16 @@ def normalized(vectors: NDArray) -> NDArray[np.float64]:
 _RAYS = 1_000_000
 
 
-class Baked(NamedTuple):
-    """What rays from every vertex found, each float64 [n].
+def bake(V: NDArray, F: NDArray, normals: NDArray) -> NDArray[np.float64]:
+    """Ambient occlusion and thickness by cosine-distributed rays from every vertex, outwards and inwards.
 
-    Attributes
-    ----------
-    visibility : float64 [n]
-        Ambient visibility, 1 - occlusion: share of the outer hemisphere from which light arrives.
-    thickness : float64 [n]
-        Mean length of the inner rays over the mesh's bounding radius.
-    inner_visibility : float64 [n]
-        Ambient visibility of the inner side, which an open surface shows.
+    Returns
+    -------
+    float64 [n, 3]
+        Ambient visibility, 1 - occlusion: share of the outer hemisphere from which light arrives. Thickness: mean
+        length of the inner rays over the mesh's bounding radius. Ambient visibility of the inner side, which an open
+        surface shows.
     """
-
-    visibility: NDArray[np.float64]
-    thickness: NDArray[np.float64]
-    inner_visibility: NDArray[np.float64]
-
-
-def bake(V: NDArray, F: NDArray, normals: NDArray) -> Baked:
-    """Cast cosine-distributed rays from every vertex, outwards and inwards."""
     count = int(np.clip(_RAYS // (2 * len(V)), 16, 64))
     return cast(V, F, frames_about(normals), count, bounding_radius(V))
 
@@ -154,8 +141,8 @@ def bounding_radius(V: NDArray) -> float:
     return float(np.linalg.norm(V - V.mean(axis=0), axis=1).max())
 
 
-def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, start: float = 0.0) -> Baked:
-    """Cast rays from every vertex to either side.
+def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, start: float = 0.0) -> NDArray[np.float64]:
+    """Cast rays from every vertex to either side, as `bake` does.
 
     Parameters
     ----------
@@ -181,8 +168,8 @@ def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, sta
 
     # nearby walls hide the light, those further than a radius away reflect some themselves
     outer, inner = distances(1.0), distances(-1.0)
-    values, (edges, _) = (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0)), edges_of(F)
-    return Baked(*(_smoothed(each.mean(axis=1), edges) for each in values))
+    values, edges = (np.minimum(outer, 1.0), inner, np.minimum(inner, 1.0)), edges_of(F).ends
+    return np.stack([_smoothed(each.mean(axis=1), edges) for each in values], axis=1)
 
 
 def frames_about(normals: NDArray, along: NDArray | None = None) -> NDArray[np.float64]:

@@ -1,16 +1,14 @@
 """The geoms of a MuJoCo model other than its floor and its targets, and its sites, on the GPU.
 
-Ambient occlusion between geoms: those near the camera's focus, approximated by capsules.
-
-Elements of a MuJoCo model that are not drawn.
+Many of one shape are one draw call, as finely tessellated as the frame needs.
 """
 
 from __future__ import annotations
 
+import functools
 import warnings
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, TypeAlias
 
 import moderngl
 import mujoco
@@ -20,218 +18,193 @@ from numpy.typing import NDArray
 from ripple_sim.coupling.model import find_flex_colliders
 from ripple_sim.coupling.soft import first_skin, is_soft
 from ripple_sim.errors import RippleWarning
-from ripple_sim.render.camera import Balls, join
-from ripple_sim.render.contract import MAX_OCCLUDERS, Binding
 from ripple_sim.render.resources import Resources
 
-from .instances import INSTANCE, Assets, Instances, ShapeLevels
-from .shapes import NamedShape, shape_of, sizes
-from .texture_mapping import mapping_of
+from .objects import Assets, Occluders
+from .shapes import NamedShape, Shape, shape_of, sizes
+from .texture_mapping import Mapping, mapping_of
 from .visual import Visual, ball_of, geom_visual, host_of, look_of, site_visual, visible_sites
 
-_REACH = 9.5  # in radii: what is further hides less than a hundredth of the sky
+INSTANCE = np.dtype(
+    [
+        ("rotation", "f4", (3, 3)),
+        ("origin", "f4", 3),
+        ("core_size", "f4", 3),
+        ("shell_size", "f4", 3),
+        ("color", "f4", 4),
+        ("mapping", "f4", 4),
+        ("tiling", "f4", 4),
+    ]
+)
+_GEOM = mujoco.mjtGeom
+_ROUND = (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_CAPSULE, _GEOM.mjGEOM_CYLINDER)
+_LEVELS = (4, 6, 8, 11, 15, 22)  # segments to a right angle
+_BIAS = 3.0  # of shadows, in sagittas of the edges: where light grazes, one is not enough
+_FLATNESS = 0.25  # how far the edges of a round shape may be off its surface [pixels]
+
+# vertices (core, shell, normal, texture coordinates) and indices of a shape with so many segments to a right angle
+Levels: TypeAlias = Callable[[int], tuple[moderngl.Buffer, moderngl.Buffer]]
 
 
-class Occluders:
-    """Capsules of about each geom's size.
+def levels_of(resources: Resources, make: Callable[[int], Shape]) -> Levels:
+    """Buffers of a shape at several levels of detail, each uploaded at its first use."""
+    uploaded: dict[int, tuple[moderngl.Buffer, moderngl.Buffer]] = {}
 
-    Parameters
-    ----------
-    resources : Resources
-    model : mujoco.MjModel
-    geoms : int64 [k]
-    """
+    def level(segments: int) -> tuple[moderngl.Buffer, moderngl.Buffer]:
+        if segments not in uploaded:
+            shape = make(segments)
+            uv = np.zeros((len(shape.core), 2)) if shape.uv is None else shape.uv
+            vertices = np.concatenate([shape.core, shape.shell, shape.normals, uv], axis=1)
+            uploaded[segments] = (
+                resources.buffer(vertices.astype("f4").tobytes()),
+                resources.buffer(shape.faces.astype("i4").tobytes()),
+            )
+        return uploaded[segments]
 
-    def __init__(self, resources: Resources, model: Any, geoms: NDArray[np.int64]) -> None:
-        self._geoms = geoms
-        self._centre, self._half_axis, self._radius = _capsules(model, geoms)
-        self._bounds = np.linalg.norm(model.geom_aabb[geoms, 3:], axis=1)
-        self._buffer = resources.buffer(reserve=32 * MAX_OCCLUDERS, dynamic=True)
-        self._bound, self._bound_geoms = np.zeros((0, 2, 4)), np.zeros(0, np.int64)
-
-    def balls(self, data: Any) -> Balls:
-        """Bounding balls of the geoms."""
-        return Balls(self._middles(data)[1], self._bounds)
-
-    def bind(self, data: Any, focus: NDArray[np.float64]) -> None:
-        """Bind the capsules nearest to a point [m]."""
-        rotation, middle = self._middles(data)
-        axis = np.einsum("gij,gj->gi", rotation, self._half_axis)
-        away = np.linalg.norm(middle - focus, axis=1)
-        nearest = np.argsort(away, kind="stable")
-        # capsules fade out before they leave the list
-        limit = away[nearest[MAX_OCCLUDERS]] if len(nearest) > MAX_OCCLUDERS else np.inf
-        nearest = nearest[:MAX_OCCLUDERS]
-        fade = np.clip(4 * (1 - away[nearest] / limit), 0.0, 1.0)
-        packed = np.zeros((len(nearest), 2, 4), dtype=np.float32)
-        packed[:, 0, :3] = (middle - axis)[nearest]
-        packed[:, 1, :3] = (middle + axis)[nearest]
-        packed[:, 0, 3] = self._radius[nearest] * fade
-        self._buffer.write(packed.tobytes())
-        self._buffer.bind_to_uniform_block(Binding.OCCLUDERS)
-        self._bound, self._bound_geoms = packed.astype(np.float64), self._geoms[nearest]
-
-    def near(self, balls: Balls, geoms: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Which of the bound capsules darken objects by a hundredth or more, as bits; never an object's own.
-
-        Parameters
-        ----------
-        balls : Balls
-            k of them, which contain the objects.
-        geoms : int64 [k]
-            The objects' own.
-        """
-        first, last, radius = self._bound[:, 0, :3], self._bound[:, 1, :3], self._bound[:, 0, 3]
-        axis, to = last - first, balls.centres[:, None] - first
-        along = np.einsum("ej,kej->ke", axis, to) / np.maximum(np.einsum("ej,ej->e", axis, axis), 1e-12)
-        away = np.linalg.norm(to - np.clip(along, 0, 1)[..., None] * axis, axis=2) - balls.radii[:, None]
-        counts = (away < _REACH * radius) & (geoms[:, None] != self._bound_geoms)
-        return (counts << np.arange(len(radius))).sum(axis=1)
-
-    def _middles(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        rotation = data.geom_xmat[self._geoms].reshape(-1, 3, 3)
-        return rotation, data.geom_xpos[self._geoms] + np.einsum("gij,gj->gi", rotation, self._centre)
+    return level
 
 
-def _capsules(model: Any, geoms: NDArray[np.int64]) -> tuple[NDArray, NDArray, NDArray]:
-    """Centre, half axis and radius of a capsule of about each geom's size, in its frame."""
-    centre, half_axis, radius = np.zeros((len(geoms), 3)), np.zeros((len(geoms), 3)), np.zeros(len(geoms))
-    for index, geom in enumerate(geoms):
-        half = np.asarray(model.geom_aabb[geom][3:], dtype=np.float64)
-        centre[index] = model.geom_aabb[geom][:3]
-        longest = int(np.argmax(half))
-        radius[index] = np.sqrt(np.prod(np.delete(half, longest)))
-        half_axis[index, longest] = max(half[longest] - radius[index], 0.0)
-    return centre, half_axis, radius
-
-
-_PLANE = mujoco.mjtGeom.mjGEOM_PLANE
-
-
-@dataclass(frozen=True)
-class TransparentVisual:
-    """A visual through which the scene behind it shows."""
-
-    visual: Visual
-    number: int  # in the table of objects
-    instances: Instances
-
-
-class GeomVisuals:
-    """All geoms of a model but the floor and the targets, and its sites, which cast shadows but occlude no sky.
+class Instances:
+    """Geoms or sites of one shape with one texture, or a single transparent one: one draw call.
 
     Parameters
     ----------
     assets : Assets
-    geoms : iterable of int
+    level : Levels
+    programs : tuple of moderngl.Program
+        For the G-buffer, for depth alone, for the colour alone, and for transmission.
+    members : list of (Visual, int)
+        Either geoms or sites, each with its number in the table of objects.
 
     Attributes
     ----------
-    occluders : Occluders
-    transparent : list of TransparentVisual
+    numbers : list of int
+        In the table of objects.
+    transparent : bool
+        Whether the scene behind shows through.
+    occludes : bool
+        Whether it hides the sky from what is below: opaque geoms do.
+    balls : float64 [k, 4]
+        That contain them.
+    shadow_biases : float64 [k]
+        How far above the surface shadows must be looked up so that its edges do not shade it [m].
     """
 
-    def __init__(self, assets: Assets, geoms: Iterable[int]) -> None:
-        self._assets, self._model = assets, assets.model
-        self._shapes: dict[str, ShapeLevels] = {}
-        self._programs: dict[tuple[int, bool], moderngl.Program] = {}
-        self._depth, self._albedo, self._transmission = (
-            assets.resources.program("visuals/geom_depth_vertex", fragment, REFRACTING=0)
-            for fragment in ("glsl/depth_fragment", "glsl/albedo_fragment", "passes/transmission_fragment")
-        )
-        model = assets.model
-        visuals = [geom_visual(model, geom) for geom in geoms] + [site_visual(model, i) for i in visible_sites(model)]
-        shaped = [(visual, shape) for visual in visuals if (shape := shape_of(model, visual)) is not None]
-        solid = [visual.index for visual, _ in shaped if not visual.site and visual.kind != _PLANE]
-        self.occluders = Occluders(assets.resources, model, np.array(solid, dtype=np.int64))
-        groups: dict[tuple[Any, ...], tuple[NamedShape, list[tuple[Visual, int]]]] = {}
-        self.transparent: list[TransparentVisual] = []
-        self._hosts: dict[int, int] = {}  # geoms, by the number in the table of objects
-        for visual, shape in shaped:
+    def __init__(
+        self, assets: Assets, level: Levels, programs: tuple[moderngl.Program, ...], members: list[tuple[Visual, int]]
+    ) -> None:
+        self._assets, self._level, self._programs = assets, level, programs
+        model, self._visual = assets.model, members[0][0]
+        self.numbers = [number for _, number in members]
+        self.transparent = self._visual.opacity < 1.0
+        self.occludes = not (self.transparent or self._visual.site)
+        self._indices = np.array([visual.index for visual, _ in members], dtype=np.int64)
+        self._hosts = np.array([host_of(model, visual) for visual, _ in members])
+        self._records = np.zeros(len(members), dtype=INSTANCE)
+        for record, (visual, number) in zip(self._records, members, strict=True):
             mapping = mapping_of(model, visual)
-            host = host_of(model, visual)
-            number = assets.objects.add(look_of(model, visual), host, opacity=visual.opacity)
-            self._hosts[number] = host
-            if visual.opacity < 1.0:
-                instances = self._instances(shape, [(visual, number)], self._transmission)
-                self.transparent.append(TransparentVisual(visual, number, instances))
-            else:
-                key = visual.site, shape[0], mapping.kind, mapping.texture
-                groups.setdefault(key, (shape, []))[1].append((visual, number))
-        self._opaque = [self._instances(shape, members, self._depth) for shape, members in groups.values()]
-        self._planes = [visual.index for visual, _ in shaped if not visual.site and visual.kind == _PLANE]
-        self._sites = [visual for visual, _ in shaped if visual.site]
+            record["core_size"], record["shell_size"] = sizes(model, visual)
+            record["color"] = [*visual.color, number]
+            record["mapping"] = [*mapping.scale, mapping.stretch * mapping.scale[2]]
+            record["tiling"] = mapping.tiling
+        self._unit, self._image = mapping.unit, None if mapping.texture < 0 else assets.texture(mapping.texture)
+        self._buffer = assets.resources.buffer(reserve=self._records.nbytes, dynamic=True)
+        self._arrays: dict[tuple[int, int], moderngl.VertexArray] = {}
+        self._segments = _LEVELS[-1]
+        self.shadow_biases, self.balls = np.zeros(len(members)), np.zeros((len(members), 4))
 
-    def balls(self, data: Any) -> Balls:
-        """Bounding balls of everything that may cast a shadow."""
-        return join(self.occluders.balls(data), *(ball_of(self._model, data, site) for site in self._sites))
-
-    def planes(self, data: Any) -> Balls:
-        """Infinite balls at the planes."""
-        return Balls(data.geom_xpos[self._planes].reshape(-1, 3), np.full(len(self._planes), np.inf))
-
-    def update(self, data: Any, eye: NDArray[np.float64], pixels: float) -> None:
+    def update(self, data: Any, eye: NDArray[np.float64], pixels: float, occluders: Occluders) -> None:
         """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""
-        for instances in (*self._opaque, *(each.instances for each in self.transparent)):
-            instances.update(data, eye, pixels)
-            near = self.occluders.near(instances.balls, np.array([self._hosts[number] for number in instances.numbers]))
-            for number, bias, bits in zip(instances.numbers, instances.shadow_biases, near, strict=True):
-                self._assets.objects.set_shadow_bias(number, float(bias))
-                self._assets.objects.set_occluders(number, int(bits))
+        poses = (data.site_xpos, data.site_xmat) if self._visual.site else (data.geom_xpos, data.geom_xmat)
+        position, rotation = (pose[self._indices] for pose in poses)
+        self._records["rotation"] = rotation.reshape(-1, 3, 3).transpose(0, 2, 1)
+        self._records["origin"] = position
+        self._buffer.write(self._records.tobytes())
+        half = self._records["core_size"] + self._records["shell_size"]
+        self.balls, radius = np.column_stack([position, np.linalg.norm(half, axis=1)]), half.max(axis=1)
+        away = np.maximum(np.linalg.norm(position - eye, axis=1) - radius, 0.1 * radius)
+        largest = float((radius / away).max()) * pixels
+        # the sagitta of a chord over a right angle's nth part: r (1 - cos(pi / 4n))
+        needed = np.pi / 4 / np.sqrt(2 * min(_FLATNESS / max(largest, 1e-9), 1.0))
+        self._segments = next((n for n in _LEVELS if n >= needed), _LEVELS[-1])
+        if self._visual.kind in _ROUND:
+            self.shadow_biases = _BIAS * radius * (1.0 - np.cos(np.pi / 4 / self._segments))
+        near = occluders.near(self.balls, self._hosts)
+        for number, bias, bits in zip(self.numbers, self.shadow_biases, near, strict=True):
+            self._assets.objects.place(number, float(bias), occluders=int(bits))
+
+    def bounds(self, data: Any) -> NDArray[np.float64]:
+        """Bounding balls [k, 4] of one or several visuals, tighter than `balls`, where the data says they are."""
+        return ball_of(self._assets.model, data, self._visual)
 
     def draw(self) -> None:
-        """Draw the opaque visuals into the G-buffer."""
-        for instances in self._opaque:
-            instances.draw()
+        """Draw into the G-buffer."""
+        if self._image is not None:
+            self._image.use(self._unit)
+        self._render(0, self._segments)
 
     def draw_depth(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the opaque visuals' depth only, under a matrix of 16 numbers, column by column."""
-        for instances in self._opaque:
-            instances.draw_depth(view_projection)
+        """Draw the depth only, under a matrix of 16 numbers, column by column."""
+        self._programs[1]["matrix"] = view_projection
+        self._render(1, self._segments)
 
     def draw_albedo(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the opaque geoms in their linear colours, likewise."""
-        for instances in self._opaque:
-            if not instances.sites:
-                instances.draw_albedo(view_projection)
+        """Draw coarsely in the linear colour, likewise."""
+        self._programs[2]["matrix"] = view_projection
+        self._render(2, _LEVELS[0])
 
     def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
-        """Draw the transparent visuals into the transmission map of a light, likewise."""
-        for each in self.transparent:
-            self._transmission["light"] = light
-            self._transmission["transmission"] = (1.0 - each.visual.opacity,) * 3
-            each.instances.draw_depth(view_projection)
+        """Draw into the transmission map of a light, likewise."""
+        program = self._programs[3]
+        program["matrix"], program["light"] = view_projection, light
+        program["transmission"] = (1.0 - self._visual.opacity,) * 3
+        self._render(3, self._segments)
 
-    def _instances(self, shape: NamedShape, members: list[tuple[Visual, int]], depth: moderngl.Program) -> Instances:
-        """Visuals of one shape and texture, each with its number in the table of objects."""
-        name, make = shape
-        assets = self._assets
-        if name not in self._shapes:
-            self._shapes[name] = ShapeLevels(assets.resources, make)
-        mappings = [mapping_of(self._model, visual) for visual, _ in members]
-        mapping = mappings[0]
-        records = np.zeros(len(members), dtype=INSTANCE)
-        for record, (visual, number), own in zip(records, members, mappings, strict=True):
-            record["core_size"], record["shell_size"] = sizes(self._model, visual)
-            record["color"] = [*visual.color, number]
-            record["mapping"] = [*own.scale, own.stretch * own.scale[2]]
-            record["tiling"] = own.tiling
-        return Instances(
-            assets.resources,
-            self._shapes[name],
-            (self._program(mapping.kind, mapping.own), depth, self._albedo),
-            [visual for visual, _ in members],
-            records,
-            None if mapping.texture < 0 else (mapping.unit, assets.textures.get(mapping.texture)),
-        )
-
-    def _program(self, kind: int, own: bool) -> moderngl.Program:
-        """Program of a kind of mapping, with the mesh's own texture coordinates or without."""
-        if (kind, own) not in self._programs:
-            self._programs[kind, own] = self._assets.resources.program(
-                "visuals/geom_vertex", "visuals/geom_fragment", MAPPING=kind, OWN=int(own)
+    def _render(self, program: int, segments: int) -> None:
+        if (program, segments) not in self._arrays:
+            vertices, indices = self._level(segments)
+            content = [
+                (vertices, "3f 3f 3f 2f", "in_core", "in_shell", "in_normal", "in_uv"),
+                (self._buffer, "9f 3f 3f 3f 4f 4f 4f/i", *(f"in_{name}" for name in INSTANCE.names or ())),
+            ]
+            # what a program does not use is optimised away
+            self._arrays[program, segments] = self._assets.resources.vertex_array(
+                self._programs[program], content, indices, skip_errors=True
             )
-        return self._programs[kind, own]
+        self._arrays[program, segments].render(instances=len(self._records))
+
+
+def visuals_of(model: Any, geoms: Iterable[int]) -> list[Visual]:
+    """Given geoms of a model and its visible sites, as far as they have a shape."""
+    visuals = [geom_visual(model, geom) for geom in geoms] + [site_visual(model, i) for i in visible_sites(model)]
+    return [visual for visual in visuals if shape_of(model, visual) is not None]
+
+
+def instances_of(assets: Assets, visuals: list[Visual]) -> list[Instances]:
+    """Draw calls of visuals: those alike in shape and texture in one, transparent ones each in its own."""
+    model, resources = assets.model, assets.resources
+    groups: dict[tuple[Any, ...], tuple[NamedShape, Mapping, list[tuple[Visual, int]]]] = {}
+    for visual in visuals:
+        shape, mapping = shape_of(model, visual), mapping_of(model, visual)
+        if shape is not None:
+            number = assets.objects.add(look_of(model, visual), host_of(model, visual), opacity=visual.opacity)
+            key = visual.site, shape[0], mapping.kind, mapping.texture, number if visual.opacity < 1.0 else None
+            groups.setdefault(key, (shape, mapping, []))[2].append((visual, number))
+
+    @functools.cache
+    def program(kind: int, own: bool) -> moderngl.Program:
+        return resources.program("visuals/geom", MAPPING=kind, OWN=int(own))
+
+    casters = tuple(
+        resources.program("passes/casters", MOVED=0, ALBEDO_MAP=albedo, TRANSMISSION_MAP=transmission)
+        for albedo, transmission in ((0, 0), (1, 0), (0, 1))
+    )
+    levels: dict[str, Levels] = {}
+    made = []
+    for (name, make), mapping, members in groups.values():
+        level = levels.setdefault(name, levels_of(resources, make))
+        made.append(Instances(assets, level, (program(mapping.kind, mapping.own), *casters), members))
+    return made
 
 
 def warn_of_unsupported(model: Any, targets: Iterable[int] = ()) -> None:

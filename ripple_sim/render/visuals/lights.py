@@ -1,21 +1,25 @@
-"""Lights of the MJCF, converted from MuJoCo's light in sRGB to linear light.
+"""The light of a scene: the lights and the skybox of the MJCF, or a photo studio in their place.
 
-The photo studio: a key light, which stands in for the MJCF's lights where it has none, soft boxes and a backdrop.
+Lights of the MJCF are converted from MuJoCo's light in sRGB to linear light. The studio has a key light, soft boxes
+and a backdrop; it stands in where the MJCF has no lights.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.camera import Pose, srgb_to_linear
-from ripple_sim.render.contract import MAX_LIGHTS, MAX_SHADOWS
+from ripple_sim.render.camera import Pose
+from ripple_sim.render.contract import MAX_LIGHTS, MAX_SHADOWS, Unit, srgb_to_linear
 from ripple_sim.render.resources import FrameUniforms
+from ripple_sim.solver.errors import RippleError
+
+from .objects import Assets
 
 _KIND = mujoco.mjtLightType
 _SUN_TANGENT = 0.05  # of the angular radius of a directional light, which MJCF does not give
@@ -89,22 +93,6 @@ def is_lit(model: Any) -> bool:
     return bool(model.nlight)
 
 
-def has_near_lights(model: Any) -> bool:
-    """Whether any light of the MJCF has a position."""
-    return bool(np.any(model.light_type != _KIND.mjLIGHT_DIRECTIONAL))
-
-
-def count_lights(model: Any) -> int:
-    """How many lights there may be, with the headlight: 1 to MAX_LIGHTS."""
-    return int(np.clip(model.nlight + 1, 1, MAX_LIGHTS))
-
-
-def count_casting_lights(model: Any) -> int:
-    """How many lights of the MJCF may cast shadows: 1 to MAX_SHADOWS."""
-    casting = model.light_castshadow.astype(bool) & (model.light_type != _KIND.mjLIGHT_IMAGE)
-    return int(np.clip(casting.sum(), 1, MAX_SHADOWS))
-
-
 def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
     """Lights of the MJCF as posed in `data`, and the headlight.
 
@@ -172,22 +160,19 @@ def studio_lighting(pose: Pose) -> Lighting:
     return Lighting([key], np.zeros(3), studio=True)
 
 
-class SkyColors(NamedTuple):
-    """Linear colours [3] of the background at the horizon and overhead, and the radiance that lights what is below."""
+def sky_colors(
+    lighting: Lighting, pose: Pose, floor_albedo: NDArray | None, sky: NDArray | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Linear colours [3] of the background at the horizon and overhead, and the radiance that lights what is below.
 
-    horizon: NDArray[np.float64]
-    zenith: NDArray[np.float64]
-    light: NDArray[np.float64]
-
-
-def sky_colors(lighting: Lighting, pose: Pose, floor_albedo: NDArray | None, sky: NDArray | None) -> SkyColors:
-    """Colours of the background; parameters as for `set_lighting`."""
+    Parameters as for `set_lighting`.
+    """
     tint = np.array([0.40, 0.42, 0.46]) if floor_albedo is None else _far_light(lighting, pose) * floor_albedo
     zenith = tint * np.array([0.36, 0.40, 0.48])
     if lighting.studio:
-        return SkyColors(tint, zenith, 0.75 * (0.7 * tint + 0.3 * zenith))
+        return tint, zenith, 0.75 * (0.7 * tint + 0.3 * zenith)
     hue = np.ones(3) if sky is None else sky / max(sky.mean(), 1e-6)
-    return SkyColors(tint, zenith, lighting.ambient * (0.5 + 0.5 * hue))
+    return tint, zenith, lighting.ambient * (0.5 + 0.5 * hue)
 
 
 def set_lighting(
@@ -213,10 +198,10 @@ def set_lighting(
         record["radiance"] = [*light.radiance, light.exponent]
         record["falloff"] = [*light.falloff, 0]
     _set_soft_boxes(frame, pose, 1.0 if lighting.studio else BESIDE_LIGHTS)
-    colors = sky_colors(lighting, pose, floor_albedo, sky)
-    frame.set_vector("horizon", colors.horizon)
-    frame.set_vector("zenith", colors.zenith)
-    frame.set_vector("sky", colors.light, 1.0 if lighting.studio else 0.0)
+    horizon, zenith, light_above = sky_colors(lighting, pose, floor_albedo, sky)
+    frame.set_vector("horizon", horizon)
+    frame.set_vector("zenith", zenith)
+    frame.set_vector("sky", light_above, 1.0 if lighting.studio else 0.0)
     frame.set_vector("floor_fade", [*(STUDIO_FADE if lighting.studio else FADE), 0.0])
 
 
@@ -246,3 +231,63 @@ def _direction(pose: Pose, azimuth: float, elevation: float) -> NDArray[np.float
     turn, rise = np.radians([azimuth, elevation])
     flat = np.cos(turn) * forward - np.sin(turn) * right
     return np.cos(rise) * flat + np.sin(rise) * np.array([0.0, 0.0, 1.0])
+
+
+LIGHTING = ("auto", "model", "studio")
+
+
+class SceneLight:
+    """What lights a model.
+
+    Parameters
+    ----------
+    assets : Assets
+    lighting : str
+        One of `LIGHTING`; "auto": the studio where the MJCF has no light.
+
+    Attributes
+    ----------
+    options : dict
+        Defines for the shaders, see `DeferredShading`: SKYBOX, NEAR_LIGHTS, LIGHTS and SHADOWS.
+
+    Raises
+    ------
+    RippleError
+        If the lighting is unknown.
+    """
+
+    def __init__(self, assets: Assets, lighting: str) -> None:
+        if lighting not in LIGHTING:
+            raise RippleError(f"lighting is {lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
+        self._model = model = assets.model
+        self._studio = lighting == "studio" or (lighting == "auto" and not is_lit(model))
+        self._sky = None if self._studio else assets.skybox()
+        casting = model.light_castshadow.astype(bool) & (model.light_type != _KIND.mjLIGHT_IMAGE)
+        near = model.light_type != _KIND.mjLIGHT_DIRECTIONAL
+        self.options = {
+            "SKYBOX": int(self._sky is not None),
+            "NEAR_LIGHTS": int(not self._studio and near.any()),
+            "LIGHTS": 1 if self._studio else int(np.clip(model.nlight + 1, 1, MAX_LIGHTS)),  # with the headlight
+            "SHADOWS": 1 if self._studio else int(np.clip(casting.sum(), 1, MAX_SHADOWS)),
+        }
+
+    def set(
+        self,
+        frame: FrameUniforms,
+        data: Any,
+        pose: Pose,
+        floor_albedo: NDArray | None = None,
+        floor_normal: NDArray | None = None,
+    ) -> list[Light]:
+        """Set the frame's light and background; return the lights. The floor's colour and normal are [3] each."""
+        lighting: Lighting = studio_lighting(pose) if self._studio else model_lighting(self._model, data, pose)
+        mean: NDArray[np.float64] | None = None if self._sky is None else self._sky[1]
+        set_lighting(frame, lighting, pose, floor_albedo, mean)
+        if floor_normal is not None:
+            frame.set_vector("floor_light", lighting.on(pose.focus, floor_normal))
+        return lighting.lights
+
+    def bind(self) -> None:
+        """Bind the skybox."""
+        if self._sky is not None:
+            self._sky[0].use(Unit.SKYBOX)

@@ -10,14 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import moderngl
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.soft import first_flex, first_skin, is_soft
-from ripple_sim.render.camera import Balls, srgb_to_linear
-from ripple_sim.render.resources import Resources, srgb_cube, srgb_texture
+from ripple_sim.render.contract import srgb_to_linear
 from ripple_sim.solver.errors import RippleError
 
 # The look that takes colour, texture and gloss from the geom's MuJoCo material.
@@ -184,17 +182,17 @@ def host_of(model: Any, visual: Visual) -> int:
     return int(near[np.argmin(np.linalg.norm(model.geom_pos[near] - model.site_pos[visual.index], axis=1))])
 
 
-def ball_of(model: Any, data: Any, visual: Visual) -> Balls:
-    """Bounding ball of a visual in the world; that of a plane is infinite."""
+def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
+    """Bounding ball [1, 4] of a visual in the world; that of a plane is infinite."""
     if visual.site:
         half = visual.half_sizes
         radius = float(np.linalg.norm(half) + half[0])  # a capsule has ends, too
-        return Balls(data.site_xpos[visual.index][None], np.array([radius]))
+        return np.array([[*data.site_xpos[visual.index], radius]])
     box, position = model.geom_aabb[visual.index], data.geom_xpos[visual.index]
     if visual.kind == _GEOM.mjGEOM_PLANE:
-        return Balls(position[None], np.array([np.inf]))
+        return np.array([[*position, np.inf]])
     centre = position + data.geom_xmat[visual.index].reshape(3, 3) @ box[:3]
-    return Balls(centre[None], np.array([float(np.linalg.norm(box[3:]))]))
+    return np.array([[*centre, np.linalg.norm(box[3:])]])
 
 
 def _visual(model: Any, which: str, index: int, asset: int) -> Visual:
@@ -226,38 +224,6 @@ def look_of(model: Any, visual: Visual) -> Look:
         coat=min(coat, 1.0),
         emission=float(model.mat_emission[material]),
     )
-
-
-class Textures:
-    """The textures of a model on the GPU, each uploaded at its first use."""
-
-    def __init__(self, resources: Resources, model: Any) -> None:
-        self._resources, self._model = resources, model
-        self._uploaded: dict[int, moderngl.Texture | moderngl.TextureCube] = {}
-
-    def get(self, texture: int) -> moderngl.Texture | moderngl.TextureCube:
-        """Return the texture of an id; it reads as linear light."""
-        if texture not in self._uploaded:
-            pixels = texture_pixels(self._model, texture)
-            flat = self._model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
-            self._uploaded[texture] = srgb_texture(self._resources, pixels) if flat else self._cube(pixels)
-        return self._uploaded[texture]
-
-    def skybox(self) -> tuple[moderngl.TextureCube, NDArray[np.float64]] | None:
-        """Return the model's skybox and its mean linear colour, or None."""
-        for texture in range(self._model.ntex):
-            if self._model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
-                pixels = texture_pixels(self._model, texture)
-                self._uploaded[texture] = cube = self._cube(pixels)
-                return cube, srgb_to_linear(pixels[::4, ::4] / 255.0).mean(axis=(0, 1))
-        return None
-
-    def _cube(self, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:
-        """Cube map of faces below one another."""
-        size = pixels.shape[1]
-        if pixels.shape[0] != 6 * size:  # one image for all faces
-            pixels = np.concatenate([pixels[:size]] * 6)
-        return srgb_cube(self._resources, pixels)
 
 
 def texture_pixels(model: Any, texture: int) -> NDArray[np.uint8]:

@@ -1,5 +1,6 @@
 #version 430
-// Weights of the six links of the quads whose south-west corners are at the places: quad_pass.py, line by line.
+// Weights of the six links of the quads whose south-west corners are at the places. The law is that of cells.py, the
+// rest that of the kernel `quad_pass`, by the same names.
 layout(local_size_x = LIST_GROUP) in;
 layout(std430, binding = 0) readonly buffer Places { double places[]; };
 layout(std430, binding = 1) readonly buffer Conductance { float conductance[]; };
@@ -8,7 +9,43 @@ layout(std430, binding = 3) writeonly buffer Sides { float sides[]; };  // south
 uniform int count, width;
 uniform float scale, power;
 
-const float SLIGHTEST = 1e-12;
+float cross_length(vec3 a, vec3 b) { return length(cross(a, b)); }
+
+float hourglass(float pp, float qq, float pq, float area) {
+    float both_sides = max(0.5 * (pp + qq), TINY);
+    float a = 0.5 * (both_sides + abs(pq)), d = 0.25 * (pp - qq);
+    float in_time = both_sides * area / (2.0 * (area * area + 3.0 * d * d));
+    float unhurried = (a * a - d * d) / (4.0 * a * area);
+    float least = min(in_time, max(SHARE * unhurried, 2.0 * area / (PER_HOURGLASS * both_sides)));
+    return min(PER_TINY * (pp + qq), 1.0) * least;
+}
+
+float quad_area(vec3 e, vec3 n, vec3 p) {
+    float rising = cross_length(e, p) + cross_length(p, n);
+    float falling = cross_length(e, n) + cross_length(p - e, n - e);
+    return 0.5 * min(rising, falling);
+}
+
+void quad(vec3 e, vec3 n, vec3 p, out float links[6]) {
+    vec3 q = n - e;
+    float pp = dot(p, p), qq = dot(q, q), pq = dot(p, q);
+    float twice = max(2.0 * max(cross_length(p, q), 0.5 * LEAST_AREA * (pp + qq)), TINY);
+    vec3 way = p - n - e;
+    float along_p = dot(way, p), along_q = dot(way, q), square = 0.25 * twice * twice;
+    float a = (along_p * qq - along_q * pq) / square, b = (along_q * pp - along_p * pq) / square;
+    float uneven = EVEN * (a * a + b * b), share = uneven / (uneven + 1.0);
+    a = clamp(share * a, -1.0, 1.0);
+    b = clamp(share * b, -1.0, 1.0);
+    float skew = pq / twice, h = hourglass(pp, qq, pq, 0.25 * twice);
+    links = float[6](
+        skew + h * (1.0 + a) * (1.0 - b),
+        skew + h * (1.0 - a) * (1.0 + b),
+        h * (1.0 + a) * (1.0 + b) - skew,
+        h * (1.0 - a) * (1.0 - b) - skew,
+        qq / twice - h * (1.0 - a * a),
+        pp / twice - h * (1.0 - b * b)
+    );
+}
 
 vec3 between(int a, int b) {
     return vec3(
@@ -18,41 +55,15 @@ vec3 between(int a, int b) {
     );
 }
 
-float hourglass(float pp, float qq, float pq, float area) {
-    float both_sides = max((pp + qq) * 0.5, SLIGHTEST);
-    float a = (both_sides + abs(pq)) * 0.5, d = (pp - qq) * 0.25;
-    float in_time = both_sides * area / (2.0 * (area * area + 3.0 * d * d));
-    float unhurried = (a * a - d * d) / (4.0 * a * area);
-    return min(in_time, max(SHARE * unhurried, HOURGLASS * 2.0 * area / both_sides));
-}
-
 void main() {
     int i = int(gl_GlobalInvocationID.x);
     if (i >= count) return;
-    float rest = conductance[i];
-    if (rest <= 0.0) {
-        for (int k = 0; k < 6; k++) sides[k * count + i] = 0.0;
-        return;
+    float links[6] = float[6](0.0, 0.0, 0.0, 0.0, 0.0, 0.0), factor = 0.0;
+    if (conductance[i] > 0.0) {
+        vec3 e = between(i, i + 1), n = between(i, i + width), p = between(i, i + width + 1);
+        quad(e, n, p, links);
+        float ratio = max(quad_area(e, n, p) * per_area[i], LEAST_RATIO);
+        factor = power == -1.0 ? conductance[i] / ratio : conductance[i] * pow(ratio, power);
     }
-    vec3 e = between(i, i + 1), n = between(i, i + width), p = between(i, i + width + 1), q = n - e;
-    float pp = dot(p, p), qq = dot(q, q), pq = dot(p, q);
-    float twice = max(2.0 * max(length(cross(p, q)), 0.5 * LEAST_AREA * (pp + qq)), SLIGHTEST);
-    float half_area = 0.5 * twice, square = half_area * half_area;
-    vec3 way = p - e - n;
-    float along_p = dot(way, p), along_q = dot(way, q);
-    float a = (along_p * qq - along_q * pq) / square, b = (along_q * pp - along_p * pq) / square;
-    float uneven = a * a + b * b, share = uneven / (uneven + UNEVEN);
-    a = clamp(share * a, -1.0, 1.0);
-    b = clamp(share * b, -1.0, 1.0);
-    float h = hourglass(pp, qq, pq, 0.5 * half_area), skew = pq / twice;
-    float rising = length(cross(e, p)) + length(cross(p, n));
-    float falling = length(cross(e, n)) + length(cross(p - e, q));
-    float ratio = max(min(rising, falling) * 0.5 * per_area[i], LEAST_RATIO);
-    float factor = power == -1.0 ? rest / ratio : rest * pow(ratio, power);
-    sides[i] = factor * (skew + h * (1.0 + a) * (1.0 - b));
-    sides[count + i] = factor * (skew + h * (1.0 - a) * (1.0 + b));
-    sides[2 * count + i] = factor * (h * (1.0 + a) * (1.0 + b) - skew);
-    sides[3 * count + i] = factor * (h * (1.0 - a) * (1.0 - b) - skew);
-    sides[4 * count + i] = factor * (qq / twice - h * (1.0 - a * a));
-    sides[5 * count + i] = factor * (pp / twice - h * (1.0 - b * b));
+    for (int k = 0; k < 6; k++) sides[k * count + i] = factor * links[k];
 }

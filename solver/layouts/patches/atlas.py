@@ -1,11 +1,4 @@
-"""The patch layout's chart map: the mesh's triangles cut into pieces, on each of which it is linear.
-
-How evenly a map onto charts spreads area.
-
-The points of a rim beside the texels of charts that end there.
-
-The atlas of any mesh in the patch layout.
-"""
+"""The atlas of any mesh in the patch layout, and its chart map: pieces of triangles, on each of which it is linear."""
 
 from __future__ import annotations
 
@@ -23,11 +16,12 @@ from ...texels.atlas import Atlas
 from ...texels.chart_map import ChartPieces, LinearParts, barycentrics_at, barycentrics_in, texel_on
 from ...texels.texel_mesh import TexelMesh, levelled_areas
 from ...texels.topology import TexelTopology, glue, stretch_summary
+from ..energy import COLUMN, FIXED
 from .layout import PatchMap, patch_map
 from .pieces import Pieces, chart_pieces, warped
 from .quads import CELLS
-from .samples import Sampler, corners_in_frame_of, untangled
-from .seamless import COLUMN, FIXED, SeamlessMap, Transitions, corner_places, follow, transitions
+from .samples import Sampler, untangled
+from .seamless import SeamlessMap, Transitions, corner_places, follow, places_seen_from, transitions
 
 
 def map_quality(mesh: Mesh, pieces: Pieces) -> dict[str, float]:
@@ -170,7 +164,10 @@ def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDAr
     beyond[(topology.halo < 0) | topology.rim] = np.nan
     sides = patches.surface.edges.sides[patches.surface.edges.rim, 0]
     seamless = patches.seamless
-    _draw_rims(seamless, patches.surface.V, sides, transitions(seamless.glued), beyond)
+    f, k = np.divmod(sides, 3)
+    corner = np.where(seamless.freedom[seamless.F[f, k]] != FIXED, k, (k + 1) % 3)
+    homes, places = places_seen_from(seamless, f, corner)
+    _draw_rims(seamless, patches.surface.V, sides, transitions(seamless.glued), corner, homes, places, beyond)
     n = topology.shape[1]
     for chart, corner in np.argwhere(topology.valence == 0):
         row, column = ((0, 0), (0, n + 1), (n + 1, n + 1), (n + 1, 0))[corner]
@@ -199,15 +196,23 @@ def _place_corners(patches: PatchMap, topology: TexelTopology, beyond: NDArray[n
 
 
 @kernel
-def _draw_rims(seamless: SeamlessMap, V: Floats, sides: Ints, across: Transitions, beyond: Floats) -> None:
+def _draw_rims(
+    seamless: SeamlessMap,
+    V: Floats,
+    sides: Ints,
+    across: Transitions,
+    corner: Ints,
+    homes: Ints,
+    places: Floats,
+    beyond: Floats,
+) -> None:
+    """Put the points of sides at a rim beyond the texels opposite to them; see `places_seen_from`."""
     n = beyond.shape[1] - 2
-    p = np.empty((3, 2))
-    for h in sides:
-        f, k = h // 3, h % 3
+    for side in range(len(sides)):
+        f, k = sides[side] // 3, sides[side] % 3
         a, b = seamless.F[f, k], seamless.F[f, (k + 1) % 3]
-        anchor = k if seamless.freedom[a] != FIXED else (k + 1) % 3
+        anchor, p = corner[side], places[side]
         v = seamless.F[f, anchor]
-        corners_in_frame_of(seamless, f, anchor, p)
         axis = 0 if seamless.freedom[v] == COLUMN else 1
         low, high = p[k, axis], p[(k + 1) % 3, axis]
         first = int(np.ceil(min(low, high) * n - 0.5 - 1e-9))
@@ -216,7 +221,7 @@ def _draw_rims(seamless: SeamlessMap, V: Floats, sides: Ints, across: Transition
             along = (i + 0.5) / n
             t = min(max((along - low) / (high - low), 0.0), 1.0)
             qx, qy = (along, p[anchor, 1]) if axis == 0 else (p[anchor, 0], along)
-            chart, _, _, _, x, y = follow(seamless.chart[v], p[anchor, 0], p[anchor, 1], qx, qy, seamless.glued, across)
+            chart, _, _, _, x, y = follow(homes[side], p[anchor, 0], p[anchor, 1], qx, qy, seamless.glued, across)
             row, column = int(np.floor(y * n)) + 1, int(np.floor(x * n)) + 1
             if abs(y) < 1e-9:
                 row = 0

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from .surface import AB, BC, CA, MIDDLE, A, B, C, Surface, Triangle
+from ...mesh.topology import SPLITS
+from .surface import AB, BC, CA, MIDDLE, A, B, C, Patterns, Surface
 
 _LEAST = 1e-12  # of the longest link: graphs know no links of length 0
 
@@ -180,10 +181,8 @@ def _gathered(surface: Surface, label: NDArray[np.int64], seeds: NDArray[np.int6
 
 
 # Triangles between two cells, the one vertex on its side of the border; and between three.
-_CUTS: dict[int, tuple[Triangle, ...]] = {
-    3: ((AB, B, BC), (A, AB, BC), (A, BC, C)),
-    6: ((BC, C, CA), (B, BC, CA), (B, CA, A)),
-    5: ((CA, A, AB), (C, CA, AB), (C, AB, B)),
+_CUTS: Patterns = {
+    **{number: SPLITS[number] for number in (3, 6, 5)},
     7: ((A, AB, MIDDLE), (AB, B, MIDDLE), (B, BC, MIDDLE), (BC, C, MIDDLE), (C, CA, MIDDLE), (CA, A, MIDDLE)),
 }
 _LEAST_SHARE = 0.1  # of an edge on either side of a border

@@ -4,8 +4,6 @@ Cuts along the borders of cells and charts leave three times as many triangles a
 the charts are known to the map, the cuts are not needed any more. In each round the best collapses are done, none of
 two neighbours, so that all are judged on the same triangles.
 
-Which vertices of a map may be merged with a neighbour, and how good that is.
-
 A half-edge collapse must meet the link condition, keep every triangle inside its parent on the mesh, and turn none
 over, neither there nor on the charts.
 """
@@ -17,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernel import Bools, Floats, Ints, kernel
-from .seamless import FIXED, FREE, SeamlessMap, after, corner_place, frame_of, inverse, stars, turned
+from ..energy import FIXED, FREE
+from .seamless import SeamlessMap, after, corner_place, frame_of, inverse, stars, turned
 from .surface import Surface
 
 _FLATTEST = 0.05  # double area over squared length of a triangle on the charts after a collapse
@@ -32,7 +31,7 @@ class Parents(NamedTuple):
 
 
 @kernel
-def targets(seamless: SeamlessMap, parents: Parents, cut: Bools) -> tuple[Floats, Ints]:
+def _targets(seamless: SeamlessMap, parents: Parents, cut: Bools, at_rim: Bools) -> tuple[Floats, Ints]:
     """How good the best collapse of each vertex is, above 0 [n], and a corner 3 triangle + k: to where it goes."""
     n = len(seamless.x)
     worth, target, seen = np.zeros(n), np.full(n, -1), np.full(n, -1)
@@ -48,7 +47,7 @@ def targets(seamless: SeamlessMap, parents: Parents, cut: Bools) -> tuple[Floats
             f, k = seamless.star[i] // 3, seamless.star[i] % 3
             for j in range(1, 2 if seamless.freedom[u] == FREE else 3):  # each neighbour once
                 m = (k + j) % 3
-                good = _worth(seamless, parents, u, f, k, m)
+                good = _worth(seamless, parents, at_rim, u, f, k, m)
                 if good > worth[u] and _meets(seamless, u, seamless.F[f, m], seen):
                     worth[u], target[u] = good, 3 * f + m
     return worth, target
@@ -80,11 +79,11 @@ def _meets(seamless: SeamlessMap, u: int, v: int, seen: Ints) -> bool:
 
 
 @kernel
-def _worth(seamless: SeamlessMap, parents: Parents, u: int, f: int, k: int, m: int) -> float:
+def _worth(seamless: SeamlessMap, parents: Parents, at_rim: Bools, u: int, f: int, k: int, m: int) -> float:
     """Width of the flattest triangle on the charts if u, corner k of triangle f, goes to corner m; 0 if it may not."""
     v = seamless.F[f, m]
     held = seamless.freedom[v] == FIXED
-    if held and _at_rim(seamless, v):
+    if held and at_rim[v]:
         return 0.0  # the frames round a corner of a rim stay as they are
     to_u = inverse(frame_of(seamless, f, k))
     vx, vy = corner_place(seamless, f, m)
@@ -114,20 +113,6 @@ def _worth(seamless: SeamlessMap, parents: Parents, u: int, f: int, k: int, m: i
 
 
 @kernel
-def _at_rim(seamless: SeamlessMap, v: int) -> bool:
-    """Whether the triangles of a vertex do not close round it: then some neighbour is seen once."""
-    first, last = seamless.star_start[v], seamless.star_start[v + 1]
-    for i in range(first, last):
-        w = seamless.F[seamless.star[i] // 3, (seamless.star[i] % 3 + 1) % 3]
-        again = False
-        for j in range(first, last):
-            again = again or seamless.F[seamless.star[j] // 3, (seamless.star[j] % 3 + 2) % 3] == w
-        if not again:
-            return True
-    return False
-
-
-@kernel
 def _inside(seamless: SeamlessMap, parents: Parents, g: int, p: int, q: int, v: int) -> bool:
     """Whether v with corners p and q of triangle g makes a triangle inside of g's parent, as it is turned."""
     for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
@@ -146,11 +131,14 @@ def without_cuts(surface: Surface, seamless: SeamlessMap, cut: Bools) -> tuple[S
     """The same map on fewer triangles: vertices `cut` [n] are gone where that folds nothing."""
     parents = Parents(surface.parent, np.ascontiguousarray(surface.inside))
     for _ in range(_MOST_ROUNDS):
-        worth, target = targets(seamless, parents, cut)
+        worth, target = _targets(seamless, parents, cut, surface.at_rim)
         chosen = _chosen(seamless, np.argsort(-worth, kind="stable"), worth, target)
         if chosen.sum() <= _LEAST_SHARE * cut.sum():
             break
-        seamless, parents = _collapsed(seamless, parents, chosen, target)
+        F, frame, turn, shift, *left = _collapsed(seamless, parents, chosen, target)
+        start, star = stars(F, len(seamless.x))
+        seamless = seamless._replace(F=F, frame=frame, turn=turn, shift=shift, star_start=start, star=star)
+        parents = Parents(*left)
     used, F = np.unique(seamless.F, return_inverse=True)
     F = F.reshape(-1, 3)
     start, star = stars(F, len(used))
@@ -196,7 +184,10 @@ def _chosen(seamless: SeamlessMap, order: Ints, worth: Floats, target: Ints) -> 
 
 
 @kernel
-def _collapsed(seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints) -> tuple[SeamlessMap, Parents]:
+def _collapsed(
+    seamless: SeamlessMap, parents: Parents, chosen: Bools, target: Ints
+) -> tuple[Ints, Ints, Ints, Ints, Ints, Floats]:
+    """What is left of the triangles: their vertices, frames, and changes to these; their parents, and where in them."""
     F, frame, turn, shift = seamless.F.copy(), seamless.frame.copy(), seamless.turn.copy(), seamless.shift.copy()
     parent, inside = parents.parent.copy(), parents.inside.copy()
     size = 0
@@ -226,17 +217,4 @@ def _collapsed(seamless: SeamlessMap, parents: Parents, chosen: Bools, target: I
                 if parents.parent[h] == parents.parent[f]:
                     inside[size, k] = parents.inside[h, c]
         size += 1
-    start, star = stars(F[:size], len(seamless.x))
-    coarser = SeamlessMap(
-        F[:size],
-        frame[:size],
-        seamless.chart,
-        seamless.x,
-        seamless.freedom,
-        turn[:size],
-        shift[:size],
-        seamless.glued,
-        start,
-        star,
-    )
-    return coarser, Parents(parent[:size], inside[:size])
+    return F[:size], frame[:size], turn[:size], shift[:size], parent[:size], inside[:size]

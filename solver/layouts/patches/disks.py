@@ -1,9 +1,8 @@
-"""Cells that are disks with three corners and more: seeds are added and taken away until all are.
+"""Cells made disks with three corners and more, and laid out flat in convex polygons without a fold.
 
-Disks laid out flat in convex polygons, without a fold.
-
-Each inner vertex is a mean of its neighbours with positive weights, so that the map is one to one (Tutte 1963, Floater
-2003), whatever the weights; mean-value weights follow the shape of the triangles.
+Seeds are added and taken away until all cells are disks. In the plane each inner vertex is a mean of its neighbours
+with positive weights, so that the map is one to one (Tutte 1963, Floater 2003), whatever the weights; mean-value
+weights follow the shape of the triangles.
 """
 
 from __future__ import annotations
@@ -17,8 +16,6 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import splu
 
 from ...errors import AtlasError
-from ...kernel import Bools, Floats, Ints, kernel
-from ..sphere_map.energy import dot, row, subtract
 from .cells import BorderedCells, Cells, Metric, centred_cells, cut_borders, voronoi_cells
 from .surface import Surface
 
@@ -123,28 +120,25 @@ def _far_side(surface: Surface, cells: Cells, cell: int) -> int:
     sides = edges.sides[links]
     beside = np.where(sides < 0, 0, number[sides // 3])
     order = np.argsort(-loop, kind="stable")
-    closing = order[_closing(beside[order], tree[order], np.arange(len(inner) + 1))]
+    closing = order[_closing(beside[order], tree[order], len(inner) + 1)]
     if not len(closing):
         return int(np.argmax(np.where(own, cells.distance, -1.0)))
     best = ends[closing[-1]]
     return int(best[np.argmax(distance[best])])
 
 
-@kernel
-def _closing(beside: Ints, tree: Bools, root: Ints) -> Bools:
-    """Edges, in this order, whose two triangles are joined already; `root` [k] is room for union-find."""
-    closing = np.zeros(len(beside), np.bool_)
-    for e in range(len(beside)):
+def _closing(beside: NDArray[np.int64], tree: NDArray[np.bool_], triangles: int) -> list[int]:
+    """Edges, in this order and but for those of the `tree`, whose two triangles are joined already."""
+    root, closing = list(range(triangles)), []
+    for e, (a, b) in enumerate(beside.tolist()):
         if tree[e]:
             continue
-        a, b = beside[e, 0], beside[e, 1]
         while root[a] != a:
-            root[a] = root[root[a]]
-            a = root[a]
+            root[a] = a = root[root[a]]
         while root[b] != b:
-            root[b] = root[root[b]]
-            b = root[b]
-        closing[e] = a == b
+            root[b] = b = root[root[b]]
+        if a == b:
+            closing.append(e)
         root[a] = b
     return closing
 
@@ -196,26 +190,17 @@ def signed_areas(places: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def along(V: NDArray[np.float64], paths: list[NDArray[np.int64]]) -> NDArray[np.float64]:
     """How far along its path each vertex lies, from 0 to 1; the paths' one behind the other."""
-    last = np.cumsum([len(each) for each in paths])
-    return _along(V, np.concatenate(paths), last)
-
-
-@kernel
-def _along(V: Floats, vertices: Ints, last: Ints) -> Floats:
-    result, first = np.zeros(len(vertices)), 0
-    for end in last:
-        longest = 0.0
-        for i in range(first + 1, end):
-            step = subtract(row(V, vertices[i]), row(V, vertices[i - 1]))
-            result[i] = np.sqrt(dot(step, step))
-            longest = max(longest, result[i])
-        for i in range(first + 1, end):
-            result[i] = max(result[i], 1e-6 * longest + 1e-300) + result[i - 1]
-        total = result[end - 1]
-        for i in range(first + 1, end):
-            result[i] /= total
-        first = end
-    return result
+    sizes = np.array([len(each) for each in paths])
+    inside = np.arange(sizes.max()) < sizes[:, None]
+    # a row a path, so that sums do not depend on the paths before
+    vertices = np.zeros(inside.shape, np.int64)
+    vertices[inside] = np.concatenate(paths)
+    x, y, z = np.moveaxis(np.diff(V[vertices], axis=1), 2, 0)
+    steps = np.where(inside[:, 1:], np.sqrt(x * x + y * y + z * z), 0.0)
+    least = 1e-6 * steps.max(axis=1, initial=0.0) + 1e-300
+    lengths = np.cumsum(np.where(inside[:, 1:], np.maximum(steps, least[:, None]), 0.0), axis=1)
+    shares = np.concatenate([np.zeros((len(paths), 1)), lengths / lengths[:, -1:]], axis=1)
+    return shares[inside]
 
 
 def _mean_value_weights(surface: Surface) -> NDArray[np.float64]:

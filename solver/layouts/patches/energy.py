@@ -8,14 +8,11 @@ singular values s1 >= s2, let D = s1^2 + s2^2 and J = s1 s2. The energy for each
 the mean of the Dirichlet energies of the map and of its inverse, each to the power p: 1 for an isometry, infinite at a
 fold. With p = 1 a map is easily brought to its least energy; a larger p reduces the worst spots at the cost of others.
 
-Gradient and Hessian of the energy of a seamless map, the latter made positive semidefinite triangle by triangle.
-
 In the basis of its singular vectors, the Hessian of a function f(s1, s2) of a 2 x 2 matrix falls into a 2 x 2 block of
 second derivatives, and two numbers: for the antisymmetric change and for the symmetric one off the diagonal.
 
-Relaxing a seamless map one vertex after the other, each inside its star.
-
-Newton steps of all vertices at once are cut short by the first triangle that would fold; sweeps clear such spots.
+`energy` of the package above says the same law for both maps; the sums here are in another order, and maps onto charts
+amplify round-off: in that order every atlas of this layout would be another, as good as this one.
 """
 
 from __future__ import annotations
@@ -23,22 +20,73 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...kernel import Floats, Ints, kernel
-from ..sphere_map.energy import cross, dot, row, subtract
-from .seamless import COLUMN, FIXED, FREE, ROW, SeamlessMap, corner_place, turned
+from ...kernel import Floats, Ints, Ints32, kernel
+from ...mesh.vectors import cross, dot, subtract
+from ..energy import ARMIJO, COLUMN, FIXED, FREE, MOST_TRIALS, REACH
+from ..newton import System
+from .seamless import SeamlessMap, Transitions, corner_place, rehome_vertex, turned
 
 FOLDED = 1e-15  # the area of a triangle on the charts must exceed this
+_POWER = 2
 _FLATTEST = 0.02  # least double area over squared length that the energy believes in
 _LEAST_AREA = 1e-6  # of a triangle, in units of their mean
+# what is known of a triangle of the star: the place of its next corner and of the one before, in the vertex's frame,
+# their cotangents, and its area
+TERMS = 7
 
 
-class Reference(NamedTuple):
-    """The triangles to resemble, and how much."""
+class ChartShapes(NamedTuple):
+    """The triangles that a map onto charts is to resemble, and how much."""
 
     area: Floats  # [m]
     cotangent: Floats  # [m, 3], of their angles
     power: int  # p
+
+
+def shapes_of(V: NDArray[np.float64], F: NDArray[np.int64], charts: int) -> ChartShapes:
+    """The shapes of the triangles F [m, 3], their areas in units in which they add up to the number of charts."""
+    a, b, c = (V[F[:, k]].T for k in range(3))
+    ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
+    normal, tiny = cross(ab, ac), np.finfo(np.float64).tiny
+    double = np.sqrt(dot(normal, normal))
+    area = np.maximum(double / 2, tiny)
+    area = np.maximum(area, _LEAST_AREA * area.mean())
+    area *= charts / area.sum()
+    squares = np.stack([dot(bc, bc), dot(ac, ac), dot(ab, ab)])
+    top, every = squares.argmax(axis=0), np.arange(len(F))
+    # needles count as a little thicker: the corner opposite to their longest side stands higher
+    double = np.maximum(np.maximum(double, _FLATTEST * squares[top, every]), tiny)
+    cotangent = np.stack([dot(ab, ac), -dot(ab, bc), dot(ac, bc)]) / double
+    left, right = cotangent[(top + 1) % 3, every], cotangent[(top + 2) % 3, every]
+    cotangent[top, every] = (1.0 - left * right) / np.maximum(left + right, tiny)
+    return ChartShapes(area, np.ascontiguousarray(cotangent.T), _POWER)
+
+
+def total_energy(seamless: SeamlessMap, shapes: ChartShapes) -> float:
+    """Energy of the whole map; infinite if a triangle is folded."""
+    return energy_of(seamless, shapes, np.arange(len(seamless.F)))
+
+
+@kernel
+def energy_of(seamless: SeamlessMap, shapes: ChartShapes, triangles: Ints) -> float:
+    """Energy of some triangles [k]; infinite if one is folded."""
+    total = 0.0
+    for f in triangles:
+        ax, ay = corner_place(seamless, f, 0)
+        bx, by = corner_place(seamless, f, 1)
+        cx, cy = corner_place(seamless, f, 2)
+        ux, uy, vx, vy, wx, wy = bx - ax, by - ay, cx - ax, cy - ay, cx - bx, cy - by
+        area, cotangent = 0.5 * (ux * vy - uy * vx), shapes.cotangent[f]
+        if not area > FOLDED:
+            return np.inf
+        dirichlet = (
+            cotangent[0] * (wx * wx + wy * wy) + cotangent[1] * (vx * vx + vy * vy) + cotangent[2] * (ux * ux + uy * uy)
+        )
+        dirichlet, jacobian = dirichlet / (2.0 * shapes.area[f]), area / shapes.area[f]
+        total += shapes.area[f] * density(dirichlet, jacobian, shapes.power)
+    return total
 
 
 @kernel
@@ -60,83 +108,19 @@ def density_derivatives(
     return w, slope_d, slope_j, bend_d, mixed, 2.0 * p * (2.0 * p + 1.0) * inverse / (jacobian * jacobian)
 
 
-def reference_of(V: Floats, F: Ints, charts: int, power: int) -> Reference:
-    """The shapes of the triangles F [m, 3], their areas in units in which they add up to the number of charts."""
-    areas, cotangent = _shapes(V, F, np.finfo(np.float64).tiny)
-    areas = np.maximum(areas, _LEAST_AREA * areas.mean())
-    return Reference(areas * (charts / areas.sum()), cotangent, power)
-
-
-@kernel
-def _shapes(V: Floats, F: Ints, tiny: float) -> tuple[Floats, Floats]:
-    """Areas [m] and cotangents [m, 3] of triangles."""
-    areas, cotangent = np.empty(len(F)), np.empty((len(F), 3))
-    for f in range(len(F)):
-        a, b, c = row(V, F[f, 0]), row(V, F[f, 1]), row(V, F[f, 2])
-        ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
-        normal = cross(ab, ac)
-        double = np.sqrt(dot(normal, normal))
-        squares = (dot(bc, bc), dot(ac, ac), dot(ab, ab))
-        dots = (dot(ab, ac), -dot(ab, bc), dot(ac, bc))
-        top = 0 if squares[0] >= max(squares[1], squares[2]) else (1 if squares[1] >= squares[2] else 2)
-        left, right = (top + 1) % 3, (top + 2) % 3
-        areas[f] = max(double / 2, tiny)
-        # needles count as a little thicker: the corner opposite to their longest side stands higher
-        double = max(double, _FLATTEST * squares[top], tiny)
-        cotangent[f, left], cotangent[f, right] = dots[left] / double, dots[right] / double
-        total = max(cotangent[f, left] + cotangent[f, right], tiny)
-        cotangent[f, top] = (1.0 - cotangent[f, left] * cotangent[f, right]) / total
-    return areas, cotangent
-
-
-@kernel
-def shape_of(seamless: SeamlessMap, reference: Reference, f: int) -> tuple[float, float, float]:
-    """D and J of a triangle, and its area on the charts."""
-    ax, ay = corner_place(seamless, f, 0)
-    bx, by = corner_place(seamless, f, 1)
-    cx, cy = corner_place(seamless, f, 2)
-    ux, uy, vx, vy = bx - ax, by - ay, cx - ax, cy - ay
-    area = 0.5 * (ux * vy - uy * vx)
-    cotangent = reference.cotangent[f]
-    wx, wy = cx - bx, cy - by
-    dirichlet = (
-        cotangent[0] * (wx * wx + wy * wy) + cotangent[1] * (vx * vx + vy * vy) + cotangent[2] * (ux * ux + uy * uy)
-    )
-    return dirichlet / (2.0 * reference.area[f]), area / reference.area[f], area
-
-
-@kernel
-def total_energy(seamless: SeamlessMap, reference: Reference) -> float:
-    """Energy of the whole map; infinite if a triangle is folded."""
-    total = 0.0
-    for f in range(len(seamless.F)):
-        dirichlet, jacobian, area = shape_of(seamless, reference, f)
-        if not area > FOLDED:
-            return np.inf
-        total += reference.area[f] * density(dirichlet, jacobian, reference.power)
-    return total
-
-
 @kernel
 def assemble(
     seamless: SeamlessMap,
-    reference: Reference,
+    shapes: ChartShapes,
     edge: Ints,
-    ends: Ints,
-    gradient: Floats,
-    diagonal: Floats,
-    blocks: Floats,
+    ends: Ints32,
+    system: System,
 ) -> None:
-    """Fill gradient [n, 2], and the Hessian's blocks of vertices [n, 3] and edges [e, 4]; see `conjugate_gradients`.
-
-    All are in the vertices' own frames.
-    """
-    gradient[:] = 0.0
-    diagonal[:] = 0.0
-    blocks[:] = 0.0
+    """Add the triangles to the system, in the vertices' own frames. `edge` [m, 3] are their edges, `ends` [e, 2]."""
+    gradient, diagonal, blocks = system
     slopes, modes, curvature = np.empty((3, 2)), np.empty((4, 3, 2)), np.empty(4)
     for f in range(len(seamless.F)):
-        _triangle(seamless, reference, f, slopes, modes, curvature)
+        _triangle(seamless, shapes, f, slopes, modes, curvature)
         for k in range(3):
             v, back = seamless.F[f, k], (4 - seamless.turn[f, k]) % 4
             x, y = turned(slopes[k, 0], slopes[k, 1], back)
@@ -157,34 +141,14 @@ def assemble(
                 blocks[e, 1] += curvature[m] * a[0] * b[1]
                 blocks[e, 2] += curvature[m] * a[1] * b[0]
                 blocks[e, 3] += curvature[m] * a[1] * b[1]
-    _hold(seamless, ends, gradient, diagonal, blocks)
-
-
-@kernel
-def _hold(seamless: SeamlessMap, ends: Ints, gradient: Floats, diagonal: Floats, blocks: Floats) -> None:
-    """Take out the directions in which vertices may not move."""
-    for v in range(len(gradient)):
-        freedom = seamless.freedom[v]
-        if freedom != FREE:
-            diagonal[v, 1] = 0.0
-            if freedom != COLUMN:
-                gradient[v, 0], diagonal[v, 0] = 0.0, 1.0
-            if freedom != ROW:
-                gradient[v, 1], diagonal[v, 2] = 0.0, 1.0
-    for e in range(len(ends)):
-        first, second = seamless.freedom[ends[e, 0]], seamless.freedom[ends[e, 1]]
-        for i in range(2):
-            for j in range(2):
-                if not ((first >> i) & 1 and (second >> j) & 1):
-                    blocks[e, 2 * i + j] = 0.0
 
 
 @kernel
 def _triangle(
-    seamless: SeamlessMap, reference: Reference, f: int, slopes: Floats, modes: Floats, curvature: Floats
+    seamless: SeamlessMap, shapes: ChartShapes, f: int, slopes: Floats, modes: Floats, curvature: Floats
 ) -> None:
     """Gradient [3, 2] at the corners of a triangle, and its Hessian: the sum of c m m', modes [4, 3, 2]."""
-    area, cotangent = reference.area[f], reference.cotangent[f]
+    area, cotangent = shapes.area[f], shapes.cotangent[f]
     # a flat copy of the triangle, by its cotangents: side ab along x
     total = cotangent[0] + cotangent[1]
     length = np.sqrt(2.0 * area * max(total, 1e-12))
@@ -206,7 +170,7 @@ def _triangle(
     s1, s2 = sum_length + rest_length, sum_length - rest_length
     left, right = (sum_angle + rest_angle) / 2, (rest_angle - sum_angle) / 2
     cl, sl, cr, sr = np.cos(left), np.sin(left), np.cos(right), np.sin(right)
-    _, wd, wj, wdd, wdj, wjj = density_derivatives(s1 * s1 + s2 * s2, s1 * s2, reference.power)
+    _, wd, wj, wdd, wdj, wjj = density_derivatives(s1 * s1 + s2 * s2, s1 * s2, shapes.power)
     f1, f2 = 2 * s1 * wd + s2 * wj, 2 * s2 * wd + s1 * wj
     f11 = 2 * wd + 4 * s1 * s1 * wdd + 4 * s1 * s2 * wdj + s2 * s2 * wjj
     f22 = 2 * wd + 4 * s2 * s2 * wdd + 4 * s1 * s2 * wdj + s1 * s1 * wjj
@@ -226,36 +190,35 @@ def _triangle(
             modes[m, k, 0], modes[m, k, 1] = cl * u - sl * v, sl * u + cl * v
 
 
-_ARMIJO = 1e-4
-_REACH = 0.3  # of a chart
-_MOST_TRIALS = 14
-# what is known of a triangle of the star: the place of its next corner and of the one before, in the vertex's frame,
-# their cotangents, and its area
-TERMS = 7
-
-
 @kernel
-def sweep(seamless: SeamlessMap, reference: Reference, backwards: bool) -> float:
-    """Move every vertex once; return by how much the energy fell."""
-    count = len(seamless.x)
-    largest = 0
-    for v in range(count):
-        largest = max(largest, seamless.star_start[v + 1] - seamless.star_start[v])
-    star = np.empty((largest, TERMS))
+def sweep(
+    seamless: SeamlessMap,
+    shapes: ChartShapes,
+    across: Transitions,
+    vertices: Ints,
+    star: Floats,
+    follow_at_once: bool,
+) -> float:
+    """Move some vertices, one after the other; return by how much the energy fell. `star` is room for any, [d, 7].
+
+    Each is followed into its new chart at once, or left to `rehome`.
+    """
     fall = 0.0
-    for i in range(count):
-        v = count - 1 - i if backwards else i
+    for v in vertices:
         if seamless.freedom[v] != FIXED:
-            fall += relax_vertex(seamless, reference, v, star)
+            x, y = seamless.x[v, 0], seamless.x[v, 1]
+            fall += relax_vertex(seamless, shapes, v, star)
+            if follow_at_once:
+                rehome_vertex(seamless, across, v, x, y)
     return fall
 
 
 @kernel
-def relax_vertex(seamless: SeamlessMap, reference: Reference, v: int, star: Floats) -> float:
+def relax_vertex(seamless: SeamlessMap, shapes: ChartShapes, v: int, star: Floats) -> float:
     """Move one vertex by a Newton step inside its star; return by how much the energy fell. `star` is room."""
-    degree = gather(seamless, reference, v, star)
+    degree = gather(seamless, shapes, v, star)
     x, y, freedom = seamless.x[v, 0], seamless.x[v, 1], seamless.freedom[v]
-    energy, gx, gy, hxx, hxy, hyy = _slopes(star, degree, x, y, reference.power)
+    energy, gx, gy, hxx, hxy, hyy = star_slopes(star, degree, x, y, shapes.power)
     if not energy < np.inf:
         return 0.0
     if freedom == FREE:
@@ -267,14 +230,14 @@ def relax_vertex(seamless: SeamlessMap, reference: Reference, v: int, star: Floa
     descent = -(gx * sx + gy * sy)
     if not descent > 1e-13 * energy:
         return 0.0
-    step = min(1.0, _REACH / np.sqrt(sx * sx + sy * sy))
-    for _ in range(_MOST_TRIALS):
-        lower = star_energy(star, degree, x + step * sx, y + step * sy, reference.power)
-        if lower < energy - _ARMIJO * step * descent:
+    step = min(1.0, REACH / np.sqrt(sx * sx + sy * sy))
+    for _ in range(MOST_TRIALS):
+        lower = star_energy(star, degree, x + step * sx, y + step * sy, shapes.power)
+        if lower < energy - ARMIJO * step * descent:
             # high up a wall a Newton step is far too short
             further = 2.0 * lower < energy
-            while further and step * np.hypot(sx, sy) < _REACH:
-                least = star_energy(star, degree, x + 2 * step * sx, y + 2 * step * sy, reference.power)
+            while further and step * np.hypot(sx, sy) < REACH:
+                least = star_energy(star, degree, x + 2 * step * sx, y + 2 * step * sy, shapes.power)
                 further = 2.0 * least < lower
                 if least < lower:
                     step, lower = 2 * step, least
@@ -287,7 +250,7 @@ def relax_vertex(seamless: SeamlessMap, reference: Reference, v: int, star: Floa
 
 
 @kernel
-def gather(seamless: SeamlessMap, reference: Reference, v: int, star: Floats) -> int:
+def gather(seamless: SeamlessMap, shapes: ChartShapes, v: int, star: Floats) -> int:
     """Fill in the star of a vertex, see above, and return how many triangles it has."""
     first, last = seamless.star_start[v], seamless.star_start[v + 1]
     for i in range(first, last):
@@ -297,10 +260,10 @@ def gather(seamless: SeamlessMap, reference: Reference, v: int, star: Floats) ->
         for j in (1, 2):
             px, py = corner_place(seamless, f, (k + j) % 3)
             star[i - first, 2 * j - 2], star[i - first, 2 * j - 1] = turned(px - dx, py - dy, back)
-        star[i - first, 4] = reference.cotangent[f, (k + 1) % 3]
-        star[i - first, 5] = reference.cotangent[f, (k + 2) % 3]
+        star[i - first, 4] = shapes.cotangent[f, (k + 1) % 3]
+        star[i - first, 5] = shapes.cotangent[f, (k + 2) % 3]
         # with the cotangent of the vertex itself the triangle is known: it follows from the other two
-        star[i - first, 6] = reference.area[f]
+        star[i - first, 6] = shapes.area[f]
     return last - first
 
 
@@ -322,9 +285,10 @@ def star_energy(star: Floats, degree: int, x: float, y: float, power: int) -> fl
 
 
 @kernel
-def _slopes(
+def star_slopes(
     star: Floats, degree: int, x: float, y: float, power: int
 ) -> tuple[float, float, float, float, float, float]:
+    """Energy of a star whose vertex lies at x, y, gradient x, y and Hessian xx, xy, yy; infinite if one is folded."""
     energy = gx = gy = hxx = hxy = hyy = 0.0
     for i in range(degree):
         bx, by, cx, cy, cot_b, cot_c, area = star[i]

@@ -9,16 +9,22 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ..energy import FIXED
 from .collapse import without_cuts
+from .cones import move_tips
+from .energy import shapes_of
 from .quads import CELLS, Part, Quads
-from .relaxation import relax
-from .seamless import SeamlessMap, seamless_map
+from .relaxation import relax_all, sweep_all
+from .seamless import SeamlessMap, seamless_map, transitions
 from .surface import Surface
 
 _MOST = 4 / 3  # times as many has a mesh in parts of uneven sizes
 _FEWEST = 0.5  # cells that the smallest part should have by its area; in truth it has four
 _NEGLIGIBLE = 2e-3  # share of the area of a part for which no others are cut smaller
 _MISJUDGED, _TRIES = 0.1, 3  # by so much more or less than its share of charts a part is cut again, so often
+
+_ROUGH, _FINE = 5e-3, 2e-3  # before the tips move and after: stop when a step saves less than this share of the energy
+_MOST_MOVES = 5  # of a tip, by an edge each
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -59,6 +65,23 @@ def patch_map(V: NDArray[np.float64], F: NDArray[np.int64], cells: int = CELLS) 
     surface, seamless = without_cuts(whole.surface, seamless_map(whole), whole.cut)
     relax(surface.V, seamless)
     return PatchMap(surface, seamless)
+
+
+def relax(V: NDArray[np.float64], seamless: SeamlessMap) -> None:
+    """Even out areas and take away shear, in place, as far as the map's cones allow; V [n, 3] are its vertices [m].
+
+    Cells are small and flat enough for that from where the quads lie; no step folds a triangle.
+    """
+    across = transitions(seamless.glued)
+    shapes = shapes_of(V, seamless.F, len(seamless.glued))
+    relax_all(seamless, shapes, across, _ROUGH)
+    tips = np.flatnonzero(seamless.freedom == FIXED)
+    for i in range(_MOST_MOVES):
+        tips = move_tips(seamless, shapes, across, tips)
+        if not len(tips):
+            break
+        sweep_all(seamless, shapes, across, i % 2 == 0)
+    relax_all(seamless, shapes, across, _FINE)
 
 
 def _recut(part: Part, quads: Quads, count: int, wanted: float, large: bool) -> Quads:

@@ -1,18 +1,13 @@
-"""Which triangles between cells' middles are joined in pairs to quads.
+"""Which triangles between cells' middles are joined in pairs to quads: large charts.
 
 Where as many quads meet round a cell's middle as its curvature asks for, the map onto the charts is strained least. By
 Gauss and Bonnet a cone where v quads meet has the curvature (4 - v) pi / 2; so v should be 4 less the curvature of the
-cell in right angles.
-
-Any pairing follows from another by alternating paths: joints are closed and opened in turn (Berge 1957). All short ones
-are tried, until none makes the pairing better.
-
-Alternating paths through triangles that are joined in pairs, and what a pairing costs.
-
-Large charts: two triangles between cells' middles are one, and so are the two charts round a corner at a rim.
+cell in right angles. Any pairing follows from another by alternating paths: joints are closed and opened in turn (Berge
+1957). All short ones are tried, until none makes the pairing better.
 
 Chart a of a cell and the next one b round a corner lie at the same side of a triangle between cells' middles, which is
-called by a: from the middle of a's cell to that of b's. Beyond it lies another triangle, or two charts at a rim.
+called by a: from the middle of a's cell to that of b's. Beyond it lies another triangle, or, at a rim, the two charts
+round a corner, which are joined too.
 """
 
 from __future__ import annotations
@@ -29,6 +24,10 @@ from .surface import Surface
 FEWEST = 3  # quads round a middle
 _TOO_FEW = 100.0  # what each costs that is missing
 _EXTRA = 2.0  # what one costs by which there are too many or too few, beyond the first
+_SHAPE = 0.5  # what the logarithm of the ratio of a quad's diagonals costs, squared
+_LONGEST, _LONGER = 11, 16  # joints that a path closes, at most; where else triangles would be left
+_MOST_PASSES = 20
+_WORTH = 1e-6
 
 
 class Pairing(NamedTuple):
@@ -43,118 +42,6 @@ class Pairing(NamedTuple):
     quads: Ints  # [cells], round each middle
     wanted: Floats  # [cells]
     passed: Bools  # [t], by the path that is tried
-
-
-class BestPath(NamedTuple):
-    """The best path yet."""
-
-    cost: Floats  # [1]
-    length: Ints  # [1]
-    path: Ints  # joints that are closed
-
-
-@kernel
-def search(pairing: Pairing, node: int, most: int, path: Ints, best: BestPath) -> bool:
-    """Look for the best path from a triangle that is left to another one; whether there is any."""
-    best.cost[0], best.length[0] = np.inf, 0
-    pairing.passed[node] = True
-    _search_all(pairing, node, path[:most], best)
-    pairing.passed[node] = False
-    return best.length[0] > 0
-
-
-@kernel
-def _search_all(pairing: Pairing, node: int, path: Ints, best: BestPath) -> None:
-    """Try all alternating paths from a triangle that is left to another one, depth first."""
-    nodes, following, cost = np.empty_like(path), np.empty_like(path), np.zeros(len(path))
-    nodes[0], following[0], length = node, pairing.start[node], 0
-    while length >= 0:
-        if following[length] == pairing.start[nodes[length] + 1]:
-            length -= 1
-            if length >= 0:
-                _undo(pairing, path[length], nodes[length], nodes[length + 1])
-            continue
-        e = pairing.joint[following[length]]
-        following[length] += 1
-        other = pairing.ends[e, 0] + pairing.ends[e, 1] - nodes[length]
-        if pairing.passed[other]:
-            continue
-        f = pairing.closed[other]
-        path[length] = e
-        if f < 0:
-            total = cost[length] + _change(pairing, e, -1)
-            _change(pairing, e, 1)
-            if total < best.cost[0]:
-                best.cost[0], best.length[0] = total, length + 1
-                best.path[: length + 1] = path[: length + 1]
-        elif length + 1 < len(path):
-            beyond = pairing.ends[f, 0] + pairing.ends[f, 1] - other
-            pairing.passed[other] = pairing.passed[beyond] = True
-            cost[length + 1] = cost[length] + _change(pairing, f, 1) + _change(pairing, e, -1)
-            length += 1
-            nodes[length], following[length] = beyond, pairing.start[beyond]
-
-
-@kernel
-def _undo(pairing: Pairing, e: int, node: int, beyond: int) -> None:
-    """Go back from a triangle to the one from which the search came over an open joint and a closed one."""
-    other = pairing.ends[e, 0] + pairing.ends[e, 1] - node
-    _change(pairing, e, 1)
-    _change(pairing, pairing.closed[other], -1)
-    pairing.passed[other] = pairing.passed[beyond] = False
-
-
-@kernel
-def follow(pairing: Pairing, node: int, best: BestPath) -> None:
-    """Close the joints of the best path, and open those between."""
-    for i in range(best.length[0]):
-        e = best.path[i]
-        other = pairing.ends[e, 0] + pairing.ends[e, 1] - node
-        f = pairing.closed[other]
-        if f >= 0:
-            node = pairing.ends[f, 0] + pairing.ends[f, 1] - other
-            open_joint(pairing, f)
-        close_joint(pairing, e)
-
-
-@kernel
-def close_joint(pairing: Pairing, e: int) -> float:
-    """Join the triangles at a joint; return what that costs."""
-    pairing.closed[pairing.ends[e, 0]] = pairing.closed[pairing.ends[e, 1]] = e
-    return _change(pairing, e, -1)
-
-
-@kernel
-def open_joint(pairing: Pairing, e: int) -> float:
-    """Part the triangles at a joint; return what that costs."""
-    pairing.closed[pairing.ends[e, 0]] = pairing.closed[pairing.ends[e, 1]] = -1
-    return _change(pairing, e, 1)
-
-
-@kernel
-def _change(pairing: Pairing, e: int, quads: int) -> float:
-    """Quads more or fewer round the middles at a joint; return what that costs."""
-    cost = -quads * pairing.cost[e]
-    for k in range(2):
-        v = pairing.middles[e, k]
-        if v >= 0:
-            cost -= _strain(pairing.quads[v], pairing.wanted[v])
-            pairing.quads[v] += quads
-            cost += _strain(pairing.quads[v], pairing.wanted[v])
-    return cost
-
-
-@kernel
-def _strain(quads: int, wanted: float) -> float:
-    """What it costs that so many quads meet round a middle."""
-    off = abs(quads - wanted)
-    return off + _EXTRA * max(off - 1.0, 0.0) + _TOO_FEW * max(FEWEST - quads, 0)
-
-
-_SHAPE = 0.5  # what the logarithm of the ratio of a quad's diagonals costs, squared
-_LONGEST, _LONGER = 11, 16  # joints that a path closes, at most; where else triangles would be left
-_MOST_PASSES = 20
-_WORTH = 1e-6
 
 
 class Joints(NamedTuple):
@@ -218,51 +105,114 @@ def chosen_joints(
     return kept[np.unique(pairing.closed)]
 
 
-@kernel
 def _paired(pairing: Pairing) -> bool:
     """Find a pairing and make it better; whether no triangle is left."""
-    best = BestPath(np.zeros(1), np.zeros(1, np.int64), np.zeros(_LONGER, np.int64))
-    path = np.zeros(_LONGER, np.int64)
     for most in (1, _LONGEST, _LONGER):
         for node in range(len(pairing.closed)):
             if pairing.closed[node] < 0:
-                _augment(pairing, node, most, path, best)
+                _augment(pairing, node, most, np.inf)
     if (pairing.closed < 0).any():
         return False
     for _ in range(_MOST_PASSES):
         better = False
         for e in range(len(pairing.ends)):
             if pairing.closed[pairing.ends[e, 0]] != e:
-                better = _improve(pairing, e, path, best) or better
+                better = _improve(pairing, e) or better
         if not better:
             break
     return True
 
 
 @kernel
-def _improve(pairing: Pairing, e: int, path: Ints, best: BestPath) -> bool:
+def _improve(pairing: Pairing, e: int) -> bool:
     """Close an open joint, and pair what that leaves; whether that is better."""
     a, b = pairing.ends[e]
     f, g = pairing.closed[a], pairing.closed[b]
-    cost = open_joint(pairing, f) + open_joint(pairing, g) + close_joint(pairing, e)
+    cost = _set_joint(pairing, f, False) + _set_joint(pairing, g, False) + _set_joint(pairing, e, True)
     left = pairing.ends[f, 0] + pairing.ends[f, 1] - a
     pairing.passed[a] = pairing.passed[b] = True
-    found = search(pairing, left, _LONGEST, path, best)
+    better = _augment(pairing, left, _LONGEST, -_WORTH - cost)
     pairing.passed[a] = pairing.passed[b] = False
-    if found and cost + best.cost[0] < -_WORTH:
-        follow(pairing, left, best)
-        return True
-    open_joint(pairing, e)
-    close_joint(pairing, f)
-    close_joint(pairing, g)
-    return False
+    if not better:
+        _set_joint(pairing, e, False)
+        _set_joint(pairing, f, True)
+        _set_joint(pairing, g, True)
+    return better
 
 
 @kernel
-def _augment(pairing: Pairing, node: int, most: int, path: Ints, best: BestPath) -> None:
-    """Pair a triangle, and another one that is left, along the best path between them."""
-    if search(pairing, node, most, path, best):
-        follow(pairing, node, best)
+def _augment(pairing: Pairing, node: int, most: int, limit: float) -> bool:
+    """Pair a triangle, and another one that is left, along the best path between them, if that costs less than `limit`.
+
+    All alternating paths that close up to `most` joints are tried, depth first.
+    """
+    path, best_path = np.zeros(most, np.int64), np.zeros(most, np.int64)
+    nodes, following, cost = np.empty(most, np.int64), np.empty(most, np.int64), np.zeros(most)
+    nodes[0], following[0], length, best, best_length = node, pairing.start[node], 0, np.inf, 0
+    pairing.passed[node] = True
+    while length >= 0:
+        if following[length] == pairing.start[nodes[length] + 1]:
+            length -= 1
+            if length >= 0:  # back over a closed joint and an open one
+                e, beyond = path[length], nodes[length + 1]
+                other = pairing.ends[e, 0] + pairing.ends[e, 1] - nodes[length]
+                _change(pairing, e, 1)
+                _change(pairing, pairing.closed[other], -1)
+                pairing.passed[other] = pairing.passed[beyond] = False
+            continue
+        e = pairing.joint[following[length]]
+        following[length] += 1
+        other = pairing.ends[e, 0] + pairing.ends[e, 1] - nodes[length]
+        if pairing.passed[other]:
+            continue
+        f = pairing.closed[other]
+        path[length] = e
+        if f < 0:
+            total = cost[length] + _change(pairing, e, -1)
+            _change(pairing, e, 1)
+            if total < best:
+                best, best_length = total, length + 1
+                best_path[:best_length] = path[:best_length]
+        elif length + 1 < most:
+            beyond = pairing.ends[f, 0] + pairing.ends[f, 1] - other
+            pairing.passed[other] = pairing.passed[beyond] = True
+            cost[length + 1] = cost[length] + _change(pairing, f, 1) + _change(pairing, e, -1)
+            length += 1
+            nodes[length], following[length] = beyond, pairing.start[beyond]
+    pairing.passed[node] = False
+    if not best < limit:
+        return False
+    for e in best_path[:best_length]:
+        other = pairing.ends[e, 0] + pairing.ends[e, 1] - node
+        f = pairing.closed[other]
+        if f >= 0:
+            node = pairing.ends[f, 0] + pairing.ends[f, 1] - other
+            _set_joint(pairing, f, False)
+        _set_joint(pairing, e, True)
+    return True
+
+
+@kernel
+def _set_joint(pairing: Pairing, e: int, close: bool) -> float:
+    """Join or part the triangles at a joint; return what that costs."""
+    pairing.closed[pairing.ends[e, 0]] = pairing.closed[pairing.ends[e, 1]] = e if close else -1
+    return _change(pairing, e, -1 if close else 1)
+
+
+@kernel
+def _change(pairing: Pairing, e: int, quads: int) -> float:
+    """Quads more or fewer round the middles at a joint; return what that costs."""
+    cost = -quads * pairing.cost[e]
+    for k in range(2):
+        v = pairing.middles[e, k]
+        if v >= 0:
+            for sign in (-1.0, 1.0):
+                count = pairing.quads[v]
+                off = abs(count - pairing.wanted[v])
+                cost += sign * (off + _EXTRA * max(off - 1.0, 0.0) + _TOO_FEW * max(FEWEST - count, 0))
+                if sign < 0.0:
+                    pairing.quads[v] += quads
+    return cost
 
 
 def joined(

@@ -1,14 +1,9 @@
-"""Points of a surface that is laid out on charts: where they lie in space and on its mesh.
+"""Where texels lie on a surface: the triangles of a seamless map, drawn on the charts as on a screen.
 
-Texels between their neighbours on a surface: how far from being folded.
-
-Where texels lie on a surface: the triangles of a seamless map, drawn on the charts as on a screen.
-
-Texels moved a little where the texel mesh is folded, though the map is not.
-
-Samples of a fold-free map may still lie in the wrong order on the surface: astride of a knife edge, whose two sides
-they see from above and from below, or round the tip of a cone. There each texel tries the other places of its square,
-on a fine lattice, and takes the one where the corners between its neighbours face outwards.
+Then texels are moved a little where the texel mesh is folded, though the map is not. Samples of a fold-free map may
+still lie in the wrong order on the surface: astride of a knife edge, whose two sides they see from above and from
+below, or round the tip of a cone. There each texel tries the other places of its square, on a fine lattice, and takes
+the one where the corners between its neighbours face outwards.
 """
 
 from __future__ import annotations
@@ -23,13 +18,13 @@ from ...kernel import Bools, Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...texels.topology import TexelTopology
 from .layout import PatchMap
-from .seamless import FIXED, SeamlessMap, Transitions, corner_place, follow, transitions, turned
+from .seamless import SeamlessMap, Transitions, follow, places_on_charts, transitions
 
 _MARGIN = 0.1  # sine of a corner that is wide enough
 
 
 class Texels(NamedTuple):
-    """Texels that move."""
+    """Texels that move, and what lies round them."""
 
     halo: Ints  # [C, n + 2, n + 2]
     rim: Bools
@@ -39,7 +34,7 @@ class Texels(NamedTuple):
     offsets: Ints  # [C, n + 2, n + 2, 2], column and row, in places of the lattice; 0 in the halo
 
 
-@kernel(inline="always")
+@kernel
 def _place(texels: Texels, chart: int, row: int, column: int) -> Floats:
     if texels.rim[chart, row, column] or texels.halo[chart, row, column] < 0:
         return texels.beyond[chart, row, column]
@@ -67,7 +62,7 @@ def _fault(texels: Texels, flat: int) -> float:
 
 @kernel
 def faults(texels: Texels, flat: int) -> float:
-    """Of a texel and its four neighbours."""
+    """Faults of a texel and of its four neighbours, added up."""
     n = texels.halo.shape[1] - 2
     chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
     total = _fault(texels, flat)
@@ -81,7 +76,7 @@ def faults(texels: Texels, flat: int) -> float:
 
 @kernel
 def folded(texels: Texels) -> Bools:
-    """Which texels are, [T]."""
+    """Which texels are folded between their neighbours, [T]."""
     result = np.zeros(len(texels.positions), np.bool_)
     for flat in range(len(result)):
         result[flat] = _fault(texels, flat) >= 1.0
@@ -116,49 +111,31 @@ def locate_in_charts(seamless: SeamlessMap, n: int, charts: Ints) -> tuple[Ints,
         near |= (near[beside] & (beside >= 0)).any(axis=1)
     triangles, barycentrics = np.full((len(charts), n, n), -1), np.zeros((len(charts), n, n, 3))
     best = np.full((len(charts), n, n), -np.inf)
-    _draw(seamless, transitions(seamless.glued), n, number, near, triangles, barycentrics, best)
+    corner, homes, places = places_on_charts(seamless)
+    chosen = np.flatnonzero(near[homes])
+    across = transitions(seamless.glued)
+    _draw(seamless.glued, across, chosen, corner, homes, places, number, triangles, barycentrics, best)
     triangles[best < -_ROUND_OFF] = -1
     return triangles, barycentrics
 
 
 @kernel
-def corners_in_frame_of(seamless: SeamlessMap, f: int, k: int, places: Floats) -> None:
-    """Fill in the places [3, 2] of a triangle's corners in the frame of the chart in which corner k lies."""
-    back = (4 - seamless.turn[f, k]) % 4
-    sx, sy = seamless.shift[f, k, 0], seamless.shift[f, k, 1]
-    for j in range(3):
-        x, y = corner_place(seamless, f, j)
-        places[j, 0], places[j, 1] = turned(x - sx, y - sy, back)
-
-
-@kernel
-def anchor(seamless: SeamlessMap, f: int) -> int:
-    """The first corner of a triangle that does not sit on the tip of a cone: it knows in which chart it lies."""
-    k = 0
-    while seamless.freedom[seamless.F[f, k]] == FIXED and k < 2:
-        k += 1
-    return k
-
-
-@kernel
 def _draw(
-    seamless: SeamlessMap,
+    glued: Ints,
     across: Transitions,
-    n: int,
+    chosen: Ints,
+    corner: Ints,
+    homes: Ints,
+    places: Floats,
     number: Ints,
-    near: Bools,
     triangles: Ints,
     barycentrics: Floats,
     best: Floats,
 ) -> None:
-    p = np.empty((3, 2))
-    slack = 1e-9
-    for f in range(len(seamless.F)):
-        k = anchor(seamless, f)
-        home = seamless.chart[seamless.F[f, k]]
-        if not near[home]:
-            continue
-        corners_in_frame_of(seamless, f, k, p)
+    """Fill in the texels of the charts that have a number, from chosen triangles; see `places_on_charts`."""
+    n, slack = best.shape[1], 1e-9
+    for f in chosen:
+        home, k, p = homes[f], corner[f], places[f]
         ux, uy, vx, vy = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[2, 0] - p[0, 0], p[2, 1] - p[0, 1]
         area = ux * vy - uy * vx
         first = int(np.ceil((min(p[0, 1], p[1, 1], p[2, 1]) - slack) * n - 0.5))
@@ -174,7 +151,7 @@ def _draw(
                 least = min(s, t, 1 - s - t)
                 if least < -1e-6:
                     continue
-                found, _, _, _, u, v = follow(home, p[k, 0], p[k, 1], x, y, seamless.glued, across)
+                found, _, _, _, u, v = follow(home, p[k, 0], p[k, 1], x, y, glued, across)
                 chart, row, column = number[found], int(np.floor(v * n)), int(np.floor(u * n))
                 if chart < 0 or not (0 <= row < n and 0 <= column < n) or least <= best[chart, row, column]:
                     continue

@@ -6,9 +6,8 @@ of its corners there. Where other than four charts meet, the surface of all char
 fixed vertex, so that every triangle is flat. A map without a folded triangle is then one to one: it winds once round
 each tip, and covers each chart once.
 
-Changes from one frame to another on charts: a turn by right angles, counter-clockwise, then a whole shift.
-
-Vertices that leave their chart: their places and frames become those of the chart that they enter.
+A change from one frame to another is a turn by right angles, counter-clockwise, then a whole shift. A vertex that
+leaves its chart takes place and frame of the chart that it enters.
 """
 
 from __future__ import annotations
@@ -18,6 +17,8 @@ from typing import NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from ...kernel import Floats, Ints, kernel
+from ...mesh.topology import counting_sort
+from ..energy import COLUMN, FIXED, FREE, ROW
 from .charts import CORNERS
 from .quads import Quads
 
@@ -27,7 +28,7 @@ Frame: TypeAlias = tuple[int, int, int]
 Number = TypeVar("Number", int, float)
 
 
-@kernel(inline="always")
+@kernel
 def turned(x: Number, y: Number, turn: int) -> tuple[Number, Number]:
     """A vector after a turn."""
     if turn == 0:
@@ -39,14 +40,14 @@ def turned(x: Number, y: Number, turn: int) -> tuple[Number, Number]:
     return y, -x
 
 
-@kernel(inline="always")
+@kernel
 def after(first: Frame, second: Frame) -> Frame:
     """Two changes, one after the other."""
     x, y = turned(first[1], first[2], second[0])
     return (first[0] + second[0]) % 4, x + second[1], y + second[2]
 
 
-@kernel(inline="always")
+@kernel
 def inverse(frame: Frame) -> Frame:
     """The change back."""
     back = (4 - frame[0]) % 4
@@ -54,7 +55,8 @@ def inverse(frame: Frame) -> Frame:
     return back, x, y
 
 
-FIXED, COLUMN, ROW, FREE = range(4)  # in which directions a vertex may move
+# what a vector [2] is multiplied with for each turn
+_TURNS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])
 
 
 class SeamlessMap(NamedTuple):
@@ -97,21 +99,9 @@ def seamless_map(quads: Quads) -> SeamlessMap:
     return seamless
 
 
-@kernel
 def stars(F: Ints, count: int) -> tuple[Ints, Ints]:
     """Corners 3 triangle + k of the triangles F [m, 3] by vertex: where those of each begin [n + 1], and all [3 m]."""
-    start, star = np.zeros(count + 1, np.int64), np.empty(3 * len(F), np.int64)
-    for f in range(len(F)):
-        for k in range(3):
-            start[F[f, k] + 1] += 1
-    for v in range(count):
-        start[v + 1] += start[v]
-    place = start[:-1].copy()
-    for f in range(len(F)):
-        for k in range(3):
-            star[place[F[f, k]]] = 3 * f + k
-            place[F[f, k]] += 1
-    return start, star
+    return counting_sort(F.ravel(), np.arange(F.size), count)
 
 
 class Transitions(NamedTuple):
@@ -125,20 +115,16 @@ def transitions(glued: Ints) -> Transitions:
     """Frame changes across glued sides; side s of one chart runs against side t of the other."""
     here, there = np.arange(4), glued[..., 1]
     turn = (there + 2 - here) % 4
-    x, y = CORNERS[here].T
-    turned_x = np.select([turn == 0, turn == 1, turn == 2], [x, -y, -x], y)
-    turned_y = np.select([turn == 0, turn == 1, turn == 2], [y, x, -y], -x)
-    shift = CORNERS[(there + 1) % 4] - np.stack([turned_x, turned_y], axis=-1)
-    return Transitions(turn, shift)
+    return Transitions(turn, CORNERS[(there + 1) % 4] - np.einsum("csij,sj->csi", _TURNS[turn], CORNERS[here]))
 
 
-@kernel(inline="always")
+@kernel
 def frame_of(seamless: SeamlessMap, f: int, k: int) -> Frame:
     """Change from the frame of corner k of triangle f to that of the triangle."""
     return seamless.turn[f, k], seamless.shift[f, k, 0], seamless.shift[f, k, 1]
 
 
-@kernel(inline="always")
+@kernel
 def corner_place(seamless: SeamlessMap, f: int, k: int) -> tuple[float, float]:
     """Place of corner k of triangle f in the triangle's frame."""
     v = seamless.F[f, k]
@@ -146,14 +132,30 @@ def corner_place(seamless: SeamlessMap, f: int, k: int) -> tuple[float, float]:
     return x + seamless.shift[f, k, 0], y + seamless.shift[f, k, 1]
 
 
-@kernel
 def corner_places(seamless: SeamlessMap) -> Floats:
     """Places [m, 3, 2] of the corners of all triangles in these triangles' frames."""
-    places = np.empty((len(seamless.F), 3, 2))
-    for f in range(len(seamless.F)):
-        for k in range(3):
-            places[f, k, 0], places[f, k, 1] = corner_place(seamless, f, k)
-    return places
+    return np.einsum("fkij,fkj->fki", _TURNS[seamless.turn], seamless.x[seamless.F]) + seamless.shift
+
+
+def places_seen_from(seamless: SeamlessMap, triangles: Ints, corner: Ints) -> tuple[Ints, Floats]:
+    """Chart in which a corner [k] of each of some triangles [k] lies, and the places of all three in its frame."""
+    offset = corner_places(seamless)[triangles] - seamless.shift[triangles, corner][:, None]
+    places = np.einsum("fij,fkj->fki", _TURNS[(4 - seamless.turn[triangles, corner]) % 4], offset)
+    return seamless.chart[seamless.F[triangles, corner]], places
+
+
+def places_on_charts(seamless: SeamlessMap) -> tuple[Ints, Ints, Floats]:
+    """Of each triangle the first corner that sits on no cone's tip: it knows in which chart it lies; see above.
+
+    Returns
+    -------
+    corner : int64 [m]
+    chart : int64 [m]
+    places : float64 [m, 3, 2]
+    """
+    free = seamless.freedom[seamless.F] != FIXED
+    corner = np.where(free.any(axis=1), free.argmax(axis=1), 2)
+    return corner, *places_seen_from(seamless, np.arange(len(corner)), corner)
 
 
 @kernel
@@ -187,6 +189,7 @@ def _connect(seamless: SeamlessMap, twin: Ints, places: Floats, across: Transiti
 def _go_round(
     seamless: SeamlessMap, twin: Ints, places: Floats, across: Transitions, v: int, h: int, at_rim: bool
 ) -> None:
+    """Fill in a vertex and its corners, counter-clockwise from corner h, the first one at a rim."""
     first, chart = h, seamless.frame
     turn, sx, sy, crossed = 0, 0, 0, 0
     seamless.chart[v] = chart[h // 3]

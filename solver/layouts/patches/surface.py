@@ -1,87 +1,27 @@
 """The triangles of a mesh, cut into smaller ones that know where they came from.
 
-Cutting flat polygons from their middles to the middles of their sides.
-
-Splitting of edges in their middle: long ones, and those that join two points of a border.
+They are cut in the middle of edges, long ones and those that join two points of a border; along straight lines, from
+the middles of flat polygons to the middles of their sides; and along the borders of cells.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernel import Ints, kernel
+from ...mesh.topology import SPLITS, Edges, edges_of
 
 # Of a triangle abc: its corners, a point on each of its sides, and one inside.
 A, B, C, AB, BC, CA, MIDDLE = range(7)
 
-Triangle = tuple[int, int, int]
+Patterns = Mapping[int, Sequence[Sequence[int]]]  # see `SPLITS`
 
-# For each set of cut sides of a triangle (see `Surface.subdivided`), the triangles that take its place.
-_SPLITS: dict[int, tuple[Triangle, ...]] = {
-    1: ((A, AB, C), (AB, B, C)),
-    2: ((B, BC, A), (BC, C, A)),
-    4: ((C, CA, B), (CA, A, B)),
-    3: ((AB, B, BC), (A, AB, BC), (A, BC, C)),
-    6: ((BC, C, CA), (B, BC, CA), (B, CA, A)),
-    5: ((CA, A, AB), (C, CA, AB), (C, AB, B)),
-    7: ((A, AB, CA), (AB, B, BC), (CA, BC, C), (AB, BC, CA)),
-}
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Edges:
-    """The edges of triangles.
-
-    Attributes
-    ----------
-    ends : int64 [e, 2]
-    of : int64 [m, 3]
-        Of each triangle, the edges ab, bc, ca.
-    sides : int64 [e, 2]
-        The two sides that lie on each edge: 3 triangle + k for side k of a triangle; -1 beyond a rim.
-    """
-
-    ends: NDArray[np.int64]
-    of: NDArray[np.int64]
-    sides: NDArray[np.int64]
-
-    @property
-    def rim(self) -> NDArray[np.bool_]:
-        """Which edges lie at a rim, [e]."""
-        return self.sides[:, 1] < 0
-
-
-def edges_of(F: NDArray[np.int64]) -> Edges:
-    """Edges of the triangles F [m, 3], which form a manifold; sorted by their lower ends, then by the higher."""
-    tail, head = F.ravel(), np.roll(F, -1, axis=1).ravel()
-    low, high = np.minimum(tail, head), np.maximum(tail, head)
-    size = int(F.max()) + 1 if len(F) else 1
-    order = _sorted(low, _sorted(high, np.arange(len(low)), size), size)
-    first = np.ones(len(order), bool)
-    first[1:] = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
-    of = np.empty(len(order), np.int64)
-    of[order] = np.cumsum(first) - 1
-    sides = np.full((int(first.sum()), 2), -1)
-    sides[:, 0], sides[of[order[~first]], 1] = order[first], order[~first]
-    return Edges(np.stack([low[sides[:, 0]], high[sides[:, 0]]], axis=1), of.reshape(-1, 3), sides)
-
-
-@kernel
-def _sorted(key: Ints, order: Ints, size: int) -> Ints:
-    """An order [k] sorted by a key below `size`, stable (a counting sort: a third of the layout went into others)."""
-    start, result = np.zeros(size + 1, np.int64), np.empty(len(order), np.int64)
-    for i in order:
-        start[key[i] + 1] += 1
-    for j in range(size):
-        start[j + 1] += start[j]
-    for i in order:
-        result[start[key[i]]] = i
-        start[key[i]] += 1
-    return result
+# in the order in which the triangles are put
+_SPLITS: Patterns = {number: SPLITS[number] for number in (1, 2, 4, 3, 6, 5, 7)}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -143,9 +83,7 @@ class Surface:
         at_rim[self.edges.ends[self.edges.rim]] = True
         return at_rim
 
-    def subdivided(
-        self, places: NDArray[np.float64], patterns: dict[int, tuple[Triangle, ...]] = _SPLITS
-    ) -> Subdivision:
+    def subdivided(self, places: NDArray[np.float64], patterns: Patterns = _SPLITS) -> Subdivision:
         """Cut edges, and the triangles beside them.
 
         Parameters

@@ -1,39 +1,99 @@
-"""Proof that a sphere map is a bijection, and measures of how evenly it spreads area.
+"""Proof that a sphere map is a bijection, how evenly it spreads area, and how it is turned to lie well on the cube.
 
-Rotation of a sphere map under the cube: the atlas's narrowest texels become as wide as possible.
-
-On the sphere a texel is 1.09 of the mean width at the middle of a chart and 0.77, in one direction, at the middle of an
-edge of the cube. Where the map itself is narrow, at the roots of limbs, this decides how long the time step may be.
+A map is rotated under the cube until the atlas's narrowest texels are as wide as possible. On the sphere a texel is
+1.09 of the mean width at the middle of a chart and 0.77, in one direction, at the middle of an edge of the cube. Where
+the map itself is narrow, at the roots of limbs, this decides how long the time step may be.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...kernel import Floats, Ints32, kernel
-from .energy import Vector, cross, dot, row, subtract
+from ...kernel import Floats, kernel
+from ...mesh.vectors import Vector, cross, dot, row, subtract
 
+EPSILON = float(np.finfo(np.float64).eps)
+QUANTILES = (0.001, 0.01, 0.5, 0.99, 0.999)
 CANDIDATES = 400  # rotations; the cube's own symmetries make that 8 degrees from one to the next
 SHARPNESS = 8  # the power of the squared narrowness that stands for its maximum
 LEAST_SQUARE = 1e-6  # of a width: triangles without area are not narrow texels
 NEGLIGIBLE = 1e-2  # share of the narrowness that no rotation need look at
 
 
+@dataclass(frozen=True)
+class Certificate:
+    """What `certify` found.
+
+    A map whose triangles all keep their orientation and together cover the sphere's 4 pi once is a bijection: a point
+    covered twice would make the sum of solid angles larger.
+    """
+
+    flipped: int  # triangles whose triple product is not positive
+    solid_angle: float  # sum over all triangles, signed [sr]
+    valid: bool
+
+
+def certify(F: NDArray[np.integer], S: NDArray[np.float64]) -> Certificate:
+    """Check a sphere map S (unit vectors, shape [n, 3]) of the triangles F, shape [m, 3]."""
+    a, b, c = (S[F[:, j]].T for j in range(3))
+    ab, ac = subtract(b, a), subtract(c, a)
+    triple = dot(a, cross(ab, ac))
+    flipped = np.count_nonzero(~(triple > 4.0 * EPSILON * np.sqrt(dot(ab, ab) * dot(ac, ac))))
+    solid_angle = np.sum(2.0 * np.arctan2(triple, 1.0 + dot(a, b) + dot(b, c) + dot(c, a)))
+    on_sphere = bool(np.all(np.abs(dot(S.T, S.T) - 1) < 1e-9))
+    valid = flipped == 0 and on_sphere and abs(solid_angle - 4 * np.pi) < 1e-6
+    return Certificate(int(flipped), float(solid_angle), bool(valid))
+
+
+def solid_angles(F: NDArray[np.integer], S: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signed solid angle of each spherical triangle [sr], shape [m] (van Oosterom and Strackee 1983)."""
+    a, b, c = (S[F[:, j]].T for j in range(3))
+    triple = dot(a, cross(subtract(b, a), subtract(c, a)))
+    return 2 * np.arctan2(triple, 1 + dot(a, b) + dot(b, c) + dot(c, a))
+
+
+def stretch(V: NDArray[np.float64], F: NDArray[np.integer], S: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Per triangle sqrt(real area / sphere area), real area scaled to 4 pi, shape [m].
+
+    How many times wider than in an ideal even grid the texels are there.
+    """
+    real = areas(V, F)
+    return np.sqrt(4 * np.pi / np.sum(real) * real / np.maximum(solid_angles(F, S), np.finfo(np.float64).tiny))
+
+
+def stretch_quantiles(
+    V: NDArray[np.float64], F: NDArray[np.integer], S: NDArray[np.float64], quantiles: ArrayLike = QUANTILES
+) -> NDArray[np.float64]:
+    """Area-weighted quantiles of the stretch: the value that a given share of the real area stays under."""
+    values, weights = stretch(V, F, S), areas(V, F)
+    order = np.argsort(values, kind="stable")
+    share = np.cumsum(weights[order]) / np.sum(weights)
+    return values[order][np.minimum(np.searchsorted(share, quantiles), len(order) - 1)]
+
+
+def areas(P: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Areas of triangles, shape [m]."""
+    return 0.5 * np.linalg.norm(np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]]), axis=1)
+
+
 def align(V: Floats, F: NDArray[np.integer], S: Floats) -> Floats:
     """Rotate a sphere map S [n, 3] of the mesh V [n, 3], F [m, 3], of area 4 pi, so that texels are not narrow."""
-    metric, area = _vertex_metrics(F.astype(np.int32), V, S)
+    metric, area = _vertex_metrics(F, V, S)
     trace = metric[:, 0] + metric[:, 1] + metric[:, 2]
     squares = np.sum(metric[:, :3] ** 2, axis=1) + 2 * np.sum(metric[:, 3:] ** 2, axis=1)
     narrowest = area * _inverse_square(trace, (trace * trace - squares) / 2) ** SHARPNESS
     order = np.argsort(-narrowest, kind="stable")
     count = int(np.searchsorted(np.cumsum(narrowest[order]), (1 - NEGLIGIBLE) * np.sum(narrowest))) + 1
     narrow = S[order[:count]], metric[order[:count]], area[order[:count]]
-    rotations = spread_rotations(CANDIDATES)
-    return S @ rotations[_widest(rotations, *narrow)].T
+    least, widest = np.inf, np.eye(3)
+    for rotation in spread_rotations(CANDIDATES):
+        narrowness = _narrowness(rotation, *narrow, least)
+        if narrowness < least:
+            least, widest = narrowness, rotation
+    return S @ widest.T
 
 
 def spread_rotations(count: int) -> NDArray[np.float64]:
@@ -56,32 +116,29 @@ def _inverse_square(trace: Floats, determinant: Floats) -> Floats:
     return 0.5 * (trace + root) / np.maximum(determinant, 0.5 * LEAST_SQUARE * (trace + root))
 
 
-@kernel
-def _vertex_metrics(F: Ints32, V: Floats, S: Floats) -> tuple[Floats, Floats]:
+def _vertex_metrics(F: NDArray[np.integer], V: Floats, S: Floats) -> tuple[Floats, Floats]:
     """Squared real length of a sphere's tangent, xx yy zz xy xz yz [n, 6], averaged round each vertex, and area [n].
 
     The average lets a sliver count no more than it covers.
     """
-    metric, area = np.zeros((len(V), 6)), np.zeros(len(V))
-    for f in range(len(F)):
-        i, j, k = F[f, 0], F[f, 1], F[f, 2]
-        e, g = subtract(row(S, j), row(S, i)), subtract(row(S, k), row(S, i))
-        real_e, real_g = subtract(row(V, j), row(V, i)), subtract(row(V, k), row(V, i))
-        normal = cross(e, g)
-        square = dot(normal, normal)
-        p, q = cross(g, normal), cross(normal, e)  # over the square: one along e and zero along g, and vice versa
-        ee, eg, gg = dot(real_e, real_e), dot(real_e, real_g), dot(real_g, real_g)
-        share = np.sqrt(square) / 6.0
-        scale = share / (square * square)
-        for v in (i, j, k):
-            area[v] += share
-            for t in range(6):
-                a, b = (t, t) if t < 3 else ((0, 1), (0, 2), (1, 2))[t - 3]
-                metric[v, t] += scale * (ee * p[a] * p[b] + eg * (p[a] * q[b] + q[a] * p[b]) + gg * q[a] * q[b])
-    for v in range(len(V)):
-        for t in range(6):
-            metric[v, t] /= area[v]
-    return metric, area
+    (i, j, k), (real_i, real_j, real_k) = ([P[F[:, c]].T for c in range(3)] for P in (S, V))
+    e, g, real_e, real_g = subtract(j, i), subtract(k, i), subtract(real_j, real_i), subtract(real_k, real_i)
+    normal = cross(e, g)
+    square = dot(normal, normal)
+    p, q = cross(g, normal), cross(normal, e)  # over the square: one along e and zero along g, and vice versa
+    ee, eg, gg = dot(real_e, real_e), dot(real_e, real_g), dot(real_g, real_g)
+    share = np.sqrt(square) / 6.0
+    scale = share / (square * square)
+
+    def at_vertices(values: Floats) -> Floats:
+        return np.bincount(F.ravel(), np.repeat(values, 3), len(V))
+
+    area = at_vertices(share)
+    sums = [
+        at_vertices(scale * (ee * p[a] * p[b] + eg * (p[a] * q[b] + q[a] * p[b]) + gg * q[a] * q[b]))
+        for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    ]
+    return np.stack(sums, axis=1) / area[:, None], area
 
 
 @kernel
@@ -129,92 +186,3 @@ def _narrowness(rotation: Floats, S: Floats, metric: Floats, area: Floats, limit
         if total > limit:
             break
     return total
-
-
-@kernel
-def _widest(rotations: Floats, S: Floats, metric: Floats, area: Floats) -> int:
-    """Which rotation has the least narrowness."""
-    best, least = 0, np.inf
-    for i in range(len(rotations)):
-        narrowness = _narrowness(rotations[i], S, metric, area, least)
-        if narrowness < least:
-            best, least = i, narrowness
-    return best
-
-
-Columns: TypeAlias = tuple[NDArray[np.float64], ...]
-
-EPSILON = float(np.finfo(np.float64).eps)
-QUANTILES = (0.001, 0.01, 0.5, 0.99, 0.999)
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """What `certify` found.
-
-    A map whose triangles all keep their orientation and together cover the sphere's 4 pi once is a bijection: a point
-    covered twice would make the sum of solid angles larger.
-    """
-
-    flipped: int  # triangles whose triple product is not positive
-    solid_angle: float  # sum over all triangles, signed [sr]
-    valid: bool
-
-
-def certify(F: NDArray[np.integer], S: NDArray[np.float64]) -> Certificate:
-    """Check a sphere map S (unit vectors, shape [n, 3]) of the triangles F, shape [m, 3]."""
-    a, b, c = (tuple(S[F[:, j]].T) for j in range(3))
-    ab, ac = _difference(a, b), _difference(a, c)
-    triple = _product(a, _cross(ab, ac))
-    flipped = np.count_nonzero(~(triple > 4.0 * EPSILON * np.sqrt(_product(ab, ab) * _product(ac, ac))))
-    solid_angle = np.sum(2.0 * np.arctan2(triple, 1.0 + _product(a, b) + _product(b, c) + _product(c, a)))
-    on_sphere = bool(np.all(np.abs(_dot(S, S) - 1) < 1e-9))
-    valid = flipped == 0 and on_sphere and abs(solid_angle - 4 * np.pi) < 1e-6
-    return Certificate(int(flipped), float(solid_angle), bool(valid))
-
-
-# column by column: the same sums in the same order on every machine
-def _product(a: Columns, b: Columns) -> NDArray[np.float64]:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Columns, b: Columns) -> Columns:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def _difference(a: Columns, b: Columns) -> Columns:
-    return b[0] - a[0], b[1] - a[1], b[2] - a[2]
-
-
-def solid_angles(F: NDArray[np.integer], S: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Signed solid angle of each spherical triangle [sr], shape [m] (van Oosterom and Strackee 1983)."""
-    a, b, c = (S[F[:, j]] for j in range(3))
-    return 2 * np.arctan2(_dot(a, np.cross(b - a, c - a)), 1 + _dot(a, b) + _dot(b, c) + _dot(c, a))
-
-
-def stretch(V: NDArray[np.float64], F: NDArray[np.integer], S: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Per triangle sqrt(real area / sphere area), real area scaled to 4 pi, shape [m].
-
-    How many times wider than in an ideal even grid the texels are there.
-    """
-    real = _areas(V, F)
-    return np.sqrt(4 * np.pi / np.sum(real) * real / np.maximum(solid_angles(F, S), np.finfo(np.float64).tiny))
-
-
-def stretch_quantiles(
-    V: NDArray[np.float64], F: NDArray[np.integer], S: NDArray[np.float64], quantiles: ArrayLike = QUANTILES
-) -> NDArray[np.float64]:
-    """Area-weighted quantiles of the stretch: the value that a given share of the real area stays under."""
-    values, weights = stretch(V, F, S), _areas(V, F)
-    order = np.argsort(values, kind="stable")
-    share = np.cumsum(weights[order]) / np.sum(weights)
-    return values[order][np.minimum(np.searchsorted(share, quantiles), len(order) - 1)]
-
-
-def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.einsum("ij,ij->i", a, b)
-
-
-def _areas(P: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:
-    normal = np.cross(P[F[:, 1]] - P[F[:, 0]], P[F[:, 2]] - P[F[:, 0]])
-    return 0.5 * np.sqrt(_dot(normal, normal))

@@ -5,25 +5,21 @@ priority queue and every cost in it is up to date. The cost favours short edges 
 error of Garland and Heckbert (1997), which keeps limbs for as long as possible. A collapse must meet the link
 condition: its two vertices have exactly two neighbours in common. Then the mesh stays a triangulated sphere.
 
-A triangle mesh as half-edges three to a triangle, with collapses that can be undone in reverse order.
-
 Half-edge h = 3 f + j is side j of triangle f and starts at vertex `tail[h]`; `twin[h]` is the same side seen from the
 neighbouring triangle; `leaving[v]` is any half-edge that starts at v. A half-edge is also the triangle's corner at its
 tail. A collapse leaves the two triangles it removes as they were, twins included. These stale links are all that its
 undoing needs (Knuth's dancing links), so a log of collapses is a list of half-edges.
-
-Quadrics: how far a point is from the planes of the triangles round a vertex (Garland and Heckbert 1997).
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernel import Bools, Floats, Ints32, kernel
-from .energy import cross, dot, row, set_row, subtract
+from ...kernel import Bools, Floats, Ints32, kernel, shared
+from ...mesh.vectors import cross, dot, row, subtract
 
 
 class CornerTable(NamedTuple):
@@ -47,16 +43,16 @@ def corner_table(F: NDArray[np.integer], vertex_count: int) -> CornerTable:
     return CornerTable(tail, twin, leaving)
 
 
-@kernel
-def following(h: int) -> int:
-    """Next half-edge round the triangle."""
-    return h + 1 if h % 3 < 2 else h - 2
+@shared
+def following(h: Any) -> Any:
+    """Next half-edge round the triangle; of one half-edge, or of an array of them."""
+    return h - h % 3 + (h + 1) % 3
 
 
-@kernel
-def preceding(h: int) -> int:
-    """Previous half-edge round the triangle."""
-    return h - 1 if h % 3 > 0 else h + 2
+@shared
+def preceding(h: Any) -> Any:
+    """Previous half-edge round the triangle; of one half-edge, or of an array of them."""
+    return h - h % 3 + (h + 2) % 3
 
 
 @kernel
@@ -106,19 +102,8 @@ def undo_collapse(table: CornerTable, h: int) -> None:
 
 
 @kernel
-def mark_neighbours(table: CornerTable, u: int, mark: Ints32) -> None:
-    """Write u beside each of its neighbours."""
-    first = h = table.leaving[u]
-    while True:
-        mark[table.tail[following(h)]] = u
-        h = table.twin[preceding(h)]
-        if h == first:
-            return
-
-
-@kernel
 def is_collapsible(table: CornerTable, u: int, v: int, mark: Ints32) -> bool:
-    """Tell whether v and u, whose neighbours are marked, meet the link condition."""
+    """Tell whether v and u, beside whose neighbours `mark` [n] has u, meet the link condition."""
     first = h = table.leaving[v]
     common = 0
     while True:
@@ -128,29 +113,19 @@ def is_collapsible(table: CornerTable, u: int, v: int, mark: Ints32) -> bool:
             return common == 2
 
 
-@kernel
 def vertex_quadrics(tail: Ints32, V: Floats) -> Floats:
-    """Area-weighted sums of squared plane distances: xx xy xz yy yz zz, x y z, 1 of each vertex, shape [n, 10]."""
-    quadrics = np.zeros((len(V), 10))
-    for f in range(len(tail) // 3):
-        p = row(V, tail[3 * f])
-        normal = cross(subtract(row(V, tail[3 * f + 1]), p), subtract(row(V, tail[3 * f + 2]), p))
-        twice_area = np.sqrt(dot(normal, normal))
-        if twice_area > 0.0:
-            x, y, z = normal[0] / twice_area, normal[1] / twice_area, normal[2] / twice_area
-            d = -(x * p[0] + y * p[1] + z * p[2])
-            terms = (x * x, x * y, x * z, y * y, y * z, z * z, x * d, y * d, z * d, d * d)
-            for j in range(3):
-                for i in range(10):
-                    quadrics[tail[3 * f + j], i] += 0.5 * twice_area * terms[i]
-    return quadrics
+    """Quadrics of the vertices: how far a point is from the planes of the triangles round each.
 
-
-@kernel
-def quadric_error(q: Floats, x: float, y: float, z: float) -> float:
-    """Sum of squared distances of (x, y, z) from the planes of a quadric [10]."""
-    squares = q[0] * x * x + q[3] * y * y + q[5] * z * z + 2.0 * (q[1] * x * y + q[2] * x * z + q[4] * y * z)
-    return squares + 2.0 * (q[6] * x + q[7] * y + q[8] * z) + q[9]
+    Area-weighted sums of squared distances (Garland and Heckbert 1997): xx xy xz yy yz zz, x y z, 1, shape [n, 10].
+    """
+    p, q, r = (V[tail[k::3]].T for k in range(3))
+    normal = cross(subtract(q, p), subtract(r, p))
+    twice_area = np.sqrt(dot(normal, normal))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        x, y, z = (np.where(twice_area > 0.0, each / twice_area, 0.0) for each in normal)
+    d = -dot((x, y, z), p)
+    terms = (x * x, x * y, x * z, y * y, y * z, z * z, x * d, y * d, z * d, d * d)
+    return np.stack([np.bincount(tail, np.repeat(0.5 * twice_area * each, 3), len(V)) for each in terms], axis=1)
 
 
 ROUND_SHARE = 0.15  # of the vertices left, removed in one round
@@ -216,10 +191,11 @@ def _price(alive: Ints32, front: _Front, blur: float, limit: int) -> None:
         if degree[u] > limit + 1:
             continue
         gather_star(table, u, neighbours)
-        mark_neighbours(table, u, mark)
         position, size = row(V, u), degree[u]
         for i in range(size):
-            set_row(ring, i, row(V, table.tail[following(neighbours[i])]))
+            v = table.tail[following(neighbours[i])]
+            ring[i, 0], ring[i, 1], ring[i, 2] = row(V, v)
+            mark[v] = u
         least, cheapest = np.inf, -1
         for i in range(size):
             h = neighbours[i]
@@ -234,7 +210,10 @@ def _price(alive: Ints32, front: _Front, blur: float, limit: int) -> None:
                 span = max(span, dot(e, e))
             e = subtract(position, p)
             shape = (span + blur) * (dot(e, e) + blur) * (1.0 + 0.5 * max(merged_degree - COMFORTABLE_DEGREE, 0))
-            price = shape + max(quadric_error(quadrics[u], p[0], p[1], p[2]), 0.0) + blur * blur * merged[u]
+            q, (x, y, z) = quadrics[u], p
+            error = q[0] * x * x + q[3] * y * y + q[5] * z * z + 2.0 * (q[1] * x * y + q[2] * x * z + q[4] * y * z)
+            error = error + 2.0 * (q[6] * x + q[7] * y + q[8] * z) + q[9]
+            price = shape + max(error, 0.0) + blur * blur * merged[u]
             if price < least and is_collapsible(table, u, v, mark):
                 least, cheapest = price, h
         cost[u], target[u] = least, cheapest
@@ -254,11 +233,13 @@ def _collapse_round(order: Ints32, quota: int, front: _Front, limit: int, log: I
         if stale[u] or degree[u] + degree[v] - 4 > limit:
             stale[u] = True
             continue
-        mark_neighbours(table, u, mark)
+        size = gather_star(table, u, star)
+        for i in range(size):
+            mark[table.tail[following(star[i])]] = u
         if not is_collapsible(table, u, v, mark):
             stale[u] = True
             continue
-        for i in range(gather_star(table, u, star)):
+        for i in range(size):
             stale[table.tail[following(star[i])]] = True
         degree[v] += degree[u] - 4
         degree[table.tail[preceding(h)]] -= 1

@@ -1,6 +1,4 @@
-"""One level of detail of the mesh, its vertices and triangles renumbered without gaps.
-
-Reference triangles: the shape and area that each triangle of a coarse level should have on the sphere.
+"""Levels of detail of a mesh, and their reference triangles: the shape and area each should have on the sphere.
 
 *Carried area.* A collapsed vertex hands its share of the real surface on to the vertex it merges with. So a limb that a
 coarse level no longer shows still gets its share of the sphere there, and finds the room when it comes back.
@@ -17,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel import Floats, Ints32, kernel
+from ...mesh.vectors import Vector, cross, dot, row, subtract
+from ..energy import Reference
 from .decimation import CornerTable, following, gather_star, preceding
-from .energy import Reference, cross, dot, row, subtract
 
 
 class Level(NamedTuple):
@@ -42,35 +41,27 @@ def build_level(table: CornerTable, vertices: NDArray[np.integer], triangles: ND
     edge[lower] = edge[twin[lower]] = np.arange(len(lower))
     ends = np.stack([tail[lower], tail[twin[lower]]], axis=1)
     star_start = np.concatenate([[0], np.cumsum(np.bincount(tail))]).astype(np.int32)
-    star = np.empty(len(tail), dtype=np.int32)
-    _gather_stars(vertices, table, star_start, star)
+    star = _stars(vertices, table, star_start)
     ring = vertex_number[table.tail[table.twin[star]]]
     return Level(tail, edge, ends, star_start, ring, corner_number[star])
 
 
-@kernel
-def _gather_stars(vertices: Ints32, table: CornerTable, star_start: Ints32, star: Ints32) -> None:
-    """Fill `star` [3 m] with the half-edges round each vertex, from `star_start` [n + 1] on."""
-    for i in range(len(vertices)):
-        gather_star(table, vertices[i], star[star_start[i] : star_start[i + 1]])
+def _stars(vertices: NDArray[np.integer], table: CornerTable, star_start: Ints32) -> Ints32:
+    """Half-edges that leave each vertex, counterclockwise, one vertex after the other, [3 m]."""
+    star = np.empty(star_start[-1], dtype=np.int32)
+    h, place, end = table.leaving[vertices], star_start[:-1], star_start[1:]
+    while len(h):
+        star[place] = h
+        left = np.flatnonzero(place + 1 < end)
+        h, place, end = table.twin[preceding(h[left])], place[left] + 1, end[left]
+    return star
 
 
-@kernel
-def set_shape(shapes: Floats, i: int, h: int, reference: Reference) -> None:
-    """Write the reference of the triangle of half-edge h into row i: area, and cotangents at tail, head and apex."""
-    shapes[i, 0] = reference.area[h // 3]
-    shapes[i, 1] = reference.cotangent[h]
-    shapes[i, 2] = reference.cotangent[following(h)]
-    shapes[i, 3] = reference.cotangent[preceding(h)]
-
-
-@kernel
 def star_shapes(star: Ints32, reference: Reference) -> Floats:
-    """References of the triangles left of the half-edges `star`, one after the other in memory, shape [3 m, 4]."""
-    shapes = np.empty((len(star), 4))
-    for i in range(len(star)):
-        set_shape(shapes, i, star[i], reference)
-    return shapes
+    """References of the triangles left of the half-edges `star`, as `expand_star` takes them, shape [3 m, 4]."""
+    cotangent = reference.cotangent
+    columns = reference.area[star // 3], cotangent[star], cotangent[following(star)], cotangent[preceding(star)]
+    return np.stack(columns, axis=1)
 
 
 def _renumber(kept: NDArray[np.integer], count: int) -> Ints32:
@@ -82,8 +73,8 @@ def _renumber(kept: NDArray[np.integer], count: int) -> Ints32:
 SMALLEST_SHARE = 1e-3  # of the mean reference area: no triangle gets less
 
 
-class Source(NamedTuple):
-    """The real surface as a level should resemble it."""
+class RealSurface(NamedTuple):
+    """The surface as a level should resemble it."""
 
     V: Floats  # [n, 3] vertices; the total area is 4 pi
     carried: Floats  # [n] real area that each vertex stands for
@@ -93,49 +84,47 @@ class Source(NamedTuple):
     mean: float  # reference area of an average triangle
 
 
+def carry(removed: Ints32, kept: Ints32, carried: Floats) -> None:
+    """Hand the area of each removed vertex on to the one it merges with, in the order of the collapses."""
+    for u, v in zip(removed.tolist(), kept.tolist(), strict=True):
+        carried[v] += carried[u]
+
+
 @kernel
-def _real_area(tail: Ints32, f: int, V: Floats) -> float:
-    """Real area of triangle f."""
-    p = row(V, tail[3 * f])
-    normal = cross(subtract(row(V, tail[3 * f + 1]), p), subtract(row(V, tail[3 * f + 2]), p))
+def _area(a: Vector, b: Vector, c: Vector) -> float:
+    normal = cross(subtract(b, a), subtract(c, a))
     return 0.5 * np.sqrt(dot(normal, normal))
 
 
 @kernel
-def carry(removed: Ints32, kept: Ints32, carried: Floats) -> None:
-    """Hand the area of each removed vertex on to the one it merges with, in the order of the collapses."""
-    for i in range(len(removed)):
-        carried[kept[i]] += carried[removed[i]]
-
-
-@kernel
-def update_load(v: int, star: Ints32, degree: int, tail: Ints32, source: Source) -> None:
+def update_load(v: int, star: Ints32, degree: int, tail: Ints32, surface: RealSurface) -> None:
     """Find the load of v: the area it carries over its share of the real area that the level still shows."""
-    shown = 0.0
+    V, shown = surface.V, 0.0
     for i in range(degree):
-        shown += _real_area(tail, star[i] // 3, source.V)
-    carried = source.carried[v]
-    source.load[v] = min(carried / max(shown / 3.0, 1e-12 * carried), 1e6)
+        h = 3 * (star[i] // 3)
+        shown += _area(row(V, tail[h]), row(V, tail[h + 1]), row(V, tail[h + 2]))
+    carried = surface.carried[v]
+    surface.load[v] = min(carried / max(shown / 3.0, 1e-12 * carried), 1e6)
 
 
 @kernel
-def update_triangle(f: int, tail: Ints32, source: Source, reference: Reference) -> None:
+def update_triangle(f: int, tail: Ints32, surface: RealSurface, reference: Reference) -> None:
     """Set the reference of triangle f from its real shape and the loads of its corners."""
-    V = source.V
-    a, b, c = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
-    e0, e1, e2 = subtract(row(V, c), row(V, b)), subtract(row(V, a), row(V, c)), subtract(row(V, b), row(V, a))
+    u, v, w = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
+    a, b, c = row(surface.V, u), row(surface.V, v), row(surface.V, w)
+    e0, e1, e2 = subtract(c, b), subtract(a, c), subtract(b, a)
     q0, q1, q2 = dot(e0, e0), dot(e1, e1), dot(e2, e2)
-    real = _real_area(tail, f, V)
+    real = _area(a, b, c)
     third = (q0 + q1 + q2) / 3.0
     if third > 1e-28:
         quality = 4.0 / np.sqrt(3.0) * real / third
-        pull = max(1.0 - min(quality / source.sliver, 1.0), 1.0 - source.trust)
+        pull = max(1.0 - min(quality / surface.sliver, 1.0), 1.0 - surface.trust)
         q0, q1, q2 = q0 + pull * (third - q0), q1 + pull * (third - q1), q2 + pull * (third - q2)
     else:
         q0 = q1 = q2 = 1.0
-    area = max(real * (source.load[a] + source.load[b] + source.load[c]) / 3.0, SMALLEST_SHARE * source.mean)
-    if source.trust < 1.0:
-        area = area**source.trust * source.mean ** (1.0 - source.trust)
+    area = max(real * (surface.load[u] + surface.load[v] + surface.load[w]) / 3.0, SMALLEST_SHARE * surface.mean)
+    if surface.trust < 1.0:
+        area = area**surface.trust * surface.mean ** (1.0 - surface.trust)
     four_areas = np.sqrt(max(2.0 * (q0 * q1 + q1 * q2 + q2 * q0) - (q0 * q0 + q1 * q1 + q2 * q2), 1e-300))
     scale = 0.5 / (four_areas * area)
     reference.area[f] = area
@@ -145,14 +134,16 @@ def update_triangle(f: int, tail: Ints32, source: Source, reference: Reference) 
 
 
 @kernel
-def update_level(vertices: Ints32, triangles: Ints32, table: CornerTable, source: Source, reference: Reference) -> None:
+def update_level(
+    vertices: Ints32, triangles: Ints32, table: CornerTable, surface: RealSurface, reference: Reference
+) -> None:
     """Set the references of a whole level, their areas summing to the sphere's 4 pi."""
-    star = np.empty(len(source.V), np.int32)
+    star = np.empty(len(surface.V), np.int32)
     for v in vertices:
-        update_load(v, star, gather_star(table, v, star), table.tail, source)
+        update_load(v, star, gather_star(table, v, star), table.tail, surface)
     total = 0.0
     for f in triangles:
-        update_triangle(f, table.tail, source, reference)
+        update_triangle(f, table.tail, surface, reference)
         total += reference.area[f]
     scale = 4.0 * np.pi / total
     for f in triangles:

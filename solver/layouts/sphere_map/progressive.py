@@ -1,70 +1,28 @@
 """The progressive sphere map: collapse to a tetrahedron, put it on the sphere, bring the vertices back level by level.
 
-In the family of Praun and Hoppe (2003) and of Hu, Fu and Liu (2017). What is new here is the carried area
-(`reference`), and a triple-product barrier with Newton steps on every level (`energy`, `newton`).
+In the family of Praun and Hoppe (2003) and of Hu, Fu and Liu (2017). What is new here is the carried area (`level`),
+and a triple-product barrier with Newton steps on every level (`energy`, `newton`).
 
-Bringing one level to the minimum of its energy: sweeps first, then Newton steps.
-
-Far from the minimum a Newton step is cut short by the steepest of the energy's walls, wherever it stands, and an exact
-direction is wasted. So conjugate gradients start with few steps, and get more once whole Newton steps succeed, and
-after a step cut short a sweep clears the spots that were in the way.
+Each vertex comes back inside the kernel of its star, so that no triangle ever folds. Next to the vertex v it was merged
+with, the kernel is the wedge between the great circles through v and the two neighbours they share, left and right. The
+bisector of that wedge always leads into it.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SphereMapError
-from ...kernel import Floats
-from .certificate import align, certify
-from .decimation import CornerTable, corner_table, decimate, following, preceding
-from .energy import Reference, total_energy
-from .hessian import newton_step
-from .level import Level, Source, build_level, carry, star_shapes, update_level
-from .relaxation import insert_vertices, sweep
-
-MOST_SWEEPS, TIRED_SWEEP = 5, 0.1  # stop when a sweep lowers the energy by less than this share
-MOST_NEWTON_STEPS, TIRED_NEWTON = 20, 5e-3  # stop when two steps in a row do
-LARGE, TIRED_LARGE = 8000, 1.5e-2  # vertices of a level that is content with less
-LEAST_CG_STEPS, MOST_CG_STEPS = 10, 60
-SHORT_STEP = 0.3  # a Newton step cut to less than this asks for fewer steps of conjugate gradients
-EXPLODED = 1e5 * 4 * np.pi  # energy of a level that is stuck: start over from the sweeps
-MOST_ROUNDS = 4
-
-
-def relax_level(level: Level, S: Floats, reference: Reference) -> None:
-    """Lower the energy of a level in place: sweeps until they tire, then Newton steps."""
-    shapes = star_shapes(level.star, reference)
-    for _ in range(MOST_ROUNDS):
-        _sweep_until_tired(level, S, reference, shapes)
-        _newton_until_tired(level, S, reference, shapes)
-        if total_energy(level.tail, S, reference) < EXPLODED:
-            return
-
-
-def _sweep_until_tired(level: Level, S: Floats, reference: Reference, shapes: Floats) -> None:
-    for i in range(MOST_SWEEPS):
-        fall = sweep(level, S, shapes, i % 2 == 0)
-        if fall < TIRED_SWEEP * total_energy(level.tail, S, reference):
-            return
-
-
-def _newton_until_tired(level: Level, S: Floats, reference: Reference, shapes: Floats) -> None:
-    tired = TIRED_NEWTON if len(S) < LARGE else TIRED_LARGE
-    cg_steps, slow = LEAST_CG_STEPS, 0
-    for i in range(MOST_NEWTON_STEPS):
-        fall, step = newton_step(level, S, reference, cg_steps)
-        if step < 1.0:
-            fall += sweep(level, S, shapes, i % 2 == 0)
-        slow = slow + 1 if fall < tired * total_energy(level.tail, S, reference) else 0
-        if slow == 2:
-            return
-        if step >= 1.0:
-            cg_steps = min(2 * cg_steps, MOST_CG_STEPS)
-        elif step < SHORT_STEP:
-            cg_steps = max(cg_steps // 2, LEAST_CG_STEPS)
-
+from ...kernel import Floats, Ints32, kernel
+from ...mesh.vectors import combine, cross, dot, row, subtract, unit
+from ..energy import TERMS, Density, Reference, expand_star, star_energy
+from .certificate import align, areas, certify
+from .decimation import CornerTable, corner_table, decimate, following, gather_star, preceding, undo_collapse
+from .level import RealSurface, build_level, carry, update_level, update_load, update_triangle
+from .relaxation import SPHERE, relax_level, relax_vertex, tangent_frame
 
 TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 GRID = 2.0**32  # the normalised mesh is rounded to multiples of 1 / GRID
@@ -119,17 +77,13 @@ def _normalise(V: Floats, F: NDArray[np.integer]) -> Floats:
     Without rounding, the last bits would decide between the many equivalent ways out of a symmetric coarse level.
     """
     V = V - V.mean(axis=0)
-    return np.rint(V * np.sqrt(4 * np.pi / np.sum(_areas(V, F))) * GRID) / GRID
-
-
-def _areas(V: Floats, F: NDArray[np.integer]) -> Floats:
-    return 0.5 * np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1)
+    return np.rint(V * np.sqrt(4 * np.pi / np.sum(areas(V, F))) * GRID) / GRID
 
 
 def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
     n = len(V)
     carried = np.full(n, 1e-3 * 4 * np.pi / n)  # every vertex gets some room, even if its triangles have no area
-    carried += np.bincount(F.ravel(), np.repeat(_areas(V, F) / 3, 3), n)
+    carried += np.bincount(F.ravel(), np.repeat(areas(V, F) / 3, 3), n)
     table = corner_table(F, n)
     log = decimate(table, V)
     removed, kept = table.tail[log], table.tail[table.twin[log]]
@@ -141,24 +95,24 @@ def _map_by_levels(V: Floats, F: NDArray[np.integer], trust: float) -> Floats:
 
     S = np.zeros((n, 3))
     S[_tetrahedron(table, np.flatnonzero(vertex_since == 4))] = TETRAHEDRON
-    reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)))
+    reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)), SPHERE)
     load = np.ones(n)
     count = 4
     for size in _level_sizes(n):
         shape_trust = trust * min(max(np.log(size / EQUAL_UNTIL) / np.log(REAL_FROM / EQUAL_UNTIL), 0.0), 1.0)
         sliver = COARSE_SLIVER if size < n / 4 else FINE_SLIVER
-        source = Source(V, carried, load, shape_trust, sliver, 4 * np.pi / (2 * size - 4))
+        surface = RealSurface(V, carried, load, shape_trust, sliver, 4 * np.pi / (2 * size - 4))
 
         vertices, triangles = np.flatnonzero(vertex_since <= count), np.flatnonzero(triangle_since <= count)
-        update_level(vertices, triangles, table, source, reference)
-        insert_vertices(log[n - size : n - count], table, source, S, reference)
+        update_level(vertices, triangles, table, surface, reference)
+        insert_vertices(log[n - size : n - count], table, surface, S, reference)
         count = size
 
         vertices, triangles = np.flatnonzero(vertex_since <= count), np.flatnonzero(triangle_since <= count)
-        update_level(vertices, triangles, table, source, reference)
+        update_level(vertices, triangles, table, surface, reference)
         corners = (3 * triangles[:, None] + np.arange(3)).ravel()
         level_S = S[vertices]
-        shown = Reference(reference.area[triangles], reference.cotangent[corners])
+        shown = Reference(reference.area[triangles], reference.cotangent[corners], SPHERE)
         relax_level(build_level(table, vertices, triangles), level_S, shown)
         S[vertices] = level_S
     return S
@@ -193,3 +147,87 @@ def _morton_order(V: NDArray[np.float64]) -> NDArray[np.int64]:
         for axis in range(3):
             code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
     return np.argsort(code, kind="stable")
+
+
+CROWDED = 64  # neighbours of a new vertex with more triangles than this wait for the sweeps
+
+
+class _Star(NamedTuple):
+    """Scratch for the star of one vertex, of room for so many neighbours; see `expand_star`."""
+
+    ring: Floats  # [room, 3]
+    shapes: Floats  # [room, 4]
+    terms: Floats  # [room, 9]
+
+
+@kernel
+def _gather(neighbours: Ints32, degree: int, tail: Ints32, S: Floats, reference: Reference, star: _Star) -> None:
+    """Fill in what `expand_star` asks for, from the half-edges to the neighbours."""
+    ring, shapes, cotangent = star.ring, star.shapes, reference.cotangent
+    for i in range(degree):
+        h = neighbours[i]
+        ring[i, 0], ring[i, 1], ring[i, 2] = row(S, tail[following(h)])
+        shapes[i, 0], shapes[i, 1] = reference.area[h // 3], cotangent[h]
+        shapes[i, 2], shapes[i, 3] = cotangent[following(h)], cotangent[preceding(h)]
+
+
+@kernel
+def _place(u: int, v: int, left: int, right: int, S: Floats, star: _Star, degree: int, density: Density) -> None:
+    """Put u where its star's energy is least among trial points on the ways from v."""
+    ring, shapes, terms = star
+    start = row(S, v)
+    x, y = tangent_frame(start)
+    expand_star(start, x, y, ring, shapes, degree, terms)
+    middle = (0.0, 0.0, 0.0)
+    for i in range(degree):
+        middle = combine(1.0, middle, 1.0, row(ring, i))
+    inward = combine(1.0, unit(cross(start, row(S, left))), 1.0, unit(cross(row(S, right), start)))
+    least = np.inf
+    best = start
+    for goal, share, trials in ((unit(middle), 0.65, 16), (unit(combine(1.0, start, 1.0, unit(inward))), 0.4, 40)):
+        t = 1.0
+        for _ in range(trials):
+            p = unit(combine(1.0 - t, start, t, goal))
+            move = subtract(p, start)
+            energy = star_energy(terms, degree, density, (dot(move, x), dot(move, y), dot(move, start)))
+            if energy < least:
+                least = energy
+                best = p
+            elif least < np.inf:
+                break
+            t *= share
+        if least < np.inf:
+            break
+    S[u, 0], S[u, 1], S[u, 2] = best
+
+
+@kernel
+def insert_vertices(log: Ints32, table: CornerTable, surface: RealSurface, S: Floats, reference: Reference) -> None:
+    """Undo the collapses in `log`, latest first, and relax round every new vertex.
+
+    A vertex that finds no place leaves a fold behind, which the certificate will find.
+    """
+    tail, density = table.tail, reference.density
+    neighbours, others = np.empty(len(S), np.int32), np.empty(len(S), np.int32)
+    star = _Star(np.empty((len(S), 3)), np.empty((len(S), 4)), np.empty((len(S), TERMS)))
+    other_star = _Star(np.empty((CROWDED, 3)), np.empty((CROWDED, 4)), star.terms)
+    for h in log[::-1]:
+        u, v = tail[h], tail[table.twin[h]]
+        undo_collapse(table, h)
+        surface.carried[v] -= surface.carried[u]
+        for w in (v, u):
+            update_load(w, neighbours, gather_star(table, w, neighbours), tail, surface)
+        for w in (v, u):
+            degree = gather_star(table, w, neighbours)
+            for i in range(degree):
+                update_triangle(neighbours[i] // 3, tail, surface, reference)
+        _gather(neighbours, degree, tail, S, reference, star)
+        _place(u, v, tail[preceding(h)], tail[preceding(table.twin[h])], S, star, degree, density)
+        relax_vertex(u, S, star.ring, star.shapes, degree, density, star.terms)
+        for i in range(degree):
+            w = tail[following(neighbours[i])]
+            other_degree = gather_star(table, w, others)
+            if other_degree <= CROWDED:
+                _gather(others, other_degree, tail, S, reference, other_star)
+                relax_vertex(w, S, other_star.ring, other_star.shapes, other_degree, density, star.terms)
+            star.ring[i, 0], star.ring[i, 1], star.ring[i, 2] = row(S, w)

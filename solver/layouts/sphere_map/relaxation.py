@@ -1,193 +1,184 @@
-"""Gauss-Seidel relaxation: one vertex at a time takes a Newton step in its tangent plane that lowers the energy.
+"""Relaxation of one level of a sphere map: sweeps over single vertices first, then Newton steps of all at once.
 
-A step never folds a triangle, since a fold has infinite energy. Sweeps get out of states where the global Newton method
-sticks (a long cigar), and remove what is rough; what is smooth is the work of `newton`.
-
-The star of one vertex as a function of that vertex's position.
-
-Let the vertex move from p to p + dx x + dy y + dz p with tangents x, y. Of each triangle of its star, J is linear in
-the move and D quadratic: a few numbers a triangle say all, and a trial position costs next to nothing.
-
-Undoing collapses: each vertex comes back inside the kernel of its star, so that no triangle ever folds.
-
-Next to the vertex v it was merged with, the kernel is the wedge between the great circles through v and the two
-neighbours they share, left and right. The bisector of that wedge always leads into it.
+A sweep moves one vertex after the other by a Newton step in its tangent plane. A step never folds a triangle, since a
+fold has infinite energy. Sweeps get out of states where the global Newton method sticks (a long cigar), and remove what
+is rough; what is smooth is the work of `newton`.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ...kernel import Floats, Ints32, kernel
-from .decimation import CornerTable, following, gather_star, preceding, undo_collapse
-from .energy import (
-    FOLDED,
-    Reference,
-    Vector,
-    combine,
-    cross,
-    density,
-    density_derivatives,
-    dot,
-    row,
-    set_row,
-    subtract,
-    tangent_frame,
-    unit,
-)
-from .level import Level, Source, set_shape, update_load, update_triangle
+from ...mesh.vectors import Vector, combine, cross, dot, row, subtract, unit
+from ..energy import FOLDED, FREE, TERMS, Density, Reference, descend, energy_density, expand_star
+from ..newton import CG_TOLERANCE, System, add_triangle, conjugate_gradients, descend_by_newton, line_search
+from .level import Level, star_shapes
 
-# what is known of a triangle: J and D at rest, their slopes (that of J along p is J itself), half of D's second
-# derivative, and the reference area
-J, JX, JY, D, DX, DY, DZ, BEND, AREA = range(9)
-TERMS = 9
+# Down to half their even share small areas are almost free: what limbs leave spares their roots from being stretched
+# round. The wall beyond is so steep that 99.9 % of a surface has texels less than twice too wide.
+SPHERE = Density(power=4, even=1.0, long=0.53**8, small=0.48**16)
+
+MOST_SWEEPS, TIRED_SWEEP = 5, 0.1  # stop when a sweep lowers the energy by less than this share
+MOST_NEWTON_STEPS, TIRED_NEWTON = 20, 5e-3  # stop when two steps in a row do
+LARGE, TIRED_LARGE = 8000, 1.5e-2  # vertices of a level that is content with less
+CG_RANGE = 10, 60
+EXPLODED = 1e5 * 4 * np.pi  # energy of a level that is stuck: start over from the sweeps
+MOST_ROUNDS = 4
+LONGEST_STEP = 0.7  # of a vertex [rad]
+HORIZON = 1.2  # Newton steps beyond which no fold is looked for
 
 
-@kernel
-def expand(p: Vector, x: Vector, y: Vector, ring: Floats, shapes: Floats, degree: int, terms: Floats) -> None:
-    """Fill `terms` [degree, 9] for a vertex at p with tangents x, y.
+def relax_level(level: Level, S: Floats, reference: Reference) -> None:
+    """Lower the energy of a level in place."""
+    shapes = star_shapes(level.star, reference)
+    least_gain = TIRED_NEWTON if len(S) < LARGE else TIRED_LARGE
 
-    Triangle i has the corners p, ring[i] and ring[i + 1], counterclockwise; after the last of the ring, [degree, 3],
-    comes the first. Row i of `shapes` [degree, 4] is the triangle's reference (see `level.star_shapes`).
-    """
-    e = subtract(row(ring, degree - 1), p)
-    ax, ay, az = dot(e, x), dot(e, y), dot(e, p)
-    i = degree - 1
-    for k in range(degree):
-        e = subtract(row(ring, k), p)
-        bx, by, bz = dot(e, x), dot(e, y), dot(e, p)
-        area, opposite, left, right = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3]
-        half = 0.5 / area
-        cx, cy, cz = bx - ax, by - ay, bz - az
-        terms[i, J] = half * (ax * by - ay * bx)
-        terms[i, JX] = half * (ay * bz - az * by - cy)
-        terms[i, JY] = half * (az * bx - ax * bz + cx)
-        terms[i, D] = (
-            opposite * (cx * cx + cy * cy + cz * cz)
-            + left * (bx * bx + by * by + bz * bz)
-            + right * (ax * ax + ay * ay + az * az)
+    def energy() -> float:
+        return total_energy(level.tail, S, reference)
+
+    for _ in range(MOST_ROUNDS):
+        for i in range(MOST_SWEEPS):
+            if sweep(level, S, shapes, reference.density, i % 2 == 0) < TIRED_SWEEP * energy():
+                break
+        descend_by_newton(
+            lambda cg_steps: newton_step(level, S, reference, cg_steps),
+            lambda backwards: sweep(level, S, shapes, reference.density, backwards),
+            energy,
+            (least_gain, 2, MOST_NEWTON_STEPS),
+            CG_RANGE,
         )
-        terms[i, DX] = -2.0 * (left * bx + right * ax)
-        terms[i, DY] = -2.0 * (left * by + right * ay)
-        terms[i, DZ] = -2.0 * (left * bz + right * az)
-        terms[i, BEND] = left + right
-        terms[i, AREA] = area
-        ax, ay, az = bx, by, bz
-        i = k
+        if energy() < EXPLODED:
+            return
 
 
 @kernel
-def energy_after(move: Vector, terms: Floats, degree: int) -> float:
-    """Energy of the star after a move; infinite if a triangle is folded then."""
-    dx, dy, dz = move
-    square = dx * dx + dy * dy + dz * dz
+def total_energy(tail: Ints32, S: Floats, reference: Reference) -> float:
+    """Energy of the whole map S; infinite if a triangle is folded."""
+    cotangent = reference.cotangent
     total = 0.0
-    for i in range(degree):
-        area = terms[i, AREA]
-        jacobian = terms[i, J] * (1.0 + dz) + terms[i, JX] * dx + terms[i, JY] * dy
-        if not 2.0 * area * jacobian > FOLDED:
+    for f in range(len(tail) // 3):
+        a, b, c = row(S, tail[3 * f]), row(S, tail[3 * f + 1]), row(S, tail[3 * f + 2])
+        ab, ac, bc = subtract(b, a), subtract(c, a), subtract(c, b)
+        triple = dot(a, cross(ab, ac))
+        if not triple > FOLDED:
             return np.inf
-        dirichlet = terms[i, D] + terms[i, DX] * dx + terms[i, DY] * dy + terms[i, DZ] * dz + terms[i, BEND] * square
-        total += area * density(dirichlet, 1.0 / jacobian)
+        area = reference.area[f]
+        dirichlet = (
+            cotangent[3 * f] * dot(bc, bc) + cotangent[3 * f + 1] * dot(ac, ac) + cotangent[3 * f + 2] * dot(ab, ab)
+        )
+        total += area * energy_density(dirichlet, 2.0 * area / triple, reference.density)
     return total
 
 
 @kernel
-def tangent_move(a: float, b: float) -> Vector:
-    """Move dx, dy, dz that takes p to p + a x + b y, brought back to the sphere."""
-    square = a * a + b * b
-    length = np.sqrt(1.0 + square)
-    return a / length, b / length, -square / (length * (1.0 + length))
+def tangent_frame(p: Vector) -> tuple[Vector, Vector]:
+    """Two orthonormal tangents x, y of the unit sphere at p, with x, y, p right-handed."""
+    x = unit((0.0, p[2], -p[1])) if abs(p[0]) < 0.6 else unit((-p[2], 0.0, p[0]))
+    return x, cross(p, x)
 
 
-@kernel
-def slopes(terms: Floats, degree: int) -> tuple[float, float, float, float, float, float]:
-    """Energy, gradient x, y and Hessian xx, xy, yy at rest; the energy is infinite if a triangle is folded."""
-    energy = gx = gy = radial = hxx = hxy = hyy = 0.0
-    for i in range(degree):
-        area, jacobian = terms[i, AREA], terms[i, J]
-        if not 2.0 * area * jacobian > FOLDED:
-            return np.inf, 0.0, 0.0, 0.0, 0.0, 0.0
-        w, wd, wj, wdd, wdj, wjj = density_derivatives(terms[i, D], jacobian)
-        dx, dy, jx, jy = terms[i, DX], terms[i, DY], terms[i, JX], terms[i, JY]
-        energy += area * w
-        gx += area * (wd * dx + wj * jx)
-        gy += area * (wd * dy + wj * jy)
-        radial += area * (wd * terms[i, DZ] + wj * jacobian)
-        flat = 2.0 * wd * terms[i, BEND]
-        ddx, ddy, jjx, jjy = wdd * dx + wdj * jx, wdd * dy + wdj * jy, wdj * dx + wjj * jx, wdj * dy + wjj * jy
-        hxx += area * (flat + dx * ddx + jx * jjx)
-        hyy += area * (flat + dy * ddy + jy * jjy)
-        hxy += area * (dx * ddy + jx * jjy)
-    # on the sphere a tangent step also falls towards the centre: the Hessian loses the radial slope
-    return energy, gx, gy, hxx - radial, hxy, hyy - radial
+def newton_step(level: Level, S: Floats, reference: Reference, cg_steps: int) -> tuple[float, float]:
+    """Move S by one Newton step in place, its direction found by up to `cg_steps` steps of conjugate gradients.
 
-
-REACH = 0.3  # longest step [rad]
-ARMIJO = 1e-4
-
-
-@kernel
-def _descent_direction(gx: float, gy: float, hxx: float, hxy: float, hyy: float) -> tuple[float, float]:
-    """Newton step -|H|^-1 g of a 2 x 2 Hessian, its eigenvalues taken by their absolute value."""
-    mean, half = 0.5 * (hxx + hyy), 0.5 * (hxx - hyy)
-    determinant = hxx * hyy - hxy * hxy
-    if mean > 0.0 and determinant > 1e-3 * mean * mean:
-        return (hxy * gy - hyy * gx) / determinant, (hxy * gx - hxx * gy) / determinant
-    radius = np.sqrt(half * half + hxy * hxy)
-    if radius > 0.0:
-        # eigenvector of mean + radius, from the better conditioned of two formulas
-        ux, uy = (half + radius, hxy) if half > 0.0 else (hxy, radius - half)
-        length = np.sqrt(ux * ux + uy * uy)
-        ux, uy = ux / length, uy / length
-    else:
-        ux, uy = 1.0, 0.0
-    first, second = abs(mean + radius), abs(mean - radius)
-    floor = 1e-4 * max(first, second)
-    along = -(gx * ux + gy * uy) / max(first, floor)
-    across = -(gy * ux - gx * uy) / max(second, floor)
-    return along * ux - across * uy, along * uy + across * ux
-
-
-@kernel
-def relax_vertex(v: int, S: Floats, ring: Floats, shapes: Floats, degree: int, terms: Floats) -> float:
-    """Move v to lower the energy of its star; return by how much it fell.
-
-    `ring` and `shapes` are as in `star.expand`, and `terms` is room for what it fills.
+    Returns
+    -------
+    float
+        By how much the energy fell; 0 where no step lowers it.
+    float
+        The step's length, 1 for a whole Newton step.
     """
-    p = row(S, v)
-    x, y = tangent_frame(p)
-    expand(p, x, y, ring, shapes, degree, terms)
-    energy, gx, gy, hxx, hxy, hyy = slopes(terms, degree)
-    if not energy < np.inf:
-        return 0.0
-    sx, sy = _descent_direction(gx, gy, hxx, hxy, hyy)
-    descent = -(gx * sx + gy * sy)
-    if not descent > 1e-13 * energy:
-        return 0.0
-    step = min(1.0, REACH / np.sqrt(sx * sx + sy * sy))
-    for _ in range(14):
-        move = tangent_move(step * sx, step * sy)
-        lower = energy_after(move, terms, degree)
-        if lower < energy - ARMIJO * step * descent:
-            further = 2.0 * lower < energy  # high up a wall a Newton step is far too short
-            while further:
-                step *= 2.0
-                ahead = tangent_move(step * sx, step * sy)
-                least = energy_after(ahead, terms, degree)
-                further = 2.0 * least < lower
-                if least < lower:
-                    move, lower = ahead, least
-            set_row(S, v, unit(combine(1.0, combine(move[0], x, move[1], y), 1.0 + move[2], p)))
-            return energy - lower
-        step *= 0.35
-    return 0.0
+    system, x, y = System.zeros(len(S), len(level.ends)), np.empty_like(S), np.empty_like(S)
+    energy = assemble(level, S, reference, x, y, system)
+    step = conjugate_gradients(level.ends, system, cg_steps, CG_TOLERANCE)
+    slope = float(np.sum(system.gradient * step))
+    if not slope < 0.0:
+        return 0.0, 0.0
+    velocity = step[:, :1] * x + step[:, 1:] * y
+    longest = float(np.sqrt(np.max(np.sum(step * step, axis=1))))
+    bound = min(0.9 * _time_of_first_fold(level.tail, S, velocity), LONGEST_STEP / longest)
+
+    def moved(t: float) -> Floats:
+        ahead = S + t * velocity
+        ahead *= (1.0 / np.sqrt(dot(ahead.T, ahead.T)))[:, None]
+        return ahead
+
+    t, lower = line_search(energy, slope, bound, lambda t: total_energy(level.tail, moved(t), reference))
+    if t > 0.0:
+        S[:] = moved(t)
+    return energy - lower, t
 
 
 @kernel
-def sweep(level: Level, S: Floats, shapes: Floats, backwards: bool) -> float:
+def assemble(level: Level, S: Floats, reference: Reference, x: Floats, y: Floats, system: System) -> float:
+    """Fill in the tangents x, y [n, 3] of the map S, add its triangles to the system, and return its energy."""
+    for v in range(len(S)):
+        (x[v, 0], x[v, 1], x[v, 2]), (y[v, 0], y[v, 1], y[v, 2]) = tangent_frame(row(S, v))
+    radial = np.zeros(len(S))
+    tail, edge, ends = level.tail, level.edge, level.ends
+    total = 0.0
+    for f in range(len(tail) // 3):
+        u, v, w = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
+        i, j, k = edge[3 * f], edge[3 * f + 1], edge[3 * f + 2]
+        energy, (at_u, at_v, at_w) = add_triangle(
+            f,
+            (u, v, w),
+            ((i, ends[i, 0] == u), (j, ends[j, 0] == v), (k, ends[k, 0] == w)),
+            (row(S, u), row(S, v), row(S, w)),
+            (row(x, u), row(x, v), row(x, w)),
+            (row(y, u), row(y, v), row(y, w)),
+            reference,
+            system,
+        )
+        total += energy
+        radial[u] += at_u
+        radial[v] += at_v
+        radial[w] += at_w
+    diagonal = system.diagonal
+    for v in range(len(S)):
+        # on the sphere a tangent step also falls towards the centre: the Hessian gains minus the radial slope
+        shift = max(-radial[v], 0.0) + 1e-8 * (diagonal[v, 0] + diagonal[v, 2])
+        diagonal[v, 0] += shift
+        diagonal[v, 2] += shift
+    return total
+
+
+@kernel
+def _time_of_first_fold(tail: Ints32, S: Floats, velocity: Floats) -> float:
+    """Lower bound on the first time t up to the horizon at which det(a + t a', b + t b', c + t c') is 0 for a triangle.
+
+    Infinite where no triangle folds by then.
+    """
+    first = np.inf
+    for f in range(len(tail) // 3):
+        i, j, k = tail[3 * f], tail[3 * f + 1], tail[3 * f + 2]
+        p, dp = row(S, i), row(velocity, i)
+        e, g = subtract(row(S, j), p), subtract(row(S, k), p)
+        de, dg = subtract(row(velocity, j), dp), subtract(row(velocity, k), dp)
+        n0, n2 = cross(e, g), cross(de, dg)
+        n1 = combine(1.0, cross(de, g), 1.0, cross(e, dg))
+        c0, c3 = dot(p, n0), dot(dp, n2)
+        c1, c2 = dot(dp, n0) + dot(p, n1), dot(dp, n1) + dot(p, n2)
+        if abs(c1) * HORIZON + abs(c2) * HORIZON**2 + abs(c3) * HORIZON**3 < 0.9 * c0:
+            continue
+        low = high = 0.0
+        for s in range(1, 25):
+            high = HORIZON * s / 24
+            if c0 + high * (c1 + high * (c2 + high * c3)) <= 0.0:
+                for _ in range(12):
+                    middle = 0.5 * (low + high)
+                    if c0 + middle * (c1 + middle * (c2 + middle * c3)) > 0.0:
+                        low = middle
+                    else:
+                        high = middle
+                first = min(first, low)
+                break
+            low = high
+    return first
+
+
+@kernel
+def sweep(level: Level, S: Floats, shapes: Floats, density: Density, backwards: bool) -> float:
     """Relax every vertex of a level once, in order or backwards; return by how much the energy fell.
 
     `shapes` [3 m, 4] comes from `level.star_shapes`.
@@ -202,87 +193,23 @@ def sweep(level: Level, S: Floats, shapes: Floats, backwards: bool) -> float:
         v = count - 1 - i if backwards else i
         first, last = level.star_start[v], level.star_start[v + 1]
         for k in range(last - first):
-            set_row(ring, k, row(S, level.ring[first + k]))
-        fall += relax_vertex(v, S, ring, shapes[first:last], last - first, terms)
+            ring[k, 0], ring[k, 1], ring[k, 2] = row(S, level.ring[first + k])
+        fall += relax_vertex(v, S, ring, shapes[first:last], last - first, density, terms)
     return fall
 
 
-CROWDED = 64  # neighbours of a new vertex with more triangles than this wait for the sweeps
-
-
-class _Star(NamedTuple):
-    """Scratch for the star of one vertex, of room for so many neighbours; see `star.expand`."""
-
-    ring: Floats  # [room, 3]
-    shapes: Floats  # [room, 4]
-    terms: Floats  # [room, 9]
-
-
 @kernel
-def _gather(neighbours: Ints32, degree: int, tail: Ints32, S: Floats, reference: Reference, star: _Star) -> None:
-    """Fill in what `star.expand` asks for, from the half-edges to the neighbours."""
-    for i in range(degree):
-        set_row(star.ring, i, row(S, tail[following(neighbours[i])]))
-        set_shape(star.shapes, i, neighbours[i], reference)
+def relax_vertex(
+    v: int, S: Floats, ring: Floats, shapes: Floats, degree: int, density: Density, terms: Floats
+) -> float:
+    """Move v to lower the energy of its star; return by how much it fell.
 
-
-@kernel
-def _place(u: int, v: int, left: int, right: int, S: Floats, star: _Star, degree: int) -> None:
-    """Put u where its star's energy is least among trial points on the ways from v."""
-    ring, shapes, terms = star
-    start = row(S, v)
-    x, y = tangent_frame(start)
-    expand(start, x, y, ring, shapes, degree, terms)
-    middle = (0.0, 0.0, 0.0)
-    for i in range(degree):
-        middle = combine(1.0, middle, 1.0, row(ring, i))
-    inward = combine(1.0, unit(cross(start, row(S, left))), 1.0, unit(cross(row(S, right), start)))
-    least = np.inf
-    best = start
-    for goal, share, trials in ((unit(middle), 0.65, 16), (unit(combine(1.0, start, 1.0, unit(inward))), 0.4, 40)):
-        t = 1.0
-        for _ in range(trials):
-            p = unit(combine(1.0 - t, start, t, goal))
-            move = subtract(p, start)
-            energy = energy_after((dot(move, x), dot(move, y), dot(move, start)), terms, degree)
-            if energy < least:
-                least = energy
-                best = p
-            elif least < np.inf:
-                break
-            t *= share
-        if least < np.inf:
-            break
-    set_row(S, u, best)
-
-
-@kernel
-def insert_vertices(log: Ints32, table: CornerTable, source: Source, S: Floats, reference: Reference) -> None:
-    """Undo the collapses in `log`, latest first, and relax round every new vertex.
-
-    A vertex that finds no place leaves a fold behind, which the certificate will find.
+    `ring` and `shapes` are as in `expand_star`, and `terms` is room for what it fills.
     """
-    tail = table.tail
-    neighbours, others = np.empty(len(S), np.int32), np.empty(len(S), np.int32)
-    star = _Star(np.empty((len(S), 3)), np.empty((len(S), 4)), np.empty((len(S), TERMS)))
-    other_star = _Star(np.empty((CROWDED, 3)), np.empty((CROWDED, 4)), star.terms)
-    for h in log[::-1]:
-        u, v = tail[h], tail[table.twin[h]]
-        undo_collapse(table, h)
-        source.carried[v] -= source.carried[u]
-        for w in (v, u):
-            update_load(w, neighbours, gather_star(table, w, neighbours), tail, source)
-        for w in (v, u):
-            degree = gather_star(table, w, neighbours)
-            for i in range(degree):
-                update_triangle(neighbours[i] // 3, tail, source, reference)
-        _gather(neighbours, degree, tail, S, reference, star)
-        _place(u, v, tail[preceding(h)], tail[preceding(table.twin[h])], S, star, degree)
-        relax_vertex(u, S, star.ring, star.shapes, degree, star.terms)
-        for i in range(degree):
-            w = tail[following(neighbours[i])]
-            other_degree = gather_star(table, w, others)
-            if other_degree <= CROWDED:
-                _gather(others, other_degree, tail, S, reference, other_star)
-                relax_vertex(w, S, other_star.ring, other_star.shapes, other_degree, other_star.terms)
-            set_row(star.ring, i, row(S, w))
+    p = row(S, v)
+    x, y = tangent_frame(p)
+    expand_star(p, x, y, ring, shapes, degree, terms)
+    fall, move = descend(terms, degree, density, FREE, True)
+    if fall > 0.0:
+        S[v, 0], S[v, 1], S[v, 2] = unit(combine(1.0, combine(move[0], x, move[1], y), 1.0 + move[2], p))
+    return fall

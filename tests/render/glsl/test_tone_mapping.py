@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shader_functions import evaluated
 
-from ripple_sim.render.camera import linear_to_srgb, srgb_to_linear
+from ripple_sim.render.contract import linear_to_srgb, srgb_to_linear
 
 FILE = "glsl/tone_mapping.glsl"
 SHOULDER = 0.72

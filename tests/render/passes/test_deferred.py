@@ -11,7 +11,7 @@ import pytest
 from drawn import BALL, FLOOR, FRONT, SUN, frame_of
 
 from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.camera import srgb_to_linear
+from ripple_sim.render.contract import srgb_to_linear
 from ripple_sim.render.passes.deferred import Tiles
 from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.render.targets import FrameFormat

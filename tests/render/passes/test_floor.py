@@ -9,7 +9,7 @@ from drawn import BALL, FLOOR, FRONT, SIZE, SUN, frame_of
 from scipy.ndimage import binary_erosion
 
 from ripple_sim.render import Camera
-from ripple_sim.render.camera import srgb_to_linear
+from ripple_sim.render.contract import srgb_to_linear
 
 
 def test_floor_texture_repeats_as_in_mujoco(gl):

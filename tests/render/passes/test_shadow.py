@@ -5,7 +5,7 @@ import pytest
 from drawn import BALL, FLOOR, FRONT, SIZE, SPOT, SUN, ball_surface, frame_of
 from scipy.ndimage import binary_erosion
 
-from ripple_sim.render.camera import srgb_to_linear
+from ripple_sim.render.contract import srgb_to_linear
 from ripple_sim.render.passes.shadow import ShadowMaps
 from ripple_sim.render.visuals.lights import Light
 

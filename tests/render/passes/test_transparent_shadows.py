@@ -5,7 +5,7 @@ import pytest
 from drawn import FLOOR, SIZE, SUN, ball_surface, frame_of
 from scipy.ndimage import distance_transform_edt
 
-from ripple_sim.render.camera import srgb_to_linear
+from ripple_sim.render.contract import srgb_to_linear
 
 PIXELS = SIZE[1] / (2 * 4.0 * np.tan(np.radians(20)))  # a metre, seen from above
 DARK_FLOOR = FLOOR.replace(".8 .8 .8", ".6 .6 .6")  # below the shoulder of the tone mapping

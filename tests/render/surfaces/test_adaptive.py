@@ -6,6 +6,7 @@ from sphere_height_maps import N, constant_height_map, height_map_of
 
 from ripple_sim.render.surfaces.adaptive import AdaptiveTessellation
 from ripple_sim.render.surfaces.tessellation import edges_of, midpoints
+from ripple_sim.render.surfaces.vertices import SurfaceVertices
 from ripple_sim.render.visuals import shapes as meshes
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points
 from ripple_sim.solver.texels.texel_atlas import ChartPage
@@ -25,7 +26,8 @@ def ball(tolerance, min_length=0.0):
     page = ChartPage(6, N)
     chart, row, column = cube_chart_points(vertices[:, SPHERE], N)
     places = page.places(chart, (np.stack([column, row], axis=1) + 0.5) / N)
-    adaptive = AdaptiveTessellation(F, edges, vertices[:, POSITION], places, page, tolerance, min_length)
+    made = SurfaceVertices(F, vertices, edges, places, places, np.zeros((0, 4)), F)
+    adaptive = AdaptiveTessellation(made, page, tolerance, min_length)
     return adaptive, vertices, F
 
 

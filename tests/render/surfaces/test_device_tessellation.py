@@ -55,18 +55,17 @@ def test_frames_are_those_of_the_host(scene, depth) -> None:
 def test_the_triangles_are_the_hosts_in_their_order(gl, scene, group, monkeypatch) -> None:
     monkeypatch.setattr(adaptive, "_GROUP", group)  # of 32 there are more than a group has threads
     renderer, atlas, frame = scene
-    (target,) = renderer._scene._targets
-    found = target._triangles
-    host, found._on_device = found._tessellation, None
+    (target,) = renderer._scene.targets
+    host, target._on_device = target._adaptive, None
     for seed, depth in ((0, 0.0), (1, 0.02), (2, 0.2)):
         noise = np.random.default_rng(seed).normal(0.0, 1.0, (6, N, N)).astype(np.float32)
         heights = np.float32(depth) * noise * (np.abs(noise) > 1)
         frame(heights, True)
         triangles, used = host(HeightMap(atlas.texels)(heights))
         with gl:
-            split = np.frombuffer(found.midpoints.read(), np.int32)
-            count = np.frombuffer(found.count.read(), np.int32)
-            indices = np.frombuffer(found.indices.read(), np.int32)[: count[0]]
+            split = np.frombuffer(target._midpoints.read(), np.int32)
+            count = np.frombuffer(target._count.read(), np.int32)
+            indices = np.frombuffer(target._indices.read(), np.int32)[: count[0]]
         np.testing.assert_array_equal(count[1:], [1, 0, 0, 0])
         np.testing.assert_array_equal(indices.reshape(-1, 3), triangles)
         np.testing.assert_array_equal(np.flatnonzero(split) + host.base_count, used)

@@ -6,15 +6,15 @@ from sphere_height_maps import cube_charts, height_map_of
 
 from ripple_sim.render.resources import HeightMapTextures
 from ripple_sim.render.surfaces.adaptive import spline_heights
-from ripple_sim.render.surfaces.displacement import Displacement, Place
+from ripple_sim.render.surfaces.surface_mesh import Displacement
 from ripple_sim.render.surfaces.tessellation import Edges
 from ripple_sim.render.surfaces.vertices import DIRECTION, POSITION, UV, SurfaceVertices
-from ripple_sim.render.visuals.geoms import Occluders
+from ripple_sim.render.visuals.objects import Occluders
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 
 N = 8
 PAGE = ChartPage(6, N)
-STILL = Place(np.eye(3), np.zeros(3), 0)
+STILL = np.eye(3), np.zeros(3), 0  # rotation, origin, occluders
 
 
 class NoGeoms:
@@ -34,7 +34,8 @@ def vertices_at(chart, uv, positions=None, directions=None, midpoints=0) -> Surf
     ends = np.zeros((midpoints, 2), dtype=np.int64)
     edges = Edges(ends, np.zeros((0, 3), dtype=np.int64), ends[:, 0], np.zeros(midpoints, dtype=bool))
     places = PAGE.places(np.asarray(chart), np.asarray(uv, dtype=float))
-    return SurfaceVertices(np.zeros((0, 3), dtype=np.int64), attributes, edges, places, places)
+    none = np.zeros((0, 3), dtype=np.int64)
+    return SurfaceVertices(none, attributes, edges, places, places, np.zeros((0, 4)), none)
 
 
 def displaced(resources, vertices, height_map, place=STILL, used=(), layers=1, layer=0) -> np.ndarray:
@@ -47,7 +48,7 @@ def displaced(resources, vertices, height_map, place=STILL, used=(), layers=1, l
         height_maps.bind()
         displacement = Displacement(resources, vertices, layer)
         displacement.moved.write(np.full(4 * len(vertices.attributes), np.nan, np.float32).tobytes())
-        displacement.run(ctx, place, np.array(used, dtype=np.int32))
+        displacement.run(ctx, *place, np.array(used, dtype=np.int32))
         return np.frombuffer(displacement.moved.read(), np.float32).reshape(-1, 4)[:-1]
 
 
@@ -139,7 +140,7 @@ def spline_on(resources, charts, height_map, chart, uv) -> np.ndarray:
         height_maps.write(0, height_map)
         height_maps.bind()
         displacement = Displacement(resources, vertices._replace(lookups=np.concatenate([places, places[:1]])), layer=0)
-        displacement.run(ctx, STILL, np.empty(0, np.int32))
+        displacement.run(ctx, *STILL, np.empty(0, np.int32))
         return np.frombuffer(displacement.moved.read(), np.float32).reshape(-1, 4)[:-1, 2]
 
 
@@ -151,7 +152,7 @@ def test_vertices_move_along_their_direction_and_then_into_the_world(resources):
     origin = np.array([0.5, -2.0, 7.0])
     height_map = np.zeros((6, N + 2, N + 2, 4), np.float32)
     height_map[..., 3] = -0.3
-    moved = displaced(resources, vertices_at(chart, uv, positions, directions), height_map, Place(rotation, origin, 0))
+    moved = displaced(resources, vertices_at(chart, uv, positions, directions), height_map, (rotation, origin, 0))
     expected = (positions - 0.3 * directions) @ rotation.T + origin
     np.testing.assert_allclose(moved[:, :3], expected, atol=1e-5)
     np.testing.assert_array_equal(moved[:, 3], 1.0)  # nothing hides the sky

@@ -5,6 +5,8 @@ Cutting a mesh at the borders of its charts: nothing is lost, no gap opens, and 
 Heatmaps: what they refuse.
 """
 
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from drawn import FRONT, ball_surface, frame_of
 from sphere_height_maps import cube_charts
 
 from ripple_sim.render import LOOKS, Renderer, Surface
-from ripple_sim.render.surfaces.surface import Charts, VertexColumns, shared_places, split_at_charts, target_color
+from ripple_sim.render.surfaces.surface import Charts, shared_places, split_at_charts, target_color
 from ripple_sim.render.visuals import shapes
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS
@@ -64,7 +66,9 @@ def test_unknown_look_names_the_valid_ones(gl):
         frame_of(gl, '<geom name="t" type="sphere" size=".5"/>', targets={"t": ball_surface("chrome")})
 
 
-COLUMNS = VertexColumns(slice(0, 3), slice(3, 6), slice(6, 9))
+def cut_at_charts(mesh, charts) -> SimpleNamespace:
+    parts = split_at_charts(mesh, charts, slice(0, 3), slice(3, 6), slice(6, 9))
+    return SimpleNamespace(**dict(zip(("F", "attributes", "same", "chart"), parts, strict=True)))
 
 
 def turned(points: np.ndarray, seed: int) -> np.ndarray:
@@ -109,7 +113,7 @@ MESHES = [*(pytest.param(ball_mesh(d, s), id=f"ball {d} {s}") for d, s in ((1, 0
 @pytest.mark.parametrize("mesh", MESHES)
 def test_no_gap_opens_and_no_area_is_lost(mesh):
     F, attributes, _ = mesh
-    cut = split_at_charts(mesh, COLUMNS, cube_charts(attributes[:, 6:]))
+    cut = cut_at_charts(mesh, cube_charts(attributes[:, 6:]))
     assert len(cut.F) > len(F)
     before, after = areas(attributes[F][:, :, :3]), areas(cut.attributes[cut.F][:, :, :3])
     assert after.sum() == pytest.approx(before.sum(), rel=1e-10)
@@ -123,7 +127,7 @@ def test_no_gap_opens_and_no_area_is_lost(mesh):
 @pytest.mark.parametrize("mesh", MESHES)
 def test_every_triangle_lies_in_one_chart(mesh):
     _, attributes, _ = mesh
-    cut = split_at_charts(mesh, COLUMNS, cube_charts(attributes[:, 6:]))
+    cut = cut_at_charts(mesh, cube_charts(attributes[:, 6:]))
     chart = cut.chart[cut.F]
     assert (chart == chart[:, :1]).all()
     # in its share of space the chart's own axis is the nearest of the six
@@ -136,7 +140,7 @@ def test_every_triangle_lies_in_one_chart(mesh):
 @pytest.mark.parametrize("mesh", MESHES)
 def test_triangles_keep_their_side_and_vertices_their_unit_normals(mesh):
     _, attributes, _ = mesh
-    cut = split_at_charts(mesh, COLUMNS, cube_charts(attributes[:, 6:]))
+    cut = cut_at_charts(mesh, cube_charts(attributes[:, 6:]))
     corners = cut.attributes[cut.F]
     cross = np.cross(corners[:, 1, :3] - corners[:, 0, :3], corners[:, 2, :3] - corners[:, 0, :3])
     assert (np.einsum("fi,fi->f", cross, corners[:, :, :3].mean(axis=1)) > 0).all()
@@ -148,7 +152,7 @@ def test_triangles_keep_their_side_and_vertices_their_unit_normals(mesh):
 def test_vertices_are_the_same_on_both_sides_of_a_border_and_nowhere_else(mesh):
     """Equal where position and normal are: a border is no crease, and a crease stays one."""
     _, attributes, _ = mesh
-    cut = split_at_charts(mesh, COLUMNS, cube_charts(attributes[:, 6:]))
+    cut = cut_at_charts(mesh, cube_charts(attributes[:, 6:]))
     _, by_value = np.unique(cut.attributes[:, :6].round(9), axis=0, return_inverse=True)
     pairs = np.unique(np.column_stack([by_value.ravel(), cut.same]), axis=0)
     assert len(np.unique(pairs[:, 0])) == len(pairs) == len(np.unique(pairs[:, 1]))
@@ -165,7 +169,7 @@ def test_texture_coordinates_keep_their_jump_where_a_seam_crosses_a_border():
     u = np.array([1.0, 1.0, 0.7, 0.0, 0.0, 0.3])
     attributes = np.column_stack([V, normal, V, u])
     mesh = np.array([[0, 2, 1], [3, 4, 5]]), attributes, np.array([0, 1, 2, 0, 1, 3])
-    cut = split_at_charts(mesh, COLUMNS, cube_charts(attributes[:, 6:9]))
+    cut = cut_at_charts(mesh, cube_charts(attributes[:, 6:9]))
     assert len(np.unique(cut.chart)) == 2
     values = cut.attributes[cut.F][:, :, 9]
     assert ((values >= 0.7 - 1e-9).all(axis=1) | (values <= 0.3 + 1e-9).all(axis=1)).all()
@@ -179,7 +183,7 @@ def test_a_mesh_within_one_chart_stays_as_it_is():
     high = attributes[:, 8] > 0.85
     F = F[high[F].all(axis=1)]
     used, number = np.unique(F, return_inverse=True)
-    cut = split_at_charts((F, attributes, same), COLUMNS, cube_charts(attributes[:, 6:]))
+    cut = cut_at_charts((F, attributes, same), cube_charts(attributes[:, 6:]))
     np.testing.assert_array_equal(cut.F, number.reshape(-1, 3))
     np.testing.assert_array_equal(cut.attributes, attributes[used])
     np.testing.assert_array_equal(cut.same, same[used])
@@ -191,7 +195,7 @@ def test_a_long_triangle_over_a_corner_of_the_cube_has_a_part_in_each_chart_ther
     normal = np.ones((3, 3)) / np.sqrt(3)
     directions = corners / np.linalg.norm(corners, axis=1, keepdims=True)
     attributes = np.concatenate([corners, normal, directions], axis=1)
-    cut = split_at_charts((np.array([[0, 1, 2]]), attributes, np.arange(3)), COLUMNS, cube_charts(directions))
+    cut = cut_at_charts((np.array([[0, 1, 2]]), attributes, np.arange(3)), cube_charts(directions))
     assert len(np.unique(cut.chart)) == 3
     part = areas(cut.attributes[cut.F][:, :, :3])
     whole = areas(corners[None])[0]
@@ -205,7 +209,7 @@ def test_a_long_triangle_over_a_corner_of_the_cube_has_a_part_in_each_chart_ther
 def test_heights_on_a_border_are_looked_up_in_one_place():
     mesh = ball_mesh(5, 6)
     charts = cube_charts(mesh[1][:, 6:], 10)
-    cut = split_at_charts(mesh, COLUMNS, charts)
+    cut = cut_at_charts(mesh, charts)
     uv = charts.map.uv(cut.attributes[:, 6:], cut.chart)
     places = charts.page.places(cut.chart, uv)
     shared = shared_places(uv, places, cut.same[:, None])

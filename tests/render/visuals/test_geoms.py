@@ -12,9 +12,9 @@ from shader_functions import evaluated
 
 from ripple_sim.errors import RippleWarning
 from ripple_sim.render import Renderer
-from ripple_sim.render.camera import Balls
 from ripple_sim.render.contract import MAX_OCCLUDERS
-from ripple_sim.render.visuals.geoms import Occluders, _capsules, warn_of_unsupported
+from ripple_sim.render.visuals.geoms import warn_of_unsupported
+from ripple_sim.render.visuals.objects import Occluders, _capsules
 
 
 def posed(geoms: str):
@@ -47,10 +47,10 @@ def test_balls_contain_the_geoms_wherever_they_are_turned(resources):
         '<geom type="box" size=".9 .1 .4" pos="1 2 3" euler="20 40 70"/><geom type="sphere" size=".3" pos="-1 0 0"/>'
     )
     balls = Occluders(resources, model, np.array([0, 1])).balls(data)
-    np.testing.assert_allclose(balls.centres, data.geom_xpos, atol=1e-12)
+    np.testing.assert_allclose(balls[:, :3], data.geom_xpos, atol=1e-12)
     corners = np.array([[x, y, z] for x in (-0.9, 0.9) for y in (-0.1, 0.1) for z in (-0.4, 0.4)])
-    assert balls.radii[0] == pytest.approx(np.linalg.norm(corners, axis=1).max())
-    assert balls.radii[1] >= 0.3
+    assert balls[0, 3] == pytest.approx(np.linalg.norm(corners, axis=1).max())
+    assert balls[1, 3] >= 0.3
 
 
 def row_of_balls(count: int) -> str:
@@ -105,7 +105,7 @@ def test_an_object_has_the_bits_of_all_that_darken_it_by_a_hundredth_but_not_its
         occluders.bind(data, np.zeros(3))
     bits = np.arange(MAX_OCCLUDERS)
     geom_of_bit = occluders._bound_geoms
-    near = occluders.near(Balls(places, np.full(len(places), 0.1)), np.arange(len(places)))
+    near = occluders.near(np.column_stack([places, np.full(len(places), 0.1)]), np.arange(len(places)))
     assert near.any() and (near < 2**MAX_OCCLUDERS - 1).all()
     for geom, mask in enumerate(near[:2]):
         own = int(bits[geom_of_bit == geom][0])
@@ -117,7 +117,7 @@ def test_an_object_has_the_bits_of_all_that_darken_it_by_a_hundredth_but_not_its
 
 def visibility(gl, points, normal, near=1):
     expression = f"vec4(occluder_visibility(x.xyz, vec3({normal}), {near}))"
-    return evaluated(gl, "visuals/occluders.glsl", expression, np.atleast_2d(points))[:, 0]
+    return evaluated(gl, "glsl/occluders.glsl", expression, np.atleast_2d(points))[:, 0]
 
 
 def test_a_geom_hides_more_of_the_sky_the_nearer_it_is_and_none_from_itself_or_from_behind(gl, resources):

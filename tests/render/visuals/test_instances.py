@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from shader_functions import evaluated
 
-from ripple_sim.render.visuals.geoms import GeomVisuals
-from ripple_sim.render.visuals.instances import Assets, ObjectTable
+from ripple_sim.render.visuals.geoms import instances_of, visuals_of
+from ripple_sim.render.visuals.objects import Assets, ObjectTable, Occluders
 from ripple_sim.render.visuals.visual import LOOKS, Look, find_look
 from ripple_sim.solver import RippleError
 
@@ -24,54 +24,67 @@ def visuals(resources):
     model = mujoco.MjModel.from_xml_string(XML)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    return GeomVisuals(Assets.of(model, resources), range(model.ngeom)), data
+    drawn = instances_of(Assets(model, resources), visuals_of(model, range(model.ngeom)))
+    occluders = Occluders(resources, model, np.arange(model.ngeom))
+
+    def update(eye, pixels):
+        for each in drawn:
+            each.update(data, np.asarray(eye), pixels, occluders)
+
+    return drawn, data, update
+
+
+def of_kind(drawn, count, site=False):
+    """The opaque draw call of so many geoms, or that of the site."""
+    return next(each for each in drawn if len(each.numbers) == count and not each.transparent and each.occludes != site)
 
 
 def test_geoms_of_one_shape_are_drawn_together_and_transparent_ones_alone(visuals):
-    drawn, _ = visuals
-    assert sorted(len(each.numbers) for each in drawn._opaque) == [1, 1, 2]  # the box, the site, both round geoms
-    assert [each.visual.index for each in drawn.transparent] == [3]
-    numbers = [n for each in drawn._opaque for n in each.numbers] + [drawn.transparent[0].number]
+    drawn, _, _ = visuals
+    # the box, the site, both round geoms
+    assert sorted(len(each.numbers) for each in drawn if not each.transparent) == [1, 1, 2]
+    assert [each.numbers for each in drawn if each.transparent] == [[3]]
+    numbers = [n for each in drawn for n in each.numbers]
     assert sorted(numbers) == list(range(5))
 
 
 def test_poses_are_those_of_the_data(visuals):
-    drawn, data = visuals
-    drawn.update(data, np.array([0.0, -5.0, 0.0]), 500.0)
-    both = next(each for each in drawn._opaque if len(each.numbers) == 2)
+    drawn, data, update = visuals
+    update([0.0, -5.0, 0.0], 500.0)
+    both = of_kind(drawn, 2)
     np.testing.assert_allclose(both._records["origin"], data.geom_xpos[:2], atol=1e-6)
     # column by column
     np.testing.assert_allclose(
         both._records["rotation"], data.geom_xmat[:2].reshape(-1, 3, 3).transpose(0, 2, 1), atol=1e-6
     )
-    site = next(each for each in drawn._opaque if each.sites)
+    site = of_kind(drawn, 1, site=True)
     np.testing.assert_allclose(site._records["origin"], data.site_xpos, atol=1e-6)
 
 
 def test_nearer_and_larger_frames_need_more_segments_and_then_edges_are_within_a_quarter_of_a_pixel(visuals):
-    drawn, data = visuals
-    both = next(each for each in drawn._opaque if len(each.numbers) == 2)
+    drawn, data, update = visuals
+    both = of_kind(drawn, 2)
     eye, segments = np.array([1.0, -4.0, 3.0]), []
     for pixels in (1.0, 30.0, 100.0, 300.0, 1000.0):
-        drawn.update(data, eye, pixels)
+        update(eye, pixels)
         segments.append(both._segments)
         away = np.linalg.norm(data.geom_xpos[0] - eye) - 0.3
         sagitta = 0.3 * (1 - np.cos(np.pi / 4 / both._segments)) / away * pixels
         assert sagitta <= 0.26
     assert segments == sorted(segments)
     assert segments[-1] > segments[0]
-    drawn.update(data, data.geom_xpos[0], 1e6)  # from within a ball: the finest there is
+    update(data.geom_xpos[0], 1e6)  # from within a ball: the finest there is
     assert both._segments >= segments[-1]
 
 
 def test_the_shadow_bias_covers_the_gap_between_chord_and_arc_and_flat_geoms_have_none(visuals):
-    drawn, data = visuals
-    drawn.update(data, np.array([0.0, -5.0, 0.0]), 500.0)
-    both = next(each for each in drawn._opaque if len(each.numbers) == 2)
+    drawn, _, update = visuals
+    update([0.0, -5.0, 0.0], 500.0)
+    both = of_kind(drawn, 2)
     sagitta = np.array([0.3, 0.3]) * (1 - np.cos(np.pi / 4 / both._segments))
     assert (both.shadow_biases > sagitta).all()
     assert (both.shadow_biases < 0.05).all()
-    box = next(each for each in drawn._opaque if len(each.numbers) == 1 and not each.sites)
+    box = of_kind(drawn, 1)
     assert not box.shadow_biases.any()
 
 
@@ -87,7 +100,7 @@ def read(gl, table, expression, count=1) -> np.ndarray:
     """An expression of an object `object_at(int(x.x))`, for all rows."""
     with gl:
         table.bind()
-    return evaluated(gl, "visuals/object_table.glsl", expression, np.arange(count)[:, None])
+    return evaluated(gl, "glsl/objects.glsl", expression, np.arange(count)[:, None])
 
 
 def test_shaders_find_a_look_in_its_row(gl, table):
@@ -112,7 +125,7 @@ def test_the_rotation_turns_gradients_into_the_world(gl, table):
     rotation, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
     table.add(LOOK, 0)
     number = table.add(LOOK, 1)
-    table.set_height_map(number, 0.125, rotation)
+    table.place(number, 0.125, rotation=rotation)
     for axis, unit in enumerate(("1, 0, 0", "0, 1, 0", "0, 0, 1")):
         turned = read(gl, table, f"vec4(object_at({number}).rotation * vec3({unit}), 0.0)")[0, :3]
         np.testing.assert_allclose(turned, rotation[:, axis], atol=1e-6)

@@ -8,11 +8,11 @@ import warnings
 import numpy as np
 import pytest
 from hand_made import flat_torus
+from layer_mode import lowest_square
 
 from ripple_sim import RippleWarning
 from ripple_sim.solver import Material, SolverError, WaveSolver, sphere_atlas, texel_atlas
 from ripple_sim.solver.operator.coefficients import LIMITS, check_mask, check_numbers, require_positive
-from ripple_sim.solver.operator.material import lowest_square
 
 STRICT = ("density", "yield_height")
 

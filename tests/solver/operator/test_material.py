@@ -5,9 +5,9 @@ The exact mode of a layer: limits that are known.
 
 import numpy as np
 import pytest
+from layer_mode import lowest_square
 
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, sphere_atlas
-from ripple_sim.solver.operator.material import lowest_square
 
 LEGENDRE = {
     2: lambda z: (3 * z**2 - 1) / 2,

@@ -31,7 +31,7 @@ def cell_by_cell(texels: TexelMesh, k: np.ndarray, s: np.ndarray) -> tuple[np.nd
         seen.add(frozenset(indices))
         conductance = len(indices) / (1 / k[indices]).sum() * s[indices].min()
         if len(indices) == 4:
-            *weights, area = quad(*points)
+            *weights, area = quad(*(np.array(points[1:]) - points[0]))
             ends = [(0, 1), (2, 3), (0, 2), (1, 3), (0, 3), (1, 2)]
         else:
             *weights, area = triangle(*points)

@@ -6,9 +6,8 @@ from numpy.testing import assert_allclose
 
 from ripple_sim.solver import build_atlas, texel_atlas
 from ripple_sim.solver.layouts.cube.atlas import sphere_atlas
-from ripple_sim.solver.texels.moving import MovingCells
-from ripple_sim.solver.texels.riding import SurfaceRide
-from ripple_sim.solver.texels.stiffness import lumped_areas, stiffness_stencil
+from ripple_sim.solver.texels.moving import SurfaceRide
+from ripple_sim.solver.texels.stiffness import TexelCells
 from tests.support.hand_made import disk, polygon, square
 
 SURFACES = {
@@ -29,31 +28,31 @@ def test_weights_and_areas_are_those_of_the_texels_where_they_are(name, fixed):
     V = atlas.mesh.V @ (np.eye(3) + 0.3 * rng.standard_normal((3, 3))) + 10.0
     around = SurfaceRide(atlas).around(V)
     speeds, soft = rng.uniform(1, 2, (2, *texels.shape)) / [[[[1]]], [[[2]]]]
-    cells = MovingCells(texels)
-    stencil, areas = cells.assemble(around, cells.coefficient(speeds, soft, 0.0))
+    cells = texels.cells
+    stencil, areas = cells.moved(around, cells.coefficient(speeds, soft, 0.0))
     beside = np.moveaxis(around, 0, -1)
-    exact = stiffness_stencil(texels.topology, beside, speeds, soft)
+    exact, spanned = TexelCells(texels.topology, beside).at_rest(speeds, soft)
     assert_allclose(stencil.weights, exact.weights, atol=3e-6 * np.abs(exact.weights).max())
     if exact.irregular is not None:
         assert_allclose(stencil.irregular.weights, exact.irregular.weights, atol=1e-6)
         assert_allclose(stencil.irregular.others, exact.irregular.others)
-    assert_allclose(areas, lumped_areas(texels.topology, beside), rtol=3e-6)
+    assert_allclose(areas, spanned, rtol=3e-6)
 
 
 def test_a_coefficient_follows_a_power_of_the_area():
     atlas = SURFACES["five charts round a point"]()
-    cells, ones = MovingCells(atlas.texels), np.ones(atlas.areas.shape)
+    cells, ones = atlas.texels.cells, np.ones(atlas.areas.shape)
     twice = SurfaceRide(atlas).around(2 * atlas.mesh.V)
-    plain, thinner = (cells.assemble(twice, cells.coefficient(ones, ones, power))[0] for power in (0.0, -1.0))
+    plain, thinner = (cells.moved(twice, cells.coefficient(ones, ones, power))[0] for power in (0.0, -1.0))
     assert_allclose(thinner.weights, plain.weights / 4, atol=1e-6)
     assert_allclose(thinner.irregular.weights, plain.irregular.weights / 4, atol=1e-6)
 
 
 def test_crushed_cells_have_finite_weights():
     atlas = SURFACES["disk"]()
-    cells, ones = MovingCells(atlas.texels), np.ones(atlas.areas.shape)
+    cells, ones = atlas.texels.cells, np.ones(atlas.areas.shape)
     for V in (0 * atlas.mesh.V, atlas.mesh.V * [1, 0, 1]):
-        stencil, areas = cells.assemble(SurfaceRide(atlas).around(V), cells.coefficient(ones, ones, -1.0))
+        stencil, areas = cells.moved(SurfaceRide(atlas).around(V), cells.coefficient(ones, ones, -1.0))
         assert np.isfinite(stencil.weights).all()
         assert np.isfinite(areas).all()
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.bench.report import energy_drift
+from ripple_sim.bench import energy_drift
 from ripple_sim.solver import Atlas, Material, WaveSolver, sphere_atlas
 
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from genus_zero import bipyramid, crumpled, icosphere, spiky, stretched
 
-from ripple_sim.solver.layouts.sphere_map.certificate import certify
+from ripple_sim.solver.layouts.energy import Reference
+from ripple_sim.solver.layouts.sphere_map import certify
 from ripple_sim.solver.layouts.sphere_map.decimation import corner_table, decimate, following, preceding
-from ripple_sim.solver.layouts.sphere_map.energy import Reference, total_energy
-from ripple_sim.solver.layouts.sphere_map.level import Source, carry, update_level
-from ripple_sim.solver.layouts.sphere_map.relaxation import insert_vertices
+from ripple_sim.solver.layouts.sphere_map.level import RealSurface, carry, update_level
+from ripple_sim.solver.layouts.sphere_map.progressive import TETRAHEDRON, insert_vertices
+from ripple_sim.solver.layouts.sphere_map.relaxation import SPHERE, total_energy
 
-TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
 SHAPES = {
     "sphere": lambda: icosphere(2),
     "fan of 100": lambda: bipyramid(100),  # its tips have more neighbours than are relaxed
@@ -28,8 +28,8 @@ def collapsed(V, F):
     table = corner_table(F, len(V))
     log = decimate(table, V)
     carry(table.tail[log], table.tail[table.twin[log]], carried)
-    source = Source(V, carried, np.ones(len(V)), 0.5, 0.5, 4 * np.pi / len(F))
-    reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)))
+    source = RealSurface(V, carried, np.ones(len(V)), 0.5, 0.5, 4 * np.pi / len(F))
+    reference = Reference(np.zeros(len(F)), np.zeros(3 * len(F)), SPHERE)
     gone = np.concatenate([log // 3, table.twin[log] // 3])
     h = 3 * int(np.setdiff1d(np.arange(len(F)), gone)[0])
     last = np.setdiff1d(np.arange(len(V)), table.tail[log])

@@ -1,1 +1,0 @@
-"""Measurements of the wave solver: how fast, how exact, and against what."""

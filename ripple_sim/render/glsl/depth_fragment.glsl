@@ -1,2 +1,0 @@
-#version 430
-void main() {}

@@ -1,0 +1,58 @@
+// Points and pixels that samples are taken at: noise, blocks of 2 x 2 pixels that share their work, points of a disc.
+
+// Interleaved gradient noise, 0 to 1: evenly spread over any few neighbouring pixels.
+float gradient_noise(vec2 pixel)
+{
+    return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))));
+}
+
+// Mean over a block of 2 x 2 pixels, or over the part of it that lies to the given sides.
+float block_mean(float value, bvec2 sides)
+{
+    vec2 side = 1.0 - 2.0 * vec2(ivec2(gl_FragCoord.xy) & 1);
+    value += sides.x ? 0.5 * side.x * dFdx(value) : 0.0;
+    return value + (sides.y ? 0.5 * side.y * dFdy(value) : 0.0);
+}
+
+vec3 block_mean(vec3 value, bvec2 sides)
+{
+    return vec3(block_mean(value.r, sides), block_mean(value.g, sides), block_mean(value.b, sides));
+}
+
+float block_mean(float value)
+{
+    return block_mean(value, bvec2(true));
+}
+
+const float TWO_PI = 6.2831853;
+
+// Points at growing radii that follow one another under turns by the golden angle spread evenly (Vogel's spiral).
+const float GOLDEN_ANGLE = 2.3999632;
+const mat2 GOLDEN_TURN = mat2(-0.73736888, 0.67549029, -0.67549029, -0.73736888);
+const mat2 FOURTH_TURN = mat2(-0.98471349, -0.17418195, 0.17418195, -0.98471349);  // by four times that
+
+// Number, and a half, of this pixel's first point of a spiral, of whose points the pixels of a block of 2 x 2 take turns:
+// every block has the same, so that there is neither noise nor hatching.
+float first_point()
+{
+    ivec2 corner = ivec2(gl_FragCoord.xy) & 1;
+    return float(corner.x + 2 * corner.y) + 0.5;
+}
+
+vec2 spiral_direction(float point)
+{
+    return vec2(cos(GOLDEN_ANGLE * point), sin(GOLDEN_ANGLE * point));
+}
+
+// Means over parts of a disc, in place of points of it: one in the middle and the rest on a circle about it, each over so
+// much. They show the edge of what covers half of the disc within 0.018 of its share, and what is small evenly; as many on
+// a spiral, which do not balance about the middle, miss the edge by 0.06.
+const int MEANS = 8;
+const float CIRCLE_RADIUS = 0.8, MEAN_WIDTH = 0.5;  // in radii of the disc
+const mat2 CIRCLE_TURN = mat2(0.62348980, 0.78183148, -0.78183148, 0.62348980);  // by a seventh
+
+// How far from the middle of the disc one of the means is.
+float mean_radius(int number)
+{
+    return number == 0 ? 0.0 : CIRCLE_RADIUS;
+}

@@ -1,0 +1,149 @@
+#version 430
+// The floor and what is behind it, without shadows; where one may fall is marked as a depth. With SHADOW those pixels.
+// Each pixel stands for a block of BLOCK x BLOCK of the frame's.
+#define OWN_POINTS (BLOCK > 1)
+#include "glsl/view.glsl"
+
+#stage fragment
+#include "glsl/floor_map.glsl"
+#include "glsl/lights.glsl"
+#include "glsl/soft_shadows.glsl"
+#include "glsl/tone_mapping.glsl"
+
+layout(binding = FLAT_IMAGE_UNIT) uniform sampler2D floor_image;
+
+uniform vec4 tiling;   // texture coordinates a metre, and at the origin
+uniform vec3 tint;     // of the image
+
+out vec4 fragment;
+
+#if MIRROR
+layout(binding = MIRROR_UNIT) uniform sampler2D mirror;  // the scene as the floor reflects it, tone mapped
+
+uniform float reflectance;
+#endif
+
+const float STEEPEST = 0.03;  // change from one block to the next up to which the background is smooth
+const float RIM = 0.5;         // blocks on either side of the floor's edges that are not smooth
+const float HIGHEST_LEVEL = 4.0;  // of the floor map
+const float BOUNCE_LEVEL = 2.3;   // where few points of the map's search are seen no longer
+const float OUTSIDE = 1e9;        // [m]
+const float LARGEST = 0.04;       // of the floor map's half width: larger blocks would miss shadows, but not the map
+
+// A skybox continues below the horizon, which the floor hides.
+#if SKYBOX
+const float HORIZON = 0.0;
+#else
+const float HORIZON = -1.0;
+#endif
+
+#if !SHADOW
+// Whether a shadow may fall on a point of the floor; `near` is its texel of the floor map.
+bool may_be_shaded(vec2 place, vec2 near)
+{
+    vec2 off = abs(place - 0.5);
+    bool boxed = false;
+    for (int i = 0; i < SHADOWS; ++i) {
+        vec4 box = shadow_at(i).floor;
+        boxed = boxed || counts.w > float(i) && all(greaterThan(place, box.xy)) && all(lessThan(place, box.zw));
+    }
+    return boxed && (max(off.x, off.y) > 0.5 || near.g > 0.0);
+}
+#endif
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    bool met = meets_floor();
+    float at = floor_distance();
+    vec2 plane = eye_local.xy + at * way_local.xy;
+    // the lights are near: a pool of light about the focus, and the background's colour beyond
+    float away = length(vec3(plane - focus_local.xy, focus_local.z));
+    // antialiasing of the floor's own edges
+    vec2 inside = limits.xy - abs(plane), filled = clamp(float(BLOCK) * inside / fwidth(inside), 0.0, 1.0);
+    float edge = 1.0 - min(filled.x, filled.y);
+    float fade = met ? max(smoothstep(floor_fade.x, floor_fade.y, away / eye.w), edge) : 1.0;
+#if TILED
+    vec3 albedo = texture(floor_image, plane * tiling.xy + tiling.zw).rgb * tint;
+#else
+    vec3 albedo = floor_albedo.rgb;
+#endif
+    vec3 world = eye.xyz + at * way;
+    vec2 place = floor_map_position(plane);
+    // the blocks of 2 x 2 that share their light are texels of the next level
+#if BLOCK > 1
+    // in higher levels, texels at the map's edge, which stand for all beyond it, are as dark as what is far inside
+    float level = clamp(textureQueryLod(floor_visibility, place).y + 1.0, 1.0, HIGHEST_LEVEL);
+    vec2 near = textureLod(floor_visibility, place, level).rg;
+#else
+    vec2 near = textureLod(floor_visibility, place, 1.0).rg;
+#endif
+    vec3 bounce = textureLod(floor_bounce, place, BOUNCE_LEVEL).rgb;
+    vec3 shadow[SHADOWS];
+    for (int i = 0; i < SHADOWS; ++i)
+        shadow[i] = vec3(1.0);
+    float blur = 0.0;
+#if SHADOW
+    // the search for what shades is shared where all four pixels of a block see the floor
+    bvec2 block = bvec2(BLOCK == 1 && block_mean(met ? 0.0 : 1.0) == 0.0);
+#if BLOCK > 1
+    // narrow penumbras are widened, so that none falls between blocks, and left to pixels
+    blur = 0.5 * length(fwidth(plane));
+#endif
+    bool partly = false;
+    for (int i = 0; i < SHADOWS; ++i) {
+        shadow[i] = light_arriving(i, world, floor_normal.xyz, -1.0, blur, block);
+#if OWN_POINTS
+        partly = partly || any(greaterThan(shadow[i] * (1.0 - shadow[i]), vec3(UNSEEN)));
+#endif
+    }
+#else
+    // all four pixels of a block, so that they can share their search for what shades them
+    bool shaded = met && may_be_shaded(place, near);
+    gl_FragDepth = block_mean(shaded ? 1.0 : 0.0) > 0.0 ? SHADED_LEVEL : OPEN_LEVEL;
+#endif
+#if NEAR_LIGHTS
+    vec3 light = vec3(0.0), unshaded = vec3(0.0);
+    for (int i = 0; i < LIGHTS; ++i) {
+        vec3 towards;
+        vec3 arrives = incident(light_at(i), world, towards) * max(dot(floor_normal.xyz, towards), 0.0);
+        light += arrives * (i < SHADOWS ? shadow[i] : vec3(1.0));
+        unshaded += arrives;
+    }
+#else
+    vec3 unshaded = floor_light.rgb, light = unshaded;
+#if SHADOW
+    for (int i = 0; i < SHADOWS; ++i) {
+        Light from = light_at(i);
+        vec3 arrives = from.radiance.rgb * max(dot(floor_normal.xyz, from.direction.xyz), 0.0);
+        light -= (1.0 - shadow[i]) * arrives;
+    }
+#endif
+#endif
+    unshaded += around + key_box;
+    light += (around + shadow[0] * key_box) * (0.15 + 0.85 * near.r);
+#if CUT_OUT
+    // only the shadows are left of the floor
+    fragment = vec4(vec3(0.0), (1.0 - fade) * (1.0 - light.g / max(unshaded.g, 1e-6)));
+#else
+    vec3 direction = normalize(way);
+    vec3 far = sky_at(met && edge == 0.0 ? vec3(direction.xy, max(direction.z, HORIZON)) : direction, 0.0);
+    vec3 shown = tone_mapped(mix(albedo * (light + bounce), far, fade));
+#if MIRROR
+    // as in MuJoCo, the reflectance does not depend on the angle
+    shown = mix(shown, textureLod(mirror, 0.5 + 0.5 * screen, 0.0).rgb, reflectance * (1.0 - fade));
+#endif
+#if BLOCK > 1
+    vec2 margin = -beside_edges(), near_edge = RIM * fwidth(margin);
+    bool rough = all(greaterThan(margin, -near_edge)) && any(lessThan(margin, near_edge)), steep = any(greaterThan(fwidth(shown), vec3(STEEPEST)));
+#if SHADOW
+    rough = rough || (partly ? in_narrow : steep) || 2.0 * blur > LARGEST * floor_map.z;
+#else
+    rough = rough || steep;
+#endif
+    fragment = vec4(shown, rough ? 0.5 : met ? 1.0 : 0.0);
+#else
+    fragment = vec4(dithered(shown), 1.0);
+#endif
+#endif
+}

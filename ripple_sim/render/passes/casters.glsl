@@ -1,0 +1,88 @@
+#version 430
+// Objects as a light or the floor sees them: their depth, with ALBEDO_MAP their linear colour, with TRANSMISSION_MAP what
+// something transparent takes from a light (see soft_shadows.glsl). With MOVED vertices are those of a target, displaced.
+#include "glsl/frame.glsl"
+
+VARYING vec3 albedo;
+#if MOVED
+VARYING vec3 world;
+#endif
+
+#stage vertex
+uniform mat4 matrix;
+
+#if MOVED
+in vec4 in_moved;
+
+uniform vec3 color;  // linear
+
+void main()
+{
+    albedo = color;
+    world = in_moved.xyz;
+    gl_Position = matrix * vec4(world, 1.0);
+}
+#else
+in vec3 in_core;
+in vec3 in_shell;
+in mat3 in_rotation;
+in vec3 in_origin;
+in vec3 in_core_size;
+in vec3 in_shell_size;
+in vec4 in_color;  // linear; number in the table of objects
+
+void main()
+{
+    albedo = in_color.rgb;
+    vec3 local = in_core * in_core_size + in_shell * in_shell_size;
+    gl_Position = matrix * vec4(in_rotation * local + in_origin, 1.0);
+}
+#endif
+
+#stage fragment
+#if TRANSMISSION_MAP
+uniform int light;
+uniform vec3 transmission;  // share of the light that passes, where it meets a refracting surface head on
+
+#if MOVED
+const float FOCUS = 3.0;       // of light that meets it head on, on the floor by its foot
+const float BRIGHTEST = 0.95;  // mean of the colours; less than 1, so that the map holds the distance as well
+
+// Cosine of the angle at which light meets the surface.
+float facing()
+{
+    vec4 place = lights[light].position;
+    vec3 towards = place.w == 0.0 ? lights[light].direction.xyz : normalize(place.xyz - world);
+    vec3 normal = cross(dFdx(world), dFdy(world));
+    return abs(dot(towards, normal)) / max(length(normal), 1e-30);
+}
+#endif
+
+out vec4 fragment;
+
+void main()
+{
+    vec3 passes = transmission;
+#if MOVED
+    float cosine = facing(), aside = 1.0 - cosine;
+#if SOLID
+    // a round body is a lens: its shadow is dark towards the rim and has a focus in the middle (caustics)
+    passes *= FOCUS * pow(cosine, 10.0);
+    passes *= min(BRIGHTEST / max(dot(passes, vec3(1.0 / 3.0)), 1e-6), 1.0);
+#else
+    passes *= 1.0 - aside * aside;  // which is reflected
+#endif
+#endif
+    vec3 taken = 1.0 - passes;
+    fragment = vec4(taken, dot(taken, vec3(1.0 / 3.0)) * light_distance(shadows[light].depth, gl_FragCoord.z));
+}
+#elif ALBEDO_MAP
+out vec4 fragment;
+
+void main()
+{
+    fragment = vec4(albedo, gl_FragCoord.z);
+}
+#else
+void main() {}
+#endif

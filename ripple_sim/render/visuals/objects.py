@@ -1,0 +1,203 @@
+"""What shaders look up of all objects: their table, the textures of the model, and geoms that darken what is near."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.render.contract import MAX_OCCLUDERS, OBJECT, OBJECT_COLUMNS, Binding, Unit, srgb_to_linear
+from ripple_sim.render.resources import Resources, srgb_cube, srgb_texture
+
+from .visual import Look, texture_pixels
+
+_ROW = OBJECT.dtype
+
+
+class ObjectTable:
+    """Rows of the shaders' `Object`; draw calls write the number of their row."""
+
+    def __init__(self, resources: Resources) -> None:
+        self._resources = resources
+        self._rows: list[np.ndarray] = []
+        self._texture: moderngl.Texture | None = None
+
+    def add(
+        self,
+        look: Look,
+        geom: int,
+        *,
+        opacity: float = 1.0,
+        size: float = 1.0,
+        heatmap: bool = False,
+        height_map: int | None = None,
+        chart: int = 0,
+    ) -> int:
+        """Append a row and return its number.
+
+        `size` [m] is how thick a transparent object is where its relative thickness is 1; `heatmap` says that colours
+        are shown as they are, but for shadows; `height_map` is the layer of the object's height map, and `chart` the
+        side of a chart with its halo in it [texels].
+        """
+        row = np.zeros((), dtype=_ROW)
+        row["base"] = look.roughness, look.metallic, look.sheen, look.coat
+        row["volume"] = look.translucency, look.transparency, look.emission, opacity
+        row["place"] = geom, size, 0.0, heatmap
+        row["height_map"] = 0 if height_map is None else (height_map, 1, 0, chart)
+        self._rows.append(row)
+        return len(self._rows) - 1
+
+    def place(
+        self, number: int, bias: float, *, occluders: int = 0, rotation: NDArray[np.float64] | None = None
+    ) -> None:
+        """Set what changes from frame to frame.
+
+        Parameters
+        ----------
+        number : int
+            Of the row.
+        bias : float
+            How far above its surface an object's shadows are looked up [m]: its bumps shall not shade each other.
+        occluders : int
+            Which occluders darken it, as bits; see `Occluders.near`.
+        rotation : float64 [3, 3], optional
+            Of its height map into the world.
+        """
+        row = self._rows[number]
+        row["place"][2], row["height_map"][2] = bias, occluders
+        if rotation is not None:
+            row["rotation"][:, :3] = rotation.T  # column by column
+
+    def bind(self) -> None:
+        """Upload the rows and bind them for the shaders."""
+        rows = np.zeros((max(-(-len(self._rows) // OBJECT_COLUMNS), 1), OBJECT_COLUMNS), dtype=_ROW)
+        rows.ravel()[: len(self._rows)] = self._rows
+        size = rows[0].nbytes // 16, len(rows)
+        if self._texture is None or self._texture.size != size:
+            self._texture = self._resources.texture(size, 4, dtype="f4")
+            self._texture.filter = moderngl.NEAREST, moderngl.NEAREST
+        self._texture.write(rows.tobytes())
+        self._texture.use(Unit.OBJECTS)
+
+
+class Assets:
+    """What all visuals of a model share on the GPU: its textures, each uploaded at its first use, and a table.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    resources : Resources
+
+    Attributes
+    ----------
+    objects : ObjectTable
+        Every visual and target has a row in it.
+    """
+
+    def __init__(self, model: Any, resources: Resources) -> None:
+        self.model, self.resources = model, resources
+        self.objects = ObjectTable(resources)
+        self._uploaded: dict[int, moderngl.Texture | moderngl.TextureCube] = {}
+
+    def texture(self, texture: int) -> moderngl.Texture | moderngl.TextureCube:
+        """Return the texture of an id; it reads as linear light."""
+        if texture not in self._uploaded:
+            pixels = texture_pixels(self.model, texture)
+            flat = self.model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
+            self._uploaded[texture] = srgb_texture(self.resources, pixels) if flat else self._cube(pixels)
+        return self._uploaded[texture]
+
+    def skybox(self) -> tuple[moderngl.TextureCube, NDArray[np.float64]] | None:
+        """Return the model's skybox and its mean linear colour, or None."""
+        for texture in range(self.model.ntex):
+            if self.model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
+                pixels = texture_pixels(self.model, texture)
+                self._uploaded[texture] = cube = self._cube(pixels)
+                return cube, srgb_to_linear(pixels[::4, ::4] / 255.0).mean(axis=(0, 1))
+        return None
+
+    def _cube(self, pixels: NDArray[np.uint8]) -> moderngl.TextureCube:
+        """Cube map of faces below one another."""
+        size = pixels.shape[1]
+        if pixels.shape[0] != 6 * size:  # one image for all faces
+            pixels = np.concatenate([pixels[:size]] * 6)
+        return srgb_cube(self.resources, pixels)
+
+
+_REACH = 9.5  # in radii: what is further hides less than a hundredth of the sky
+
+
+class Occluders:
+    """Capsules of about each geom's size.
+
+    Parameters
+    ----------
+    resources : Resources
+    model : mujoco.MjModel
+    geoms : int64 [k]
+    """
+
+    def __init__(self, resources: Resources, model: Any, geoms: NDArray[np.int64]) -> None:
+        self._geoms = geoms
+        self._centre, self._half_axis, self._radius = _capsules(model, geoms)
+        self._bounds = np.linalg.norm(model.geom_aabb[geoms, 3:], axis=1)
+        self._buffer = resources.buffer(reserve=32 * MAX_OCCLUDERS, dynamic=True)
+        self._bound, self._bound_geoms = np.zeros((0, 2, 4)), np.zeros(0, np.int64)
+
+    def balls(self, data: Any) -> NDArray[np.float64]:
+        """Bounding balls of the geoms."""
+        return np.column_stack([self._middles(data)[1], self._bounds])
+
+    def bind(self, data: Any, focus: NDArray[np.float64]) -> None:
+        """Bind the capsules nearest to a point [m]."""
+        rotation, middle = self._middles(data)
+        axis = np.einsum("gij,gj->gi", rotation, self._half_axis)
+        away = np.linalg.norm(middle - focus, axis=1)
+        nearest = np.argsort(away, kind="stable")
+        # capsules fade out before they leave the list
+        limit = away[nearest[MAX_OCCLUDERS]] if len(nearest) > MAX_OCCLUDERS else np.inf
+        nearest = nearest[:MAX_OCCLUDERS]
+        fade = np.clip(4 * (1 - away[nearest] / limit), 0.0, 1.0)
+        packed = np.zeros((len(nearest), 2, 4), dtype=np.float32)
+        packed[:, 0, :3] = (middle - axis)[nearest]
+        packed[:, 1, :3] = (middle + axis)[nearest]
+        packed[:, 0, 3] = self._radius[nearest] * fade
+        self._buffer.write(packed.tobytes())
+        self._buffer.bind_to_uniform_block(Binding.OCCLUDERS)
+        self._bound, self._bound_geoms = packed.astype(np.float64), self._geoms[nearest]
+
+    def near(self, balls: NDArray[np.float64], geoms: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Which of the bound capsules darken objects by a hundredth or more, as bits; never an object's own.
+
+        Parameters
+        ----------
+        balls : float64 [k, 4]
+            That contain the objects.
+        geoms : int64 [k]
+            The objects' own.
+        """
+        first, last, radius = self._bound[:, 0, :3], self._bound[:, 1, :3], self._bound[:, 0, 3]
+        axis, to = last - first, balls[:, None, :3] - first
+        along = np.einsum("ej,kej->ke", axis, to) / np.maximum(np.einsum("ej,ej->e", axis, axis), 1e-12)
+        away = np.linalg.norm(to - np.clip(along, 0, 1)[..., None] * axis, axis=2) - balls[:, 3:]
+        counts = (away < _REACH * radius) & (geoms[:, None] != self._bound_geoms)
+        return (counts << np.arange(len(radius))).sum(axis=1)
+
+    def _middles(self, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        rotation = data.geom_xmat[self._geoms].reshape(-1, 3, 3)
+        return rotation, data.geom_xpos[self._geoms] + np.einsum("gij,gj->gi", rotation, self._centre)
+
+
+def _capsules(model: Any, geoms: NDArray[np.int64]) -> tuple[NDArray, NDArray, NDArray]:
+    """Centre, half axis and radius of a capsule of about each geom's size, in its frame."""
+    centre, half_axis, radius = np.zeros((len(geoms), 3)), np.zeros((len(geoms), 3)), np.zeros(len(geoms))
+    for index, geom in enumerate(geoms):
+        half = np.asarray(model.geom_aabb[geom][3:], dtype=np.float64)
+        centre[index] = model.geom_aabb[geom][:3]
+        longest = int(np.argmax(half))
+        radius[index] = np.sqrt(np.prod(np.delete(half, longest)))
+        half_axis[index, longest] = max(half[longest] - radius[index], 0.0)
+    return centre, half_axis, radius

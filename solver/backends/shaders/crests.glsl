@@ -1,0 +1,20 @@
+#version 430
+// Raise the crests to the size of the height, with what is permanent of it. Bits of positive floats are in the order of
+// the floats, and those of what is no number are beyond.
+#include "charts.glsl"
+
+layout(std430, binding = 0) readonly buffer Height { float h[]; };
+layout(std430, binding = 1) buffer Crests { float crests[]; };
+#ifdef DENT
+layout(std430, binding = 2) readonly buffer Dent { float dent[]; };
+#endif
+
+void main() {
+    int p = address(int(gl_GlobalInvocationID.x));
+    if (p < 0) return;
+    float height = h[p];
+#ifdef DENT
+    height += dent[p];
+#endif
+    crests[p] = uintBitsToFloat(max(floatBitsToUint(crests[p]), floatBitsToUint(abs(height))));
+}

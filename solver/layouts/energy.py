@@ -1,0 +1,282 @@
+"""The energy of a map of triangles onto a sphere or onto flat charts: what stretching and shearing them costs.
+
+For the map from a reference triangle (area A) with singular values s1 >= s2, let
+
+    D = s1^2 + s2^2  = sum of cotangent times squared side over 2 A,   J = s1 s2 = (a x b . c) / 2 A.
+
+On the unit sphere J takes the triple product of the triangle's three unit vectors in place of its area: it vanishes
+exactly where the triangle folds over. Charts are the plane z = 1, where the triple product is twice the area. A finite
+energy thus means that nothing is folded.
+
+The star of a vertex: let the vertex move from p to p + dx x + dy y + dz p with tangents x, y. Of each triangle round
+it, J is linear in the move and D quadratic: a few numbers a triangle say all, and a trial position costs next to
+nothing.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from ..kernel import Floats, kernel
+from ..mesh.vectors import Vector, dot, row, subtract
+
+
+class Density(NamedTuple):
+    """Energy per reference area, W = (D / 2)^p (even + long J^-2p + small J^-4p).
+
+    The first term punishes a large singular value, hence short texel edges on the real surface, which set the wave
+    solver's time step. D / J^2 is D of the inverse map: the second term punishes long texel edges. The third is a wall
+    for areas that get too small.
+    """
+
+    power: int  # p: 2 or 4
+    even: float
+    long: float
+    small: float
+
+
+class Reference(NamedTuple):
+    """The triangles to resemble, and what it costs to differ from them."""
+
+    area: Floats  # [m]
+    cotangent: Floats  # [3 m], of each corner, over twice the area
+    density: Density
+
+
+# W_D and W_J; then the Hessian is the second of D, the second of J, and gD gD^T, gD gJ^T + gJ gD^T and gJ gJ^T with the
+# gradients gD and gJ, in these shares
+Shares: TypeAlias = tuple[float, float, float, float, float, float, float]
+
+
+@kernel
+def energy_density(dirichlet: float, inverse: float, density: Density) -> float:
+    """W of D and of `inverse` = 1 / J; see `Density`."""
+    square = inverse * inverse
+    wall, scale = square * square, (0.5 * dirichlet) * (0.5 * dirichlet)
+    if density.power == 4:
+        wall, scale = wall * wall, scale * scale
+    return scale * (density.even + wall * (density.long + density.small * wall))
+
+
+@kernel
+def density_derivatives(
+    dirichlet: float, jacobian: float, density: Density
+) -> tuple[float, float, float, float, float, float]:
+    """W and its derivatives W_D, W_J, W_DD, W_DJ, W_JJ."""
+    inverse, inverse_d, p = 1.0 / jacobian, 1.0 / dirichlet, float(density.power)
+    square = inverse * inverse
+    wall, scale = square * square, (0.5 * dirichlet) * (0.5 * dirichlet)
+    if density.power == 4:
+        wall, scale = wall * wall, scale * scale
+    long, small = density.long * wall, density.small * wall * wall
+    w = scale * (density.even + long + small)
+    slope_d, slope_j = p * w * inverse_d, -scale * (2.0 * p * long + 4.0 * p * small) * inverse
+    bend_d, bend_mixed = (p - 1.0) * slope_d * inverse_d, p * slope_j * inverse_d
+    bend_j = scale * (2.0 * p * (2.0 * p + 1.0) * long + 4.0 * p * (4.0 * p + 1.0) * small) * square
+    return w, slope_d, slope_j, bend_d, bend_mixed, bend_j
+
+
+@kernel
+def projected_hessian(area: float, dirichlet: float, jacobian: float, density: Density) -> tuple[float, Shares]:
+    """Energy of a triangle of the given area, and the shares that make up its Hessian's positive part.
+
+    With a = (s1 + s2)/2 and b = (s1 - s2)/2, W is a function of a^2 = D/4 + J/2 and b^2 = D/4 - J/2, and its Hessian
+    splits into a twist (slope along a over a), a flip (slope along b over b), and a 2 x 2 block in (a, b) (Smith, de
+    Goes, Kim 2019). Each of them loses its negative part in closed form.
+    """
+    w, wd, wj, wdd, wdj, wjj = density_derivatives(dirichlet, jacobian, density)
+    aa, bb = 0.25 * dirichlet + 0.5 * jacobian, max(0.25 * dirichlet - 0.5 * jacobian, 0.0)
+    twist, flip = 4.0 * wd + 2.0 * wj, 4.0 * wd - 2.0 * wj
+    haa = aa * (16.0 * (wdd + wdj) + 4.0 * wjj) + twist
+    hbb = bb * (16.0 * (wdd - wdj) + 4.0 * wjj) + flip
+    root = np.sqrt(aa * bb)
+    hab = root * (16.0 * wdd - 4.0 * wjj)
+    if haa < 0.0 or hbb < 0.0 or haa * hbb < hab * hab:
+        # keep the upper eigenvalue alone: its projector is (1 + (H - mean) / radius) / 2
+        mean, half = 0.5 * (haa + hbb), 0.5 * (haa - hbb)
+        radius = np.sqrt(half * half + hab * hab)
+        upper = max(mean + radius, 0.0)
+        turn = half / radius if radius > 0.0 else 0.0
+        haa, hbb = 0.5 * upper * (1.0 + turn), 0.5 * upper * (1.0 - turn)
+        hab = 0.5 * upper * hab / radius if radius > 0.0 else 0.0
+    twist, flip = max(twist, 0.0), max(flip, 0.0)
+    along_aa = 0.25 * (haa - twist) / aa
+    along_bb = along_ab = 0.0
+    if bb > 1e-10 * aa:  # else b has no direction
+        along_bb, along_ab = 0.25 * (hbb - flip) / bb, 0.25 * hab / root
+    dd = (along_aa + 2.0 * along_ab + along_bb) / 16.0
+    dj = (along_aa - along_bb) / 8.0
+    jj = (along_aa - 2.0 * along_ab + along_bb) / 4.0
+    bend_d, bend_j = 0.125 * (twist + flip), 0.25 * (twist - flip)
+    return area * w, (area * wd, area * wj, area * bend_d, area * bend_j, area * dd, area * dj, area * jj)
+
+
+FOLDED = 1e-16  # a triple product must exceed this
+REACH = 0.3  # longest step of a vertex: radians on the sphere, or charts
+MOST_TRIALS = 14
+ARMIJO = 1e-4  # share of the fall that the slope promises
+
+FIXED, COLUMN, ROW, FREE = range(4)  # in which directions a vertex may move: none, x, y, both
+
+# what is known of a triangle: J and D at rest, their slopes (that of J along p is J itself), half of D's second
+# derivative, and the reference area
+J, JX, JY, D, DX, DY, DZ, BEND, AREA = range(9)
+TERMS = 9
+
+# a triangle's reference seen from one corner: area, and the cotangents there, at the next corner and at the one before
+Shape: TypeAlias = tuple[float, float, float, float]
+
+
+@kernel
+def expand_star(p: Vector, x: Vector, y: Vector, ring: Floats, shapes: Floats, degree: int, terms: Floats) -> None:
+    """Fill `terms` [degree, 9] for a vertex at p with tangents x, y.
+
+    Triangle i has the corners p, ring[i] and ring[i + 1], counterclockwise; after the last of the ring, [degree, 3],
+    comes the first. Row i of `shapes` [degree, 4] is the triangle's reference: area, and cotangents of the angles at p,
+    ring[i] and ring[i + 1] over twice the area.
+    """
+    e = subtract(row(ring, degree - 1), p)
+    ax, ay, az = dot(e, x), dot(e, y), dot(e, p)
+    i = degree - 1
+    for k in range(degree):
+        e = subtract(row(ring, k), p)
+        bx, by, bz = dot(e, x), dot(e, y), dot(e, p)
+        shape = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3]
+        expand_triangle((ax, ay, az), (bx, by, bz), shape, terms, i)
+        ax, ay, az = bx, by, bz
+        i = k
+
+
+@kernel
+def expand_triangle(a: Vector, b: Vector, shape: Shape, terms: Floats, i: int) -> None:
+    """Fill row i of `terms`, for a triangle whose other corners lie at a and b in the vertex's own coordinates."""
+    (ax, ay, az), (bx, by, bz), (area, opposite, left, right) = a, b, shape
+    half = 0.5 / area
+    cx, cy, cz = bx - ax, by - ay, bz - az
+    terms[i, J] = half * (ax * by - ay * bx)
+    terms[i, JX] = half * (ay * bz - az * by - cy)
+    terms[i, JY] = half * (az * bx - ax * bz + cx)
+    terms[i, D] = (
+        opposite * (cx * cx + cy * cy + cz * cz)
+        + left * (bx * bx + by * by + bz * bz)
+        + right * (ax * ax + ay * ay + az * az)
+    )
+    terms[i, DX] = -2.0 * (left * bx + right * ax)
+    terms[i, DY] = -2.0 * (left * by + right * ay)
+    terms[i, DZ] = -2.0 * (left * bz + right * az)
+    terms[i, BEND] = left + right
+    terms[i, AREA] = area
+
+
+@kernel
+def star_energy(terms: Floats, degree: int, density: Density, move: Vector) -> float:
+    """Energy of the star after a move; infinite if a triangle is folded then."""
+    dx, dy, dz = move
+    square = dx * dx + dy * dy + dz * dz
+    total = 0.0
+    for i in range(degree):
+        area = terms[i, AREA]
+        jacobian = terms[i, J] * (1.0 + dz) + terms[i, JX] * dx + terms[i, JY] * dy
+        if not 2.0 * area * jacobian > FOLDED:
+            return np.inf
+        dirichlet = terms[i, D] + terms[i, DX] * dx + terms[i, DY] * dy + terms[i, DZ] * dz + terms[i, BEND] * square
+        total += area * energy_density(dirichlet, 1.0 / jacobian, density)
+    return total
+
+
+@kernel
+def star_slopes(
+    terms: Floats, degree: int, density: Density, curved: bool
+) -> tuple[float, float, float, float, float, float]:
+    """Energy, gradient x, y and Hessian xx, xy, yy at rest; the energy is infinite if a triangle is folded.
+
+    `curved`: on the sphere a tangent step also falls towards the centre, and the Hessian loses the radial slope.
+    """
+    energy = gx = gy = radial = hxx = hxy = hyy = 0.0
+    for i in range(degree):
+        area, jacobian = terms[i, AREA], terms[i, J]
+        if not 2.0 * area * jacobian > FOLDED:
+            return np.inf, 0.0, 0.0, 0.0, 0.0, 0.0
+        w, wd, wj, wdd, wdj, wjj = density_derivatives(terms[i, D], jacobian, density)
+        dx, dy, jx, jy = terms[i, DX], terms[i, DY], terms[i, JX], terms[i, JY]
+        energy += area * w
+        gx += area * (wd * dx + wj * jx)
+        gy += area * (wd * dy + wj * jy)
+        radial += area * (wd * terms[i, DZ] + wj * jacobian)
+        flat = 2.0 * wd * terms[i, BEND]
+        ddx, ddy, jjx, jjy = wdd * dx + wdj * jx, wdd * dy + wdj * jy, wdj * dx + wjj * jx, wdj * dy + wjj * jy
+        hxx += area * (flat + dx * ddx + jx * jjx)
+        hyy += area * (flat + dy * ddy + jy * jjy)
+        hxy += area * (dx * ddy + jx * jjy)
+    if not curved:
+        radial = 0.0
+    return energy, gx, gy, hxx - radial, hxy, hyy - radial
+
+
+@kernel
+def newton_direction(gx: float, gy: float, hxx: float, hxy: float, hyy: float) -> tuple[float, float]:
+    """Newton step -|H|^-1 g of a 2 x 2 Hessian, its eigenvalues taken by their absolute value."""
+    mean, half = 0.5 * (hxx + hyy), 0.5 * (hxx - hyy)
+    determinant = hxx * hyy - hxy * hxy
+    if mean > 0.0 and determinant > 1e-3 * mean * mean:
+        return (hxy * gy - hyy * gx) / determinant, (hxy * gx - hxx * gy) / determinant
+    radius = np.sqrt(half * half + hxy * hxy)
+    if radius > 0.0:
+        # eigenvector of mean + radius, from the better conditioned of two formulas
+        ux, uy = (half + radius, hxy) if half > 0.0 else (hxy, radius - half)
+        length = np.sqrt(ux * ux + uy * uy)
+        ux, uy = ux / length, uy / length
+    else:
+        ux, uy = 1.0, 0.0
+    first, second = abs(mean + radius), abs(mean - radius)
+    floor = 1e-4 * max(first, second)
+    along = -(gx * ux + gy * uy) / max(first, floor)
+    across = -(gy * ux - gx * uy) / max(second, floor)
+    return along * ux - across * uy, along * uy + across * ux
+
+
+@kernel
+def tangent_move(a: float, b: float, curved: bool) -> Vector:
+    """Move dx, dy, dz that takes p to p + a x + b y, brought back to the sphere if `curved`."""
+    square = a * a + b * b
+    length = np.sqrt(1.0 + square)
+    if curved:
+        return a / length, b / length, -square / (length * (1.0 + length))
+    return a, b, 0.0
+
+
+@kernel
+def descend(terms: Floats, degree: int, density: Density, freedom: int, curved: bool) -> tuple[float, Vector]:
+    """How far the energy of a star falls by a Newton step of its vertex that folds nothing, and the move."""
+    stay = (0.0, 0.0, 0.0)
+    energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, density, curved)
+    if not energy < np.inf:
+        return 0.0, stay
+    if freedom == FREE:
+        sx, sy = newton_direction(gx, gy, hxx, hxy, hyy)
+    elif freedom == COLUMN:
+        sx, sy = -gx / max(abs(hxx), 1e-300), 0.0
+    else:
+        sx, sy = 0.0, -gy / max(abs(hyy), 1e-300)
+    descent = -(gx * sx + gy * sy)
+    if not descent > 1e-13 * energy:
+        return 0.0, stay
+    length = np.sqrt(sx * sx + sy * sy)
+    step = min(1.0, REACH / length)
+    for _ in range(MOST_TRIALS):
+        move = tangent_move(step * sx, step * sy, curved)
+        lower = star_energy(terms, degree, density, move)
+        if lower < energy - ARMIJO * step * descent:
+            further = 2.0 * lower < energy  # high up a wall a Newton step is far too short
+            while further and (curved or step * length < REACH):
+                step *= 2.0
+                ahead = tangent_move(step * sx, step * sy, curved)
+                least = star_energy(terms, degree, density, ahead)
+                further = 2.0 * least < lower
+                if least < lower:
+                    move, lower = ahead, least
+            return energy - lower, move
+        step *= 0.35
+    return 0.0, stay

@@ -1,0 +1,267 @@
+"""Times of arrival: against exact geodesics, and the same for the same object however it lies, is scaled or meshed.
+
+Front and first crest are found in signals whose crests are known, calibration finds a known speed, and the bump's wave
+on the plane is that of another way to compute it: Poisson's integral of the initial value problem.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from arrival import (
+    CALIBRATED,
+    CONFORMAL,
+    NEAREST,
+    Arrival,
+    arrival,
+    arrival_times,
+    arrivals,
+    front_and_crest,
+    geodesic_distance,
+    ideal_width,
+    mean_error,
+    plane_arrival,
+    speed_factor,
+    spread_sources,
+)
+from known_meshes import known_mesh
+from scipy.integrate import simpson
+from scipy.special import i0e
+from surfaces import disk, joined, moved, torus
+
+from ripple_sim.scenes.shapes import limbed
+from ripple_sim.solver import Atlas, Mesh, build_atlas, load_mesh, sphere_atlas
+
+
+def test_front_on_a_sphere_arrives_at_the_distance() -> None:
+    atlas = sphere_atlas(1.0, 64)
+    width = ideal_width(atlas)
+    pole = np.array([0.36, 0.48, 0.8])
+    probes = np.random.default_rng(0).standard_normal((500, 3))
+    probes /= np.linalg.norm(probes, axis=1, keepdims=True)
+    distance = np.arccos(np.clip(probes @ pole, -1, 1))
+    probes, distance = probes[(distance > 0.7) & (distance < 2.2)], distance[(distance > 0.7) & (distance < 2.2)]
+    times = arrival_times(atlas, pole, probes, width, 2.2)
+    for time, expected in zip(times, plane_arrival(distance / width), strict=True):
+        assert np.abs(time / (expected * width) - 1).max() < 0.015
+
+
+def test_waves_arrive_in_time_on_a_body_with_limbs() -> None:
+    atlas = build_atlas(Mesh.from_arrays(*limbed()), 96, cache=False)
+    for source in spread_sources(atlas, 1):
+        error = arrival(atlas, source).error()
+        assert error.front_median < 0.005
+        assert error.front_under_3_percent > 0.97
+        assert error.crest_median < 0.01
+        assert error.crest_under_3_percent > 0.95
+    # the paper's formula on the same texels
+    assert arrival(atlas, source, "paper").error().crest_median > 0.05
+
+
+@pytest.mark.parametrize("name", ["spot.obj", "bunny.off", "elephant.obj"])
+def test_waves_arrive_in_time_on_known_meshes(name: str) -> None:
+    atlas = build_atlas(load_mesh(known_mesh(f"good/{name}")), 96, cache=False)
+    errors = [arrival(atlas, source).error() for source in spread_sources(atlas, 3)]
+    assert np.mean([error.front_median for error in errors]) < 0.01
+    # a crest lags by what texels disperse, and by what limbs and furrows bend, however narrow the texels
+    assert np.mean([error.crest_median for error in errors]) < 0.012
+    assert np.mean([error.front_under_3_percent for error in errors]) > 0.88
+
+
+def test_same_object_otherwise_presented_has_the_same_times() -> None:
+    V, F = limbed()
+    mesh = Mesh.from_arrays(V, F)
+    atlas = build_atlas(mesh, 96, cache=False)
+    source, width, reach = mesh.V[100], ideal_width(atlas), 1.2 * float(np.ptp(mesh.V))
+    points = mesh.V[::7]
+
+    def times(other: Atlas, rotation: np.ndarray, scale: float) -> np.ndarray:
+        there = scale * points @ rotation.T
+        _, directions = other.project(there)
+        start, _ = other.project(scale * source @ rotation.T)
+        return arrival_times(other, start[0], directions, scale * width, scale * reach)[0] / scale
+
+    unit = np.eye(3)
+    reference = times(atlas, unit, 1.0)
+    away = np.linalg.norm(points - source, axis=1) > 6 * width
+    away &= np.isfinite(reference)
+    turn = trimesh.transformations.random_rotation_matrix(np.array([0.2, 0.5, 0.9]))[:3, :3]
+    fine_V, fine_F = trimesh.remesh.subdivide(V, F)
+    cases = {
+        "rotated": (build_atlas(Mesh.from_arrays(V @ turn.T, F), 96, cache=False), turn, 1.0),
+        "scaled": (build_atlas(Mesh.from_arrays(37.0 * V, F), 96, cache=False), unit, 37.0),
+        "re-meshed": (build_atlas(Mesh.from_arrays(fine_V, fine_F), 96, cache=False), unit, 1.0),
+        "doubled resolution": (build_atlas(mesh, 192, cache=False), unit, 1.0),
+    }
+    for name, case in cases.items():
+        change = np.abs(times(*case) / reference - 1)[away]
+        assert np.nanmedian(change) < 0.005, name
+        assert np.nanquantile(change, 0.9) < 0.01, name
+
+
+def test_waves_arrive_in_time_on_any_surface_and_not_on_its_other_parts() -> None:
+    ring, drum = torus(24), moved(disk(12), (3, 0, 0))
+    atlas = build_atlas(joined(ring, drum), 64, cache=False, layout="patches")
+    sources = spread_sources(atlas, 3)
+    assert max(sources) < len(ring.V)  # on the larger part
+    other = len(ring.V) + np.argmin(np.linalg.norm(drum.V - drum.V.mean(axis=0), axis=1))
+    for source, own in ((sources[0], ring), (int(other), drum)):
+        times = arrival(atlas, source)
+        assert 0.5 * len(own.V) < len(times.front) < len(own.V)
+        assert np.isfinite(geodesic_distance(atlas.mesh, source)).sum() == len(own.V)
+        assert times.error().front_median < 0.01
+        assert times.error().front_under_3_percent > 0.8
+
+
+N = 32
+
+
+@pytest.fixture(scope="module")
+def atlas() -> Atlas:
+    return build_atlas(Mesh.from_arrays(*limbed()), N, cache=False)
+
+
+@pytest.mark.parametrize("operator", ["fem", "dynamic-paint"])
+def test_calibration_finds_the_factor_of_a_known_speed(atlas: Atlas, operator: str) -> None:
+    source = spread_sources(atlas, 1)[0]
+    as_it_is = arrival(atlas, source, operator)
+    slow = arrival(atlas, source, operator, speed=0.7)
+    assert speed_factor([slow]) == pytest.approx(speed_factor([as_it_is]) / 0.7, rel=5e-3)
+
+
+def test_waves_at_the_calibrated_speed_arrive_as_calibration_says(atlas: Atlas) -> None:
+    source = spread_sources(atlas, 1)[0]
+    as_it_is = arrival(atlas, source, "dynamic-paint")
+    factor = speed_factor([as_it_is])
+    again = arrival(atlas, source, "dynamic-paint", speed=factor)
+    assert speed_factor([again]) == pytest.approx(1, abs=5e-3)
+    for name, error in mean_error([again]).items():
+        assert error == pytest.approx(mean_error([as_it_is.at_speed(factor)])[name], abs=0.02), name
+
+
+def test_a_constant_delay_is_calibrated_away_and_no_crest_is_not() -> None:
+    late = Arrival(np.full(9, 1.25), np.full(9, 1.25))
+    assert mean_error([late])["front_median"] == pytest.approx(0.25)
+    assert speed_factor([late]) == 1.25
+    assert max(mean_error([late.at_speed(1.25)])[key] for key in ("front_median", "crest_q90")) == 0
+    none = Arrival(np.array([1.0, np.nan, np.nan]), np.array([1.0, np.nan, np.nan]))
+    assert speed_factor([none]) == 1
+    assert none.error().front_median == 1
+
+
+def test_table_has_our_operator_and_its_rivals() -> None:
+    rows = arrivals({}, resolution=N, sources=1)["limbed"]
+    paint, calibrated, conformal = rows["dynamic-paint"], rows[CALIBRATED], rows[CONFORMAL]
+    # on a grid of squares the sum over 8 neighbours is twice the Laplacian
+    assert calibrated["speed factor"] == pytest.approx(np.sqrt(1 / 2), rel=0.1)
+    assert calibrated["front_median"] < paint["front_median"] / 2
+    assert conformal.keys() == rows["paper"].keys()
+    assert conformal != rows["paper"]
+    assert rows["fem"]["front_median"] < min(calibrated["front_median"], conformal["front_median"])
+
+
+def test_a_mesh_with_a_handle_has_no_sphere_map_and_all_else(tmp_path: Path) -> None:
+    ring = torus(16)
+    trimesh.Trimesh(ring.V, ring.F, process=False).export(tmp_path / "ring.obj")
+    rows = arrivals({"ring": load_mesh(tmp_path / "ring.obj")}, resolution=24, sources=1)["ring"]
+    assert rows.pop(CONFORMAL) is None
+    assert len(rows) == 5
+    for name, row in rows.items():
+        assert np.isfinite(list(row.values())).all(), name
+    assert rows["fem"]["front_median"] < 0.5 * rows["paper"]["front_median"]
+
+
+TIMES = np.linspace(0, 4, 401)
+
+
+def bump(middle: float, width: float = 0.3, height: float = 1.0) -> np.ndarray:
+    return height * np.exp(-(((TIMES - middle) / width) ** 2) / 2)
+
+
+def test_a_parabola_is_found_exactly_between_the_samples() -> None:
+    times = np.arange(8.0)
+    signal = (9 - (times - 3.3) ** 2)[:, None]
+    [front], [crest] = front_and_crest(times, signal)
+    assert crest == pytest.approx(3.3, abs=1e-12)
+    assert front == pytest.approx(1 + (4.5 - signal[1, 0]) / (signal[2, 0] - signal[1, 0]), abs=1e-12)
+
+
+@pytest.mark.parametrize("middle", [1.5, 2.003, 2.718])
+@pytest.mark.parametrize("height", [1e-6, 1.0, 1e4])
+def test_a_bump_has_its_crest_in_the_middle_and_its_front_at_half_height(middle: float, height: float) -> None:
+    [front], [crest] = front_and_crest(TIMES, bump(middle, height=height)[:, None])
+    assert crest == pytest.approx(middle, abs=1e-4)
+    assert front == pytest.approx(middle - 0.3 * np.sqrt(2 * np.log(2)), abs=1e-4)
+
+
+def test_the_first_of_two_crests_counts_though_the_second_is_higher() -> None:
+    [front], [crest] = front_and_crest(TIMES, (bump(1.0, 0.1, 0.5) + bump(3.0, 0.1))[:, None])
+    assert crest == pytest.approx(1.0, abs=1e-4)
+    assert front == pytest.approx(1.0 - 0.1 * np.sqrt(2 * np.log(2)), abs=1e-3)
+
+
+@pytest.mark.parametrize(("height", "expected"), [(0.15, 3.0), (0.25, 1.0)])
+def test_a_ripple_below_a_fifth_of_the_strongest_is_no_crest(height: float, expected: float) -> None:
+    _, [crest] = front_and_crest(TIMES, (bump(1.0, 0.1, height) + bump(3.0, 0.1))[:, None])
+    assert crest == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize("signal", [np.zeros(401), -bump(2.0), TIMES, -TIMES], ids=["zero", "trough", "rise", "fall"])
+def test_without_a_crest_there_is_no_time(signal: np.ndarray) -> None:
+    for [time] in front_and_crest(TIMES, signal[:, None]):
+        assert np.isnan(time)
+
+
+def test_signals_side_by_side_do_not_mix() -> None:
+    middles = np.array([0.9, 1.7, 2.4])
+    signals = np.stack([*(bump(middle) for middle in middles), np.zeros(401)], axis=1)
+    fronts, crests = front_and_crest(TIMES, signals)
+    np.testing.assert_allclose(crests[:3], middles, atol=1e-4)
+    np.testing.assert_allclose(np.diff(fronts[:3]), np.diff(middles), atol=1e-4)
+    assert np.isnan([fronts[3], crests[3]]).all()
+
+
+def test_times_shift_with_the_clock() -> None:
+    signal = bump(2.0)[:, None]
+    for here, later in zip(front_and_crest(TIMES, signal), front_and_crest(TIMES + 10, signal), strict=True):
+        np.testing.assert_allclose(later, here + 10)
+
+
+FARTHEST = 20.0
+SLANTS = np.linspace(0, np.pi / 2, 2001)
+
+
+def potential(r: float, times: np.ndarray) -> np.ndarray:
+    """Integral over s < t of s mean(s) / sqrt(t^2 - s^2), with s = t sin(a); mean over the circle of radius s."""
+    s = times[:, None] * np.sin(SLANTS)
+    return times * simpson(np.sin(SLANTS) * np.exp(-((r - s) ** 2) / 2) * i0e(r * s), x=SLANTS)
+
+
+def plane_height(r: float, times: np.ndarray) -> np.ndarray:
+    return (potential(r, times + 1e-3) - potential(r, times - 1e-3)) / 2e-3
+
+
+@pytest.mark.parametrize("distance", [6.0, 11.0])
+def test_front_and_crest_come_when_the_initial_value_problem_says(distance: float) -> None:
+    times = distance + np.linspace(-3, 2, 101)
+    signal = plane_height(distance, times)
+    [expected_front], [expected_crest] = front_and_crest(times, signal[:, None])
+    (front, _), (crest, _) = plane_arrival(np.array([distance, FARTHEST]))
+    assert front == pytest.approx(expected_front, abs=5e-3)
+    assert crest == pytest.approx(expected_crest, abs=5e-3)
+
+
+def test_far_away_the_wave_travels_at_its_speed_and_its_front_leads_the_crest() -> None:
+    distance = np.linspace(NEAREST, FARTHEST, 40)
+    front, crest = plane_arrival(distance)
+    assert (front < crest).all()
+    assert (crest < distance).all()  # the half-derivative of a bump leads its middle
+    for times in (front, crest):
+        np.testing.assert_allclose(np.diff(times) / np.diff(distance), 1.0, atol=0.01)
+
+
+def test_a_distance_has_the_same_times_whatever_else_is_asked() -> None:
+    alone, among = plane_arrival(np.array([8.0])), plane_arrival(np.array([8.0, FARTHEST]))
+    for one, other in zip(alone, among, strict=True):
+        assert other[0] == pytest.approx(one[0], abs=2e-3)

@@ -1,0 +1,65 @@
+"""The rivals compute what the solver computes: otherwise their speed would say nothing."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from rivals import NaiveLoop, PlainShader, SparseLeapfrog
+
+from ripple_sim.solver import GLError, Material, sphere_atlas
+from ripple_sim.solver.backends.backend import make_backend
+from ripple_sim.solver.operator.assembly import build_operator
+from ripple_sim.solver.operator.wave_operator import WaveOperator
+
+N, SUBSTEPS = 16, 41
+ROUND_OFF = 1e-5  # of the peak, after that many substeps in float32
+
+START = np.random.default_rng(0).standard_normal((6, N, N)).astype(np.float32)
+RIVALS: dict[str, Callable[[WaveOperator], Any]] = {
+    "naive loop": NaiveLoop,
+    "naive loop, prange": lambda operator: NaiveLoop(operator, parallel=True),
+    "sparse matrix": SparseLeapfrog,
+    "plain shader": PlainShader,
+}
+
+
+@pytest.fixture(scope="module")
+def operator() -> WaveOperator:
+    # speed and density differ from 1 and from texel to texel, so that no factor can be left out unseen
+    z = sphere_atlas(1.0, N).positions[..., 2]
+    return build_operator(sphere_atlas(1.0, N), Material(speed=2.0 + z, density=3.0 - z), "fem")
+
+
+def made(name: str, operator: WaveOperator) -> Any:
+    try:
+        return RIVALS[name](operator)
+    except GLError as error:
+        pytest.skip(str(error))
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_rival_follows_the_backend(name: str, operator: WaveOperator) -> None:
+    rival, solver = made(name, operator), make_backend("cpu", operator)
+    rival.set_height(START)
+    solver.set_height(START)
+    dt = 0.7 * operator.stable_timestep
+    # the solver drifts half a step before each kick and half a step after: the first half moves nothing, at a velocity
+    # of 0, and the rival, which drifts a whole step after each kick, is taken back by the last half
+    rival.advance(SUBSTEPS, dt)
+    solver.advance(SUBSTEPS, dt)
+    height, velocity = rival.state()
+    assert np.abs(height - dt / 2 * velocity - solver.height()).max() < ROUND_OFF * np.abs(START).max()
+    assert np.abs(velocity - solver.velocity()).max() < ROUND_OFF * np.abs(velocity).max()
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_momentum_stays_zero_and_a_lifted_surface_at_rest(name: str, operator: WaveOperator) -> None:
+    rival, lifted, dt = made(name, operator), made(name, operator), 0.6 * operator.stable_timestep
+    rival.set_height(START)
+    lifted.set_height(np.full_like(START, 0.5))
+    for each in (rival, lifted):
+        each.advance(20, dt)
+    velocity = rival.state()[1].astype(float)
+    assert abs((operator.mass * velocity).sum()) < 1e-5 * (operator.mass * np.abs(velocity)).sum()
+    np.testing.assert_allclose(lifted.state()[0], 0.5, rtol=1e-5)

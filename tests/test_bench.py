@@ -1,0 +1,131 @@
+"""The benchmark: its accuracy is that of the theory, its races are fair, its coupling has bodies that touch."""
+
+import itertools
+import re
+import time
+
+import numpy as np
+import pytest
+from modes import mode_error
+
+from ripple_sim.bench import (
+    FIELDS,
+    as_text,
+    coupling_cost,
+    energy_drift,
+    memory_fields,
+    memory_stream,
+    mesh_cost,
+    race,
+    sphere_mode_error,
+    sphere_modes,
+    table,
+)
+from ripple_sim.scenes.shapes import ellipsoid, peanut, polygonise
+from ripple_sim.solver import Material, Mesh, sphere_atlas
+from ripple_sim.solver.operator.assembly import OPERATORS, build_operator
+
+
+def test_report_reads_as_text() -> None:
+    cost = {"touching": 3.2, "mj_step [s]": 2e-3, "coupling [s]": 3e-4, "waves [s]": 2e-4, "of mj_step": 0.15}
+    text = as_text(
+        {
+            "machine": {"version": "1", "processors": 2, "renderer": "none"},
+            "cpu": {"256": {"cpu": 6e8, "stream": 8e8, "of stream": 0.75}},
+            "gl": {"256": None, "512": 1.2e9},
+            "meshes": {"duck": {"triangles": 9000, "texels": 98_304, "atlas [s]": 1.5, "substep [s]": 5e-5}},
+            "coupling": {"dish": cost},
+            "sphere": {"fem": {"16": 0.1, "128": 1e-3, "order": 2.0}, "paper": {"16": 0.5, "order": 0.0}},
+            "energy": {"steps": 10_000, "largest": 1e-7, "trend": -2e-8},
+        }
+    )
+    for row in (
+        "256  600  800  0.75",
+        "duck  9,000  98,304  1.50  0.050",
+        "dish  3.2  2.000  0.300  0.200  0.15",
+        "paper  0.5  0",  # no error of N = 128 was measured
+        "over 10,000 steps: largest relative change 1.0e-07, trend -2.0e-08",
+    ):
+        assert row in [re.sub(r"  +", "  ", line) for line in text.splitlines()]
+
+
+def test_columns_are_aligned_the_first_to_the_left_and_the_others_to_the_right() -> None:
+    head, *rows = table(["N", "rate", ""], [["16", "1,234", "x"], ["256", "7", ""]]).splitlines()
+    assert (head, rows) == ("N     rate", ["16   1,234  x", "256      7"])
+
+
+def test_the_modes_have_errors_for_every_operator_and_ours_is_of_second_order() -> None:
+    errors = sphere_modes((8, 16, 32))
+    assert list(errors) == list(OPERATORS)
+    assert all(list(row) == ["8", "16", "32", "order"] for row in errors.values())
+    assert 1.7 < errors["fem"]["order"] < 2.6
+    assert errors["paper"]["order"] < 0.5
+    slope = np.polyfit(np.log([8, 16, 32]), np.log([errors["fem"][n] for n in ("8", "16", "32")]), 1)[0]
+    assert errors["fem"]["order"] == pytest.approx(-slope)
+
+
+def test_only_ours_is_measured_beyond_64_texels() -> None:
+    errors = sphere_modes((8, 16, 65))
+    assert [name for name, row in errors.items() if "65" in row] == ["fem"]
+
+
+def test_an_error_is_that_of_the_mode_against_itself_one_period_earlier() -> None:
+    assert sphere_mode_error(16) == pytest.approx(mode_error(16), rel=1e-12)
+    assert 0 < sphere_mode_error(16) < sphere_mode_error(16, "paper")
+
+
+def test_energy_and_momentum_stay_within_the_rounding_of_single_precision() -> None:
+    drift = energy_drift(12, 1000)
+    assert drift["steps"] == 1000
+    assert 0 < drift["largest"] < 1e-5
+    assert abs(drift["trend"]) <= 2 * drift["largest"]
+    assert drift["momentum_change"] < 1e-5
+
+
+def test_contestants_take_turns() -> None:
+    calls: list[str] = []
+
+    def contestant(name: str):
+        def advance(substeps: int, dt: float) -> None:
+            calls.append(name)
+            time.sleep(0.01)
+
+        return advance
+
+    seconds = race({name: contestant(name) for name in "abc"}, rounds=4)
+    assert [name for name, _ in itertools.groupby(calls)][-12:] == ["a", "b", "c"] * 4
+    assert {name: len(turns) for name, turns in seconds.items()} == {"a": 4, "b": 4, "c": 4}
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_the_memory_stream_passes_once_over_every_texel_each_substep(threads: int) -> None:
+    fields = memory_fields(5000)
+    streams = dict(zip(FIELDS, fields[:, :5000], strict=True))
+    streams["velocity"][:], streams["height"][:], streams["gain"][:] = np.arange(5000), 1.0, 0.5
+    for value, name in enumerate(("east", "north", "northeast", "northwest"), start=1):
+        streams[name][:] = value
+    memory_stream(fields, 5000, threads)(3, 0.25)
+    kicked = np.arange(5000) + 3 * 0.25 * 0.5 * (1 + 2 + 3 + 4)
+    assert np.allclose(streams["velocity"], kicked)
+    assert np.allclose(streams["next height"], 1 + 0.25 * kicked)
+
+
+def test_the_memory_stream_has_the_fields_of_a_substep() -> None:
+    """Read are 4 link weights, gain, height and velocity (28 bytes); written are velocity and next height (8 bytes)."""
+    operator = build_operator(sphere_atlas(1.0, 16), Material(), "fem")
+    stencil = operator.stencil.weights[..., 1:, 1:]  # one weight of each direction a texel
+    assert stencil.size + 4 * operator.mass.size == len(FIELDS) * operator.mass.size
+
+
+def test_a_mesh_has_the_time_of_its_atlas_and_of_its_wave_step() -> None:
+    cost = mesh_cost(Mesh.from_arrays(*peanut(cell=0.05)), resolution=16)
+    assert cost["texels"] == 6 * 16**2
+    assert min(cost["atlas [s]"], cost["substep [s]"]) > 0
+
+
+def test_coupling_is_measured_on_bodies_that_touch() -> None:
+    egg = polygonise(ellipsoid((0.0, 0.0, 0.2), (0.4, 0.3, 0.2)), ((-0.5, -0.5, -0.1), (0.5, 0.5, 0.5)), 0.1)
+    cost = coupling_cost({"egg": lambda: egg}, seconds=0.5, bodies=2, resolution=8, rounds=1)["egg"]
+    assert cost["touching"] > 0
+    assert min(cost["mj_step [s]"], cost["coupling [s]"], cost["waves [s]"]) > 0
+    assert cost["of mj_step"] == pytest.approx(cost["coupling [s]"] / cost["mj_step [s]"])
