@@ -14,8 +14,7 @@ from __future__ import annotations
 import functools
 import threading
 import time
-import types
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numba
@@ -84,42 +83,13 @@ Bools: TypeAlias = NDArray[np.bool_]
 def kernel(function: Callable | None = None, **options: Any) -> Any:
     """Compile a function at its first call: `@kernel`, or `@kernel(inline="always")` with options of `numba.njit`.
 
-    A kernel cannot call itself.
+    A kernel cannot call itself. One that only kernels call and that takes many arrays compiles quicker with
+    `no_cpython_wrapper=True`: without the code that unpacks what Python hands over. With the environment variable
+    NUMBA_DISABLE_JIT=1 kernels are plain Python, for a debugger.
     """
     # nobody calls kernels through pointers: without the wrappers for that a tenth less is compiled
     options = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
-
-    def compiled(function: Callable) -> Any:
-        dispatcher, inner = numba.njit(**options)(function), _Inner(function, options)
-        dispatcher.get_call_template, dispatcher.get_overload = inner.call_template, inner.overload
-        return dispatcher
-
-    return compiled if function is None else compiled(function)
-
-
-class _Inner:
-    """A kernel as others call it: without the wrapper that unpacks what Python hands over, often most of the code."""
-
-    def __init__(self, function: Callable, options: Mapping[str, Any]) -> None:
-        self._function, self._options = function, options
-
-    @functools.cached_property
-    def _dispatcher(self) -> Any:
-        original = self._function
-        twin = types.FunctionType(
-            original.__code__, original.__globals__, None, original.__defaults__, original.__closure__
-        )
-        twin.__module__, twin.__qualname__ = original.__module__, f"{original.__qualname__}.inner"  # names its file
-        return numba.njit(no_cpython_wrapper=True, **self._options)(twin)
-
-    def call_template(self, args: Sequence[Any], kws: Mapping[str, Any]) -> Any:
-        """What numba asks of a kernel that others call: one version for all numbers, not one more for each literal."""
-        of_any = {name: numba.types.unliteral(each) for name, each in kws.items()}
-        return self._dispatcher.get_call_template([*map(numba.types.unliteral, args)], of_any)
-
-    def overload(self, signature: Any) -> Any:
-        """The version of a signature."""
-        return self._dispatcher.get_overload(signature)
+    return numba.njit(**options) if function is None else numba.njit(**options)(function)
 
 
 def shared(function: Callable) -> Any:
@@ -127,13 +97,16 @@ def shared(function: Callable) -> Any:
     return register_jitable(function)
 
 
-def variant(declared: Callable, first: type) -> Callable[[Callable], Callable]:
-    """Decorate the version of a declared function that kernels call where its first argument is of this NamedTuple.
+def variant(declared: Any, first: type) -> Callable[[Callable], Callable]:
+    """Decorate the version of a `functools.singledispatch` function for a first argument of this NamedTuple.
 
-    So compiled code is open to kinds that it does not know: whoever declares the function need not import them.
+    Kernels and plain Python call the declared function, and get the version. So compiled code is open to kinds that it
+    does not know: whoever declares the function need not import them.
     """
 
     def register(version: Callable) -> Callable:
+        declared.register(first)(version)
+
         @overload(declared)
         @functools.wraps(version)
         def choose(*arguments: Any) -> Callable | None:

@@ -1,11 +1,7 @@
 """CPU backend: the leapfrog update as one pass over the texels, compiled by numba.
 
-One thread on all but the largest atlases: a substep takes 0.07 ms at N = 128 and 0.3 ms at N = 256, less than a helper
-may wait for its core while other threads render and encode. Waiting for it then costs more than two threads gain.
-
-Fields in memory as the compiled loops read them: charts with halo, aligned to cache lines and pages.
-
-What compiled loops read beside fields, in few types: for each choice of types the loops are compiled anew.
+One thread: a substep takes 0.07 ms at N = 128 and 0.3 ms at N = 256, less than a helper may wait for its core while
+other threads render and encode. Waiting for it then costs more than two threads gain.
 """
 
 from __future__ import annotations
@@ -20,28 +16,9 @@ from ..operator.volume import volume_rate
 from ..operator.wave_operator import StepCoefficients, WaveOperator, number_or_field, step_coefficients
 from ..texels.stencil import NO_LINKS, Stencil
 from ..texels.topology import TexelTopology
-from . import blocks, kernels
-from .stencil_loops import (
-    NO_FEATURES,
-    Amplitude,
-    Balance,
-    Bending,
-    Coefficient,
-    Drift,
-    Features,
-    Halo,
-    Kick,
-    Links,
-    Loads,
-    PartRuns,
-    Plasticity,
-    State,
-    Weights,
-)
-
-# From this resolution on memory is what takes time, milliseconds a substep: several threads share out the charts, and
-# rows lie close together. Below, where caches hold the fields, rows that begin with a cache line are a tenth faster.
-LARGE = 512
+from . import kernels
+from .kernels import NO_BALANCE, NO_FEATURES, Balance, Kick
+from .stencil_loops import Amplitude, Coefficient, Links, Weights
 
 # Below this resolution charts lie side by side, row by row: one loop then runs over a row of all of them. On charts of
 # 12 columns, loops that begin anew for each take four times as long.
@@ -51,7 +28,7 @@ SMALL = 64
 LINE, PAGE = 16, 1024
 
 
-class FieldLayout:
+class RowLayout:
     """Charts [C, n + 2, pitch] float32, the texels from row 1 and column 1 on.
 
     Side by side, all charts with their halo are one, [1, n + 2, (C + 1)(n + 2)]: loops run over the halo between them
@@ -60,8 +37,6 @@ class FieldLayout:
     Parameters
     ----------
     topology : TexelTopology
-    alone : bool
-        Whether small charts, too, lie one after the other.
 
     Attributes
     ----------
@@ -71,29 +46,26 @@ class FieldLayout:
         Columns that loops run over, from 1 on.
     addresses : int64 [C n^2]
         Address of every texel, by flat texel index.
-    halo : Halo
-        Addresses of the halo, and of the texels that it shows.
+    halo : int64 [2, k]
+        Addresses of the halo's places, and of the texels that they show.
     """
 
-    def __init__(self, topology: TexelTopology, *, alone: bool = False) -> None:
+    def __init__(self, topology: TexelTopology) -> None:
         self._charts, self.n, _ = topology.shape
-        self._alone = alone or self.n >= SMALL or self._charts == 1
+        self._alone = self.n >= SMALL or self._charts == 1
         width = self.n + 2
         if self._alone:
-            self.columns, self._pitch = self.n, width if self.n >= LARGE else -(-width // LINE) * LINE
+            self.columns, self._pitch = self.n, -(-width // LINE) * LINE
         else:
             self.columns, self._pitch = self._charts * width - 2, (self._charts + 1) * width
         table = topology.addresses
         self.addresses = self._address(table.texels)
-        self.halo = Halo(self._address(table.ghosts), self._address(table.sources))
+        self.halo = np.stack([self._address(table.ghosts), self._address(table.sources)])
         if topology.fixed_rim and not self._alone:
             # loops run over these: they are set to 0 again
             beside = np.flatnonzero(topology.rim)
             beside = self._address(beside[(beside // width % width % (width - 1)) > 0])
-            ghosts, sources = self.halo
-            self.halo = Halo(
-                np.concatenate([ghosts, beside]), np.append(sources, np.full(len(beside), self._pitch - 1))
-            )
+            self.halo = np.append(self.halo, [beside, np.full(len(beside), self._pitch - 1)], axis=1)
 
     def zeros(self, shift: int = 0) -> NDArray[np.float32]:
         """A field with halo; its first texel, or that of every row of a chart alone, begins a cache line."""
@@ -178,29 +150,21 @@ def is_varied(k: StepCoefficients) -> bool:
     return any(np.ndim(each) for each in (k.decay, k.spring, k.span))
 
 
-def laid_out(k: StepCoefficients, fields: FieldLayout, *, varied: bool) -> StepCoefficients:
+def laid_out(k: StepCoefficients, fields: RowLayout, *, varied: bool) -> StepCoefficients:
     """Coefficients as the loops read them: beside the gain all fields, or none."""
     each = (k.gain, k.decay, k.spring, k.span)
     return StepCoefficients(*map(fields.coefficients, np.broadcast_arrays(*each) if varied else each))
 
 
-def part_runs(parts: NDArray[np.int32], fields: FieldLayout) -> PartRuns:
-    """Runs of texels in coefficients, by the part of each texel, [C, n, n]."""
+def part_runs(operator: WaveOperator, fields: RowLayout) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Runs of texels in coefficients that belong to one part: where each begins, [k + 1], and its part, [k]."""
+    parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
     beside = fields.coefficients(parts).reshape(-1)
     begins = np.flatnonzero(np.diff(beside, prepend=-1))
-    return PartRuns(np.append(begins, beside.size), beside[begins].astype(np.int64))
+    return np.append(begins, beside.size), beside[begins].astype(np.int64)
 
 
-def pressure(amplitude: Amplitude, runs: PartRuns | None, fields: FieldLayout) -> Coefficient:
-    """An amplitude, one for all or one for each part, as a number, or where there are runs of parts as a field."""
-    if runs is None:
-        return np.float32(amplitude)
-    amplitudes = np.full(int(runs.parts.max()) + 1, amplitude, np.float32)
-    field: NDArray[np.float32] = np.repeat(amplitudes[runs.parts], np.diff(runs.begins))
-    return field.reshape(-1, fields.n, fields.columns)
-
-
-def volume_balance(operator: WaveOperator, dt: float, fields: FieldLayout, runs: PartRuns | None) -> Balance | None:
+def volume_balance(operator: WaveOperator, dt: float, fields: RowLayout) -> Balance | None:
     """What keeps the volume over a substep of dt [s], if anything needs to; see `volume_rate`."""
     rate = volume_rate(operator, dt)
     if rate is None:
@@ -218,7 +182,8 @@ def volume_balance(operator: WaveOperator, dt: float, fields: FieldLayout, runs:
         rate.velocities,
         loaded,
         total,
-        runs or part_runs(np.zeros(operator.mass.shape, np.int32), fields),
+        fields.coefficients(np.zeros(operator.mass.shape, np.float32)),
+        *part_runs(operator, fields),
     )
 
 
@@ -228,57 +193,42 @@ class CPUBackend:
     Parameters
     ----------
     operator : WaveOperator
-    thread_count : int, optional
-        How many share out the charts, where the material neither bends, drags nor yields and the volume needs no
-        keeping; by default as many as can be of use from N = 512 on. The numbers do not depend on it.
     keeps_volume : bool
         See `backends.Backend`.
     """
 
     name = "cpu"
 
-    def __init__(self, operator: WaveOperator, thread_count: int | None = None, *, keeps_volume: bool = False) -> None:
+    def __init__(self, operator: WaveOperator, *, keeps_volume: bool = False) -> None:
         self._operator = operator
         self.keeps_volume = keeps_volume
-        plain = operator.viscous_stencil is operator.laplace_stencil is operator.yield_height is None
-        plain = plain and blocks.on_borders(operator.stencil.irregular, operator.mass.shape[1])
-        large = operator.mass.size >= 6 * LARGE**2
-        if thread_count is None:
-            thread_count = blocks.available() if large else 1
-        self._threads = thread_count if plain else 1
-        self._in_blocks = plain and (large or thread_count > 1)
-        self._fields = fields = FieldLayout(operator.topology, alone=self._in_blocks)
+        self._fields = fields = RowLayout(operator.topology)
         self._stencil = fields.weights(operator.stencil)
-        self._viscous = None if operator.viscous_stencil is None else fields.weights(operator.viscous_stencil)
         # the processor takes a store to one field and a load from another at the same place of a page for a conflict:
         # each field begins elsewhere in its page
         self._h, self._h_next, self._v = (fields.zeros(shift * PAGE // 3 // LINE * LINE) for shift in range(3))
-        self._bending = self._plasticity = self._dent = None
+        self._dent: NDArray[np.float32] | None = None
+        features = NO_FEATURES
+        if operator.viscous_stencil is not None:
+            features = features._replace(viscous=fields.weights(operator.viscous_stencil))
         if operator.laplace_stencil is not None and operator.rigidity is not None:
             rigidity = fields.coefficients(operator.rigidity.astype(np.float32))
-            self._bending = Bending(fields.weights(operator.laplace_stencil), rigidity, fields.zeros())
+            laplace = fields.weights(operator.laplace_stencil)
+            features = features._replace(laplace=laplace, rigidity=rigidity, moment=fields.zeros())
         if operator.yield_height is not None:
             self._dent = fields.zeros()
             limit = fields.coefficients(operator.yield_height.astype(np.float32))
-            self._plasticity = Plasticity(fields.columns, limit, self._dent)
-        self._most = blocks.block_length(fields.n, self._h.shape[2])
+            features = features._replace(limit=limit, dent=self._dent)
+        self._features = features
         self._response = fields.coefficients(number_or_field(operator.response))
-        self._part_runs = None if operator.parts is None else part_runs(operator.parts, fields)
+        self._part_runs = None if operator.parts is None else part_runs(operator, fields)
+        self._part_count = 1 if operator.parts is None else int(operator.parts.max()) + 1
         self._balance: Balance | None = None
         self._extra: Coefficient = np.float32(0)
         self._shift: Amplitude = 0.0
         self._crests: NDArray[np.float32] | None = None
         self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
-
-    @property
-    def _by_threads(self) -> bool:
-        return self._in_blocks and self._balance is None
-
-    @property
-    def thread_count(self) -> int:
-        """How many threads share out the charts."""
-        return self._threads
 
     def height(self) -> NDArray[np.float32]:
         """Copy of the height [m], [C, n, n]."""
@@ -344,18 +294,25 @@ class CPUBackend:
 
     def advance(self, substeps: int, dt: float) -> None:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
-        k = self._prepare(dt)
-        state = State(self._h, self._v, self._h_next)
-        kick = Kick(self._stencil, k.gain, k.decay, k.spring, k.span, self._extra, self._pressure(self._acceleration))
-        length, step = np.float32(dt), (state, self._fields.halo, kick, self._loads)
-        if self._by_threads:
-            plan = blocks.Plan(substeps, self._most, length)
-            blocks.advance(self._threads, plan, *step, self._start(dt / 2))
-        else:
-            self._drift(dt / 2)
-            if self._plasticity is not None:
-                kernels.flow(self._h, self._plasticity)
-            kernels.advance(substeps, length, *step, *self._beside())
+        k, balance = self._prepare(dt), self._balance
+        acceleration = self._pressure(self._acceleration) if balance is None else balance.pressure
+        kick = Kick(self._stencil.rows, k.gain, k.decay, k.spring, k.span, self._extra, acceleration)
+        self._drift(dt / 2)
+        features = self._features
+        if len(features.dent):
+            kernels.flow(self._h, features.limit, features.dent)
+        drags = self._plain and len(features.viscous.rows) > 0
+        kernels.advance(
+            substeps,
+            np.float32(dt),
+            *(self._h, self._v, self._h_next),
+            self._fields.halo,
+            kick,
+            self._stencil.irregular,
+            *self._kicks,
+            features.viscous if drags else None,
+            None if self._plain else features,
+        )
         if substeps % 2:
             self._h, self._h_next = self._h_next, self._h
         if self._crests is not None:
@@ -365,12 +322,14 @@ class CPUBackend:
         """Take over the stencils of the same surface with its texels elsewhere."""
         self._operator, fields = operator, self._fields
         self._stencil = fields.fill(self._stencil.rows, operator.stencil)
-        if self._viscous is not None and operator.viscous_stencil is not None:
-            self._viscous = fields.fill(self._viscous.rows, operator.viscous_stencil)
-        if self._bending is not None and operator.laplace_stencil is not None and operator.rigidity is not None:
-            laplace = fields.fill(self._bending.laplace.rows, operator.laplace_stencil)
+        features = self._features
+        if operator.viscous_stencil is not None:
+            features = features._replace(viscous=fields.fill(features.viscous.rows, operator.viscous_stencil))
+        if operator.laplace_stencil is not None and operator.rigidity is not None:
             rigidity = fields.coefficients(operator.rigidity.astype(np.float32))
-            self._bending = self._bending._replace(laplace=laplace, rigidity=rigidity)
+            laplace = fields.fill(features.laplace.rows, operator.laplace_stencil)
+            features = features._replace(laplace=laplace, rigidity=rigidity)
+        self._features = features
         if operator.density is not None:
             self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
 
@@ -385,32 +344,24 @@ class CPUBackend:
     def _raise_crests(self, crests: NDArray[np.float32]) -> None:
         # the next height is but scratch between steps
         height = self._h if self._dent is None else np.add(self._h, self._dent, out=self._h_next)
-        kernels.raise_crests(height, crests)
+        np.maximum(crests, np.abs(height, out=self._h_next), out=crests)
 
     def _drift(self, dt: float) -> None:
-        if dt or np.any(self._shift):
-            kernels.drift(self._h, self._v, self._start(dt))
-
-    def _start(self, dt: float) -> Drift:
         """The drift by which a step begins; the noted shift is in it."""
-        drift = Drift(self._fields.columns, self._response, self._pressure(self._shift), np.float32(dt))
-        self._shift = 0.0
-        return drift
+        if dt or np.any(self._shift):
+            shift = self._pressure(self._shift)
+            kernels.drift(self._h, self._v, self._response, shift, self._fields.columns, np.float32(dt))
+            self._shift = 0.0
 
     def _pressure(self, amplitude: Amplitude) -> Coefficient:
-        """An amplitude as the loops take it."""
-        return pressure(amplitude, self._part_runs if self._balance is None else self._balance.spread, self._fields)
-
-    def _beside(self) -> tuple[Weights | None, Features | None]:
-        """The last two arguments of `kernels.advance`."""
-        if not self._has_features:
-            return self._viscous, None
-        return None, Features(
-            self._viscous or NO_FEATURES.viscous,
-            self._bending or NO_FEATURES.bending,
-            self._plasticity or NO_FEATURES.plasticity,
-            self._balance or NO_FEATURES.balance,
+        """An amplitude, one for all or one for each part, as the loops take it."""
+        if self._part_runs is None:
+            return np.float32(amplitude)
+        begins, parts = self._part_runs
+        field: NDArray[np.float32] = np.repeat(
+            np.broadcast_to(np.float32(amplitude), self._part_count)[parts], np.diff(begins)
         )
+        return field.reshape(-1, self._fields.n, self._fields.columns)
 
     def _prepare(self, dt: float) -> StepCoefficients:
         """Coefficients of the kick, computed once a step length, and the load's, once a load as well."""
@@ -418,21 +369,22 @@ class CPUBackend:
         if new_length:
             self._balance = None
             if self.keeps_volume:
-                self._balance = volume_balance(self._operator, dt, self._fields, self._part_runs)
+                self._balance = volume_balance(self._operator, dt, self._fields)
+            self._features = self._features._replace(balance=self._balance or NO_BALANCE)
             k = step_coefficients(self._operator, dt)
             varied = is_varied(k) or self._part_runs is not None or self._balance is not None
             self._coefficients = laid_out(k, self._fields, varied=varied)
-            self._has_features = varied or self._bending is not None or self._plasticity is not None
-            drags = self._viscous is not None or (self._has_features and not self._by_threads)
+            features = self._features
+            self._plain = not (varied or len(features.moment) or len(features.dent))
+            # a field where forces are added up, or the number 0
+            drags = len(features.viscous.rows) > 0 or not self._plain
             if drags != bool(np.ndim(self._extra)):
                 self._extra = self._fields.zeros() if drags else np.float32(0)
             self._prepared = (dt, self.keeps_volume)
         k = self._coefficients
         if new_length or self._load_is_new:
             kicks = k.gain.reshape(-1)[self._fields.places[self._loaded]] * self._forces.astype(np.float32)
-            addresses = self._fields.addresses[self._loaded]
-            order = np.argsort(addresses, kind="stable")
-            self._loads = Loads(addresses[order], kicks[order])
+            self._kicks = self._fields.addresses[self._loaded], kicks
             if self._balance is not None:
                 self._balance.loaded[:] = self._acceleration
             self._load_is_new = False

@@ -34,13 +34,13 @@ class ExtraForces:
         self._laplace: StencilBuffer | None = None
         if operator.viscous_stencil is not None:
             self._viscous = StencilBuffer(gl, fields, dispatch, operator.viscous_stencil)
-            self._apply_viscous = dispatch.block_shader("apply")
+            self._apply_viscous = dispatch.texel_shader("apply")
         if operator.laplace_stencil is not None and operator.rigidity is not None:
             self._laplace = StencilBuffer(gl, fields, dispatch, operator.laplace_stencil)
             self._rigidity, self._moment = fields.upload(operator.rigidity), fields.zeros()
-            self._apply_rigidity = dispatch.block_shader("apply", FACTOR=1)
+            self._apply_rigidity = dispatch.texel_shader("apply", FACTOR=1)
             added = {"ADD": 1} if self._viscous else {}
-            self._subtract_laplace = dispatch.block_shader("apply", SUBTRACT=1, **added)
+            self._subtract_laplace = dispatch.texel_shader("apply", SUBTRACT=1, **added)
         if self._viscous or self._laplace:
             self.field = fields.zeros()
         self._irregular = dispatch.shader("irregular", KICK=0)
@@ -63,15 +63,15 @@ class ExtraForces:
         if self._viscous:
             dispatch.fill_halo(velocity)
             dispatch.bind(velocity, self.field, None, self._viscous.buffer)
-            dispatch.run_blocks(self._apply_viscous)
+            dispatch.run_texels(self._apply_viscous)
             self._apply_links(self._viscous_links, velocity, self.field)
         if self._laplace:
             dispatch.bind(height, self._moment, None, self._laplace.buffer, self._rigidity)
-            dispatch.run_blocks(self._apply_rigidity)
+            dispatch.run_texels(self._apply_rigidity)
             self._apply_links(self._moment_links, height, self._moment)
             dispatch.fill_halo(self._moment)
             dispatch.bind(self._moment, self.field, None, self._laplace.buffer)
-            dispatch.run_blocks(self._subtract_laplace)
+            dispatch.run_texels(self._subtract_laplace)
             self._apply_links(self._bending_links, self._moment, self.field)
 
     def _link(self, operator: WaveOperator) -> None:
@@ -87,7 +87,6 @@ class ExtraForces:
 
     def _apply_links(self, links: LinkBuffers, field: moderngl.Buffer, result: moderngl.Buffer) -> None:
         if links.count:
-            self._irregular["count"] = links.count
             self._dispatch.bind(field, result, None, links.texels, links.links)
             self._dispatch.run_list(self._irregular, links.count)
 
@@ -211,7 +210,7 @@ class GLBackend:
                     self._extra.field,
                     *pressure,
                 )
-                self._dispatch.run_blocks(kick_drift)
+                self._dispatch.run_texels(kick_drift)
                 self._kick_irregular(drift)
                 self._h, self._h_next = self._h_next, self._h
                 self._kick_texels(self._forces, drift)
@@ -239,10 +238,10 @@ class GLBackend:
 
     def _compile(self) -> None:
         self._kick = self._dispatch.shader("kick")
-        self._drift = self._dispatch.shader("drift", **({} if self._given is None else {"PARTS": 1}))
+        self._drift = self._dispatch.texel_shader("drift", **({} if self._given is None else {"PARTS": 1}))
         self._irregular_kick = self._dispatch.shader("irregular", KICK=1)
         if self._yield:
-            self._yielding = self._dispatch.shader("flow")
+            self._yielding = self._dispatch.texel_shader("flow")
 
     def _start(self, dt: float) -> None:
         """Apply the kicks that wait, and drift."""
@@ -260,23 +259,23 @@ class GLBackend:
             else:
                 self._given.set(self._shift)
                 self._dispatch.bind(self._h, self._v, self._response, self._given.parts, self._given.amplitudes)
-            self._dispatch.run_list(self._drift, self._fields.eights)
+            self._dispatch.run_texels(self._drift)
         self._shift = 0.0
 
     def _flow(self) -> None:
         if self._dent is not None and self._yield is not None:
             self._dispatch.bind(self._h, self._dent, self._yield)
-            self._dispatch.run_list(self._yielding, self._fields.eights)
+            self._dispatch.run_texels(self._yielding)
 
     def _raise_crests(self, crests: moderngl.Buffer) -> None:
-        shader = self._dispatch.shader("crests", **({} if self._dent is None else {"DENT": 1}))
+        shader = self._dispatch.texel_shader("crests", **({} if self._dent is None else {"DENT": 1}))
         self._dispatch.bind(self._h, crests, self._dent)
-        self._dispatch.run_list(shader, self._fields.eights)
+        self._dispatch.run_texels(shader)
 
     def _kick_irregular(self, dt: float) -> None:
         """What the irregular links add to a substep."""
         if self._links.count:
-            self._irregular_kick["count"], self._irregular_kick["dt"] = self._links.count, dt
+            self._irregular_kick["dt"] = dt
             self._dispatch.bind(self._h, self._v, self._h_next, self._links.texels, self._links.links)
             self._dispatch.run_list(self._irregular_kick, self._links.count)
 
@@ -298,7 +297,7 @@ class GLBackend:
                 self._held.set(self._acceleration)
             self._load_is_new = False
         defines = {"EXTRA": self._extra.field, "MAPS": self._maps, "PARTS": self._held}
-        kick_drift = self._dispatch.block_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
+        kick_drift = self._dispatch.texel_shader("kick_drift", **{name: 1 for name, used in defines.items() if used})
         if self._held is None:
             kick_drift["acceleration"] = self._acceleration
         if not self._maps:
@@ -315,6 +314,6 @@ class GLBackend:
 
     def _kick_texels(self, kicks: TexelList, dt: float) -> None:
         if kicks.count:
-            self._kick["count"], self._kick["dt"] = kicks.count, dt
+            self._kick["dt"] = dt
             self._dispatch.bind(self._h, self._v, kicks.places, kicks.values)
             self._dispatch.run_list(self._kick, kicks.count)

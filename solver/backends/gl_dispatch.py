@@ -1,4 +1,4 @@
-"""Compute shaders of the waves: compiled for a layout of fields, bound to buffers, and run over blocks or lists.
+"""Compute shaders of the waves: compiled for a layout of fields, bound to buffers, and run over texels or lists.
 
 The pressure on each part of the surface, in storage buffers; see `VolumeRate`.
 """
@@ -14,12 +14,8 @@ from numpy.typing import NDArray
 from ..gl import GLContext
 from ..operator.volume import VolumeRate
 from ..operator.wave_operator import WaveOperator
-from .gl_fields import EIGHT, FieldLayout
+from .gl_fields import FieldLayout
 from .stencil_loops import Amplitude
-
-# Rows that one thread walks up, and threads of a group, in eights of columns and in blocks of rows (block.glsl). A
-# software driver has few threads and reads on where the last row ended; a GPU wants many.
-_SOFTWARE_BLOCK, _HARDWARE_BLOCK = (64, (8, 1)), (4, (8, 8))
 
 # Threads of a group that works through a list.
 _LIST_GROUP = 64
@@ -31,7 +27,6 @@ class Dispatch:
     def __init__(self, gl: GLContext, fields: FieldLayout) -> None:
         self._gl = gl
         self._fields = fields
-        self._rows, self._group = _SOFTWARE_BLOCK if gl.software else _HARDWARE_BLOCK
         self._halo = self.shader("halo")
 
     def shader(self, name: str, **defines: float) -> moderngl.ComputeShader:
@@ -40,12 +35,9 @@ class Dispatch:
             "ripple_sim.solver.backends.shaders", name, LIST_GROUP=_LIST_GROUP, **defines
         )
 
-    def block_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
-        """A shader that walks up blocks of the fields, see block.glsl."""
-        fields, (columns, rows) = self._fields, self._group
-        strips = {"N": fields.n, "WIDTH": fields.width, "STRIDE": fields.stride, "FIELD": fields.eights}
-        block = {"ROWS": self._rows, "GROUP_COLUMNS": columns, "GROUP_ROWS": rows}
-        return self.shader(name, **strips, **block, **defines)
+    def texel_shader(self, name: str, **defines: int) -> moderngl.ComputeShader:
+        """A shader that runs over all texels, see charts.glsl."""
+        return self.shader(name, N=self._fields.n, **defines)
 
     def bind(self, *buffers: moderngl.Buffer | None) -> None:
         """Bind buffers to 0, 1, 2 ..., in the order in which the shader declares them; None leaves out a binding."""
@@ -53,12 +45,9 @@ class Dispatch:
             if buffer is not None:
                 buffer.bind_to_storage_buffer(binding)
 
-    def run_blocks(self, shader: moderngl.ComputeShader) -> None:
-        """Run a block shader over the whole fields."""
-        columns, rows = self._group
-        fields = self._fields
-        shader.run(-(-fields.width // (EIGHT * columns)), -(-fields.n // (self._rows * rows)), fields.strips)
-        self._gl.barrier()
+    def run_texels(self, shader: moderngl.ComputeShader) -> None:
+        """Run a shader over all texels."""
+        self.run_list(shader, self._fields.count)
 
     def run_groups(self, shader: moderngl.ComputeShader, count: int) -> None:
         """Run so many groups of threads."""
@@ -66,7 +55,8 @@ class Dispatch:
         self._gl.barrier()
 
     def run_list(self, shader: moderngl.ComputeShader, count: int) -> None:
-        """Run a shader over a list of so many entries."""
+        """Run a shader over a list of so many entries, of which it is told."""
+        shader["count"] = count
         shader.run(-(-count // _LIST_GROUP))
         self._gl.barrier()
 
@@ -75,7 +65,6 @@ class Dispatch:
         count = self._fields.halo_count
         if count:
             self.bind(field, self._fields.halo_pairs)
-            self._halo["count"] = count
             self.run_list(self._halo, count)
 
 
@@ -124,7 +113,7 @@ class VolumeKeeper(Pressure):
             self._chunks = ctx.buffer(chunks.astype(np.int32).tobytes())
             self._begins = ctx.buffer(begins.astype(np.int32).tobytes())
             self._sums, self._loaded = ctx.buffer(reserve=4 * len(chunks)), ctx.buffer(reserve=4 * self._count)
-        self._weigh, self._balance = dispatch.shader("weigh"), dispatch.shader("balance")
+        self._weigh, self._balance = dispatch.shader("volume"), dispatch.shader("volume", PARTS=1)
 
     def set(self, amplitude: Amplitude) -> None:
         """Write what the load asks for."""
@@ -135,7 +124,6 @@ class VolumeKeeper(Pressure):
         """Set the amplitudes of the coming substep."""
         self._dispatch.bind(height, velocity, self._addresses, self._factors, self._chunks, self._sums)
         self._dispatch.run_groups(self._weigh, self._chunk_count)
-        self._balance["count"] = self._count
         self._dispatch.bind(self._loaded, self._sums, self._begins, self.amplitudes)
         self._dispatch.run_list(self._balance, self._count)
 

@@ -12,6 +12,7 @@ The parts of a mesh's triangles on which map coordinates are linear, as a mesh o
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -209,11 +210,13 @@ def nearest_places(surface: Any, points: Floats) -> tuple[Floats, Ints]:
     return closest, texels
 
 
+@functools.singledispatch
 def nearest_place(surface: Any, x: float, y: float, z: float) -> tuple[float, float, float, int]:
     """Closest surface point [m] and the texel nearest to it; every kind of surface has a `variant` of this."""
     raise NotImplementedError
 
 
+@functools.singledispatch
 def texel_on(charts: Any, triangle: int, x: float, y: float, z: float) -> int:
     """Texel in which a point of a triangle lies [m]; every chart map has a `variant` of this."""
     raise NotImplementedError

@@ -1,6 +1,6 @@
-"""Checks that numbers, fields and heights are finite.
+"""Checks of what the waves are given, and a guard that they stay finite.
 
-Watches that the waves stay finite, and names the source that was too much for them.
+The guard names the source that was too much for them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SolverError, is_finite, shown
+from ..errors import SolverError, is_finite, shown, whole
 from ..texels.atlas import Atlas
 
 
@@ -53,6 +53,47 @@ def require_finite(name: str, value: float, unit: str, least: float = -np.inf) -
     if not (is_finite(value) and value >= least):
         bound = "" if least == -np.inf else f", {least:g} or greater"
         raise SolverError(f"{name} is {shown(value)} {unit}; valid is a finite number{bound}")
+
+
+# A step that needs more is a mistake in a unit, and would run for ever.
+_MOST = 1_000_000
+_ONE_OR_MORE = whole(1)
+
+
+def count_substeps(dt: float, stable: float, asked: int | None) -> int:
+    """Number of equal substeps for a step of dt [s], at most `stable` [s] long each.
+
+    Parameters
+    ----------
+    dt, stable : float
+        [s].
+    asked : int or None
+        How many the caller wants; None: the fewest.
+
+    Raises
+    ------
+    SolverError
+        If the step would take far too many, or fewer are asked for than stability allows.
+    """
+    ratio = dt / stable * (1 - 1e-12)
+    if not ratio < _MOST:
+        raise SolverError(
+            f"a step of {dt:.4g} s would take {ratio:.3g} substeps of the stable {stable:.4g} s; "
+            f"valid are {_MOST} at most: take shorter steps, or a material with slower waves"
+        )
+    needed = max(1, int(np.ceil(ratio)))
+    if asked is None:
+        return needed
+    if not (_ONE_OR_MORE.holds(asked) and asked <= _MOST):
+        raise SolverError(
+            f"substeps is {shown(asked)}; valid is {_ONE_OR_MORE.words}, up to {_MOST}, or None for the fewest"
+        )
+    if asked < needed:
+        raise SolverError(
+            f"{asked} substeps of {dt / max(asked, 1):.4g} s are longer than the stable {stable:.4g} s; "
+            f"use {needed} or more substeps, or leave the number out"
+        )
+    return asked
 
 
 # A look at all heights takes a fifth of a substep: one in so many substeps is less than a hundredth. Nobody sees the

@@ -1,6 +1,6 @@
 """The footprint of a source: smooth weights on the texels within a radius, measured along the surface.
 
-The weights of a footprint, compiled: contacts ask for them at every step.
+Contacts ask for the weights at every step; `weigh` is what compiled code calls.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from ..kernel import Floats, Ints, kernel
 from ..texels.atlas import Atlas, check_points
 from ..texels.distance import distance_scratch, distance_to, march_from_point, taken
 from ..texels.texel_mesh import TexelGrid
+from .finite import require_finite
 
 # Fewer texels across than this and the source would excite waves that the grid cannot resolve.
 MIN_TEXELS = 2.0
@@ -171,3 +172,12 @@ def footprint_at(atlas: Atlas, point: NDArray[np.float64], center: int, radius: 
     """The footprint round a point of the surface whose nearest texel is known, see `Atlas.nearest`."""
     texels, weights, radius = weigh(atlas.texels.grid, center, point, radius, distance_scratch(atlas.areas.size))
     return Footprint(texels, weights, center, point, radius)
+
+
+def spread(
+    atlas: Atlas, name: str, value: float, unit: str, point: ArrayLike, radius: float
+) -> tuple[Footprint, NDArray[np.float64]]:
+    """Footprint of a point source, and the part of its value on each texel, [k]; `name` and `unit` are for messages."""
+    require_finite(name, value, unit)
+    where = footprint(atlas, point, radius)
+    return where, value * (where.weights * atlas.areas.reshape(-1)[where.texels])

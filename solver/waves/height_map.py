@@ -117,7 +117,7 @@ class HeightMapShaders:
                     ("halo_heights", {}),
                     ("halo_heights", {"LIMIT": 1}),
                     ("height_map", {}),
-                    ("height_map_corners", {}),
+                    ("height_map", {"CORNERS": 1}),
                 )
             )
             self._sources = ctx.buffer(sources.tobytes())

@@ -1,15 +1,11 @@
-"""Loads: forces on some texels, held over a step.
-
-The load of the coming steps: forces held until further notice, and those of a single step.
-"""
+"""Loads: forces on some texels, held over a step, and what a solver holds over the coming ones."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
 import threading
-from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +13,7 @@ from numpy.typing import NDArray
 from ..backends.backend import Backend
 from ..errors import SolverError
 from ..kernel import Floats, Ints, kernel
+from ..operator.volume import VolumeBalance
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -97,9 +94,6 @@ def add_up_by(place: Ints, texels: Ints, values: Floats) -> tuple[Ints, Floats]:
     return once[:count].copy(), sums[:, :count].copy()
 
 
-Counterpart: TypeAlias = Callable[[NDArray[np.int64], NDArray[np.float64]], "float | NDArray[np.float64]"]
-
-
 class HeldLoad:
     """Forces that a backend holds over its steps.
 
@@ -108,10 +102,12 @@ class HeldLoad:
     backend : Backend
     share : float64 [C, n, n]
         Of a force that sets a texel in motion.
+    balance : VolumeBalance
+        Of the forces, where the backend keeps the volume.
     """
 
-    def __init__(self, backend: Backend, share: NDArray[np.float64]) -> None:
-        self._backend = backend
+    def __init__(self, backend: Backend, share: NDArray[np.float64], balance: VolumeBalance) -> None:
+        self._backend, self._balance = backend, balance
         self._shape = share.shape
         self._share = share.reshape(-1)
         self._size = share.size
@@ -136,15 +132,12 @@ class HeldLoad:
         """Hold a load beside what is held."""
         self._held = Load.together([self._held, load]).merged(self._size)
 
-    def upload(self, extra: Load | None, counterpart: Counterpart) -> float | None:
-        """Hand the backend the load of the coming step, with `extra` for that step alone, unless it has it already.
+    def counterpart(self, texels: NDArray[np.int64], momenta: NDArray[np.float64]) -> float | NDArray[np.float64]:
+        """What balances the momenta of a source on some texels, or forces, outwards, where volume is conserved."""
+        return self._balance.counterpart(texels, momenta) if self._backend.keeps_volume else 0.0
 
-        Parameters
-        ----------
-        extra : Load or None
-        counterpart : callable
-            From texels and the forces on them, outwards [N], to the acceleration that balances them; see
-            `VolumeBalance.counterpart`.
+    def upload(self, extra: Load | None) -> float | None:
+        """Hand the backend the load of the coming step, with `extra` for that step alone, unless it has it already.
 
         Returns
         -------
@@ -164,6 +157,6 @@ class HeldLoad:
         total = -float(forces.sum())
         if not np.isfinite(total):
             raise SolverError(f"the forces of a load add up to {total!r} N; valid are finite numbers")
-        self._backend.load(once.texels, forces, counterpart(once.texels, forces))
+        self._backend.load(once.texels, forces, self.counterpart(once.texels, forces))
         self._uploaded = load
         return total

@@ -1,9 +1,4 @@
-"""The wave solver: impulses and loads in, time steps forward.
-
-How many substeps a step takes.
-
-All that decides how waves go on: what one solver hands to another.
-"""
+"""The wave solver: impulses and loads in, time steps forward, heights out."""
 
 from __future__ import annotations
 
@@ -14,56 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..backends.backend import make_backend
-from ..errors import SolverError, checked, instance, shown, whole
+from ..backends.gl_fields import DeviceField
+from ..errors import SolverError, checked, instance
 from ..files import require_memory
 from ..operator.assembly import build_operator
 from ..operator.material import Material, warn_of_wavelengths
+from ..operator.volume import VolumeBalance
 from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
-from .finite import Source, require_finite
-from .load import Load
+from .finite import FiniteGuard, Source, as_field, check_kick, count_substeps, require_finite
+from .footprint import Footprint, spread
+from .load import HeldLoad, Load
 from .motion import Motion
-from .wave_field import WaveSources
-
-# A step that needs more is a mistake in a unit, and would run for ever.
-_MOST = 1_000_000
-_ONE_OR_MORE = whole(1)
-
-
-def count_substeps(dt: float, stable: float, asked: int | None) -> int:
-    """Number of equal substeps for a step of dt [s], at most `stable` [s] long each.
-
-    Parameters
-    ----------
-    dt, stable : float
-        [s].
-    asked : int or None
-        How many the caller wants; None: the fewest.
-
-    Raises
-    ------
-    SolverError
-        If the step would take far too many, or fewer are asked for than stability allows.
-    """
-    ratio = dt / stable * (1 - 1e-12)
-    if not ratio < _MOST:
-        raise SolverError(
-            f"a step of {dt:.4g} s would take {ratio:.3g} substeps of the stable {stable:.4g} s; "
-            f"valid are {_MOST} at most: take shorter steps, or a material with slower waves"
-        )
-    needed = max(1, int(np.ceil(ratio)))
-    if asked is None:
-        return needed
-    if not (_ONE_OR_MORE.holds(asked) and asked <= _MOST):
-        raise SolverError(
-            f"substeps is {shown(asked)}; valid is {_ONE_OR_MORE.words}, up to {_MOST}, or None for the fewest"
-        )
-    if asked < needed:
-        raise SolverError(
-            f"{asked} substeps of {dt / max(asked, 1):.4g} s are longer than the stable {stable:.4g} s; "
-            f"use {needed} or more substeps, or leave the number out"
-        )
-    return asked
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -96,7 +53,7 @@ class WaveState:
 _TEXEL = 300
 
 
-class WaveSolver(WaveSources):
+class WaveSolver:
     """Waves on the surface of an atlas.
 
     Time stepping is leapfrog in its drift-kick-drift form with implicit damping: second order, stable up to
@@ -119,6 +76,15 @@ class WaveSolver(WaveSources):
         height. Each part of a mesh, and each region that rigid texels cut off, has a mean of its own. Where the density
         varies, a uniform pressure keeps the volume while the waves run as well, unless something holds the surface: a
         clamp, a fixed rim, or stiffness that varies.
+
+    Attributes
+    ----------
+    rest : Atlas
+        Of the surface before it moved.
+    operator : WaveOperator
+    time : float
+        [s].
+    substeps_taken : int
 
     Raises
     ------
@@ -152,8 +118,76 @@ class WaveSolver(WaveSources):
 
     def _begin(self, atlas: Atlas, operator: WaveOperator, backend: str, conserve_volume: bool) -> None:
         """At rest, at time 0."""
-        super().__init__(atlas, operator, make_backend(backend, operator, keeps_volume=conserve_volume))
+        self.rest, self.operator = atlas, operator
+        self._motion: Motion | None = None
+        self.time, self.substeps_taken, self._substep = 0.0, 0, 0.0
+        self._backend = make_backend(backend, operator, keeps_volume=conserve_volume)
+        self._balance = VolumeBalance(operator)
+        self._held = HeldLoad(self._backend, operator.source_share, self._balance)
+        self._guard = FiniteGuard(atlas)
         self._least_mass = float(operator.mass.min())
+
+    @property
+    def atlas(self) -> Atlas:
+        """The surface where it is now."""
+        return self.rest if self._motion is None else self._motion.atlas
+
+    @property
+    def vertices(self) -> NDArray[np.float64] | None:
+        """Where `WaveSolver.move` put the vertices [m], [vertex_count, 3]; None as long as it did not."""
+        return None if self._motion is None else self._motion.V
+
+    @property
+    def backend(self) -> str:
+        """Which backend runs: "gl" or "cpu"."""
+        return self._backend.name
+
+    @property
+    def stable_timestep(self) -> float:
+        """Longest substep that is stable [s]."""
+        return self.operator.stable_timestep
+
+    def step(self, dt: float, substeps: int | None = None, load: Load | None = None) -> None:
+        """Advance by dt [s] in equal substeps, as many as stability asks for.
+
+        Parameters
+        ----------
+        dt : float
+            [s].
+        substeps : int, optional
+            How many, instead of the fewest.
+        load : Load, optional
+            Forces that act over this step alone, beside those that are held.
+
+        Raises
+        ------
+        SolverError
+            If dt is negative or not finite, a given number of substeps is too small to be stable, a load is not finite
+            or names no texel, or the height is no longer finite: the CPU looks at it every 32 substeps, and both
+            backends look at whatever is read.
+        """
+        require_finite("time step", dt, "s", least=0.0)
+        if dt == 0:
+            return
+        substeps = count_substeps(dt, self.stable_timestep, substeps)
+        self._substep = dt / substeps
+        # values too large for float32 become infinite here; the next look reports them
+        with np.errstate(over="ignore", invalid="ignore"):
+            force = self._held.upload(load)
+            self._backend.advance(substeps, self._substep)
+        if force is not None:
+            self._guard.note(Source("forces", force, "N", self.time, abs(force) * dt / self._least_mass))
+        self.time += dt
+        self.substeps_taken += substeps
+        if self._guard.due(substeps) and not self._backend.finite():
+            self._finite(self._backend.height(), "height")
+
+    def reset(self) -> None:
+        """Flatten the surface, end all pressure, and set the time back to 0."""
+        self.height = self.velocity = 0.0
+        self.pressure = 0.0
+        self.time, self.substeps_taken = 0.0, 0
+        self._guard.clear()
 
     def move(self, V: ArrayLike) -> None:
         """Move the surface: the texels ride on their triangles, at their barycentric coordinates.
@@ -176,15 +210,191 @@ class WaveSolver(WaveSources):
         if self._motion is None:
             if self._kind != "fem":
                 raise SolverError(f"a surface with the operator {self._kind!r} cannot move; valid is 'fem'")
-            self._motion = Motion(self._rest, self.material, self.operator)
+            self._motion = Motion(self.rest, self.material, self.operator)
         operator = self._motion.to(V)
         if operator is not None:
             self.operator = operator
             self._backend.move(operator)
 
+    @property
+    def conserve_volume(self) -> bool:
+        """Whether sources are rid of their mean; may be changed while the waves run."""
+        return self._backend.keeps_volume
+
+    @conserve_volume.setter
+    def conserve_volume(self, value: bool) -> None:
+        self._backend.keeps_volume = value
+
+    @property
+    def pressure(self) -> NDArray[np.float64]:
+        """Pressure held over `step` [Pa], positive inwards, float64 [C, n, n]; assign to change it, 0 to end it.
+
+        A copy; it holds the forces of `add_force` as well.
+        """
+        return self._held.forces() / self._areas
+
+    @pressure.setter
+    def pressure(self, value: ArrayLike) -> None:
+        self._held.load = Load.none()
+        self.add_pressure(value)
+
+    def add_impulse(self, point: ArrayLike, impulse: float, radius: float) -> Footprint:
+        """Press on the surface for an instant.
+
+        Parameters
+        ----------
+        point : [3]
+            Where [m], in the frame of the mesh; the nearest surface point is taken.
+        impulse : float
+            J [N s]. Positive presses inwards: the sum of sigma A dv over the texels is -J (before the mean is removed,
+            where volume is conserved). The part on clamped or rigid texels is lost to what supports them.
+        radius : float
+            Footprint radius [m], along the surface; at least two texels are used.
+
+        Returns
+        -------
+        Footprint
+            The texels that were hit.
+
+        Raises
+        ------
+        SolverError
+            If the impulse or the radius is not finite, the radius is negative, there are several points, or the
+            velocity is beyond float32.
+        """
+        where, impulses = spread(self.atlas, "impulse", impulse, "N s", point, radius)
+        momentum = -impulses * self.operator.source_share.reshape(-1)[where.texels]
+        velocities = momentum / self.operator.mass.reshape(-1)[where.texels]
+        fastest = check_kick(velocities, "impulse", impulse, "N s")
+        self._guard.note(Source("impulse", impulse, "N s", self.time, fastest))
+        # sums too large for float32 become infinite here, and are reported later
+        with np.errstate(over="ignore"):
+            self._backend.kick(
+                where.texels, velocities.astype(np.float32), self._held.counterpart(where.texels, momentum)
+            )
+        return where
+
+    def add_force(self, point: ArrayLike, force: float, radius: float) -> Footprint:
+        """Press on the surface from now on, until `pressure` is assigned.
+
+        Parameters
+        ----------
+        point : [3]
+            Where [m], in the frame of the mesh; the nearest surface point is taken.
+        force : float
+            [N], positive inwards.
+        radius : float
+            Footprint radius [m], along the surface; at least two texels are used.
+
+        Raises
+        ------
+        SolverError
+            If the force or the radius is not finite, the radius is negative, or there are several points.
+        """
+        where, forces = spread(self.atlas, "force", force, "N", point, radius)
+        self._held.add(Load(where.texels, forces))
+        return where
+
+    def add_pressure(self, pressure: ArrayLike) -> None:
+        """Add a pressure field [Pa], a number or [C, n, n], positive inwards, that is held from now on."""
+        force = (as_field(pressure, "pressure", self.operator.mass.shape) * self._areas).reshape(-1)
+        texels = np.flatnonzero(force)
+        self._held.add(Load(texels, force[texels]))
+
+    def add_height(self, height: ArrayLike) -> None:
+        """Raise the surface by a field [m], [C, n, n]; where volume is conserved its mean over the area is removed."""
+        field = as_field(height, "height", self.operator.mass.shape).astype(np.float64) * self.operator.free
+        if self.conserve_volume:
+            field = self._balance.balanced_height(field, self._areas)
+        self._note("height", field)
+        self._backend.set_height(self._backend.elastic() + field.astype(np.float32), self._backend.dent())
+
+    def add_velocity(self, velocity: ArrayLike) -> None:
+        """Add a field [m/s], [C, n, n], to the velocity; where volume is conserved its volume rate is removed."""
+        field = as_field(velocity, "velocity", self.operator.mass.shape).astype(np.float64) * self.operator.movable
+        if self.conserve_volume:
+            field = self._balance.balanced_velocity(field)
+        self._note("velocity", field)
+        self._backend.set_velocity(self._backend.velocity() + field.astype(np.float32))
+
+    @property
+    def height(self) -> NDArray[np.float32]:
+        """Displacement along the outward normal [m], float32 [C, n, n]: a copy; assign to change it.
+
+        `waves.height = field` and `waves.height += field` work, also with one number; `waves.height[0] = x` changes the
+        copy only. A height that is assigned is elastic: dents are gone.
+
+        Reading raises `SolverError` once if it is no longer finite.
+        """
+        return self._finite(self._backend.height(), "height")
+
+    @height.setter
+    def height(self, value: ArrayLike) -> None:
+        height = as_field(value, "height", self.operator.mass.shape) * self.operator.free
+        self._note("height", height)
+        self._backend.set_height(height)
+
+    def crests(self) -> NDArray[np.float32]:
+        """Greatest size that each height has had after any step since the last call, or has now [m], [C, n, n].
+
+        Kept from the first call on, where the waves are; a copy begins anew. Not finite, they raise as `height` does.
+        """
+        return self._finite(self._backend.crests(), "height")
+
+    def snapshot(self) -> NDArray[np.float32] | DeviceField:
+        """A copy of the height [m], [C, n, n], where the waves are: on hardware GL it stays on the GPU.
+
+        `numpy.asarray` gives the array; `HeightMap` takes both.
+        """
+        heights = self._backend.snapshot()
+        return self._finite(heights, "height") if isinstance(heights, np.ndarray) else heights
+
+    @property
+    def dent(self) -> NDArray[np.float32]:
+        """The part of the height that stays [m], float32 [C, n, n]; 0 unless the material yields."""
+        return self._finite(self._backend.dent(), "dent")
+
+    @property
+    def velocity(self) -> NDArray[np.float32]:
+        """Rate of the height [m/s], float32 [C, n, n]: a copy; assign to change it, as with `height`.
+
+        Reading raises `SolverError` once if it is no longer finite, which it may be before the height is.
+        """
+        return self._finite(self._backend.velocity(), "velocity")
+
+    @velocity.setter
+    def velocity(self, value: ArrayLike) -> None:
+        velocity = as_field(value, "velocity", self.operator.mass.shape) * self.operator.movable
+        self._note("velocity", velocity)
+        self._backend.set_velocity(velocity)
+
+    def energy(self) -> float:
+        """Kinetic plus potential energy [J] of the discrete system.
+
+        Without damping this is what the leapfrog scheme conserves to round-off while the substep stays the same:
+        1/2 v' (M - dt^2/4 K) v + 1/2 h' K h, with dt the latest substep and K all elastic forces. It differs from the
+        continuous energy by O(dt^2). Energy spent on dents is not included.
+        """
+        elastic = self._finite(self._backend.elastic(), "height")
+        height, velocity = elastic.astype(np.float64), self.velocity.astype(np.float64)
+        with np.errstate(invalid="ignore"):  # NaN says enough
+            kinetic = float((self.operator.momenta(velocity) * velocity).sum()) / 2
+            of_height, of_velocity = (
+                -float((x * self.operator.elastic_force(x)).sum()) / 2 for x in (height, velocity)
+            )
+            return kinetic + of_height - self._substep**2 / 4 * of_velocity
+
+    def volume(self) -> float:
+        """Volume that the waves add to the target, to first order: sum of area times height [m^3]."""
+        return float((self._areas * self.height.astype(np.float64)).sum())
+
+    def momentum(self) -> float:
+        """Sum of sigma A v [kg m/s], positive outwards."""
+        return float((self.operator.mass * self.velocity.astype(np.float64)).sum())
+
     def __getstate__(self) -> tuple[Any, ...]:
         """What `copy` and `pickle` keep: a copy goes on as the original does, bit for bit."""
-        made_of = self._rest, self.material, self._kind, self.operator, self._motion
+        made_of = self.rest, self.material, self._kind, self.operator, self._motion
         return made_of, self.backend, self.conserve_volume, self.state
 
     def __setstate__(self, kept: tuple[Any, ...]) -> None:
@@ -221,54 +431,20 @@ class WaveSolver(WaveSources):
         self._held.load = state.held
         self.time, self._substep, self.substeps_taken = state.time, state.substep, state.substeps_taken
         self._guard.clear()
-        self._note_height(state.elastic)
-        self._note_velocity(state.velocity)
+        self._note("height", state.elastic)
+        self._note("velocity", state.velocity)
 
     @property
-    def stable_timestep(self) -> float:
-        """Longest substep that is stable [s]."""
-        return self.operator.stable_timestep
+    def _areas(self) -> NDArray[np.float64]:
+        return self.rest.areas if self._motion is None else self._motion.areas
 
-    def step(self, dt: float, substeps: int | None = None, load: Load | None = None) -> None:
-        """Advance by dt [s] in equal substeps, as many as stability asks for.
+    def _finite(self, field: NDArray[np.float32], name: str) -> NDArray[np.float32]:
+        """A field, which is looked at; see `FiniteGuard.check`."""
+        self._guard.check(field, name, self.time)
+        return field
 
-        Parameters
-        ----------
-        dt : float
-            [s].
-        substeps : int, optional
-            How many, instead of the fewest.
-        load : Load, optional
-            Forces that act over this step alone, beside those that are held.
-
-        Raises
-        ------
-        SolverError
-            If dt is negative or not finite, a given number of substeps is too small to be stable, a load is not finite
-            or names no texel, or the height is no longer finite: the CPU looks at it every 32 substeps, and both
-            backends look at whatever is read.
-        """
-        require_finite("time step", dt, "s", least=0.0)
-        if dt == 0:
-            return
-        substeps = count_substeps(dt, self.stable_timestep, substeps)
-        self._substep = dt / substeps
-        # values too large for float32 become infinite here; the next look reports them
-        with np.errstate(over="ignore", invalid="ignore"):
-            force = self._held.upload(load, self._counterpart)
-            self._backend.advance(substeps, self._substep)
-        if force is not None:
-            self._guard.note(Source("forces", force, "N", self.time, abs(force) * dt / self._least_mass))
-        self.time += dt
-        self.substeps_taken += substeps
-        if self._guard.due(substeps) and not self._backend.finite():
-            self._finite(self._backend.height(), "height")
-
-    def reset(self) -> None:
-        """Flatten the surface, end all pressure, and set the time back to 0."""
-        shape = self.operator.mass.shape
-        self.height = np.zeros(shape, np.float32)
-        self.velocity = np.zeros(shape, np.float32)
-        self.pressure = 0.0
-        self.time, self.substeps_taken = 0.0, 0
-        self._guard.clear()
+    def _note(self, kind: str, field: NDArray) -> None:
+        """Tell the guard of a height or a velocity that is given."""
+        unit, time = ("m", self.operator.stable_timestep) if kind == "height" else ("m/s", 1.0)
+        largest = float(np.abs(field).max())
+        self._guard.note(Source(kind, largest, unit, self.time, largest / time))

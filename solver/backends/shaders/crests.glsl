@@ -1,27 +1,20 @@
 #version 430
 // Raise the crests to the size of the height, with what is permanent of it. Bits of positive floats are in the order of
 // the floats, and those of what is no number are beyond.
-layout(local_size_x = LIST_GROUP) in;
-layout(std430, binding = 0) readonly buffer Height { dvec4 h[]; };
-layout(std430, binding = 1) buffer Crests { dvec4 crests[]; };
-#ifdef DENT
-layout(std430, binding = 2) readonly buffer Dent { dvec4 dent[]; };
-#endif
+#include "charts.glsl"
 
-#include "eights.glsl"
+layout(std430, binding = 0) readonly buffer Height { float h[]; };
+layout(std430, binding = 1) buffer Crests { float crests[]; };
+#ifdef DENT
+layout(std430, binding = 2) readonly buffer Dent { float dent[]; };
+#endif
 
 void main() {
-    uint eight = gl_GlobalInvocationID.x;
-    if (eight >= h.length()) return;
-    float height[8] = unpack(h[eight]), crest[8] = unpack(crests[eight]);
+    int p = address(int(gl_GlobalInvocationID.x));
+    if (p < 0) return;
+    float height = h[p];
 #ifdef DENT
-    float stays[8] = unpack(dent[eight]);
+    height += dent[p];
 #endif
-    for (int i = 0; i < 8; i++) {
-#ifdef DENT
-        height[i] += stays[i];
-#endif
-        crest[i] = uintBitsToFloat(max(floatBitsToUint(crest[i]), floatBitsToUint(abs(height[i]))));
-    }
-    crests[eight] = pack(crest);
+    crests[p] = uintBitsToFloat(max(floatBitsToUint(crests[p]), floatBitsToUint(abs(height))));
 }

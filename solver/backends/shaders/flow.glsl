@@ -1,21 +1,15 @@
 #version 430
 // Hand the part of the elastic height that is beyond the yield height over to the permanent one.
-layout(local_size_x = LIST_GROUP) in;
-layout(std430, binding = 0) buffer Height { dvec4 h[]; };
-layout(std430, binding = 1) buffer Dent { dvec4 dent[]; };
-layout(std430, binding = 2) readonly buffer YieldHeight { dvec4 limit[]; };
+#include "charts.glsl"
 
-#include "eights.glsl"
+layout(std430, binding = 0) buffer Height { float h[]; };
+layout(std430, binding = 1) buffer Dent { float dent[]; };
+layout(std430, binding = 2) readonly buffer YieldHeight { float limit[]; };
 
 void main() {
-    uint eight = gl_GlobalInvocationID.x;
-    if (eight >= h.length()) return;
-    float height[8] = unpack(h[eight]), stays[8] = unpack(dent[eight]), most[8] = unpack(limit[eight]);
-    for (int i = 0; i < 8; i++) {
-        float kept = clamp(height[i], -most[i], most[i]);
-        stays[i] += height[i] - kept;
-        height[i] = kept;
-    }
-    dent[eight] = pack(stays);
-    h[eight] = pack(height);
+    int p = address(int(gl_GlobalInvocationID.x));
+    if (p < 0) return;
+    float kept = clamp(h[p], -limit[p], limit[p]);
+    dent[p] += h[p] - kept;
+    h[p] = kept;
 }

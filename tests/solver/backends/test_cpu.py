@@ -8,8 +8,8 @@ from dense_waves import DenseWaves
 from hand_made import flat_torus, polygon, square, two_squares
 
 from ripple_sim.solver import Material, TexelMesh, texel_atlas
-from ripple_sim.solver.backends.cpu import CPUBackend
-from ripple_sim.solver.backends.kernels import advance
+from ripple_sim.solver.backends.cpu import CPUBackend, RowLayout
+from ripple_sim.solver.backends.kernels import advance, fill
 from ripple_sim.solver.operator.assembly import build_operator
 from ripple_sim.solver.operator.wave_operator import WaveOperator
 
@@ -20,6 +20,7 @@ MESHES = {
     "corner of five": polygon(5, 3),
     "torus": flat_torus(6),
     "two squares": two_squares(3),
+    "fixed rim": polygon(3, 4).with_fixed_rim(),
 }
 
 
@@ -77,6 +78,29 @@ def test_waves_are_those_of_whole_matrices(mesh: str, material: str, substeps: i
     expected = [(dense.h + dense.dent), dense.v, dense.dent]
     for now, then in zip((backend.height(), backend.velocity(), backend.dent()), expected, strict=True):
         np.testing.assert_allclose(now.ravel(), then, atol=2e-5 * max(1.0, np.abs(then).max()))
+
+
+@pytest.mark.parametrize(
+    "texels", [square(15), polygon(5, 14), square(3).with_fixed_rim(), polygon(3, 64)], ids=lambda each: str(each.shape)
+)
+def test_a_filled_halo_shows_the_texels_round_each_texel(texels: TexelMesh) -> None:
+    """Charts side by side and one after the other, with what loops have left between them set to 0 again."""
+    layout, n = RowLayout(texels.topology), texels.shape[1]
+    values, field = noise(texels, 0), layout.zeros()
+    field[:, 1:-1, 1 : layout.columns + 1] = 7
+    layout.texels(field)[:] = values
+    fill(field, layout.halo)
+    topology = texels.topology
+    beyond = (topology.halo < 0) | (topology.rim & topology.fixed_rim)
+    around = np.where(beyond, np.float32(0), topology.with_halo(values))
+    where = layout.addresses.reshape(texels.shape)
+    pitch = field.shape[2]
+    for r, c in np.ndindex(3, 3):
+        seen = field.reshape(-1)[where + (r - 1) * pitch + c - 1]
+        np.testing.assert_array_equal(seen, around[:, r : r + n, c : c + n])
+    laid_out = layout.coefficients(values)
+    np.testing.assert_array_equal(laid_out.reshape(-1)[layout.places], values.ravel())
+    assert np.count_nonzero(laid_out) == values.size, "0 between charts"
 
 
 def test_few_loops_are_compiled_for_all_materials() -> None:

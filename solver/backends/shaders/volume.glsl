@@ -1,6 +1,22 @@
 #version 430
-// Sums of factor times field over the chunks of a list, one group of threads a chunk.
+// The pressure on each part of the surface: what the load asks for, and sums of factor times field over the chunks of a
+// list. First the sums, one group of threads a chunk; then, with PARTS, what they add up to.
 layout(local_size_x = LIST_GROUP) in;
+#ifdef PARTS
+layout(std430, binding = 0) readonly buffer Loaded { float loaded[]; };
+layout(std430, binding = 1) readonly buffer Sums { float sums[]; };
+layout(std430, binding = 2) readonly buffer Begins { int begins[]; };
+layout(std430, binding = 3) writeonly buffer Amplitudes { float amplitudes[]; };
+uniform int count;
+
+void main() {
+    int part = int(gl_GlobalInvocationID.x);
+    if (part >= count) return;
+    float total = loaded[part];
+    for (int i = begins[part]; i < begins[part + 1]; i++) total += sums[i];
+    amplitudes[part] = total;
+}
+#else
 layout(std430, binding = 0) readonly buffer Height { float h[]; };
 layout(std430, binding = 1) readonly buffer Velocity { float v[]; };
 layout(std430, binding = 2) readonly buffer Addresses { int addresses[]; };
@@ -23,3 +39,4 @@ void main() {
     }
     if (thread == 0) sums[gl_WorkGroupID.x] = partial[0];
 }
+#endif
