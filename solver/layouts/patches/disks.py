@@ -1,8 +1,8 @@
 """Cells made disks with three corners and more, and laid out flat in convex polygons without a fold.
 
-Seeds are added and taken away until all cells are disks. In the plane each inner vertex is a mean of its neighbours with
-positive weights, so that the map is one to one (Tutte 1963, Floater 2003), whatever the weights; mean-value weights
-follow the shape of the triangles.
+Seeds are added and taken away until all cells are disks. In the plane each inner vertex is a mean of its neighbours
+with positive weights, so that the map is one to one (Tutte 1963, Floater 2003), whatever the weights; mean-value
+weights follow the shape of the triangles.
 """
 
 from __future__ import annotations
