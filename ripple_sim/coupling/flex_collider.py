@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 import igl
 import mujoco
 import numpy as np
-from embreex import rtcore_scene
-from embreex.mesh_construction import TriangleMesh
 from numpy.typing import NDArray
 
 from ripple_sim.solver import Mesh
+from ripple_sim.solver.mesh.rays import RayScene
 
 from .convex_collider import LISTS, SETTINGS, mesh_on_body
 
@@ -134,7 +133,5 @@ def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
 
 def _thickness(V: NDArray[np.float64], F: NDArray[np.int64], inward: NDArray[Any], start: float) -> NDArray[np.float64]:
     """Distance from each vertex inwards to the other side of a mesh [m], [n]; infinite where there is none."""
-    scene = rtcore_scene.EmbreeScene()
-    TriangleMesh(scene, V.astype(np.float32), F.astype(np.int32))
-    hit = scene.run((V + start * inward).astype(np.float32), inward.astype(np.float32), output=1)
-    return np.where(hit["primID"] >= 0, start + hit["tfar"], np.inf)
+    distance: NDArray[Any] = RayScene(V, F).cast(V + start * inward, inward).distance
+    return start + distance

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.mesh.closest import downward_hits
+from ripple_sim.solver.mesh.rays import downward_hits
 
 from .events import DropEntry
 

@@ -11,8 +11,6 @@ import dataclasses
 from typing import Any, NamedTuple
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.soft import target_pose
@@ -25,6 +23,7 @@ from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import Atlas, HeightMap, RippleError
 from ripple_sim.solver.kernel import Floats32, Ints32, kernel
+from ripple_sim.solver.mesh.rays import RayScene
 
 from .opening import FLIGHT, Balls, poke_strength, surface_size
 
@@ -52,7 +51,7 @@ class Picker:
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._scenes: dict[str, tuple[NDArray[np.float64] | None, EmbreeScene]] = {
+        self._scenes: dict[str, tuple[NDArray[np.float64] | None, RayScene]] = {
             name: (None, _ray_scene(simulation, name)) for name in simulation.ripples
         }
 
@@ -64,9 +63,9 @@ class Picker:
             scene = self._scene(name)
             position, rotation = self._pose(name)
             local, heading = (start - position) @ rotation, along @ rotation
-            found = scene.run(local[None].astype(np.float32), heading[None].astype(np.float32), output=1)
-            if found["primID"][0] >= 0:
-                distance = float(found["tfar"][0])
+            found = scene.cast(local[None], heading[None])
+            if found.triangle[0] >= 0:
+                distance = float(found.distance[0])
                 hits.append(Hit(name, local + distance * heading, distance))
         return min(hits, key=lambda hit: hit.distance, default=None)
 
@@ -79,7 +78,7 @@ class Picker:
         middle, _ = self._pose(self._simulation.scene.targets[0].geom)
         return max(float((middle - start) @ along / (along @ along)), 0.0)
 
-    def _scene(self, name: str) -> EmbreeScene:
+    def _scene(self, name: str) -> RayScene:
         """A target's surface where it is."""
         V, scene = self._scenes[name]
         if self._simulation.ripples[name].vertices is not V:
@@ -92,11 +91,9 @@ class Picker:
         return target_pose(self._simulation.data, self._simulation.ripples.geom_ids[name])
 
 
-def _ray_scene(simulation: Simulation, name: str) -> EmbreeScene:
+def _ray_scene(simulation: Simulation, name: str) -> RayScene:
     mesh = simulation.ripples[name].atlas.mesh
-    scene = EmbreeScene()
-    TriangleMesh(scene, mesh.V.astype(np.float32), mesh.F.astype(np.int32))
-    return scene
+    return RayScene(mesh.V, mesh.F)
 
 
 # Software OpenGL draws this many triangles 30 times a second beside the simulation, on two cores.
