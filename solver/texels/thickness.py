@@ -1,8 +1,7 @@
-"""How thick an object is at each texel of its surface.
+"""How thick an object is at each texel of its surface, by rays and by the balls that fit into it.
 
-How far a surface may move along its normals before it meets itself: the radii of its medial balls.
-
-How thick the layer is between a surface and what lies inside it.
+The radii of medial balls say how far a surface may move along its normals before it meets itself; rays, how far it is
+to the other side, or to what lies inside.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ def texel_areas(
     mesh, sphere, topology
         Surface, its sphere map [vertex_count, 3], and the cube's charts.
     spanned : float64 [6, N, N]
-        Area that the texel mesh spans [m^2]; see `lumped_areas`.
+        Area that the texel mesh spans [m^2]; see `TexelCells.areas`.
     triangles, barycentrics
         Where the texels lie; see `Atlas`.
     """
