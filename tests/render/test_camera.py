@@ -280,27 +280,6 @@ def test_depths_grow_with_distance_and_points_behind_the_eye_have_no_place():
     assert (matrix @ [0.0, 0.0, 1.0, 1.0])[3] < 0
 
 
-@pytest.mark.parametrize("lens", [(0.05, 0.0), (0.0, -0.08), (-0.03, 0.04)])
-def test_points_in_the_plane_of_focus_stay_in_the_frame_from_all_over_the_lens(lens):
-    middle = CAMERAS[1].pose()
-    focal, near, far = 3.0, 0.1, 50.0
-
-    def place(pose: Pose, points):
-        return projected(perspective(pose.fovy, 1.5, near, far, pose.shear) @ view_matrix(pose), points)[0]
-
-    rng = np.random.default_rng(1)
-    sideways = rng.uniform(-1, 1, (30, 2))
-    beside = Pose(middle.position, middle.rotation, middle.distance, middle.fovy, lens, focal)
-    for depth, stays in ((focal, True), (0.5 * focal, False), (2 * focal, False)):
-        points = middle.position + np.column_stack([sideways, np.full(30, -depth)]) @ middle.rotation.T
-        moved = (place(beside, points) - place(middle, points))[:, :2]
-        scale = 1 / np.tan(np.radians(middle.fovy) / 2)
-        # similar triangles: the ray through the lens meets the plane of focus where the one through its middle does
-        blur = np.multiply([scale / 1.5, scale], lens) * (1 / focal - 1 / depth)
-        np.testing.assert_allclose(moved, np.tile(blur, (30, 1)), atol=1e-12)
-        assert (np.abs(moved).max() < 1e-12) == stays
-
-
 @pytest.mark.parametrize(("half_width", "depth"), [(1.0, 2.0), (0.02, 7.0), (30.0, 0.5)])
 def test_the_orthographic_box_is_clip_space(half_width, depth):
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
