@@ -9,7 +9,6 @@ from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.contract import srgb_to_linear
 from ripple_sim.render.passes.deferred import TILE, touched_tiles
 from ripple_sim.render.surfaces.surface import Charts
-from ripple_sim.render.targets import FrameFormat
 from ripple_sim.solver import HeightMap, RippleError, sphere_atlas
 
 XML = '<mujoco><worldbody><geom type="sphere" size="1" rgba=".8 .2 .2 1"/></worldbody></mujoco>'
@@ -46,13 +45,6 @@ def test_samples_smooth_the_outline_and_leave_the_inside_as_it_is(gl):
     assert np.abs(hard[inside] - smooth[inside]).max() <= 6
     assert set(np.unique(hard[..., 3])) == {0, 255}
     assert len(np.unique(smooth[..., 3])) > 2
-
-
-@pytest.mark.parametrize(("linear", "dtype"), [(False, "f1"), (True, "f2")])
-def test_a_format_knows_its_shape_and_channels(linear, dtype):
-    frame_format = FrameFormat((16, 9), linear=linear)
-    assert frame_format.aspect == pytest.approx(16 / 9)
-    assert frame_format.dtype == dtype
 
 
 def test_a_sharp_edge_of_polished_metal_is_no_brighter_than_its_sides(gl):
