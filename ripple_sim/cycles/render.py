@@ -1,10 +1,7 @@
-"""`render_cycles`: a scene simulated, written as USD, and rendered by Cycles.
+"""`render_cycles`: a scene simulated, written as USD, and rendered by Cycles in a process of Blender's own.
 
-The process of Blender: which Python runs it, and frames as they come from it.
-
-What Blender is told beside the stage: frames, sky, soft boxes, and the floor that fades into the sky.
-
-Linear radiance to the colours of a frame, as the renderer's shader makes them (render/glsl/tone_mapping.glsl).
+Beside the stage Blender is told frames, sky, soft boxes, and the floor that fades into the sky. The linear radiance
+that it gives back gets the colours of a frame, as the renderer's shader makes them (render/glsl/tone_mapping.glsl).
 """
 
 from __future__ import annotations

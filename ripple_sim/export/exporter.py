@@ -1,7 +1,4 @@
-"""`Exporter`: a run of anybody's own loop, written frame by frame to the file of another program.
-
-`RippleRenderer`: frames of a MuJoCo model with its ripples, in your own loop.
-"""
+"""For a loop of one's own: `Exporter` writes it to the file of another program, `RippleRenderer` renders frames."""
 
 from __future__ import annotations
 

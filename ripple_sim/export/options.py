@@ -1,7 +1,4 @@
-"""`ExportOptions`: every option of an export, listed once for Python and for the command line.
-
-Options of an export checked before anything that takes time.
-"""
+"""`ExportOptions`: every option of an export, listed once for Python and for the command line, and checked."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Where an export goes: whole or not at all, and over nothing foreign.
-
-The endings of exports: what writes each, what it needs, and how a file of it is known again.
-"""
+"""Where an export goes: whole or not at all, and over nothing foreign; and what writes the files of each ending."""
 
 from __future__ import annotations
 

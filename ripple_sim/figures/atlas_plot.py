@@ -1,11 +1,4 @@
-"""A figure of an atlas: the mesh with the texel grid, the charts, stretch and quality.
-
-The page that a plot is drawn on: its title, its images, and the file that it becomes.
-
-Colours of an atlas's texels: by stretch, and by chart.
-
-A figure of a layer's thickness: the mesh from both sides, and how much of it has which thickness.
-"""
+"""Figures of an atlas: the mesh with the texel grid, charts, stretch and quality; or the thickness of its layer."""
 
 from __future__ import annotations
 

@@ -1,12 +1,6 @@
 """A default scene around any mesh: the target on a floor, and bodies that drop on it.
 
-The image that belongs to a mesh file's texture coordinates.
-
-The image that colours a target, in the model that MuJoCo draws too.
-
-Which way is up in a mesh file.
-
-A scene by its name, its file, or the mesh on which bodies drop.
+The target has the image of its file, and the side up that its format has.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""`VideoOptions`: every option of a video, listed once for Python and for the command line.
+"""`VideoOptions`: every option of a video, listed once for Python and for the command line, checked and settled.
 
-Fingerprints of a scene with all its files, and of the software that simulates and renders it.
-
-Options checked and settled for one render, and the settings that tell whether an interrupted one can continue.
+The settings of a render, with fingerprints of its scene, its files and the software, tell whether an interrupted one
+can continue.
 """
 
 from __future__ import annotations

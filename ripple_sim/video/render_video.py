@@ -1,10 +1,6 @@
 """`render_video`: a scene rendered to a video. Simulation, rendering and encoding overlap.
 
-`open_video`: starts a video, or continues one, as its options say.
-
-Double buffering: an iterator in a thread of its own, a few items ahead of its consumer.
-
-`Summary`: what a rendered video took.
+The simulation runs in a thread of its own, a few frames ahead (`Prefetch`); `Summary` is what it all took.
 """
 
 from __future__ import annotations
