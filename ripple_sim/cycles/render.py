@@ -47,8 +47,9 @@ from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual, visible_geoms
 from ripple_sim.scene.scene import Scene, with_exposure
 from ripple_sim.simulation import Simulation
-from ripple_sim.video.options import EXPOSURE, VideoOptions, check_options, frame_count, settled
+from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import open_video
+from ripple_sim.video.settings import EXPOSURE, check_options, frame_count, settled
 
 PYTHON = "RIPPLE_SIM_BPY_PYTHON"
 OLDEST = (5, 0)  # bpy before it has other names for what the importer of USD is told

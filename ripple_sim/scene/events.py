@@ -176,8 +176,8 @@ class Script:
     """
 
     def __init__(self, model: mujoco.MjModel, events: Events, targets: Sequence[str]) -> None:
-        moved = sorted([*events.drop, *events.throw, *events.place], key=lambda entry: entry.time)
-        self._moved = [(entry, *free_joint(model, entry)) for entry in moved]
+        moved: list[DropEntry | ThrowEntry | PlaceEntry] = [*events.drop, *events.throw, *events.place]
+        self._moved = [(entry, *free_joint(model, entry)) for entry in sorted(moved, key=lambda entry: entry.time)]
         self._home: dict[str, NDArray[np.float64]] = {}
         for poke in events.poke:
             _check_target(model, "poke", poke, targets)

@@ -25,7 +25,8 @@ from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.kernel import compile_times, work_clock
 
 from .film import Film, Shot
-from .options import EXPOSURE, VideoOptions, check_options, frame_count, render_settings, settled
+from .options import VideoOptions
+from .settings import EXPOSURE, check_options, frame_count, render_settings, settled
 
 
 def open_video(

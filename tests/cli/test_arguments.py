@@ -14,6 +14,10 @@ import pytest
 from ripple_sim.cli import arguments
 from ripple_sim.cli.parser import UsageError, ViewCommand, parse
 from ripple_sim.cli.render import DropCommand, RenderCommand
+from ripple_sim.overlay import notes
+from ripple_sim.scene import drop
+from ripple_sim.solver.layouts import build
+from ripple_sim.solver.operator import assembly
 from ripple_sim.video.options import VideoOptions
 
 
@@ -76,6 +80,11 @@ def test_numbers_that_are_read_are_finite(parse: Callable[[str], float]) -> None
         assert math.isfinite(parse(word))
     with pytest.raises(ValueError, match="valid"):
         parse("1e999")
+
+
+def test_names_are_those_of_the_rooms_that_have_them() -> None:
+    assert (arguments.UP_AXES, arguments.BASELINES) == (drop.UP_AXES, notes.BASELINES)
+    assert (arguments.LAYOUTS, arguments.RIMS) == (build.LAYOUTS, assembly.RIMS)
 
 
 WORDS = {
