@@ -23,7 +23,6 @@ from ripple_sim.scene.scene import (
     Scene,
     parse_request,
     read_toml,
-    shipped_scenes,
     through_camera,
     with_exposure,
 )
@@ -55,14 +54,6 @@ def write(folder: Path, toml: str = TOML, mjcf: str = MJCF) -> Path:
     path = folder / "scene.toml"
     path.write_text(toml)
     return path
-
-
-def test_every_shipped_scene_loads() -> None:
-    assert "duck" in shipped_scenes()
-    for name in shipped_scenes():
-        scene = load_scene(name)
-        assert scene.targets
-        assert scene.duration > 0
 
 
 def test_values_arrive_where_they_belong(tmp_path: Path) -> None:
