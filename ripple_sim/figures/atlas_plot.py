@@ -132,7 +132,10 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
     atlas : Atlas
     path : path
         Ends in .png, .jpg, .pdf or .svg.
-    title, subtitle : str
+    title : str
+        Of the figure.
+    subtitle : str
+        Line below the title.
     up : str
         Axis of the mesh that points up in the figure, "y" or "z".
 
@@ -225,7 +228,10 @@ def plot_thickness(
     thickness : [C, n, n]
     path : path
         Ends in .png, .jpg, .pdf or .svg.
-    title, subtitle : str
+    title : str
+        Of the figure.
+    subtitle : str
+        Line below the title.
     up : str
         Axis of the mesh that points up in the figure, "y" or "z".
 

@@ -199,8 +199,10 @@ def drop_scene(
     Parameters
     ----------
     mesh_path : path
-    bodies, seed : int
-        How many drop, 0 to 100, over the first 3.5 seconds; of their sizes, places and colours.
+    bodies : int
+        How many drop, 0 to 100, over the first 3.5 seconds.
+    seed : int
+        Of their sizes, places and colours.
     up : str, optional
         Axis of the file that points up, "y" or "z". By default a flat sheet lies down; else see `usual_up`.
     look : str

@@ -1,6 +1,5 @@
 """The program's manners: quick help, one line for a mistake, exit statuses, nothing left behind."""
 
-import json
 import os
 import re
 import signal
@@ -172,23 +171,6 @@ def test_a_missing_input_is_told_before_what_the_machine_lacks(tmp_path, monkeyp
     for package in ("pyarrow", "OpenEXR", "nibabel"):
         monkeypatch.setitem(sys.modules, package, None)
     assert argv[1] in complaint(capsys, *argv)
-
-
-def test_atlas_prints_its_figures_as_json_and_saves(tmp_path, capsys, tetrahedron):
-    saved = tmp_path / "atlas.npz"
-    assert cli.main(["atlas", str(tetrahedron), "--resolution", "8", "--json", "-o", str(saved)]) == 0
-    report = json.loads(capsys.readouterr().out)
-    assert (report["vertices"], report["triangles"], report["resolution"]) == (4, 4, 8)
-    assert report["quality"]["flipped"] == 0
-    assert all(seconds >= 0 for seconds in report["seconds"].values())
-    assert saved.stat().st_size > 0
-
-
-def test_atlas_prints_its_figures_for_reading(capsys, tetrahedron):
-    assert cli.main(["atlas", str(tetrahedron), "--resolution", "8"]) == 0
-    out = capsys.readouterr().out
-    assert "4 vertices, 4 triangles" in out
-    assert re.search(r"^folded triangles +0$", out, re.MULTILINE)
 
 
 def test_atlas_refuses_an_unwritable_file_and_an_unknown_method(capsys, tetrahedron):

@@ -165,14 +165,6 @@ def test_two_processes_do_not_write_the_same_video(interrupted):
     assert write(interrupted, 48, FRAMES).frames == FRAMES
 
 
-def test_a_folder_with_other_files_is_left_alone(tmp_path):
-    (tmp_path / "clip.mp4.part").mkdir()
-    (tmp_path / "clip.mp4.part" / "thesis.tex").write_text("mine")
-    with pytest.raises(VideoError, match=r"clip\.mp4\.part holds other files \(thesis\.tex\)"):
-        write(tmp_path / "clip.mp4", 0, FRAMES, resume=False)
-    assert (tmp_path / "clip.mp4.part" / "thesis.tex").read_text() == "mine"
-
-
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_a_full_disk_is_one_line_and_leaves_nothing_broken(tmp_path, ending):
     """Files may not grow beyond a few kilobytes: what a full disk does, without filling one."""
