@@ -1,10 +1,6 @@
-"""Images of an atlas, ray by ray: the mesh with the texel grid on it.
+"""Images of an atlas: the mesh with the texel grid on it, and its charts, unfolded, on the sphere or side by side.
 
 Every pixel is traced to its place on the charts, so the grid is exactly the atlas's.
-
-A look at a surface: where the eye is, a soft light, and images averaged from finer pixels.
-
-Images of the charts themselves: a cube's unfolded and on the sphere, any layout's as squares side by side.
 """
 
 from __future__ import annotations

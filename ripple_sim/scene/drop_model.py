@@ -1,8 +1,6 @@
 """The MuJoCo model of a default scene: a target on a floor, and bodies parked above it until they drop.
 
-Shapes of falling bodies, by name: MuJoCo's primitives of 0.6 to 1 times the volume of a ball.
-
-Domain randomisation: the free bodies of a model varied by a seed.
+Also domain randomisation: the free bodies of any model varied by a seed.
 """
 
 from __future__ import annotations
