@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
-from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
+from ripple_sim.solver.kernel import Bools, Floats, Ints, Ints32, kernel
 
 from .flex_contacts import FlexContacts
 from .model import CoupledModel
@@ -115,13 +115,19 @@ def pair_rows(colliders: NDArray[np.integer], bears: Bools, is_target: Bools) ->
 def normal_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Floats:
     """Normal forces of some contacts [N], as `mj_contactForce` gives them; 0 without a row in the constraint solver."""
     address, dim = data.contact.efc_address[contacts], data.contact.dim[contacts]
-    forces, efc_force, pyramidal = np.zeros(len(contacts)), data.efc_force, _is_pyramidal(model)
-    for condim in set(dim.tolist()):
-        # the edges of a friction pyramid share the normal force among them
-        edges = 2 * (condim - 1) if pyramidal and condim > 1 else 1
-        which = np.flatnonzero((dim == condim) & (address >= 0))
-        forces[which] = efc_force[address[which, None] + np.arange(edges)].sum(axis=1)
-    return forces
+    # the edges of a friction pyramid share the normal force among them
+    edges = np.maximum(2 * dim - 2, 1) if _is_pyramidal(model) else np.ones_like(dim)
+    return _edge_sums(data.efc_force, address, edges)
+
+
+@kernel
+def _edge_sums(efc_force: Floats, address: Ints32, edges: Ints32) -> Floats:
+    """Sums of some forces from each address on, 0 where that is negative."""
+    sums = np.zeros(len(address))
+    for i in range(len(address)):
+        for k in range(edges[i] if address[i] >= 0 else 0):
+            sums[i] += efc_force[address[i] + k]
+    return sums
 
 
 def friction_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Floats:

@@ -6,6 +6,7 @@ What the contacts did is kept for those who ask: impulses for the user, touches 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -208,9 +209,9 @@ class TargetLoad:
         # what touches from inside pushes outwards
         pushes = loads.forces * np.where(inner, -timestep / elapsed, timestep / elapsed)[loads.patches]
         texels, shares = (np.concatenate(each) for each in zip(*under, strict=True))
-        counts = np.array([len(each) for each, _ in under])
+        counts = [len(each) for each, _ in under]
         first = np.searchsorted(loads.patches, np.arange(len(geoms) + 1))
-        begins = np.concatenate([[0], np.cumsum(counts)])[first]
+        begins = np.array([0, *itertools.accumulate(counts)])[first]
         on_texels = TexelForces(
             geoms, middles, loads.radii[first[:-1]] / 2, begins, texels, shares * np.repeat(pushes, counts)
         )

@@ -68,10 +68,11 @@ def load_points(
     closest : callable
         Surface points [m], [q, 3], nearest to points [q, 3].
     """
-    patches = np.arange(len(starts))
     if len(forces) == len(starts):
-        return LoadPoints(patches, points, forces, radii)
-    patches, points, forces = corners(np.repeat(patches, np.diff(starts, append=len(forces))), points, forces, radii)
+        return LoadPoints(np.arange(len(starts)), points, forces, radii)
+    patches = np.zeros(len(forces), dtype=np.int64)
+    patches[starts[1:]] = 1
+    patches, points, forces = corners(patches.cumsum(), points, forces, radii)
     counts = np.bincount(patches)
     wide = convex & (counts > 1)
     if not wide.any():
