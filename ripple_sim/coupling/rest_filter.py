@@ -42,26 +42,26 @@ _JITTERS, _LEAST_MOVE, _MOST_MOVE = 4.0, 0.1, 0.6
 _LEAST_SHARE = 1e-6
 _TINY = np.finfo(np.float64).tiny
 
-CONTACT_STATE = np.dtype(
-    [
-        ("active", np.bool_),  # the geom touches, has lost touch only now, or has a deficit
-        ("absent", np.float64),  # how long it has not touched [s]
-        ("age", np.float64),  # how long it has touched [s]
-        ("unbroken", np.float64),  # how long it has touched since its last opening [s]
-        ("chatters", np.bool_),
-        ("springy", np.bool_),  # it has chattered before
-        ("side", np.float64),  # 1 where it pushes inwards, -1 outwards; forces are amounts along that
-        ("level", np.float64),  # its force, averaged over chatter [N]
-        ("deficit", np.float64),  # impulse that the target has not received yet [N s]
-        ("memory", np.float64),  # time over which means are taken, short where something changes [s]
-        ("mean", np.float64),  # mean force [N]
-        ("place", np.float64, 3),  # where it is [m]
-        ("mean_place", np.float64, 3),  # [m]
-        ("jitter", np.float64),  # mean distance of its contact points from its place [m]
-        ("first", np.int64),  # its texels among the mean shares
-        ("last", np.int64),
-    ]
-)
+# records, so that the fields are attributes in plain Python as well as in kernels
+_FIELDS = [
+    ("active", np.bool_),  # the geom touches, has lost touch only now, or has a deficit
+    ("absent", np.float64),  # how long it has not touched [s]
+    ("age", np.float64),  # how long it has touched [s]
+    ("unbroken", np.float64),  # how long it has touched since its last opening [s]
+    ("chatters", np.bool_),
+    ("springy", np.bool_),  # it has chattered before
+    ("side", np.float64),  # 1 where it pushes inwards, -1 outwards; forces are amounts along that
+    ("level", np.float64),  # its force, averaged over chatter [N]
+    ("deficit", np.float64),  # impulse that the target has not received yet [N s]
+    ("memory", np.float64),  # time over which means are taken, short where something changes [s]
+    ("mean_force", np.float64),  # mean force [N]
+    ("place", np.float64, 3),  # where it is [m]
+    ("mean_place", np.float64, 3),  # [m]
+    ("jitter", np.float64),  # mean distance of its contact points from its place [m]
+    ("first", np.int64),  # its texels among the mean shares
+    ("last", np.int64),
+]
+CONTACT_STATE = np.dtype((np.record, _FIELDS))
 
 
 class TexelForces(NamedTuple):
@@ -187,7 +187,7 @@ def _filtered(
             for i in range(begin, end):
                 slots[under[i]] = -1
             state.active = True
-            steady = side * min(state.mean, side * total)
+            steady = side * min(state.mean_force, side * total)
         elif state.active:
             total = steady = state.side * _miss(state, dt)
             for i in range(state.first, state.last):
@@ -225,7 +225,7 @@ def _touch(state: Any, force: float, middle: Floats, place_radius: float, dt: fl
         [s].
     """
     if not state.active or _has_left(state, dt):
-        state.age, state.unbroken, state.level, state.mean = 0.0, 0.0, force, force
+        state.age, state.unbroken, state.level, state.mean_force = 0.0, 0.0, force, force
         state.chatters, state.springy = False, False
         state.jitter = place_radius
         for k in range(3):
@@ -238,7 +238,7 @@ def _touch(state: Any, force: float, middle: Floats, place_radius: float, dt: fl
     state.age += dt
     state.unbroken += dt
     state.chatters = state.chatters and state.unbroken < _CALM
-    hit = force - state.mean if state.chatters and force > _HIT * state.mean else 0.0
+    hit = force - state.mean_force if state.chatters and force > _HIT * state.mean_force else 0.0
     state.level += dt / (dt + _AVERAGED) * (force - hit - state.level)
     _follow_force(state, force, dt)
     _follow_place(state, middle, place_radius, dt)
@@ -280,12 +280,12 @@ def _follow_force(state: Any, force: float, dt: float) -> None:
     if state.age < _ONSET:
         unchanged = 0.0
     elif state.springy or state.unbroken < _CALM:
-        unchanged = _HIT - force / max(state.mean, _TINY)
+        unchanged = _HIT - force / max(state.mean_force, _TINY)
     else:
-        unchanged = 2 - abs(force - state.mean) / max(_CHANGE * state.mean, _TINY)
+        unchanged = 2 - abs(force - state.mean_force) / max(_CHANGE * state.mean_force, _TINY)
     state.memory = min(state.memory + _GROWTH * dt, _LONGEST_MEMORY) * min(max(unchanged, 0.0), 1.0)
     now = state.level if state.chatters else force
-    state.mean += dt / (dt + state.memory) * (now - state.mean)
+    state.mean_force += dt / (dt + state.memory) * (now - state.mean_force)
 
 
 @kernel
