@@ -1,6 +1,6 @@
-"""The backends' protocol, and backends by name.
+"""The backends' protocol, backends by name, and which is the faster on this machine.
 
-Which backend is faster on this machine: measured once, and remembered in the user's cache folder.
+The latter is measured once, and remembered in the user's cache folder.
 """
 
 from __future__ import annotations
