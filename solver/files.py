@@ -1,7 +1,7 @@
 """Files that appear complete or not at all, images to be read, and the memory that is left for either.
 
 What cannot fit into memory is refused before it is begun: past a cgroup's limit the system kills a process without a
-word, so a look at the limits is all that can name them. Images are read with pillow's limit against decompression bombs.
+word, so only a look beforehand can name them. Images are read with pillow's limit against decompression bombs.
 """
 
 from __future__ import annotations
