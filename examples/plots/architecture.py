@@ -15,13 +15,12 @@ from pathlib import Path
 
 import matplotlib as mpl
 from figure import FAINT, FOLDER, TEXT, sheet
-from imports import FOLDERS, ROOT, cycles, grouped, read
+from imports import FOLDERS, ROOT, cycles, grouped, read, room
 from layered import Layout, Node, layers, without_detours
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch, PathPatch
 from matplotlib.path import Path as Curve
-from structure import room
 
 DOCS = ROOT / "docs" / "pictures"
 SUBTITLE = (
@@ -39,7 +38,9 @@ def description(name: str) -> tuple[str, list[str]]:
     """First sentence of a package's or module's docstring, and the packages inside."""
     folder, package = next((f, p) for f, p in reversed(FOLDERS.items()) if name == p or name.startswith(f"{p}."))
     path = ROOT.joinpath(folder, *name.removeprefix(package).split(".")[1:])
-    text = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8")
+    text = (path / "__init__.py" if (path / "__init__.py").exists() else path.with_suffix(".py")).read_text(
+        encoding="utf-8"
+    )
     sentence = " ".join((ast.get_docstring(ast.parse(text)) or "").split("\n\n")[0].split())
     sentence = sentence.split(". ")[0].rstrip(".").replace("`", "")
     inside = [each.parent.name for each in sorted(path.glob("*/*.py")) if each.name == "__init__.py"]

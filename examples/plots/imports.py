@@ -83,6 +83,12 @@ def _home(name: str, trees: dict[str, ast.Module], public: dict[str, str]) -> st
     return None
 
 
+def room(name: str) -> str:
+    """What a newcomer sees in the folder listing: ripple_sim/coupling/, solver/waves/, ripple_sim/simulation.py."""
+    depth = 3 if name.startswith("ripple_sim.solver.") else 2
+    return ".".join(name.split(".")[:depth])
+
+
 def grouped(modules: dict[str, Module], group: dict[str, str]) -> dict[str, set[str]]:
     """Imports between groups of modules, given the group of each module; a group does not import itself."""
     arrows: dict[str, set[str]] = {each: set() for each in group.values()}

@@ -28,7 +28,7 @@ from ripple_sim.errors import BatchError
 from ripple_sim.scene.load_scene import load_scene
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.files import atomic_write
-from ripple_sim.video.options import scene_digest
+from ripple_sim.video.settings import scene_digest
 
 from .plan import Plan
 

@@ -20,8 +20,8 @@ from ripple_sim.errors import EncodingError
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.files import atomic_write
-from ripple_sim.video.options import frame_count, settled
 from ripple_sim.video.render_video import render_video
+from ripple_sim.video.settings import frame_count, settled
 
 from .finished import FACTS, TIMES
 from .folder import BatchFolder, clear, load_plan

@@ -23,7 +23,8 @@ import trimesh
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.scene import read_toml, shipped_scenes
 from ripple_sim.solver.errors import shown
-from ripple_sim.video.options import VideoOptions, check_options
+from ripple_sim.video.options import VideoOptions
+from ripple_sim.video.settings import check_options
 
 Numbers = float | list[float]
 

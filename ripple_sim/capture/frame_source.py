@@ -1,10 +1,7 @@
 """`FrameSource`: snapshots of a simulation rendered to frames, offscreen.
 
-A camera's sensor: averages the finer pixels and the exposures of a frame, in linear light.
-
-What the renderer draws of a target.
-
-Viewpoint of a scene's camera at a given time, free or fixed, orbiting or tracking; and its focal distance.
+Where the scene's camera stands at a time and what it is focused on, which surface is drawn of a target, and the sensor
+that averages the finer pixels and the exposures of a frame in linear light.
 """
 
 from __future__ import annotations
@@ -27,7 +24,7 @@ from ripple_sim.solver import SphereAtlas, WaveSolver, sphere_atlas
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.kernel import Floats32, kernel
 
-from .passes import SeenMesh, Sighting
+from .passes import Sighting
 from .snapshot import Exposures, Snapshot
 
 # Steps of the table from linear light to sRGB: enough that each of the 256 values has entries, the darkest too.
@@ -282,12 +279,12 @@ class FrameSource:
         read = {geom: np.asarray(height_map) for geom, height_map in height_maps.items()}
         return Sighting.of(image, camera.pose(), snapshot.data, read, self._meshes(height_maps))
 
-    def _meshes(self, height_maps: Mapping[int, AnyHeightMap]) -> dict[int, SeenMesh]:
-        """The meshes of the targets where they are at a snapshot."""
+    def _meshes(self, height_maps: Mapping[int, AnyHeightMap]) -> dict[int, tuple[NDArray, NDArray]]:
+        """Vertices [m] and triangles of the targets where they are at a snapshot."""
         meshes = {}
         for name, geom in self._geoms.items():
             mesh, height_map = self._simulation.ripples[name].rest.mesh, height_maps[geom]
-            meshes[geom] = SeenMesh(height_map.V if isinstance(height_map, MovedHeightMap) else mesh.V, mesh.F)
+            meshes[geom] = height_map.V if isinstance(height_map, MovedHeightMap) else mesh.V, mesh.F
         return meshes
 
     def camera(self, snapshot: Snapshot) -> Camera | FixedCamera:

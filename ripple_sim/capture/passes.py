@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,13 +15,6 @@ from ripple_sim.render.passes.surface_buffers import SurfaceImage
 from ripple_sim.render.surfaces.adaptive import spline_heights, spline_samples
 from ripple_sim.render.surfaces.moving import MovingVertices
 from ripple_sim.solver.texels.texel_atlas import ChartPage
-
-
-class SeenMesh(NamedTuple):
-    """The mesh of a target at a time, in its frame: vertices [n, 3] [m] and triangles [m, 3]."""
-
-    V: NDArray[np.float64]
-    F: NDArray[np.int64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -39,7 +31,7 @@ class Sighting:
     height_maps : mapping
         By geom id, float32 [C, n + 2, n + 2, 4].
     meshes : mapping
-        Likewise, those of the targets.
+        Likewise, vertices [n, 3] [m] and triangles [m, 3] of the targets, in their frames.
     """
 
     image: SurfaceImage
@@ -47,7 +39,7 @@ class Sighting:
     positions: NDArray[np.float64]
     rotations: NDArray[np.float64]
     height_maps: Mapping[int, NDArray[np.float32]]
-    meshes: Mapping[int, SeenMesh]
+    meshes: Mapping[int, tuple[NDArray, NDArray]]
 
     @classmethod
     def of(
@@ -56,7 +48,7 @@ class Sighting:
         pose: Pose,
         data: mujoco.MjData,
         height_maps: Mapping[int, NDArray[np.float32]],
-        meshes: Mapping[int, SeenMesh],
+        meshes: Mapping[int, tuple[NDArray, NDArray]],
     ) -> Sighting:
         """Sighting with the poses in `data`, which are copied."""
         model = data.model
@@ -102,18 +94,20 @@ class Sighting:
                 heights = spline_heights(height_map, *spline_samples(page, image.place[mask].astype(np.float64)))
                 direction = image.smooth_normal[mask] @ rotation
                 still = local - image.height[mask, None] * direction
-                still, direction = _ridden(self.meshes[geom], later.meshes[geom], still, direction)
+                still, direction = _taken_along(self.meshes[geom], later.meshes[geom], still, direction)
                 local = still + heights[:, None] * direction
             moved = local @ later.rotations[geom].T + later.positions[geom]
             flow[mask] = later.pixels(moved) - self.pixels(points)
         return flow
 
 
-def _ridden(mesh: SeenMesh, later: SeenMesh, points: NDArray, directions: NDArray) -> tuple[NDArray, NDArray]:
+def _taken_along(
+    mesh: tuple[NDArray, NDArray], later: tuple[NDArray, NDArray], points: NDArray, directions: NDArray
+) -> tuple[NDArray, NDArray]:
     """Points of a mesh and the directions in which waves move them, both [k, 3], once the mesh has moved on."""
-    if np.array_equal(mesh.V, later.V):
+    if np.array_equal(mesh[0], later[0]):
         return points, directions
-    points, directions, _ = MovingVertices(mesh.V, mesh.F, points, directions, directions)(later.V)
+    points, directions, _ = MovingVertices(*mesh, points, directions, directions)(later[0])
     return points.astype(np.float64), directions.astype(np.float64)
 
 

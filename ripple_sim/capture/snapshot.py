@@ -1,10 +1,7 @@
 """Frozen copies of a running simulation's state, one for each exposure of a frame.
 
-A simulation's state at times between its physics steps, while the shutter is open.
-
-Height maps of a target, wherever its surface is.
-
-How a frame is exposed: at which times while the shutter is open, and through which points of the lens.
+`Exposures` says at which times while the shutter is open, and through which points of the lens; `ShutterTimes` takes
+the simulation there, between its physics steps, and `DrawnHeights` makes height maps, wherever a surface is.
 """
 
 from __future__ import annotations

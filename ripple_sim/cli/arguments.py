@@ -15,12 +15,12 @@ from typing import Annotated, Any
 from tyro.conf import arg
 from tyro.constructors import PrimitiveConstructorSpec
 
-from ripple_sim.overlay.notes import BASELINES
-from ripple_sim.scene.drop import UP_AXES
 from ripple_sim.solver.errors import shown
-from ripple_sim.solver.layouts.build import LAYOUTS
-from ripple_sim.solver.operator.assembly import RIMS
 from ripple_sim.video.options import VideoOptions
+
+# Written out, since the modules that have these names take seconds to import; a test compares them.
+UP_AXES, RIMS = ("y", "z"), ("free", "fixed")
+LAYOUTS, BASELINES = ("auto", "cube", "patches"), ("paper", "uncorrected", "dynamic-paint")
 
 
 def parse_size(word: str) -> tuple[int, int]:
@@ -110,22 +110,23 @@ def parse_shard(word: str) -> tuple[int, int]:
 
 def parse_axis(word: str) -> str:
     """Read the axis that points up."""
-    if word not in UP_AXES:
-        raise ValueError(f"{shown(word)} is not valid; it must be {' or '.join(UP_AXES)}")
-    return word
+    return _one_of(word, UP_AXES)
 
 
 def parse_layout(word: str) -> str:
     """Read the name of a layout."""
-    if word not in LAYOUTS:
-        raise ValueError(f"{shown(word)} is not valid; it must be {', '.join(LAYOUTS[:-1])} or {LAYOUTS[-1]}")
-    return word
+    return _one_of(word, LAYOUTS)
 
 
 def parse_rim(word: str) -> str:
     """Read what rims do."""
-    if word not in RIMS:
-        raise ValueError(f"{shown(word)} is not valid; it must be {' or '.join(RIMS)}")
+    return _one_of(word, RIMS)
+
+
+def _one_of(word: str, names: tuple[str, ...]) -> str:
+    if word not in names:
+        *most, last = names
+        raise ValueError(f"{shown(word)} is not valid; it must be {', '.join(most)} or {last}")
     return word
 
 

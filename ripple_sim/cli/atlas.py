@@ -13,12 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from tyro.conf import Positional, arg
 
-from ripple_sim.solver import Atlas
-
 from .arguments import Count, LayoutName, UpAxis
 
 if TYPE_CHECKING:
-    from ripple_sim.solver import Atlas as SolverAtlas
+    from ripple_sim.solver import Atlas
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -105,7 +103,7 @@ class AtlasCommand:
 
             check_plot_path(self.plot, self.overwrite)
 
-    def _plot(self, path: Path, atlas: SolverAtlas, thickness: NDArray[np.float64] | None) -> None:
+    def _plot(self, path: Path, atlas: Atlas, thickness: NDArray[np.float64] | None) -> None:
         from ripple_sim.figures.atlas_plot import plot_atlas, plot_thickness
         from ripple_sim.scene.drop import usual_up
 

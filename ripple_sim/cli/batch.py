@@ -121,7 +121,16 @@ def duration_text(seconds: float) -> str:
 def batch_progress() -> Iterator[Callable[[Progress], None]]:
     """Yield a function that shows a batch's progress on stderr."""
     if not sys.stderr.isatty():
-        yield _Log()
+        told = time.monotonic()
+
+        def log(progress: Progress) -> None:
+            nonlocal told
+            if time.monotonic() - told >= _BETWEEN:
+                told = time.monotonic()
+                done = progress.finished + progress.aside
+                print(f"{done} of {progress.scenes} scenes, {progress_text(progress)}", file=sys.stderr, flush=True)
+
+        yield log
         return
     columns = (BarColumn(), MofNCompleteColumn(), TextColumn("scenes, {task.description}"))
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
@@ -129,16 +138,3 @@ def batch_progress() -> Iterator[Callable[[Progress], None]]:
         yield lambda now: bars.update(
             task, total=now.scenes, completed=now.finished + now.aside, description=progress_text(now)
         )
-
-
-class _Log:
-    """Writes a line now and then."""
-
-    def __init__(self) -> None:
-        self._last = time.monotonic()
-
-    def __call__(self, progress: Progress) -> None:
-        if time.monotonic() - self._last >= _BETWEEN:
-            self._last = time.monotonic()
-            done = progress.finished + progress.aside
-            print(f"{done} of {progress.scenes} scenes, {progress_text(progress)}", file=sys.stderr, flush=True)

@@ -18,7 +18,6 @@ from rich.text import Text
 from tyro.conf import Positional, arg
 
 from ripple_sim.export.options import ExportOptions
-from ripple_sim.solver.kernel import compile_times, compiling
 
 from .arguments import (
     Count,
@@ -67,8 +66,7 @@ class ExportCommand(ExportOptions):
 
     def run(self) -> None:
         """Export the scene and print a summary."""
-        from ripple_sim.export.options import check_options
-        from ripple_sim.export.place import check_export
+        from ripple_sim.export.place import check_export, check_options
         from ripple_sim.scene.drop import find_scene, is_scene
 
         is_scene(self.scene)
@@ -76,7 +74,7 @@ class ExportCommand(ExportOptions):
         check_options(options)  # before anything that takes time
         check_export(self.output, options.overwrite)
 
-        from ripple_sim.export.options import frame_count
+        from ripple_sim.export.place import frame_count
         from ripple_sim.export.scene import export_scene
         from ripple_sim.scene.scene import through_camera
 
@@ -113,6 +111,8 @@ class _Compiling(ProgressColumn):
     """What is being compiled, and for how many seconds so far; nothing while nothing is."""
 
     def render(self, task: Task) -> Text:
+        from ripple_sim.solver.kernel import compile_times, compiling
+
         module = compiling()
         if module is None:
             return Text("")
@@ -176,13 +176,13 @@ class _VideoCommand(VideoArguments):
             self._run_gl()
 
     def _run_gl(self) -> None:
-        from ripple_sim.video.options import check_options
+        from ripple_sim.video.settings import check_options
 
         check_options(self.options(), self.output)  # before anything that takes time
 
         from ripple_sim.solver.gl import select_device, shared_context
-        from ripple_sim.video.options import frame_count, settled
         from ripple_sim.video.render_video import render_video
+        from ripple_sim.video.settings import frame_count, settled
 
         if self.device is not None:
             select_device(self.device)
@@ -198,7 +198,7 @@ class _VideoCommand(VideoArguments):
 
         check_cycles(self.options(), self.output, self.samples)  # before anything that takes time
 
-        from ripple_sim.video.options import frame_count, settled
+        from ripple_sim.video.settings import frame_count, settled
 
         scene = self._seen()
         frames = frame_count(settled(self.options(), scene, self.output))

@@ -1,14 +1,32 @@
-"""`make_collidable`: let a mesh geom collide as its true surface."""
+"""`make_collidable`: let a mesh geom collide as its true surface.
+
+A convex collider stands for a geom by convex parts of its mesh, which CoACD finds and the user's cache keeps; a flex
+collider by a rigid flex of triangles.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
+import importlib.metadata
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import igl
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
+from ripple_sim.solver import Mesh
+from ripple_sim.solver.cache import cache_path, make_room, mark_used
+from ripple_sim.solver.files import atomic_write
+from ripple_sim.solver.mesh.rays import RayScene
+from ripple_sim.solver.texels.atlas import read_arrays, write_arrays
 
-from .collision_warnings import SPECULATIVE
-from .convex_collider import add_convex_collider, convex_parts_of, is_closed, remove_convex_collider
-from .flex_collider import add_flex_collider, flex_core, remove_flex_collider
+from .collision_warnings import GAP_TOLERANCE
+from .model import SPECULATIVE, part_name
+from .target_mesh import target_mesh
 
 _GEOM = mujoco.mjtGeom
 ROUTES = ("auto", "sdf", "flex", "convex", "hull")
@@ -107,3 +125,269 @@ def _find(spec: mujoco.MjSpec, key: str) -> mujoco.MjsGeom:
         return found
     names = ", ".join(repr(each.name) for each in spec.geoms if each.name)
     raise SceneError(f"the specification has no geom {key!r}; its named geoms are {names or 'none'}")
+
+
+# Vertices of a flex inside a mesh [m], [n, 3], its triangles, and the margin that reaches to the surface [m].
+FlexCore: TypeAlias = tuple[NDArray[np.float64], NDArray[np.int64], float]
+
+# CoACD's own threshold of concavity: parts then lie up to 2.5 % of a mesh's size off the surface. With a third of its
+# usual iterations it finds as good cuts in half the time.
+_DECOMPOSITION = {"threshold": 0.05, "mcts_iterations": 60, "seed": 0}
+
+
+def convex_parts(mesh: Mesh) -> list[NDArray[np.float64]]:
+    """Vertices of the convex parts of a mesh [m], each [n, 3]; the same for the same mesh.
+
+    Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware concavity and tree search".
+
+    Raises
+    ------
+    SceneError
+        If the package coacd is missing.
+    """
+    try:
+        version = importlib.metadata.version("coacd")
+    except importlib.metadata.PackageNotFoundError as error:
+        raise SceneError(
+            "the route 'convex' needs coacd, which is not installed; install it with: pip install "
+            "'ripple-sim[convex]', or take another route, such as 'sdf'"
+        ) from error
+    path = cache_path(f"convex parts {version} {_DECOMPOSITION}", (mesh.V, mesh.F))
+    with contextlib.suppress(OSError, ValueError, KeyError):
+        stored = read_arrays(path)
+        mark_used(path)
+        return [stored[str(i)] for i in range(len(stored))]
+    parts = _decompose(mesh)
+    # a folder that cannot be written costs the next call its time, nothing else
+    with contextlib.suppress(OSError), atomic_write(path) as unfinished, unfinished.open("wb") as file:
+        write_arrays(file, {str(i): part for i, part in enumerate(parts)})
+    make_room(path)
+    return parts
+
+
+def _decompose(mesh: Mesh) -> list[NDArray[np.float64]]:
+    import coacd
+
+    coacd.set_log_level("error")
+    return [np.array(V, dtype=np.float64) for V, _ in coacd.run_coacd(coacd.Mesh(mesh.V, mesh.F), **_DECOMPOSITION)]
+
+
+# What a geom's stand-ins collide like.
+_SETTINGS = ("contype", "conaffinity", "condim", "priority", "solmix", "gap")
+_LISTS = ("friction", "solref", "solimp")
+
+
+def mesh_on_body(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> Mesh:
+    """A geom's mesh in the frame of its body, as MuJoCo compiles it.
+
+    Raises
+    ------
+    SceneError
+        If the specification does not compile as it is, or would lose geoms that do not collide.
+    """
+    if spec.compiler.discardvisual:
+        raise SceneError(
+            f"geom {geom.name!r} cannot have others collide for it: with discardvisual the compiler would discard it; "
+            "set spec.compiler.discardvisual = False"
+        )
+    model = _compiled(spec, geom)
+    index = model.geom(geom.name).id
+    mesh, rotation = target_mesh(model, index), np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, model.geom_quat[index])
+    return dataclasses.replace(mesh, V=model.geom_pos[index] + mesh.V @ rotation.reshape(3, 3).T)
+
+
+def is_closed(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
+    """Whether a geom's mesh has no rim; raises SceneError if the specification does not compile."""
+    model = _compiled(spec, geom)
+    return target_mesh(model, model.geom(geom.name).id).closed
+
+
+def _compiled(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjModel:
+    trial = spec.copy()
+    # a signed distance would take long, and a flat mesh has no convex hull
+    trial.compiler.discardvisual = False
+    own = trial.geom(geom.name)
+    own.type, own.contype, own.conaffinity = mujoco.mjtGeom.mjGEOM_MESH, 0, 0
+    try:
+        return trial.compile()
+    except ValueError as error:
+        raise SceneError(
+            f"the colliders of geom {geom.name!r} are made from its compiled mesh, but the specification does not "
+            f"compile: {error}"
+        ) from error
+
+
+# MuJoCo's viewers and ours do not show this group.
+_HIDDEN = 3
+
+
+def add_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, parts: Sequence[NDArray[np.float64]]) -> None:
+    """Let a mesh geom collide through geoms of its convex parts, on its body, and no longer by itself.
+
+    They have its contact settings and no mass: mass and looks stay with the geom.
+
+    Parameters
+    ----------
+    spec : mujoco.MjSpec
+    geom : mujoco.MjsGeom
+        Of type mesh.
+    parts : sequence of float64 [k, 3]
+        Vertices of each [m]; see `convex_parts_of`.
+    """
+    for i, V in enumerate(parts):
+        name = part_name(geom.name, i)
+        # a thin part may have too little volume for MuJoCo to take an inertia from it
+        spec.add_mesh(name=name, uservert=V.ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+        geom.parent.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=name,
+            mass=0.0,
+            group=_HIDDEN,
+            margin=geom.margin,
+            **{each: getattr(geom, each) for each in _SETTINGS},
+            **{each: np.array(getattr(geom, each)) for each in _LISTS},
+        )
+    geom.contype = geom.conaffinity = 0
+
+
+def convex_parts_of(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> list[NDArray[np.float64]]:
+    """Vertices of the convex parts of a geom's mesh in the frame of its body [m].
+
+    Raises
+    ------
+    SceneError
+        If the mesh is open, the package coacd is missing, or the specification does not compile or discards geoms that
+        do not collide.
+    """
+    mesh = mesh_on_body(spec, geom)
+    if not mesh.closed:
+        raise SceneError(
+            f"the mesh of geom {geom.name!r} is open and encloses no volume that has convex parts; valid routes for it "
+            "are 'flex' and 'hull'"
+        )
+    return convex_parts(mesh)
+
+
+def remove_convex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
+    """Remove the convex colliders of a geom, if it has any, and let the geom collide by itself again."""
+    i = 0
+    while (part := spec.geom(part_name(geom.name, i))) is not None and part.parent.name == geom.parent.name:
+        geom.contype, geom.conaffinity = part.contype, part.conaffinity
+        spec.delete(part)
+        spec.delete(spec.mesh(part_name(geom.name, i)))
+        i += 1
+
+
+# Thicknesses over the mesh's size: the first within the tolerance is taken, or else the last.
+_THICKNESSES = (0.05, 0.04, 0.03, 0.02)
+# Thickness of a sheet over its size, on either side.
+_SHEET = 0.01
+# Vertices at sharp corners move by this many thicknesses at most; those of a cube need 1.73.
+_SHARPEST = 2.0
+# Weight of the isotropic term over that of the triangles' planes: it settles the directions that they leave open.
+_ROUNDING = 1e-3
+# Vertices move by this share of the local thickness at most, so that opposite sides of a thin part stay apart.
+_DEEPEST = 0.45
+
+
+def add_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, core: FlexCore) -> None:
+    """Let a mesh geom collide through a rigid flex of its triangles, of the same name, and no longer by itself.
+
+    MuJoCo's contacts with a triangle are right as long as nothing penetrates it: they push along the shortest line
+    between the two. A geom that has penetrated is pushed out through the nearest side, which is sideways for a flat
+    geom with a triangle under its rim. So the triangles lie inside the surface, and a contact margin of the same
+    thickness holds other geoms off: they meet the true surface. Sharp edges become rounded and thin parts thicker; the
+    flex is as thick as possible (2 to 5 % of the mesh's size) without putting either off by more than 2 %.
+
+    An open mesh is a sheet that can be hit from both sides: the triangles are its own, and the margin, 1 % of its size,
+    holds geoms off either side.
+
+    Parameters
+    ----------
+    spec : mujoco.MjSpec
+    geom : mujoco.MjsGeom
+        Of type mesh.
+    core : FlexCore
+        See `flex_core`.
+    """
+    (V, F, thickness), body = core, geom.parent
+    body.name = body.name or f"body of {geom.name}"
+    spec.add_flex(
+        name=geom.name,
+        dim=2,
+        vertbody=[body.name],
+        vert=V.ravel(),
+        elem=F.ravel().astype(np.int32),
+        radius=0.0,
+        margin=geom.margin + thickness,
+        # MuJoCo's own viewer does not show this group
+        group=3,
+        **{name: getattr(geom, name) for name in _SETTINGS},
+        **{name: np.array(getattr(geom, name)) for name in _LISTS},
+    )
+    geom.contype = geom.conaffinity = 0
+
+
+def remove_flex_collider(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
+    """Remove the flex collider of a geom, if it has one, and let the geom collide by itself again."""
+    flex = spec.flex(geom.name)
+    if flex is not None and set(flex.vertbody) == {geom.parent.name}:
+        geom.contype, geom.conaffinity = flex.contype, flex.conaffinity
+        spec.delete(flex)
+
+
+def flex_core(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> FlexCore:
+    """What a geom's flex collider is made of.
+
+    Raises
+    ------
+    SceneError
+        If the specification does not compile as it is, or discards geoms that do not collide.
+    MeshError
+        If the mesh has no triangle with an area.
+    """
+    mesh = mesh_on_body(spec, geom)
+    size = float(np.ptp(mesh.V, axis=0).max())
+    if not mesh.closed:
+        return mesh.V, mesh.F, _SHEET * size
+    points = np.concatenate([mesh.V, mesh.V[mesh.F].mean(axis=1)])
+    for share in _THICKNESSES:
+        thickness = share * size
+        core = inset(mesh, thickness)
+        squared, _, _ = igl.point_mesh_squared_distance(points, core, mesh.F)
+        if np.abs(np.sqrt(squared) - thickness).max() <= GAP_TOLERANCE * size:
+            break
+    return core, mesh.F, thickness
+
+
+def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
+    """Vertices [m], [n, 3], moved inwards until the planes of their triangles lie deeper by `depth` [m].
+
+    Where more than three planes meet, the remaining squared distances, weighted by the corners' angles, are least.
+    Parts too thin for that keep a tenth of their thickness.
+    """
+    V, F = mesh.V, mesh.F
+    corners = V[F]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    squares, sums, weights = np.zeros((len(V), 3, 3)), np.zeros((len(V), 3)), np.zeros(len(V))
+    for k in range(3):
+        a, b = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
+        angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+        np.add.at(squares, F[:, k], angle[:, None, None] * normals[:, :, None] * normals[:, None, :])
+        np.add.at(sums, F[:, k], angle[:, None] * normals)
+        np.add.at(weights, F[:, k], angle)
+    squares += _ROUNDING * weights[:, None, None] * np.eye(3)
+    outward = (1 + _ROUNDING) * np.linalg.solve(squares, sums[:, :, None])[:, :, 0]
+    length = np.maximum(np.linalg.norm(outward, axis=1), np.finfo(np.float64).tiny)
+    outward /= length[:, None]
+    moved = np.minimum(depth * np.minimum(length, _SHARPEST), _DEEPEST * _thickness(V, F, -outward, 1e-3 * depth))
+    return V - moved[:, None] * outward
+
+
+def _thickness(V: NDArray[np.float64], F: NDArray[np.int64], inward: NDArray[Any], start: float) -> NDArray[np.float64]:
+    """Distance from each vertex inwards to the other side of a mesh [m], [n]; infinite where there is none."""
+    distance: NDArray[Any] = RayScene(V, F).cast(V + start * inward, inward).distance
+    return start + distance

@@ -1,15 +1,7 @@
-"""Warnings of targets whose collisions are off their true surface.
-
-Pairs of geoms that approach each other too fast, found before they touch.
-
-How far the surface that collides lies off the surface that ripples.
-
-Tunnelling: geoms so fast that they would pass through a target or get stuck in it are reported before they touch.
-"""
+"""Warnings of targets that nothing can touch, or whose collisions are off the surface that ripples."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Iterator
 
 import igl
@@ -18,72 +10,11 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Atlas
-from ripple_sim.solver.kernel import Floats, Ints, Ints32
 
-from .flex_collider import GAP_TOLERANCE
 from .geoms import TARGET_TYPES
 from .model import CoupledModel, flex_thickness
 from .target_mesh import primitive_triangles
-
-# A pair to watch.
-APPROACH = np.dtype(
-    [
-        ("target", np.int64),  # geom ids
-        ("other", np.int64),
-        ("limit", np.float64),  # depth up to which a contact is safe [m]
-        ("range", np.float64),  # distance of the geoms' centres at which they may touch [m]
-        ("stopping_time", np.float64),  # depth over speed after the first contact [s]
-    ]
-)
-
-
-def too_fast(
-    pairs: np.ndarray,
-    geom_xpos: Floats,
-    cvel: Floats,
-    subtree_com: Floats,
-    bodies: Ints32,
-    timestep: float,
-    steps: int,
-) -> tuple[Ints, Floats]:
-    """Find pairs that may touch within some steps and would sink in beyond their limits.
-
-    Parameters
-    ----------
-    pairs : APPROACH [p]
-    geom_xpos, cvel, subtree_com
-        From MuJoCo's data.
-    bodies : int32 [ngeom, 2]
-        Body of each geom, and the root of that body's tree.
-    timestep : float
-        [s].
-    steps : int
-
-    Returns
-    -------
-    rows : int64 [k]
-        Rows of the pairs.
-    speeds : float64 [k]
-        Their relative speeds [m/s].
-    """
-    target, other = pairs["target"], pairs["other"]
-    velocities = _velocities(geom_xpos, cvel, subtree_com, bodies)
-    away, relative = geom_xpos[other] - geom_xpos[target], velocities[other] - velocities[target]
-    distances, speeds = np.linalg.norm(away, axis=1), np.linalg.norm(relative, axis=1)
-    near = distances < pairs["range"] + (1 + steps) * speeds * timestep
-    approaching = np.einsum("ij,ij->i", away, relative) < 0
-    rows = np.flatnonzero(near & approaching & (speeds * (timestep + pairs["stopping_time"]) > pairs["limit"]))
-    return rows, speeds[rows]
-
-
-def _velocities(geom_xpos: Floats, cvel: Floats, subtree_com: Floats, bodies: Ints32) -> Floats:
-    """Velocities of all geoms' centres in the world [m/s], [ngeom, 3]."""
-    body, root = bodies.T
-    # MuJoCo gives a body's velocity at the centre of mass of the tree that it belongs to
-    return cvel[body, 3:] + np.cross(cvel[body, :3], geom_xpos - subtree_com[root])
-
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 # Points of the rippling surface at which its distance is taken.
@@ -144,8 +75,9 @@ def _solid(coupled: CoupledModel, geom: int) -> tuple[NDArray[np.float64], NDArr
     return V, F
 
 
-# The tolerance for geoms that were made to collide in place of a finer one.
-COARSE_TOLERANCE = 0.1
+# A collision surface off the true one by this share of the target's size shows: bodies stop in mid-air. The coarse
+# tolerance is for geoms that were made to collide in place of a finer one.
+GAP_TOLERANCE, COARSE_TOLERANCE = 0.02, 0.1
 
 _GEOM = mujoco.mjtGeom
 
@@ -280,118 +212,3 @@ def _kept_apart(model: mujoco.MjModel, body: int) -> list[int]:
     pairs = [(int(signature) >> 16, int(signature) & 0xFFFF) for signature in model.exclude_signature]
     excluded = {b for pair in pairs if body in pair for b in pair if b != body}
     return sorted(excluded.union(np.flatnonzero(joined).tolist()))
-
-
-_SDF = int(mujoco.mjtGeom.mjGEOM_SDF)
-_CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
-# The flag that enables MuJoCo's speculative contacts, which it has from version 4 on; 0 before.
-SPECULATIVE = int(getattr(mujoco.mjtEnableBit, "mjENBL_SPECULATIVE", 0))
-
-_SAFE = 0.85
-# Depth over a geom's smallest half-extent at which contacts with a signed distance begin to push from all sides: seen
-# at 1.4, not yet at 1.2.
-_SAFE_IN_SDF = 1.2
-# Depth over a flex's thickness at which it begins to throw cylinders aside.
-_SAFE_IN_FLEX = 0.7
-# The check runs once in so many steps, and looks as many steps ahead.
-_EVERY = 5
-
-
-class TunnellingCheck:
-    """Compares how deep geoms will sink into the targets with how thick both are.
-
-    A geom that arrives at speed v sinks in by about v dt before MuJoCo sees the contact, and then by v t_stop before
-    the contact's spring has stopped it: t_stop = tau zeta exp(-zeta) for a `solref` of time constant tau and damping
-    ratio zeta (a critically damped spring at zeta = 1). Past the sum of the two geoms' smallest half-extents it comes
-    out on the other side or stays inside; the first that did so were seen at 0.9 of that sum. A geom that is inside an
-    SDF geom by more than its own half-extent is pushed from all sides: the normal forces then add up to many times the
-    momentum exchanged. A warning is given once for each pair. MuJoCo's speculative contacts, where the version has them
-    and they are enabled, stop geoms in time, but not at SDF geoms or flexes: then only those are checked.
-
-    A flex collider holds geoms off by its thickness, which counts in place of the half-extent of its geom. Cylinders
-    that sink in by 0.7 of the thickness begin to be thrown aside.
-
-    Parameters
-    ----------
-    coupled : CoupledModel
-    targets : sequence of int
-        Geom ids.
-    """
-
-    def __init__(self, coupled: CoupledModel, targets: list[int]) -> None:
-        self._model, self._names = coupled.model, coupled.names
-        self._pairs = _watched_pairs(coupled, targets)
-        roots = coupled.model.body_rootid[coupled.model.geom_bodyid]
-        self._bodies = np.column_stack([coupled.model.geom_bodyid, roots])
-        self._warned = np.zeros(len(self._pairs), dtype=bool)
-        self._steps = 0
-
-    def __call__(self, data: mujoco.MjData) -> None:
-        """Warn of the pairs that are about to meet too fast. Call it after each physics step."""
-        self._steps += 1
-        if not len(self._warned) or (self._steps - 1) % _EVERY:
-            return
-        rows, speeds = too_fast(
-            self._pairs,
-            data.geom_xpos,
-            data.cvel,
-            data.subtree_com,
-            self._bodies,
-            self._model.opt.timestep,
-            _EVERY,
-        )
-        for i, speed in zip(rows.tolist(), speeds.tolist(), strict=True):
-            if not self._warned[i]:
-                self._warned[i] = True
-                warnings.warn(self._message(i, speed), RippleWarning, stacklevel=4)
-
-    def _message(self, i: int, speed: float) -> str:
-        model, names, timestep = self._model, self._names, self._model.opt.timestep
-        target, other, limit, _, stopping_time = self._pairs[i].item()
-        body = model.body(int(model.geom_bodyid[other])).name or names[other]
-        needed = limit / speed - stopping_time
-        # MuJoCo keeps a contact's time constant at two time steps or more
-        advice = (
-            f"use a time step of {needed:.2g} s or less"
-            if needed > 0
-            else f"use a time step of {limit / speed / (1 + 2 / np.e):.2g} s or less, and a solref of twice that"
-        )
-        return (
-            f"body {body!r} meets geom {names[target]!r} at {speed:.3g} m/s and would pass through it, get stuck or "
-            f"give a wrong impulse: with a time step of {timestep:.2g} s it sinks in by "
-            f"{speed * (timestep + stopping_time):.2g} m, of which {limit:.2g} m are safe; {advice}"
-        )
-
-
-def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void]:
-    """Pairs of a geom that collides for a target and another geom, which may tunnel, `APPROACH` [p]."""
-    model, extents, flex = coupled.model, coupled.collider_extents, coupled.has_flex
-    sdf, cylinder = model.geom_type == _SDF, model.geom_type == _CYLINDER
-    unchecked = sdf | flex if model.opt.enableflags & SPECULATIVE else np.ones(model.ngeom, dtype=bool)
-    pairs = [
-        (target, other)
-        for target in dict.fromkeys(geom for each in targets for geom in coupled.collision_geoms(each))
-        for other in np.flatnonzero(coupled.can_collide(target)).tolist()
-        if np.isfinite(extents[other]) and (unchecked[target] or unchecked[other])
-    ]
-    target, other = np.array(pairs, dtype=np.int64).reshape(-1, 2).T.copy()
-    limit = _SAFE * (extents[target] + extents[other])
-    for geom, around in ((target, other), (other, target)):
-        safe = np.where(sdf[around], _SAFE_IN_SDF * extents[geom], np.inf)
-        safe = np.where(flex[around] & cylinder[geom], _SAFE_IN_FLEX * extents[around], safe)
-        limit = np.minimum(limit, safe)
-    reach = model.geom_rbound[target] + model.geom_rbound[other]
-    solref = (coupled.solref[target] + coupled.solref[other]) / 2
-    stopping_times = _stopping_times(solref, model.opt.timestep)
-    return np.array(list(zip(target, other, limit, reach, stopping_times, strict=True)), APPROACH)
-
-
-def _stopping_times(solref: NDArray[np.float64], timestep: float) -> NDArray[np.float64]:
-    """Depth over speed [s], [k], of contacts with these parameters, [k, 2]."""
-    # negative pairs are -stiffness and -damping for each kg: omega = sqrt(stiffness), ratio = damping / (2 omega)
-    direct = solref[:, 0] <= 0
-    omega = np.sqrt(np.where(direct, np.maximum(-solref[:, 0], 1e-12), 1.0))
-    constant = np.maximum(solref[:, 0], 2 * timestep)
-    ratio = np.where(direct, -solref[:, 1] / (2 * omega), solref[:, 1])
-    period = np.where(direct, 1 / omega, constant * ratio)
-    return period * np.exp(-np.clip(ratio, 0, 1))

@@ -1,32 +1,34 @@
-"""The contacts on one target, geom by geom: what every later step reads.
+"""MuJoCo's contacts as arrays: what touches each target, where, and with how much force.
 
-MuJoCo's contacts between geoms: normal forces, and where they act on each target.
+A `ContactReader` reads them from MuJoCo's data at every step. Contacts of geoms that collide in place of a target are
+handed to it, at places on its surface.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, Ints32, kernel
 
+from .flex_contacts import FlexContacts
+from .model import CoupledModel
+from .step_checks import SolverBalance
+from .target_mesh import target_mesh
 
-class TargetContacts(NamedTuple):
+
+class Contacts(NamedTuple):
     """All contacts that load one target in one step.
 
     Attributes
     ----------
-    target : int
-        Geom id.
-    others : int64 [p]
-        Collider ids of what touches it, ascending; see `CoupledModel`.
-    begins : int64 [p + 1]
-        The contacts with others[i] are those from begins[i] to begins[i + 1].
+    others : int64 [k]
+        Collider id of what touches, ascending; see `CoupledModel`.
     points : float64 [k, 3]
         Contact points in the world [m], just outside the target's surface.
     forces : float64 [k]
@@ -35,209 +37,126 @@ class TargetContacts(NamedTuple):
         Unit normals in the world, from the target to the other geom.
     """
 
-    target: int
     others: Ints
-    begins: Ints
     points: Floats
     forces: Floats
     normals: Floats
 
+    def rows(self, which: slice | NDArray) -> Contacts:
+        """Some of the contacts."""
+        return Contacts(self.others[which], self.points[which], self.forces[which], self.normals[which])
 
-class PairContacts(NamedTuple):
-    """The contacts on all targets, by (target, other) in ascending order; more as in `TargetContacts`.
+    @classmethod
+    def together(cls, parts: Sequence[Contacts]) -> Contacts:
+        """Several on one target, sorted by what touches it."""
+        joined = cls(*map(np.concatenate, zip(*parts, strict=True)))
+        return joined.rows(np.argsort(joined.others, kind="stable"))
+
+
+def first_rows(*sorted_ids: NDArray) -> Ints:
+    """Where runs of equal ids, or of equal pairs of ids, begin."""
+    begins = np.ones(len(sorted_ids[0]), dtype=np.bool_)
+    begins[1:] = False
+    for ids in sorted_ids:
+        begins[1:] |= ids[1:] != ids[:-1]
+    return begins.nonzero()[0]
+
+
+def by_target(targets: Ints, contacts: Contacts) -> dict[int, Contacts]:
+    """Contacts by target, from those on all targets, [k], sorted by these."""
+    if len(targets) and targets[0] == targets[-1]:
+        return {int(targets[0]): contacts}
+    starts = first_rows(targets)
+    bounds = [*starts.tolist(), len(targets)]
+    return {target: contacts.rows(slice(*bounds[i : i + 2])) for i, target in enumerate(targets[starts].tolist())}
+
+
+class PairRows(NamedTuple):
+    """MuJoCo's contacts that bear on targets, sorted by target and other; where two targets touch, one for each.
 
     Attributes
     ----------
-    targets : int64 [t]
-        Geom ids.
-    starts : int64 [t + 1]
-        The pairs of targets[i] are those from starts[i] to starts[i + 1].
-    """
-
-    targets: Ints
-    starts: Ints
-    others: Ints
-    begins: Ints
-    points: Floats
-    forces: Floats
-    normals: Floats
-
-    def by_target(self) -> dict[int, TargetContacts]:
-        """Split by target, in ascending order of their geom ids."""
-        targets, starts, others, begins, points, forces, normals = self
-        return {
-            target: TargetContacts(target, others[a:b], begins[a : b + 1], points, forces, normals)
-            for target, (a, b) in zip(targets.tolist(), pairwise(starts.tolist()), strict=True)
-        }
-
-
-class Pairs(NamedTuple):
-    """MuJoCo's contacts grouped by (target, other), in ascending order, and in MuJoCo's order within a pair.
-
-    Attributes
-    ----------
-    targets, others : int64 [p]
-        Collider ids.
-    begins : int64 [p + 1]
-        Pair i has the rows from begins[i] to begins[i + 1].
     contacts : int64 [k]
-        Indices among MuJoCo's contacts. Where two targets touch, a contact is there for each of them.
+        Indices among MuJoCo's contacts.
     sides : int64 [k]
         0 where the target is the first geom of the contact, 1 where it is the second.
+    targets, others : int64 [k]
+        Collider ids.
     """
 
-    targets: Ints
-    others: Ints
-    begins: Ints
     contacts: Ints
     sides: Ints
+    targets: Ints
+    others: Ints
 
 
-def contiguous(*fields: NDArray) -> Iterator[NDArray]:
-    """Arrays of MuJoCo's contacts as kernels take them.
-
-    One contact alone is an array of another layout than several: kernels would be compiled for each.
-    """
-    return map(np.ascontiguousarray, fields)
-
-
-@kernel
-def group_by_pair(colliders: Ints, address: Ints32, is_target: Bools) -> Pairs:
-    """Group the contacts that bear on targets.
+def pair_rows(colliders: NDArray[np.integer], bears: Bools, is_target: Bools) -> PairRows:
+    """Find the contacts that bear on targets.
 
     Parameters
     ----------
-    colliders : int64 [ncon, 2]
+    colliders : int [ncon, 2]
         Collider ids, -1 for what is none.
-    address : int32 [ncon]
-        Their rows in the constraint solver. A contact without one (excluded, or in the margin only) carries no force.
+    bears : bool [ncon]
+        Whether a contact carries a force: one without a row in the constraint solver (excluded, or in the margin only)
+        does not.
     is_target : bool [c]
     """
-    count = 0
-    for i in range(len(colliders)):
-        for side in range(2):
-            if _bears(colliders, address, is_target, i, side):
-                count += 1
-    order = np.empty(count, np.int64)
-    count = 0
-    for i in range(len(colliders)):
-        for side in range(2):
-            if _bears(colliders, address, is_target, i, side):
-                order[count] = 2 * i + side
-                count += 1
-    order = _sorted_by(_sorted_by(order, colliders, 1, len(is_target)), colliders, 0, len(is_target))
-    pairs = 0
-    for j in range(count):
-        if j == 0 or not _same_pair(order[j - 1], order[j], colliders):
-            pairs += 1
-    targets, others, begins = np.empty(pairs, np.int64), np.empty(pairs, np.int64), np.empty(pairs + 1, np.int64)
-    contacts, sides = np.empty(count, np.int64), np.empty(count, np.int64)
-    pairs = 0
-    for j in range(count):
-        contacts[j], sides[j] = order[j] // 2, order[j] % 2
-        if j == 0 or not _same_pair(order[j - 1], order[j], colliders):
-            targets[pairs], others[pairs] = _collider(order[j], colliders, 0), _collider(order[j], colliders, 1)
-            begins[pairs] = j
-            pairs += 1
-    begins[pairs] = count
-    return Pairs(targets, others, begins, contacts, sides)
+    # the two sides of a contact stand together: of row i the other is i ^ 1
+    both = colliders.astype(np.int64).ravel()
+    rows = np.flatnonzero(is_target[both] & np.repeat(bears, 2))
+    targets, others = both[rows], both[rows ^ 1]
+    order = np.lexsort((others, targets))
+    order = order[np.minimum(targets, others)[order] >= 0]
+    rows = rows[order]
+    return PairRows(rows >> 1, rows & 1, targets[order], others[order])
 
 
-# In these kernels there are loops only: slices, sorts and expressions of arrays take many times longer to compile.
-@kernel
-def _bears(colliders: Ints, address: Ints32, is_target: Bools, i: int, side: int) -> bool:
-    """Whether contact i bears on the target that is its side."""
-    return address[i] >= 0 and min(colliders[i, 0], colliders[i, 1]) >= 0 and is_target[colliders[i, side]]
+def normal_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Floats:
+    """Normal forces of some contacts [N], as `mj_contactForce` gives them; 0 without a row in the constraint solver."""
+    address, dim = data.contact.efc_address[contacts], data.contact.dim[contacts]
+    # the edges of a friction pyramid share the normal force among them
+    edges = np.maximum(2 * dim - 2, 1) if _is_pyramidal(model) else np.ones_like(dim)
+    return _edge_sums(data.efc_force, address, edges)
 
 
 @kernel
-def _collider(source: int, colliders: Ints, role: int) -> int:
-    """Target, role 0, or other, 1, of a contact i as seen from a side: source 2 i + side."""
-    return colliders[source // 2, (source + role) % 2]
+def _edge_sums(efc_force: Floats, address: Ints32, edges: Ints32) -> Floats:
+    """Sums of some forces from each address on, 0 where that is negative."""
+    sums = np.zeros(len(address))
+    for i in range(len(address)):
+        for k in range(edges[i] if address[i] >= 0 else 0):
+            sums[i] += efc_force[address[i] + k]
+    return sums
 
 
-@kernel
-def _same_pair(one: int, two: int, colliders: Ints) -> bool:
-    """Whether two sources have the same target and other."""
-    targets_agree = _collider(one, colliders, 0) == _collider(two, colliders, 0)
-    return targets_agree and _collider(one, colliders, 1) == _collider(two, colliders, 1)
+def friction_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Floats:
+    """Forces of some contacts, which have rows in the solver, along the other two axes of their frames [N], [k, 2]."""
+    each, axis = data.contact, np.arange(2)
+    address, friction = each.efc_address[contacts, None], each.friction[contacts, :2]
+    has_axis = each.dim[contacts, None] > axis + 1
+    if _is_pyramidal(model):
+        # each direction has two opposite edges of the pyramid: friction is their difference
+        edge = np.where(has_axis, address + 2 * axis, 0)
+        forces = friction * (data.efc_force[edge] - data.efc_force[np.where(has_axis, edge + 1, 0)])
+    else:
+        forces = data.efc_force[np.where(has_axis, address + 1 + axis, 0)]
+    return np.where(has_axis, forces, 0.0)
 
 
-@kernel
-def _sorted_by(sources: Ints, colliders: Ints, role: int, size: int) -> Ints:
-    """Sources sorted by their colliders in a role, by counting: those with the same one stay in their order."""
-    starts, found = np.zeros(size + 1, np.int64), np.empty(len(sources), np.int64)
-    for j in range(len(sources)):
-        starts[_collider(sources[j], colliders, role) + 1] += 1
-    for i in range(size):
-        starts[i + 1] += starts[i]
-    for j in range(len(sources)):
-        collider = _collider(sources[j], colliders, role)
-        found[starts[collider]] = sources[j]
-        starts[collider] += 1
-    return found
-
-
-@kernel
-def room_for(pairs: Pairs) -> PairContacts:
-    """Arrays for the contacts of all pairs, with a target for each pair."""
-    p, k = len(pairs.targets), len(pairs.contacts)
-    targets, starts, others = np.empty(p, np.int64), np.empty(p + 1, np.int64), np.empty(p, np.int64)
-    return PairContacts(
-        targets, starts, others, np.empty(p + 1, np.int64), np.empty((k, 3)), np.empty(k), np.empty((k, 3))
-    )
-
-
-@kernel
-def close(room: PairContacts, pairs: int, contacts: int) -> tuple[int, int, int]:
-    """Sum up the first pairs and contacts that were written to the arrays; how many targets they have, and they are."""
-    targets, count = room.targets, 0
-    for pair in range(pairs):
-        if count == 0 or targets[pair] != targets[count - 1]:
-            targets[count], room.starts[count] = targets[pair], pair
-            count += 1
-    room.starts[count], room.begins[pairs] = pairs, contacts
-    return count, pairs, contacts
-
-
-def trimmed(room: PairContacts, counts: tuple[int, int, int]) -> PairContacts:
-    """Arrays that were closed, cut to what is in them."""
-    targets, pairs, contacts = counts
-    return PairContacts(
-        room.targets[:targets],
-        room.starts[: targets + 1],
-        room.others[:pairs],
-        room.begins[: pairs + 1],
-        room.points[:contacts],
-        room.forces[:contacts],
-        room.normals[:contacts],
-    )
-
-
-PYRAMIDAL = int(mujoco.mjtCone.mjCONE_PYRAMIDAL)
-
-
-class _MujocoContacts(NamedTuple):
-    """MuJoCo's arrays of contacts, of the same names, forces of its constraint solver, and pulls; see `Adhesion`."""
-
-    efc_address: Ints32
-    dim: Ints32
-    frame: Floats
-    pos: Floats
-    dist: Floats
-    efc_force: Floats
-    pulls: Floats
+def _is_pyramidal(model: mujoco.MjModel) -> bool:
+    return bool(model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL)
 
 
 def geom_contacts(
     model: mujoco.MjModel,
     data: mujoco.MjData,
-    colliders: NDArray[np.int64],
-    is_target: NDArray[np.bool_],
-    extents: NDArray[np.float64],
-    pulls: NDArray[np.float64] | None = None,
-    has_flex: NDArray[np.bool_] | None = None,
-) -> dict[int, TargetContacts]:
+    colliders: NDArray[np.integer],
+    is_target: Bools,
+    extents: Floats,
+    pulls: Floats | None = None,
+    has_flex: Bools | None = None,
+) -> dict[int, Contacts]:
     """Contacts that load each target that is touched, by its geom id in ascending order.
 
     Where two targets touch, their contacts are reported for each of them. What sticks to a target and pulls more than
@@ -246,101 +165,253 @@ def geom_contacts(
     Parameters
     ----------
     model, data
-    colliders : int64 [ncon, 2]
+    colliders : int [ncon, 2]
         Collider ids of each contact, see `CoupledModel`.
     is_target : bool [c]
         By collider id.
     extents : float64 [c]
         Smallest half-extents [m].
     pulls : float64 [ncon], optional
-        Of the contacts [N]; see `Adhesion`.
+        Of the contacts [N]; see `adhesion`.
     has_flex : bool [c], optional
         By collider id, whether it collides through a flex. Its triangles push sideways in pairs: the contacts of such a
         pair add up to the sum of their vectors, as for the flex; see `FlexContacts`.
     """
-    if not data.ncon:
-        return {}
     each = data.contact
-    pulls = np.zeros(data.ncon) if pulls is None else pulls
-    fields = (each.efc_address, each.dim, each.frame, each.pos, each.dist, data.efc_force, pulls)
-    contacts = _MujocoContacts(*contiguous(*fields))
-    has_flex = np.zeros(len(is_target), dtype=np.bool_) if has_flex is None else has_flex
-    pyramidal = model.opt.cone == PYRAMIDAL
-    return trimmed(*_normal_contacts(colliders, contacts, is_target, has_flex, extents, pyramidal)).by_target()
+    bears = each.efc_address >= 0
+    if pulls is not None:
+        bears |= pulls > 0  # those within the gap pull without a row in the constraint solver
+    rows = pair_rows(colliders, bears, is_target)
+    if not len(rows.contacts):
+        return {}
+    forces = normal_forces(model, data, rows.contacts)
+    if pulls is not None:
+        forces += pulls[rows.contacts]
+    if not (forces > 0).all():
+        rows, forces = PairRows(*(each[forces > 0] for each in rows)), forces[forces > 0]
+    contacts, sides, targets, others = rows
+    normals = each.frame[contacts, :3] * (1.0 - 2.0 * sides)[:, None]
+    # an overlap deeper than a geom is not real: a speculative contact's `dist` only says how hard to stop
+    depths = np.minimum(np.abs(each.dist[contacts]), np.minimum(extents[targets], extents[others]))
+    # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's surface is dist/2
+    # away. A little outside it the nearest surface point is on this side, even of a thin part.
+    points = each.pos[contacts] + 1.5 * depths[:, None] * normals
+    found = Contacts(others, points, forces, normals)
+    if pulls is not None or (has_flex is not None and has_flex[others].any()):
+        factors = _pair_factors(rows, forces, normals, pulls, has_flex)
+        found = found._replace(forces=factors * forces).rows(factors != 0)
+        targets = targets[factors != 0]
+    return by_target(targets, found)
+
+
+def _pair_factors(
+    rows: PairRows, forces: Floats, normals: Floats, pulls: Floats | None, has_flex: Bools | None
+) -> Floats:
+    """Factors [k] that make the forces of a pair add up to what it bears: without pulls, and as vectors with a flex."""
+    starts = first_rows(rows.targets, rows.others)
+    whole = np.add.reduceat(forces, starts)
+    factors = np.ones(len(starts))
+    if pulls is not None:
+        factors -= 2 * np.add.reduceat(pulls[rows.contacts], starts) / whole
+    if has_flex is not None:
+        sums = np.linalg.norm(np.add.reduceat(forces[:, None] * normals, starts), axis=1)
+        factors *= np.where(has_flex[rows.others[starts]], sums / whole, 1.0)
+    return np.repeat(factors, np.diff(np.append(starts, len(forces))))
+
+
+# MuJoCo's marks of contacts that pull though they do not push: all right, or within the gap.
+_FORCE, _GAP = 0, 1
+
+
+def adhesion(model: mujoco.MjModel, data: mujoco.MjData) -> Floats | None:
+    """Pull of every contact [N], [ncon], by sticky geoms and adhesion actuators; None where nothing pulls.
+
+    MuJoCo's constraint solver holds geoms apart against the pull, so that its forces contain it: what a target receives
+    is their difference. An actuator shares its force among all contacts of its body, and also those within the gap.
+    """
+    actuators = np.flatnonzero(model.actuator_trntype == mujoco.mjtTrn.mjTRN_BODY).tolist() if model.nu else []
+    if not (model.flg_adhesion or actuators):
+        return None
+    contacts = data.contact
+    pulls = contacts.adhesion.copy()
+    if actuators:
+        bodies = np.where(contacts.geom >= 0, model.geom_bodyid[contacts.geom], -1)
+        bodies[(bodies < 0).any(axis=1) | ~np.isin(contacts.exclude, (_FORCE, _GAP))] = -1
+        for actuator in actuators:
+            on_body = (bodies == model.actuator_trnid[actuator, 0]).any(axis=1)
+            pulls[on_body] += data.actuator_force[model.actuator_outadr[actuator]] / max(on_body.sum(), 1)
+    return pulls
+
+
+class ColliderIds:
+    """Collider ids of the two sides of every contact, see `CoupledModel`.
+
+    Parameters
+    ----------
+    coupled : CoupledModel
+    """
+
+    def __init__(self, coupled: CoupledModel) -> None:
+        self._model = model = coupled.model
+        self._plain = not (model.nflex or coupled.convex_colliders or coupled.soft)
+        self._of_geom = np.arange(model.ngeom)
+        # geom that a flex collides for, or itself where it is a target; -1 for none, and after the last flex
+        self._of_flex = np.full(model.nflex + 1, -1)
+        for geom, parts in coupled.convex_colliders.items():
+            self._of_geom[parts] = geom
+        for geom, flex in coupled.flex_colliders.items():
+            self._of_flex[flex] = geom
+        for target, surface in coupled.soft.items():
+            self._of_geom[surface.geoms] = target
+            if surface.flex >= 0:
+                self._of_flex[surface.flex] = target
+
+    def __call__(self, data: mujoco.MjData) -> NDArray[np.integer]:
+        """Collider ids, [ncon, 2]; of a contact with an element of a flex, of the vertex nearest to the contact."""
+        geom = data.contact.geom
+        if self._plain:
+            return geom
+        flex = data.contact.flex
+        found = np.where(geom >= 0, self._of_geom[geom], self._of_flex[flex])
+        contact, side = np.nonzero((geom < 0) & (found < 0))
+        if len(contact):
+            flex, vertex = flex[contact, side], data.contact.vert[contact, side].astype(np.int64)
+            of_element = vertex < 0
+            vertex[of_element] = self._nearest_vertices(data, contact[of_element], side[of_element])
+            found[contact, side] = self._model.ngeom + self._model.flex_vertadr[flex] + vertex
+        found[found[:, 0] == found[:, 1]] = -1  # what is soft touches itself
+        return found
+
+    def _nearest_vertices(self, data: mujoco.MjData, contact: Ints, side: Ints) -> Ints:
+        """Vertices of the contacts' elements, counted from the first of their flex, that are nearest to them, [k]."""
+        model, flex, element = self._model, data.contact.flex[contact, side], data.contact.elem[contact, side]
+        dim = model.flex_dim[flex]
+        # the last corner of an element stands for those that it has not
+        corner = np.minimum(np.arange(4), dim[:, None])
+        vertices = model.flex_elem[(model.flex_elemdataadr[flex] + (dim + 1) * element)[:, None] + corner]
+        places = data.flexvert_xpos[model.flex_vertadr[flex, None] + vertices]
+        distances = np.linalg.norm(places - data.contact.pos[contact, None], axis=2)
+        return vertices[np.arange(len(vertices)), distances.argmin(axis=1)]
+
+
+# Cosine between the normals of a contact and of the surface, above which the surface faces the contact.
+_FACING = 0.25
+
+
+def places_facing(atlas: Atlas, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Surface points [m], [k, 3], nearest to contact points among those that face the contacts.
+
+    The other side of a thin part may be nearer. Where no part of the surface faces a contact, it is the nearest point.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    points : float64 [k, 3]
+        In the frame of the target [m].
+    normals : float64 [k, 3]
+        From the target to the other geom, unit vectors.
+    """
+    found, texels = atlas.nearest(points)
+    outward = atlas.normals.reshape(-1, 3)
+    away = np.flatnonzero(np.einsum("ij,ij->i", outward[texels], normals) <= _FACING)
+    if len(away):
+        positions = atlas.positions.reshape(-1, 3)
+        facing = _nearest_facing(positions, outward, points[away], normals[away])
+        found[away[facing >= 0]] = positions[facing[facing >= 0]]
+    return found
 
 
 @kernel
-def _normal_contacts(
-    colliders: Ints, contacts: _MujocoContacts, is_target: Bools, has_flex: Bools, extents: Floats, pyramidal: bool
-) -> tuple[PairContacts, tuple[int, int, int]]:
-    """Contacts that push or pull, and how many; pairs without one are left out."""
-    address = contacts.efc_address.copy()
-    for i in range(len(address)):
-        # those within the gap pull without a row in the constraint solver
-        if contacts.pulls[i] > 0:
-            address[i] = 0
-    pairs = group_by_pair(colliders, address, is_target)
-    found, found_pairs, row = room_for(pairs), 0, 0
-    for pair in range(len(pairs.targets)):
-        first, pull, whole = row, 0.0, 0.0
-        for j in range(pairs.begins[pair], pairs.begins[pair + 1]):
-            i, frame = pairs.contacts[j], contacts.frame
-            force = _normal_force(contacts, i, pyramidal) + contacts.pulls[i]
-            if not force > 0:
-                continue
-            found.forces[row] = force
-            pull, whole = pull + 2 * contacts.pulls[i], whole + force
-            # an overlap deeper than a geom is not real: a speculative contact's `dist` only says how hard to stop
-            depth = min(abs(contacts.dist[i]), extents[pairs.targets[pair]], extents[pairs.others[pair]])
+def _nearest_facing(positions: Floats, outward: Floats, points: Floats, normals: Floats) -> Ints:
+    """Nearest texel to each point, [k], whose normal agrees with the point's; -1 where none does."""
+    found = np.full(len(points), -1)
+    for i in range(len(points)):
+        least = np.inf
+        for texel in range(len(positions)):
+            distance2, along = 0.0, 0.0
             for k in range(3):
-                # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's surface is
-                # dist/2 away. A little outside it the nearest surface point is on this side, even of a thin part.
-                normal = -frame[i, k] if pairs.sides[j] else frame[i, k]
-                found.normals[row, k] = normal
-                found.points[row, k] = contacts.pos[i, k] + 1.5 * depth * normal
-            row += 1
-        if pull > 0:
-            # the pair's own force, shared among its contacts by how much they bear
-            _multiply(found.forces, first, row, (whole - pull) / whole)
-        if has_flex[pairs.others[pair]] and row > first and pull != whole:
-            _multiply(found.forces, first, row, _unity(found.forces, found.normals, first, row))
-        if row > first and pull != whole:
-            found.targets[found_pairs], found.others[found_pairs] = pairs.targets[pair], pairs.others[pair]
-            found.begins[found_pairs] = first
-            found_pairs += 1
+                distance2 += (positions[texel, k] - points[i, k]) ** 2
+                along += outward[texel, k] * normals[i, k]
+            if distance2 < least and along > _FACING:
+                least, found[i] = distance2, texel
+    return found
+
+
+class ContactReader:
+    """Reads the contacts on each target from MuJoCo's data.
+
+    Parameters
+    ----------
+    coupled : CoupledModel
+    atlases : mapping
+        Geom id of every target to its atlas, in the geom's frame [m].
+    """
+
+    def __init__(self, coupled: CoupledModel, atlases: Mapping[int, Atlas]) -> None:
+        self._coupled = coupled
+        self._atlases = {target: atlas for target, atlas in atlases.items() if target not in coupled.soft}
+        # the targets of the geoms that collide for others, or through their convex parts
+        self._targets_of: dict[int, list[int]] = {}
+        for target in self._atlases:
+            for geom in coupled.collision_geoms(target):
+                if geom != target or geom in coupled.convex_colliders:
+                    self._targets_of.setdefault(geom, []).append(target)
+        meshes = {target: atlas.mesh for target, atlas in self._atlases.items()}
+        for geom in coupled.flex_colliders.keys() & self._targets_of.keys():
+            meshes[geom] = target_mesh(coupled.model, geom)
+        self._colliders = ColliderIds(coupled)
+        count = len(coupled.owners)
+        self._is_read, self._has_flex = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+        self._is_read[[*meshes, *self._targets_of, *coupled.soft]] = True
+        self._has_flex[list(coupled.flex_colliders)] = True
+        self._check_solver = SolverBalance(coupled)
+        self._flexes = FlexContacts(coupled, meshes) if coupled.flex_colliders else None
+        if self._flexes is not None:
+            self._is_read[self._flexes.is_target] = False
+
+    def read(self, data: mujoco.MjData) -> dict[int, Contacts]:
+        """Contacts of each target that is touched, by geom id."""
+        if not data.ncon:
+            found: dict[int, Contacts] = {}
         else:
-            row = first
-    return found, close(found, found_pairs, row)
+            model, extents, colliders = self._coupled.model, self._coupled.extents, self._colliders(data)
+            has_flex = None if self._flexes is None else self._has_flex
+            found = geom_contacts(model, data, colliders, self._is_read, extents, adhesion(model, data), has_flex)
+            if self._flexes is not None:
+                found |= self._flex_contacts(self._flexes, data, colliders)
+            if self._targets_of.keys() & found.keys():
+                self._hand_over(data, found)
+        self._check_solver(data, found)
+        return found
 
+    def _flex_contacts(
+        self, flexes: FlexContacts, data: mujoco.MjData, colliders: NDArray[np.integer]
+    ) -> dict[int, Contacts]:
+        """The same of targets with a flex collider."""
+        model = self._coupled.model
+        rows = pair_rows(colliders, data.contact.efc_address >= 0, flexes.is_target)
+        if not len(rows.contacts):
+            return {}
+        normal, friction = (read(model, data, rows.contacts) for read in (normal_forces, friction_forces))
+        forces = np.column_stack([normal - data.contact.adhesion[rows.contacts], friction])
+        kept, *loads = flexes.loads(data, *rows, first_rows(rows.targets, rows.others), forces)
+        return by_target(rows.targets[kept], Contacts(rows.others[kept], *loads))
 
-@kernel
-def _multiply(forces: Floats, first: int, last: int, factor: float) -> None:
-    """Multiply the forces from `first` to `last`."""
-    for i in range(first, last):
-        forces[i] *= factor
+    def _hand_over(self, data: mujoco.MjData, found: dict[int, Contacts]) -> None:
+        """Hand every contact of a collision geom to one target: where several share the geom, to the nearest."""
+        theirs = {geom: found.pop(geom) for geom in sorted(self._targets_of.keys() & found.keys())}
+        for geom, contacts in theirs.items():
+            targets = self._targets_of[geom]
+            placed = np.array([self._places(data, target, contacts) for target in targets])
+            nearest = np.linalg.norm(placed - contacts.points, axis=2).argmin(axis=0)
+            for i, target in enumerate(targets):
+                if (nearest == i).any():
+                    own = [found[target]] if target in found else []
+                    mine = contacts._replace(points=placed[i]).rows(nearest == i)
+                    found[target] = Contacts.together([*own, mine])
 
-
-@kernel
-def _unity(forces: Floats, normals: Floats, first: int, last: int) -> float:
-    """Amount of the sum of forces from `first` to `last` along normals, over the sum of their amounts."""
-    whole, square = 0.0, 0.0
-    for i in range(first, last):
-        whole += forces[i]
-    for k in range(3):
-        along = 0.0
-        for i in range(first, last):
-            along += forces[i] * normals[i, k]
-        square += along**2
-    return np.sqrt(square) / abs(whole)
-
-
-@kernel
-def _normal_force(contacts: _MujocoContacts, i: int, pyramidal: bool) -> float:
-    """Normal force of a contact [N]."""
-    address, dim, force = contacts.efc_address[i], contacts.dim[i], 0.0
-    if address < 0:
-        return force
-    # the edges of a friction pyramid share the normal force among them
-    for edge in range(2 * (dim - 1) if pyramidal and dim > 1 else 1):
-        force += contacts.efc_force[address + edge]
-    return force
+    def _places(self, data: mujoco.MjData, target: int, contacts: Contacts) -> Floats:
+        """Places of contacts on a target in the world [m], [k, 3]."""
+        position, rotation = data.geom_xpos[target], data.geom_xmat[target].reshape(3, 3)
+        points, normals = (contacts.points - position) @ rotation, contacts.normals @ rotation
+        return position + places_facing(self._atlases[target], points, normals) @ rotation.T

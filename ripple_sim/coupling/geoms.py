@@ -1,8 +1,7 @@
-"""Geoms of a MuJoCo model: what they are called, and which of them can ripple.
+"""Geoms of a MuJoCo model as a user names them, and the checks of what is given to `Ripples`.
 
-What a user gives to `Ripples`: checked, and taken out of other libraries' wrappers.
-
-Collision geoms: those that collide in place of a target, as models of robots have them.
+What geoms are called and which can ripple; models and data, also in other libraries' wrappers, and whether they belong
+together; arguments by geom; and collision geoms, which collide in place of a target, as models of robots have them.
 """
 
 from __future__ import annotations

@@ -1,63 +1,24 @@
 """`CoupledModel`: what a MuJoCo model says about what collides, computed once and shared by all steps.
 
-The contacts of bodies that sleep from the beginning, as MuJoCo would find them if it held the bodies still.
-
-Which geoms and flexes MuJoCo lets touch each other.
-
-Convex colliders: geoms that collide as the convex parts of a mesh geom, in its place.
-
-Flex colliders: rigid flexes through which mesh geoms collide.
-
-Soft flexes as colliders: each of their vertices touches for itself.
-
-The contacts of sleeping bodies, which MuJoCo does not report.
+Which geoms and flexes MuJoCo lets touch each other (`ContactMasks`), and what collides in place of a mesh geom: geoms
+of its convex parts (convex colliders), or a rigid flex of its triangles (flex collider). Of a soft flex each vertex
+touches for itself.
 """
 
 from __future__ import annotations
 
-import collections
-import copy
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver.kernel import Floats
-
-from .contacts import TargetContacts
 from .geoms import find_collision_geoms, geom_name
 from .soft import SoftSurface, is_soft, soft_names
 
-_SLEEP, _STATE = int(mujoco.mjtEnableBit.mjENBL_SLEEP), int(mujoco.mjtState.mjSTATE_INTEGRATION)
-
-# Contacts of these parameters have no spring, and a share of nearly 1 in what holds bodies: their forces are those of
-# statics, however deep the bodies lie in each other.
-_NO_SPRING, _RIGID = (1e6, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
-# Geoms that are apart by this share of the smaller one's size are meant to touch.
-_NEAR = 1e-3
-
-
-def at_rest(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData | None:
-    """Data with the contacts of all bodies as they lie, all awake and at rest; None where none of them sleeps."""
-    if not model.opt.enableflags & _SLEEP or (data.tree_asleep < 0).all():
-        return None
-    still = copy.copy(model)
-    still.opt.enableflags &= ~_SLEEP
-    for kind in ("geom", "pair", "flex"):
-        getattr(still, f"{kind}_solref")[:] = _NO_SPRING
-        getattr(still, f"{kind}_solimp")[:] = _RIGID
-    # planes, which have no end, are given a radius of 0
-    still.geom_margin += _NEAR * np.minimum(still.geom_aabb[:, 3:].min(axis=1), still.geom_rbound)
-    state = np.empty(mujoco.mj_stateSize(model, _STATE))
-    mujoco.mj_getState(model, data, state, _STATE)
-    resting = mujoco.MjData(still)
-    mujoco.mj_setState(still, resting, state, _STATE)
-    resting.qvel[:], resting.qacc_warmstart[:] = 0.0, 0.0
-    mujoco.mj_forward(still, resting)
-    return resting
+# The flag that enables MuJoCo's speculative contacts, which it has from version 4 on; 0 before.
+SPECULATIVE = int(getattr(mujoco.mjtEnableBit, "mjENBL_SPECULATIVE", 0))
 
 
 class ContactMasks:
@@ -160,11 +121,6 @@ def find_flex_colliders(model: mujoco.MjModel) -> dict[int, int]:
 def flex_thickness(model: mujoco.MjModel, flex: int) -> float:
     """Distance from its triangles at which a flex holds other geoms off [m]."""
     return float(model.flex_margin[flex] + model.flex_radius[flex])
-
-
-def flex_name(model: mujoco.MjModel, flex: int) -> str:
-    """Name of a flex, or "flex <id>"."""
-    return mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex) or f"flex {flex}"
 
 
 def vertex_flexes(model: mujoco.MjModel) -> NDArray[np.int64]:
@@ -285,87 +241,3 @@ class CoupledModel:
     def can_collide(self, geom: int) -> NDArray[np.bool_]:
         """The same on bodies that are not welded to that of this geom."""
         return self.masks_match(geom) & self.masks.apart(geom)
-
-
-_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
-# A body falls asleep after it was slow for this many steps: `mjMINAWAKE` of MuJoCo.
-_SLOW_STEPS = 10
-
-
-class _Pair(NamedTuple):
-    """The latest contacts of a collider with a target, and their summed forces in the latest steps [N]."""
-
-    points: Floats
-    forces: Floats
-    normals: Floats
-    sums: collections.deque[float]
-
-
-class SleepingContacts:
-    """Holds the contacts of bodies that sleep on a target that sleeps too or is static.
-
-    A sleeping body still presses on what it lies on. Its contacts stay where they were, with their mean force over the
-    steps before it fell asleep, until one of the two wakes.
-
-    Parameters
-    ----------
-    coupled : CoupledModel
-    """
-
-    def __init__(self, coupled: CoupledModel) -> None:
-        self._coupled = coupled
-        self._pairs: dict[tuple[int, int], _Pair] = {}
-
-    def add(self, data: mujoco.MjData, contacts: dict[int, TargetContacts]) -> dict[int, TargetContacts]:
-        """Contacts of each target, by geom id, with those of sleeping bodies."""
-        if not self._coupled.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
-            return contacts
-        present = {(target, pair[0]): pair for target, each in contacts.items() for pair in _split(each)}
-        held: dict[int, list[tuple[int, Floats, Floats, Floats]]] = {}
-        for key, pair in list(self._pairs.items()):
-            if key in present:
-                continue
-            if self._sleeps(data, *key):
-                share = sum(pair.sums) / len(pair.sums) / pair.forces.sum()
-                held.setdefault(key[0], []).append((key[1], pair.points, share * pair.forces, pair.normals))
-            else:
-                pair.sums.append(0.0)
-                if not any(pair.sums):
-                    del self._pairs[key]
-        for key, (_, points, forces, normals) in present.items():
-            sums = self._pairs[key].sums if key in self._pairs else collections.deque(maxlen=_SLOW_STEPS)
-            sums.append(float(forces.sum()))
-            self._pairs[key] = _Pair(points, forces, normals, sums)
-        if not held:
-            return contacts
-        return {
-            target: _joined(target, [*(_split(contacts[target]) if target in contacts else ()), *held.get(target, ())])
-            for target in sorted(contacts.keys() | held.keys())
-        }
-
-    def _sleeps(self, data: mujoco.MjData, target: int, other: int) -> bool:
-        """Whether neither of a pair is awake: each sleeps or is static. Vertices between bodies never sleep."""
-        bodies = self._coupled.bodies[[target, other]]
-        return bool((bodies >= 0).all() and (data.body_awake[bodies] != _AWAKE).all())
-
-
-def _split(contacts: TargetContacts) -> list[tuple[int, Floats, Floats, Floats]]:
-    """Collider id, points, forces and normals of each pair."""
-    begins = contacts.begins.tolist()
-    return [
-        (other, contacts.points[a:b], contacts.forces[a:b], contacts.normals[a:b])
-        for other, a, b in zip(contacts.others.tolist(), begins, begins[1:], strict=False)
-    ]
-
-
-def _joined(target: int, pairs: list[tuple[int, Floats, Floats, Floats]]) -> TargetContacts:
-    """The opposite of `_split`."""
-    others, points, forces, normals = zip(*sorted(pairs, key=lambda pair: pair[0]), strict=True)
-    return TargetContacts(
-        target=target,
-        others=np.array(others),
-        begins=np.cumsum([0, *map(len, forces)]),
-        points=np.concatenate(points),
-        forces=np.concatenate(forces),
-        normals=np.concatenate(normals),
-    )

@@ -7,8 +7,6 @@ while nothing changes, and is short where force or place do.
 A contact that chatters is the exception: its force is averaged over some periods too. The deficit [N s] is what the
 surface has yet to receive, so that nothing is lost.
 
-The contact of one geom with a target over time: how long nothing has changed, and whether it chatters.
-
 A geom on stiff, springy contacts chatters: contact opens for a step and closes again, at the natural frequency of the
 contact's spring, and the force jumps between nothing and twice the weight.
 """
@@ -19,9 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ripple_sim.solver.kernel import Floats, Ints, kernel
-
-from .footprints import MeanShares, TexelForces
+from ripple_sim.solver import Load
+from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
+from ripple_sim.solver.waves.load import slot_scratch
 
 # A first hit is over within this time [s]; until then nothing is averaged.
 _ONSET = 0.1
@@ -40,6 +38,8 @@ _PLACE_MEMORY, _JITTER_MEMORY, _FOLLOWS_WITHIN = 0.05, 0.5, 0.006
 # A contact moves where it is farther from its mean place than so many times its jitter, but not less or more than these
 # shares of the place's radius; a springy one, where it is farther than the latter.
 _JITTERS, _LEAST_MOVE, _MOST_MOVE = 4.0, 0.1, 0.6
+# Shares below this are dropped from a mean.
+_LEAST_SHARE = 1e-6
 _TINY = np.finfo(np.float64).tiny
 
 CONTACT_STATE = np.dtype(
@@ -58,28 +58,158 @@ CONTACT_STATE = np.dtype(
         ("place", np.float64, 3),  # where it is [m]
         ("mean_place", np.float64, 3),  # [m]
         ("jitter", np.float64),  # mean distance of its contact points from its place [m]
-        ("first", np.int64),  # its texels among the `MeanShares`
+        ("first", np.int64),  # its texels among the mean shares
         ("last", np.int64),
     ]
 )
 
 
+class TexelForces(NamedTuple):
+    """Contact forces on the texels of a target in one step, geom by geom.
+
+    Attributes
+    ----------
+    geoms : int64 [p]
+        Geom ids, ascending.
+    middles : float64 [p, 3]
+        Force-weighted contact points [m].
+    place_radii : float64 [p]
+        A geom has left its place where its contact point has moved by more than this [m].
+    begins : int64 [p + 1]
+        The texels of geom i are those from begins[i] to begins[i + 1].
+    texels : int64 [k]
+        Flat texel indices.
+    forces : float64 [k]
+        [N].
+    """
+
+    geoms: Ints
+    middles: Floats
+    place_radii: Floats
+    begins: Ints
+    texels: Ints
+    forces: Floats
+
+
+NO_FORCES = TexelForces(
+    np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0)
+)
+
+
+class RestFilter:
+    """Filters the contact forces on one target.
+
+    Parameters
+    ----------
+    geoms, texels : int
+        How many there are.
+    """
+
+    def __init__(self, geoms: int, texels: int) -> None:
+        self._states = np.zeros(geoms, CONTACT_STATE)
+        # texels under the geoms, and the mean share of each in the force of its geom; those of a geom add up to 1
+        self._texels, self._shares = np.zeros(0, np.int64), np.zeros(0)
+        self._size, self._is_over = texels, True
+
+    @property
+    def active(self) -> Bools:
+        """Geoms that touch, have lost touch only now, or have yet to give an impulse, [c]."""
+        return np.asarray(self._states["active"])
+
+    def forget_places(self) -> None:
+        """Begin to average anew, as where other texels carry loads than before."""
+        self._states["memory"] = 0.0
+
+    def __call__(self, present: TexelForces, dt: float) -> Load:
+        """Load over a time step [s] in which these forces act."""
+        if self._is_over and not len(present.geoms):
+            return Load.none()
+        self._texels, self._shares, forces, self._is_over = _filtered(
+            self._states, self._texels, self._shares, present, dt, slot_scratch(self._size)
+        )
+        return Load(self._texels, forces)
+
+
 @kernel
-def has_left(state: Any, dt: float) -> bool:
+def _filtered(
+    states: np.ndarray, texels: Ints, shares: Floats, present: TexelForces, dt: float, slots: Ints
+) -> tuple[Ints, Floats, Floats, bool]:
+    """Texels under the geoms, their new mean shares, the forces on them [N], and whether all geoms have left.
+
+    Parameters
+    ----------
+    states : CONTACT_STATE [ngeom]
+        Updated.
+    texels, shares
+        Those of the step before.
+    present : TexelForces
+    dt : float
+        Time step [s].
+    slots : int64 [C n n]
+        See `slot_scratch`.
+    """
+    size = len(texels) + len(present.texels)
+    under, mean, given = np.empty(size, np.int64), np.empty(size), np.empty(size)
+    at, forces = present.texels, present.forces
+    end, row, over = 0, 0, True
+    for geom in range(len(states)):
+        state, begin, force, first, last = states[geom], end, 0.0, 0, 0
+        if row < len(present.geoms) and present.geoms[row] == geom:
+            first, last = present.begins[row], present.begins[row + 1]
+            row += 1
+        for i in range(first, last):
+            force += forces[i]
+        if force != 0:
+            side = 1.0 if force > 0 else -1.0
+            if state.side != side:
+                # what the target has not received yet stays as it is
+                state.side, state.deficit = side, -state.deficit
+            total = side * _touch(state, abs(force), present.middles[row - 1], present.place_radii[row - 1], dt)
+            weight, whole = dt / (dt + state.memory) if state.first < state.last else 1.0, 0.0
+            if weight < 1:
+                for i in range(state.first, state.last):
+                    if shares[i] > _LEAST_SHARE:
+                        whole += shares[i]
+                fading = (1 - weight) / whole
+                for i in range(state.first, state.last):
+                    if shares[i] > _LEAST_SHARE:
+                        under[end], mean[end], given[end] = texels[i], fading * shares[i], 0.0
+                        slots[texels[i]] = end
+                        end += 1
+            for i in range(first, last):
+                slot = slots[at[i]]
+                if slot < 0:
+                    slot = slots[at[i]] = end
+                    under[end], mean[end], given[end] = at[i], 0.0, 0.0
+                    end += 1
+                mean[slot] += weight * (forces[i] / force)
+                given[slot] += forces[i] / force
+            for i in range(begin, end):
+                slots[under[i]] = -1
+            state.active = True
+            steady = side * min(state.mean, side * total)
+        elif state.active:
+            total = steady = state.side * _miss(state, dt)
+            for i in range(state.first, state.last):
+                under[end], mean[end], given[end] = texels[i], shares[i], 0.0
+                end += 1
+        else:
+            continue
+        over = over and not state.active
+        state.first, state.last = begin, end
+        for i in range(begin, end):
+            given[i] = steady * mean[i] + (total - steady) * given[i]
+    return under[:end], mean[:end], given[:end], over
+
+
+@kernel
+def _has_left(state: Any, dt: float) -> bool:
     """Whether a geom is gone, and not open for a moment only."""
     return state.absent > max(_LEFT, 1.5 * dt)
 
 
 @kernel
-def turn(state: Any, side: float) -> None:
-    """Follow a geom that pushes inwards, 1, or outwards, -1: what the target has not received yet stays as it is."""
-    if state.side != side:
-        state.deficit = -state.deficit
-        state.side = side
-
-
-@kernel
-def touch(state: Any, force: float, middle: Floats, place_radius: float, dt: float) -> float:
+def _touch(state: Any, force: float, middle: Floats, place_radius: float, dt: float) -> float:
     """Follow a contact for a step; force that the target gets [N].
 
     Parameters
@@ -94,7 +224,7 @@ def touch(state: Any, force: float, middle: Floats, place_radius: float, dt: flo
     dt : float
         [s].
     """
-    if not state.active or has_left(state, dt):
+    if not state.active or _has_left(state, dt):
         state.age, state.unbroken, state.level, state.mean = 0.0, 0.0, force, force
         state.chatters, state.springy = False, False
         state.jitter = place_radius
@@ -116,15 +246,15 @@ def touch(state: Any, force: float, middle: Floats, place_radius: float, dt: flo
 
 
 @kernel
-def miss(state: Any, dt: float) -> float:
+def _miss(state: Any, dt: float) -> float:
     """Follow a contact for a step without touch; force that the target gets [N]."""
     state.absent += dt
     state.unbroken += dt
     state.level -= dt / (dt + _AVERAGED) * state.level
     # that of a springy contact does from its first opening on
-    state.chatters = state.springy and not has_left(state, dt)
+    state.chatters = state.springy and not _has_left(state, dt)
     given = _given(state, 0.0, 0.0, dt)
-    state.active = state.deficit != 0 or not has_left(state, dt)
+    state.active = state.deficit != 0 or not _has_left(state, dt)
     return given
 
 
@@ -135,7 +265,7 @@ def _given(state: Any, force: float, hit: float, dt: float) -> float:
     state.deficit += dt * (force - given)
     if state.deficit != 0:
         share = dt / (dt + _PAID_WITHIN)
-        if has_left(state, dt):
+        if _has_left(state, dt):
             # even parts
             share = min(1.0, dt / max(_AVERAGED - state.absent, dt))
         paid = share * state.deficit
@@ -148,12 +278,12 @@ def _given(state: Any, force: float, hit: float, dt: float) -> float:
 def _follow_force(state: Any, force: float, dt: float) -> None:
     """Let the mean force follow; a hit ends the memory."""
     if state.age < _ONSET:
-        kept = 0.0
+        unchanged = 0.0
     elif state.springy or state.unbroken < _CALM:
-        kept = _HIT - force / max(state.mean, _TINY)
+        unchanged = _HIT - force / max(state.mean, _TINY)
     else:
-        kept = 2 - abs(force - state.mean) / max(_CHANGE * state.mean, _TINY)
-    state.memory = min(state.memory + _GROWTH * dt, _LONGEST_MEMORY) * min(max(kept, 0.0), 1.0)
+        unchanged = 2 - abs(force - state.mean) / max(_CHANGE * state.mean, _TINY)
+    state.memory = min(state.memory + _GROWTH * dt, _LONGEST_MEMORY) * min(max(unchanged, 0.0), 1.0)
     now = state.level if state.chatters else force
     state.mean += dt / (dt + state.memory) * (now - state.mean)
 
@@ -173,119 +303,3 @@ def _follow_place(state: Any, middle: Floats, place_radius: float, dt: float) ->
         stays_within = min(max(_JITTERS * state.jitter, _LEAST_MOVE * place_radius), stays_within)
     if lag2 > stays_within**2:
         state.memory *= 1 - min(1.0, dt / _FOLLOWS_WITHIN) * (1 - stays_within / np.sqrt(lag2))
-
-
-# Shares below this are dropped from a mean.
-_LEAST_SHARE = 1e-6
-
-
-class _Room(NamedTuple):
-    """Texels under the geoms, their new mean shares, and the shares of this step, which become forces [N]."""
-
-    texels: Ints
-    shares: Floats
-    given: Floats
-
-
-@kernel
-def rest_filter(
-    states: np.ndarray, before: MeanShares, present: TexelForces, dt: float, scratch: Ints
-) -> tuple[MeanShares, Floats, bool]:
-    """Filter the contact forces of a step.
-
-    Parameters
-    ----------
-    states : CONTACT_STATE [ngeom]
-        Updated.
-    before : MeanShares
-        Those of the step before.
-    present : TexelForces
-    dt : float
-        Time step [s].
-    scratch : int64 [C n n]
-        See `slot_scratch`.
-
-    Returns
-    -------
-    mean : MeanShares
-    given : float64 [k]
-        Forces on its texels over this step [N].
-    over : bool
-        Whether all geoms have left, and there is no deficit.
-    """
-    size = len(before.texels) + len(present.texels)
-    room = _Room(np.empty(size, np.int64), np.empty(size), np.empty(size))
-    end, row, over = 0, 0, True
-    for geom in range(len(states)):
-        state, begin, force = states[geom], end, 0.0
-        if row < len(present.geoms) and present.geoms[row] == geom:
-            for i in range(present.begins[row], present.begins[row + 1]):
-                force += present.forces[i]
-            row += 1
-        if force != 0:
-            turn(state, 1.0 if force > 0 else -1.0)
-            total = state.side * touch(state, abs(force), present.middles[row - 1], present.place_radii[row - 1], dt)
-            pace = dt / (dt + state.memory) if state.first < state.last else 1.0
-            if pace < 1:
-                end = _add_before(room, end, before, state, 1 - pace, scratch)
-            end = _add_present(room, begin, end, present, row - 1, force, pace, scratch)
-            state.active = True
-            steady = state.side * min(state.mean, state.side * total)
-        elif state.active:
-            total = steady = state.side * miss(state, dt)
-            for i in range(state.first, state.last):
-                room.texels[end], room.shares[end], room.given[end] = before.texels[i], before.shares[i], 0.0
-                end += 1
-        else:
-            continue
-        over = over and not state.active
-        state.first, state.last = begin, end
-        for i in range(begin, end):
-            room.given[i] = steady * room.shares[i] + (total - steady) * room.given[i]
-    return MeanShares(room.texels[:end], room.shares[:end]), room.given[:end], over
-
-
-# Loops only: slices and expressions of arrays take many times longer to compile. Arrays are taken out of their tuples
-# before a loop: in it that would cost more than all else.
-@kernel
-def _add_before(room: _Room, end: int, before: MeanShares, state: Any, part: float, scratch: Ints) -> int:
-    """Add the mean shares of a geom so far, as a part of the new ones; where they end."""
-    (texels, shares, given), (under, old), total = room, before, 0.0
-    for i in range(state.first, state.last):
-        if old[i] > _LEAST_SHARE:
-            total += old[i]
-    fading = part / total
-    for i in range(state.first, state.last):
-        if old[i] > _LEAST_SHARE:
-            slot = _slot(scratch, under[i], end)
-            if slot == end:
-                texels[slot], shares[slot], given[slot] = under[i], 0.0, 0.0
-                end += 1
-            shares[slot] += fading * old[i]
-    return end
-
-
-@kernel
-def _add_present(
-    room: _Room, begin: int, end: int, present: TexelForces, row: int, force: float, pace: float, scratch: Ints
-) -> int:
-    """Add the shares of this step, times the pace; where they end. All from `begin` on are the geom's."""
-    (texels, shares, given), under, forces = room, present.texels, present.forces
-    for i in range(present.begins[row], present.begins[row + 1]):
-        share, slot = forces[i] / force, _slot(scratch, under[i], end)
-        if slot == end:
-            texels[slot], shares[slot], given[slot] = under[i], 0.0, 0.0
-            end += 1
-        shares[slot] += pace * share
-        given[slot] += share
-    for i in range(begin, end):
-        scratch[texels[i]] = -1
-    return end
-
-
-@kernel
-def _slot(scratch: Ints, texel: int, end: int) -> int:
-    """Where the shares of a texel are, which is told of once for each geom: `end` if it is new."""
-    if scratch[texel] < 0:
-        scratch[texel] = end
-    return scratch[texel]

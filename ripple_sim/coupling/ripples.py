@@ -16,7 +16,7 @@ from ripple_sim.solver import Load, Material
 from ripple_sim.solver.errors import checked, whole
 
 from .amplitude import AmplitudeCheck
-from .collision_warnings import TunnellingCheck, collision_warnings
+from .collision_warnings import collision_warnings
 from .geoms import (
     ByGeom,
     GeomKey,
@@ -30,6 +30,7 @@ from .geoms import (
 from .load import ContactLoads, Impulse
 from .model import CoupledModel
 from .soft import HighPass
+from .step_checks import TunnellingCheck
 from .stepping import (
     UNSOLVED_WARNING,
     SolvedForces,

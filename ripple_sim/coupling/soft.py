@@ -1,8 +1,7 @@
-"""Soft targets: the surface of a flex, and a skin over bodies, in the world.
+"""Soft targets: flexes and skins, whose surfaces move in the world.
 
-Ids and names of soft targets: flexes and skins come after geoms and the vertices of flexes; see `CoupledModel`.
-
-A high-pass for loads: a flex moves coarsely by itself, and its waves get what it cannot follow.
+Their ids come after those of geoms and of the vertices of flexes; see `CoupledModel`. A `SoftSurface` is the mesh and
+where it is. A `HighPass` leaves a flex its coarse motion: its waves get what it cannot follow.
 """
 
 from __future__ import annotations

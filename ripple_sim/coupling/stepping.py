@@ -1,17 +1,8 @@
-"""Contact forces are read only where MuJoCo has solved for them.
+"""A simulation as it is stepped by whoever owns its loop.
 
-A mark in MuJoCo's data that every reset wipes out.
-
-Time alone does not tell: a reset after one step, and one more step, and it is the same time again; or steps that nobody
-saw after a reset bring the time to where it was, or beyond; or a keyframe sets it to any value.
-
-Time as the waves follow it: how much has passed, how many steps nobody saw, and whether the simulation was reset.
-
-Whether MuJoCo found its own state to be broken.
-
-Steps that other code takes, such as an environment's `step`, seen one by one, when their forces are known.
-
-What MuJoCo itself says: its warnings as ours, and its errors with what helps.
+`StepClock` follows its time and its resets, `followed` the steps that other code takes, and `SolvedForces` finds data
+whose contact forces are solved. MuJoCo's own warnings and errors become ours: divergence, `adopt_warnings` and
+`physics_errors`.
 """
 
 from __future__ import annotations
@@ -33,39 +24,6 @@ from ripple_sim.errors import RippleWarning, SimulationError
 _FWDINV = int(mujoco.mjtEnableBit.mjENBL_FWDINV)
 # nothing that is computed depends on the marks, so they may differ from run to run
 _random = random.SystemRandom()
-
-
-class ResetMark:
-    """Sees whether `data` was reset since it last looked.
-
-    The mark is a negative number in `data.solver_fwdinv[0]`: a step leaves it alone, `copy` keeps it, and
-    `mj_resetData`, a keyframe and the automatic reset of a simulation that diverges all wipe it out. MuJoCo's own
-    values there are not negative, and written only where the flag `fwdinv` is enabled: then no mark is made, and only
-    a time that goes back tells.
-    """
-
-    def __init__(self) -> None:
-        self.forget()
-
-    def forget(self) -> None:
-        """Accept whatever mark comes next."""
-        self._mark: float | None = None
-
-    def __getstate__(self) -> dict[str, object]:
-        # MuJoCo's data loses the mark when it is pickled; that is no reset
-        return {"_mark": None}
-
-    def stands(self, model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-        """Whether the mark is still there. Makes one where there is none, and takes over one that others made."""
-        if model.opt.enableflags & _FWDINV:
-            return True
-        found = float(data.solver_fwdinv[0])
-        if not found < 0:
-            found = -1.0 - _random.random()
-            data.solver_fwdinv[0] = found
-        stands = self._mark is None or found == self._mark
-        self._mark = found
-        return stands
 
 
 _ROUND_OFF = 1e-6  # of times, in time steps
@@ -92,25 +50,34 @@ class Passed(NamedTuple):
 class StepClock:
     """Follows the simulation's time from look to look.
 
-    The simulation began anew if MuJoCo's data lost its mark (see `ResetMark`) or its time went back. Then, as at the
-    first look, only the latest step counts: what came before belongs to no wave. At time 0 there was no step yet.
+    The simulation began anew if its time went back, or if MuJoCo's data lost a mark. Then, as at the first look, only
+    the latest step counts: what came before belongs to no wave. At time 0 there was no step yet.
+
+    Time alone does not tell: a reset after one step, and one more step, and it is the same time again; or steps that
+    nobody saw after a reset bring the time to where it was, or beyond; or a keyframe sets it to any value. The mark is
+    a negative number in `data.solver_fwdinv[0]`: a step leaves it alone, `copy` keeps it, and `mj_resetData`, a
+    keyframe and the automatic reset of a simulation that diverges all wipe it out. MuJoCo's own values there are not
+    negative, and written only where the flag `fwdinv` is enabled: then no mark is made.
     """
 
     def __init__(self) -> None:
-        self._mark = ResetMark()
         self.restart()
 
     def restart(self) -> None:
-        """Start anew."""
-        self._mark.forget()
+        """Start anew, with whatever mark comes next."""
+        self._mark: float | None = None
         self._time: float | None = None
         self._timestep = 0.0
+
+    def __getstate__(self) -> dict[str, object]:
+        # MuJoCo's data loses the mark when it is pickled; that is no reset
+        return {**vars(self), "_mark": None}
 
     def look(self, model: mujoco.MjModel, data: mujoco.MjData) -> Passed:
         """What happened since the last look."""
         time, timestep = float(data.time), float(model.opt.timestep)
         before, longest = self._time, max(timestep, self._timestep)
-        reset = not self._mark.stands(model, data) or (before is not None and time < before)
+        reset = not self._mark_stands(model, data) or (before is not None and time < before)
         self._time, self._timestep = time, timestep
         if before is None or reset:
             return Passed(timestep if time else 0.0, reset=reset)
@@ -121,6 +88,18 @@ class StepClock:
         steps = round(elapsed / timestep)
         elapsed = steps * timestep if abs(elapsed - steps * timestep) < _ROUND_OFF * timestep else elapsed
         return Passed(elapsed, max(round(elapsed / longest) - 1, 0))
+
+    def _mark_stands(self, model: mujoco.MjModel, data: mujoco.MjData) -> bool:
+        """Whether the mark is still there. Makes one where there is none, and takes over one that others made."""
+        if model.opt.enableflags & _FWDINV:
+            return True
+        found = float(data.solver_fwdinv[0])
+        if not found < 0:
+            found = -1.0 - _random.random()
+            data.solver_fwdinv[0] = found
+        stands = self._mark is None or found == self._mark
+        self._mark = found
+        return stands
 
 
 def missed_warning(missed: int) -> str | None:

@@ -1,8 +1,6 @@
 """The surface of a target as a mesh, and its atlas, in the geom's own frame.
 
-Triangles on MuJoCo's height fields.
-
-Triangles on the surfaces of MuJoCo's primitive geoms.
+Meshes are MuJoCo's own; height fields and primitive geoms are cut into triangles.
 """
 
 from __future__ import annotations
@@ -89,7 +87,7 @@ def _on_round_surface(kind: str, size: NDArray[np.float64], V: NDArray[np.float6
 
 _MOST_TEXELS = 100_000  # of an atlas that is kept: 20 MB
 
-_kept: Kept[Atlas] = Kept(4, lambda atlas: atlas.areas.size <= _MOST_TEXELS)
+_atlases: Kept[Atlas] = Kept(4, lambda atlas: atlas.areas.size <= _MOST_TEXELS)
 
 
 def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str = "auto") -> Atlas:
@@ -104,7 +102,7 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str 
         return build_atlas(SoftSurface(model, geom).mesh, resolution, layout=layout)
     if TARGET_TYPES[int(model.geom_type[geom])] == "sphere" and layout != "patches":
         radius = float(model.geom_size[geom, 0])
-        return _kept.get(f"sphere {radius!r} {resolution}", lambda: sphere_atlas(radius, resolution))
+        return _atlases.get(f"sphere {radius!r} {resolution}", lambda: sphere_atlas(radius, resolution))
     V, F, uv, name = _surface(model, geom)
     key = content_key(f"{resolution} {layout}", [V, F, np.zeros(0) if uv is None else uv])
 
@@ -112,7 +110,7 @@ def target_atlas(model: mujoco.MjModel, geom: int, resolution: int, layout: str 
         mesh = Mesh.from_arrays(V, F, uv, name)
         return build_atlas(mesh, resolution, layout=layout, sphere=shipped_sphere_map(mesh))
 
-    return _kept.get(key, build)
+    return _atlases.get(key, build)
 
 
 def target_mesh(model: mujoco.MjModel, geom: int) -> Mesh:

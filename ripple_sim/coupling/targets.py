@@ -1,7 +1,4 @@
-"""`Targets`: the rippling geoms of a model, and what may be changed on them while their waves run.
-
-One target: the waves on a geom's surface, and the material that may change while they run.
-"""
+"""`Targets`: the rippling geoms of a model, and what may be changed on them while their waves run."""
 
 from __future__ import annotations
 

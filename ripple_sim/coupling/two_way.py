@@ -1,14 +1,12 @@
 """Two-way coupling: where the surface moves outwards under a body, it pushes the body, and is held back by it.
 
-Support points: the point of a convex geom that lies farthest in a direction.
-
-Geoms within reach of a risen surface, which MuJoCo, knowing the undeformed surface alone, sees apart from it.
+`PushBack` exchanges the momentum. `Reach` finds geoms that a risen surface touches though MuJoCo, which knows the
+undeformed one alone, sees them apart: by the point of a geom that lies farthest in a direction (`support_point`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -69,15 +67,6 @@ _SOLID = tuple(
 )
 
 
-class _Surface(NamedTuple):
-    """A target's waves, their height [m], [C n n], and its maximum."""
-
-    target: int
-    waves: WaveSolver
-    height: NDArray[np.float32]
-    highest: float
-
-
 class Reach:
     """Finds geoms above targets, lower than their waves are high.
 
@@ -106,19 +95,21 @@ class Reach:
         """
         for target, others in self._others.items():
             height = waves[target].height.reshape(-1)
-            surface = _Surface(target, waves[target], height, float(height.max()))
-            for other in others:
-                if surface.highest > 0 and (target, other) not in touching:
-                    touch = self._touch(data, surface, other)
+            for other in others if height.max() > 0 else ():
+                if (target, other) not in touching:
+                    touch = self._touch(data, target, other, waves[target], height)
                     if touch is not None:
                         yield touch
 
-    def _touch(self, data: mujoco.MjData, surface: _Surface, other: int) -> Touch | None:
-        model, target, atlas = self._coupled.model, surface.target, surface.waves.atlas
+    def _touch(
+        self, data: mujoco.MjData, target: int, other: int, waves: WaveSolver, height: NDArray[np.float32]
+    ) -> Touch | None:
+        """The touch of a target, whose waves have a height [m], [C n n], with another geom; None out of reach."""
+        model, atlas = self._coupled.model, waves.atlas
         rotation = data.geom_xmat[target].reshape(3, 3)
         to_target = rotation.T @ data.geom_xmat[other].reshape(3, 3)
         centre = (data.geom_xpos[other] - data.geom_xpos[target]) @ rotation
-        reach = float(model.geom_rbound[other]) + surface.highest
+        reach = float(model.geom_rbound[other] + height.max())
         box_centre, box_size = model.geom_aabb[target, :3], model.geom_aabb[target, 3:]
         if np.linalg.norm(np.maximum(np.abs(centre - box_centre) - box_size, 0.0)) > reach:
             return None
@@ -129,22 +120,14 @@ class Reach:
                 return None
             normal = atlas.normals.reshape(-1, 3)[texel]
             point = centre + to_target @ support_point(model, other, -normal @ to_target)
-        if (point - place) @ normal >= surface.height[texel]:
+        if (point - place) @ normal >= height[texel]:
             return None
         radii = self._coupled.footprint_radii
         where = footprint(atlas, place, min(radii[target], radii[other]))
-        movable = surface.waves.operator.movable.reshape(-1)[where.texels]
+        movable = waves.operator.movable.reshape(-1)[where.texels]
         movable_area = atlas.areas.reshape(-1)[where.texels] * movable
         in_world = data.geom_xpos[target] + rotation @ place
         return Touch(target, other, in_world, rotation @ normal, Load(where.texels, where.weights * movable_area))
-
-
-class _Patch(NamedTuple):
-    """The patch of surface under a touch: mass [kg], outward velocity [m/s], and how a unit force spreads over it."""
-
-    mass: float
-    velocity: float
-    shares: Load
 
 
 class PushBack:
@@ -189,17 +172,29 @@ class PushBack:
         loads = []
         for touch in touches:
             mass, velocity = waves[touch.target].operator.mass.reshape(-1), velocities[touch.target]
-            patch = _patch(touch, mass, velocity)
-            impulse = 0.0 if patch is None else self._push(data, touch, patch)
-            if patch is not None and impulse:
-                texels, impulses = patch.shares.texels, impulse * patch.shares.forces
-                velocity[texels] -= impulses / mass[texels]  # what the next touch meets
-                loads.append((touch.target, Load(texels, impulses / elapsed)))
+            load = touch.load.merged(mass.size)
+            total = load.forces.sum()
+            if total <= 0:
+                continue  # nothing is movable under it
+            texels, shares = load.texels, load.forces / total
+            patch_mass, outward = 1 / float((shares**2 / mass[texels]).sum()), float(shares @ velocity[texels])
+            impulse = self._push(data, touch, patch_mass, outward)
+            if impulse:
+                velocity[texels] -= impulse * shares / mass[texels]  # what the next touch meets
+                loads.append((touch.target, Load(texels, impulse * shares / elapsed)))
         return loads
 
-    def _push(self, data: mujoco.MjData, touch: Touch, patch: _Patch) -> float:
-        """Push the bodies with the impulse that they exchange with a patch, and return it [N s]."""
-        if patch.velocity <= 0 or self._bodies[touch.other] < 0:
+    def _push(self, data: mujoco.MjData, touch: Touch, patch_mass: float, outward: float) -> float:
+        """Push the bodies with the impulse that they exchange with the patch under a touch, and return it [N s].
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+        touch : Touch
+        patch_mass, outward : float
+            Mass [kg] and outward velocity [m/s] of the patch.
+        """
+        if outward <= 0 or self._bodies[touch.other] < 0:
             return 0.0
         model, point = self._model, touch.point
         body, base = int(self._bodies[touch.other]), int(self._bodies[touch.target])
@@ -207,23 +202,12 @@ class PushBack:
         response = np.zeros((1, model.nv))
         mujoco.mj_solveM(model, data, response, along[None])
         inverse_mass = float(along @ response[0])
-        approach = patch.velocity - max(0.0, float(along @ data.qvel))
+        approach = outward - max(0.0, float(along @ data.qvel))
         if inverse_mass <= 0 or approach <= 0:
             return 0.0
-        impulse = approach / (1 / patch.mass + inverse_mass)
+        impulse = approach / (1 / patch_mass + inverse_mass)
         data.qvel += impulse * response[0]
         return impulse
-
-
-def _patch(touch: Touch, mass: NDArray[np.float64], velocity: NDArray[np.float32]) -> _Patch | None:
-    """The patch under a touch, from mass [kg] and velocity [m/s] of all texels; None where nothing is movable."""
-    load = touch.load.merged(mass.size)
-    total = load.forces.sum()
-    if total <= 0:
-        return None
-    shares = load.forces / total
-    patch_mass = 1 / float((shares**2 / mass[load.texels]).sum())
-    return _Patch(patch_mass, float(shares @ velocity[load.texels]), Load(load.texels, shares))
 
 
 def _jacobian(model: mujoco.MjModel, data: mujoco.MjData, body: int, point: NDArray[np.float64]) -> NDArray[np.float64]:

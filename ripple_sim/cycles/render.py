@@ -1,10 +1,7 @@
-"""`render_cycles`: a scene simulated, written as USD, and rendered by Cycles.
+"""`render_cycles`: a scene simulated, written as USD, and rendered by Cycles in a process of Blender's own.
 
-The process of Blender: which Python runs it, and frames as they come from it.
-
-What Blender is told beside the stage: frames, sky, soft boxes, and the floor that fades into the sky.
-
-Linear radiance to the colours of a frame, as the renderer's shader makes them (render/glsl/tone_mapping.glsl).
+Beside the stage Blender is told frames, sky, soft boxes, and the floor that fades into the sky. The linear radiance
+that it gives back gets the colours of a frame, as the renderer's shader makes them (render/glsl/tone_mapping.glsl).
 """
 
 from __future__ import annotations
@@ -50,8 +47,9 @@ from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual, visible_geoms
 from ripple_sim.scene.scene import Scene, with_exposure
 from ripple_sim.simulation import Simulation
-from ripple_sim.video.options import EXPOSURE, VideoOptions, check_options, frame_count, settled
+from ripple_sim.video.options import VideoOptions
 from ripple_sim.video.render_video import open_video
+from ripple_sim.video.settings import EXPOSURE, check_options, frame_count, settled
 
 PYTHON = "RIPPLE_SIM_BPY_PYTHON"
 OLDEST = (5, 0)  # bpy before it has other names for what the importer of USD is told

@@ -1,16 +1,10 @@
-"""Files of passes: one a frame, NumPy's .npz or OpenEXR, in a folder beside the video.
+"""Files of images: EXR frames, passes, and the animations GIF and WebP, whose memory does not grow with their length.
 
-OpenEXR frames: linear light in half floats, for compositing and grading.
-
-GIF with one palette made for the whole animation.
-
-The palette depends on every frame, so the frames are first stored losslessly, and then read twice: to choose the
-colours, and to draw with them. Memory does not grow with the length of the video.
-
-Animated WebP, assembled from still images so that memory does not grow with the length of the video.
-
-The container is RIFF; see "WebP Container Specification" by Google: VP8X (size and flags), ANIM (background, loops),
-an ANMF chunk per frame with the chunks of a still image, and XMP with the mark.
+EXR is linear light in half floats, for compositing and grading. Passes are one file a frame, NumPy's .npz or OpenEXR,
+in a folder beside the video. A GIF has one palette for the whole animation, which depends on every frame, so the frames
+are first stored losslessly, and then read twice: to choose the colours, and to draw with them. A WebP is assembled from
+still images: the container is RIFF, see "WebP Container Specification" by Google: VP8X (size and flags), ANIM
+(background, loops), an ANMF chunk per frame with the chunks of a still image, and XMP with the mark.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Checks of a video's output before its first frame is rendered.
+"""The formats of videos: how each stores its frames in segments, and joins these to the video.
 
-The formats: how each stores its frames in segments, and joins these to the video.
+An output is checked before its first frame is rendered.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""What an interrupted video is known by: the settings it was rendered with, and fingerprints of its simulation.
+"""What may be replaced, and what may be continued.
 
-The mark in every file that is written here. By it a later job knows what it may replace without being told to.
-
-Renaming a finished file or folder, safely against a crash.
+Every file that is written here has a mark, by which a later job knows what it may replace without being told to. A
+`Record` has what an interrupted video is known by: the settings it was rendered with, and fingerprints of its
+simulation.
 """
 
 from __future__ import annotations

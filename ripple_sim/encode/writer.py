@@ -1,8 +1,6 @@
-"""`FrameWriter`: frames go in one by one, a video comes out at the end or not at all.
+"""Frames go in one by one, a video comes out at the end or not at all: `open_writer` starts or continues one.
 
-`Encoder`: frames encoded into segments, in a thread of its own, and joined to the video.
-
-`open_writer`: starts a video, or continues an interrupted one.
+`FrameWriter` takes the frames, and `Encoder` stores them as segments, in a thread of its own, and joins these.
 """
 
 from __future__ import annotations

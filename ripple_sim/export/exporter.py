@@ -1,7 +1,4 @@
-"""`Exporter`: a run of anybody's own loop, written frame by frame to the file of another program.
-
-`RippleRenderer`: frames of a MuJoCo model with its ripples, in your own loop.
-"""
+"""For a loop of one's own: `Exporter` writes it to the file of another program, `RippleRenderer` renders frames."""
 
 from __future__ import annotations
 
@@ -30,9 +27,9 @@ from ripple_sim.scene.scene_file import CameraEntry, check_camera
 from ripple_sim.solver.errors import PATH, POSITIVE, checked, instance
 from ripple_sim.solver.gl import GLContext, shared_context
 
-from .options import WRITE_OPTIONS, WriteOptions, check_write_options
+from .options import WRITE_OPTIONS, WriteOptions
 from .page import framed
-from .place import Unfinished, check_export
+from .place import Unfinished, check_export, check_write_options
 from .source import Chunking, Moment, Paint, Source
 
 

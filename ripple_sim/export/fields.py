@@ -1,7 +1,4 @@
-"""The fields of a run over time as a Zarr store, which xarray opens as one dataset.
-
-A Zarr store (version 2) whose arrays grow along their first dimension, with what xarray wants to know of them.
-"""
+"""The fields of a run over time as a Zarr store (version 2), which xarray opens as one dataset."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.render.surfaces.adaptive import spline_weights
 from ripple_sim.render.surfaces.moving import Attachment, MovingSurface
 from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.render.surfaces.vertices import COORDINATES, DIRECTION, NORMAL, POSITION, UV, tessellated
@@ -154,13 +155,9 @@ class _Rest(NamedTuple):
 def _displace(height_map: Floats32, rates: Floats32, rest: _Rest, shape: Shape) -> None:
     """Fill in a shape from a height map [C, n + 2, n + 2, 4] and the rates of its heights [C, n + 2, n + 2]."""
     points, normals, velocities, heights = shape
-    half, most = np.float32(0.5), np.float32(0.75)
-    down, across = np.empty(3, np.float32), np.empty(3, np.float32)
     for i in range(len(points)):
         chart, row, column = rest.texels[i]
-        s, t = rest.offsets[i]
-        down[0], down[1], down[2] = half * (half - s) ** 2, most - s * s, half * (half + s) ** 2
-        across[0], across[1], across[2] = half * (half - t) ** 2, most - t * t, half * (half + t) ** 2
+        down, across = spline_weights(rest.offsets[i, 0]), spline_weights(rest.offsets[i, 1])
         gx = gy = gz = h = v = np.float32(0)
         for j in range(3):
             for k in range(3):

@@ -1,8 +1,6 @@
-"""`PageWriter`: a run as one self-contained page.
+"""`PageWriter`: a run as one self-contained page, which plays in any browser and inside a notebook.
 
-Pages inside a notebook.
-
-What of a page stays the same over time: meshes, looks, textures, camera and light.
+What stays the same over time, meshes, looks, textures, camera and light, is written once; `page_motion` has the rest.
 """
 
 from __future__ import annotations
@@ -29,7 +27,7 @@ from ripple_sim.render.visuals.lights import SOFT_BOX_LIGHTS, is_lit, model_ligh
 from ripple_sim.render.visuals.visual import texture_pixels, visible_geoms
 
 from .moving_mesh import MovingMesh
-from .page_motion import Motion, local_order, packed, parents_of, quantised, residuals
+from .page_motion import PageMotion, local_order, packed, parents_of, quantised, residuals
 from .source import Moment, Source
 from .visuals import Finish, Solid, solid_finish, solids, target_finish, target_uv
 
@@ -49,7 +47,7 @@ _TRIANGLES, _SEGMENTS = 16_000, 6  # of a target, and of a primitive to a right 
 _LARGEST_IMAGE = 1024  # [pixels]
 
 
-class Part(NamedTuple):
+class PagePart(NamedTuple):
     """A mesh of a page: what describes it, its arrays, its triangles, and which vertices of the source are its own."""
 
     meta: dict[str, Any]
@@ -63,7 +61,7 @@ def target_mesh(source: Source, name: str) -> MovingMesh:
     return MovingMesh(source.ripples[name].rest, source.tessellation, source.limited[name], _TRIANGLES)
 
 
-def target_part(source: Source, name: str, mesh: MovingMesh) -> Part:
+def target_part(source: Source, name: str, mesh: MovingMesh) -> PagePart:
     """A target at rest; its points follow along `directions`, and with its mesh's own vertices."""
     model, geom = source.model, source.ripples.geom_ids[name]
     finish = target_finish(model, geom, source.paints[name], mesh.uv is not None)
@@ -81,7 +79,7 @@ def target_part(source: Source, name: str, mesh: MovingMesh) -> Part:
     return _part(meta, mesh.F, [mesh.rest, mesh.directions], uv)
 
 
-def solid_parts(source: Source, floor: int) -> list[Part]:
+def solid_parts(source: Source, floor: int) -> list[PagePart]:
     """Everything else but the floor, which is a geom id."""
     model = source.model
     found = solids(model, {*source.ripples.geom_ids.values(), floor}, _SEGMENTS)
@@ -149,7 +147,7 @@ def heat_colors() -> list[list[int]]:
     return color_table()[::8].tolist()
 
 
-def _solid_part(model: mujoco.MjModel, solid: Solid) -> Part:
+def _solid_part(model: mujoco.MjModel, solid: Solid) -> PagePart:
     meta = {
         "name": solid.name,
         "target": False,
@@ -169,7 +167,7 @@ def _look(finish: Finish) -> dict[str, Any]:
     return {"color": finish.color.tolist(), "opacity": finish.opacity, "texture": finish.texture, **values}
 
 
-def _part(meta: dict[str, Any], F: NDArray, fields: list[NDArray], uv: NDArray | None) -> Part:
+def _part(meta: dict[str, Any], F: NDArray, fields: list[NDArray], uv: NDArray | None) -> PagePart:
     """Points and directions in 16 bits each, triangles, and texture coordinates of their corners."""
     triangles, vertices, F = local_order(fields[0], F)
     points, directions = (np.asarray(field, np.float64)[vertices] for field in fields)
@@ -179,7 +177,7 @@ def _part(meta: dict[str, Any], F: NDArray, fields: list[NDArray], uv: NDArray |
     if uv is not None:
         arrays.append(np.asarray(uv, "<f4")[triangles])
     counts = {"points": len(points), "triangles": len(F), "textured": uv is not None}
-    return Part({**meta, "low": low.tolist(), "size": size, **counts}, arrays, F, vertices)
+    return PagePart({**meta, "low": low.tolist(), "size": size, **counts}, arrays, F, vertices)
 
 
 def _data_uri(model: mujoco.MjModel, texture: int) -> str:
@@ -215,7 +213,7 @@ class PageWriter:
         self._parents = {name: parents_of(part.F, len(part.vertices)) for name, part in self._targets.items()}
         self._steps = {name: _STEP * float(np.ptp(mesh.rest, axis=0).max()) for name, mesh in self._meshes.items()}
         self._motions = [
-            Motion(source.ripples[name].rest.mesh, self._meshes[name], part.vertices)
+            PageMotion(source.ripples[name].rest.mesh, self._meshes[name], part.vertices)
             for name, part in self._targets.items()
         ]
         self._told: set[int] = set()  # targets whose motion has been told of

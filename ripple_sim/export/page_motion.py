@@ -1,11 +1,7 @@
-"""The vertices of a surface that moves, as the page streams them.
+"""Heights and moving vertices of a page in few bytes: predicted from earlier ones and the frame before, and deflated.
 
-Heights as few bytes: predicted from earlier vertices and the frame before, and deflated.
-
-Triangles and vertices in an order in which neighbours come close together.
-
-Drawing then computes a vertex about once and not once for each of its triangles, and heights are predicted well from
-earlier ones.
+Triangles and vertices come in an order in which neighbours are close together: drawing then computes a vertex about
+once and not once for each of its triangles, and heights are predicted well from earlier ones.
 """
 
 from __future__ import annotations
@@ -100,7 +96,7 @@ def _morton(points: NDArray) -> NDArray[np.int64]:
 _STEP = 2e-5  # of places, in sizes of the mesh
 
 
-class Motion:
+class PageMotion:
     """The vertices of a target's own mesh over time; nothing is written of one that rests.
 
     Parameters

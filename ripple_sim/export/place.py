@@ -1,6 +1,6 @@
-"""Where an export goes: whole or not at all, and over nothing foreign.
+"""Where an export goes: whole or not at all, and over nothing foreign; and what writes the files of each ending.
 
-The endings of exports: what writes each, what it needs, and how a file of it is known again.
+The options of an export are checked here, too, before anything that takes time.
 """
 
 from __future__ import annotations
@@ -13,10 +13,14 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from ripple_sim.encode.output import check_size
 from ripple_sim.encode.replace import MARK, made_here, move
-from ripple_sim.errors import EncodingError, ExportError
+from ripple_sim.errors import EncodingError, ExportError, SceneError
+from ripple_sim.scene.scene import MAX_DURATION, Scene
+from ripple_sim.solver.errors import shown
 from ripple_sim.solver.files import NO_NAME, final_path
 
+from .options import TESSELLATIONS, WRITE_OPTIONS, ExportOptions, WriteOptions
 from .source import Source, Writer
 
 Recognised = Callable[[Path], bool]
@@ -208,3 +212,63 @@ def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Endin
         raise ExportError(f"there are chunks of {able} files alone, not of {path.name}; leave --chunk out")
     check_place(path, ending.made_here, overwrite)
     return ending
+
+
+MAX_FPS, MAX_SLOW_MOTION, LARGEST_MESH = 1000, 1000, 10_000_000
+
+
+def check_options(options: ExportOptions) -> None:
+    """Make sure that the options are possible, before anything that takes time.
+
+    Raises
+    ------
+    RippleError
+    """
+    if not isinstance(options.fps, int) or not 1 <= options.fps <= MAX_FPS:
+        raise ExportError(f"frame rate is {options.fps!r}; valid is a whole number from 1 to {MAX_FPS} frames a second")
+    if options.resume and options.chunk is None:
+        raise ExportError("only an export in chunks can be resumed; add --chunk, or leave --resume out")
+    check_write_options(
+        {
+            "size": options.size,
+            "tessellation": options.tessellation,
+            "triangles": options.triangles,
+            "chunk": options.chunk,
+        }
+    )
+
+
+def check_write_options(options: WriteOptions) -> None:
+    """Make sure that there are such options, and that their values are possible.
+
+    Raises
+    ------
+    RippleError
+    """
+    if unknown := [name for name in options if name not in WRITE_OPTIONS]:
+        raise ExportError(f"there is no option {unknown[0]!r}; valid are {', '.join(WRITE_OPTIONS)}")
+    given = WRITE_OPTIONS | options
+    check_size(*given["size"])
+    triangles, tessellation, chunk = given["triangles"], given["tessellation"], given["chunk"]
+    if not isinstance(triangles, int) or not 1 <= triangles <= LARGEST_MESH:
+        raise ExportError(f"there shall be {shown(triangles)} triangles; valid is a whole number, 1 to {LARGEST_MESH}")
+    if chunk is not None and (not isinstance(chunk, int) or chunk < 1):
+        raise ExportError(f"a chunk shall have {shown(chunk)} frames; valid is a whole number from 1")
+    if tessellation not in TESSELLATIONS:
+        raise ExportError(f"tessellation is {shown(tessellation)}; valid are {' and '.join(map(repr, TESSELLATIONS))}")
+
+
+def frame_count(options: ExportOptions, scene: Scene) -> int:
+    """Frames of a scene's export.
+
+    Raises
+    ------
+    SceneError
+        If the duration or the slow motion is out of range.
+    """
+    duration = scene.duration if options.duration is None else options.duration
+    if not 0 < duration < MAX_DURATION:
+        raise SceneError(f"duration is {duration!r} s; valid is a positive number, less than {MAX_DURATION}")
+    if not 0 < options.slow_motion <= MAX_SLOW_MOTION:
+        raise SceneError(f"slow motion is {options.slow_motion!r}; valid is a positive number up to {MAX_SLOW_MOTION}")
+    return max(1, round(duration * options.fps * options.slow_motion))

@@ -12,11 +12,11 @@ from ripple_sim.errors import ExportError
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.errors import PATH, checked, instance
-from ripple_sim.video.options import origin
+from ripple_sim.video.settings import origin
 
 from .exporter import Exporter
-from .options import ExportOptions, check_options, frame_count
-from .place import check_export
+from .options import ExportOptions
+from .place import check_export, check_options, frame_count
 from .source import Chunking, Paint, Source
 
 Progress = Callable[[int, int], None]

@@ -1,7 +1,4 @@
-"""The frames of a long run in files of their own: value clips of USD, which a root layer joins.
-
-Saving layers, with USD's errors as those of the operating system.
-"""
+"""The frames of a long run in files of their own: value clips of USD, which a root layer joins."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""A figure of an atlas: the mesh with the texel grid, the charts, stretch and quality.
-
-The page that a plot is drawn on: its title, its images, and the file that it becomes.
-
-Colours of an atlas's texels: by stretch, and by chart.
-
-A figure of a layer's thickness: the mesh from both sides, and how much of it has which thickness.
-"""
+"""Figures of an atlas: the mesh with the texel grid, charts, stretch and quality; or the thickness of its layer."""
 
 from __future__ import annotations
 
@@ -139,7 +132,10 @@ def plot_atlas(atlas: Atlas, path: str | Path, *, title: str, subtitle: str = ""
     atlas : Atlas
     path : path
         Ends in .png, .jpg, .pdf or .svg.
-    title, subtitle : str
+    title : str
+        Of the figure.
+    subtitle : str
+        Line below the title.
     up : str
         Axis of the mesh that points up in the figure, "y" or "z".
 
@@ -232,7 +228,10 @@ def plot_thickness(
     thickness : [C, n, n]
     path : path
         Ends in .png, .jpg, .pdf or .svg.
-    title, subtitle : str
+    title : str
+        Of the figure.
+    subtitle : str
+        Line below the title.
     up : str
         Axis of the mesh that points up in the figure, "y" or "z".
 

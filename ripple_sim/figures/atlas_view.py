@@ -1,10 +1,6 @@
-"""Images of an atlas, ray by ray: the mesh with the texel grid on it.
+"""Images of an atlas: the mesh with the texel grid on it, and its charts, unfolded, on the sphere or side by side.
 
 Every pixel is traced to its place on the charts, so the grid is exactly the atlas's.
-
-A look at a surface: where the eye is, a soft light, and images averaged from finer pixels.
-
-Images of the charts themselves: a cube's unfolded and on the sphere, any layout's as squares side by side.
 """
 
 from __future__ import annotations
@@ -13,13 +9,12 @@ import dataclasses
 import functools
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from ripple_sim.render.visuals.corners import bake, corner_normals
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points
+from ripple_sim.solver.mesh.rays import RayScene
 
 OVERSAMPLING = 2  # finer pixels along each side of a pixel
 _LIGHT = np.array([-0.45, 0.55, 0.7]) / np.linalg.norm([-0.45, 0.55, 0.7])  # to the right, up, to the eye
@@ -106,12 +101,10 @@ class AtlasPainter:
         middle = (plane.min(axis=0) + plane.max(axis=0)) / 2
         x, y = screen(size * OVERSAMPLING, float(np.ptp(plane, axis=0).max()) / 2 * 1.02)
         origins = (middle[0] + x)[..., None] * right + (middle[1] + y)[..., None] * up + 4 * eye
-        hit = self._scene.run(
-            origins.reshape(-1, 3).astype(np.float32), np.tile(-eye, (x.size, 1)).astype(np.float32), output=1
-        )
-        seen = np.flatnonzero(hit["primID"] >= 0)
-        triangle = hit["primID"][seen].astype(np.int64)
-        u, v = hit["u"][seen].astype(np.float64), hit["v"][seen].astype(np.float64)
+        hit = self._scene.cast(origins.reshape(-1, 3), np.tile(-eye, (x.size, 1)))
+        seen = np.flatnonzero(hit.triangle >= 0)
+        triangle = hit.triangle[seen]
+        u, v = hit.u[seen].astype(np.float64), hit.v[seen].astype(np.float64)
         weights = np.stack([1 - u - v, u, v], axis=1)
         mesh = self._atlas.mesh
         corners = mesh.F[triangle]
@@ -157,10 +150,8 @@ class AtlasPainter:
         return (V - middle) / np.linalg.norm(V - middle, axis=1).max()
 
     @functools.cached_property
-    def _scene(self) -> EmbreeScene:
-        scene = EmbreeScene()
-        TriangleMesh(scene, self._vertices.astype(np.float32), self._atlas.mesh.F.astype(np.int32))
-        return scene
+    def _scene(self) -> RayScene:
+        return RayScene(self._vertices, self._atlas.mesh.F)
 
     @functools.cached_property
     def _corner_normals(self) -> NDArray[np.float64]:

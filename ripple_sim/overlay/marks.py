@@ -1,8 +1,7 @@
-"""`Sprite`: a small transparent image that is drawn once and laid over many frames.
+"""Marks of contacts with the targets and their impulses, which stay long enough to be seen, and what draws them.
 
-Arrows with a light rim and smooth edges.
-
-Marks of contacts with the targets and their impulses, which stay long enough to be seen.
+A `Sprite` is a small transparent image that is drawn once and laid over many frames: shapes, text, and arrows with a
+light rim and smooth edges.
 """
 
 from __future__ import annotations

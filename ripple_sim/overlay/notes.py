@@ -1,17 +1,11 @@
 """The content of the overlays, gathered from running simulations frame by frame.
 
-A diverging colour map: blue for negative, almost white for zero, red for positive values.
+`Notebook` follows one simulation, or two of one scene side by side, and notes for each frame what is to be shown:
+fields for heatmaps, marks of contacts, energies so far, and the ends of their scales, round numbers that are steady.
 
-It is a curve in CIELAB of constant speed, so that equal steps of the value look equally large. Both arms have the same
-lightness at the same distance from zero, and blue differs from orange-red in every common colour vision.
-
-Two runs of one scene side by side: their wave operators and titles.
-
-Heatmaps: a scalar field on the texels, prepared for the renderer.
-
-A curve over the whole length of a video in bounded memory.
-
-Round numbers for axes: steady limits, and a unit in which they are easy to read.
+The colour map of heatmaps is blue for negative, almost white for zero, red for positive values: a curve in CIELAB of
+constant speed, so that equal steps of the value look equally large. Both arms have the same lightness at the same
+distance from zero, and blue differs from orange-red in every common colour vision.
 """
 
 from __future__ import annotations

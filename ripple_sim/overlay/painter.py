@@ -1,7 +1,4 @@
-"""Draws panels over finished frames, stacked in the corners.
-
-The plot of energy over time, which grows during the video.
-"""
+"""Draws panels over finished frames, stacked in the corners; one is the plot of energy, which grows with the video."""
 
 from __future__ import annotations
 

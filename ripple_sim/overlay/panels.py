@@ -1,10 +1,7 @@
-"""The small panels: a bar of colours, a clock, a label, the scale of the arrows.
+"""What overlays put on a frame of any size, and where: small panels and contact marks.
 
-Sizes and places of the overlays on a frame of any size.
-
-Projection of points of the scene onto a frame, and their visibility.
-
-Contact marks on a frame: arrows as long as the impulse is large.
+Panels are a bar of colours, a clock, a label, the scale of the arrows. Contact marks are arrows as long as the impulse
+is large, projected onto the frame, and faint where a geom hides them.
 """
 
 from __future__ import annotations

@@ -1,12 +1,6 @@
 """A default scene around any mesh: the target on a floor, and bodies that drop on it.
 
-The image that belongs to a mesh file's texture coordinates.
-
-The image that colours a target, in the model that MuJoCo draws too.
-
-Which way is up in a mesh file.
-
-A scene by its name, its file, or the mesh on which bodies drop.
+The target has the image of its file, and the side up that its format has.
 """
 
 from __future__ import annotations
@@ -205,8 +199,10 @@ def drop_scene(
     Parameters
     ----------
     mesh_path : path
-    bodies, seed : int
-        How many drop, 0 to 100, over the first 3.5 seconds; of their sizes, places and colours.
+    bodies : int
+        How many drop, 0 to 100, over the first 3.5 seconds.
+    seed : int
+        Of their sizes, places and colours.
     up : str, optional
         Axis of the file that points up, "y" or "z". By default a flat sheet lies down; else see `usual_up`.
     look : str

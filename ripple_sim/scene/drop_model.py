@@ -1,8 +1,6 @@
 """The MuJoCo model of a default scene: a target on a floor, and bodies parked above it until they drop.
 
-Shapes of falling bodies, by name: MuJoCo's primitives of 0.6 to 1 times the volume of a ball.
-
-Domain randomisation: the free bodies of a model varied by a seed.
+Also domain randomisation: the free bodies of any model varied by a seed.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.mesh.closest import downward_hits
+from ripple_sim.solver.mesh.rays import downward_hits
 
 from .events import DropEntry
 

@@ -1,6 +1,6 @@
 """A scene's script: timed events of bodies and surfaces.
 
-Timed motion of free bodies: dropped (held until then), thrown, or placed.
+Free bodies are dropped (and held until then), thrown or placed; surfaces are poked, or get another material.
 """
 
 from __future__ import annotations
@@ -68,34 +68,6 @@ class PlaceEntry(msgspec.Struct, forbid_unknown_fields=True):
     """In the world [m]."""
     orientation: Quaternion | None = None
     """Quaternion w x y z; by default unchanged."""
-
-
-class Motions:
-    """Sets bodies in motion at their times. Call `apply` before each physics step.
-
-    Raises
-    ------
-    SceneError
-        If a body does not exist or has no free joint, or a time or an orientation is invalid.
-    """
-
-    def __init__(self, model: mujoco.MjModel, entries: Sequence[DropEntry | ThrowEntry | PlaceEntry]) -> None:
-        self._waiting = [(entry, *free_joint(model, entry)) for entry in sorted(entries, key=lambda e: e.time)]
-        self._home: dict[str, NDArray[np.float64]] = {}
-
-    def apply(self, data: mujoco.MjData) -> None:
-        """Hold bodies that wait for their drop, and set the bodies in motion whose time has come."""
-        begun = 0
-        for entry, position, velocity in self._waiting:
-            if isinstance(entry, DropEntry):
-                pose = slice(position, position + 7)
-                data.qpos[pose] = self._home.setdefault(entry.body, data.qpos[pose].copy())
-                data.qvel[velocity : velocity + 6] = 0
-            if entry.time <= data.time + 1e-9:
-                _set_motion(data, entry, position, velocity)
-                begun += 1
-        # sorted by time: those that have begun are the first
-        del self._waiting[:begun]
 
 
 def _set_motion(data: mujoco.MjData, entry: DropEntry | ThrowEntry | PlaceEntry, position: int, velocity: int) -> None:
@@ -199,11 +171,14 @@ class Script:
     Raises
     ------
     SceneError
-        If an event names a missing body or geom, or has an invalid time, impulse or radius.
+        If an event names a missing body or geom, a body without a free joint, or has an invalid time, orientation,
+        impulse or radius.
     """
 
     def __init__(self, model: mujoco.MjModel, events: Events, targets: Sequence[str]) -> None:
-        self._motions = Motions(model, [*events.drop, *events.throw, *events.place])
+        moved: list[DropEntry | ThrowEntry | PlaceEntry] = [*events.drop, *events.throw, *events.place]
+        self._moved = [(entry, *free_joint(model, entry)) for entry in sorted(moved, key=lambda entry: entry.time)]
+        self._home: dict[str, NDArray[np.float64]] = {}
         for poke in events.poke:
             _check_target(model, "poke", poke, targets)
             if not (np.isfinite([poke.impulse, *poke.point]).all() and 0 <= poke.radius < np.inf):
@@ -219,7 +194,7 @@ class Script:
 
     def apply(self, data: mujoco.MjData, ripples: Ripples) -> None:
         """Carry out the events that are due."""
-        self._motions.apply(data)
+        self._move(data)
         while self._controls and self._controls[0][0].time <= data.time + 1e-9:
             entry, actuator = self._controls.pop(0)
             data.ctrl[actuator] = entry.value
@@ -229,6 +204,20 @@ class Script:
                 ripples.poke(event.geom, event.point, event.impulse, event.radius)
             else:
                 ripples.change_material(event.geom, **given_fields(event.material))
+
+    def _move(self, data: mujoco.MjData) -> None:
+        """Hold bodies that wait for their drop, and set the bodies in motion whose time has come."""
+        begun = 0
+        for entry, position, velocity in self._moved:
+            if isinstance(entry, DropEntry):
+                pose = slice(position, position + 7)
+                data.qpos[pose] = self._home.setdefault(entry.body, data.qpos[pose].copy())
+                data.qvel[velocity : velocity + 6] = 0
+            if entry.time <= data.time + 1e-9:
+                _set_motion(data, entry, position, velocity)
+                begun += 1
+        # sorted by time: those that have begun are the first
+        del self._moved[:begun]
 
 
 def _check_target(model: mujoco.MjModel, verb: str, entry: PokeEntry | ChangeEntry, targets: Sequence[str]) -> None:

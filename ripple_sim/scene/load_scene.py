@@ -1,8 +1,7 @@
 """Reading a scene: one MJCF, and one TOML file that names its targets, the camera, the duration and the script.
 
-A scene's names and numbers against its model, before anything is simulated.
-
-The files that an MJCF names, looked at before MuJoCo opens them: it would wait for ever for one that is a FIFO.
+Names and numbers are checked against the model before anything is simulated, and the files that an MJCF names are
+looked at before MuJoCo opens them: it would wait for ever for one that is a FIFO.
 """
 
 from __future__ import annotations

@@ -1,12 +1,7 @@
 """`Scene`: a MuJoCo model, what ripples in it, the camera, the duration and the script.
 
-A scene seen through another camera, or exposed in another way, than its file says.
-
-Overlays by name: "height", "velocity=0.5", "contacts" and so on.
-
-Where a scene is: the TOML file of a shipped scene's name, or the path of another one.
-
-`read_toml`: a TOML file as a table, whatever the file holds.
+Where its TOML file is, by a shipped scene's name or a path, and how it is read as a table, whatever it holds; the scene
+through another camera, or exposed in another way; and overlays by name, such as "velocity=0.5".
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """The TOML file of a scene: its tables, read strictly.
 
-`[camera]` of a scene file, and whether the model and the optics can do what it says.
-
-A target as its scene file wants it: maps of the material, the layer over what is inside, and parts without waves.
+`[[ripple]]` makes maps of the material, the layer over what is inside, and parts without waves; of `[camera]` it is
+checked whether the model and the optics can do what it says.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""`[[ripple.inside]]`: what lies under a layer, as a bone under the skin, and so how thick the layer is.
+"""What a scene file says of a target texel by texel, beside its material.
 
-Expressions of position in scene files, such as "0.02 * exp(-(x**2 + y**2) / 0.1**2)": arithmetic alone.
-
-`[ripple.height]`: the shape of the surface at the beginning.
+`[ripple.height]` is the shape of the surface at the beginning, also as an expression of position such as
+"0.02 * exp(-(x**2 + y**2) / 0.1**2)"; `[[ripple.inside]]` is what lies under a layer, as a bone under the skin, and so
+how thick the layer is.
 """
 
 from __future__ import annotations

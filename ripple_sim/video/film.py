@@ -1,8 +1,6 @@
-"""`Film`: one simulation, or two side by side, rendered to frames with overlays.
+"""`Film`: one simulation, or two side by side, rendered to frames with overlays, and with passes beside them.
 
-Passes beside the frames of a film.
-
-`Shot`: everything that one exposure of a film shows.
+A `Shot` is everything that one exposure of a film shows.
 """
 
 from __future__ import annotations

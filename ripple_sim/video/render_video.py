@@ -1,10 +1,6 @@
 """`render_video`: a scene rendered to a video. Simulation, rendering and encoding overlap.
 
-`open_video`: starts a video, or continues one, as its options say.
-
-Double buffering: an iterator in a thread of its own, a few items ahead of its consumer.
-
-`Summary`: what a rendered video took.
+The simulation runs in a thread of its own, a few frames ahead (`Prefetch`); `Summary` is what it all took.
 """
 
 from __future__ import annotations
@@ -29,7 +25,8 @@ from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.kernel import compile_times, work_clock
 
 from .film import Film, Shot
-from .options import EXPOSURE, VideoOptions, check_options, frame_count, render_settings, settled
+from .options import VideoOptions
+from .settings import EXPOSURE, check_options, frame_count, render_settings, settled
 
 
 def open_video(

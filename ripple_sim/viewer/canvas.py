@@ -1,12 +1,6 @@
 """`Canvas`: a session's stage drawn frame by frame, with texts over it, as a screenshot or a recording if asked for.
 
-The viewer's controls and their keys, for the window, the web page and the help texts alike.
-
-The orbiting camera of the window: kept level, and the ray through a pixel.
-
-Screenshots and videos of a window, numbered so that none is overwritten.
-
-The sliders at the window's lower edge: the poke's impulse, and the material.
+The viewer's controls and sliders, and the orbiting camera, are the same for the window, the web page and the help.
 """
 
 from __future__ import annotations

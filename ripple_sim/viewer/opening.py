@@ -1,12 +1,11 @@
 """Opening a scene or a mesh in the viewer, with balls to throw at it.
 
-Balls to throw: a pool of free bodies in the model, parked far away until thrown.
+The balls are free bodies in the model, parked far away until they are thrown.
 """
 
 from __future__ import annotations
 
 import colorsys
-import dataclasses
 import functools
 from collections.abc import Callable
 from pathlib import Path
@@ -135,24 +134,8 @@ FLIGHT = 0.5
 _THROW = 3.0
 
 
-@dataclasses.dataclass(frozen=True)
-class Strength:
-    """A poke.
-
-    Attributes
-    ----------
-    radius : float
-        Footprint radius of a poke [m].
-    impulse : float
-        Presses the surface in by a few per cent of its size [N s].
-    """
-
-    radius: float
-    impulse: float
-
-
-def poke_strength(material: Material, size: float) -> Strength:
-    """A suitable poke for a surface of a size [m].
+def poke_strength(material: Material, size: float) -> tuple[float, float]:
+    """Radius [m] and impulse [N s] of a poke that presses a surface of a size [m] in by a few per cent of that.
 
     The footprint (1 - (d / r)^2)^3 has its peak at 4 / (pi r^2), so an impulse J sets its middle moving at
     4 J / (pi r^2 sigma); it swings back at about omega^2 = (2 c / r)^2 + k.
@@ -163,7 +146,7 @@ def poke_strength(material: Material, size: float) -> Strength:
     )
     omega = np.hypot(2 * speed / radius, np.sqrt(stiffness))
     # nothing pulls a surface without stiffness back: it then gets a second
-    return Strength(radius, _DEPTH * size * density * np.pi * radius**2 / 4 * max(float(omega), 1.0))
+    return radius, _DEPTH * size * density * np.pi * radius**2 / 4 * max(float(omega), 1.0)
 
 
 def open_scene(
@@ -200,7 +183,7 @@ def open_scene(
     size = surface_size(scene)
     first = scene.targets[0]
     materials, _ = suited_targets(scene.model, {first.geom: first.material.material()}, {first.geom: 1})
-    impulse = poke_strength(materials[first.geom], size).impulse
+    _, impulse = poke_strength(materials[first.geom], size)
     # a ball that bounces back with half its speed gives 1.5 times its momentum: here that of a poke
     mass = impulse / (1.5 * _THROW * size / FLIGHT)
 

@@ -1,30 +1,23 @@
 """`Session`: a running scene that the user can poke and change, without a window.
 
-Which rippling surface lies under a ray.
-
-The skin of a target: a fine triangle mesh whose points and normals follow the waves, changed in place.
+`Picker` finds the rippling surface under a ray, and `Skin` is such a surface as it is drawn.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.soft import target_pose
 from ripple_sim.coupling.stepping import adopt_warnings
-from ripple_sim.render.surfaces.moving import MovingSurface
-from ripple_sim.render.surfaces.surface import Charts
-from ripple_sim.render.surfaces.vertices import COORDINATES, DIRECTION, NORMAL, POSITION, tessellated
-from ripple_sim.render.visuals.corners import smooth_normals
+from ripple_sim.export.moving_mesh import MovingMesh
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver import Atlas, HeightMap, RippleError
-from ripple_sim.solver.kernel import Floats32, Ints32, kernel
+from ripple_sim.solver import Atlas, RippleError
+from ripple_sim.solver.mesh.rays import RayScene
 
 from .opening import FLIGHT, Balls, poke_strength, surface_size
 
@@ -52,7 +45,7 @@ class Picker:
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._scenes: dict[str, tuple[NDArray[np.float64] | None, EmbreeScene]] = {
+        self._scenes: dict[str, tuple[NDArray[np.float64] | None, RayScene]] = {
             name: (None, _ray_scene(simulation, name)) for name in simulation.ripples
         }
 
@@ -64,9 +57,9 @@ class Picker:
             scene = self._scene(name)
             position, rotation = self._pose(name)
             local, heading = (start - position) @ rotation, along @ rotation
-            found = scene.run(local[None].astype(np.float32), heading[None].astype(np.float32), output=1)
-            if found["primID"][0] >= 0:
-                distance = float(found["tfar"][0])
+            found = scene.cast(local[None], heading[None])
+            if found.triangle[0] >= 0:
+                distance = float(found.distance[0])
                 hits.append(Hit(name, local + distance * heading, distance))
         return min(hits, key=lambda hit: hit.distance, default=None)
 
@@ -79,7 +72,7 @@ class Picker:
         middle, _ = self._pose(self._simulation.scene.targets[0].geom)
         return max(float((middle - start) @ along / (along @ along)), 0.0)
 
-    def _scene(self, name: str) -> EmbreeScene:
+    def _scene(self, name: str) -> RayScene:
         """A target's surface where it is."""
         V, scene = self._scenes[name]
         if self._simulation.ripples[name].vertices is not V:
@@ -92,11 +85,9 @@ class Picker:
         return target_pose(self._simulation.data, self._simulation.ripples.geom_ids[name])
 
 
-def _ray_scene(simulation: Simulation, name: str) -> EmbreeScene:
+def _ray_scene(simulation: Simulation, name: str) -> RayScene:
     mesh = simulation.ripples[name].atlas.mesh
-    scene = EmbreeScene()
-    TriangleMesh(scene, mesh.V.astype(np.float32), mesh.F.astype(np.int32))
-    return scene
+    return RayScene(mesh.V, mesh.F)
 
 
 # Software OpenGL draws this many triangles 30 times a second beside the simulation, on two cores.
@@ -104,7 +95,7 @@ MAX_TRIANGLES = 24_000
 
 
 class Skin:
-    """A surface, tessellated to about its texels and displaced by their heights.
+    """The surface of an atlas as a mesh of triangles of about its texels, whose points follow the waves in place.
 
     Parameters
     ----------
@@ -125,80 +116,14 @@ class Skin:
     """
 
     def __init__(self, atlas: Atlas, limit: bool = True) -> None:
-        mesh, charts = atlas.mesh, Charts.of(atlas)
-        self.F, vertices, _ = tessellated(
-            mesh,
-            charts,
-            smooth=smooth_normals(mesh.V, mesh.F),
-            max_length=float(np.sqrt(atlas.areas.mean())),
-            max_faces=MAX_TRIANGLES,
-        )
-        for columns in (DIRECTION, NORMAL):  # those of midpoints are means
-            vertices[:, columns] /= np.linalg.norm(vertices[:, columns], axis=1, keepdims=True)
-        rest, direction, normals = (
-            np.ascontiguousarray(vertices[:, columns], dtype=np.float32) for columns in (POSITION, DIRECTION, NORMAL)
-        )
-        chart_points = charts.map.chart_points(vertices[:, COORDINATES], atlas.resolution)
-        self._rest = _Rest(rest, direction, normals, *_bilinear(*chart_points, atlas.resolution))
-        self._height_map = HeightMap.drawn(atlas, limit)
-        self._moving = MovingSurface(atlas, rest, direction, normals)
-        self.points, self.normals = rest.copy(), normals.copy()
-        self.height = np.zeros(len(vertices), np.float32)
+        self._mesh = MovingMesh(atlas, limit=limit, triangles=MAX_TRIANGLES)
+        self._still = np.zeros(atlas.areas.shape, np.float32)
+        self.F = self._mesh.F
+        self.points, self.normals, _, self.height = self._mesh.shape(self._still, self._still)
 
     def update(self, height: NDArray[np.float32], V: NDArray[np.float64] | None = None) -> None:
         """Follow a height field, float32 [C, n, n], and the vertices of the mesh, [vertex_count, 3], in metres."""
-        height_map, rest = self._height_map(height), self._rest
-        if V is not None:
-            height_map, (points, directions, normals) = self._moving(height_map, V)
-            rest = rest._replace(points=points, directions=directions, normals=normals)
-        _displace(height_map.reshape(-1, 4), rest, self.points, self.normals, self.height)
-
-
-def _bilinear(
-    chart: NDArray[np.int64], row: NDArray[np.float64], column: NDArray[np.float64], n: int
-) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Addresses in a height map [C (n + 2)^2] and weights of the four texels round each chart point, [k, 4] both."""
-    # the height map has a halo around each chart
-    row, column = np.clip(row + 1, 0, n + 1), np.clip(column + 1, 0, n + 1)
-    r, c = np.minimum(row.astype(np.int64), n), np.minimum(column.astype(np.int64), n)
-    s, t = row - r, column - c
-    corner = (chart * (n + 2) + r) * (n + 2) + c
-    texels = np.stack([corner, corner + 1, corner + n + 2, corner + n + 3], axis=1)
-    weights = np.stack([(1 - s) * (1 - t), (1 - s) * t, s * (1 - t), s * t], axis=1)
-    return texels.astype(np.int32), weights.astype(np.float32)
-
-
-class _Rest(NamedTuple):
-    """The undisplaced skin: points and outward directions and normals [n, 3], and where each point lies on the texels.
-
-    `texels` and `weights` [n, 4] are addresses in a height map [C (n + 2)^2] and bilinear weights.
-    """
-
-    points: Floats32
-    directions: Floats32
-    normals: Floats32
-    texels: Ints32
-    weights: Floats32
-
-
-@kernel
-def _displace(height_map: Floats32, rest: _Rest, points: Floats32, normals: Floats32, height: Floats32) -> None:
-    """Raise points by the height; a normal tips against the gradient, to first order in the height."""
-    texels, weights, direction, rest_normals = rest.texels, rest.weights, rest.directions, rest.normals
-    for i in range(len(texels)):
-        gx = gy = gz = h = np.float32(0)
-        for k in range(4):
-            weight, texel = weights[i, k], texels[i, k]
-            gx += weight * height_map[texel, 0]
-            gy += weight * height_map[texel, 1]
-            gz += weight * height_map[texel, 2]
-            h += weight * height_map[texel, 3]
-        height[i] = h
-        for k in range(3):
-            points[i, k] = rest.points[i, k] + h * direction[i, k]
-        x, y, z = rest_normals[i, 0] - gx, rest_normals[i, 1] - gy, rest_normals[i, 2] - gz
-        scale = 1 / np.sqrt(x * x + y * y + z * z)
-        normals[i, 0], normals[i, 1], normals[i, 2] = x * scale, y * scale, z * scale
+        self.points[:], self.normals[:], _, self.height[:] = self._mesh.shape(height, self._still, V)
 
 
 OPERATORS = ("fem", "uncorrected", "paper")
@@ -248,8 +173,8 @@ class Session:
         self.skins = {name: Skin(ripples[name].rest, limited[name]) for name in ripples}
         self._picker = Picker(self.simulation)
         self._size = surface_size(scene)
-        self._strength = poke_strength(ripples[scene.targets[0].geom].material, self._size)
-        self.poke_impulse = self._strength.impulse
+        material = ripples[scene.targets[0].geom].material
+        self._poke_radius, self.poke_impulse = poke_strength(material, self._size)
         self.operator = OPERATORS[0]
         self.paused = False
         self.color_range = _FAINT * self._size
@@ -343,7 +268,7 @@ class Session:
         """Press on the first surface on a ray, with `poke_impulse`; return the place, if there is one."""
         hit = self.pick(origin, direction)
         if hit is not None:
-            self.simulation.ripples[hit.geom].add_impulse(hit.point, self.poke_impulse, self._strength.radius)
+            self.simulation.ripples[hit.geom].add_impulse(hit.point, self.poke_impulse, self._poke_radius)
         return hit
 
     def throw(self, origin: ArrayLike, direction: ArrayLike) -> bool:

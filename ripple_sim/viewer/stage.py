@@ -1,10 +1,6 @@
-"""`Stage`: a session's targets, bodies, shadows and lights in a PyVista plotter.
+"""`Stage`: a session's targets, bodies, floor, shadows and lights in a PyVista plotter.
 
-The floor: the plane that shadows fall on, and a large plane drawn as a disc that fades into the background.
-
-Geoms and skins as PyVista actors.
-
-Soft round shadows on the floor, which show how high bodies and targets are.
+Soft round shadows on the floor show how high bodies and targets are.
 """
 
 from __future__ import annotations

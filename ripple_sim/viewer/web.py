@@ -1,10 +1,9 @@
 """The viewer in a browser on the same machine: trame sends frames of an off-screen window, and events come back.
 
-Who may use the viewer's page: whoever has the address of this run, and only from the page itself.
-
-Any page that is open in the user's browser can send requests to a port of this machine. So the address holds a secret
-that is new in every run, and requests are refused whose headers name another site: `Origin`, the page that asks, and
-`Host`, the name that the browser looked up, which another site's name server can point at this machine.
+Who has the address of this run may use the viewer's page, and only from the page itself. Any page that is open in the
+user's browser can send requests to a port of this machine. So the address holds a secret that is new in every run, and
+requests are refused whose headers name another site: `Origin`, the page that asks, and `Host`, the name that the
+browser looked up, which another site's name server can point at this machine.
 """
 
 from __future__ import annotations

@@ -1,18 +1,11 @@
-"""`Window`: a canvas that runs, with the user's keys, clicks and sliders.
+"""`Window`: a canvas that runs, with the user's keys, clicks and sliders; its loop on the desktop, and its speed.
 
-Keys and clicks of a plotter, as calls.
-
-What the user can do in the viewer: one method for each of `CONTROLS`, and for a click.
-
-The viewer on the desktop: the window's loop, and its speed.
-
-Whether there is a display. Without one VTK would run and show nothing.
+`Actions` has one method for each of `CONTROLS`, and for a click.
 """
 
 from __future__ import annotations
 
 import ctypes
-import dataclasses
 import os
 import sys
 import time
@@ -243,36 +236,12 @@ def run(window: Window) -> None:
         window.close()
 
 
-@dataclasses.dataclass(frozen=True)
-class Benchmark:
-    """Highest update rate of a window, and where the time goes.
+def benchmark(window: Window, updates: int = 60, tries: int = 3) -> str:
+    """Highest update rate of a window, and where the time goes: simulation, drawing, and processor time.
 
-    Attributes
-    ----------
-    updates_per_second : float
-    simulate, draw : float
-        [ms] per update, for physics, waves and the displaced mesh; for VTK.
-    processor : float
-        Processor time of all threads [ms] per update, which other programs hardly change.
-    renderer : str
-        OpenGL driver.
+    The best of several runs of some updates without waiting, each with a poke and a ball at the start. Processor time
+    is that of all threads, which other programs hardly change.
     """
-
-    updates_per_second: float
-    simulate: float
-    draw: float
-    processor: float
-    renderer: str
-
-    def __str__(self) -> str:
-        return (
-            f"{self.updates_per_second:.1f} updates/s: simulation {self.simulate:.1f} ms, drawing {self.draw:.1f} ms; "
-            f"{self.processor:.1f} ms of processor time ({self.renderer})"
-        )
-
-
-def benchmark(window: Window, updates: int = 60, tries: int = 3) -> Benchmark:
-    """Best of several runs of some updates without waiting, each with a poke and a ball at the start."""
     window.open()
     width, height = window.plotter.render_window.GetSize()
     trials = []
@@ -293,13 +262,10 @@ def benchmark(window: Window, updates: int = 60, tries: int = 3) -> Benchmark:
     renderer = window.gl_renderer
     window.close()
     seconds, drawing, processor = min(trials)
-    per_update = 1e3 / updates
-    return Benchmark(
-        updates_per_second=updates / seconds,
-        simulate=(seconds - drawing) * per_update,
-        draw=drawing * per_update,
-        processor=processor * per_update,
-        renderer=renderer,
+    simulate, draw, processor = (1e3 / updates * each for each in (seconds - drawing, drawing, processor))
+    return (
+        f"{updates / seconds:.1f} updates/s: simulation {simulate:.1f} ms, drawing {draw:.1f} ms; "
+        f"{processor:.1f} ms of processor time ({renderer})"
     )
 
 

@@ -1,9 +1,4 @@
-"""From a mesh to its atlas, by way of the cache.
-
-The names of the layouts: how a mesh gets its charts.
-
-Atlases from files.
-"""
+"""From a mesh to its atlas, by way of the cache, in one of the layouts; and atlases from files."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """What is done to every surface as it is read, without asking: nothing that could be seen.
 
-Equal vertices merged, hairline cracks closed, and triangles dropped that collapse or repeat.
-
-Triangles without area, whose corners lie on a line, taken out without opening the surface.
+Equal vertices are merged, hairline cracks closed, and triangles dropped that collapse or repeat. Triangles without
+area, whose corners lie on a line, are taken out without opening the surface.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """Mesh files of any format, read and joined to one mesh.
 
-OBJ and OFF files as triangles: polygons of any size, and each corner's own texture coordinates.
-
-The other formats are left to trimesh. Its readers of these two fail on polygons of more than four corners in OFF files
-and on indices that count backwards in OBJ files, both of which are common.
+OBJ and OFF files are read here, polygons of any size and each corner's own texture coordinates, PLY files in `ply`, the
+others by trimesh. Its readers of these fail on polygons of more than four corners in OFF files, on indices that count
+backwards in OBJ files, and on binary PLY files in which polygons of several sizes are mixed, all of which are common.
 """
 
 from __future__ import annotations

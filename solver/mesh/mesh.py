@@ -1,8 +1,6 @@
-"""Triangle meshes: manifold and oriented surfaces of any kind, made from any triangle soup.
+"""Triangle meshes: manifold and oriented surfaces of any kind, made from any triangle soup, and their normals.
 
-Normals of vertices, which point away from every triangle round them where any direction does.
-
-What the cube layout asks of a surface: closed, one part, no handles. Refusals come with numbers and places.
+The cube layout asks more of a surface: closed, one part, no handles. Refusals come with numbers and places.
 """
 
 from __future__ import annotations

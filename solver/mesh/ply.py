@@ -1,10 +1,6 @@
-"""The rows of a PLY file, element by element, text or binary.
+"""PLY files as triangles, text or binary: texture coordinates of vertices or of corners, polygons of any size.
 
-Polygons of a mesh file cut into triangles: by a fan, or by clipping ears where a fan folds.
-
-PLY files as triangles, text or binary: polygons of any size, texture coordinates of vertices or of corners.
-
-trimesh, which reads the other formats, fails on binary PLY files in which polygons of several sizes are mixed.
+Polygons are cut into triangles by a fan, or by clipping ears where a fan folds.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""Which sheets go on in which where more than two triangles meet along an edge.
+"""Surfaces cut apart where they touch themselves, so that what is left is manifold.
 
-Sides of triangles that lie on the same edge, and which of them are joined.
-
-Surfaces cut apart where they touch themselves, so that what is left is manifold.
+Of the sides of triangles that lie on the same edge two by two are joined. Where more than two meet, that says which
+sheet goes on in which.
 """
 
 from __future__ import annotations
@@ -135,31 +134,23 @@ def _chosen(pairs: NDArray[np.int64], against: NDArray[np.bool_], sheet: NDArray
 _APART = 1e6
 
 
-@dataclasses.dataclass(frozen=True)
-class Joints:
-    """Which sides of triangles are joined.
+def join_sides(
+    V: NDArray[np.float64], corners: Corners
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Join the sides that lie on the same edge, two by two, to an orientable surface.
 
-    Attributes
-    ----------
+    Two alone on an edge belong together. Where more meet, first those are joined that share both vertices as given;
+    then, pair by pair, those whose windings agree, that are parts of one sheet already, and between which the surface
+    bends least. What remains single becomes a rim. A one-sided surface stays open along a path.
+
+    Returns
+    -------
     pairs : int64 [k, 2]
         Sides that are joined, numbered 3 x triangle + side. All others are rims.
     crowded : int64 [j]
         One side of every edge on which more than two lie.
     one_sided : int64 [i]
         Sides of pairs left apart, since joining them would make a one-sided surface.
-    """
-
-    pairs: NDArray[np.int64]
-    crowded: NDArray[np.int64]
-    one_sided: NDArray[np.int64]
-
-
-def join_sides(V: NDArray[np.float64], corners: Corners) -> Joints:
-    """Join the sides that lie on the same edge, two by two, to an orientable surface.
-
-    Two alone on an edge belong together. Where more meet, first those are joined that share both vertices as given;
-    then, pair by pair, those whose windings agree, that are parts of one sheet already, and between which the surface
-    bends least. What remains single becomes a rim. A one-sided surface stays open along a path.
     """
     edges = _Edges.of(corners.F)
     firm, cost = edges.firm(corners.given)
@@ -177,7 +168,7 @@ def join_sides(V: NDArray[np.float64], corners: Corners) -> Joints:
         sheet = labels(pairs // 3, count)
         sides = edges.order[np.repeat(edges.size > 2, edges.size)]
         pairs = np.vstack([pairs, matched(V, corners.F, sides[free[sides]], sheet, _most_as_given(flip, sheet))])
-    return Joints(pairs, edges.order[edges.first[crowded]], firm[apart][:, 0])
+    return pairs, edges.order[edges.first[crowded]], firm[apart][:, 0]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -244,8 +235,8 @@ def cut_apart(
     notes : list of str
         What was cut.
     """
-    joints = join_sides(V, corners)
-    fan = _fans(corners.F, joints.pairs)
+    pairs, crowded, one_sided = join_sides(V, corners)
+    fan = _fans(corners.F, pairs)
     vertex = np.empty(fan.max() + 1, dtype=np.int64)
     vertex[fan] = corners.F.ravel()
     whole = np.bincount(vertex, minlength=len(V))[vertex] == 1
@@ -255,13 +246,13 @@ def cut_apart(
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     cut = Corners(rank[fan].reshape(-1, 3), corners.given, corners.uv)
-    V, cut = _without_double_edges(V[vertex[order]], cut, joints.pairs)
+    V, cut = _without_double_edges(V[vertex[order]], cut, pairs)
     notes = []
-    if len(joints.crowded):
-        notes.append(f"cut apart along {counted(len(joints.crowded), 'edge')} where more than two triangles met")
-    if len(joints.one_sided):
-        notes.append(f"cut open along {counted(len(joints.one_sided), 'edge')}: one-sided, like a Moebius band")
-    touched = _ends(corners.F, np.append(joints.crowded, joints.one_sided))
+    if len(crowded):
+        notes.append(f"cut apart along {counted(len(crowded), 'edge')} where more than two triangles met")
+    if len(one_sided):
+        notes.append(f"cut open along {counted(len(one_sided), 'edge')}: one-sided, like a Moebius band")
+    touched = _ends(corners.F, np.append(crowded, one_sided))
     pinched = np.setdiff1d(vertex[~whole], touched)
     if len(pinched):
         notes.append(f"cut apart at {counted(len(pinched), 'vertex')} where the surface touched itself")

@@ -1,6 +1,6 @@
 """Volumes of voxels, as a scan gives them, and the surfaces in them.
 
-Volumes of voxels from files: NIfTI, DICOM series, NRRD, and whatever else SimpleITK reads; arrays of NumPy.
+Read from NIfTI, DICOM series, NRRD, and whatever else SimpleITK reads, and from arrays of NumPy.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
 """A closed surface round an object that is no surface itself: parts that pass through each other, scans in pieces.
 
 All points at a given distance from the object, by marching cubes (Lorensen and Cline 1987). What cannot be reached from
-far away without coming closer than that counts as inside, as in alpha wrapping (Portaneri et al. 2022).
-
-Distance from triangles on a regular grid, computed where it matters.
-
-The surface of a field on a regular grid, by marching cubes.
+far away without coming closer than that counts as inside, as in alpha wrapping (Portaneri et al. 2022). Distances on
+the grid are computed where they matter.
 """
 
 from __future__ import annotations

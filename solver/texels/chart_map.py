@@ -1,12 +1,7 @@
 """The way from a point of the mesh to its place on the charts, which each layout knows in its own manner.
 
-Barycentric coordinates of points in triangles.
-
-The nearest place of a surface in compiled code, for all layouts: contacts ask at every step.
-
-A chart map that is linear in each triangle: its corners lie at rows and columns of one chart.
-
-The parts of a mesh's triangles on which map coordinates are linear, as a mesh of their own.
+In Python a layout's `ChartMap` gives map coordinates; compiled code, which contacts ask at every step, has a version of
+`texel_on` for its arrays. The chart map here is linear in each triangle: corners lie at rows and columns of one chart.
 """
 
 from __future__ import annotations

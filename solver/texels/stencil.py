@@ -1,17 +1,11 @@
-"""The symmetric nine-point stencil of a texel mesh, with its irregular links.
+"""The symmetric nine-point stencil of a texel mesh, and the links beyond it round irregular vertices.
 
-Layout. A stencil's weights are [C, 4, n + 1, n + 1]: those of the links of place (r, c) of a chart with halo to the
-east (r, c)-(r, c + 1), north (r, c)-(r + 1, c), north-east (r, c)-(r + 1, c + 1), and its other diagonal
+A stencil's weights are [C, 4, n + 1, n + 1]: those of the links of place (r, c) of a chart with halo to the east
+(r, c)-(r, c + 1), north (r, c)-(r + 1, c), north-east (r, c)-(r + 1, c + 1), and its other diagonal
 (r, c + 1)-(r + 1, c). A link that crosses a glued side is stored on both charts, with the same value to the last bit.
 Links to places beyond a fixed rim, where heights are 0, tie the last texels down; a free rim has none.
 
-Links beyond the nine-point stencil: the diagonals of the cells round irregular vertices.
-
-The links of the nine-point stencil: their ends, their lengths, and the copies of those that cross a glued side.
-
-The largest eigenvalue of an operator on texels, which sets the time step.
-
-A stencil as a sparse matrix.
+A stencil has a largest eigenvalue, which sets the time step, and can be had as a sparse matrix.
 """
 
 from __future__ import annotations
@@ -171,7 +165,7 @@ def _level(weights: Floats, copies: Ints, begins: Ints) -> None:
             weights[copies[i]] = total / (last - first)
 
 
-@functools.lru_cache(maxsize=4)  # like the other tables of a topology: asked for by everything on one surface
+@functools.lru_cache(maxsize=4)
 def crossing_links(topology: TexelTopology) -> CrossingLinks:
     """The links across glued sides of a topology."""
     keys, places, size = [], [], topology.texel_count
@@ -352,19 +346,11 @@ def stiffness_matrix(stencil: Stencil) -> csr_array:
         weights.append(irregular.weights)
     row, column, weight = np.concatenate(rows), np.concatenate(columns), np.concatenate(weights)
     size = topology.texel_count
-    diagonal = np.bincount(row, weight, size) + _ties_to_rim(stencil)
+    diagonal = np.bincount(row, weight, size)
+    if topology.fixed_rim:
+        tied, ties = rim_ties(topology)
+        diagonal += np.bincount(tied, stencil.weights.reshape(-1)[ties], size)
     texels = np.arange(size)
     entries = np.concatenate([-weight, diagonal])
     places = np.concatenate([row, texels]), np.concatenate([column, texels])
     return csr_array(coo_array((entries, places), shape=(size, size)))
-
-
-def _ties_to_rim(stencil: Stencil) -> NDArray[np.float64]:
-    """Sum of the weights that tie each texel to a fixed rim, [T]."""
-    topology = stencil.topology
-    sums = np.zeros(topology.texel_count)
-    for link, (a, b) in enumerate(LINK_ENDS):
-        for end in (a, b):
-            tied = ties_to_rim(topology, link) & topology.own[end]
-            sums += np.bincount(topology.halo[end][tied], stencil.weights[:, link][tied], topology.texel_count)
-    return sums

@@ -83,9 +83,21 @@ class TexelCells:
         ends = np.concatenate([np.zeros((0, 2), np.int64), *(each.irregular[1] for each in self._special)])
         self._links = IrregularLinks.of(ends, np.arange(len(ends), dtype=np.float64))
 
-    def at_rest(self, values: Floats, softening: Floats) -> tuple[Stencil, Floats]:
-        """Stencil of values [C, n, n], see `TexelMesh.stencil`, and the area that belongs to each texel [m^2]."""
-        weights, areas = np.zeros(self._shape), np.zeros(self._positions.shape[:3])
+    @functools.cached_property
+    def areas(self) -> Floats:
+        """Area of the mesh of texel centres that belongs to each texel at rest [m^2], [C, n, n]."""
+        around, quarters = np.zeros(self._positions.shape[:3]), self._quad_areas() / (4 * self._scale**2)
+        for corner in self._at_corners(around)[::-1]:
+            corner += quarters
+        areas = np.ascontiguousarray(around[:, 1:-1, 1:-1])
+        for cells in self._special:
+            shares = cells.weigh(self._positions.reshape(-1, 3).T, self._scale)[1]
+            np.add.at(areas.reshape(-1), cells.shares[1], shares.ravel()[cells.shares[0]])
+        return areas
+
+    def at_rest(self, values: Floats, softening: Floats) -> Stencil:
+        """Stencil of values [C, n, n], see `TexelMesh.stencil`."""
+        weights = np.zeros(self._shape)
         fields = [self.topology.with_halo(each) for each in (values, softening)]
         for charts, rows in self._blocks():
             # with the row of texels above
@@ -93,20 +105,16 @@ class TexelCells:
             x = self._at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
             factor = conductance(*(self._at_corners(each[part]) for each in fields))
             with np.errstate(invalid="ignore"):  # beyond rims there may be no positions
-                cells = np.where(self._whole[charts, rows], np.stack(quad(*(each - x[0] for each in x[1:]))), 0.0)
-            south, north, west, east, rising, falling = factor * cells[:6]
-            link, quarter = weights[charts], cells[6] / (4 * self._scale**2)
+                links = np.where(self._whole[charts, rows], np.stack(quad(*(each - x[0] for each in x[1:]))[:6]), 0.0)
+            south, north, west, east, rising, falling = factor * links
+            link = weights[charts]
             link[:, 0, above] += north[:, : len(link[0, 0, above])]
             link[:, 0, rows] += south
             link[:, 1, rows, 1:] += east[:, :, :-1]
             link[:, 1, rows] += west
             link[:, 2, rows], link[:, 3, rows] = rising, falling
-            for corner in self._at_corners(areas[part])[::-1]:
-                corner += quarter
-        inner = np.ascontiguousarray(areas[:, 1:-1, 1:-1])
-        factors = self._special_coefficient(*fields)
-        links = self._add_special(self._positions.reshape(-1, 3).T, factors, 0.0, weights, inner)
-        return Stencil(self.topology, weights, links), inner
+        places, factors = self._positions.reshape(-1, 3).T, self._special_coefficient(*fields)
+        return Stencil(self.topology, weights, self._add_special(places, factors, 0.0, weights, None))
 
     def coefficient(self, values: Floats, softening: Floats, power: float) -> CellCoefficient:
         """Coefficient of a surface that moves, of values at the texels at rest [C, n, n]; see `TexelMesh.stencil`."""
@@ -134,8 +142,8 @@ class TexelCells:
 
         Only the places at `special_places` of those around are looked at.
         """
-        weights, areas, power = self._empty, np.zeros(self.topology.shape), coefficient.quads.power
-        links = self._add_special(around.reshape(3, -1), coefficient.special, power, weights, areas)
+        weights, power = self._empty, coefficient.quads.power
+        links = self._add_special(around.reshape(3, -1), coefficient.special, power, weights, None)
         values = weights.reshape(-1)[self.special_links]
         weights.reshape(-1)[self.special_links] = 0.0
         return values, links
@@ -161,10 +169,19 @@ class TexelCells:
     @functools.cached_property
     def _per_area(self) -> Floats32:
         """One over the areas of whole quads at rest, see `QuadCells`; 0 where there is none."""
-        x = self._at_corners(self._scale * np.moveaxis(self._positions, -1, 0))
-        with np.errstate(invalid="ignore"):
-            areas = np.where(self._whole, quad_area(*(each - x[0] for each in x[1:])), 0.0)
+        areas = self._quad_areas()
         return _padded(np.divide(1, areas, out=np.zeros_like(areas), where=areas > 0))
+
+    def _quad_areas(self) -> Floats:
+        """Areas of whole quads at rest in units of 1 / scale^2, [C, n + 1, n + 1]; 0 where there is none."""
+        areas = np.empty(self._whole.shape)
+        for charts, rows in self._blocks():
+            part = charts, slice(rows.start, rows.stop + 1)
+            x = self._at_corners(self._scale * np.moveaxis(self._positions[part], -1, 0))
+            with np.errstate(invalid="ignore"):  # beyond rims there may be no positions
+                quads = quad_area(*(each - x[0] for each in x[1:]))
+            areas[charts, rows] = np.where(self._whole[charts, rows], quads, 0.0)
+        return areas
 
     @functools.cached_property
     def _special_per_area(self) -> list[Floats]:
@@ -180,7 +197,7 @@ class TexelCells:
         )
 
     def _add_special(
-        self, places: Floats, factors: tuple[Floats, ...], power: float, weights: Floats, areas: Floats
+        self, places: Floats, factors: tuple[Floats, ...], power: float, weights: Floats, areas: Floats | None
     ) -> IrregularLinks | None:
         """Add the special cells to weights and areas, and make the copies of each link agree; the irregular links."""
         flat, irregular, of_polygons = weights.reshape(-1), [np.zeros(0)], []
@@ -189,7 +206,8 @@ class TexelCells:
             if power:
                 factor = factor * np.maximum(area * self._special_per_area[kind], LEAST_RATIO) ** power
             values = (factor * links).ravel()
-            np.add.at(areas.reshape(-1), cells.shares[1], shares.ravel()[cells.shares[0]])
+            if areas is not None:
+                np.add.at(areas.reshape(-1), cells.shares[1], shares.ravel()[cells.shares[0]])
             irregular.append(values[cells.irregular[0]])
             if cells.on_all_copies:
                 of_polygons.append((cells.links[1], values[cells.links[0]]))

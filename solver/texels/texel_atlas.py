@@ -1,6 +1,6 @@
-"""An atlas whose surface is its own texel mesh: for surfaces that come as grids of points, without a triangle mesh.
+"""Surfaces that come as grids of points: an atlas whose mesh is made of its own texels.
 
-All charts on one rectangular page, each with its halo: one texture then holds any number of them.
+A page holds all charts of an atlas, each with its halo, in one rectangle: one texture then holds any number of them.
 """
 
 from __future__ import annotations

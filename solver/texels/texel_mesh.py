@@ -1,18 +1,12 @@
 """The texel mesh: charts of texels on a surface, whose centres are the vertices on which waves are solved.
 
-Smooth fields on the texels, and masks with soft edges.
+It cuts corners where the surface is creased, and spans twists that the surface has not: its area is up to 2 % too small
+or too large at N = 96. The map onto the charts knows better: a texel's share is its area on the charts times the real
+area for each unit of that in the texel's triangle. Alone that is one sample a texel, exact in the mean and noisy where
+triangles are uneven; so the texel mesh gives the shape of the field, the map its level in every neighbourhood.
 
-Area of the surface that belongs to each texel.
-
-The texel mesh cuts corners where the surface is creased, and spans twists that the surface has not: its area is up to
-2 % too small or too large at N = 96. The map onto the charts knows better: a texel's share is its area on the charts
-times the real area for each unit of that in the texel's triangle. Alone that is one sample a texel, exact in the mean
-and noisy where triangles are uneven; so the texel mesh gives the shape of the field, the map its level in every
-neighbourhood.
-
-Softening of the few texels that would set the time step for all.
-
-How good a texel mesh is: texel edges, and how much of the surface it covers.
+Here are also the softening of the few texels that would set the time step for all, and figures of how good a texel mesh
+is.
 """
 
 from __future__ import annotations
@@ -65,7 +59,7 @@ def levelled_areas(
     ----------
     topology : TexelTopology
     spanned : float64 [C, n, n]
-        Area that the texel mesh spans [m^2]; see `TexelMesh.spanned_areas`.
+        Area that the texel mesh spans [m^2]; see `TexelCells.areas`.
     sampled : float64 [C, n, n]
         What the map onto the charts says of each texel [m^2].
     """
@@ -117,8 +111,7 @@ class TexelMesh:
         around = _with_halo(topology, points, beyond)
         if normals is None:
             normals = _grid_normals(around)
-        ones = np.ones(topology.shape)
-        return cls(topology, points, normals, TexelCells(topology, around).at_rest(ones, ones)[1], beyond)
+        return cls(topology, points, normals, TexelCells(topology, around).areas, beyond)
 
     def with_positions(
         self,
@@ -132,7 +125,7 @@ class TexelMesh:
         Areas change in proportion to what the texel mesh spans, so that a level taken from a finer mesh is kept.
         """
         moved = TexelMesh.of(self.topology, positions, normals=normals, beyond=beyond)
-        spanned = self.spanned_areas
+        spanned = self.cells.areas
         level = np.divide(self.areas, spanned, out=np.ones_like(spanned), where=spanned > 0)
         return dataclasses.replace(moved, areas=moved.areas * level)
 
@@ -155,11 +148,6 @@ class TexelMesh:
     def cells(self) -> TexelCells:
         """The cells between the texels."""
         return TexelCells(self.topology, self.halo_positions)
-
-    @property
-    def spanned_areas(self) -> NDArray[np.float64]:
-        """Area of the mesh of texel centres that belongs to each [m^2], [C, n, n]."""
-        return self.cells.at_rest(np.ones(self.shape), np.ones(self.shape))[1]
 
     @functools.cached_property
     def grid(self) -> TexelGrid:
@@ -194,7 +182,7 @@ class TexelMesh:
         softening : [C, n, n], optional
             Factors up to 1: the stiffness of every cell is multiplied by the least of those at its corners.
         """
-        return self.cells.at_rest(coefficient, np.ones(self.shape) if softening is None else softening)[0]
+        return self.cells.at_rest(coefficient, np.ones(self.shape) if softening is None else softening)
 
     def stiffness(self, speed: float | NDArray[np.float64] = 1.0) -> csr_array:
         """Stiffness matrix [T, T], T = C n^2, of the area integral of c^2 grad . grad for a wave speed c [m/s].
@@ -300,7 +288,7 @@ def texel_quality(texels: TexelMesh, mesh: Mesh) -> dict[str, float]:
         "edge_max": float(edges.max()),
         "folded": folded_texels(texels),
         "coverage": float(texels.areas.sum() / mesh.area),
-        "spanned": float(texels.spanned_areas.sum() / mesh.area),
+        "spanned": float(texels.cells.areas.sum() / mesh.area),
         "timestep": _timestep(texels, mesh.area),
     }
 

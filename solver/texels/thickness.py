@@ -1,8 +1,7 @@
-"""How thick an object is at each texel of its surface.
+"""How thick an object is at each texel of its surface, by rays and by the balls that fit into it.
 
-How far a surface may move along its normals before it meets itself: the radii of its medial balls.
-
-How thick the layer is between a surface and what lies inside it.
+The radii of medial balls say how far a surface may move along its normals before it meets itself; rays, how far it is
+to the other side, or to what lies inside.
 """
 
 from __future__ import annotations
@@ -12,14 +11,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..cache import kept_with
 from ..errors import AtlasError, RippleWarning, Valid, checked, instance
 from ..mesh.mesh import Mesh
+from ..mesh.rays import RayScene
 from ..mesh.volume import Volume
 from .atlas import Atlas
 from .texel_mesh import smoothed
@@ -95,10 +93,9 @@ def half_thickness_at(mesh: Mesh, points: NDArray[np.float64], normals: NDArray[
     """Half the way from points of the surface [m], [k, 3], to the other side [m], [k]; normals [k, 3] are outward."""
     V, F = mesh.V, mesh.F
     middle, size = V.mean(axis=0), float(np.ptp(V, axis=0).max())
-    scene = EmbreeScene()
-    TriangleMesh(scene, np.ascontiguousarray(((V - middle) / size)[F], dtype=np.float32))
+    scene = RayScene(((V - middle) / size)[F])
     start = (points - middle) / size - _START * normals
-    distance = scene.run(start.astype(np.float32), -normals.astype(np.float32), query="DISTANCE")
+    distance = scene.distances(start, -normals)
     return size * np.clip((distance.astype(np.float64) + _START) / 2, _LEAST, _MOST)
 
 
@@ -187,11 +184,9 @@ def _cast(
     Embree finds the triangle in float32; the distance is that to its plane in float64.
     """
     middle = points.mean(axis=0)
-    scene = EmbreeScene()
-    TriangleMesh(scene, np.ascontiguousarray((corners - middle) / size, dtype=np.float32))
     starts = points - _LEAST_THICKNESS * size * ways
-    found = scene.run(((starts - middle) / size).astype(np.float32), ways.astype(np.float32), output=1)
-    triangle = np.asarray(found["primID"])
+    found = RayScene((corners - middle) / size).cast((starts - middle) / size, ways)
+    triangle = found.triangle
     met = np.flatnonzero(triangle >= 0)
     a, b, c = (corners[triangle[met], k] for k in range(3))
     normal = np.cross(b - a, c - a)
@@ -199,7 +194,7 @@ def _cast(
     distance, out = np.full(len(points), np.inf), np.zeros(len(points), np.bool_)
     with np.errstate(divide="ignore", invalid="ignore"):
         exact = ((a - points[met]) * normal).sum(axis=1) / along
-    distance[met] = np.where(np.isfinite(exact), np.maximum(exact, 0.0), found["tfar"][met] * size)
+    distance[met] = np.where(np.isfinite(exact), np.maximum(exact, 0.0), found.distance[met] * size)
     out[met] = along > 0  # the first that is met is the far side
     distance[out] = 0.0
     return distance, out

@@ -2,17 +2,8 @@
 
 A chart is a square of n x n texels. Its sides are numbered counter-clockwise, south (row 0), east, north, west; side s
 runs from corner s to corner s + 1, so that corner 0 lies south-west. Two charts that share a side run along it in
-opposite directions, as on any oriented surface.
-
-The corners of glued charts: how many charts meet in each, and the cells round irregular vertices.
-
-Connecting charts along their sides: the halo table, rims and corners of a texel mesh.
-
-Fields with halo: each chart surrounded by copies of the texels beyond its border.
-
-Fields between the texels: bilinear interpolation on charts with halo.
-
-Stretch in figures: how much wider than in an even spread texels are.
+opposite directions, as on any oriented surface. Each chart has a halo, copies of the texels beyond its border, so that
+fields can be read, and interpolated, across sides; corners of other than four charts are cells of their own.
 """
 
 from __future__ import annotations

@@ -189,14 +189,9 @@ def shrink(picture: np.ndarray, factor: int) -> np.ndarray:
 @pytest.mark.parametrize("factor", [1, 2, 3])
 @pytest.mark.parametrize("channels", [3, 4])
 def test_even_areas_keep_their_colour(factor, channels):
-    small = np.random.default_rng(1).integers(0, 256, (5, 7, channels), np.uint8)
+    small = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(channels, axis=2)  # all values survive
     small[..., 3:] = 255
     np.testing.assert_array_equal(shrink(small.repeat(factor, axis=0).repeat(factor, axis=1), factor), small)
-
-
-def test_all_values_survive():
-    small = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, axis=2)
-    np.testing.assert_array_equal(shrink(small.repeat(2, axis=0).repeat(2, axis=1), 2), small)
 
 
 def test_black_and_white_average_to_half_the_light():

@@ -4,16 +4,17 @@ The command line of a video has every option of `VideoOptions`, with its default
 """
 
 import dataclasses
-import math
-import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from ripple_sim.cli import arguments
-from ripple_sim.cli.parser import UsageError, ViewCommand, parse
+from ripple_sim.cli.parser import ViewCommand, parse
 from ripple_sim.cli.render import DropCommand, RenderCommand
+from ripple_sim.overlay import notes
+from ripple_sim.scene import drop
+from ripple_sim.solver.layouts import build
+from ripple_sim.solver.operator import assembly
 from ripple_sim.video.options import VideoOptions
 
 
@@ -68,14 +69,9 @@ def test_what_is_not_valid_is_quoted_with_what_would_be(parse: str, words: list[
         assert valid in str(refusal.value)
 
 
-@pytest.mark.parametrize(
-    "parse", [arguments.parse_seconds, arguments.parse_factor, arguments.parse_angle, arguments.parse_diameter]
-)
-def test_numbers_that_are_read_are_finite(parse: Callable[[str], float]) -> None:
-    for word in ("1e-300", "1", "359.5"):
-        assert math.isfinite(parse(word))
-    with pytest.raises(ValueError, match="valid"):
-        parse("1e999")
+def test_names_are_those_of_the_rooms_that_have_them() -> None:
+    assert (arguments.UP_AXES, arguments.BASELINES) == (drop.UP_AXES, notes.BASELINES)
+    assert (arguments.LAYOUTS, arguments.RIMS) == (build.LAYOUTS, assembly.RIMS)
 
 
 WORDS = {
@@ -124,31 +120,6 @@ def test_an_option_changes_its_own_field_alone(command: str, option: str) -> Non
     flag = [f"--{option.replace('_', '-')}", *([] if word is None else [word])]
     made = parse([command, COMMANDS[command][0], "--output", "clip.mp4", *flag])
     assert made.options() == dataclasses.replace(VideoOptions(), **{option: value})
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["render", "duck"], "--output"),
-        (["render", "-o", "a.mp4"], "SCENE"),
-        (["render", "duck", "-o", "a.mp4", "--fps", "0"], "'0' is not valid; it must be a whole number, 1 or more"),
-        (["drop", "m.obj", "-o", "a.mp4", "--up", "x"], "'x' is not valid; it must be"),
-        (["drop", "m.obj", "-o", "a.mp4", "--size", "big"], "'big' is not a frame size"),
-        (["view", "duck", "--port", "-1"], "-1"),
-        (["render", "duck", "-o", "a.mp4", "--backend", "cuda"], "cuda"),
-        (["render", "duck", "-o", "a.mp4", "--no-such-option"], "no-such-option"),
-        (["fly"], "fly"),
-        ([], ""),
-    ],
-)
-def test_a_usage_error_is_one_line_with_the_cause_and_the_help(words: list[str], said: str) -> None:
-    with pytest.raises(UsageError) as error:
-        parse(words)
-    text = str(error.value)
-    assert said in text
-    assert "\n" not in text
-    assert not set(text) & set("│╭╰─")
-    assert re.search(r"; see ripple-sim( [a-z]+)? --help$", text)
 
 
 def test_the_commands_have_their_own_arguments() -> None:

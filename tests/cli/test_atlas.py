@@ -12,7 +12,6 @@ from PIL import Image
 
 from ripple_sim.cli import main as cli
 from ripple_sim.figures import atlas_view
-from ripple_sim.solver import AtlasError, build_atlas
 
 
 @pytest.fixture(autouse=True)
@@ -102,10 +101,6 @@ def test_a_picture_that_cannot_be_written_is_refused_before_the_mesh_is_read(cap
     assert re.search(said, refusal(capsys, "atlas", "mesh.obj", "--plot", path))
 
 
-def test_the_axis_is_checked(capsys):
-    assert "'x'" in refusal(capsys, "atlas", "mesh.obj", "--up", "x")
-
-
 def test_repair_closes_or_says_what_to_install(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "pymeshfix", None)
@@ -152,11 +147,6 @@ def test_an_open_mesh_gets_patches(capsys, tmp_path):
 def test_a_layout_that_does_not_exist_is_refused(capsys, tmp_path):
     message = refusal(capsys, "atlas", str(tmp_path / "any.off"), "--layout", "octahedron")
     assert "'octahedron' is not valid; it must be auto, cube or patches" in message
-
-
-def test_a_wrong_method_is_refused(animal):
-    with pytest.raises(AtlasError, match="'progressive', 'conformal'"):
-        build_atlas(animal.mesh, 8, method="mercator")
 
 
 @pytest.mark.usefixtures("coarse_pictures")

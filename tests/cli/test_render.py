@@ -43,8 +43,9 @@ def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.Mon
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setattr(sys, "stderr", Terminal())
     kernels = "ripple_sim.solver.backends.kernels"
-    monkeypatch.setattr(render, "compiling", lambda: kernels)
-    monkeypatch.setattr(render, "compile_times", lambda: {kernels: 11.6, "ripple_sim.solver.texels.stencil": 3.0})
+    monkeypatch.setattr("ripple_sim.solver.kernel.compiling", lambda: kernels)
+    times = {kernels: 11.6, "ripple_sim.solver.texels.stencil": 3.0}
+    monkeypatch.setattr("ripple_sim.solver.kernel.compile_times", lambda: times)
     with frame_progress("renderer", 120):
         pass
     text = sys.stderr.getvalue()

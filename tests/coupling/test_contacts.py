@@ -1,15 +1,15 @@
-"""Contacts by target and geom: none is lost, doubled or turned round, against MuJoCo's own list.
-
-MuJoCo's contacts, grouped by target and geom, against a search through all of them.
-"""
+"""MuJoCo's contacts by target and geom: none is lost, doubled or turned round, with geoms and with flex colliders."""
 
 import mujoco
 import numpy as np
 import pytest
-from mujoco_models import BALL, model_of
+import trimesh
+from mujoco_models import BALL, mesh_asset, model_of
 
-from ripple_sim.coupling.contacts import TargetContacts, geom_contacts, group_by_pair
+from ripple_sim import Material, Ripples, make_collidable
+from ripple_sim.coupling.contacts import ContactReader, Contacts, first_rows, geom_contacts
 from ripple_sim.coupling.model import CoupledModel
+from ripple_sim.coupling.target_mesh import target_atlas
 
 SHAPES = ('type="box" size="0.2 0.2 0.1"', 'type="sphere" size="0.15"', 'type="capsule" size="0.08 0.1"')
 
@@ -34,12 +34,8 @@ def pit(seed: int, cone: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
     return model, data
 
 
-def by_geom(contacts: TargetContacts) -> dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    rows = [slice(a, b) for a, b in zip(contacts.begins[:-1], contacts.begins[1:], strict=True)]
-    return {
-        other: (contacts.points[row], contacts.forces[row], contacts.normals[row])
-        for other, row in zip(contacts.others.tolist(), rows, strict=True)
-    }
+def by_geom(contacts: Contacts) -> dict[int, Contacts]:
+    return {other: contacts.rows(contacts.others == other) for other in contacts.others[first_rows(contacts.others)]}
 
 
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
@@ -61,9 +57,8 @@ def test_every_contact_with_a_force_is_found_once_for_each_target_it_touches(con
     assert sum(len(others) for others in expected.values()) > 6
     for target, others in expected.items():
         contacts = by_geom(found[target])
-        assert found[target].target == target
         assert list(contacts) == sorted(others), "so do the geoms that touch one"
-        for other, (points, forces, normals) in contacts.items():
+        for other, (_, points, forces, normals) in contacts.items():
             force, normal, place = (np.array(each) for each in zip(*others[other], strict=True))
             np.testing.assert_allclose(forces, force, rtol=1e-12)
             np.testing.assert_array_equal(normals, normal)
@@ -94,25 +89,130 @@ def test_speculative_contact_loads_the_target_where_it_is() -> None:
     assert np.linalg.norm(after.points - before.points) < 1.5 * 0.05
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_groups_hold_every_contact_of_a_target_once_and_in_order(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    geoms = np.array([rng.choice(6, 2, replace=False) for _ in range(60)])
-    address, is_target = rng.integers(-1, 3, 60), rng.random(6) < 0.5
-    expected: dict[tuple[int, int], list[tuple[int, int]]] = {}
-    for i, pair in enumerate(geoms.tolist()):
-        for side in range(2):
-            target, other = pair[side], pair[1 - side]
-            if address[i] >= 0 and is_target[target]:
-                expected.setdefault((target, other), []).append((i, side))
-    pairs = group_by_pair(geoms, address, is_target)
-    found = list(zip(pairs.targets.tolist(), pairs.others.tolist(), strict=True))
-    assert found == sorted(expected)
-    for i, pair in enumerate(found):
-        rows = slice(*pairs.begins[i : i + 2])
-        assert list(zip(pairs.contacts[rows].tolist(), pairs.sides[rows].tolist(), strict=True)) == expected[pair]
+PLANK = """<body name="plank" pos="0.3 0 0.232"><freejoint/>
+<geom name="plank" type="box" size="0.3 0.1 0.03" mass="2"/></body>"""
 
 
-def test_nothing_to_group() -> None:
-    pairs = group_by_pair(np.zeros((0, 2), np.int64), np.zeros(0, np.int64), np.ones(3, bool))
-    assert [len(each) for each in pairs] == [0, 0, 1, 0, 0]
+def slab_and_table(bodies: str, slab: str = "") -> mujoco.MjModel:
+    """A slab that collides through a flex, and a table beside it, both with their tops at 0.2 m."""
+    solid = trimesh.creation.box(extents=(0.6, 0.6, 0.4))
+    V, F = trimesh.remesh.subdivide_to_size(solid.vertices, solid.faces, 0.12)
+    spec = mujoco.MjSpec.from_string(
+        f"""<mujoco><default><geom condim="1"/></default><asset>{mesh_asset("m", V, F)}</asset><worldbody>
+        <geom name="table" type="box" size="0.3 0.3 0.2" pos="0.6 0 0"/>
+        <body name="slab" {slab}>{"<freejoint/>" if slab else ""}
+        <geom name="slab" type="mesh" mesh="m" mass="3"/></body>{bodies}</worldbody></mujoco>"""
+    )
+    make_collidable(spec, "slab", "flex")
+    return spec.compile()
+
+
+def reader_of(model: mujoco.MjModel, *targets: str) -> ContactReader:
+    geoms = [model.geom(name).id for name in targets]
+    return ContactReader(CoupledModel(model), {geom: target_atlas(model, geom, 8) for geom in geoms})
+
+
+def after(model: mujoco.MjModel, steps: int) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, nstep=steps)
+    return data
+
+
+def push_on_target(contacts: Contacts) -> np.ndarray:
+    return -contacts.forces @ contacts.normals
+
+
+def test_a_body_at_rest_on_a_flex_and_a_geom_weighs_on_both_what_it_weighs() -> None:
+    model = slab_and_table(PLANK)
+    slab, table, plank = (model.geom(name).id for name in ("slab", "table", "plank"))
+    reader, data, push = reader_of(model, "slab", "table"), after(model, 600), np.zeros(3)
+    found = reader.read(data)
+    assert sorted(found) == sorted((slab, table))
+    for contacts in found.values():
+        assert set(contacts.others.tolist()) == {plank}
+        np.testing.assert_allclose(contacts.points[:, 2], 0.2, atol=0.01)
+        assert push_on_target(contacts)[2] < -1
+        push += push_on_target(contacts)
+    np.testing.assert_allclose(push, [0, 0, -2 * 9.81], atol=0.02)
+
+
+def test_only_targets_are_read_and_only_those_that_are_touched() -> None:
+    model = slab_and_table(PLANK)
+    slab, table = model.geom("slab").id, model.geom("table").id
+    resting, flying = after(model, 100), mujoco.MjData(model)
+    flying.qpos[2] = 5
+    mujoco.mj_forward(model, flying)
+    both = reader_of(model, "slab", "table").read(resting)
+    for name, geom in (("slab", slab), ("table", table)):
+        found = reader_of(model, name).read(resting)
+        assert list(found) == [geom]
+        np.testing.assert_allclose(push_on_target(found[geom]), push_on_target(both[geom]), rtol=1e-12)
+        assert not reader_of(model, name).read(flying)
+    assert not reader_of(model).read(resting)
+
+
+def test_two_targets_push_on_each_other_with_the_same_force() -> None:
+    """A free slab with a flex lies on the table: without friction, sum of whole forces and of normal ones agree."""
+    model = slab_and_table("", slab='pos="0.6 0 0.41"')
+    slab, table = model.geom("slab").id, model.geom("table").id
+    data = after(model, 600)
+    found = reader_of(model, "slab", "table").read(data)
+    assert set(found[slab].others.tolist()) == {table}
+    assert set(found[table].others.tolist()) == {slab}
+    np.testing.assert_allclose(push_on_target(found[table]), -push_on_target(found[slab]), atol=0.05)
+    np.testing.assert_allclose(push_on_target(found[table]), [0, 0, -3 * 9.81], atol=0.05)
+
+
+def test_a_flex_that_does_not_ripple_goes_by_its_geom() -> None:
+    model = slab_and_table("", slab='pos="0.6 0 0.41"')
+    [(target, contacts)] = reader_of(model, "table").read(after(model, 600)).items()
+    assert (target, set(contacts.others.tolist())) == (model.geom("table").id, {model.geom("slab").id})
+
+
+SECONDS, WEIGHT = 0.4, 9.81
+
+
+@pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
+@pytest.mark.parametrize("sticky", ["geom", "actuator", "both"])
+@pytest.mark.parametrize("side", [1, -1], ids=["above", "below"])
+def test_a_sticky_ball_gives_the_target_its_weight_and_no_more(cone: str, sticky: str, side: int) -> None:
+    adhesion = 'adhesion="20"' if sticky != "actuator" else ""
+    actuator = '<adhesion body="ball" ctrlrange="0 1" gain="30"/>' if sticky != "geom" else ""
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="0.001" cone="{cone}"/><worldbody><geom name="target" size="0.5"/>
+        <body name="ball" pos="0 0 {side * 0.55}"><freejoint/>
+        <geom name="ball" size="0.05" mass="1" gap="0.01" {adhesion}/></body></worldbody>
+        <actuator>{actuator}</actuator></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 1.0
+    ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=8, backend="cpu", conserve_volume=False)
+    given = 0.0
+    while data.time < SECONDS - 1e-9:
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+        given += sum(impulse.impulse for impulse in ripples.last_impulses)
+    assert abs(data.body("ball").xpos[2]) == pytest.approx(0.55, abs=2e-3), "the ball stays where it is"
+    lost = (data.qvel[2] + WEIGHT * SECONDS) * model.body("ball").mass[0]
+    assert given == pytest.approx(side * WEIGHT * SECONDS, rel=0.01)
+    assert given == pytest.approx(side * abs(lost), rel=1e-3)
+    # a share of the first moments may still be on its way
+    assert ripples["target"].momentum() == pytest.approx(-given, rel=0.02)
+
+
+def test_two_suckers_on_one_body_share_the_force_among_their_contacts() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><option timestep="0.001"/><worldbody><geom name="target" type="box" size="0.5 0.5 0.1"/>
+        <body name="plate" pos="0 0 -0.15"><freejoint/><geom size="0.05" pos="-0.2 0 0" mass="1"/>
+        <geom size="0.05" pos="0.2 0 0" mass="1"/></body></worldbody>
+        <actuator><adhesion body="plate" ctrlrange="0 1" gain="60"/></actuator></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 1.0
+    ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=8, backend="cpu", conserve_volume=False)
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+        ripples.step(data)
+    left, right = (impulse.impulse for impulse in ripples.last_impulses)
+    assert left == pytest.approx(-WEIGHT * 0.001, rel=0.01)
+    assert right == pytest.approx(-WEIGHT * 0.001, rel=0.01)

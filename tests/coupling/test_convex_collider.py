@@ -9,8 +9,8 @@ import trimesh
 from mujoco_models import add_ball, mesh_spec
 
 from ripple_sim import Material, RippleError, Ripples, make_collidable
-from ripple_sim.coupling import convex_collider
-from ripple_sim.coupling.convex_collider import convex_parts
+from ripple_sim.coupling import colliders
+from ripple_sim.coupling.colliders import convex_parts
 from ripple_sim.coupling.model import CoupledModel
 from ripple_sim.scenes.shapes import peanut
 from ripple_sim.solver import Mesh
@@ -37,7 +37,7 @@ def test_parts_of_a_mesh_are_the_same_each_time_and_come_from_the_cache(tmp_path
     file.unlink()
     second = convex_parts(mesh)
     assert len(first) == len(second) == 2
-    monkeypatch.setattr(convex_collider, "_decompose", lambda _: pytest.fail("the cache was not used"))
+    monkeypatch.setattr(colliders, "_decompose", lambda _: pytest.fail("the cache was not used"))
     for one, two, three in zip(first, second, convex_parts(mesh), strict=True):
         np.testing.assert_array_equal(one, two)
         np.testing.assert_array_equal(one, three)
@@ -56,7 +56,7 @@ def test_a_missing_package_is_named_with_the_way_to_install_it(monkeypatch) -> N
     def missing(_: str) -> str:
         raise importlib.metadata.PackageNotFoundError
 
-    monkeypatch.setattr(convex_collider.importlib.metadata, "version", missing)
+    monkeypatch.setattr(colliders.importlib.metadata, "version", missing)
     with pytest.raises(RippleError, match=r"needs coacd.*pip install 'ripple-sim\[convex\]'.*'sdf'"):
         make_collidable(mesh_spec(WAIST, route=None), "target", "convex")
 

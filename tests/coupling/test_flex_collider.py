@@ -8,7 +8,8 @@ import trimesh
 from mujoco_models import mesh_spec
 
 from ripple_sim import make_collidable
-from ripple_sim.coupling.flex_collider import GAP_TOLERANCE, inset
+from ripple_sim.coupling.colliders import inset
+from ripple_sim.coupling.collision_warnings import GAP_TOLERANCE
 from ripple_sim.coupling.model import find_flex_colliders, flex_thickness
 from ripple_sim.errors import SceneError
 from ripple_sim.scenes.shapes import limbed, peanut

@@ -4,6 +4,7 @@ The load of contacts with a flex collider is the sum of their whole forces, alon
 """
 
 import warnings
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -12,11 +13,10 @@ import trimesh
 from mujoco_models import add_ball, mesh_asset, mesh_spec
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling.contact_reader import ColliderIds
-from ripple_sim.coupling.contacts import PairContacts
-from ripple_sim.coupling.flex_contacts import FlexContacts, FlexNormals, MujocoFlexContacts, summed_contacts
+from ripple_sim.coupling.contacts import ContactReader
+from ripple_sim.coupling.flex_contacts import FlexContacts
 from ripple_sim.coupling.model import CoupledModel
-from ripple_sim.coupling.target_mesh import target_mesh
+from ripple_sim.coupling.target_mesh import target_atlas, target_mesh
 from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import limbed, peanut
 
@@ -228,7 +228,18 @@ def test_what_sinks_into_a_flex_and_is_pushed_sideways_is_warned_of() -> None:
 
 
 UP, ASIDE = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
-EXTENTS = np.array([0.5, 0.03])
+
+
+@pytest.fixture(scope="module")
+def slab() -> tuple[mujoco.MjModel, np.ndarray]:
+    """A block that collides through a flex, geom 0, with a ball of 0.03 m; and the outward normals of its triangles."""
+    solid = trimesh.creation.box(extents=(1, 1, 1))
+    spec = mesh_spec((solid.vertices, solid.faces))
+    add_ball(spec, "ball", [0, 0, 9], size=[0.03, 0, 0])
+    model = spec.compile()
+    corners = target_mesh(model, 0).V[target_mesh(model, 0).F]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return model, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def frame_along(normal: np.ndarray) -> np.ndarray:
@@ -239,54 +250,67 @@ def frame_along(normal: np.ndarray) -> np.ndarray:
     return np.array([x, y, np.cross(x, y)])
 
 
-def contacts_of(
-    *contacts: tuple[tuple[float, ...], tuple[float, float, float]], elem: int = -1, swapped: bool = False
-) -> tuple[np.ndarray, MujocoFlexContacts]:
-    """Contacts of a ball, geom 1, with a target, geom 0: outward normal, and force on the ball in the world [N]."""
+def summed(
+    slab: tuple[mujoco.MjModel, np.ndarray],
+    contacts: list[tuple[tuple[float, ...], tuple[float, float, float]]],
+    *,
+    surface: tuple[float, ...] | None = UP,
+    swapped: bool = False,
+    rotation: np.ndarray = np.eye(3),  # noqa: B008
+    dist: float = -0.002,
+    margin: float = 0.0,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Which contacts of the ball with the block are kept, and their points (from MuJoCo's), forces and normals.
+
+    Parameters
+    ----------
+    contacts
+        Outward normal, and force on the ball in the world [N], of each.
+    surface
+        Normal of the triangle that is touched in the world; None for a vertex.
+    swapped
+        Whether the ball is the first geom of the contacts.
+    rotation
+        Of the block.
+    """
+    model, normals = slab
     k, side = len(contacts), int(swapped)
-    frames = np.array([frame_along(np.multiply(-1 if swapped else 1, normal)) for normal, _ in contacts]).reshape(k, 9)
-    forces = np.array([force for _, force in contacts]).reshape(k, 3) * (-1 if swapped else 1)
+    frames = np.array([frame_along(np.multiply(-1 if swapped else 1, normal)) for normal, _ in contacts])
+    forces = np.array([force for _, force in contacts]) * (-1 if swapped else 1)
     elements = np.full((k, 2), -1, np.int32)
-    elements[:, side] = elem
-    return np.tile([1, 0] if swapped else [0, 1], (k, 1)), MujocoFlexContacts(
-        efc_address=3 * np.arange(k, dtype=np.int32),
-        dim=np.full(k, 3, np.int32),
-        friction=np.ones((k, 5)),
-        elem=elements,
-        frame=frames,
-        pos=np.arange(3.0 * k).reshape(k, 3),
-        dist=np.full(k, -0.002),
-        includemargin=np.zeros(k),
-        adhesion=np.zeros(k),
-        efc_force=np.einsum("kij,kj->ki", frames.reshape(k, 3, 3), forces).ravel(),
-        geom_xmat=np.tile(np.eye(3).ravel(), (2, 1)),
-    )
+    if surface is not None:
+        elements[:, side] = (normals @ rotation.T @ surface).argmax()
+    contact = SimpleNamespace(
+        dim=np.full(k, 3, np.int32), friction=np.ones((k, 5)), elem=elements, frame=frames.reshape(k, 9),
+        pos=np.arange(3.0 * k).reshape(k, 3), dist=np.full(k, dist), includemargin=np.full(k, margin),
+    )  # fmt: skip
+    data = SimpleNamespace(contact=contact, geom_xmat=np.tile(rotation.ravel(), (2, 1)))
+    coupled, rows = CoupledModel(model), (np.arange(k), np.full(k, side), np.zeros(k, int), np.ones(k, int))
+    along = np.einsum("kij,kj->ki", frames, forces)
+    kept, points, *loads = FlexContacts(coupled, {0: target_mesh(model, 0)}).loads(data, *rows, np.zeros(1, int), along)
+    return kept, points - contact.pos[kept], *loads
 
 
-def summed(geoms: np.ndarray, contacts: MujocoFlexContacts, normals: np.ndarray | None = None) -> PairContacts:
-    flex = FlexNormals(np.array([0, -1]), np.zeros((1, 3)) if normals is None else normals, np.zeros(2, bool))
-    return summed_contacts(geoms, contacts, flex, EXTENTS, False)[0]
+RIM = [(UP, (0, 0, 3)), (ASIDE, (50, 0, 1)), ((-1, 0, 0), (-50, 0, 2))]
 
 
-def test_friction_of_contacts_that_push_sideways_counts_along_the_normal() -> None:
+def test_friction_of_contacts_that_push_sideways_counts_along_the_normal(slab: tuple) -> None:
     """Two opposite contacts at a rim cancel along x, but their friction pushes upwards: 3 + 1 + 2 N."""
-    found = summed(*contacts_of((UP, (0, 0, 3)), (ASIDE, (50, 0, 1)), ((-1, 0, 0), (-50, 0, 2)), elem=0))
-    assert found.forces.sum() != pytest.approx(6), "without the surface's normals all three would count as normals"
-    found = summed(
-        *contacts_of((UP, (0, 0, 3)), (ASIDE, (50, 0, 1)), ((-1, 0, 0), (-50, 0, 2)), elem=0), np.array([UP])
-    )
-    np.testing.assert_allclose(found.forces, [6])
-    np.testing.assert_array_equal(found.normals, [UP])
+    assert summed(slab, RIM, surface=None)[0].all(), "without the surface's normals all three would count as normals"
+    kept, _, forces, normals = summed(slab, RIM)
+    assert kept.tolist() == [True, False, False]
+    np.testing.assert_allclose(forces, [6])
+    np.testing.assert_allclose(normals, [UP], atol=1e-15)
 
 
-def test_the_load_is_shared_by_normal_force_and_by_how_straight_it_is() -> None:
-    slanted = (0.6, 0.0, 0.8)
-    found = summed(*contacts_of((UP, (0, 0, 4)), (slanted, (1.2, 0, 1.6)), elem=0), np.array([UP]))
+def test_the_load_is_shared_by_normal_force_and_by_how_straight_it_is(slab: tuple) -> None:
+    _, _, forces, _ = summed(slab, [(UP, (0, 0, 4)), ((0.6, 0.0, 0.8), (1.2, 0, 1.6))])
     # 4 and 2 N along their own normals; the whole force of (1.2, 0, 5.6) lies along their mean normal as it is
-    assert found.forces.sum() == pytest.approx(np.hypot(1.2, 5.6))
-    assert found.forces[1] / found.forces[0] == pytest.approx(2 * 0.8**2 / 4)
+    assert forces.sum() == pytest.approx(np.hypot(1.2, 5.6))
+    assert forces[1] / forces[0] == pytest.approx(2 * 0.8**2 / 4)
 
 
+@pytest.mark.filterwarnings("ignore:the impulses on geom")
 @pytest.mark.parametrize(
     "contacts",
     [
@@ -294,30 +318,17 @@ def test_the_load_is_shared_by_normal_force_and_by_how_straight_it_is() -> None:
         [(UP, (0, 0, 1)), (ASIDE, (0, 0, -3))],
         [(ASIDE, (5, 0, 0)), ((0, 1, 0), (0, 5, 0))],
         [(UP, (0, 0, 0))],
-        [],
     ],
-    ids=["pulled", "pulled in sum", "sideways only", "no force", "no contact"],
+    ids=["pulled", "pulled in sum", "sideways only", "no force"],
 )
-def test_a_pair_that_does_not_push_is_left_out(contacts: list) -> None:
-    found = summed(*contacts_of(*contacts, elem=0), np.array([UP]))
-    assert len(found.targets) == len(found.forces) == len(found.points) == 0
-    assert found.begins.tolist() == found.starts.tolist() == [0]
+def test_a_pair_that_does_not_push_is_left_out(slab: tuple, contacts: list) -> None:
+    assert [len(each) for each in summed(slab, contacts)[1:]] == [0, 0, 0]
 
 
-def test_a_contact_without_a_row_in_the_solver_and_one_with_another_flex_count_nothing() -> None:
-    geoms, contacts = contacts_of((UP, (0, 0, 3)), (UP, (0, 0, 5)), (UP, (0, 0, 7)))
-    contacts.efc_address[1] = -1
-    geoms[2, 1] = -1
-    found = summed(geoms, contacts)
-    np.testing.assert_allclose(found.forces, [3])
-
-
-def test_it_does_not_matter_which_of_the_two_mujoco_names_first() -> None:
-    contacts = ((UP, (1, 0, 3)), ((0.6, 0, 0.8), (0, 1, 5)), (ASIDE, (4, 0, 2)))
-    one = summed(*contacts_of(*contacts, elem=0), np.array([UP]))
-    other = summed(*contacts_of(*contacts, elem=0, swapped=True), np.array([UP]))
-    for name in ("targets", "others", "begins", "forces", "normals", "points"):
-        np.testing.assert_allclose(getattr(one, name), getattr(other, name), atol=1e-14)
+def test_it_does_not_matter_which_of_the_two_mujoco_names_first(slab: tuple) -> None:
+    contacts = [(UP, (1, 0, 3)), ((0.6, 0, 0.8), (0, 1, 5)), (ASIDE, (4, 0, 2))]
+    for one, other in zip(summed(slab, contacts), summed(slab, contacts, swapped=True), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -326,23 +337,16 @@ def test_it_does_not_matter_which_of_the_two_mujoco_names_first() -> None:
     ids=["shallow", "deeper than the ball", "within the margin"],
 )
 def test_points_lie_outside_by_the_depth_but_not_by_more_than_the_geom(
-    dist: float, margin: float, height: float
+    slab: tuple, dist: float, margin: float, height: float
 ) -> None:
-    """MuJoCo's point is half-way between the two surfaces; of the ball's, it is out by its depth in the margin twice.
-
-    The ball's smallest half-extent is 0.03 m.
-    """
-    geoms, contacts = contacts_of((UP, (0, 0, 3)))
-    contacts.dist[:], contacts.includemargin[:] = dist, margin
-    [point] = summed(geoms, contacts).points
-    assert point[2] - contacts.pos[0, 2] == pytest.approx(height)
+    """MuJoCo's point is half-way between the two surfaces, the ball's is out by its depth in the margin, twice."""
+    _, [point], _, _ = summed(slab, [(UP, (0, 0, 3))], dist=dist, margin=margin)
+    assert point[2] == pytest.approx(height)
 
 
-def test_normals_turn_with_the_geom() -> None:
-    geoms, contacts = contacts_of((UP, (0, 0, 3)), elem=0)
-    contacts.geom_xmat[0] = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]]).T.ravel()
-    local = contacts.geom_xmat[0].reshape(3, 3).T @ UP
-    np.testing.assert_allclose(summed(geoms, contacts, local[None]).normals, [UP], atol=1e-15)
+def test_normals_turn_with_the_geom(slab: tuple) -> None:
+    rotation = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    np.testing.assert_allclose(summed(slab, [(UP, (0, 0, 3))], rotation=rotation)[3], [UP], atol=1e-15)
 
 
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
@@ -360,11 +364,11 @@ def test_the_load_is_the_force_with_which_mujoco_moves_the_body(cone: str, condi
     make_collidable(spec, "slab", "flex")
     model = spec.compile()
     data, coupled, wrench, steps = mujoco.MjData(model), CoupledModel(model), np.zeros(6), 0
-    reader = FlexContacts(coupled, {0: target_mesh(model, 0)})
+    reader = ContactReader(coupled, {0: target_atlas(model, 0, 8)})
     data.qvel[:] = [0.4, 0.2, -1.0, 4.0, 2.0, 5.0]
     for _ in range(100):
         mujoco.mj_step(model, data)
-        found = reader.contacts(data, ColliderIds(coupled)(data), coupled.extents)
+        found = reader.read(data)
         mean = np.zeros(3)
         for i, contact in enumerate(data.contact):
             mujoco.mj_contactForce(model, data, i, wrench)
@@ -390,13 +394,17 @@ def test_the_load_is_the_force_with_which_mujoco_moves_the_body(cone: str, condi
         # two slanted pushes that balance: their sum is the whole
         ([((0.6, 0, 0.8), (3, 0, 4)), ((-0.6, 0, 0.8), (-3, 0, 4))], 0.0),
         # 4 N up, with friction of 4 N at most, where 12 N push sideways
-        ([(UP, (0, 0, 4)), (ASIDE, (12, 0, 0))], np.hypot(12, 4) - np.hypot(4, 4)),
+        ([(UP, (0, 0, 4)), (ASIDE, (12, 0, 0))], 1 - np.hypot(4, 4) / np.hypot(12, 4)),
         # nothing pushes along the surface's normal
-        ([(ASIDE, (5, 0, 0))], 5.0),
+        ([(ASIDE, (5, 0, 0))], 1.0),
     ],
 )
-def test_pushes_sideways_beyond_friction_are_told(contacts: list, unexplained: float) -> None:
-    flex = FlexNormals(np.array([0, -1]), np.array([UP]), np.zeros(2, bool))
-    _, amounts = summed_contacts(*contacts_of(*contacts, elem=0), flex, EXTENTS, False)
-    whole = np.linalg.norm(sum(np.array(force, dtype=float) for _, force in contacts))
-    np.testing.assert_allclose(amounts, [[whole, unexplained], [0, 0]], atol=1e-12)
+def test_the_share_of_pushes_sideways_beyond_friction_is_warned_of(
+    slab: tuple, contacts: list, unexplained: float
+) -> None:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RippleWarning)
+        summed(slab, contacts)
+    assert [f"wrong by about {unexplained:.1%}" in str(each.message) for each in caught] == [True] * int(
+        unexplained > 0
+    )

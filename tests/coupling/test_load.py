@@ -3,13 +3,14 @@
 What is told of the contacts of a step: impulses for the user, touches for two-way coupling.
 """
 
+import mujoco
 import numpy as np
 import pytest
-from sphere_contacts import CONVEX, RADII, contacts_on, sphere_load, tilted
+from sphere_contacts import CONVEX, RADII, Pose, contacts_on, sphere_load, tilted
 
-from ripple_sim.coupling.load import ContactRecord, TargetLoad
-from ripple_sim.coupling.patches import Pose, in_frame
-from ripple_sim.solver import Material, WaveSolver, sphere_atlas
+from ripple_sim import Material, Ripples
+from ripple_sim.coupling.load import StepContacts, TargetLoad
+from ripple_sim.solver import WaveSolver, sphere_atlas
 
 DT = 0.002
 POLE, SIDE, CORNER = (0, 0, 1), (1, 0, 0), (1, 0.8, -0.7)
@@ -103,10 +104,10 @@ def test_new_waves_on_the_same_atlas_get_what_the_old_ones_did_not() -> None:
 def test_what_bears_on_fixed_texels_is_lost() -> None:
     atlas, pose = sphere_atlas(1.0, 16), tilted()
     lower = atlas.positions[..., 2] < 0
-    load = TargetLoad(WaveSolver(atlas, Material(fixed=lower), backend="cpu"), RADII, CONVEX)
+    load = TargetLoad(WaveSolver(atlas, Material(fixed=lower), backend="cpu"), 0, RADII, CONVEX)
     found, _ = load.touched(contacts_on(pose, {1: [(POLE, 5.0)], 2: [((0, 0, -1), 7.0)]}), pose, DT, DT)
     assert found.forces.sum() == pytest.approx(5.0)
-    load = TargetLoad(WaveSolver(atlas, Material(), backend="cpu"), RADII, CONVEX)
+    load = TargetLoad(WaveSolver(atlas, Material(), backend="cpu"), 0, RADII, CONVEX)
     both = contacts_on(pose, {1: [(POLE, 5.0)], 2: [((0, 0, -1), 7.0)]})
     before, _ = load.touched(both, pose, DT, DT)
     # footprints made for the old waves must not serve the new ones
@@ -119,7 +120,11 @@ TOLD = ["globe", "one", "two", "three"], np.arange(4), sphere_atlas(1.0, 16), DT
 EACH = {1: [((0, 0, 1), 5.0)], 3: [((1, 0, 0.1), 2.0), ((1, 0.2, 0), 1.0)]}
 
 
-def record_of(each: dict = EACH, elapsed: float = DT) -> tuple[ContactRecord, Pose]:
+def local_to(pose: Pose, point: np.ndarray) -> np.ndarray:
+    return (point - pose.position) @ pose.rotation
+
+
+def record_of(each: dict = EACH, elapsed: float = DT) -> tuple[StepContacts, Pose]:
     pose = tilted()
     return sphere_load().touched(contacts_on(pose, each), pose, DT, elapsed)[1], pose
 
@@ -140,7 +145,7 @@ def test_impulses_do_not_depend_on_how_the_load_is_spread_over_time() -> None:
 def test_points_lie_on_the_surface_in_the_world_under_the_middle_of_the_contacts() -> None:
     record, pose = record_of()
     for impulse, contacts in zip(record.impulses(*TOLD), EACH.values(), strict=True):
-        [local] = in_frame(impulse.point[None], pose)
+        local = local_to(pose, impulse.point)
         assert np.linalg.norm(local) == pytest.approx(1.0, abs=1e-6), "on a sphere of 1 m"
         normals = np.array([np.array(normal) / np.linalg.norm(normal) for normal, _ in contacts])
         middle = np.array([force for _, force in contacts]) @ normals
@@ -153,7 +158,7 @@ def test_the_point_lies_within_the_texel() -> None:
     for direction in directions:
         record, pose = record_of({2: [(direction, 1.0)]})
         [impulse] = record.impulses(*TOLD)
-        away = np.linalg.norm(atlas.positions[impulse.texel] - in_frame(impulse.point[None], pose))
+        away = np.linalg.norm(atlas.positions[impulse.texel] - local_to(pose, impulse.point))
         # at the cube's corners texels are rhombi of 120 degrees: half the diagonal is 0.93 of the area's root
         assert away < 0.95 * np.sqrt(atlas.areas[impulse.texel])
 
@@ -165,7 +170,7 @@ def test_touches_have_the_force_weighted_point_and_normal_and_the_geoms_own_load
     for touch, contacts in zip(touches, EACH.values(), strict=True):
         forces = np.array([force for _, force in contacts])
         normals = np.array([np.array(normal) / np.linalg.norm(normal) for normal, _ in contacts])
-        [local] = in_frame(touch.point[None], pose)
+        local = local_to(pose, touch.point)
         np.testing.assert_allclose(local, 1.003 * forces @ normals / forces.sum(), atol=1e-12)
         mean = pose.rotation @ (forces @ normals)
         np.testing.assert_allclose(touch.normal, mean / np.linalg.norm(mean), atol=1e-12)
@@ -187,7 +192,41 @@ def test_parts_of_one_flex_are_told_of_together_at_their_middle_on_the_surface()
     [impulse] = record.impulses(names, owners, sphere_atlas(1.0, 16), DT)
     assert (impulse.geom, impulse.other) == ("globe", "cloth")
     assert impulse.impulse == pytest.approx(8.0 * DT)
-    [local] = in_frame(impulse.point[None], pose)
-    places = [in_frame(each.point[None], pose)[0] for each in record.impulses(*TOLD)]
+    local = local_to(pose, impulse.point)
+    places = [local_to(pose, each.point) for each in record.impulses(*TOLD)]
     middle = np.average(places, axis=0, weights=[5.0, 3.0])
     np.testing.assert_allclose(local, middle / np.linalg.norm(middle), atol=2e-3)
+
+
+def test_a_target_gets_the_same_load_whether_others_ripple_or_not() -> None:
+    """Three targets and bodies on all of them: those that ripple with others have the same waves, bit for bit."""
+    rng = np.random.default_rng(4)
+    targets = "".join(
+        f'<geom name="{name}" type="box" size="0.3 0.3 0.05" pos="{x} 0 0"/>'
+        for name, x in (("left", -0.7), ("middle", 0.0), ("right", 0.7))
+    )
+    bodies = "".join(
+        f'<body pos="{0.7 * (i % 3 - 1) + x:.3f} {y:.3f} {0.1 + 0.02 * i:.3f}"><freejoint/>'
+        f'<geom type="{("sphere", "box", "capsule")[i // 3]}" size="0.04 0.04 0.04"/></body>'
+        for i, (x, y) in enumerate(rng.uniform(-0.2, 0.2, (9, 2)))
+    )
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{targets}{bodies}</worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    names = ("left", "middle", "right")
+    options = {"resolution": 16, "backend": "cpu"}
+    together = Ripples(model, {name: Material() for name in names}, **options)
+    alone = {name: Ripples(model, {name: Material()}, **options) for name in names}
+    most = 0
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+        together.step(data)
+        for ripples in alone.values():
+            ripples.step(data)
+        assert [(each.geom, each.other) for each in together.last_impulses] == [
+            (each.geom, each.other) for ripples in alone.values() for each in ripples.last_impulses
+        ]
+        most = max(most, len(together.last_impulses))
+    assert most > 6
+    for name in names:
+        assert together[name].height.any()
+        np.testing.assert_array_equal(together[name].height, alone[name][name].height)

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.footprints import NO_FORCES, NO_SHARES, TexelForces
-from ripple_sim.coupling.rest_filter import CONTACT_STATE, rest_filter
+from ripple_sim.coupling.rest_filter import NO_FORCES, RestFilter, TexelForces
 from ripple_sim.solver import Load, sphere_atlas
 from ripple_sim.solver.waves.footprint import footprint
-from ripple_sim.solver.waves.load import slot_scratch
 
 
 class LoadedSphere:
@@ -15,29 +13,25 @@ class LoadedSphere:
 
     def __init__(self, resolution: int, radius: float, dt: float) -> None:
         self.atlas, self.radius, self.dt = sphere_atlas(1.0, resolution), radius, dt
-        self.states, self.mean, self.over = np.zeros(1, CONTACT_STATE), NO_SHARES, True
+        self.filter = RestFilter(1, self.atlas.areas.size)
 
     def at(self, point: np.ndarray, force: float) -> Load:
         where = footprint(self.atlas, point, self.radius)
         forces = force * where.weights * self.atlas.areas.reshape(-1)[where.texels]
         rows = np.array([0, len(forces)])
-        return self.filter(
-            TexelForces(np.zeros(1, np.int64), point[None], np.array([self.radius / 2]), rows, where.texels, forces)
+        present = TexelForces(
+            np.zeros(1, np.int64), point[None], np.array([self.radius / 2]), rows, where.texels, forces
         )
-
-    def filter(self, present: TexelForces) -> Load:
-        scratch = slot_scratch(self.atlas.areas.size)
-        self.mean, given, self.over = rest_filter(self.states, self.mean, present, self.dt, scratch)
-        return Load(self.mean.texels, given)
+        return self.filter(present, self.dt)
 
 
 def given_over_time(forces: np.ndarray, dt: float) -> np.ndarray:
     """Force that the surface receives in each step, while a geom touches and for a second after."""
     sphere, given = LoadedSphere(16, 0.3, dt), []
     for force in np.concatenate([forces, np.zeros(round(1.0 / dt))]):
-        out = sphere.at(np.array([0.0, 0.0, 1.0]), force) if force > 0 else sphere.filter(NO_FORCES)
+        out = sphere.at(np.array([0.0, 0.0, 1.0]), force) if force > 0 else sphere.filter(NO_FORCES, dt)
         given.append(out.forces.sum())
-    assert sphere.over
+    assert not sphere.filter.active.any()
     return np.array(given)
 
 
@@ -131,21 +125,17 @@ def forces_of(geoms: list[int], texels: list[np.ndarray], forces: list[np.ndarra
 def test_geoms_are_filtered_each_for_itself() -> None:
     """Three geoms that come and go, together and alone."""
     size, dt, rng = 96, 0.002, np.random.default_rng(3)
-    alone = [(np.zeros(4, CONTACT_STATE), NO_SHARES) for _ in range(4)]
-    states, mean, over = np.zeros(4, CONTACT_STATE), NO_SHARES, True
+    alone, every = [RestFilter(4, size) for _ in range(4)], RestFilter(4, size)
     for step in range(400):
         present = [g for g in range(1, 4) if rng.random() < (0.9, 0.5, 0.02)[g - 1] and step < 200]
         texels = [rng.permutation(8) + 10 * g for g in present]
         forces = [rng.exponential(1.0, 8) for _ in present]
-        forces_now = forces_of(present, texels, forces)
-        mean, given, over = rest_filter(states, mean, forces_now, dt, slot_scratch(size))
-        together, apart = np.bincount(mean.texels, given, size), np.zeros(size)
+        load = every(forces_of(present, texels, forces), dt)
+        together, apart = np.bincount(load.texels, load.forces, size), np.zeros(size)
         for g in range(1, 4):
             mine = slice(present.index(g), present.index(g) + 1) if g in present else slice(0, 0)
-            mine = forces_of(present[mine], texels[mine], forces[mine])
-            own, out, _ = rest_filter(alone[g][0], alone[g][1], mine, dt, slot_scratch(size))
-            alone[g] = alone[g][0], own
-            apart += np.bincount(own.texels, out, size)
+            own = alone[g](forces_of(present[mine], texels[mine], forces[mine]), dt)
+            apart += np.bincount(own.texels, own.forces, size)
         np.testing.assert_array_equal(together, apart)
-        assert over == (not states["active"].any())
-    assert over
+    assert not every.active.any()
+    assert not len(every(NO_FORCES, dt).texels)

@@ -13,7 +13,6 @@ from arrival import (
     CALIBRATED,
     CONFORMAL,
     NEAREST,
-    Arrival,
     arrival,
     arrival_times,
     arrivals,
@@ -140,16 +139,6 @@ def test_waves_at_the_calibrated_speed_arrive_as_calibration_says(atlas: Atlas) 
         assert error == pytest.approx(mean_error([as_it_is.at_speed(factor)])[name], abs=0.02), name
 
 
-def test_a_constant_delay_is_calibrated_away_and_no_crest_is_not() -> None:
-    late = Arrival(np.full(9, 1.25), np.full(9, 1.25))
-    assert mean_error([late])["front_median"] == pytest.approx(0.25)
-    assert speed_factor([late]) == 1.25
-    assert max(mean_error([late.at_speed(1.25)])[key] for key in ("front_median", "crest_q90")) == 0
-    none = Arrival(np.array([1.0, np.nan, np.nan]), np.array([1.0, np.nan, np.nan]))
-    assert speed_factor([none]) == 1
-    assert none.error().front_median == 1
-
-
 def test_table_has_our_operator_and_its_rivals() -> None:
     rows = arrivals({}, resolution=N, sources=1)["limbed"]
     paint, calibrated, conformal = rows["dynamic-paint"], rows[CALIBRATED], rows[CONFORMAL]
@@ -213,21 +202,6 @@ def test_without_a_crest_there_is_no_time(signal: np.ndarray) -> None:
         assert np.isnan(time)
 
 
-def test_signals_side_by_side_do_not_mix() -> None:
-    middles = np.array([0.9, 1.7, 2.4])
-    signals = np.stack([*(bump(middle) for middle in middles), np.zeros(401)], axis=1)
-    fronts, crests = front_and_crest(TIMES, signals)
-    np.testing.assert_allclose(crests[:3], middles, atol=1e-4)
-    np.testing.assert_allclose(np.diff(fronts[:3]), np.diff(middles), atol=1e-4)
-    assert np.isnan([fronts[3], crests[3]]).all()
-
-
-def test_times_shift_with_the_clock() -> None:
-    signal = bump(2.0)[:, None]
-    for here, later in zip(front_and_crest(TIMES, signal), front_and_crest(TIMES + 10, signal), strict=True):
-        np.testing.assert_allclose(later, here + 10)
-
-
 FARTHEST = 20.0
 SLANTS = np.linspace(0, np.pi / 2, 2001)
 
@@ -259,9 +233,3 @@ def test_far_away_the_wave_travels_at_its_speed_and_its_front_leads_the_crest() 
     assert (crest < distance).all()  # the half-derivative of a bump leads its middle
     for times in (front, crest):
         np.testing.assert_allclose(np.diff(times) / np.diff(distance), 1.0, atol=0.01)
-
-
-def test_a_distance_has_the_same_times_whatever_else_is_asked() -> None:
-    alone, among = plane_arrival(np.array([8.0])), plane_arrival(np.array([8.0, FARTHEST]))
-    for one, other in zip(alone, among, strict=True):
-        assert other[0] == pytest.approx(one[0], abs=2e-3)

@@ -58,31 +58,30 @@ def test_imports_are_those_of_the_modules_that_names_come_from(plots, root: Path
 def test_cycles_are_found_and_counted_as_the_folders_stand(plots, root: Path) -> None:
     modules = plots.imports.read(root)
     assert plots.imports.cycles({name: set(each.imports) for name, each in modules.items()}) == [[LOAD, RIPPLES]]
-    rooms = plots.imports.grouped(modules, {name: plots.structure.room(name) for name in modules})
+    rooms = plots.imports.grouped(modules, {name: plots.imports.room(name) for name in modules})
     assert rooms["ripple_sim.coupling"] == {"ripple_sim.solver.operator"}
     assert plots.imports.cycles(rooms) == []
 
 
-def test_measures_of_the_small_tree(plots, root: Path) -> None:
-    measures = plots.structure.measure(root)
-    assert measures["modules"] == "5"
-    assert measures["lines of code"] == "11"
-    assert measures["longest function"] == "3 lines (simulation.run)"
-    assert measures["most parameters"] == "2 (simulation.run)"
-    assert measures["rooms, arrows between them"] == "4, 3"
-    assert measures["arrows between modules"] == "5"
-    assert measures["cycles of modules"] == "1: coupling.load - coupling.ripples"
-    assert measures["tests / code"] == "0.36"
-    assert measures["code that stands twice, 40 tokens or more"] == "0.0 %"
+def test_counts_of_the_small_tree(plots, root: Path) -> None:
+    (root / "solver" / "a.glsl").write_text("void main() {}\n")
+    counts = plots.structure.counts(root)
+    assert counts["modules"] == "5"
+    assert counts["folders with Python"] == "4"
+    assert counts["lines of Python"] == "11"
+    assert counts["median module, longest"] == "2, 5 lines"
+    assert counts["GLSL"] == "1 files, 1 lines"
+    assert counts["tests"] == "1 files, 4 lines"
+    assert counts["cycles of modules"] == "1"
+    # ripples has two importers, material, errors and load one each
+    assert plots.structure.with_one_importer(plots.imports.read(root)) == 0.6
 
 
-def test_copies_are_counted_in_both_places(plots, root: Path) -> None:
-    for name in ("one", "two"):
-        (root / "solver" / f"{name}.py").write_text(
-            f"{name} = 1\n" + "x = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]\n" * 2
-        )
-    share = plots.structure.measure(root)["code that stands twice, 40 tokens or more"]
-    assert 70 < float(share.split()[0]) < 100
+def test_the_older_column_of_the_page_stays(plots) -> None:
+    page = "a <!-- counts -->| modules | 9 | 1 |<!-- end of counts --> b"
+    older = plots.structure.older_figures("| measure | before | now |\n| modules | 9 | 1 |\n")
+    text = plots.structure.replaced(page, "counts", plots.structure.table(older, {"modules": "5"}))
+    assert "| modules | 9 | 5 |" in text and text.startswith("a <!--") and text.endswith("--> b")
 
 
 def test_arrows_that_others_imply_are_left_out(plots) -> None:

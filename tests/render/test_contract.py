@@ -1,7 +1,6 @@
 """The renderer's contract with its shaders: nothing stands twice, every shader keeps to it, and so does the driver."""
 
 import re
-from enum import IntEnum
 from pathlib import Path
 
 import numpy as np
@@ -102,17 +101,3 @@ def test_structs_are_laid_out_as_by_the_driver(gl, layout: str) -> None:
         shader.run()
         ctx.finish()
         np.testing.assert_array_equal(np.frombuffer(result.read(), np.float32), rows.view(np.float32))
-
-
-def test_arrays_and_nested_structs_are_declared() -> None:
-    assert OUTER.members.startswith("vec4 first; vec4 many[3]; mat3 rotation; Inner inner[2];")
-    assert INNER.defines() == {"INNER_MEMBERS": "vec4 direction; mat4 planes;"}
-    assert OUTER.dtype["inner"].shape == (2,)
-
-
-def test_numbered_names_get_a_suffix() -> None:
-    class Unit(IntEnum):
-        SHADOW = 1
-        SKY = 4
-
-    assert numbered(Unit, "_UNIT") == {"SHADOW_UNIT": 1, "SKY_UNIT": 4}

@@ -1,9 +1,7 @@
 """Scripted events happen when and where the scene says; the hook is called at every step; seeds decide chance."""
 
-import importlib.util
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -31,34 +29,6 @@ def simulation(folder: Path, script: str, **options) -> Simulation:
     (folder / "scene.xml").write_text(MJCF)
     (folder / "scene.toml").write_text(TOML + script)
     return Simulation(load_scene(folder / "scene.toml"), fps=100, backend="cpu", **options)
-
-
-def test_throw_sets_velocity_and_spin_in_the_world(tmp_path: Path) -> None:
-    sim = simulation(
-        tmp_path,
-        """[[place]]
-        body = "stone"
-        time = 0.05
-        position = [1, 1, 5]
-        orientation = [1, 1, 0, 0]
-        [[throw]]
-        body = "stone"
-        time = 0.1
-        velocity = [1, 0, 2]
-        angular_velocity = [0, 0, 3]
-        """,
-    )
-    for _ in range(8):
-        sim.advance_frame()
-    np.testing.assert_allclose(sim.data.body("stone").xpos, [1, 1, 5])
-    np.testing.assert_allclose(np.abs(sim.data.body("stone").xquat), np.sqrt([0.5, 0.5, 0, 0]), atol=1e-12)
-    for _ in range(12):
-        sim.advance_frame()
-    moved = 0.1 - sim.model.opt.timestep  # poses in data are those at the beginning of the step just made
-    np.testing.assert_allclose(sim.data.body("stone").xpos, [1 + moved, 1, 5 + 2 * moved], atol=1e-9)
-    spin = np.zeros(6)
-    mujoco.mj_objectVelocity(sim.model, sim.data, mujoco.mjtObj.mjOBJ_BODY, sim.model.body("stone").id, spin, 0)
-    np.testing.assert_allclose(spin[:3], [0, 0, 3], atol=1e-6)
 
 
 def test_poke_presses_at_its_point_of_the_bodys_frame(tmp_path: Path) -> None:
@@ -130,18 +100,6 @@ def test_hook_is_called_before_every_step(tmp_path: Path) -> None:
     np.testing.assert_allclose(times, 0.002 * np.arange(10), atol=1e-12)
 
 
-def test_example_hook_moves_the_surface() -> None:
-    path = Path(__file__).parents[2] / "examples" / "step_hook.py"
-    spec = importlib.util.spec_from_file_location("step_hook", path)
-    example = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(example)
-    sim = Simulation(load_scene("sphere"), fps=60, resolution=24, backend="cpu", on_step=example.stir)
-    for _ in range(6):
-        sim.advance_frame()
-    assert not sim.impulses
-    assert np.abs(sim.ripples["sphere"].height).max() > 1e-4
-
-
 @pytest.mark.parametrize(
     ("script", "message"),
     [
@@ -163,39 +121,3 @@ def test_example_hook_moves_the_surface() -> None:
 def test_wrong_events_are_refused_with_what_is_valid(tmp_path: Path, script: str, message: str) -> None:
     with pytest.raises(SceneError, match=message):
         simulation(tmp_path, script)
-
-
-RANDOM = """[random]
-seed = {}
-position = 0.1
-orientation = true
-size = [0.5, 2.0]
-mass = [0.5, 2.0]
-shapes = ["sphere", "box", "capsule"]
-bodies = ["stone"]
-[[drop]]
-body = "stone"
-time = 0.1
-position = [5, 0, 0]
-"""
-
-
-def test_seed_decides_size_mass_shape_and_place(tmp_path: Path) -> None:
-    def drawn(seed: int) -> tuple:
-        sim = simulation(tmp_path, RANDOM.format(seed))
-        [drop] = sim.scene.events.drop
-        stone = sim.model.body("stone")
-        return (*stone.pos, *stone.quat, float(stone.mass[0]), *sim.model.geom("stone").size, *drop.position)
-
-    first, again, other = drawn(1), drawn(1), drawn(2)
-    assert first == again
-    assert not set(first) & set(other) - {0.0}
-    plain = simulation(tmp_path, "").model
-    for values in (first, other):
-        shift = np.array(values[:3]) - [0, 0, 3]
-        assert 0 < np.abs(shift).max() <= 0.1
-        np.testing.assert_allclose(values[-3:], np.array([5, 0, 0]) + shift)
-        assert 0.5 <= values[7] / 0.2 <= 2
-    varied = simulation(tmp_path, RANDOM.format(1)).model
-    np.testing.assert_array_equal(varied.body("brick").pos, plain.body("brick").pos)
-    np.testing.assert_array_equal(varied.geom("brick").size, plain.geom("brick").size)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.events import DropEntry, Motions, PlaceEntry, ThrowEntry, check_time, free_joint
+from ripple_sim.scene.events import DropEntry, Events, PlaceEntry, Script, ThrowEntry, check_time, free_joint
 
 MJCF = """<mujoco><option timestep="0.002"/><worldbody><geom name="ground" type="plane" size="9 9 1"/>
 <body name="post" pos="5 0 0"><joint type="hinge" axis="0 0 1"/><geom size="0.1"/></body>
@@ -19,10 +19,16 @@ def model() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(MJCF)
 
 
+def script(model: mujoco.MjModel, *entries: DropEntry | ThrowEntry | PlaceEntry) -> Script:
+    kinds = {"drop": DropEntry, "throw": ThrowEntry, "place": PlaceEntry}
+    events = {name: [each for each in entries if type(each) is kind] for name, kind in kinds.items()}
+    return Script(model, Events(**events), ())
+
+
 def run(model: mujoco.MjModel, entries: list, seconds: float) -> mujoco.MjData:
-    data, motions = mujoco.MjData(model), Motions(model, entries)
+    data, motions = mujoco.MjData(model), script(model, *entries)
     while data.time < seconds - 1e-9:
-        motions.apply(data)
+        motions.apply(data, {})
         mujoco.mj_step(model, data)
     return data
 
@@ -39,11 +45,11 @@ def velocity(data: mujoco.MjData, name: str) -> np.ndarray:
 def test_velocity_and_spin_are_those_of_the_world_whatever_the_orientation(model, entry: type) -> None:
     data = mujoco.MjData(model)
     turn = (0.5, -1.5, 2.0, 1.0)
-    motions = Motions(
+    motions = script(
         model,
-        [entry("stone", 0.0, position=(1, 2, 3), orientation=turn, velocity=(4, 5, 6), angular_velocity=(-1, 2, 3))],
+        entry("stone", 0.0, position=(1, 2, 3), orientation=turn, velocity=(4, 5, 6), angular_velocity=(-1, 2, 3)),
     )
-    motions.apply(data)
+    motions.apply(data, {})
     np.testing.assert_allclose(velocity(data, "stone"), [-1, 2, 3, 4, 5, 6], atol=1e-12)
     np.testing.assert_allclose(data.body("stone").xpos, [1, 2, 3])
     np.testing.assert_allclose(data.body("stone").xquat, np.array(turn) / np.linalg.norm(turn))
@@ -52,7 +58,7 @@ def test_velocity_and_spin_are_those_of_the_world_whatever_the_orientation(model
 
 def test_without_place_and_orientation_a_throw_begins_where_the_body_is(model) -> None:
     data = mujoco.MjData(model)
-    Motions(model, [ThrowEntry("stone", 0.0, velocity=(1, 0, 0), angular_velocity=(0, 0, 7))]).apply(data)
+    script(model, ThrowEntry("stone", 0.0, velocity=(1, 0, 0), angular_velocity=(0, 0, 7))).apply(data, {})
     np.testing.assert_allclose(velocity(data, "stone"), [0, 0, 7, 1, 0, 0], atol=1e-12)
     np.testing.assert_allclose(data.body("stone").xpos, [0, 0, 3])
     np.testing.assert_allclose(data.body("stone").xquat, [0.6, 0, 0.8, 0])
@@ -62,7 +68,7 @@ def test_a_placed_body_is_at_rest_and_only_it_is_touched(model) -> None:
     data = mujoco.MjData(model)
     data.qvel[:] = np.arange(1.0, model.nv + 1)
     before = data.qvel.copy()
-    Motions(model, [PlaceEntry("brick", 0.0, position=(7, 8, 9))]).apply(data)
+    script(model, PlaceEntry("brick", 0.0, position=(7, 8, 9))).apply(data, {})
     address = int(model.jnt_dofadr[model.body("brick").jntadr[0]])
     assert not data.qvel[address : address + 6].any()
     np.testing.assert_array_equal(np.delete(data.qvel, range(address, address + 6)), before[:address])
@@ -92,7 +98,7 @@ def test_events_happen_once_and_in_the_order_of_time_not_of_the_file(model) -> N
 def test_a_time_within_round_off_of_a_step_belongs_to_it(model) -> None:
     data = mujoco.MjData(model)
     data.time = 0.1 + 0.2 - 1e-12
-    Motions(model, [PlaceEntry("stone", 0.3, position=(1, 1, 1))]).apply(data)
+    script(model, PlaceEntry("stone", 0.3, position=(1, 1, 1))).apply(data, {})
     np.testing.assert_array_equal(data.qpos[1:4], 1)
 
 
@@ -117,7 +123,7 @@ def test_free_joint_addresses_skip_the_joints_before(model) -> None:
 )
 def test_entries_that_cannot_be_carried_out_are_refused_at_once(model, entry: object, message: str) -> None:
     with pytest.raises(SceneError, match=message):
-        Motions(model, [entry])
+        script(model, entry)
 
 
 @pytest.mark.parametrize("time", [-1e-9, float("inf"), float("-inf"), float("nan")])

@@ -14,7 +14,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim.cli.main import main
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
 from ripple_sim.scene.load_scene import load_scene
@@ -24,7 +23,6 @@ from ripple_sim.scene.scene import (
     Scene,
     parse_request,
     read_toml,
-    shipped_scenes,
     through_camera,
     with_exposure,
 )
@@ -56,14 +54,6 @@ def write(folder: Path, toml: str = TOML, mjcf: str = MJCF) -> Path:
     path = folder / "scene.toml"
     path.write_text(toml)
     return path
-
-
-def test_every_shipped_scene_loads() -> None:
-    assert "duck" in shipped_scenes()
-    for name in shipped_scenes():
-        scene = load_scene(name)
-        assert scene.targets
-        assert scene.duration > 0
 
 
 def test_values_arrive_where_they_belong(tmp_path: Path) -> None:
@@ -102,17 +92,6 @@ def test_mistakes_are_named_with_what_is_valid(tmp_path: Path, old: str, new: st
     with pytest.raises(RippleError, match=message) as error:
         load_scene(write(tmp_path, TOML.replace(old, new)))
     assert "\n" not in str(error.value)
-
-
-def test_mujocos_refusal_is_passed_on_in_one_line(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="MuJoCo refuses") as error:
-        load_scene(write(tmp_path, mjcf=MJCF.replace('size="0.05"', 'size="-1"')))
-    assert "\n" not in str(error.value)
-
-
-def test_unknown_scene_lists_the_shipped_ones() -> None:
-    with pytest.raises(SceneError, match="duck"):
-        load_scene("goose")
 
 
 def test_dropped_body_waits_then_falls(tmp_path: Path) -> None:
@@ -156,18 +135,6 @@ def test_drop_scene_stands_any_mesh_on_the_floor(tmp_path: Path) -> None:
         simulation.advance_frame()
         hit |= {impulse.other for impulse in simulation.impulses}
     assert hit == {"body_0", "body_1", "body_2"}
-
-
-def test_drop_scene_is_the_same_for_the_same_seed(tmp_path: Path) -> None:
-    write_obj(tmp_path / "peanut.obj", *peanut())
-    first, second, other = (drop_scene(tmp_path / "peanut.obj", seed=seed) for seed in (3, 3, 4))
-    assert [d.position for d in first.events.drop] == [d.position for d in second.events.drop]
-    assert [d.position for d in first.events.drop] != [d.position for d in other.events.drop]
-
-
-def test_drop_scene_refuses_wrong_numbers(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="0 to 100"):
-        drop_scene(tmp_path / "any.obj", bodies=101)
 
 
 MODEL = mujoco.MjModel.from_xml_string(
@@ -215,11 +182,6 @@ def test_an_exposure_without_effect_or_sense_is_refused(camera: dict, changes: d
         with_exposure(scene(**camera), **changes)
 
 
-def test_one_exposure_needs_neither_shutter_nor_lens() -> None:
-    assert with_exposure(scene(), exposures=1).camera.exposures == 1
-    assert with_exposure(scene(shutter=180.0), exposures=16).camera.exposures == 16
-
-
 def test_request_takes_every_name_and_ranges() -> None:
     request = parse_request([" height=0.02", "contacts", "grid", "time", "energy "])
     assert request == Request("height", 0.02, True, True, True, True)
@@ -243,18 +205,6 @@ def test_request_takes_every_name_and_ranges() -> None:
 def test_request_refuses(words: list[str], said: str) -> None:
     with pytest.raises(SceneError, match=said):
         parse_request(words)
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [(["--overlay", "height,hight"], "valid are height, velocity"), (["--compare", "fem"], "valid are paper")],
-)
-def test_program_refuses_bad_names(
-    options: list[str], said: str, capsys: pytest.CaptureFixture, tmp_path: Path
-) -> None:
-    assert main(["render", "duck", "-o", str(tmp_path / "x.mp4"), *options]) == 2
-    assert said in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from sphere_height_maps import cube_charts
 from ripple_sim.capture.frame_source import FrameSource
 from ripple_sim.capture.snapshot import snapshots
 from ripple_sim.errors import SceneError
-from ripple_sim.overlay.marks import MEMORY, ContactMarks, Mark
+from ripple_sim.overlay.marks import ContactMarks, Mark
 from ripple_sim.overlay.notes import Notebook, color_table, colors, compared_operators
 from ripple_sim.overlay.panels import Layout, Projection, draw_marks, place_marks
 from ripple_sim.render import Camera, Renderer, Surface
@@ -154,43 +154,6 @@ def test_mark_lies_at_the_projected_contact(make_scene: Callable[..., Scene]) ->
     centre = np.array([(dark * (columns + 0.5)).sum(), (dark * (rows + 0.5)).sum()]) / dark.sum()
     expected = projection.pixels(gathered[0].point[None])[0]
     np.testing.assert_allclose(centre, expected, atol=0.1)
-
-
-def test_mark_fades_and_ends(make_scene: Callable[..., Scene]) -> None:
-    simulation = Simulation(make_scene(), fps=RATE, backend="cpu")
-    gatherer = ContactMarks(simulation, 1 / RATE)
-    while not simulation.impulses:
-        simulation.advance_frame()
-    (first,) = gatherer.follow()
-    simulation.impulses = []
-    (second,) = gatherer.follow()
-    assert second.impulse == pytest.approx(first.impulse * np.exp(-1 / (RATE * MEMORY)))
-    np.testing.assert_array_equal(second.point, first.point)
-    counts = [len(gatherer.follow()) for _ in range(RATE)]
-    assert counts[0] == 1
-    assert counts[-1] == 0
-
-
-def test_hidden_marks_are_faint() -> None:
-    model = mujoco.MjModel.from_xml_string(
-        '<mujoco><worldbody><geom type="box" size=".5 .02 .5" pos="0 -.5 0"/></worldbody></mujoco>'
-    )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    camera = Camera((0.0, 0.0, 0.0), 2.0, 90.0, 0.0)  # looks along y, at the box
-    projection = Projection(camera.pose(), 160, 120)
-    points = np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 0.9]])
-    assert projection.seen(model, data, points).tolist() == [False, True, True]
-
-    def ink(y: float) -> int:
-        frame = np.full((120, 160, 3), 255, np.uint8)
-        mark = Mark(np.array([0.0, y, 0.0]), np.array([0.0, 0.0, 1.0]), 1.0)
-        layout = Layout(160, 120)
-        draw_marks(frame, place_marks([mark], 1.0, layout, projection, model, data), layout)
-        return int((255 - frame.astype(int)).max())
-
-    assert ink(-1.0) > 200
-    assert 30 < ink(0.0) < 100
 
 
 @pytest.mark.parametrize("baseline", ["paper", "uncorrected"])

@@ -10,7 +10,8 @@ import pytest
 from ripple_sim.errors import RippleError, SceneError
 from ripple_sim.scene.scene import MAX_DURATION, Scene
 from ripple_sim.scene.scene_file import CameraEntry, MapEntry, MaterialEntry, RippleEntry
-from ripple_sim.video.options import MAX_SLOW_MOTION, VideoOptions, check_options, frame_count, scene_digest, settled
+from ripple_sim.video.options import VideoOptions
+from ripple_sim.video.settings import MAX_SLOW_MOTION, check_options, frame_count, scene_digest, settled
 
 MJCF = '<mujoco><worldbody><geom name="egg" size="{}"/></worldbody></mujoco>'
 

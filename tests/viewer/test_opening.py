@@ -45,9 +45,9 @@ def test_meshes_and_scene_files_can_be_opened_and_mistakes_are_named(tmp_path: P
 
 def test_a_suggested_poke_scales_with_size_and_density() -> None:
     material = load_scene("sphere").targets[0].material.material()
-    one, two = poke_strength(material, 1.0), poke_strength(material, 2.0)
-    assert two.radius == pytest.approx(2 * one.radius)
-    assert two.impulse > 4 * one.impulse
+    (radius, impulse), (twice, more) = poke_strength(material, 1.0), poke_strength(material, 2.0)
+    assert twice == pytest.approx(2 * radius)
+    assert more > 4 * impulse
 
 
 def test_a_thrown_ball_hits_where_the_ray_meets_the_surface(session: Session) -> None:

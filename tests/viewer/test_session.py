@@ -5,7 +5,6 @@ Rays find the nearest surface.
 The skin follows the surface.
 """
 
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +15,6 @@ from played import MIDDLE, RADIUS, run
 
 from ripple_sim.errors import SimulationError
 from ripple_sim.scene.scene import Scene
-from ripple_sim.scenes import shapes
 from ripple_sim.solver import SolverError, sphere_atlas
 from ripple_sim.viewer.opening import open_scene
 from ripple_sim.viewer.session import OPERATORS, Session, Skin
@@ -61,24 +59,6 @@ def test_two_sessions_that_are_played_alike_are_alike(scene: Scene) -> None:
         return state(session)
 
     assert play() == play()
-
-
-def test_a_script_and_its_changed_materials_start_again_too(tmp_path: Path) -> None:
-    folder = Path(shapes.__file__).parent
-    (tmp_path / "sphere.xml").write_text((folder / "sphere.xml").read_text())
-    (tmp_path / "sphere.toml").write_text(
-        (folder / "sphere.toml").read_text()
-        + '\n[[change]]\ngeom = "sphere"\ntime = 0.02\nmaterial = {speed = 0.9}\n'
-        + '\n[[poke]]\ngeom = "sphere"\ntime = 0.1\npoint = [0.5, 0.0, 0.5]\nimpulse = 0.2\n'
-    )
-    session = Session(open_scene(tmp_path / "sphere.toml"), resolution=16)
-    run(session, 8)
-    first, waves = state(session), session.simulation.ripples["sphere"]
-    assert np.abs(waves.height).max() > 1e-5
-    session.reset()
-    assert np.max(session.simulation.ripples["sphere"].material.speed) == 0.5
-    run(session, 8)
-    assert state(session) == first
 
 
 def test_a_poke_presses_the_surface_in_where_it_points(session: Session) -> None:
@@ -178,13 +158,6 @@ def test_a_session_needs_no_vtk() -> None:
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.splitlines()[-1] == "[]"
-
-
-def test_the_example_of_the_documentation_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "viewer.md").read_text(encoding="utf-8")
-    [code] = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    exec(compile(code, "docs/viewer.md", "exec"), {})
-    assert float(capsys.readouterr().out.split()[0]) < 0
 
 
 def test_a_ray_finds_the_surface_where_geometry_says(session: Session) -> None:

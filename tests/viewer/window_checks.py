@@ -3,6 +3,7 @@
 """
 
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -255,9 +256,7 @@ def test_arrays_are_changed_in_place(window: Window) -> None:
 
 def test_the_benchmark_reports_and_closes(closed: Window) -> None:
     result = benchmark(closed, updates=3, tries=1)
-    assert result.updates_per_second > 0
-    assert "updates/s" in str(result)
-    assert result.renderer in str(result)
+    assert re.match(r"\d+\.\d updates/s: simulation \d+\.\d ms, drawing", result)
 
 
 @pytest.mark.skipif(OFF_SCREEN, reason="needs a screen")

@@ -22,7 +22,15 @@ from ripple_sim.solver.errors import RippleError
 from .background import Background, CoarseBackground
 from .floor import Floor
 
-_TILE = 32  # [pixels]
+TILE = 32  # [pixels]
+
+
+def touched_tiles(boxes: NDArray[np.int64], size: tuple[int, int]) -> NDArray[np.int64]:
+    """Column and row [k, 2] of the tiles of a frame (width, height) that any of some boxes touches; see `boxes_of`."""
+    touched = np.zeros((-(-size[1] // TILE), -(-size[0] // TILE)), dtype=bool)
+    for left, lower, right, upper in boxes[(boxes[:, :2] < boxes[:, 2:]).all(axis=1)]:
+        touched[lower // TILE : -(-upper // TILE), left // TILE : -(-right // TILE)] = True
+    return np.argwhere(touched)[:, ::-1]
 
 
 class DeferredShading:
@@ -75,9 +83,9 @@ class DeferredShading:
         self._background = (CoarseBackground if smooth else Background)(resources, size, options, floor)
         self._solids = FramePass(resources, "passes/deferred", size, **options, LAYER=0)
         # where solids may show, square tiles are classified, as instances
-        self._mask = np.zeros((-(-size[1] // _TILE), -(-size[0] // _TILE)), dtype=bool)
-        self._extent = 2.0 * _TILE / np.array(size)  # of a tile, where the frame extends from -1 to 1
-        self._corners = resources.buffer(reserve=8 * self._mask.size, dynamic=True)
+        self._extent = 2.0 * TILE / np.array(size)  # of a tile, where the frame extends from -1 to 1
+        most = -(-size[0] // TILE) * -(-size[1] // TILE)
+        self._corners = resources.buffer(reserve=8 * most, dynamic=True)
         classify = resources.program("passes/classify", **options, LAYER=0, TILES=1)
         classify["level"] = 0.5  # any will do
         classify["extent"] = tuple(self._extent)
@@ -121,10 +129,7 @@ class DeferredShading:
 
     def _classify_tiles(self, boxes: NDArray[np.int64]) -> None:
         """Mark pixels by what their samples show, in the tiles that any of some boxes [k, 4] touches."""
-        self._mask[...] = False
-        for left, lower, right, upper in boxes[(boxes[:, :2] < boxes[:, 2:]).all(axis=1)]:
-            self._mask[lower // _TILE : -(-upper // _TILE), left // _TILE : -(-right // _TILE)] = True
-        tiles = np.argwhere(self._mask)[:, ::-1]
+        tiles = touched_tiles(boxes, self.frame.size)
         if len(tiles):
             self._corners.write((tiles * self._extent - 1.0).astype("f4").tobytes())
             self._classify.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(tiles))

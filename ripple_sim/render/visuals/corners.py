@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ripple_sim.solver.mesh.rays import RayScene
 from ripple_sim.solver.mesh.topology import edges_of, undirected
 
 _ASTRAY = 60.0  # [degrees] between a triangle's normal and the one that it shares at a vertex
@@ -156,14 +155,12 @@ def cast(V: NDArray, F: NDArray, frames: NDArray, count: int, radius: float, sta
     start : float
         Walls nearer than that are not seen [m].
     """
-    scene = EmbreeScene()
-    TriangleMesh(scene, np.ascontiguousarray(V, np.float32), np.ascontiguousarray(F, np.int32))
+    scene = RayScene(V, F)
 
     def distances(side: float) -> NDArray[np.float64]:
         directions = side * _hemisphere(frames, count)
         origins = (V + side * 1e-3 * radius * frames[:, 2])[:, None] + start * directions
-        rays = (each.reshape(-1, 3).astype(np.float32) for each in (origins, directions))
-        hits = start + scene.run(*rays, query="DISTANCE")  # 1e37 where nothing was hit
+        hits = start + scene.distances(origins.reshape(-1, 3), directions.reshape(-1, 3))
         return (np.minimum(hits, 4.0 * radius) / radius).reshape(len(V), count)
 
     # nearby walls hide the light, those further than a radius away reflect some themselves

@@ -1,10 +1,7 @@
-"""The analytic atlas of a sphere: the reference on which symmetry and accuracy are tested.
+"""The atlas of a closed genus-0 mesh in the cube layout: rays through the cube map's texels onto its sphere map.
 
-How good a sphere map is: folds, stretch, starved area.
-
-The cube layout's chart map: map coordinates are directions from the cube's centre.
-
-The atlas of a closed genus-0 mesh: rays through the cube map's texels onto its sphere map.
+Map coordinates are directions from the cube's centre. The analytic atlas of a sphere is the reference on which symmetry
+and accuracy are tested.
 """
 
 from __future__ import annotations

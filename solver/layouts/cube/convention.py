@@ -5,10 +5,6 @@ Texel (chart, row, column) looks along n + tan(pi/4 a) u + tan(pi/4 b) v with a 
 b = (2 row + 1)/N - 1, so that texels are equally wide in angle along both axes. A grid line that leaves a chart goes on
 as a grid line of the next one.
 
-Area of the surface that belongs to each texel, from the sphere map: see `texels.areas`.
-
-The edges of the cube: where they cut triangles, and where directions lie in the charts between them.
-
 A triangle that crosses an edge of the cube is cut along it. One coordinate pair a corner cannot do instead: equiangular
 coordinates continue smoothly beyond an edge, but there they leave the neighbour's grid (its rows are not the
 continuation of this chart's rows), and at 90 degrees from the chart's middle they end: a long triangle has none.
@@ -47,7 +43,7 @@ def texel_areas(
     mesh, sphere, topology
         Surface, its sphere map [vertex_count, 3], and the cube's charts.
     spanned : float64 [6, N, N]
-        Area that the texel mesh spans [m^2]; see `lumped_areas`.
+        Area that the texel mesh spans [m^2]; see `TexelCells.areas`.
     triangles, barycentrics
         Where the texels lie; see `Atlas`.
     """

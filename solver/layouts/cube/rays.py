@@ -1,8 +1,7 @@
 """Rays from the cube's centre through every texel onto the sphere-mapped mesh: triangle and barycentrics of each.
 
-Every ray against every triangle, as the paper does it: slow and simple, the oracle and the baseline of `rays`.
-
-From a triangle and a point on it to the sphere and to the nearest texel, compiled: contacts ask at every step.
+And the way back, compiled, since contacts ask at every step: from a triangle and a point on it to the sphere and to the
+nearest texel.
 """
 
 from __future__ import annotations
@@ -11,12 +10,12 @@ from typing import NamedTuple
 
 import igl
 import numpy as np
-from embreex import rtcore_scene
-from embreex.mesh_construction import TriangleMesh
 from numpy.typing import NDArray
 
 from ...errors import AtlasError
 from ...kernel import Floats, Ints, kernel, variant
+from ...mesh.rays import RayScene
+from ...mesh.vectors import combine, cross, dot, row
 from ...texels.chart_map import nearest_place, texel_on
 from .convention import CHART_U, CHART_V
 
@@ -24,7 +23,7 @@ from .convention import CHART_U, CHART_V
 def cast_rays_exhaustively(
     sphere: NDArray[np.float64], F: NDArray[np.int64], directions: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Intersect rays from the origin with all triangles (Moeller and Trumbore 1997).
+    """Intersect rays from the origin with all triangles (Moeller and Trumbore 1997): slow, simple, the oracle.
 
     Parameters and results are those of `rays.cast_rays`. The cost is the number of rays times that of triangles. Where
     a ray meets several triangles on the edge that they share, the one in which it lies deepest is taken.
@@ -103,15 +102,10 @@ def _direction(V: Floats, F: Ints, sphere: Floats, triangle: int, point: Floats)
     # a triangle without area has no barycentrics: its corners are as good as any point of it
     s = min(max((vv * pu - uv * pv) / area, 0.0), 1.0) if area > 0 else 1 / 3
     t = min(max((uu * pv - uv * pu) / area, 0.0), 1.0 - s) if area > 0 else 1 / 3
-    x, y, z = _mean(sphere, 0, a, b, c, s, t), _mean(sphere, 1, a, b, c, s, t), _mean(sphere, 2, a, b, c, s, t)
+    first = combine(1 - s - t, row(sphere, a), s, row(sphere, b))
+    x, y, z = combine(1.0, first, t, row(sphere, c))
     length = np.sqrt(x * x + y * y + z * z)
     return x / length, y / length, z / length
-
-
-@kernel
-def _mean(sphere: Floats, k: int, a: int, b: int, c: int, s: float, t: float) -> float:
-    """Coordinate k of the sphere map at barycentric coordinates 1 - s - t, s, t of the vertices a, b, c."""
-    return (1 - s - t) * sphere[a, k] + s * sphere[b, k] + t * sphere[c, k]
 
 
 @kernel
@@ -162,14 +156,11 @@ def cast_rays(
     AtlasError
         If a ray meets no triangle, which a fold-free map rules out.
     """
-    scene = rtcore_scene.EmbreeScene()
-    TriangleMesh(scene, sphere.astype(np.float32), F.astype(np.int32))
-    seeds = directions[::stride].astype(np.float32)
-    hits = np.full(len(directions), -1, dtype=np.int64)
-    hits[::stride] = scene.run(np.zeros_like(seeds), seeds, output=1)["primID"]
+    hits, seeds = np.full(len(directions), -1, dtype=np.int64), directions[::stride]
+    hits[::stride] = RayScene(sphere, F).cast(np.zeros_like(seeds), seeds).triangle
     neighbours, _ = igl.triangle_triangle_adjacency(F)
     barycentrics = np.empty((len(directions), 3))
-    lost = _settle(sphere, F, neighbours.astype(np.int64), directions, hits, barycentrics)
+    lost = _walk_to_triangles(sphere, F, neighbours.astype(np.int64), directions, hits, barycentrics)
     if lost:
         raise AtlasError(f"{lost} of {len(directions)} rays meet no triangle of the sphere map; is the map fold-free?")
     return hits, barycentrics
@@ -179,16 +170,13 @@ def cast_rays(
 def _edge_products(sphere: Floats, corners: Ints, d: Floats) -> tuple[float, float, float]:
     """Triple products det(d, b, c) of the ray with the three edges: all >= 0 if and only if it passes inside."""
     a, b, c = sphere[corners[0]], sphere[corners[1]], sphere[corners[2]]
-    return _triple_product(d, b, c), _triple_product(d, c, a), _triple_product(d, a, b)
+    return dot(d, cross(b, c)), dot(d, cross(c, a)), dot(d, cross(a, b))
 
 
 @kernel
-def _triple_product(a: Floats, b: Floats, c: Floats) -> float:
-    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-
-
-@kernel
-def _settle(sphere: Floats, F: Ints, neighbours: Ints, directions: Floats, hits: Ints, barycentrics: Floats) -> int:
+def _walk_to_triangles(
+    sphere: Floats, F: Ints, neighbours: Ints, directions: Floats, hits: Ints, barycentrics: Floats
+) -> int:
     """Walk each ray's hit to the triangle that truly contains it; fill barycentrics; return how many rays are lost."""
     lost = 0
     previous = 0

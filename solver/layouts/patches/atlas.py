@@ -20,7 +20,7 @@ from ..energy import COLUMN, FIXED
 from .layout import PatchMap, patch_map
 from .pieces import Pieces, chart_pieces, warped
 from .quads import CELLS
-from .samples import Sampler, untangled
+from .samples import centres, untangled
 from .seamless import SeamlessMap, Transitions, corner_places, follow, places_seen_from, transitions
 
 
@@ -266,11 +266,10 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
     """Put texels on a mesh that is laid out on charts."""
     glued = patches.seamless.glued
     n = max(round(resolution * np.sqrt(6 / len(glued))), _LEAST_TEXELS)
-    sampler = Sampler(mesh, patches)
-    samples = sampler.everywhere(n)
+    samples = centres(mesh, patches, n)
     topology = glue(glued, n)
     beyond = positions_beyond(patches, topology, samples.positions)
-    samples, offsets = untangled(sampler, topology, samples, beyond)
+    samples, offsets = untangled(mesh, patches, topology, samples, beyond)
     pieces = chart_pieces(patches)
     if offsets.any():
         pieces, beyond = warped(pieces, offsets), positions_beyond(patches, topology, samples.positions)

@@ -1,10 +1,7 @@
 """Voronoi cells: every vertex of a surface belongs to the nearest of a few seeds, along the surface.
 
-Distances along a surface, between its vertices.
-
-Cells cut apart: smooth borders between them, and the corners and arcs of these.
-
-How large cells may be: smaller on limbs and round their ends, where a large one would be stretched.
+How large cells may be: smaller on limbs and round their ends, where a large one would be stretched. Then they are cut
+apart, along smooth borders with corners and arcs between these.
 """
 
 from __future__ import annotations
@@ -105,7 +102,7 @@ _MOST_PASSES = 50
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Cells:
+class VoronoiCells:
     """Vertices shared out among seeds.
 
     Attributes
@@ -137,16 +134,16 @@ def spread_seeds(metric: Metric, reach: float) -> NDArray[np.int64]:
     return np.array(seeds)
 
 
-def voronoi_cells(metric: Metric, seeds: NDArray[np.int64]) -> Cells:
+def voronoi_cells(metric: Metric, seeds: NDArray[np.int64]) -> VoronoiCells:
     """The vertices nearest to each seed."""
     distance, _, source = dijkstra(metric.graph, indices=seeds, min_only=True, return_predecessors=True)
     number = np.full(len(metric.unit), -1)
     number[seeds] = np.arange(len(seeds))
     label = _gathered(metric.surface, number[source], seeds)
-    return Cells(seeds, label, distance)
+    return VoronoiCells(seeds, label, distance)
 
 
-def centred_cells(metric: Metric, seeds: NDArray[np.int64]) -> Cells:
+def centred_cells(metric: Metric, seeds: NDArray[np.int64]) -> VoronoiCells:
     """Cells whose seeds moved to their middles a few times (Lloyd 1982)."""
     V, mass = metric.surface.V, metric.masses
     for _ in range(_LLOYD_STEPS):
@@ -214,7 +211,7 @@ class BorderedCells:
         return np.flatnonzero([len(each) < 3 for each in self.arcs])
 
 
-def cut_borders(metric: Metric, cells: Cells) -> BorderedCells:
+def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     """Cut the triangles between cells that are disks, and find the cells' corners.
 
     In an inner corner three cells meet, in one at the rim two; at the rim a cell has corners of its own where that is
@@ -325,7 +322,7 @@ def cell_sizes(metric: Metric, reach: float, between: tuple[float, float]) -> ND
     return (size + _GROWTH * distance).min(axis=1)[cells.label]
 
 
-def _coarse_graph(surface: Surface, cells: Cells) -> csr_array:
+def _coarse_graph(surface: Surface, cells: VoronoiCells) -> csr_array:
     """Cells linked to their neighbours, by the shortest way from seed to seed along an edge between them [m]."""
     count, ends = len(cells.seeds), surface.edges.ends
     between = cells.label[ends[:, 0]] != cells.label[ends[:, 1]]

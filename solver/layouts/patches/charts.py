@@ -1,11 +1,9 @@
-"""Square charts: one for each corner of a polygon, from its middle to the middles of its sides.
+"""Square charts: one for each corner of a cell, from its middle to the middles of its sides.
 
-Sides and corners of charts are numbered as in `texels.topology`. Corner 0 of a chart lies in the middle of its cell,
-corner 2 in the corner of the cell, 1 and 3 in the middles of the cell's sides before and behind that corner.
-
-Cells laid out as regular polygons, and cut from their middles to the middles of their sides.
-
-Corners in which three cells meet, moved to the middle between the cells' middles.
+Cells are laid out as regular polygons and cut; the corners in which three of them meet are then moved to the middle
+between their middles. Sides and corners of charts are numbered as in `texels.topology`. Corner 0 of a chart lies in the
+middle of its cell, corner 2 in the corner of the cell, 1 and 3 in the middles of the cell's sides before and behind
+that corner.
 """
 
 from __future__ import annotations
@@ -94,7 +92,7 @@ def _polygon_border(surface: Surface, halves: list[Halves]) -> Border:
     lengths = [len(path) for path in paths]
     a, b = np.repeat(np.array(ends), lengths, axis=0).T
     z = a + (b - a) * along(surface.V, paths)
-    return Border(np.repeat(cells, lengths), np.concatenate(paths), np.stack([z.real, z.imag], axis=1))
+    return np.repeat(cells, lengths), np.concatenate(paths), np.stack([z.real, z.imag], axis=1)
 
 
 # column and row of a chart's corners, counter-clockwise
@@ -141,7 +139,7 @@ def square_border(surface: Surface, sides: list[Sides]) -> Border:
     lengths = [len(path) for path in paths]
     side = np.repeat(np.arange(len(paths)), lengths)
     a, b = CORNERS[side % 4], CORNERS[(side + 1) % 4]
-    return Border(side // 4, np.concatenate(paths), a + (b - a) * along(surface.V, paths)[:, None])
+    return side // 4, np.concatenate(paths), a + (b - a) * along(surface.V, paths)[:, None]
 
 
 def on_paths(surface: Surface, sides: list[Sides]) -> NDArray[np.bool_]:

@@ -10,8 +10,6 @@ over, neither there nor on the charts.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ...kernel import Bools, Floats, Ints, kernel
@@ -23,11 +21,8 @@ _FLATTEST = 0.05  # double area over squared length of a triangle on the charts 
 _LEAST_INSIDE = 1e-9  # double area of a triangle in its parent, in barycentric coordinates
 
 
-class Parents(NamedTuple):
-    """Where the triangles lie on the mesh."""
-
-    parent: Ints  # [m]
-    inside: Floats  # [m, 3, 3]
+# Where the triangles lie on the mesh: parent [m], and barycentrics in it of their corners [m, 3, 3]
+Parents = tuple[Ints, Floats]
 
 
 @kernel
@@ -117,8 +112,8 @@ def _inside(seamless: SeamlessMap, parents: Parents, g: int, p: int, q: int, v: 
     """Whether v with corners p and q of triangle g makes a triangle inside of g's parent, as it is turned."""
     for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
         h, c = seamless.star[i] // 3, seamless.star[i] % 3
-        if parents.parent[h] == parents.parent[g]:
-            o, a, b = parents.inside[h, c], parents.inside[g, p], parents.inside[g, q]
+        if parents[0][h] == parents[0][g]:
+            o, a, b = parents[1][h, c], parents[1][g, p], parents[1][g, q]
             ux, uy, vx, vy = a[1] - o[1], a[2] - o[2], b[1] - o[1], b[2] - o[2]
             return ux * vy - uy * vx > _LEAST_INSIDE
     return False
@@ -129,16 +124,16 @@ _MOST_ROUNDS, _LEAST_SHARE = 20, 0.01  # of the vertices in question, in a round
 
 def without_cuts(surface: Surface, seamless: SeamlessMap, cut: Bools) -> tuple[Surface, SeamlessMap]:
     """The same map on fewer triangles: vertices `cut` [n] are gone where that folds nothing."""
-    parents = Parents(surface.parent, np.ascontiguousarray(surface.inside))
+    parents = surface.parent, np.ascontiguousarray(surface.inside)
     for _ in range(_MOST_ROUNDS):
         worth, target = _targets(seamless, parents, cut, surface.at_rim)
         chosen = _chosen(seamless, np.argsort(-worth, kind="stable"), worth, target)
         if chosen.sum() <= _LEAST_SHARE * cut.sum():
             break
-        F, frame, turn, shift, *left = _collapsed(seamless, parents, chosen, target)
+        F, frame, turn, shift, parent, inside = _collapsed(seamless, parents, chosen, target)
         start, star = stars(F, len(seamless.x))
         seamless = seamless._replace(F=F, frame=frame, turn=turn, shift=shift, star_start=start, star=star)
-        parents = Parents(*left)
+        parents = parent, inside
     used, F = np.unique(seamless.F, return_inverse=True)
     F = F.reshape(-1, 3)
     start, star = stars(F, len(used))
@@ -150,7 +145,7 @@ def without_cuts(surface: Surface, seamless: SeamlessMap, cut: Bools) -> tuple[S
         star_start=start,
         star=star,
     )
-    return Surface(surface.V[used], F, parents.parent, parents.inside), seamless
+    return Surface(surface.V[used], F, parents[0], parents[1]), seamless
 
 
 @kernel
@@ -189,7 +184,7 @@ def _collapsed(
 ) -> tuple[Ints, Ints, Ints, Ints, Ints, Floats]:
     """What is left of the triangles: their vertices, frames, and changes to these; their parents, and where in them."""
     F, frame, turn, shift = seamless.F.copy(), seamless.frame.copy(), seamless.turn.copy(), seamless.shift.copy()
-    parent, inside = parents.parent.copy(), parents.inside.copy()
+    parent, inside = parents[0].copy(), parents[1].copy()
     size = 0
     for f in range(len(F)):
         k = 0
@@ -201,7 +196,7 @@ def _collapsed(
             seamless.shift[f],
             seamless.frame[f],
         )
-        parent[size], inside[size] = parents.parent[f], parents.inside[f]
+        parent[size], inside[size] = parents[0][f], parents[1][f]
         if k < 3:
             u = seamless.F[f, k]
             g, m = target[u] // 3, target[u] % 3
@@ -214,7 +209,7 @@ def _collapsed(
             F[size, k], turn[size, k], shift[size, k, 0], shift[size, k, 1] = v, change[0], change[1], change[2]
             for i in range(seamless.star_start[v], seamless.star_start[v + 1]):
                 h, c = seamless.star[i] // 3, seamless.star[i] % 3
-                if parents.parent[h] == parents.parent[f]:
-                    inside[size, k] = parents.inside[h, c]
+                if parents[0][h] == parents[0][f]:
+                    inside[size, k] = parents[1][h, c]
         size += 1
     return F[:size], frame[:size], turn[:size], shift[:size], parent[:size], inside[:size]

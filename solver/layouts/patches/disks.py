@@ -7,8 +7,6 @@ weights follow the shape of the triangles.
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
@@ -16,14 +14,14 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import splu
 
 from ...errors import AtlasError
-from .cells import BorderedCells, Cells, Metric, centred_cells, cut_borders, voronoi_cells
+from .cells import BorderedCells, Metric, VoronoiCells, centred_cells, cut_borders, voronoi_cells
 from .surface import Surface
 
 _MOST_ROUNDS = 200
 _FEWEST = 4  # cells of a closed surface
 
 
-def disk_cells(metric: Metric, cells: Cells) -> BorderedCells:
+def disk_cells(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     """Cells of one connected component, cut apart, each a disk with at least three corners.
 
     A cell that is no disk gets a seed half-way round its shortest loop that does not shrink to a point; one with fewer
@@ -42,7 +40,7 @@ def disk_cells(metric: Metric, cells: Cells) -> BorderedCells:
     return bordered
 
 
-def _mended(metric: Metric, cells: Cells) -> tuple[Cells, BorderedCells]:
+def _mended(metric: Metric, cells: VoronoiCells) -> tuple[VoronoiCells, BorderedCells]:
     surface, tried = metric.surface, set[int]()
     for _ in range(_MOST_ROUNDS):
         bad = np.flatnonzero(_euler(surface, cells) != 1)
@@ -63,7 +61,7 @@ def _mended(metric: Metric, cells: Cells) -> tuple[Cells, BorderedCells]:
     raise AtlasError("no cells found that are disks with three corners")
 
 
-def _with_corners(metric: Metric, cells: Cells, few: NDArray[np.int64], tried: set[int]) -> Cells:
+def _with_corners(metric: Metric, cells: VoronoiCells, few: NDArray[np.int64], tried: set[int]) -> VoronoiCells:
     """Give cells with too few corners a neighbour each, or take away their seeds where that was `tried` before."""
     new: list[int] = []
     gone: list[int] = []
@@ -78,11 +76,11 @@ def _with_corners(metric: Metric, cells: Cells, few: NDArray[np.int64], tried: s
     return voronoi_cells(metric, np.union1d(np.delete(cells.seeds, gone), new).astype(np.int64))
 
 
-def _with(metric: Metric, cells: Cells, seed: int) -> Cells:
+def _with(metric: Metric, cells: VoronoiCells, seed: int) -> VoronoiCells:
     return voronoi_cells(metric, np.unique(np.append(cells.seeds, seed)))
 
 
-def _beside(surface: Surface, cells: Cells, cell: int) -> NDArray[np.bool_]:
+def _beside(surface: Surface, cells: VoronoiCells, cell: int) -> NDArray[np.bool_]:
     """Vertices of other cells that have a neighbour in this one, [n]."""
     ends = surface.edges.ends[(cells.label[surface.edges.ends] == cell).any(axis=1)]
     beside = np.zeros(len(surface.V), bool)
@@ -90,7 +88,7 @@ def _beside(surface: Surface, cells: Cells, cell: int) -> NDArray[np.bool_]:
     return beside & (cells.label != cell)
 
 
-def _euler(surface: Surface, cells: Cells) -> NDArray[np.int64]:
+def _euler(surface: Surface, cells: VoronoiCells) -> NDArray[np.int64]:
     """Euler characteristic of the vertices of each cell with the edges and triangles between them."""
     count, label = len(cells.seeds), cells.label
     ends, corners = label[surface.edges.ends], label[surface.F]
@@ -100,7 +98,7 @@ def _euler(surface: Surface, cells: Cells) -> NDArray[np.int64]:
     return vertices - links + faces
 
 
-def _far_side(surface: Surface, cells: Cells, cell: int) -> int:
+def _far_side(surface: Surface, cells: VoronoiCells, cell: int) -> int:
     """Vertex farthest along the shortest loop in a cell that does not shrink to a point.
 
     Edges that close no such loop are those of a tree of shortest paths, and those of a tree of triangles, longest loops
@@ -147,19 +145,8 @@ def _closing(beside: NDArray[np.int64], tree: NDArray[np.bool_], triangles: int)
 _LEAST, _MOST = 1e-3, 1e3
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Border:
-    """Places of the vertices on the borders of parts.
-
-    Attributes
-    ----------
-    part, vertex : int64 [b]
-    place : float64 [b, 2]
-    """
-
-    part: NDArray[np.int64]
-    vertex: NDArray[np.int64]
-    place: NDArray[np.float64]
+# of the vertices on the borders of parts: part and vertex, each [b], and place [b, 2]
+Border = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
 
 
 def flattened(surface: Surface, part: NDArray[np.int64], border: Border) -> NDArray[np.float64]:
@@ -171,8 +158,9 @@ def flattened(surface: Surface, part: NDArray[np.int64], border: Border) -> NDAr
     key, copies = np.unique(part[:, None] * size + surface.F, return_inverse=True)
     corners = copies.reshape(-1, 3)
     fixed = np.full(len(key), -1)
-    fixed[np.searchsorted(key, border.part * size + border.vertex)] = np.arange(len(border.part))
-    start = np.where(fixed[:, None] >= 0, border.place[fixed], np.nan)
+    on_border, vertex, place = border
+    fixed[np.searchsorted(key, on_border * size + vertex)] = np.arange(len(vertex))
+    start = np.where(fixed[:, None] >= 0, place[fixed], np.nan)
     weights = _mean_value_weights(surface)
     places = _solved(corners, weights, start)[corners]
     folded = np.isin(part, part[signed_areas(places) <= 0])

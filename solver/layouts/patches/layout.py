@@ -13,7 +13,7 @@ from ..energy import FIXED
 from .collapse import without_cuts
 from .cones import move_tips
 from .energy import shapes_of
-from .quads import CELLS, Part, Quads
+from .quads import CELLS, Quads, large_quads_of, part_of, quads_of
 from .relaxation import relax_all, sweep_all
 from .seamless import SeamlessMap, seamless_map, transitions
 from .surface import Surface
@@ -53,10 +53,10 @@ def patch_map(V: NDArray[np.float64], F: NDArray[np.int64], cells: int = CELLS) 
     """
     parts, counts, shares = _components(V, F, cells)
     widest = int(shares.argmax())
-    first = parts[widest].large_quads(counts[widest])
+    first = large_quads_of(parts[widest], counts[widest])
     large = first is not None
     quads = [
-        first if first is not None and i == widest else part.quads(counts[i], large) for i, part in enumerate(parts)
+        first if first is not None and i == widest else quads_of(part, counts[i], large) for i, part in enumerate(parts)
     ]
     wanted = shares * sum(len(each.glued) for each in quads)
     for i in np.flatnonzero(shares > _NEGLIGIBLE) if len(parts) > 1 else ():
@@ -84,7 +84,7 @@ def relax(V: NDArray[np.float64], seamless: SeamlessMap) -> None:
     relax_all(seamless, shapes, across, _FINE)
 
 
-def _recut(part: Part, quads: Quads, count: int, wanted: float, large: bool) -> Quads:
+def _recut(part: Surface, quads: Quads, count: int, wanted: float, large: bool) -> Quads:
     """Cut a part again that has come to more or less than the charts that its area should have; the best of the tries.
 
     Cells are mended until they are disks with corners enough, which changes their number.
@@ -95,14 +95,14 @@ def _recut(part: Part, quads: Quads, count: int, wanted: float, large: bool) -> 
         count, before = max(1, round(count * float(np.sqrt(wanted / charts)))), count
         if abs(charts / wanted - 1) < _MISJUDGED or count == before:
             break
-        quads = part.quads(count, large)
+        quads = quads_of(part, count, large)
         best = min(best, quads, key=lambda each: abs(np.log(len(each.glued) / wanted)))
     return best
 
 
 def _components(
     V: NDArray[np.float64], F: NDArray[np.int64], cells: int
-) -> tuple[list[Part], list[int], NDArray[np.float64]]:
+) -> tuple[list[Surface], list[int], NDArray[np.float64]]:
     """Each connected component, how many cells it gets, and its share of the area."""
     links = coo_array((np.ones(F.size), (F.ravel(), np.roll(F, -1, axis=1).ravel())), shape=(len(V), len(V)))
     _, part = connected_components(links, directed=False)
@@ -112,7 +112,7 @@ def _components(
     # a small part has a few cells at least; where others have more, its texels are less tiny beside theirs
     small = share[share >= min(_NEGLIGIBLE, share.max())].min()
     count = np.maximum(1, np.rint(np.clip(_FEWEST / small, cells, _MOST * cells) * share)).astype(int)
-    return [Part(V, F, np.flatnonzero(of == each)) for each in range(len(number))], count.tolist(), share
+    return [part_of(V, F, np.flatnonzero(of == each)) for each in range(len(number))], count.tolist(), share
 
 
 def _joined(parts: list[Quads]) -> Quads:

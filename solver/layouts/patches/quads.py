@@ -1,7 +1,4 @@
-"""Cells cut into square charts, and these laid out.
-
-A connected component of a mesh, cut into cells and these into quads.
-"""
+"""A connected component of a mesh, cut into cells and these into quads: square charts, laid out."""
 
 from __future__ import annotations
 
@@ -102,28 +99,29 @@ _SMALLEST = 0.85  # of the radius of cells elsewhere
 _TRIANGLES = 2000  # of a mesh of one part, in units of the square of its longest edge
 
 
-class Part:
+def part_of(V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArray[np.int64]) -> Surface:
     """A connected component, the triangles `faces` [m] of V, F."""
+    used, corners = np.unique(F[faces], return_inverse=True)
+    return dataclasses.replace(Surface.of(V[used], corners.reshape(-1, 3)), parent=faces)
 
-    def __init__(self, V: NDArray[np.float64], F: NDArray[np.int64], faces: NDArray[np.int64]) -> None:
-        used, corners = np.unique(F[faces], return_inverse=True)
-        self._whole = dataclasses.replace(Surface.of(V[used], corners.reshape(-1, 3)), parent=faces)
 
-    def quads(self, count: int, large: bool) -> Quads:
-        """The quads of a count of cells; large ones where they are wanted and possible, else about as many."""
-        quads = self.large_quads(count) if large else None
-        if quads is not None:
-            return quads
-        return cut_into_quads(self._cells(max(1, round(count * _LARGE / _CORNERS)) if large else count))
+def quads_of(part: Surface, count: int, large: bool) -> Quads:
+    """The quads of a count of cells; large ones where they are wanted and possible, else about as many."""
+    quads = large_quads_of(part, count) if large else None
+    if quads is not None:
+        return quads
+    return cut_into_quads(_cells_of(part, max(1, round(count * _LARGE / _CORNERS)) if large else count))
 
-    def large_quads(self, count: int) -> Quads | None:
-        """About as many quads as cells, some more of these; None where the surface has none."""
-        return cut_into_large_quads(self._cells(round(_LARGE * count)))
 
-    def _cells(self, count: int) -> BorderedCells:
-        area = self._whole.areas.sum()
-        metric, reach = Metric.of(refined(self._whole, np.sqrt(area / (_TRIANGLES / CELLS * count)))), np.inf
-        if count > 1:
-            largest = _RADIUS * np.sqrt(area / count)
-            metric, reach = metric.in_units(cell_sizes(metric, _REACH, (_SMALLEST * largest, largest))), 1.0
-        return disk_cells(metric, centred_cells(metric, spread_seeds(metric, reach)))
+def large_quads_of(part: Surface, count: int) -> Quads | None:
+    """About as many quads as cells, some more of these; None where the surface has none."""
+    return cut_into_large_quads(_cells_of(part, round(_LARGE * count)))
+
+
+def _cells_of(part: Surface, count: int) -> BorderedCells:
+    area = part.areas.sum()
+    metric, reach = Metric.of(refined(part, np.sqrt(area / (_TRIANGLES / CELLS * count)))), np.inf
+    if count > 1:
+        largest = _RADIUS * np.sqrt(area / count)
+        metric, reach = metric.in_units(cell_sizes(metric, _REACH, (_SMALLEST * largest, largest))), 1.0
+    return disk_cells(metric, centred_cells(metric, spread_seeds(metric, reach)))

@@ -187,31 +187,22 @@ class Samples(NamedTuple):
     normals: NDArray[np.float64]
 
 
-class Sampler(NamedTuple):
-    """A mesh and its map onto charts."""
+def sampled(mesh: Mesh, patches: PatchMap, small: NDArray[np.int64], weights: NDArray[np.float64]) -> Samples:
+    """Points at barycentric coordinates in triangles of the surface."""
+    surface = patches.surface
+    positions = np.einsum("...k,...kj->...j", weights, surface.V[surface.F[small]])
+    triangles = surface.parent[small]
+    barycentrics = np.einsum("...k,...kj->...j", weights, surface.inside[small])
+    at_corners = mesh.vertex_normals[mesh.F[triangles]]
+    normals = np.einsum("...k,...kj->...j", barycentrics, at_corners)
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
+    normals = np.where(length > 1e-9, normals / np.maximum(length, 1e-9), at_corners[..., 0, :])
+    return Samples(small, weights, triangles, barycentrics, positions, normals)
 
-    mesh: Mesh
-    patches: PatchMap
 
-    def everywhere(self, n: int) -> Samples:
-        """The centres of n x n squares of every chart."""
-        return self.samples(*locate_texels(self.patches.seamless, n))
-
-    def in_charts(self, n: int, charts: NDArray[np.int64]) -> Samples:
-        """The same in some charts alone; `small` is -1 where a point was not found."""
-        return self.samples(*locate_in_charts(self.patches.seamless, n, charts))
-
-    def samples(self, small: NDArray[np.int64], weights: NDArray[np.float64]) -> Samples:
-        """Points at barycentric coordinates in triangles of the surface."""
-        mesh, surface = self.mesh, self.patches.surface
-        positions = np.einsum("...k,...kj->...j", weights, surface.V[surface.F[small]])
-        triangles = surface.parent[small]
-        barycentrics = np.einsum("...k,...kj->...j", weights, surface.inside[small])
-        at_corners = mesh.vertex_normals[mesh.F[triangles]]
-        normals = np.einsum("...k,...kj->...j", barycentrics, at_corners)
-        length = np.linalg.norm(normals, axis=-1, keepdims=True)
-        normals = np.where(length > 1e-9, normals / np.maximum(length, 1e-9), at_corners[..., 0, :])
-        return Samples(small, weights, triangles, barycentrics, positions, normals)
+def centres(mesh: Mesh, patches: PatchMap, n: int) -> Samples:
+    """The centres of n x n squares of every chart."""
+    return sampled(mesh, patches, *locate_texels(patches.seamless, n))
 
 
 _LATTICE = 7  # places along a texel's side; odd, so that one is the centre
@@ -222,13 +213,14 @@ _AROUND = 2  # texels round a folded one that may move
 
 
 def untangled(
-    sampler: Sampler, topology: TexelTopology, samples: Samples, beyond: NDArray[np.float64] | None
+    mesh: Mesh, patches: PatchMap, topology: TexelTopology, samples: Samples, beyond: NDArray[np.float64] | None
 ) -> tuple[Samples, NDArray[np.float64]]:
     """Move texels at the centres of their squares to where fewer are folded.
 
     Parameters
     ----------
-    sampler : Sampler
+    mesh : Mesh
+    patches : PatchMap
     topology : TexelTopology
     samples : Samples
         At the centres.
@@ -254,13 +246,13 @@ def untangled(
         if not len(active):
             break
         chosen, index = np.unique(active // (n * n), return_inverse=True)
-        places = sampler.in_charts(n * _LATTICE, chosen)
+        places = sampled(mesh, patches, *locate_in_charts(patches.seamless, n * _LATTICE, chosen))
         known = (places.small >= 0)[..., None]
         number = np.full(charts, -1)
         number[chosen] = np.arange(len(chosen))
-        candidates = Candidates(number, np.where(known, places.positions, np.nan), places.normals)
+        candidates = np.where(known, places.positions, np.nan), places.normals
         for i in range(_SWEEPS):
-            if not _improve(texels, candidates, active[:: 1 if i % 2 == 0 else -1].copy()):
+            if not _improve(texels, number, *candidates, active[:: 1 if i % 2 == 0 else -1].copy()):
                 break
         chart, row, column = np.unravel_index(active, topology.shape)
         moved = offsets[chart, row + 1, column + 1]
@@ -268,7 +260,7 @@ def untangled(
         changed = moved.any(axis=1)
         small[chart[changed], row[changed], column[changed]] = places.small[at][changed]
         weights[chart[changed], row[changed], column[changed]] = places.weights[at][changed]
-    return sampler.samples(small, weights), offsets[:, 1:-1, 1:-1] / _LATTICE
+    return sampled(mesh, patches, small, weights), offsets[:, 1:-1, 1:-1] / _LATTICE
 
 
 def _around(topology: TexelTopology, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -278,14 +270,6 @@ def _around(topology: TexelTopology, chosen: NDArray[np.bool_]) -> NDArray[np.in
         halo = topology.with_halo(chosen.reshape(topology.shape))
         chosen = np.any([halo[:, i : i + n, j : j + n] for i in range(3) for j in range(3)], axis=0)
     return np.flatnonzero(chosen)
-
-
-class Candidates(NamedTuple):
-    """Places that texels of some charts may take."""
-
-    number: Ints  # [C], of a chart among these; -1
-    positions: Floats  # [k, n m, n m, 3] [m]; NaN where unknown
-    normals: Floats  # [k, n m, n m, 3]
 
 
 @kernel
@@ -310,13 +294,17 @@ def _fits(offsets: Floats, row: int, column: int) -> bool:
 
 
 @kernel
-def _improve(texels: Texels, candidates: Candidates, active: Ints) -> int:
-    """Move each of these texels to its best place, one after the other; return how many moved."""
+def _improve(texels: Texels, number: Ints, positions: Floats, normals: Floats, active: Ints) -> int:
+    """Move each of these texels to its best place, one after the other; return how many moved.
+
+    Places that texels of some charts may take, [k, n m, n m, 3] [m], NaN where unknown, with their normals; `number`
+    [C] is that of a chart among these.
+    """
     n, half = texels.halo.shape[1] - 2, _LATTICE // 2
     moved = 0
     for flat in active:
         chart, row, column = flat // (n * n), flat // n % n + 1, flat % n + 1
-        index, offset = candidates.number[chart], texels.offsets[chart, row, column]
+        index, offset = number[chart], texels.offsets[chart, row, column]
         ox, oy = offset[0], offset[1]
         point, normal = texels.positions[flat].copy(), texels.normals[flat].copy()
         least = faults(texels, flat) + _PULL * (ox * ox + oy * oy) / (_LATTICE * _LATTICE)
@@ -330,8 +318,8 @@ def _improve(texels: Texels, candidates: Candidates, active: Ints) -> int:
                 r, c = (row - 1) * _LATTICE + half + i, (column - 1) * _LATTICE + half + j
                 if pull >= least or not _fits(texels.offsets[chart], row, column):
                     continue
-                texels.positions[flat] = candidates.positions[index, r, c]
-                texels.normals[flat] = candidates.normals[index, r, c]
+                texels.positions[flat] = positions[index, r, c]
+                texels.normals[flat] = normals[index, r, c]
                 if not texels.positions[flat, 0] < np.inf:
                     continue
                 fault = faults(texels, flat) + pull
@@ -342,7 +330,7 @@ def _improve(texels: Texels, candidates: Candidates, active: Ints) -> int:
             texels.positions[flat], texels.normals[flat] = point, normal
         else:
             r, c = (row - 1) * _LATTICE + half + best_y, (column - 1) * _LATTICE + half + best_x
-            texels.positions[flat] = candidates.positions[index, r, c]
-            texels.normals[flat] = candidates.normals[index, r, c]
+            texels.positions[flat] = positions[index, r, c]
+            texels.normals[flat] = normals[index, r, c]
             moved += 1
     return moved

@@ -131,7 +131,7 @@ def _vertex_metrics(F: NDArray[np.integer], V: Floats, S: Floats) -> tuple[Float
     scale = share / (square * square)
 
     def at_vertices(values: Floats) -> Floats:
-        return np.bincount(F.ravel(), np.repeat(values, 3), len(V))
+        return np.bincount(F.ravel(), np.repeat(values, 3), len(V)).astype(np.float64)
 
     area = at_vertices(share)
     sums = [

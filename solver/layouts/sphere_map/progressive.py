@@ -10,8 +10,6 @@ bisector of that wedge always leads into it.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -152,18 +150,12 @@ def _morton_order(V: NDArray[np.float64]) -> NDArray[np.int64]:
 CROWDED = 64  # neighbours of a new vertex with more triangles than this wait for the sweeps
 
 
-class _Star(NamedTuple):
-    """Scratch for the star of one vertex, of room for so many neighbours; see `expand_star`."""
-
-    ring: Floats  # [room, 3]
-    shapes: Floats  # [room, 4]
-    terms: Floats  # [room, 9]
-
-
 @kernel
-def _gather(neighbours: Ints32, degree: int, tail: Ints32, S: Floats, reference: Reference, star: _Star) -> None:
+def _gather(
+    neighbours: Ints32, degree: int, tail: Ints32, S: Floats, reference: Reference, ring: Floats, shapes: Floats
+) -> None:
     """Fill in what `expand_star` asks for, from the half-edges to the neighbours."""
-    ring, shapes, cotangent = star.ring, star.shapes, reference.cotangent
+    cotangent = reference.cotangent
     for i in range(degree):
         h = neighbours[i]
         ring[i, 0], ring[i, 1], ring[i, 2] = row(S, tail[following(h)])
@@ -172,9 +164,19 @@ def _gather(neighbours: Ints32, degree: int, tail: Ints32, S: Floats, reference:
 
 
 @kernel
-def _place(u: int, v: int, left: int, right: int, S: Floats, star: _Star, degree: int, density: Density) -> None:
+def _place(
+    u: int,
+    v: int,
+    left: int,
+    right: int,
+    S: Floats,
+    ring: Floats,
+    shapes: Floats,
+    degree: int,
+    density: Density,
+    terms: Floats,
+) -> None:
     """Put u where its star's energy is least among trial points on the ways from v."""
-    ring, shapes, terms = star
     start = row(S, v)
     x, y = tangent_frame(start)
     expand_star(start, x, y, ring, shapes, degree, terms)
@@ -209,8 +211,8 @@ def insert_vertices(log: Ints32, table: CornerTable, surface: RealSurface, S: Fl
     """
     tail, density = table.tail, reference.density
     neighbours, others = np.empty(len(S), np.int32), np.empty(len(S), np.int32)
-    star = _Star(np.empty((len(S), 3)), np.empty((len(S), 4)), np.empty((len(S), TERMS)))
-    other_star = _Star(np.empty((CROWDED, 3)), np.empty((CROWDED, 4)), star.terms)
+    ring, shapes, terms = np.empty((len(S), 3)), np.empty((len(S), 4)), np.empty((len(S), TERMS))
+    other_ring, other_shapes = np.empty((CROWDED, 3)), np.empty((CROWDED, 4))
     for h in log[::-1]:
         u, v = tail[h], tail[table.twin[h]]
         undo_collapse(table, h)
@@ -221,13 +223,13 @@ def insert_vertices(log: Ints32, table: CornerTable, surface: RealSurface, S: Fl
             degree = gather_star(table, w, neighbours)
             for i in range(degree):
                 update_triangle(neighbours[i] // 3, tail, surface, reference)
-        _gather(neighbours, degree, tail, S, reference, star)
-        _place(u, v, tail[preceding(h)], tail[preceding(table.twin[h])], S, star, degree, density)
-        relax_vertex(u, S, star.ring, star.shapes, degree, density, star.terms)
+        _gather(neighbours, degree, tail, S, reference, ring, shapes)
+        _place(u, v, tail[preceding(h)], tail[preceding(table.twin[h])], S, ring, shapes, degree, density, terms)
+        relax_vertex(u, S, ring, shapes, degree, density, terms)
         for i in range(degree):
             w = tail[following(neighbours[i])]
             other_degree = gather_star(table, w, others)
             if other_degree <= CROWDED:
-                _gather(others, other_degree, tail, S, reference, other_star)
-                relax_vertex(w, S, other_star.ring, other_star.shapes, other_degree, density, star.terms)
-            star.ring[i, 0], star.ring[i, 1], star.ring[i, 2] = row(S, w)
+                _gather(others, other_degree, tail, S, reference, other_ring, other_shapes)
+                relax_vertex(w, S, other_ring, other_shapes, other_degree, density, terms)
+            ring[i, 0], ring[i, 1], ring[i, 2] = row(S, w)

@@ -1,20 +1,14 @@
-"""Deferred shading: which sizes a driver can draw, that a frame is what its format says, and what surfaces reflect.
-
-The reflection in the floor.
-
-Tiles cover boxes, once and little more.
-"""
+"""Deferred shading: which sizes a driver can draw, what surfaces and the floor reflect, and what shows through."""
 
 import mujoco
 import numpy as np
 import pytest
-from drawn import BALL, FLOOR, FRONT, SUN, frame_of
+from drawn import BALL, FLOOR, FRONT, SUN, ball_surface, frame_of
 
 from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.contract import srgb_to_linear
-from ripple_sim.render.passes.deferred import Tiles
+from ripple_sim.render.passes.deferred import TILE, touched_tiles
 from ripple_sim.render.surfaces.surface import Charts
-from ripple_sim.render.targets import FrameFormat
 from ripple_sim.solver import HeightMap, RippleError, sphere_atlas
 
 XML = '<mujoco><worldbody><geom type="sphere" size="1" rgba=".8 .2 .2 1"/></worldbody></mujoco>'
@@ -51,13 +45,6 @@ def test_samples_smooth_the_outline_and_leave_the_inside_as_it_is(gl):
     assert np.abs(hard[inside] - smooth[inside]).max() <= 6
     assert set(np.unique(hard[..., 3])) == {0, 255}
     assert len(np.unique(smooth[..., 3])) > 2
-
-
-@pytest.mark.parametrize(("linear", "dtype"), [(False, "f1"), (True, "f2")])
-def test_a_format_knows_its_shape_and_channels(linear, dtype):
-    frame_format = FrameFormat((16, 9), linear=linear)
-    assert frame_format.aspect == pytest.approx(16 / 9)
-    assert frame_format.dtype == dtype
 
 
 def test_a_sharp_edge_of_polished_metal_is_no_brighter_than_its_sides(gl):
@@ -125,41 +112,45 @@ def test_a_reflecting_floor_shows_the_ball_upside_down(gl):
     assert redder[1] > redder[0] + 40
 
 
-SIZE = (200, 120)
-
-
-class Buffer:
-    """Stands for a buffer on the GPU."""
-
-    def write(self, data: bytes) -> None:
-        self.corners = np.frombuffer(data, dtype="f4").reshape(-1, 2)
-
-
-class Context:
-    """Makes buffers."""
-
-    def buffer(self, **_: object) -> Buffer:
-        return Buffer()
-
-
 def test_tiles_cover_the_boxes_once_and_little_more() -> None:
-    tiles = Tiles(Context(), SIZE)
     boxes = np.array([[10, 20, 60, 50], [40, 40, 64, 64], [150, 100, 200, 120], [70, 70, 70, 70]])
-    tiles.cover(boxes)
-    shown = np.zeros(SIZE[::-1], dtype=int)
-    wanted = np.zeros(SIZE[::-1], dtype=bool)
-    for corner in tiles.buffer.corners[: tiles.count]:
-        left, lower = np.round((corner + 1) / 2 * SIZE).astype(int)
-        right, upper = np.round((corner + tiles.extent + 1) / 2 * SIZE).astype(int)
-        shown[lower:upper, left:right] += 1
+    shown, wanted = np.zeros((120, 200), dtype=int), np.zeros((120, 200), dtype=bool)
+    tiles = touched_tiles(boxes, (200, 120))
+    for left, lower in TILE * tiles:
+        shown[lower : lower + TILE, left : left + TILE] += 1
     for left, lower, right, upper in boxes:
         wanted[lower:upper, left:right] = True
     assert shown.max() == 1
     assert (shown[wanted] == 1).all()
-    assert tiles.count == 7
+    assert len(tiles) == 7
+    assert not len(touched_tiles(boxes[:0], (200, 120)))
 
 
-def test_no_tiles_without_boxes() -> None:
-    tiles = Tiles(Context(), SIZE)
-    tiles.cover(np.zeros((0, 4), dtype=np.int64))
-    assert tiles.count == 0
+def test_a_transparent_geom_shows_what_is_behind_it(gl):
+    wall = '<geom type="box" size="3 .1 3" pos="0 2 0" rgba="0 0 1 1"/>'
+    glass = '<geom type="box" size=".5 .02 .5" pos="0 0 .5" rgba="1 0 0 {}"/>'
+    middle = np.s_[55:65, 75:85]
+    red, mixed, blue = (
+        frame_of(gl, wall + pane, camera=FRONT)[middle].mean(axis=(0, 1))
+        for pane in (glass.format(1.0), glass.format(0.5), "")
+    )
+    np.testing.assert_allclose(mixed, (red + blue) / 2, atol=12)
+
+
+def test_a_transparent_plane_is_drawn_too(gl):
+    pane = '<geom type="plane" size=".5 .5 .1" pos="0 0 .5" rgba="1 0 0 .5"/>'
+    assert (frame_of(gl, FLOOR + pane) - frame_of(gl, FLOOR))[60, 80, 2] < -40
+
+
+def test_water_shows_what_is_behind_it_and_clay_does_not(gl):
+    """A wall behind the ball tints the middle of the frame through a clear body alone."""
+
+    def middle(look: str, rgba: str) -> np.ndarray:
+        body = f'<geom name="t" type="sphere" size="1"/><geom type="box" size="4 .1 4" pos="0 3 0" rgba="{rgba}"/>'
+        camera = Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0, 40.0)
+        frame = frame_of(gl, body, camera=camera, targets={"t": ball_surface(look, 1.0)}, size=(240, 180))
+        return frame[80:100, 110:130].mean(axis=(0, 1))
+
+    for look, seen in (("water", True), ("clay", False)):
+        change = middle(look, "0 0 1 1") - middle(look, "1 0 0 1")
+        assert bool(change[2] > 30) is seen, (look, change)

@@ -124,7 +124,7 @@ def test_a_vertex_without_triangles_has_finite_values():
 
 def test_smoothing_keeps_constants_and_spreads_a_peak_over_two_rings():
     ball = shapes.ball(6)
-    edges, _ = edges_of(ball.faces)
+    edges = edges_of(ball.faces).ends
     np.testing.assert_allclose(_smoothed(np.full(len(ball.shell), 0.3), edges), 0.3)
     peak = np.zeros(len(ball.shell))
     peak[17] = 1.0

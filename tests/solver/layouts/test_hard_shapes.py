@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from ripple_sim.solver import Atlas, Mesh, build_atlas
 
 SEEDS = st.integers(0, 2**32 - 1)
-EXAMPLES = settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+EXAMPLES = settings(max_examples=5, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 
 
 def sphere(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:

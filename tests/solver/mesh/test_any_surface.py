@@ -13,7 +13,7 @@ from sound import assert_sound, assert_unchanged_when_read_again
 
 from ripple_sim.solver import Mesh, MeshError
 
-quick = settings(derandomize=True, max_examples=80, deadline=None, database=None)
+quick = settings(derandomize=True, max_examples=40, deadline=None, database=None)
 
 
 def areas(V: np.ndarray, F: np.ndarray) -> np.ndarray:
@@ -38,11 +38,10 @@ def made(V: np.ndarray, F: np.ndarray) -> Mesh:
 
 
 @pytest.mark.parametrize("genus", range(6))
-@pytest.mark.parametrize("seed", range(2))
-def test_thickened_graphs_have_a_handle_for_every_cycle(genus: int, seed: int) -> None:
-    V, F = thickened_graph(genus, seed)
+def test_thickened_graphs_have_a_handle_for_every_cycle(genus: int) -> None:
+    V, F = thickened_graph(genus, 0)
     for loose in (False, True):
-        mesh = made(*shuffled(V, F, seed, turned=0.5, loose=loose))
+        mesh = made(*shuffled(V, F, 0, turned=0.5, loose=loose))
         assert mesh.closed
         assert mesh.genus.tolist() == [genus]
         assert mesh.volume > 0
@@ -74,7 +73,7 @@ def test_every_hole_of_a_ball_is_a_rim_that_runs_round_it(holes: int) -> None:
         assert np.cross(P, np.roll(P, -1, axis=0)).sum(axis=0) @ P.mean(axis=0) < 0
 
 
-@pytest.mark.parametrize("half_twists", range(5))
+@pytest.mark.parametrize("half_twists", range(4))
 @pytest.mark.parametrize("loose", [False, True])
 def test_bands_keep_two_rims_and_moebius_bands_are_cut_across(half_twists: int, loose: bool) -> None:
     V, F = band(half_twists)

@@ -11,7 +11,7 @@ from sound import assert_sound, assert_unchanged_when_read_again
 
 from ripple_sim.solver import Atlas, Mesh, MeshError, build_atlas
 
-quick = settings(derandomize=True, max_examples=60, deadline=None, database=None)
+quick = settings(derandomize=True, max_examples=40, deadline=None, database=None)
 
 faces = st.lists(st.integers(0, len(BALL.faces) - 1), max_size=6)
 
@@ -106,7 +106,7 @@ def test_a_ball_that_touches_itself_is_cut_apart_there() -> None:
     assert_unchanged_when_read_again(mesh)
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e6])
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
 def test_units_do_not_matter(animal: Atlas, scale: float) -> None:
     atlas = build_atlas(Mesh.from_arrays(animal.mesh.V * scale, animal.mesh.F), animal.resolution, cache=False)
     np.testing.assert_allclose(atlas.positions / scale, animal.positions, atol=1e-9)

@@ -9,7 +9,8 @@ import pytest
 import trimesh
 
 from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver.mesh.closest import TriangleTree, closest_points, downward_hits, refitted, triangle_tree
+from ripple_sim.solver.mesh.closest import TriangleTree, closest_points, refitted, triangle_tree
+from ripple_sim.solver.mesh.rays import downward_hits
 from ripple_sim.solver.texels.chart_map import barycentrics_in
 
 

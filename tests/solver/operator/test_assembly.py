@@ -1,7 +1,4 @@
-"""Operators by name, the baselines, and softened needles.
-
-Free and fixed rims of open surfaces, against modes that are known exactly.
-"""
+"""Operators by name, the baselines and softened needles; rims of open surfaces, against modes that are known."""
 
 import dataclasses
 

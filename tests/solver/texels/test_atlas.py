@@ -1,7 +1,4 @@
-"""The atlas locates points, also where charts meet.
-
-Arrays in a file: what comes back is what was written, or the damage is named.
-"""
+"""The atlas locates points, also where charts meet; arrays come back from a file, or the damage is named."""
 
 from __future__ import annotations
 

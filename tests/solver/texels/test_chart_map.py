@@ -1,9 +1,4 @@
-"""Texture coordinates of an atlas: values carried to the cut triangles, and places in layers with a halo.
-
-The chart map of grids of points: linear in each triangle, and the same way back.
-
-The nearest places of compiled code are those of the atlas, in every layout.
-"""
+"""Chart maps: texture coordinates, maps linear in each triangle, and the nearest places of compiled code."""
 
 from collections.abc import Callable
 

@@ -1,9 +1,4 @@
-"""Texel meshes of any topology: rims, irregular vertices, several parts, against what is known of their waves.
-
-Figures of merit of a texel mesh, where they are known.
-
-Smoothing by passes of 1 2 1: its frequency response, its width, and its symmetry.
-"""
+"""Texel meshes of any topology: what is known of their waves, their figures of merit, and smoothing on them."""
 
 import copy
 import dataclasses
@@ -78,14 +73,9 @@ def test_irregular_vertices_converge_to_a_fine_mesh_at_second_order(sides: int) 
 
 
 @pytest.mark.parametrize("sides", [3, 4, 5, 6, 7])
-def test_stiffness_is_symmetric_and_positive_but_for_the_constant(sides: int) -> None:
-    texels = polygon(sides, 6)
-    matrix = texels.stiffness()
-    assert abs(matrix - matrix.T).max() < 1e-12
-    values = np.linalg.eigvalsh(matrix.toarray())
-    assert values[0] > -1e-12 and values[1] > 1e-3
+def test_charts_round_a_point_have_the_area_of_a_polygon(sides: int) -> None:
     area = sides / 2 * np.sin(2 * np.pi / sides)
-    assert texels.areas.sum() == pytest.approx(area, rel=1e-12)
+    assert polygon(sides, 6).areas.sum() == pytest.approx(area, rel=1e-12)
 
 
 def test_new_positions_keep_the_topology() -> None:
@@ -198,7 +188,9 @@ def test_a_point_spreads_with_a_standard_deviation_of_root_2_and_keeps_its_sum()
 def test_constants_stay_and_nothing_leaves_its_range(topology) -> None:
     np.testing.assert_allclose(smoothed(topology, np.full(topology.shape, 7.0)), 7)
     field = np.random.default_rng(0).uniform(-1, 2, topology.shape)
+    before = field.copy()
     found = smoothed(topology, field)
+    np.testing.assert_array_equal(field, before)
     assert field.min() < found.min() < found.max() < field.max()
 
 
@@ -210,10 +202,3 @@ def test_smoothing_does_not_know_how_the_cube_is_turned() -> None:
         np.testing.assert_allclose(
             smoothed(topology, permute_texels(field, rotation)), permute_texels(found, rotation), atol=1e-14
         )
-
-
-def test_the_field_itself_is_left_alone() -> None:
-    field = np.random.default_rng(2).standard_normal((6, 4, 4))
-    before = field.copy()
-    smoothed(cube_topology(4), field)
-    np.testing.assert_array_equal(field, before)

@@ -66,7 +66,7 @@ def moebius_band() -> Mesh:
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 MESHES: dict[str, Callable[[], Mesh]] = {
-    **{f"graph of genus {genus}": (lambda genus=genus: thick_graph(genus)) for genus in range(6)},
+    **{f"graph of genus {genus}": (lambda genus=genus: thick_graph(genus)) for genus in (0, 2, 5)},
     "sphere with 1 hole": lambda: holed_sphere(1),
     "sphere with 6 holes": lambda: holed_sphere(6),
     "strip": lambda: Mesh.from_arrays(*grid(12, lambda x, y: (10 * x, y, 0 * x))),

@@ -7,7 +7,7 @@ from surfaces import sphere
 from ripple_sim.solver import Atlas, Mesh, glue
 from ripple_sim.solver.layouts.patches.atlas import atlas_from_patch_map
 from ripple_sim.solver.layouts.patches.layout import patch_map
-from ripple_sim.solver.layouts.patches.samples import Sampler
+from ripple_sim.solver.layouts.patches.samples import centres
 from ripple_sim.solver.texels.texel_mesh import TexelMesh, folded_texels
 
 N = 24
@@ -24,7 +24,7 @@ def atlases() -> tuple[TexelMesh, Atlas]:
     mesh = blade()
     patches = patch_map(mesh.V, mesh.F, 24)
     atlas = atlas_from_patch_map(mesh, patches, N)
-    samples = Sampler(mesh, patches).everywhere(atlas.texels.resolution)
+    samples = centres(mesh, patches, atlas.texels.resolution)
     topology = glue(patches.seamless.glued, atlas.texels.resolution)
     return TexelMesh.of(topology, samples.positions, normals=samples.normals), atlas
 

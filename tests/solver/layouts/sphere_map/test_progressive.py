@@ -23,7 +23,7 @@ def test_map_is_certified(shape):
     np.testing.assert_allclose(np.linalg.norm(S, axis=1), 1, atol=1e-12)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=15, deadline=None, derandomize=True)
 @given(
     seed=st.integers(0, 2**32 - 1),
     subdivisions=st.integers(0, 3),

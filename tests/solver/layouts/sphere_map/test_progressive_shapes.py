@@ -14,7 +14,7 @@ from ripple_sim.solver.layouts.sphere_map import certify, progressive_sphere_map
 
 SEEDS = st.integers(0, 2**32 - 1)
 
-EXAMPLES = settings(max_examples=15, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+EXAMPLES = settings(max_examples=6, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 
 
 def smooth_radius(V, rng, roughness, waves=5):
@@ -109,30 +109,26 @@ def limbed_figures():
     return figures(*limbed())
 
 
-def assert_as_good(found, expected):
-    np.testing.assert_allclose(found[:4], expected[:4], rtol=0.02)
-    # the narrowest of a few thousand texels decides on the time step, and falls now here, now there
-    assert found[4] == pytest.approx(expected[4], rel=0.25)
+def rotated(V, F):
+    return V @ Rotation.random(random_state=0).as_matrix().T, F
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_rotated_mesh_has_an_atlas_as_good(seed, limbed_figures):
-    V, F = limbed()
-    assert_as_good(figures(V @ Rotation.random(random_state=seed).as_matrix().T, F), limbed_figures)
-
-
-@pytest.mark.parametrize("scale", [1e-5, 1e4])
-def test_a_scaled_mesh_has_an_atlas_as_good(scale, limbed_figures):
-    V, F = limbed()
-    assert_as_good(figures(scale * V, F), limbed_figures)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_a_renumbered_mesh_has_an_atlas_as_good(seed, limbed_figures):
-    V, F = limbed()
-    rng = np.random.default_rng(seed)
+def renumbered(V, F):
+    rng = np.random.default_rng(0)
     order = rng.permutation(len(V))
     number = np.empty(len(V), dtype=int)
     number[order] = np.arange(len(V))
     F = np.array([np.roll(f, k) for f, k in zip(number[F], rng.integers(0, 3, len(F)), strict=True)])
-    assert_as_good(figures(V[order], rng.permutation(F)), limbed_figures)
+    return V[order], rng.permutation(F)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [rotated, renumbered, lambda V, F: (1e-5 * V, F), lambda V, F: (1e4 * V, F)],
+    ids=["turn", "order", "small", "large"],
+)
+def test_a_mesh_turned_scaled_or_renumbered_has_an_atlas_as_good(change, limbed_figures):
+    found = figures(*change(*limbed()))
+    np.testing.assert_allclose(found[:4], limbed_figures[:4], rtol=0.02)
+    # the narrowest of a few thousand texels decides on the time step, and falls now here, now there
+    assert found[4] == pytest.approx(limbed_figures[4], rel=0.25)

@@ -10,7 +10,7 @@ import trimesh
 from mujoco_models import BALL, mesh_asset, model_of
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling.placing import places
+from ripple_sim.coupling.contacts import places_facing
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
 
@@ -28,7 +28,7 @@ def test_contact_with_a_thin_part_is_placed_on_its_own_side(plate: Atlas, side: 
     rng = np.random.default_rng(3)
     points = np.column_stack([rng.uniform(-0.35, 0.35, (20, 2)), np.full(20, height)])
     normals = np.tile([0.0, 0.0, side], (20, 1))
-    placed = places(plate, points, normals)
+    placed = places_facing(plate, points, normals)
     np.testing.assert_allclose(placed[:, 2], 0.05 * side, atol=1e-12)
     # on the other side to a texel, or else straight above
     nearer = abs(height - 0.05 * side) < abs(height + 0.05 * side)
@@ -43,7 +43,7 @@ def test_point_is_the_nearest_of_all_that_face_the_contact(animal: Atlas) -> Non
     normals = rng.standard_normal((60, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     texel = np.sqrt(animal.areas.max())
-    for point, normal, place in zip(points, normals, places(animal, points, normals), strict=True):
+    for point, normal, place in zip(points, normals, places_facing(animal, points, normals), strict=True):
         [there] = animal.nearest_texel(place)
         assert outward[there] @ normal > 0
         least = np.linalg.norm(positions[outward @ normal > 0.25] - point, axis=1).min()
@@ -53,7 +53,7 @@ def test_point_is_the_nearest_of_all_that_face_the_contact(animal: Atlas) -> Non
 
 def test_where_nothing_faces_a_contact_the_nearest_point_is_taken() -> None:
     atlas = sphere_atlas(1.0, 8)
-    [place] = places(atlas, np.array([[0.0, 0.0, 1.1]]), np.zeros((1, 3)))
+    [place] = places_facing(atlas, np.array([[0.0, 0.0, 1.1]]), np.zeros((1, 3)))
     np.testing.assert_allclose(place, [0, 0, 1], atol=0.02)
 
 

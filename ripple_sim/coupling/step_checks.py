@@ -1,0 +1,235 @@
+"""Checks at every step, which warn once where impulses are going to be wrong.
+
+`TunnellingCheck` reports geoms so fast that they would pass through a target or get stuck in it, before they touch.
+`SolverBalance` asks whether the contact forces that MuJoCo's constraint solver reports move bodies as they should.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.errors import RippleWarning
+from ripple_sim.solver.kernel import Floats, Ints
+
+from .model import SPECULATIVE, CoupledModel
+
+_SDF = int(mujoco.mjtGeom.mjGEOM_SDF)
+_CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
+_SAFE = 0.85
+# Depth over a geom's smallest half-extent at which contacts with a signed distance begin to push from all sides: seen
+# at 1.4, not yet at 1.2.
+_SAFE_IN_SDF = 1.2
+# Depth over a flex's thickness at which it begins to throw cylinders aside.
+_SAFE_IN_FLEX = 0.7
+# The check runs once in so many steps, and looks as many steps ahead.
+_EVERY = 5
+
+# A pair to watch.
+PAIR = np.dtype(
+    [
+        ("target", np.int64),  # geom ids
+        ("other", np.int64),
+        ("limit", np.float64),  # depth up to which a contact is safe [m]
+        ("range", np.float64),  # distance of the geoms' centres at which they may touch [m]
+        ("stopping_time", np.float64),  # depth over speed after the first contact [s]
+    ]
+)
+
+
+class TunnellingCheck:
+    """Compares how deep geoms will sink into the targets with how thick both are.
+
+    A geom that arrives at speed v sinks in by about v dt before MuJoCo sees the contact, and then by v t_stop before
+    the contact's spring has stopped it: t_stop = tau zeta exp(-zeta) for a `solref` of time constant tau and damping
+    ratio zeta (a critically damped spring at zeta = 1). Past the sum of the two geoms' smallest half-extents it comes
+    out on the other side or stays inside; the first that did so were seen at 0.9 of that sum. A geom that is inside an
+    SDF geom by more than its own half-extent is pushed from all sides: the normal forces then add up to many times the
+    momentum exchanged. A warning is given once for each pair. MuJoCo's speculative contacts, where the version has them
+    and they are enabled, stop geoms in time, but not at SDF geoms or flexes: then only those are checked.
+
+    A flex collider holds geoms off by its thickness, which counts in place of the half-extent of its geom. Cylinders
+    that sink in by 0.7 of the thickness begin to be thrown aside.
+
+    Parameters
+    ----------
+    coupled : CoupledModel
+    targets : sequence of int
+        Geom ids.
+    """
+
+    def __init__(self, coupled: CoupledModel, targets: list[int]) -> None:
+        self._model, self._names = coupled.model, coupled.names
+        self._pairs = _watched_pairs(coupled, targets)
+        self._warned = np.zeros(len(self._pairs), dtype=bool)
+        self._steps = 0
+
+    def __call__(self, data: mujoco.MjData) -> None:
+        """Warn of the pairs that are about to meet too fast. Call it after each physics step."""
+        self._steps += 1
+        if not len(self._warned) or (self._steps - 1) % _EVERY:
+            return
+        rows, speeds = too_fast(self._pairs, self._model, data, _EVERY)
+        for i, speed in zip(rows.tolist(), speeds.tolist(), strict=True):
+            if not self._warned[i]:
+                self._warned[i] = True
+                warnings.warn(self._message(i, speed), RippleWarning, stacklevel=4)
+
+    def _message(self, i: int, speed: float) -> str:
+        model, names, timestep = self._model, self._names, self._model.opt.timestep
+        target, other, limit, _, stopping_time = self._pairs[i].item()
+        body = model.body(int(model.geom_bodyid[other])).name or names[other]
+        needed = limit / speed - stopping_time
+        # MuJoCo keeps a contact's time constant at two time steps or more
+        advice = (
+            f"use a time step of {needed:.2g} s or less"
+            if needed > 0
+            else f"use a time step of {limit / speed / (1 + 2 / np.e):.2g} s or less, and a solref of twice that"
+        )
+        return (
+            f"body {body!r} meets geom {names[target]!r} at {speed:.3g} m/s and would pass through it, get stuck or "
+            f"give a wrong impulse: with a time step of {timestep:.2g} s it sinks in by "
+            f"{speed * (timestep + stopping_time):.2g} m, of which {limit:.2g} m are safe; {advice}"
+        )
+
+
+def too_fast(pairs: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> tuple[Ints, Floats]:
+    """Rows of the pairs, `PAIR`, that may touch within some steps and sink in beyond their limits, and speeds [m/s]."""
+    body, target, other, timestep = model.geom_bodyid, pairs["target"], pairs["other"], model.opt.timestep
+    # MuJoCo gives a body's velocity at the centre of mass of the tree that it belongs to
+    from_root = data.geom_xpos - data.subtree_com[model.body_rootid[body]]
+    velocities = data.cvel[body, 3:] + np.cross(data.cvel[body, :3], from_root)
+    away, relative = data.geom_xpos[other] - data.geom_xpos[target], velocities[other] - velocities[target]
+    distances, speeds = np.linalg.norm(away, axis=1), np.linalg.norm(relative, axis=1)
+    near = distances < pairs["range"] + (1 + steps) * speeds * timestep
+    approaching = np.einsum("ij,ij->i", away, relative) < 0
+    rows = np.flatnonzero(near & approaching & (speeds * (timestep + pairs["stopping_time"]) > pairs["limit"]))
+    return rows, speeds[rows]
+
+
+def _watched_pairs(coupled: CoupledModel, targets: list[int]) -> NDArray[np.void]:
+    """Pairs of a geom that collides for a target and another geom, which may tunnel, `PAIR` [p]."""
+    model, extents, flex = coupled.model, coupled.collider_extents, coupled.has_flex
+    sdf, cylinder = model.geom_type == _SDF, model.geom_type == _CYLINDER
+    unchecked = sdf | flex if model.opt.enableflags & SPECULATIVE else np.ones(model.ngeom, dtype=bool)
+    pairs = [
+        (target, other)
+        for target in dict.fromkeys(geom for each in targets for geom in coupled.collision_geoms(each))
+        for other in np.flatnonzero(coupled.can_collide(target)).tolist()
+        if np.isfinite(extents[other]) and (unchecked[target] or unchecked[other])
+    ]
+    target, other = np.array(pairs, dtype=np.int64).reshape(-1, 2).T.copy()
+    limit = _SAFE * (extents[target] + extents[other])
+    for geom, around in ((target, other), (other, target)):
+        safe = np.where(sdf[around], _SAFE_IN_SDF * extents[geom], np.inf)
+        safe = np.where(flex[around] & cylinder[geom], _SAFE_IN_FLEX * extents[around], safe)
+        limit = np.minimum(limit, safe)
+    reach = model.geom_rbound[target] + model.geom_rbound[other]
+    solref = (coupled.solref[target] + coupled.solref[other]) / 2
+    stopping_times = _stopping_times(solref, model.opt.timestep)
+    return np.array(list(zip(target, other, limit, reach, stopping_times, strict=True)), PAIR)
+
+
+def _stopping_times(solref: NDArray[np.float64], timestep: float) -> NDArray[np.float64]:
+    """Depth over speed [s], [k], of contacts with these parameters, [k, 2]."""
+    # negative pairs are -stiffness and -damping for each kg: omega = sqrt(stiffness), ratio = damping / (2 omega)
+    direct = solref[:, 0] <= 0
+    omega = np.sqrt(np.where(direct, np.maximum(-solref[:, 0], 1e-12), 1.0))
+    constant = np.maximum(solref[:, 0], 2 * timestep)
+    ratio = np.where(direct, -solref[:, 1] / (2 * omega), solref[:, 1])
+    period = np.where(direct, 1 / omega, constant * ratio)
+    return period * np.exp(-np.clip(ratio, 0, 1))
+
+
+# Share of the impulses on a target that may be missing from the bodies' motion, or be there without a contact force.
+_TOLERANCE = 0.005
+# The solver is looked at in the first steps of a touch, and then in one of so many; it is judged after so many looks,
+# or when nothing touches any more, by all looks so far, where old ones count less and less.
+_FIRST_LOOKS, _LOOK_EVERY, _LOOKS, _MEMORY = 12, 8, 4, 0.98
+_PGS = int(mujoco.mjtSolver.mjSOL_PGS)
+_TINY = np.finfo(np.float64).tiny
+
+
+class SolverBalance:
+    """Compares reported contact forces with the accelerations of the bodies that they act on.
+
+    MuJoCo's solvers CG and Newton look for the accelerations, and stop at an absolute tolerance that is set by the mean
+    inertia of the whole model. Among very heavy bodies light ones may then be far from where their contact forces would
+    take them: M a is not the sum of all forces. What is missing, over the contact forces, is the share by which the
+    impulses given to a target are wrong. A warning is given once for each target.
+
+    Parameters
+    ----------
+    coupled : CoupledModel
+    """
+
+    def __init__(self, coupled: CoupledModel) -> None:
+        self._model, self._names, model = coupled.model, coupled.names, coupled.model
+        # tree of each collider: the last one, without degrees of freedom, for what does not move and vertices of flexes
+        self._tree = np.full(len(coupled.owners), -1)
+        self._tree[: model.ngeom] = model.body_treeid[model.geom_bodyid]
+        # a free body at the root: its first three degrees of freedom move the tree as a whole
+        self._free = model.jnt_type[model.body_jntadr[model.tree_bodyadr]] == mujoco.mjtJoint.mjJNT_FREE
+        self._warned = set[int]()
+        # for how many steps each target has been touched; its looks, sum of contact forces [N], and missing part [N]
+        self._touched: dict[int, int] = {}
+        self._sums = {target: np.zeros(3) for target in range(model.ngeom)}
+
+    def __call__(self, data: mujoco.MjData, contacts: Mapping[int, Any]) -> None:
+        """Warn of the targets whose forces and bodies disagree. Call it with the `Contacts` of each step, by target."""
+        touched = [target for target in contacts if target < self._model.ngeom]
+        for target in self._touched.keys() - touched:
+            self._judge(target)
+        self._touched = {target: self._touched.get(target, -1) + 1 for target in touched}
+        watched = [t for t, steps in self._touched.items() if steps < _FIRST_LOOKS or steps % _LOOK_EVERY == 0]
+        # PGS looks for the forces: the accelerations follow from them
+        if not watched or self._model.opt.solver == _PGS:
+            return
+        free, share = self._missing(data)
+        for target in watched:
+            others, forces = contacts[target].others, np.abs(contacts[target].forces)
+            trees = self._tree[[np.full_like(others, target), others]]
+            # of a pair with a free body: a heavy one may hardly feel what moves a light one
+            starts = np.flatnonzero(np.diff(others, prepend=-1))
+            amounts = np.add.reduceat(forces, starts)
+            at_free, at_joints = free[trees].min(axis=0)[starts], share[trees].min(axis=0)[starts] * amounts
+            missing = np.where(np.isfinite(at_free), at_free, np.where(np.isfinite(at_joints), at_joints, 0.0))
+            sums = self._sums[target]
+            sums[1:] *= _MEMORY
+            sums += [1.0, amounts.sum(), missing.sum()]
+            if sums[0] >= _LOOKS:
+                self._judge(target)
+
+    def _missing(self, data: mujoco.MjData) -> tuple[Floats, Floats]:
+        """What is missing of each tree's motion, [ntree + 1]: the force [N] on a free body, the share of it at joints.
+
+        Infinite where the tree is not of that kind.
+        """
+        moved, first = np.empty(self._model.nv), self._model.tree_dofadr
+        mujoco.mj_mulM(self._model, data, moved, data.qacc)
+        missing = (moved - data.qfrc_smooth - data.qfrc_constraint) ** 2
+        constraint = np.add.reduceat(data.qfrc_constraint**2, first)
+        share = np.sqrt(np.add.reduceat(missing, first) / np.maximum(constraint, _TINY))
+        force = np.full(len(first) + 1, np.inf)
+        force[:-1][self._free] = np.sqrt(missing[first[self._free, None] + np.arange(3)].sum(axis=1))
+        return force, np.append(np.where(self._free, np.inf, share), np.inf)
+
+    def _judge(self, target: int) -> None:
+        _, whole, missing = self._sums[target]
+        if target in self._warned or missing <= _TOLERANCE * whole:
+            return
+        self._warned.add(target)
+        option = self._model.opt
+        warnings.warn(
+            f"the impulses on geom {self._names[target]!r} are wrong by about {missing / whole:.1%}: MuJoCo's solver "
+            f"stopped before contact forces and accelerations agreed, as happens where masses differ by many orders; "
+            f"set option tolerance to 1e-14 or less (it is {option.tolerance:.2g}) and iterations to 1000 (it is "
+            f"{option.iterations})",
+            RippleWarning,
+            stacklevel=6,
+        )

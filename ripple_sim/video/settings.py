@@ -1,0 +1,173 @@
+"""The options of a video checked and settled for one render.
+
+The settings of a render, with fingerprints of its scene, its files and the software, tell whether an interrupted one
+can continue.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+from importlib.metadata import version
+from pathlib import Path
+from typing import cast
+
+import msgspec
+import mujoco
+import numpy as np
+
+from ripple_sim.encode import check_output, default_fps
+from ripple_sim.encode.images import check_passes
+from ripple_sim.errors import SceneError, VideoError
+from ripple_sim.overlay.notes import compared_operators
+from ripple_sim.scene.scene import MAX_DURATION, Scene, parse_request
+from ripple_sim.solver.backends.backend import auto_backend
+from ripple_sim.solver.gl import GLContext
+
+from .options import Backend, VideoOptions
+
+_PACKAGES = ("ripple-sim", "mujoco", "numpy", "numba", "moderngl", "av", "pillow")
+
+
+def provenance(scene: Scene, gl: GLContext) -> dict[str, str]:
+    """Fingerprint of a scene, name of the OpenGL driver, and versions of the packages, by name."""
+    return {**origin(scene), "the OpenGL driver": f"{gl.renderer}, {gl.version}"}
+
+
+def origin(scene: Scene) -> dict[str, str]:
+    """Fingerprint of a scene and versions of the packages, by name."""
+    return {"the scene's fingerprint": scene_digest(scene), **_versions()}
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    return {f"the version of {package}": version(package) for package in _PACKAGES}
+
+
+def scene_digest(scene: Scene) -> str:
+    """Fingerprint of the model, the surfaces, the camera and the script, 16 hexadecimal digits."""
+    hasher = hashlib.blake2b(digest_size=8)
+    model = np.zeros(mujoco.mj_sizeModel(scene.model), np.uint8)
+    mujoco.mj_saveModel(scene.model, None, model)
+    hasher.update(model.tobytes())
+    for entry in scene.targets:
+        for each in entry.material.maps().values():
+            hasher.update(Path(each.map).read_bytes())
+        if entry.still_map is not None:
+            hasher.update(Path(entry.still_map).read_bytes())
+    hasher.update(msgspec.json.encode((scene.targets, scene.camera, scene.events, scene.two_way)))
+    return hasher.hexdigest()
+
+
+MAX_SLOW_MOTION = 1000
+
+# Options that replace those of the scene's camera, by the same names.
+EXPOSURE = ("shutter", "aperture", "focus", "exposures")
+
+
+def settled(options: VideoOptions, scene: Scene, output: Path) -> VideoOptions:
+    """The options with None and "auto" replaced by what the scene, the output and this machine say.
+
+    Shutter, aperture, focus and exposures stay as they are: see `with_exposure`.
+
+    Raises
+    ------
+    VideoError
+        For an output of unknown format.
+    """
+    return dataclasses.replace(
+        options,
+        fps=default_fps(output) if options.fps is None else options.fps,
+        duration=scene.duration if options.duration is None else options.duration,
+        overlay=tuple(scene.overlay if options.overlay is None else options.overlay),
+        backend=_backend(options, scene),
+    )
+
+
+def _backend(options: VideoOptions, scene: Scene) -> Backend:
+    """The backend that is meant, for the largest target of known resolution."""
+    if options.backend != "auto":
+        return options.backend
+    sides = [options.resolution or entry.resolution for entry in scene.targets]
+    known = [6 * n * n for n in sides if n is not None]
+    return cast(Backend, auto_backend(max(known)) if known else auto_backend())
+
+
+def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLContext) -> dict[str, str | int | float]:
+    """What decides the pixels of a video, by the names in messages.
+
+    Parameters
+    ----------
+    scene : Scene
+        With the exposure that the options ask for.
+    options : VideoOptions
+        Settled.
+    frames : int
+        Of the video.
+    gl : GLContext
+        That renders.
+    """
+    width, height = options.size
+    return {
+        "the size": f"{width}x{height}",
+        "the frame rate": options.fps or 0,
+        "the number of frames": frames,
+        "the slow motion": options.slow_motion,
+        "the supersampling": options.supersample,
+        "the camera's shutter": scene.camera.shutter,
+        "the camera's aperture": scene.camera.aperture,
+        "the camera's focus": str(scene.camera.focus or "the point that the camera looks at"),
+        "the camera's exposures": scene.camera.exposures,
+        "transparency": options.transparent,
+        "the frame format": options.frame_format,
+        "the overlays": ",".join(options.overlay or ()),
+        "the operators": ",".join(compared_operators(options.compare)),
+        "the resolution": options.resolution or "the scene's",
+        "the layout": options.layout or "the scene's",
+        "the rims": options.rim or "the scene's",
+        "the wave solver": options.backend,
+        **provenance(scene, gl),
+        **({"the version of OpenEXR": version("OpenEXR")} if options.linear else {}),
+    }
+
+
+def check_options(options: VideoOptions, output: Path) -> None:
+    """Make sure, before anything that takes time, that a video with these options can be written to `output`.
+
+    Raises
+    ------
+    RippleError
+    """
+    parse_request(options.overlay or ())
+    operators = compared_operators(options.compare)
+    check_output(
+        output,
+        *options.size,
+        default_fps(output) if options.fps is None else options.fps,
+        transparent=options.transparent,
+        frame_format=options.frame_format,
+        overlaid=bool(options.overlay) or len(operators) > 1,
+        overwrite=options.overwrite,
+    )
+    if options.passes:
+        check_passes(output, tuple(options.passes), options.pass_format, options.overwrite)
+        if options.resume or len(operators) > 1:
+            other = "--resume" if options.resume else "--compare"
+            raise VideoError(f"passes cannot be written with {other}; leave one of the two out")
+
+
+def frame_count(options: VideoOptions) -> int:
+    """Frames of a video with settled options.
+
+    Raises
+    ------
+    SceneError
+        If the duration or the slow motion is out of range.
+    """
+    duration, slow_motion = options.duration or 0.0, options.slow_motion
+    if not 0 < duration < MAX_DURATION:
+        raise SceneError(f"duration is {options.duration!r} s; valid is a positive number, less than {MAX_DURATION}")
+    if not 0 < slow_motion <= MAX_SLOW_MOTION:
+        raise SceneError(f"slow motion is {slow_motion!r}; valid is a positive number up to {MAX_SLOW_MOTION}")
+    return max(1, round(duration * (options.fps or 0) * slow_motion))

@@ -1,0 +1,325 @@
+"""Checks at every step warn once where impulses are going to be wrong.
+
+Geoms too fast for the time step are reported before they get through, and others are not. Where MuJoCo's solver stops
+too early, impulses and momentum disagree, and a warning says so.
+"""
+
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+from mujoco_models import BALL, mesh_asset, model_of
+
+from ripple_sim import Material, Ripples, make_collidable
+from ripple_sim.coupling import step_checks
+from ripple_sim.coupling.model import CoupledModel
+from ripple_sim.coupling.step_checks import PAIR, TunnellingCheck, too_fast
+from ripple_sim.errors import RippleWarning
+from ripple_sim.scenes.shapes import peanut
+
+MASS, DT = 1e-5, 0.001
+
+
+def throw(solver: str, tolerance: float, target: float) -> tuple[float, list[str]]:
+    """Share of a box's contact forces on a target of a mass [kg] that its momentum does not show, and warnings."""
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="{DT}" tolerance="{tolerance}" solver="{solver}" iterations="1000"
+        gravity="0 0 0"/>
+        <worldbody><body><freejoint/><geom name="target" type="sphere" size="0.5" mass="{target}"/></body>
+        <body pos="0.1 0 0.54"><freejoint/><geom type="box" size="0.05 0.04 0.03" mass="{MASS}"/></body>
+        </worldbody></mujoco>"""
+    )
+    data, wrench, missing, pressed = mujoco.MjData(model), np.zeros(6), 0.0, 0.0
+    data.qvel[8] = -1.0
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RippleWarning)
+        ripples = Ripples(model, {"target": Material(density=1.0)}, resolution=8, backend="cpu")
+        for _ in range(150):
+            before = data.qvel[6:9].copy()
+            mujoco.mj_step(model, data)
+            ripples.step(data)
+            force = np.zeros(3)
+            for i, contact in enumerate(data.contact):
+                mujoco.mj_contactForce(model, data, i, wrench)
+                force += contact.frame.reshape(3, 3).T @ wrench[:3]
+            pressed += np.linalg.norm(force) * DT
+            missing += np.linalg.norm(MASS * (data.qvel[6:9] - before) - force * DT)
+    return missing / pressed, [str(warning.message) for warning in caught if "solver" in str(warning.message)]
+
+
+@pytest.mark.parametrize("solver", ["Newton", "CG"])
+def test_a_solver_that_stops_too_early_is_warned_of_and_the_advice_helps(solver: str) -> None:
+    missing, messages = throw(solver, 1e-8, target=1e3)
+    assert missing > 0.05
+    assert len(messages) == 1
+    assert "the impulses on geom 'target' are wrong by about" in messages[0]
+    assert "set option tolerance to 1e-14" in messages[0]
+    missing, messages = throw(solver, 1e-14, target=1e3)
+    assert missing < 1e-3
+    assert not messages
+
+
+@pytest.mark.parametrize("solver", ["Newton", "CG", "PGS"])
+def test_a_solver_that_has_converged_is_not_warned_of(solver: str) -> None:
+    missing, messages = throw(solver, 1e-8, target=1e-2)
+    assert missing < 3e-3
+    assert not messages
+
+
+TREES = """<mujoco><option gravity="0 0 0" timestep="0.001"/><worldbody><geom name="still" size="0.1"/>
+<body pos="1 0 0"><freejoint/><geom size="0.1" pos="0.2 0.1 0"/>
+  <body pos="0.5 0 0"><joint type="hinge" axis="0 1 0"/><geom type="box" size="0.1 0.2 0.1" pos="0 0 0.4"/>
+    <body pos="0 0 0.5"><joint type="ball"/><geom type="capsule" size="0.1 0.2" pos="0.1 0.3 0"/></body></body></body>
+<body pos="-2 0 1"><joint type="slide" axis="0 0 1"/><geom size="0.2" pos="0 0.3 0"/></body></worldbody></mujoco>"""
+TWO_BALLS = """<mujoco><option gravity="0 0 0" timestep="0.001"/><worldbody><geom size="0.1"/>
+<body pos="0 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"""
+
+
+def pair(target: int, other: int, *, limit: float = 0.0, at: float = np.inf, stopping_time: float = 0.0) -> tuple:
+    return target, other, limit, at, stopping_time
+
+
+def found_in(
+    model: mujoco.MjModel, data: mujoco.MjData, pairs: list[tuple], steps: int = 5
+) -> tuple[np.ndarray, np.ndarray]:
+    return too_fast(np.array(pairs, PAIR), model, data, steps)
+
+
+def flying(velocity: list[float], place: tuple[float, ...] = (0, 0, 1)) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """A ball that rests at the origin, and another at a place, with a velocity."""
+    model = mujoco.MjModel.from_xml_string(TWO_BALLS)
+    data = mujoco.MjData(model)
+    data.qpos[:3], data.qvel[:3] = place, velocity
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_speeds_of_geoms_on_turning_trees_of_bodies_are_mujocos(seed: int) -> None:
+    model = mujoco.MjModel.from_xml_string(TREES)
+    data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+    mujoco.mj_integratePos(model, data.qpos, rng.uniform(-1, 1, model.nv), 1.0)
+    forwards, pairs, seen = rng.uniform(-3, 3, model.nv), np.argwhere(~np.eye(model.ngeom, dtype=bool)), []
+    for data.qvel[:] in (forwards, -forwards):
+        mujoco.mj_forward(model, data)
+        velocities = np.zeros((model.ngeom, 6))
+        for geom in range(model.ngeom):
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, velocities[geom], 0)
+        apart, relative = np.diff(data.geom_xpos[pairs], axis=1)[:, 0], np.diff(velocities[pairs, 3:], axis=1)[:, 0]
+        approaching = np.flatnonzero(np.einsum("ij,ij->i", apart, relative) < 0)
+        rows, speeds = found_in(model, data, [pair(*each) for each in pairs])
+        np.testing.assert_array_equal(rows, approaching)
+        np.testing.assert_allclose(speeds, np.linalg.norm(relative[rows], axis=1), rtol=1e-12)
+        seen += rows.tolist()
+    assert sorted(seen) == list(range(len(pairs))), "what comes nearer goes away when time runs backwards"
+
+
+@pytest.mark.parametrize(
+    ("velocity", "found"),
+    [([0, 0, -3], True), ([0, 0, 3], False), ([3, 0, 0], False), ([3, 0, -0.1], True), ([0, 0, 0], False)],
+)
+def test_only_a_geom_that_comes_nearer_is_found(velocity: list[float], found: bool) -> None:
+    rows, speeds = found_in(*flying(velocity), [pair(0, 1)])
+    assert rows.tolist() == [0] * found
+    np.testing.assert_allclose(speeds, [np.linalg.norm(velocity)] * found)
+
+
+def test_the_way_within_the_steps_and_one_more_decides_whether_a_geom_is_near() -> None:
+    """At 20 m/s five steps of a millisecond, and the one in which the contact is found, are 0.12 m."""
+    for place, found in ((0.3 + 0.119, True), (0.3 + 0.121, False)):
+        rows, _ = found_in(*flying([0, 0, -20], (0, 0, place)), [pair(0, 1, at=0.3)], steps=5)
+        assert (len(rows) == 1) == found
+    rows, _ = found_in(*flying([0, 0, -20], (0, 0, 0.3 + 0.121)), [pair(0, 1, at=0.3)], steps=6)
+    assert len(rows) == 1
+
+
+def test_the_depth_of_a_time_step_and_of_stopping_is_held_against_the_limit() -> None:
+    """At 10 m/s a geom sinks in by 10 mm in a step, and by 40 mm in 4 ms of stopping: 50 mm in all."""
+    rows, _ = found_in(
+        *flying([0, 0, -10]),
+        [
+            pair(0, 1, limit=0.0499, stopping_time=0.004),
+            pair(0, 1, limit=0.0501, stopping_time=0.004),
+            pair(0, 1, limit=0.0101),
+            pair(0, 1, limit=0.0099),
+        ],
+    )
+    assert rows.tolist() == [0, 3]
+
+
+def test_it_does_not_matter_which_of_two_geoms_is_the_target_or_who_moves() -> None:
+    model, data = flying([1, 2, -5])
+    rows, speeds = found_in(model, data, [pair(0, 1), pair(1, 0)])
+    assert rows.tolist() == [0, 1]
+    assert speeds[0] == speeds[1] == pytest.approx(np.sqrt(30))
+
+
+def test_no_pairs_and_a_state_that_is_not_finite_find_nothing() -> None:
+    model, data = flying([0, 0, -5])
+    rows, speeds = found_in(model, data, [])
+    assert len(rows) == len(speeds) == 0
+    data.cvel[1, 3:] = np.nan
+    assert not len(found_in(model, data, [pair(0, 1)])[0])
+
+
+# springs that throw back 0.9 of the speed
+BOUNCY = "0.149 0.0335"
+PLATE = '<geom name="plate" type="box" size="0.3 0.3 0.02"/>'
+
+
+def shoot(speed: float, solref: str, timestep: float, worldbody: str = PLATE) -> tuple[bool, list[str]]:
+    """Whether a ball is thrown back by a plate, and the warnings on its way."""
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="{timestep}" gravity="0 0 0"/><default><geom solref="{solref}"/></default>
+        <worldbody>{worldbody}<body name="ball" pos="0 0 0.6"><freejoint/><geom size="0.03"/></body></worldbody>
+        </mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    check = TunnellingCheck(CoupledModel(model), [0])
+    data.qvel[2] = -speed
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for _ in range(int(1.2 / speed / timestep) + 200):
+            mujoco.mj_step(model, data)
+            check(data)
+            if data.qvel[2] > 0:
+                break
+    return bool(data.qvel[2] > 0), [str(w.message) for w in caught if w.category is RippleWarning]
+
+
+@pytest.mark.parametrize("solref", ["0.02 1", "0.01 0.2", "0.004 1"])
+def test_what_gets_through_was_warned_of_and_what_is_slow_was_not(solref: str) -> None:
+    outcomes = [shoot(speed, solref, 0.002) for speed in np.geomspace(0.5, 120, 14)]
+    assert all(warned for back, warned in outcomes if not back)
+    first_warned = next(i for i, (_, warned) in enumerate(outcomes) if warned)
+    first_through = next(i for i, (back, _) in enumerate(outcomes) if not back)
+    # neither too late nor so early that nobody heeds it: within a factor of three in speed
+    assert 0 <= first_through - first_warned <= 2 + np.log(3) / np.log(120 / 0.5) * 13
+    assert all(len(warned) <= 1 for _, warned in outcomes)
+
+
+def test_warning_names_body_speed_and_a_time_step_that_does() -> None:
+    back, [message] = shoot(10.0, "0.02 1", 0.002)
+    assert not back
+    assert "body 'ball' meets geom 'plate' at 10 m/s" in message
+    timestep = float(message.split("time step of ")[-1].split()[0])
+    assert "a solref of twice that" in message
+    assert shoot(10.0, f"{2 * timestep} 1", timestep) == (True, [])
+
+
+def test_moving_target_counts_with_its_own_speed() -> None:
+    body = '<body name="plate" pos="0 0 {}"><freejoint/><geom name="plate" type="box" size="0.3 0.3 0.02"/></body>'
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option gravity="0 0 0"/><worldbody>{body.format(0)}
+        <body name="ball" pos="0 0 0.2"><freejoint/><geom size="0.03"/></body></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    data.qvel[:6] = data.qvel[6:] = [0, 0, -30, 0, 0, 0]
+    mujoco.mj_forward(model, data)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        TunnellingCheck(CoupledModel(model), [0])(data)  # both fly along together
+    data.qvel[2], data.qvel[8] = 15, -15
+    mujoco.mj_forward(model, data)
+    with pytest.warns(RippleWarning, match="at 30 m/s"):
+        TunnellingCheck(CoupledModel(model), [0])(data)
+
+
+@pytest.mark.parametrize("solref", ["0.02 1", "0.01 0.2", "0.149 0.0335"])
+def test_what_an_sdf_pushes_from_all_sides_was_warned_of(solref: str) -> None:
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="0.002" gravity="0 0 0" sdf_initpoints="10"/>
+        <default><geom solref="{solref}" condim="1"/></default>
+        <asset>{mesh_asset("m", *peanut(0.05))}</asset><worldbody>
+        <geom name="target" type="sdf" mesh="m"/><body name="ball" pos="-0.17 0.01 0.3"><freejoint/>
+        <geom size="0.03" mass="0.3"/></body></worldbody></mujoco>"""
+    )
+    outcomes = []
+    for speed in np.geomspace(1, 30, 8):
+        data, check, wrench = mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0]), np.zeros(6)
+        data.qvel[2], forces, push = -speed, 0.0, 0.0
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            while data.time < 0.2 / speed + 0.06:
+                mujoco.mj_step(model, data)
+                check(data)
+                total = np.zeros(3)
+                for i, contact in enumerate(data.contact):
+                    mujoco.mj_contactForce(model, data, i, wrench)
+                    forces, total = forces + wrench[0], total + wrench[0] * contact.frame[:3]
+                push += float(np.linalg.norm(total))
+        outcomes.append((forces / push < 1.03, bool(caught)))
+    assert all(warned for right, warned in outcomes if not right)
+    # and not much too early: within two of the speeds tried
+    first_wrong, first_warned = [right for right, _ in outcomes].index(False), [w for _, w in outcomes].index(True)
+    assert first_wrong - first_warned <= 2
+
+
+def slab_of_flex(kind: str, solref: str) -> mujoco.MjModel:
+    slab = trimesh.creation.box(extents=(0.6, 0.6, 0.4))
+    V, F = trimesh.remesh.subdivide_to_size(slab.vertices, slab.faces, 0.06)
+    spec = mujoco.MjSpec.from_string(
+        f"""<mujoco><option timestep="0.002" gravity="0 0 0"/><default><geom solref="{solref}" condim="3"/></default>
+        <asset>{mesh_asset("m", V, F)}</asset><worldbody><geom name="slab" type="mesh" mesh="m"/>
+        <body name="body" pos="-0.03 0.01 0.26"><freejoint/><geom type="{kind}" size="0.05 0.04" mass="0.3"/></body>
+        </worldbody></mujoco>"""
+    )
+    make_collidable(spec, "slab", "flex")
+    return spec.compile()
+
+
+@pytest.mark.parametrize(("kind", "solref"), [("sphere", "0.02 1"), ("sphere", BOUNCY), ("cylinder", BOUNCY)])
+def test_what_goes_through_a_flex_or_is_thrown_aside_by_it_was_warned_of(kind: str, solref: str) -> None:
+    model = slab_of_flex(kind, solref)
+    right, warned, back = [], [], None
+    for speed in np.geomspace(0.5, 60, 9):
+        data, check = mujoco.MjData(model), TunnellingCheck(CoupledModel(model), [0])
+        data.qvel[2] = -speed
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            while data.time < 0.03 / speed + 0.06:
+                mujoco.mj_step(model, data)
+                check(data)
+        back = data.qvel[2] / speed if back is None else back
+        aside = np.linalg.norm([*data.qvel[:2], 0.05 * np.linalg.norm(data.qvel[3:])]) / speed
+        right.append(abs(data.qvel[2] / speed - back) < 0.2 and aside < 0.5)
+        warned.append(bool(caught))
+    assert all(was_warned for ok, was_warned in zip(right, warned, strict=True) if not ok)
+    # and not much too early: within a factor of six in speed
+    assert 0 < right.index(False) - warned.index(True) + 1 <= 4
+
+
+def test_speculative_contacts_make_the_check_needless_but_for_sdf(monkeypatch: pytest.MonkeyPatch) -> None:
+    flags = [flag for name, flag in mujoco.mjtEnableBit.__members__.items() if "SPECULATIVE" in name]
+    assert sum(int(flag) for flag in flags) == step_checks.SPECULATIVE
+    monkeypatch.setattr(step_checks, "SPECULATIVE", 1 << 20)
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option gravity="0 0 0"/><worldbody>{PLATE}<body name="ball" pos="0 0 0.2"><freejoint/>
+        <geom size="0.03"/></body></worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    data.qvel[2] = -60
+    mujoco.mj_forward(model, data)
+    with pytest.warns(RippleWarning, match="at 60 m/s"):
+        TunnellingCheck(CoupledModel(model), [0])(data)
+    model.opt.enableflags |= 1 << 20
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        TunnellingCheck(CoupledModel(model), [0])(data)
+
+
+@pytest.mark.filterwarnings("ignore:geom 'shell' collides as 'core'")
+def test_geoms_that_collide_for_a_target_are_watched() -> None:
+    seen = 'contype="0" conaffinity="0"'
+    model = model_of(
+        f'<body name="link"><geom name="shell" size="0.3" {seen}/><geom name="core" type="box" size="0.3 0.3 0.01"/>'
+        "</body>" + BALL.format("0 0 0.5")
+    )
+    data = mujoco.MjData(model)
+    data.qvel[2] = -80.0
+    ripples = Ripples(model, {"shell": Material()}, contacts={"shell": ["core"]}, resolution=8, backend="cpu")
+    mujoco.mj_step(model, data)
+    with pytest.warns(RippleWarning, match="body 'ball' meets geom 'core' at 80 m/s"):
+        ripples.step(data)
