@@ -1,9 +1,8 @@
-"""The user's cache folder: what took long to make, under a hash of what it was made from.
+"""What took long to make, kept: in the user's cache folder, and in memory.
 
-It is kept under a limit: what was used longest ago goes first. Several processes may use it at once: a file appears
-whole, and whoever finds one missing makes it again.
-
-Results kept in memory for the next one who asks for the same: the next scene of a batch, or the next target.
+A file in the folder lies under a hash of what it was made from. The folder is kept under a limit: what was used longest
+ago goes first. Several processes may use it at once: a file appears whole, and whoever misses one makes it again. In
+memory, results are for the next one who asks for the same: the next scene of a batch, or the next target.
 """
 
 from __future__ import annotations

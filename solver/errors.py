@@ -1,6 +1,6 @@
-"""The errors a caller may catch. Every one of them is a `RippleError`.
+"""The errors a caller may catch, every one of them a `RippleError`, and checks of arguments that raise them.
 
-Arguments of public functions checked in one place: `checked` names the argument, its value and what is valid.
+`checked` names the argument of a public function, its value and what is valid.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""What cannot fit into memory is refused before it is begun.
+"""Files that appear complete or not at all, images to be read, and the memory that is left for either.
 
-Files that appear complete or not at all.
-
-Image files, read with pillow's limit against decompression bombs and a look at the memory they take.
+What cannot fit into memory is refused before it is begun: past a cgroup's limit the system kills a process without a
+word, so only a look beforehand can name them. Images are read with pillow's limit against decompression bombs.
 """
 
 from __future__ import annotations

@@ -6,7 +6,8 @@ There is no fast-math unless a kernel asks for it: the same input gives the same
 are kept on disk. Numba notices a change of a kernel's own file only: delete the *.nbi files after editing one that
 others call.
 
-Compilation, told apart from work: a kernel is compiled at its first call, which takes seconds, once a machine.
+A kernel is compiled at its first call, which takes seconds, once a machine: `compile_times` and `work_clock` tell that
+from work.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The backends' protocol, and backends by name.
+"""The backends' protocol, backends by name, and which is the faster on this machine.
 
-Which backend is faster on this machine: measured once, and remembered in the user's cache folder.
+The latter is measured once, and remembered in the user's cache folder.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from ..cache import cache_limit, cache_path, mark_used
 from ..errors import GLError, SolverError
 from ..files import atomic_write
-from ..gl import GLContext
+from ..gl import GLContext, shared_context
 from ..layouts.cube.convention import cube_topology
 from ..operator.deep_water import FluidOperator
 from ..operator.wave_operator import WaveOperator
 from ..texels.stencil import Stencil
 from .cpu import CPUBackend
+from .fluid import FluidBackend
 from .gl import GLBackend
 from .gl_fields import DeviceField
 from .stencil_loops import Amplitude
@@ -76,15 +77,9 @@ def make_backend(name: str, operator: WaveOperator, *, keeps_volume: bool = Fals
     if name == "auto":
         name = auto_backend(operator.mass.size)
     if isinstance(operator, FluidOperator):
-        from .fluid import FluidBackend
-
         return FluidBackend(operator, keeps_volume=keeps_volume)
     if name == "gl":
-        from .gl import GLBackend
-
         return GLBackend(operator, keeps_volume=keeps_volume)
-    from .cpu import CPUBackend
-
     return CPUBackend(operator, keeps_volume=keeps_volume)
 
 
@@ -94,14 +89,10 @@ def auto_backend(texels: int = _TYPICAL) -> str:
     On a hardware driver the faster one, measured once; a software driver runs on the processor's own cores, where the
     CPU's loops are many times faster.
     """
-    from ..gl import shared_context
-
     try:
         gl = shared_context()
         if gl.software:
             return "cpu"
-        pass
-
         return measured(gl).faster(texels)
     except GLError:
         return "cpu"

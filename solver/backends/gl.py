@@ -1,7 +1,4 @@
-"""GPU backend: the same leapfrog update as compute shaders, one file a stage in `shaders/`.
-
-Forces beside tension and stiffness on the GPU: viscous ones, and those of bending.
-"""
+"""GPU backend: the same leapfrog update as compute shaders, one file a stage in `shaders/`."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Compute shaders of the waves: compiled for a layout of fields, bound to buffers, and run over texels or lists.
 
-The pressure on each part of the surface, in storage buffers; see `VolumeRate`.
+`Pressure` and `VolumeKeeper` hold the pressure on each part of the surface in storage buffers; see `VolumeRate`.
 """
 
 from __future__ import annotations

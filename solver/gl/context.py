@@ -1,14 +1,8 @@
 """The OpenGL context: created here, entered here, checked here, and nowhere else.
 
-OpenGL drivers that render on the processor. EGL falls back to one of them without saying so.
-
-EGL: the libraries, the devices, and the context that is current.
-
-Fences: OpenGL's sync objects, which moderngl lacks, to wait for the GPU without blocking other Python threads.
-
-Programs that nobody uses at the time, for whoever asks for the same next: compiling takes as long as a frame.
-
-The one context of a device that all in the process share.
+`shared_context` gives the one context of a device that all in the process share. Beside it: software drivers, to which
+EGL falls back without saying so; fences, which moderngl lacks, to wait for the GPU without blocking other Python
+threads; and a pool of programs that nobody uses at the time, for compiling one takes as long as a frame.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""GLSL sources: read from packages, their includes resolved, their constants defined by Python."""
+"""GLSL sources: read from packages, their includes resolved, their constants defined by Python.
+
+`Struct` and `numbered` write once what Python and GLSL agree on: struct layouts and numbered names.
+"""
 
 from __future__ import annotations
 

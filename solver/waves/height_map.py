@@ -1,8 +1,7 @@
 """What a renderer needs of the waves: height and surface gradient of every texel, with a halo for interpolation.
 
-A limit on the height that is drawn, so that a surface with waves too high for it does not pass through itself.
-
-The height map where the heights are on the GPU: they go into the renderer's texture without leaving it.
+Heights that are drawn have a limit, so that a surface with waves too high for it does not pass through itself. Where
+they are on the GPU, the height map goes into the renderer's texture without leaving it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""An atlas whose vertices move, and the operator on it.
-
-Gradients of the height on a surface that has moved, from those on the surface at rest.
-"""
+"""An atlas whose vertices move: the operator on it, and gradients of the height from those on the surface at rest."""
 
 from __future__ import annotations
 
