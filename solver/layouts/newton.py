@@ -101,7 +101,8 @@ Slopes: TypeAlias = tuple[float, float, float, float]
 Corner: TypeAlias = tuple[Vector, Vector, Slopes, Slopes]
 
 
-@kernel
+# inlined: handing over so many numbers would take longer than the work
+@kernel(inline="always")
 def add_triangle(
     f: int,
     vertices: Triple,
