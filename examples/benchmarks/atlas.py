@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from ripple_sim.solver import build_atlas, load_mesh
+from ripple_sim.solver.layouts.cube.atlas import cast_rays_exhaustively
 from ripple_sim.solver.layouts.cube.convention import texel_directions
-from ripple_sim.solver.layouts.cube.rays import cast_rays_exhaustively
 
 
 def seconds(runs: int, work: Callable[[], Any]) -> float:

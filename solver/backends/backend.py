@@ -28,7 +28,7 @@ from .cpu import CPUBackend
 from .fluid import FluidBackend
 from .gl import GLBackend
 from .gl_fields import DeviceField
-from .stencil_loops import Amplitude
+from .kernels import Amplitude
 
 BACKENDS = ("auto", "gl", "cpu")
 

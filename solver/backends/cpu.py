@@ -17,8 +17,7 @@ from ..operator.wave_operator import StepCoefficients, WaveOperator, number_or_f
 from ..texels.stencil import NO_LINKS, Stencil
 from ..texels.topology import TexelTopology
 from . import kernels
-from .kernels import NO_BALANCE, NO_FEATURES, Balance, Kick
-from .stencil_loops import Amplitude, Coefficient, Links, Weights
+from .kernels import NO_BALANCE, NO_FEATURES, Amplitude, Balance, Coefficient, Kick, Links, Weights
 
 # Below this resolution charts lie side by side, row by row: one loop then runs over a row of all of them. On charts of
 # 12 columns, loops that begin anew for each take four times as long.

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..operator.deep_water import FluidOperator
 from ..operator.wave_operator import WaveOperator, damped_step
-from .stencil_loops import Amplitude
+from .kernels import Amplitude
 
 
 class FluidBackend:

@@ -12,7 +12,7 @@ from ..operator.wave_operator import WaveOperator, step_coefficients
 from .gl_dispatch import Dispatch, Pressure, VolumeKeeper
 from .gl_fields import DeviceField, FieldLayout, LinkBuffers, TexelList
 from .gl_stiffness import StencilBuffer
-from .stencil_loops import Amplitude
+from .kernels import Amplitude
 
 
 class ExtraForces:

@@ -15,7 +15,7 @@ from ..gl import GLContext
 from ..operator.volume import VolumeRate
 from ..operator.wave_operator import WaveOperator
 from .gl_fields import FieldLayout
-from .stencil_loops import Amplitude
+from .kernels import Amplitude
 
 # Threads of a group that works through a list.
 _LIST_GROUP = 64

@@ -9,8 +9,8 @@ import warnings
 
 import pytest
 
-from ripple_sim.cli import info
 from ripple_sim.cli import main as cli
+from ripple_sim.cli import parser
 from ripple_sim.errors import EncodingError, RippleWarning, SceneError
 from ripple_sim.solver.errors import GLError
 
@@ -193,7 +193,7 @@ def test_the_exit_status_tells_what_kind_of_error_it_was(monkeypatch, capsys, er
     def run(self):
         raise error
 
-    monkeypatch.setattr(info.InfoCommand, "run", run)
+    monkeypatch.setattr(parser.InfoCommand, "run", run)
     assert cli.main(["info"]) == status
     line = capsys.readouterr().err
     assert line.startswith("ripple-sim: ")
@@ -204,7 +204,7 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
     def run(self):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(info.InfoCommand, "run", run)
+    monkeypatch.setattr(parser.InfoCommand, "run", run)
     with pytest.raises(ZeroDivisionError):
         cli.main(["info"])
 
@@ -213,7 +213,7 @@ def test_an_unexpected_error_is_not_hidden(monkeypatch):
     ("number", "status", "word", "where"),
     [
         (signal.SIGINT, 130, "interrupted", "cli._parse = meet_signal"),
-        (signal.SIGTERM, 143, "terminated", "info.InfoCommand.run = meet_signal"),
+        (signal.SIGTERM, 143, "terminated", "parser.InfoCommand.run = meet_signal"),
     ],
 )
 def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_path, number, status, word, where):
@@ -221,7 +221,7 @@ def test_a_signal_while_modules_are_imported_ends_the_program_with_one_line(tmp_
     code = (
         "import signal, sys\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # which a job in the background has ignored
-        "from ripple_sim.cli import info\n"
+        "from ripple_sim.cli import parser\n"
         "from ripple_sim.cli import main as cli\n"
         "def meet_signal(argument):\n"
         "    import slow\n"
@@ -241,7 +241,7 @@ def test_an_interrupted_command_says_what_is_left(monkeypatch, capsys):
         ending.add_note("48 frames are kept")
         raise ending
 
-    monkeypatch.setattr(info.InfoCommand, "run", run)
+    monkeypatch.setattr(parser.InfoCommand, "run", run)
     assert cli.main(["info"]) == 130
     assert capsys.readouterr().err == "ripple-sim: interrupted; 48 frames are kept\n"
 
@@ -251,7 +251,7 @@ def test_a_warning_is_one_line_and_the_handler_is_given_back(monkeypatch, capsys
         warnings.warn("the hull is\noff the surface", RippleWarning, stacklevel=1)
 
     before = warnings.showwarning
-    monkeypatch.setattr(info.InfoCommand, "run", run)
+    monkeypatch.setattr(parser.InfoCommand, "run", run)
     assert cli.main(["info"]) == 0
     assert capsys.readouterr().err == "ripple-sim: warning: the hull is off the surface\n"
     assert warnings.showwarning is before

@@ -2,6 +2,11 @@
 
 Map coordinates are directions from the cube's centre. The analytic atlas of a sphere is the reference on which symmetry
 and accuracy are tested.
+
+Rays from the cube's centre through every texel onto the sphere-mapped mesh: triangle and barycentrics of each.
+
+And the way back, compiled, since contacts ask at every step: from a triangle and a point on it to the sphere and to the
+nearest texel.
 """
 
 from __future__ import annotations
@@ -9,20 +14,26 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from typing import NamedTuple
 
+import igl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
 from ...errors import POSITIVE, AtlasError, checked
-from ...kernel import Floats, Ints
+from ...kernel import Floats, Ints, kernel, variant
 from ...mesh.mesh import Mesh
+from ...mesh.rays import RayScene
+from ...mesh.vectors import combine, cross, dot, row
 from ...texels.atlas import Atlas, check_points
-from ...texels.chart_map import ChartPieces, LinearParts, nearest_places
+from ...texels.chart_map import ChartPieces, LinearParts, nearest_place, nearest_places, texel_on
 from ...texels.texel_mesh import TexelMesh
 from ...texels.topology import TexelTopology, stretch_summary
 from ..sphere_map import certify, stretch
 from .convention import (
+    CHART_U,
+    CHART_V,
     chart_uv,
     check_memory,
     check_resolution,
@@ -32,7 +43,195 @@ from .convention import (
     texel_areas,
     texel_directions,
 )
-from .rays import Ball, SphereCharts, cast_rays, sphere_directions
+
+
+def cast_rays_exhaustively(
+    sphere: NDArray[np.float64], F: NDArray[np.int64], directions: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Intersect rays from the origin with all triangles (Moeller and Trumbore 1997): slow, simple, the oracle.
+
+    Parameters and results are those of `rays.cast_rays`. The cost is the number of rays times that of triangles. Where
+    a ray meets several triangles on the edge that they share, the one in which it lies deepest is taken.
+    """
+    corner = sphere[F[:, 0]]
+    edge1, edge2 = sphere[F[:, 1]] - corner, sphere[F[:, 2]] - corner
+    to_origin = -corner
+    q = np.cross(to_origin, edge1)
+    triangles = np.empty(len(directions), dtype=np.int64)
+    barycentrics = np.empty((len(directions), 3))
+    for i, direction in enumerate(directions):
+        p = np.cross(direction, edge2)
+        determinant = np.einsum("ij,ij->i", edge1, p)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = np.einsum("ij,ij->i", to_origin, p) / determinant
+            v = q @ direction / determinant
+            distance = np.einsum("ij,ij->i", edge2, q) / determinant
+            inside = np.minimum(np.minimum(u, v), 1 - u - v)
+        depth = np.where((distance > 0) & np.isfinite(inside), inside, -np.inf)
+        hit = int(np.argmax(depth))
+        triangles[i], barycentrics[i] = hit, (1 - u[hit] - v[hit], u[hit], v[hit])
+    return triangles, barycentrics
+
+
+@kernel
+def sphere_directions(V: Floats, F: Ints, sphere: Floats, triangles: Ints, points: Floats) -> Floats:
+    """Unit vectors, [k, 3], of points that lie on triangles: where linear interpolation of the sphere map puts them."""
+    found = np.empty((len(points), 3))
+    for i in range(len(points)):
+        found[i, 0], found[i, 1], found[i, 2] = _direction(V, F, sphere, triangles[i], points[i])
+    return found
+
+
+class SphereCharts(NamedTuple):
+    """A mesh and its sphere map on the six charts; see `CubeChartMap`."""
+
+    V: Floats
+    F: Ints
+    sphere: Floats
+    resolution: int
+
+
+class Ball(NamedTuple):
+    """A sphere round the origin [m], whose sphere map is itself."""
+
+    radius: float
+    resolution: int
+
+
+@variant(texel_on, SphereCharts)
+def _texel_on_sphere_map(charts: SphereCharts, triangle: int, x: float, y: float, z: float) -> int:
+    u, v, w = _direction(charts.V, charts.F, charts.sphere, triangle, (x, y, z))
+    return texel_at(u, v, w, charts.resolution)
+
+
+@variant(nearest_place, Ball)
+def _nearest_on_ball(surface: Ball, x: float, y: float, z: float) -> tuple[float, float, float, int]:
+    length = np.sqrt(x * x + y * y + z * z)
+    if length > 0:
+        x, y, z = x / length, y / length, z / length
+    else:
+        x, y, z = 0.0, 0.0, 1.0  # all are as near
+    texel = texel_at(x, y, z, surface.resolution)
+    return surface.radius * x, surface.radius * y, surface.radius * z, texel
+
+
+@kernel
+def _direction(V: Floats, F: Ints, sphere: Floats, triangle: int, point: Floats) -> tuple[float, float, float]:
+    """Unit vector of a point [3] that lies on a triangle."""
+    a, b, c = F[triangle, 0], F[triangle, 1], F[triangle, 2]
+    uu = uv = vv = pu = pv = 0.0
+    for k in range(3):
+        u, v, p = V[b, k] - V[a, k], V[c, k] - V[a, k], point[k] - V[a, k]
+        uu, uv, vv, pu, pv = uu + u * u, uv + u * v, vv + v * v, pu + p * u, pv + p * v
+    area = uu * vv - uv * uv
+    # a triangle without area has no barycentrics: its corners are as good as any point of it
+    s = min(max((vv * pu - uv * pv) / area, 0.0), 1.0) if area > 0 else 1 / 3
+    t = min(max((uu * pv - uv * pu) / area, 0.0), 1.0 - s) if area > 0 else 1 / 3
+    first = combine(1 - s - t, row(sphere, a), s, row(sphere, b))
+    x, y, z = combine(1.0, first, t, row(sphere, c))
+    length = np.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
+
+
+@kernel
+def texel_at(x: float, y: float, z: float, n: int) -> int:
+    """Flat index (chart N + row) N + column of the texel in which a direction lies; see `cube_chart_points`."""
+    direction, axis = (x, y, z), 0
+    for k in range(1, 3):
+        if abs(direction[k]) > abs(direction[axis]):
+            axis = k
+    chart = 2 * axis + (1 if direction[axis] < 0 else 0)
+    place = 0
+    for along in (CHART_V, CHART_U):
+        across = 0.0
+        for k in range(3):
+            across += direction[k] * along[chart, k]
+        angle = np.arctan(across / abs(direction[axis])) * (4 / np.pi)
+        place = place * n + min(max(int(np.rint(((angle + 1) * n - 1) / 2)), 0), n - 1)
+    return chart * n * n + place
+
+
+def cast_rays(
+    sphere: NDArray[np.float64], F: NDArray[np.int64], directions: NDArray[np.float64], stride: int = 1
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Intersect rays from the origin with the sphere-mapped mesh.
+
+    Embree finds triangles in float32; the barycentrics are computed again in float64, which also moves a hit to the
+    neighbouring triangle where float32 chose wrongly and recovers rays that slipped between two triangles.
+
+    Parameters
+    ----------
+    sphere : [vertex_count, 3]
+        A fold-free sphere map (unit vectors).
+    F : [triangle_count, 3]
+    directions : [k, 3]
+        Ray directions.
+    stride : int
+        Embree casts only one ray of so many. Those after it, which should be close by, walk on from its triangle to
+        their own: a texel is mostly in the triangle of the one before it, or next to that.
+
+    Returns
+    -------
+    triangles : int64 [k]
+    barycentrics : float64 [k, 3]
+        Not negative, each row sums to 1.
+
+    Raises
+    ------
+    AtlasError
+        If a ray meets no triangle, which a fold-free map rules out.
+    """
+    hits, seeds = np.full(len(directions), -1, dtype=np.int64), directions[::stride]
+    hits[::stride] = RayScene(sphere, F).cast(np.zeros_like(seeds), seeds).triangle
+    neighbours, _ = igl.triangle_triangle_adjacency(F)
+    barycentrics = np.empty((len(directions), 3))
+    lost = _walk_to_triangles(sphere, F, neighbours.astype(np.int64), directions, hits, barycentrics)
+    if lost:
+        raise AtlasError(f"{lost} of {len(directions)} rays meet no triangle of the sphere map; is the map fold-free?")
+    return hits, barycentrics
+
+
+@kernel
+def _edge_products(sphere: Floats, corners: Ints, d: Floats) -> tuple[float, float, float]:
+    """Triple products det(d, b, c) of the ray with the three edges: all >= 0 if and only if it passes inside."""
+    a, b, c = sphere[corners[0]], sphere[corners[1]], sphere[corners[2]]
+    return dot(d, cross(b, c)), dot(d, cross(c, a)), dot(d, cross(a, b))
+
+
+@kernel
+def _walk_to_triangles(
+    sphere: Floats, F: Ints, neighbours: Ints, directions: Floats, hits: Ints, barycentrics: Floats
+) -> int:
+    """Walk each ray's hit to the triangle that truly contains it; fill barycentrics; return how many rays are lost."""
+    lost = 0
+    previous = 0
+    for i in range(len(directions)):
+        d = directions[i]
+        triangle = hits[i] if hits[i] >= 0 else previous
+        x, y, z = _edge_products(sphere, F[triangle], d)
+        for _ in range(200):
+            if min(x, y, z) >= 0:
+                break
+            worst = 2 if z < min(x, y) else 1 if y < x else 0
+            # libigl numbers the edge (corner k, corner k + 1) as k; the edge opposite corner k is (k + 1, k + 2)
+            triangle = neighbours[triangle, (worst + 1) % 3]
+            x, y, z = _edge_products(sphere, F[triangle], d)
+        if min(x, y, z) < 0 or x + y + z <= 0:
+            # a walk can circle on very distorted maps: look at every triangle
+            best = -np.inf
+            for f in range(len(F)):
+                x, y, z = _edge_products(sphere, F[f], d)
+                if min(x, y, z) > best and x + y + z > 0:
+                    best, triangle = min(x, y, z), f
+            x, y, z = _edge_products(sphere, F[triangle], d)
+            if best < -1e-12:
+                lost += 1
+        x, y, z = max(x, 0.0), max(y, 0.0), max(z, 0.0)
+        total = x + y + z
+        barycentrics[i, 0], barycentrics[i, 1], barycentrics[i, 2] = x / total, y / total, z / total
+        hits[i] = triangle
+        previous = triangle
+    return lost
 
 
 def sphere_map_quality(mesh: Mesh, sphere: NDArray[np.float64]) -> dict[str, float]:

@@ -1,19 +1,36 @@
-"""A connected component of a mesh, cut into cells and these into quads: square charts, laid out."""
+"""A connected component of a mesh, cut into cells and these into quads: square charts, laid out.
+
+Which triangles between cells' middles are joined in pairs to quads: large charts.
+
+Where as many quads meet round a cell's middle as its curvature asks for, the map onto the charts is strained least. By
+Gauss and Bonnet a cone where v quads meet has the curvature (4 - v) pi / 2; so v should be 4 less the curvature of the
+cell in right angles. Any pairing follows from another by alternating paths: joints are closed and opened in turn (Berge
+1957). All short ones are tried, until none makes the pairing better.
+
+Chart a of a cell and the next one b round a corner lie at the same side of a triangle between cells' middles, which is
+called by a: from the middle of a's cell to that of b's. Beyond it lies another triangle, or, at a rim, the two charts
+round a corner, which are joined too.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import AtlasError
+from ...kernel import Bools, Floats, Ints, kernel
 from .cells import BorderedCells, Metric, cell_sizes, centred_cells, spread_seeds
 from .charts import (
+    Fans,
+    Path,
     Sides,
     chart_sides,
     charts_of,
     cut_polygons,
+    fans_of,
     glued_sides,
     on_paths,
     square_border,
@@ -21,8 +38,290 @@ from .charts import (
     with_middles,
 )
 from .disks import disk_cells, flattened, signed_areas
-from .pairing import joined
 from .surface import Surface, halved_chords, refined
+
+FEWEST = 3  # quads round a middle
+_TOO_FEW = 100.0  # what each costs that is missing
+_EXTRA = 2.0  # what one costs by which there are too many or too few, beyond the first
+_SHAPE = 0.5  # what the logarithm of the ratio of a quad's diagonals costs, squared
+_LONGEST, _LONGER = 11, 16  # joints that a path closes, at most; where else triangles would be left
+_MOST_PASSES = 20
+_WORTH = 1e-6
+
+
+class Pairing(NamedTuple):
+    """Triangles, and a node beyond all rims where their number is odd, with the joints that are closed."""
+
+    start: Ints  # [t + 1], where the joints of each begin
+    joint: Ints  # by triangle
+    ends: Ints  # [k, 2], triangles on either side of each joint
+    middles: Ints  # [k, 2], cells of which a closed joint takes a quad each; -1: none
+    cost: Floats  # [k], of a closed joint
+    closed: Ints  # [t], joint; -1
+    quads: Ints  # [cells], round each middle
+    wanted: Floats  # [cells]
+    passed: Bools  # [t], by the path that is tried
+
+
+class Joints(NamedTuple):
+    """Sides between triangles, over which these may be joined.
+
+    Attributes
+    ----------
+    triangles : int64 [k, 2]
+        On either side; -1 where there lies none, and where the triangle may stay alone.
+    middles : int64 [k, 2]
+        Cells at the ends.
+    shape : float64 [k]
+        Logarithm of the ratio of the diagonals of the quad.
+    """
+
+    triangles: NDArray[np.int64]
+    middles: NDArray[np.int64]
+    shape: NDArray[np.float64]
+
+
+def chosen_joints(
+    joints: Joints, triangle_count: int, corners: NDArray[np.int64], wanted: NDArray[np.float64]
+) -> NDArray[np.int64] | None:
+    """The joints, one of each triangle, that leave about as many quads at each cell's middle as are wanted.
+
+    Parameters
+    ----------
+    joints : Joints
+    triangle_count : int
+    corners : int64 [cells]
+        How many meet round each cell's middle before any are joined.
+    wanted : float64 [cells]
+        How many should.
+
+    Returns
+    -------
+    int64 [l] or None
+        At most one with a triangle that stays alone; None if no way is found with three quads round every middle.
+    """
+    kept = np.flatnonzero((joints.triangles[:, 1] >= 0) | (triangle_count % 2 == 1))
+    ends = joints.triangles[kept]
+    inner = ends[:, 1] >= 0
+    nodes = triangle_count + triangle_count % 2
+    ends = np.where(ends < 0, triangle_count, ends)
+    order = np.argsort(ends.T.ravel(), kind="stable")
+    pairing = Pairing(
+        np.searchsorted(ends.T.ravel()[order], np.arange(nodes + 1)),
+        order % max(len(kept), 1),
+        ends,
+        np.where(inner[:, None], joints.middles[kept], -1),
+        np.where(inner, _SHAPE * joints.shape[kept] ** 2, 0.0),
+        np.full(nodes, -1),
+        corners.copy(),
+        wanted,
+        np.zeros(nodes, bool),
+    )
+    if not nodes:
+        return kept[:0]
+    if not _paired(pairing) or pairing.quads.min() < FEWEST:
+        return None
+    return kept[np.unique(pairing.closed)]
+
+
+def _paired(pairing: Pairing) -> bool:
+    """Find a pairing and make it better; whether no triangle is left."""
+    for most in (1, _LONGEST, _LONGER):
+        for node in range(len(pairing.closed)):
+            if pairing.closed[node] < 0:
+                _augment(pairing, node, most, np.inf)
+    if (pairing.closed < 0).any():
+        return False
+    for _ in range(_MOST_PASSES):
+        better = False
+        for e in range(len(pairing.ends)):
+            if pairing.closed[pairing.ends[e, 0]] != e:
+                better = _improve(pairing, e) or better
+        if not better:
+            break
+    return True
+
+
+@kernel
+def _improve(pairing: Pairing, e: int) -> bool:
+    """Close an open joint, and pair what that leaves; whether that is better."""
+    a, b = pairing.ends[e]
+    f, g = pairing.closed[a], pairing.closed[b]
+    cost = _set_joint(pairing, f, False) + _set_joint(pairing, g, False) + _set_joint(pairing, e, True)
+    left = pairing.ends[f, 0] + pairing.ends[f, 1] - a
+    pairing.passed[a] = pairing.passed[b] = True
+    better = _augment(pairing, left, _LONGEST, -_WORTH - cost)
+    pairing.passed[a] = pairing.passed[b] = False
+    if not better:
+        _set_joint(pairing, e, False)
+        _set_joint(pairing, f, True)
+        _set_joint(pairing, g, True)
+    return better
+
+
+@kernel
+def _augment(pairing: Pairing, node: int, most: int, limit: float) -> bool:
+    """Pair a triangle, and another one that is left, along the best path between them, if that costs less than `limit`.
+
+    All alternating paths that close up to `most` joints are tried, depth first.
+    """
+    path, best_path = np.zeros(most, np.int64), np.zeros(most, np.int64)
+    nodes, following, cost = np.empty(most, np.int64), np.empty(most, np.int64), np.zeros(most)
+    nodes[0], following[0], length, best, best_length = node, pairing.start[node], 0, np.inf, 0
+    pairing.passed[node] = True
+    while length >= 0:
+        if following[length] == pairing.start[nodes[length] + 1]:
+            length -= 1
+            if length >= 0:  # back over a closed joint and an open one
+                e, beyond = path[length], nodes[length + 1]
+                other = pairing.ends[e, 0] + pairing.ends[e, 1] - nodes[length]
+                _change(pairing, e, 1)
+                _change(pairing, pairing.closed[other], -1)
+                pairing.passed[other] = pairing.passed[beyond] = False
+            continue
+        e = pairing.joint[following[length]]
+        following[length] += 1
+        other = pairing.ends[e, 0] + pairing.ends[e, 1] - nodes[length]
+        if pairing.passed[other]:
+            continue
+        f = pairing.closed[other]
+        path[length] = e
+        if f < 0:
+            total = cost[length] + _change(pairing, e, -1)
+            _change(pairing, e, 1)
+            if total < best:
+                best, best_length = total, length + 1
+                best_path[:best_length] = path[:best_length]
+        elif length + 1 < most:
+            beyond = pairing.ends[f, 0] + pairing.ends[f, 1] - other
+            pairing.passed[other] = pairing.passed[beyond] = True
+            cost[length + 1] = cost[length] + _change(pairing, f, 1) + _change(pairing, e, -1)
+            length += 1
+            nodes[length], following[length] = beyond, pairing.start[beyond]
+    pairing.passed[node] = False
+    if not best < limit:
+        return False
+    for e in best_path[:best_length]:
+        other = pairing.ends[e, 0] + pairing.ends[e, 1] - node
+        f = pairing.closed[other]
+        if f >= 0:
+            node = pairing.ends[f, 0] + pairing.ends[f, 1] - other
+            _set_joint(pairing, f, False)
+        _set_joint(pairing, e, True)
+    return True
+
+
+@kernel
+def _set_joint(pairing: Pairing, e: int, close: bool) -> float:
+    """Join or part the triangles at a joint; return what that costs."""
+    pairing.closed[pairing.ends[e, 0]] = pairing.closed[pairing.ends[e, 1]] = e if close else -1
+    return _change(pairing, e, -1 if close else 1)
+
+
+@kernel
+def _change(pairing: Pairing, e: int, quads: int) -> float:
+    """Quads more or fewer round the middles at a joint; return what that costs."""
+    cost = -quads * pairing.cost[e]
+    for k in range(2):
+        v = pairing.middles[e, k]
+        if v >= 0:
+            for sign in (-1.0, 1.0):
+                count = pairing.quads[v]
+                off = abs(count - pairing.wanted[v])
+                cost += sign * (off + _EXTRA * max(off - 1.0, 0.0) + _TOO_FEW * max(FEWEST - count, 0))
+                if sign < 0.0:
+                    pairing.quads[v] += quads
+    return cost
+
+
+def joined(
+    surface: Surface, chart: NDArray[np.int64], sides: list[Sides]
+) -> tuple[Surface, NDArray[np.int64], list[Sides]] | None:
+    """Join the charts of cells [m] to larger ones; None where that is not possible."""
+    glued = glued_sides(sides)
+    fans, rest = fans_of(sides, glued)
+    cell = np.unique([each[0][0] for each in sides], return_inverse=True)[1]
+    at_rim = (glued[..., 0] < 0)[:, 1:3]
+    if not at_rim[rest].any(axis=1).all():
+        return None
+    joints, first = _joints(surface.V, sides, glued, fans)
+    wanted = 4 - _curvature(surface, cell[chart]) + np.bincount(cell, at_rim.all(axis=1))
+    joints = joints._replace(middles=cell[joints.middles])
+    chosen = chosen_joints(joints, len(fans), np.bincount(cell), wanted)
+    if chosen is None:
+        return None
+    alone = joints.triangles[chosen, 1] < 0
+    new = [_quad(sides, glued, a) for a in first[chosen[~alone]]]
+    new += [_lone_triangle(sides, glued, a) for a in first[chosen[alone]]]
+    new += _at_rim(sides, glued, rest, glued[first[chosen[alone]], 0, 0])
+    if (glued_sides(new)[..., 0] == np.arange(len(new))[:, None]).any():
+        return None
+    surface, chart = charts_of(surface, new)
+    return surface, chart, new
+
+
+def _curvature(surface: Surface, cell: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Curvature of each cell, and of the rim in it, in right angles."""
+    total = np.bincount(surface.F.ravel(), surface.angles.ravel(), len(surface.V))
+    missing = np.where(surface.at_rim, np.pi, 2 * np.pi) - total
+    share = (missing / total)[surface.F] * surface.angles
+    return np.bincount(cell, share.sum(axis=1)) / (np.pi / 2)
+
+
+def _joints(
+    V: NDArray[np.float64], sides: list[Sides], glued: NDArray[np.int64], fans: Fans
+) -> tuple[Joints, NDArray[np.int64]]:
+    """Sides over which triangles may be joined, with charts for their cells, and what they are called."""
+    fan = np.full(len(sides), -1)
+    for number, each in enumerate(fans):
+        fan[each] = number
+    found = []
+    for a in np.flatnonzero(fan >= 0).tolist():
+        b, beyond = int(glued[a, 1, 0]), int(glued[a, 0, 0])
+        # the other triangle calls it otherwise; two triangles with two sides in common would be glued to themselves
+        if fan[beyond] < 0 or (a < glued[beyond, 2, 0] and (fan[glued[fans[fan[a]], 0, 0]] == fan[beyond]).sum() == 1):
+            found.append((a, b, glued[b, 1, 0], glued[beyond, 1, 0], beyond))
+    first, second, third, fourth, other = np.array(found, dtype=np.int64).reshape(-1, 5).T
+    middle = V[[each[0][0] for each in sides]]
+    inside, across = (np.linalg.norm(middle[p] - middle[q], axis=1) for p, q in ((first, second), (third, fourth)))
+    shape = np.log(np.maximum(across, 1e-300) / np.maximum(inside, 1e-300))
+    return Joints(np.stack([fan[first], fan[other]], axis=1), np.stack([first, second], axis=1), shape), first
+
+
+def _whole(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Path:
+    """The side of a triangle, from middle to middle."""
+    return np.concatenate([sides[a][0], sides[glued[a, 1, 0]][3][1:]])
+
+
+def _quad(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Sides:
+    """Two triangles, joined over the side a."""
+    b, beyond = glued[a, 1, 0], glued[a, 0, 0]
+    around = (b, glued[b, 1, 0], beyond, glued[beyond, 1, 0])
+    p, q, r, s = (_whole(sides, glued, each) for each in around)
+    return p, q, r, s
+
+
+def _lone_triangle(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Sides:
+    """A triangle with a fourth corner in the middle of its side a; the charts at the rim beyond stay apart."""
+    b = glued[a, 1, 0]
+    return sides[a][0], sides[b][3], _whole(sides, glued, b), _whole(sides, glued, glued[b, 1, 0])
+
+
+def _at_rim(sides: list[Sides], glued: NDArray[np.int64], rest: list[int], apart: NDArray[np.int64]) -> list[Sides]:
+    """Charts at the rim: those round a corner are joined, but for some that stay apart, called by the second one."""
+    new = []
+    for b in rest:
+        a, before = int(glued[b, 2, 0]), int(glued[b, 1, 0])
+        if a < 0 and before < 0:
+            new.append(sides[b])
+        elif a >= 0:
+            # chart a has the rim before the corner, and b behind it
+            if b in apart or a in apart:
+                new += [sides[a], sides[b]]
+            else:
+                rim = np.concatenate([sides[b][1], sides[a][2][1:]])
+                new.append((rim, sides[a][3], _whole(sides, glued, a), sides[b][0]))
+    return new
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from ripple_sim.solver.layouts.energy import (
 )
 from ripple_sim.solver.layouts.newton import conjugate_gradients
 from ripple_sim.solver.layouts.sphere_map.level import star_shapes
-from ripple_sim.solver.layouts.sphere_map.relaxation import SPHERE, sweep, tangent_frame, total_energy
+from ripple_sim.solver.layouts.sphere_map.progressive import SPHERE, sweep, tangent_frame, total_energy
 
 # Dirichlet energy and area ratio of maps that shrink, keep and stretch, evenly and not
 STRETCHES = [(2.0, 1.0), (2.5, 1.0), (0.7, 0.3), (0.5, 0.25), (1.2, 0.1), (9.0, 4.0)]

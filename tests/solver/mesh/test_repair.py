@@ -13,8 +13,8 @@ from solids import BALL
 from sound import assert_sound
 
 from ripple_sim.solver import MeshError, load_mesh
+from ripple_sim.solver.mesh.files import repaired
 from ripple_sim.solver.mesh.ply import Soup
-from ripple_sim.solver.mesh.repair import repaired
 
 
 def located(places: np.ndarray, uv: np.ndarray) -> set[tuple[float, ...]]:

@@ -16,9 +16,14 @@ from genus_zero import TETRAHEDRON, bipyramid, icosphere, spiky
 
 from ripple_sim.solver import AtlasError, Mesh, sphere_atlas
 from ripple_sim.solver.layouts.cube import atlas
-from ripple_sim.solver.layouts.cube.atlas import CubeChartMap, _interpolate, atlas_from_sphere_map, sphere_map_quality
+from ripple_sim.solver.layouts.cube.atlas import (
+    CubeChartMap,
+    _interpolate,
+    atlas_from_sphere_map,
+    sphere_map_quality,
+    texel_at,
+)
 from ripple_sim.solver.layouts.cube.convention import cube_rotations, permute_texels, texel_directions
-from ripple_sim.solver.layouts.cube.rays import texel_at
 from ripple_sim.solver.texels.topology import QUANTILES
 
 BALL = Mesh(*icosphere(2))

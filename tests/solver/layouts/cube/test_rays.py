@@ -15,8 +15,8 @@ import trimesh
 from genus_zero import bipyramid
 
 from ripple_sim.solver import Atlas
+from ripple_sim.solver.layouts.cube.atlas import cast_rays, cast_rays_exhaustively, sphere_directions, texel_at
 from ripple_sim.solver.layouts.cube.convention import cube_chart_points, cube_rotations, texel_directions
-from ripple_sim.solver.layouts.cube.rays import cast_rays, cast_rays_exhaustively, sphere_directions, texel_at
 
 
 def surface_points(atlas: Atlas, triangles: np.ndarray, barycentrics: np.ndarray) -> np.ndarray:

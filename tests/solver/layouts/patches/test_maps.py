@@ -8,10 +8,9 @@ from ripple_sim.solver import Mesh
 from ripple_sim.solver.layouts.energy import FIXED, FREE
 from ripple_sim.solver.layouts.patches.cells import Metric, centred_cells, spread_seeds
 from ripple_sim.solver.layouts.patches.collapse import without_cuts
-from ripple_sim.solver.layouts.patches.cones import move_tips
 from ripple_sim.solver.layouts.patches.disks import disk_cells, signed_areas
 from ripple_sim.solver.layouts.patches.energy import shapes_of, total_energy
-from ripple_sim.solver.layouts.patches.layout import relax
+from ripple_sim.solver.layouts.patches.layout import move_tips, relax
 from ripple_sim.solver.layouts.patches.quads import Quads, cut_into_quads
 from ripple_sim.solver.layouts.patches.samples import locate_texels
 from ripple_sim.solver.layouts.patches.seamless import SeamlessMap, corner_places, seamless_map, transitions

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from ripple_sim.solver.layouts.patches.pairing import Joints, chosen_joints
+from ripple_sim.solver.layouts.patches.quads import Joints, chosen_joints
 
 
 def hull(points: int) -> tuple[Joints, int, np.ndarray]:

@@ -8,8 +8,7 @@ from ripple_sim.solver.layouts.energy import Reference
 from ripple_sim.solver.layouts.sphere_map import certify
 from ripple_sim.solver.layouts.sphere_map.decimation import corner_table, decimate, following, preceding
 from ripple_sim.solver.layouts.sphere_map.level import RealSurface, carry, update_level
-from ripple_sim.solver.layouts.sphere_map.progressive import TETRAHEDRON, insert_vertices
-from ripple_sim.solver.layouts.sphere_map.relaxation import SPHERE, total_energy
+from ripple_sim.solver.layouts.sphere_map.progressive import SPHERE, TETRAHEDRON, insert_vertices, total_energy
 
 SHAPES = {
     "sphere": lambda: icosphere(2),

@@ -19,7 +19,7 @@ from ripple_sim.solver.layouts.sphere_map.level import (
     update_load,
     update_triangle,
 )
-from ripple_sim.solver.layouts.sphere_map.relaxation import SPHERE
+from ripple_sim.solver.layouts.sphere_map.progressive import SPHERE
 
 
 def partial_level(V, F, count):

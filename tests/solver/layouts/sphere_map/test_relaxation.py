@@ -6,7 +6,7 @@ from genus_zero import crumpled, icosphere
 from levels import whole_level
 
 from ripple_sim.solver.layouts.sphere_map import certify
-from ripple_sim.solver.layouts.sphere_map.relaxation import newton_step, relax_level, total_energy
+from ripple_sim.solver.layouts.sphere_map.progressive import newton_step, relax_level, total_energy
 
 
 def perturbed(V):
