@@ -1,9 +1,8 @@
 """From the words of a command line to a command.
 
 A command is a class: its fields are the arguments, the docstrings the help, and `run` does the work. Heavy imports are
-inside `run`, so that `--help` and usage errors are answered at once. `ripple-sim view` is here as well.
-
-Commands that tell something and write no file: `bench`, `cache`, `completion`, `info` and `materials`.
+inside `run`, so that `--help` and usage errors are answered at once. `view` and the commands that write no file are
+here: `bench`, `cache`, `completion`, `info` and `materials`.
 """
 
 from __future__ import annotations

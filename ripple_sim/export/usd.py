@@ -1,10 +1,7 @@
 """`UsdWriter`: a run as a stage of Universal Scene Description.
 
-The camera of a run, with its motion, lens and shutter.
-
-Files of Universal Scene Description, and how one from here is known again.
-
-The frames of a long run in files of their own: value clips of USD, which a root layer joins.
+The camera has its motion, lens and shutter. The frames of a long run may lie in files of their own, value clips, which
+a root layer joins. Metadata tell a file made here from others.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""Compiled loops of a wave step on the CPU; for fields and coefficients see `stencil_loops`.
-
-The nine-point stencil in compiled loops: the force on a texel, and a field that the stencil makes of another.
+"""Compiled loops of a wave step on the CPU: the nine-point stencil's force on a texel, and the step that it drives.
 
 Nothing is contracted or reordered: every loop over texels gives the same numbers, and the two ends of a link see the
 same force, so that momentum is kept. Rows are cut out of the fields before the loop over columns: the compiler then

@@ -4,9 +4,7 @@
 EGL falls back without saying so; fences, which moderngl lacks, to wait for the GPU without blocking other Python
 threads; and a pool of programs that nobody uses at the time, for compiling one takes as long as a frame.
 
-GLSL sources: read from packages, their includes resolved, their constants defined by Python.
-
-`Struct` and `numbered` write once what Python and GLSL agree on: struct layouts and numbered names.
+`load_shader` reads GLSL sources from packages, resolves their includes, and defines the constants that Python gives.
 """
 
 from __future__ import annotations

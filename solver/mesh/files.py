@@ -4,7 +4,7 @@ OBJ and OFF files are read here, polygons of any size and each corner's own text
 others by trimesh. Its readers of these fail on polygons of more than four corners in OFF files, on indices that count
 backwards in OBJ files, and on binary PLY files in which polygons of several sizes are mixed, all of which are common.
 
-Holes of a mesh closed, on request, by pymeshfix (Attene 2010, a package of its own under the GPL).
+On request the holes of a mesh are closed by pymeshfix (Attene 2010, a package of its own under the GPL).
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """Deferred shading: the G-buffer is lit, each visible surface of a pixel once, with the floor and the background.
 
 What is transparent follows layer by layer. The reflection in the floor is shaded likewise, as a camera below sees it.
-
-The background: floor and sky behind the solids.
-
-Where it is smooth it is shaded at a fraction of the frame's resolution, from which the frame's tiles are filled.
+The background is floor and sky behind the solids: where it is smooth it is shaded at a fraction of the frame's
+resolution, from which the frame's tiles are filled.
 """
 
 from __future__ import annotations

@@ -1,12 +1,9 @@
 """The atlas of a closed genus-0 mesh in the cube layout: rays through the cube map's texels onto its sphere map.
 
-Map coordinates are directions from the cube's centre. The analytic atlas of a sphere is the reference on which symmetry
-and accuracy are tested.
-
-Rays from the cube's centre through every texel onto the sphere-mapped mesh: triangle and barycentrics of each.
-
-And the way back, compiled, since contacts ask at every step: from a triangle and a point on it to the sphere and to the
-nearest texel.
+Map coordinates are directions from the cube's centre. A ray from there through each texel gives its triangle and
+barycentric coordinates. The way back, from a triangle and a point on it to the sphere and to the nearest texel, is
+compiled, since contacts ask at every step. The analytic atlas of a sphere is the reference on which symmetry and
+accuracy are tested.
 """
 
 from __future__ import annotations

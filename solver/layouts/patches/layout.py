@@ -1,11 +1,10 @@
 """From the triangles of a mesh to charts: components, cells, quads, relaxation.
 
-Tips of cones that move over the surface.
-
-The tips sit on vertices, where the cells' corners and middles happened to be, and a tip in the wrong place strains the
-map round it until texels beside it fold. So a tip may move on to a neighbouring vertex, if that lowers the energy: what
-was a cone's vertex becomes a free one, and its neighbour is fixed on the tip. Frames change only in the two stars: a
-turn round the old vertex is now nothing, a turn round the new one what the old one's was.
+Tips of cones move over the surface. They sit on vertices, where the cells' corners and middles happened to be, and a
+tip in the wrong place strains the map round it until texels beside it fold. So a tip may move on to a neighbouring
+vertex, if that lowers the energy: what was a cone's vertex becomes a free one, and its neighbour is fixed on the tip.
+Frames change only in the two stars: a turn round the old vertex is now nothing, a turn round the new one what the old
+one's was.
 """
 
 from __future__ import annotations

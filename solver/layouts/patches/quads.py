@@ -1,11 +1,10 @@
 """A connected component of a mesh, cut into cells and these into quads: square charts, laid out.
 
-Which triangles between cells' middles are joined in pairs to quads: large charts.
-
-Where as many quads meet round a cell's middle as its curvature asks for, the map onto the charts is strained least. By
-Gauss and Bonnet a cone where v quads meet has the curvature (4 - v) pi / 2; so v should be 4 less the curvature of the
-cell in right angles. Any pairing follows from another by alternating paths: joints are closed and opened in turn (Berge
-1957). All short ones are tried, until none makes the pairing better.
+Triangles between cells' middles are joined in pairs to quads, so that charts are large. Where as many quads meet round
+a cell's middle as its curvature asks for, the map onto the charts is strained least. By Gauss and Bonnet a cone where v
+quads meet has the curvature (4 - v) pi / 2; so v should be 4 less the curvature of the cell in right angles. Any
+pairing follows from another by alternating paths: joints are closed and opened in turn (Berge 1957). All short ones are
+tried, until none makes the pairing better.
 
 Chart a of a cell and the next one b round a corner lie at the same side of a triangle between cells' middles, which is
 called by a: from the middle of a's cell to that of b's. Beyond it lies another triangle, or, at a rim, the two charts

@@ -7,11 +7,10 @@ Each vertex comes back inside the kernel of its star, so that no triangle ever f
 with, the kernel is the wedge between the great circles through v and the two neighbours they share, left and right. The
 bisector of that wedge always leads into it.
 
-Relaxation of one level of a sphere map: sweeps over single vertices first, then Newton steps of all at once.
-
-A sweep moves one vertex after the other by a Newton step in its tangent plane. A step never folds a triangle, since a
-fold has infinite energy. Sweeps get out of states where the global Newton method sticks (a long cigar), and remove what
-is rough; what is smooth is the work of `newton`.
+Each level is relaxed: by sweeps over single vertices first, then by Newton steps of all at once. A sweep moves one
+vertex after the other by a Newton step in its tangent plane. A step never folds a triangle, since a fold has infinite
+energy. Sweeps get out of states where the global Newton method sticks (a long cigar), and remove what is rough; what is
+smooth is the work of `newton`.
 """
 
 from __future__ import annotations
