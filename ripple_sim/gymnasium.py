@@ -1,6 +1,6 @@
 """`RippleWrapper` makes a MuJoCo environment of Gymnasium ripple.
 
-What a MuJoCo environment of Gymnasium has: its model and data, the size of its frames, and its camera.
+It reads the environment's model and data, the size of its frames, and its camera.
 """
 
 from __future__ import annotations

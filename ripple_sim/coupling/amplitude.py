@@ -1,6 +1,6 @@
 """Waves too high or too steep for the object that carries them are reported once a target, with what would do.
 
-How high and how steep waves are, beside what the object allows.
+Heights are compared with the local radius, slopes with 1.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """What suits a target where the user does not say: the material's coefficients, and the resolution.
 
-The resolution that suits a target: fine enough for what touches it, coarse enough for the time step.
-
-The materials and resolutions of all targets, with what is not given chosen by the model.
+Materials are chosen by the bodies that can touch the target, by how far they fall, and by the time step; resolutions
+are fine enough for what touches it and coarse enough for the time step.
 """
 
 from __future__ import annotations

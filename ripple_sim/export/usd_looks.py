@@ -1,8 +1,6 @@
-"""Looks and textures as UsdPreviewSurface materials.
+"""What stays the same over time in a stage of USD: meshes, looks with their textures, and the lamps.
 
-Meshes in a stage: what stays the same over time.
-
-The lamps of a run as UsdLux lights.
+Looks are UsdPreviewSurface materials, lamps UsdLux lights.
 """
 
 from __future__ import annotations

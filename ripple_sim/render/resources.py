@@ -1,10 +1,7 @@
-"""Objects on the GPU that are released together.
+"""Objects on the GPU that are released together, and those that every pass shares.
 
-The uniform block that every shader shares.
-
-Textures of sRGB pixels, which read as linear light.
-
-The height-map textures of all targets, for any pass.
+These are the uniform block of a frame, textures of sRGB pixels, which read as linear light, and the height maps of all
+targets.
 """
 
 from __future__ import annotations

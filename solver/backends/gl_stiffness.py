@@ -1,7 +1,4 @@
-"""The stiffness of a moving surface on the GPU, made there from its vertices.
-
-A stencil in a storage buffer, which follows a surface that moves.
-"""
+"""The stiffness of a moving surface on the GPU, made there from its vertices, in a storage buffer."""
 
 from __future__ import annotations
 

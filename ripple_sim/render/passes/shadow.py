@@ -1,7 +1,4 @@
-"""Shadow maps of the lights.
-
-Maps of what transparent objects take from the lights.
-"""
+"""Shadow maps of the lights, and maps of what transparent objects take from them."""
 
 from __future__ import annotations
 

@@ -1,12 +1,8 @@
-"""Shapes of visuals: which mesh each kind of geom is drawn as, and its sizes.
+"""Shapes of visuals: which mesh each kind of geom is drawn as, with vertex normals, and its sizes.
 
-Tessellated primitives.
-
-Every MuJoCo primitive is the Minkowski sum of a box-like core and a ball-like shell: a point of it is
-`core * core_size + shell * shell_size`, component by component. A sphere has no core, a
-capsule's is a segment, a box's a box; boxes and cylinders get a small round shell: edges that catch the light.
-
-Meshes and height fields of a MuJoCo model, with vertex normals.
+Every MuJoCo primitive is the Minkowski sum of a box-like core and a ball-like shell: a point of it is `core * core_size
++ shell * shell_size`, component by component. A sphere has no core, a capsule's is a segment, a box's a box; boxes and
+cylinders get a small round shell: edges that catch the light.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Visuals: the geoms and sites that a MuJoCo model shows, read alike.
+"""Visuals: the geoms and sites that a MuJoCo model shows, read alike, and their materials in the shaders' terms.
 
-Looks: named sets of parameters for the surface of a target.
-
-MuJoCo's materials and textures, in the shaders' terms.
+Looks are named sets of parameters for the surface of a target.
 """
 
 from __future__ import annotations
