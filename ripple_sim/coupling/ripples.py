@@ -42,6 +42,7 @@ from .stepping import (
     physics_errors,
 )
 from .targets import Targets
+from .giving_way import GivingWay
 from .two_way import PushBack
 
 __all__ = ["Impulse", "Ripples"]
@@ -138,6 +139,7 @@ class Ripples(Targets):
         self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
         self._check_amplitude = AmplitudeCheck(coupled, rigid)
         self._push_back = PushBack(coupled, self._waves) if two_way else None
+        self._giving_way = GivingWay(coupled, self._waves) if two_way else None
         self._clock, self._solved = StepClock(), SolvedForces(self.model)
         self._warned: set[str] = set()
 
@@ -242,14 +244,18 @@ class Ripples(Targets):
         self._check_tunnelling(solved)
         for target, surface in self._soft.items():
             self._waves[target].move(surface.vertices(solved))
+        shared: dict[int, Load] = {}
+        if self._giving_way is not None:
+            shared = self._giving_way.solve(data, passed.elapsed)
         loads = self._loads.loads(solved, passed.elapsed)
         for target, filtered in self._high_pass.items():
             loads[target] = filtered(loads[target])
-        if self._push_back is not None:
-            for geom, load in self._push_back.exchange(data, self._loads.touches, self._waves, passed.elapsed):
-                loads[geom] = Load.together([loads[geom], load])
+        if self._giving_way is not None:
+            loads = {geom: shared.get(geom, Load.none()) for geom in self._waves}
         for geom, waves in self._waves.items():
             waves.step(passed.elapsed, load=loads[geom])
+        if self._giving_way is not None:
+            self._giving_way.settle()
         self._check_amplitude()
 
     def _waves_changed(self, name: GeomKey) -> None:
@@ -263,6 +269,8 @@ class Ripples(Targets):
     def _flatten(self) -> None:
         self._check_amplitude.flush()
         self._loads.clear()
+        if self._giving_way is not None:
+            self._giving_way.clear()
         for waves in self._waves.values():
             waves.reset()
 
