@@ -42,6 +42,7 @@ from .stepping import (
     physics_errors,
 )
 from .targets import Targets
+from .energy import BodyEnergy, Energy
 from .giving_way import GivingWay
 from .two_way import PushBack
 
@@ -140,6 +141,7 @@ class Ripples(Targets):
         self._check_amplitude = AmplitudeCheck(coupled, rigid)
         self._push_back = PushBack(coupled, self._waves) if two_way else None
         self._giving_way = GivingWay(coupled, self._waves) if two_way else None
+        self._body_energy = BodyEnergy(self.model)
         self._clock, self._solved = StepClock(), SolvedForces(self.model)
         self._warned: set[str] = set()
 
@@ -211,6 +213,19 @@ class Ripples(Targets):
         with followed(data, lambda: self._follow(data)):
             yield
         self._follow(data)  # what was stepped in other ways is warned of
+
+    def energy(self, data: mujoco.MjData) -> Energy:
+        """Kinetic and potential energy of the bodies, energy of the waves, and their total [J].
+
+        With `two_way` and without actuators, the total does not rise while nothing but contacts acts.
+
+        Raises
+        ------
+        SceneError
+            If `data` belongs to another model.
+        """
+        bodies = self._body_energy(own_data(self.model, data))
+        return Energy(bodies, sum(waves.energy() for waves in self._waves.values()))
 
     def vertices(self, name: GeomKey, data: mujoco.MjData) -> NDArray[np.float64] | None:
         """Where the vertices of a target's mesh are [m], [n, 3]: of a flex or a skin by `data`, in the world.
