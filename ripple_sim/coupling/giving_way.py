@@ -25,6 +25,8 @@ _SAME_PLACE = 0.3
 _MOST_CORNERS = 8
 # Rounds in which contacts that share a footprint find their forces, and the share of the force that may be left.
 _ROUNDS, _LEFT = 8, 1e-4
+# Rounds in which pairs that cannot afford their forces get less; in the last one, this share or nearly nothing.
+_ATTEMPTS, _LEAST_SHARE = 4, 1e-9
 # Rows whose contact is open get this acceleration to reach: any is greater.
 _OPEN = -1e10
 
@@ -302,16 +304,19 @@ class GivingWay:
             shift[c] = (free - before) / dt + sum(p.mobility * p.held for p in mine)
             stiff[rows] = sum(p.mobility * count[k] for k, p in zip(contact.pairs, mine, strict=True))
             is_open[c] = gap >= 0
-        data.efc_R[:] = r0 + stiff
-        data.efc_D[:] = 1 / data.efc_R
-        for contact in contacts:
-            first, i = contact.rows.start, contact.index
-            if contact.rows.stop - first == 1 and con.dim[i] > 1:
-                con.mu[i] = con.friction[i, 0] * np.sqrt(data.efc_R[first + 1] / data.efc_R[first])
         smooth = np.zeros(data.nefc)
         mujoco.mj_mulJacVec(model, data, smooth, data.qacc_smooth)
-        aim, force = wish, np.zeros(data.nefc)
-        for attempt in range(3):
+        aim, force, soft = wish, np.zeros(data.nefc), np.zeros(data.nefc)
+        for attempt in range(_ATTEMPTS):
+            data.efc_R[:] = r0 + stiff + soft
+            data.efc_D[:] = 1 / data.efc_R
+            if data.nisland:
+                # unlike the target acceleration, the solver does not gather these anew
+                data.iefc_R[:], data.iefc_D[:] = data.efc_R[data.map_iefc2efc], data.efc_D[data.map_iefc2efc]
+            for contact in contacts:
+                first, i = contact.rows.start, contact.index
+                if contact.rows.stop - first == 1 and con.dim[i] > 1:
+                    con.mu[i] = con.friction[i, 0] * np.sqrt(data.efc_R[first + 1] / data.efc_R[first])
             base = aref0.copy()
             for c, contact in enumerate(contacts):
                 base[contact.rows] = edge[contact.rows] + (aim[c] - gap_rate[c]) / dt + shift[c]
@@ -338,16 +343,19 @@ class GivingWay:
             if not shares:
                 break
             self.limited = getattr(self, "limited", 0) + 1
-            aim = aim.copy()
-            for c, contact in enumerate(contacts):
-                mine = [pairs[p] for p in contact.pairs]
-                key = tuple(sorted(mine[0].key))
-                if key in shares:
-                    # what it would be without force
-                    none = float((data.efc_vel[contact.rows] + dt * smooth[contact.rows]).mean()) - sum(
-                        p.free + p.mobility * p.held * dt for p in mine
-                    )
-                    aim[c] = none + shares[key] * (aim[c] - none)
+            pulled = np.zeros(data.nefc)
+            mujoco.mj_mulJacVec(model, data, pulled, data.qacc)
+            pulled -= smooth
+            total = self._sum(contacts, normal)
+            for contact in contacts:
+                share = shares.get(tuple(sorted(pairs[contact.pairs[0]].key)))
+                if share is not None:
+                    share = max(share, _LEAST_SHARE) if attempt < _ATTEMPTS - 2 else _LEAST_SHARE
+                    rows = np.arange(contact.rows.start, contact.rows.stop)
+                    yields = sum(mobility[p] * total[p] for p in contact.pairs)
+                    lost = np.maximum(pulled[rows] + yields, 0) / np.maximum(force[rows], force[rows].max() * _LEAST_SHARE)
+                    lost[force[rows] <= 0] = 0.0
+                    soft[rows] = ((r0[rows] + soft[rows]) + (1 - share) * lost) / share - r0[rows]
         return normal
 
     def _affordable(self, data, contacts, normal, smooth, dt) -> dict:
