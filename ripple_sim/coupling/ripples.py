@@ -43,8 +43,7 @@ from .stepping import (
 )
 from .targets import Targets
 from .energy import BodyEnergy, Energy
-from .giving_way import GivingWay
-from .two_way import PushBack
+from .two_way import TwoWay
 
 __all__ = ["Impulse", "Ripples"]
 
@@ -139,8 +138,7 @@ class Ripples(Targets):
         self._loads = ContactLoads(coupled, self._waves)
         self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
         self._check_amplitude = AmplitudeCheck(coupled, rigid)
-        self._push_back = PushBack(coupled, self._waves) if two_way else None
-        self._giving_way = GivingWay(coupled, self._waves) if two_way else None
+        self._two_way = TwoWay(coupled, self._waves) if two_way else None
         self._body_energy = BodyEnergy(self.model)
         self._clock, self._solved = StepClock(), SolvedForces(self.model)
         self._warned: set[str] = set()
@@ -259,18 +257,16 @@ class Ripples(Targets):
         self._check_tunnelling(solved)
         for target, surface in self._soft.items():
             self._waves[target].move(surface.vertices(solved))
-        shared: dict[int, Load] = {}
-        if self._giving_way is not None:
-            shared = self._giving_way.solve(data, passed.elapsed)
+        shared = None
+        if self._two_way is not None:
+            shared = self._two_way.solve(data, solved, passed.elapsed, ahead=solved_here)
         loads = self._loads.loads(solved, passed.elapsed)
         for target, filtered in self._high_pass.items():
             loads[target] = filtered(loads[target])
-        if self._giving_way is not None:
-            loads = {geom: shared.get(geom, Load.none()) for geom in self._waves}
         for geom, waves in self._waves.items():
-            waves.step(passed.elapsed, load=loads[geom])
-        if self._giving_way is not None:
-            self._giving_way.settle()
+            waves.step(passed.elapsed, load=loads[geom] if shared is None else shared.get(geom))
+        if self._two_way is not None:
+            self._two_way.settle()
         self._check_amplitude()
 
     def _waves_changed(self, name: GeomKey) -> None:
@@ -284,8 +280,8 @@ class Ripples(Targets):
     def _flatten(self) -> None:
         self._check_amplitude.flush()
         self._loads.clear()
-        if self._giving_way is not None:
-            self._giving_way.clear()
+        if self._two_way is not None:
+            self._two_way.clear()
         for waves in self._waves.values():
             waves.reset()
 
