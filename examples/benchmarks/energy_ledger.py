@@ -97,36 +97,40 @@ def random_scene(rng: np.random.Generator) -> Scene:
             stiffness=float(rng.choice([0.0, (rng.uniform(0, 1) / dt) ** 2])),
             viscosity=float(rng.choice([0.0, 1e-3])),
         )
-    words = f"{shape} of {mass:.3g} kg on {joint} {target} of {weight:.3g} kg, dt {1e3 * dt:.2f} ms, {contact or '-'}, {cone} {integrator}, fall {fall:.2f}"
+    words = (
+        f"{shape} of {mass:.3g} kg, {joint} {target} of {weight:.3g} kg, dt {1e3 * dt:.2f} ms, "
+        f"{contact or 'default contact'}, {cone}, {integrator}"
+    )
     return Scene(model, material, 0.8, words)
 
 
-def rise(scene: Scene, *, own: bool) -> tuple[float, str]:
-    """Greatest rise over the largest energy so far, as its share, and what happened in words."""
+def rise(scene: Scene, *, own: bool = True, rigid: bool = False) -> tuple[float, str]:
+    """Greatest rise over the largest energy so far, as its share, and what the waves are in words.
+
+    Steps are our own, or `mujoco.mj_step` and `step`; or those of MuJoCo alone, where the target is rigid.
+    """
     model, data = scene.model, mujoco.MjData(scene.model)
     if not model.opt.gravity[2]:
         data.qvel[-4] = -2.0
     ripples = Ripples(model, {"target": scene.material}, resolution=24, backend="cpu", two_way=True)
-    mujoco.mj_forward(model, data)
     energy = ripples.energy(data)
     # potential energy counts from where the body touches
     largest = model.body_mass[2] * (-model.opt.gravity[2] * _drop(scene) + data.qvel[-4] ** 2 / 2)
     touch, worst, waves = energy.total - largest, 0.0, 0.0
     while data.time < scene.duration:
-        if own:
+        if own and not rigid:
             ripples.mj_step(data)
         else:
             mujoco.mj_step(model, data)
-            ripples.step(data)
+            if not rigid:
+                ripples.step(data)
         energy = ripples.energy(data)
-        total = energy.total - touch
-        worst, largest = max(worst, (total - largest) / largest), max(largest, total)
-        waves = max(waves, energy.waves)
+        worst = max(worst, (energy.total - touch - largest) / largest)
+        largest, waves = max(largest, energy.total - touch), max(waves, energy.waves)
     material = ripples["target"].material
-    numbers = (float(np.mean(each)) for each in (material.speed, material.density, material.stiffness))
-    return worst, "c {:.3g} rho {:.3g} sqrt(k) dt {:.2f}, waves up to {:.3g} of it".format(
-        *(n**0.5 * model.opt.timestep if i == 2 else n for i, n in enumerate(numbers)), waves / largest
-    )
+    speed, density, stiffness = (np.mean(each) for each in (material.speed, material.density, material.stiffness))
+    words = f"c {speed:.3g}, rho {density:.3g}, sqrt(k) dt {stiffness**0.5 * model.opt.timestep:.2f}"
+    return float(worst), f"{words}; waves have up to {waves / largest:.2%}"
 
 
 def _drop(scene: Scene) -> float:
@@ -143,19 +147,21 @@ def _drop(scene: Scene) -> float:
 def main(count: int = 300, seed: int = 0) -> None:
     """Run the scenes, and print those beyond the bar and how many pass."""
     warnings.simplefilter("ignore")
-    for own, way in ((True, "ripples.mj_step(data)"),):
-        passed, worst, begun = 0, 0.0, time.perf_counter()
+    for own, way in ((True, "ripples.mj_step(data)"), (False, "mujoco.mj_step, ripples.step(data)")):
+        found, begun = [], time.perf_counter()
         for index in range(count):
             scene = random_scene(np.random.default_rng([seed, index]))
             try:
-                found, words = rise(scene, own=own)
+                rises, words = rise(scene, own=own)
             except RippleError as error:
-                found, words = np.inf, str(error)
-            passed, worst = passed + (found <= BAR), max(worst, found)
-            if not found <= BAR:
-                print(f"  scene {index}: rises by {found:.2%} ({scene.words}; {words})", flush=True)
-        print(f"{way}: {passed} of {count} within {BAR:.0%}, the worst rises by {worst:.2%}; "
-              f"{time.perf_counter() - begun:.0f} s", flush=True)
+                rises, words = np.inf, str(error)
+            found.append(rises)
+            if rises > BAR:
+                alone = rise(scene, rigid=True)[0]
+                print(f"  {index}: {rises:.2%}, {alone:.2%} with a rigid target: {scene.words}; {words}", flush=True)
+        took = time.perf_counter() - begun
+        passed, beyond = np.sum(np.array(found) <= BAR), max(found)
+        print(f"{way}: {passed} of {count} within {BAR:.0%}, the worst {beyond:.2%}; {took:.0f} s", flush=True)
 
 
 if __name__ == "__main__":

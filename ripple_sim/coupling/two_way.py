@@ -33,8 +33,9 @@ _SAME_PLACE = 0.3
 _MOST_CORNERS = 8
 # Rounds in which contacts that share a footprint find their forces, and the share of a force that may be left.
 _ROUNDS, _LEFT = 8, 1e-4
-# Rounds in which pairs that cannot afford their forces get a share of them: in the last ones the least.
-_ATTEMPTS, _LEAST_SHARE = 4, 1e-9
+# Rounds in which pairs that cannot afford their forces get a share of them, after the first a little less than they can
+# afford, and in the last one the least.
+_ATTEMPTS, _LESS, _LEAST_SHARE = 6, 0.95, 1e-9
 # A difference of work that round-off makes, as a share of it.
 _ROUND_OFF = 1e-6
 # Acceleration that the rows of an open contact aim at: any is greater, so that they do not push.
@@ -104,10 +105,13 @@ class _Pair(NamedTuple):
 
 
 class _Contact(NamedTuple):
-    """A contact: which of MuJoCo's, its rows that carry the normal force, its pairs, two where two targets touch."""
+    """A contact: which of MuJoCo's, its rows that carry the normal force, all its rows, its pairs, two where two targets
+    touch.
+    """
 
     index: int
     rows: slice
+    whole: slice
     pairs: list[_Pair]
 
 
@@ -358,17 +362,17 @@ class TwoWay:
         for i, mine in touched.items():
             first, dim = int(contact.efc_address[i]), int(contact.dim[i])
             count = 2 * (dim - 1) if model.opt.cone == PYRAMIDAL and dim > 1 else 1
-            contacts.append(_Contact(i, slice(first, first + count), mine))
+            rows = slice(first, first + count)
+            contacts.append(_Contact(i, rows, rows if count > 1 else slice(first, first + dim), mine))
             for pair in mine:
                 rows_of[pair.key] += count
         R, aref, mobility, smooth = data.efc_R.copy(), data.efc_aref.copy(), np.zeros(data.nefc), np.zeros(data.nefc)
         mujoco.mj_mulJacVec(model, data, smooth, data.qacc_smooth)
-        for i, rows, mine in contacts:
+        for i, rows, whole, mine in contacts:
             first = rows.start
             gap = data.efc_pos[first] - data.efc_margin[first] - sum(pair.height for pair in mine)
             stiffness, damping = data.efc_KBIP[first, :2]
             part = impedance(contact.solimp[i], gap)
-            whole = slice(first, max(rows.stop, first + contact.dim[i])) if rows.stop == first + 1 else rows
             R[whole] *= data.efc_diagA[first] * (1 - part) / part / R[first]
             mobility[rows] = sum(pair.mobility * rows_of[pair.key] for pair in mine)
             if gap >= 0:
@@ -394,7 +398,8 @@ class TwoWay:
                 if share is None:
                     continue
                 # with this much added to R, and all else as it is, a row bears that share of its force
-                share = _LEAST_SHARE if attempt >= _ATTEMPTS - 2 else max(share, _LEAST_SHARE)
+                share = max(share * (_LESS if attempt else 1), _LEAST_SHARE)
+                share = share if attempt < _ATTEMPTS - 2 else _LEAST_SHARE
                 rows = contact.rows
                 less = (1 - share) / share
                 yields = sum(pair.mobility * total[pair.key] for pair in contact.pairs)
@@ -408,8 +413,8 @@ class TwoWay:
             # the solver takes `aref` from all rows, but these from the rows of islands
             data.iefc_R[:], data.iefc_D[:] = data.efc_R[data.map_iefc2efc], data.efc_D[data.map_iefc2efc]
         contact = data.contact
-        for i, rows, _ in problem.contacts:
-            if rows.stop - rows.start == 1 and contact.dim[i] > 1:
+        for i, rows, whole, _ in problem.contacts:
+            if rows != whole:
                 # an elliptic cone: friction stays what it is
                 contact.mu[i] = contact.friction[i, 0] * np.sqrt(R[rows.start + 1] / R[rows.start])
 
@@ -453,13 +458,19 @@ class TwoWay:
             _add(square, pair.purse, pressed * dt * added * pressed)
         gained = self._along(data, data.qacc) - problem.smooth
         for contact, normal in zip(problem.contacts, problem.normal(force), strict=True):
-            rows, purse = contact.rows, contact.pairs[0].purse
-            _add(linear, purse, normal * dt * float((data.efc_vel[rows] + dt / 2 * problem.smooth[rows]).mean()))
-            _add(square, purse, normal * dt * dt / 2 * float(gained[rows].mean()))
+            rows, whole, purse = contact.rows, contact.whole, contact.pairs[0].purse
+            at_first, later = data.efc_vel + dt / 2 * problem.smooth, dt / 2 * gained
+            works = [normal * dt * float(each[rows].mean()) for each in (at_first, later)]
+            aside = [dt * float(force[whole] @ each[whole]) - work for each, work in zip((at_first, later), works)]
+            if sum(aside) > 0:
+                # friction that drives must be paid for too
+                works = [work + more for work, more in zip(works, aside, strict=True)]
+            _add(linear, purse, works[0])
+            _add(square, purse, works[1])
         return {
             purse: share
             for purse in linear
-            if (share := _share(linear[purse], square[purse], max(self._paid.get(purse, 0.0), 0.0))) < 1
+            if (share := _share(linear[purse], square[purse], self._paid.get(purse, 0.0))) < 1
         }
 
     def _along(self, data: mujoco.MjData, vector: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -473,7 +484,9 @@ class TwoWay:
         means = data.efc_vel + dt / 2 * self._along(data, data.qacc)
         total, work = problem.total(data.efc_force), dict[_Key, float]()
         for contact, normal in zip(problem.contacts, problem.normal(data.efc_force), strict=True):
-            _add(work, contact.pairs[0].key, normal * dt * float(means[contact.rows].mean()))
+            along, whole = normal * dt * float(means[contact.rows].mean()), contact.whole
+            aside = dt * float(data.efc_force[whole] @ means[whole]) - along
+            _add(work, contact.pairs[0].key, along + max(aside, 0.0))
         for pair in {pair.key: pair for contact in problem.contacts for pair in contact.pairs}.values():
             self._work.append((pair, work.get(pair.key, 0.0), total[pair.key]))
 
@@ -507,7 +520,7 @@ class TwoWay:
         start = end - dt * float(along @ solved.qacc)
         linear = force * dt * ((start + end) / 2 - pair.mean - pair.mean_mobility * dt * pair.held)
         square = (force * dt) ** 2 * (light / 2 + pair.mean_mobility)
-        force *= max(_share(linear, square, max(self._paid.get(pair.purse, 0.0), 0.0)), 0.0)
+        force *= _share(linear, square, self._paid.get(pair.purse, 0.0))
         self._move(data, force * dt * response[0], dt, ahead=ahead)
         self._work.append((pair, force * dt * ((start + end) / 2 + force * dt * light / 2), force))
         return force
@@ -517,7 +530,7 @@ def _share(linear: float, square: float, paid: float) -> float:
     """The greatest share s up to 1 whose work, linear s + square s^2, is paid for [J]."""
     if square <= 0 or linear + square <= paid + _ROUND_OFF * abs(linear):
         return 1.0
-    return float((np.sqrt(linear**2 + 4 * square * paid) - linear) / (2 * square))
+    return max(float(np.sqrt(max(linear**2 + 4 * square * paid, 0.0)) - linear) / (2 * square), 0.0)
 
 
 def _add(sums: dict[_Key, float], key: _Key, value: float) -> None:
