@@ -2,9 +2,9 @@
 
     python examples/benchmarks/energy_ledger.py [SCENES] [SEED]
 
-A body falls on a target, or flies at it. Masses, time steps, materials, geom types, joints of the target, friction cones
-and contact damping are random. What counts is the greatest rise of the energy of bodies and waves together over its
-largest value so far, as a share of that; potential energy counts from where the body touches. No actuators act.
+A body falls on a target, or flies at it. Masses, time steps, materials, geom types, joints of the target, friction
+cones and contact damping are random. What counts is the greatest rise of the energy of bodies and waves together over
+its largest value so far, as a share of that; potential energy counts from where the body touches. No actuators act.
 """
 
 from __future__ import annotations

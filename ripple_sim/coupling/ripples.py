@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.solver import Load, Material
+from ripple_sim.solver import Material
 from ripple_sim.solver.errors import checked, whole
 
 from .amplitude import AmplitudeCheck
 from .collision_warnings import TunnellingCheck, collision_warnings
+from .energy import BodyEnergy, Energy
 from .geoms import (
     ByGeom,
     GeomKey,
@@ -42,7 +43,6 @@ from .stepping import (
     physics_errors,
 )
 from .targets import Targets
-from .energy import BodyEnergy, Energy
 from .two_way import TwoWay
 
 __all__ = ["Impulse", "Ripples"]

@@ -105,11 +105,9 @@ class _Pair(NamedTuple):
 
 
 class _Contact(NamedTuple):
-    """A contact: which of MuJoCo's, its rows that carry the normal force, all its rows, its pairs, two where two targets
-    touch.
-    """
+    """A contact: which of MuJoCo's, its rows that carry the normal force, all its rows, and its pairs, one a target."""
 
-    index: int
+    which: int
     rows: slice
     whole: slice
     pairs: list[_Pair]
@@ -140,7 +138,7 @@ class _Problem(NamedTuple):
 
     def normal(self, force: NDArray[np.float64]) -> list[float]:
         """Normal force of each contact on its bodies, without what adhesion takes of it [N]."""
-        return [float(force[each.rows].sum() - self.pulls[each.index]) for each in self.contacts]
+        return [float(force[each.rows].sum() - self.pulls[each.which]) for each in self.contacts]
 
     def total(self, force: NDArray[np.float64]) -> dict[_Key, float]:
         """Force on each target in a pair [N]."""
@@ -199,7 +197,7 @@ class TwoWay:
         ahead : bool
             Whether `data` has yet to take the step.
         """
-        model, dt = self._coupled.model, self._coupled.model.opt.timestep
+        dt = self._coupled.model.opt.timestep
         contacts = self._touching(solved)
         known, self._places = self._places, {}
         for key, touched in contacts.items():
@@ -261,7 +259,9 @@ class TwoWay:
                     point, outward = (at - data.geom_xpos[target]) @ rotation, normal @ rotation
                     if target != geom:
                         (point,), off = places(self._waves[target].atlas, point[None], outward[None]), point
-                    choices.append((0.0 if target == geom else float(np.linalg.norm(point - off)), target, point, outward))
+                    choices.append(
+                        (0.0 if target == geom else float(np.linalg.norm(point - off)), target, point, outward)
+                    )
                 _, target, point, outward = min(choices, key=lambda choice: choice[0])
                 found.setdefault((target, other), []).append((i, point, outward))
         return found
@@ -461,7 +461,10 @@ class TwoWay:
             rows, whole, purse = contact.rows, contact.whole, contact.pairs[0].purse
             at_first, later = data.efc_vel + dt / 2 * problem.smooth, dt / 2 * gained
             works = [normal * dt * float(each[rows].mean()) for each in (at_first, later)]
-            aside = [dt * float(force[whole] @ each[whole]) - work for each, work in zip((at_first, later), works)]
+            aside = [
+                dt * float(force[whole] @ each[whole]) - work
+                for each, work in zip((at_first, later), works, strict=True)
+            ]
             if sum(aside) > 0:
                 # friction that drives must be paid for too
                 works = [work + more for work, more in zip(works, aside, strict=True)]
