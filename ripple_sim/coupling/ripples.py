@@ -82,9 +82,10 @@ class Ripples(Targets):
     rim : str or mapping
         "free" or "fixed" rims of open surfaces, likewise; see `WaveSolver`.
     two_way : bool
-        Let the moving surfaces push back on the bodies that touch them or are within reach of them while risen. Each
-        `step` hands on the momentum at once, as a change of `data.qvel`: it acts exactly once, and `xfrc_applied` and
-        the other forces in `data` are yours alone.
+        Let surfaces give way to the bodies that touch them, and push back on those within reach of them while risen.
+        Each `step` finds the contact forces of the latest physics step anew, with the motion of both, and corrects
+        `data.qvel` and `data.qpos`; `xfrc_applied` and the other applied forces in `data` are yours alone. See
+        "Two-way coupling" in how-it-works.md.
     contacts : mapping, optional
         Geom to the geoms that collide for it, where a visible geom ripples and others, on its body or on bodies welded
         to it, collide. A target that neither collides nor is named here takes the contacts of all geoms of its body
