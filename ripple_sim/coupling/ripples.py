@@ -260,7 +260,7 @@ class Ripples(Targets):
             self._waves[target].move(surface.vertices(solved))
         shared = None
         if self._two_way is not None:
-            shared = self._two_way.solve(data, solved, passed.elapsed, ahead=solved_here)
+            shared = self._two_way.solve(data, solved, passed.elapsed, pending=solved_here)
         loads = self._loads.loads(solved, passed.elapsed)
         for target, filtered in self._high_pass.items():
             loads[target] = filtered(loads[target])

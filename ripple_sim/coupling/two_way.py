@@ -183,7 +183,7 @@ class TwoWay:
         self._before: dict[int, NDArray[np.float32]] = {}
         self._work: list[tuple[_Pair, float, float]] = []
 
-    def solve(self, data: mujoco.MjData, solved: mujoco.MjData, elapsed: float, *, ahead: bool) -> dict[int, Load]:
+    def solve(self, data: mujoco.MjData, solved: mujoco.MjData, elapsed: float, *, pending: bool) -> dict[int, Load]:
         """Find the forces of the latest physics step anew, correct the bodies' motion, and return the targets' loads.
 
         Parameters
@@ -194,7 +194,7 @@ class TwoWay:
             The contact problem of the step: `data`, or a copy, see `SolvedForces`. Gets the new forces.
         elapsed : float
             Time that the waves are about to step [s].
-        ahead : bool
+        pending : bool
             Whether `data` has yet to take the step.
         """
         dt = self._coupled.model.opt.timestep
@@ -214,11 +214,11 @@ class TwoWay:
             problem = self._problem(solved, pairs, dt)
             old = solved.qacc.copy()
             forces |= problem.total(self._solved(solved, problem, dt))
-            self._move(data, dt * (solved.qacc - old), dt, ahead=ahead)
+            self._move(data, dt * (solved.qacc - old), dt, pending=pending)
             self._note_work(solved, problem, dt)
         for touch in reached:
             key = touch.target, touch.other
-            forces[key] = self._push(data, solved, touch, pairs[key], dt, ahead=ahead)
+            forces[key] = self._push(data, solved, touch, pairs[key], dt, pending=pending)
         self._forces = forces
         self._before = self._heights
         loads: dict[int, list[Load]] = {}
@@ -453,9 +453,9 @@ class TwoWay:
         """
         total, linear, square = problem.total(force), dict[_Key, float](), dict[_Key, float]()
         for pair in {pair.key: pair for contact in problem.contacts for pair in contact.pairs}.values():
-            pressed, added = total[pair.key], pair.mean_mobility * dt
-            _add(linear, pair.purse, -pressed * dt * (pair.mean + added * pair.held))
-            _add(square, pair.purse, pressed * dt * added * pressed)
+            given, added = total[pair.key], pair.mean_mobility * dt
+            _add(linear, pair.purse, -given * dt * (pair.mean + added * pair.held))
+            _add(square, pair.purse, given * dt * added * given)
         gained = self._along(data, data.qacc) - problem.smooth
         for contact, normal in zip(problem.contacts, problem.normal(force), strict=True):
             rows, whole, purse = contact.rows, contact.whole, contact.pairs[0].purse
@@ -495,15 +495,15 @@ class TwoWay:
 
     # What happens to the bodies
 
-    def _move(self, data: mujoco.MjData, change: NDArray[np.float64], dt: float, *, ahead: bool) -> None:
+    def _move(self, data: mujoco.MjData, change: NDArray[np.float64], dt: float, *, pending: bool) -> None:
         """Change velocities [m/s] as the step would have, and positions with them."""
         data.qvel += change
-        if not ahead:
+        if not pending:
             mujoco.mj_integratePos(self._coupled.model, data.qpos, change, dt)
             data.qacc_warmstart[:] = data.qacc
 
     def _push(
-        self, data: mujoco.MjData, solved: mujoco.MjData, touch: Touch, pair: _Pair, dt: float, *, ahead: bool
+        self, data: mujoco.MjData, solved: mujoco.MjData, touch: Touch, pair: _Pair, dt: float, *, pending: bool
     ) -> float:
         """Push a body that the risen surface has reached, so that they part no slower than they meet; the force [N]."""
         model, bodies = self._coupled.model, self._coupled.bodies
@@ -515,7 +515,7 @@ class TwoWay:
         response = np.zeros((1, model.nv))
         mujoco.mj_solveM(model, solved, response, along[None])
         light = float(along @ response[0])
-        end = float(along @ data.qvel) + (dt * float(along @ solved.qacc) if ahead else 0.0)
+        end = float(along @ data.qvel) + (dt * float(along @ solved.qacc) if pending else 0.0)
         meets = pair.free + pair.mobility * dt * pair.held - end
         if light + pair.mobility <= 0 or meets <= 0:
             return 0.0
@@ -524,7 +524,7 @@ class TwoWay:
         linear = force * dt * ((start + end) / 2 - pair.mean - pair.mean_mobility * dt * pair.held)
         square = (force * dt) ** 2 * (light / 2 + pair.mean_mobility)
         force *= _share(linear, square, self._paid.get(pair.purse, 0.0))
-        self._move(data, force * dt * response[0], dt, ahead=ahead)
+        self._move(data, force * dt * response[0], dt, pending=pending)
         self._work.append((pair, force * dt * ((start + end) / 2 + force * dt * light / 2), force))
         return force
 
