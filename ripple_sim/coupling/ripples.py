@@ -216,7 +216,7 @@ class Ripples(Targets):
     def energy(self, data: mujoco.MjData) -> Energy:
         """Kinetic and potential energy of the bodies, energy of the waves, and their total [J].
 
-        With `two_way` and without actuators, the total does not rise while nothing but contacts acts.
+        With `two_way` contacts do not raise the total, within the bounds given in how-it-works.md; actuators may.
 
         Raises
         ------
