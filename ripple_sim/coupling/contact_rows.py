@@ -83,17 +83,17 @@ class ContactProblem:
     model : mujoco.MjModel
     data : mujoco.MjData
         With the contacts of the step; gets the forces that are found.
-    touched : mapping
+    pairs_at : mapping
         MuJoCo's index of each contact to the pairs that it belongs to.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, touched: Mapping[int, Sequence[Pair]]) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, pairs_at: Mapping[int, Sequence[Pair]]) -> None:
         self._model, self._data, self._dt = model, data, model.opt.timestep
         contact, pulls = data.contact, adhesion(model, data)
         self._pulls = np.zeros(data.ncon) if pulls is None else pulls
-        self._pairs = {pair.key: pair for mine in touched.values() for pair in mine}
+        self._pairs = {pair.key: pair for mine in pairs_at.values() for pair in mine}
         self._contacts, rows_of = [], dict.fromkeys(self._pairs, 0)
-        for i, mine in touched.items():
+        for i, mine in pairs_at.items():
             first, dim = int(contact.efc_address[i]), int(contact.dim[i])
             count = 2 * (dim - 1) if is_pyramidal(model) and dim > 1 else 1
             rows = slice(first, first + count)

@@ -116,11 +116,11 @@ class TwoWay:
         pairs = self._surfaces(dt)
         forces, self._work = {key: self._forces[key] for key in asleep}, []
         if contacts:
-            touched: dict[int, list[Pair]] = {}
+            pairs_at: dict[int, list[Pair]] = {}
             for key, each in contacts.items():
                 for i, _, _ in each:
-                    touched.setdefault(i, []).append(pairs[key])
-            problem = ContactProblem(self._coupled.model, solved, touched)
+                    pairs_at.setdefault(i, []).append(pairs[key])
+            problem = ContactProblem(self._coupled.model, solved, pairs_at)
             old = solved.qacc.copy()
             forces |= problem.solve(self._paid)
             self._move(data, dt * (solved.qacc - old), dt, pending=pending)
