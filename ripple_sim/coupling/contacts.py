@@ -116,7 +116,7 @@ def normal_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) ->
     """Normal forces of some contacts [N], as `mj_contactForce` gives them; 0 without a row in the constraint solver."""
     address, dim = data.contact.efc_address[contacts], data.contact.dim[contacts]
     # the edges of a friction pyramid share the normal force among them
-    edges = np.maximum(2 * dim - 2, 1) if _is_pyramidal(model) else np.ones_like(dim)
+    edges = np.maximum(2 * dim - 2, 1) if is_pyramidal(model) else np.ones_like(dim)
     return _edge_sums(data.efc_force, address, edges)
 
 
@@ -135,7 +135,7 @@ def friction_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) 
     each, axis = data.contact, np.arange(2)
     address, friction = each.efc_address[contacts, None], each.friction[contacts, :2]
     has_axis = each.dim[contacts, None] > axis + 1
-    if _is_pyramidal(model):
+    if is_pyramidal(model):
         # each direction has two opposite edges of the pyramid: friction is their difference
         edge = np.where(has_axis, address + 2 * axis, 0)
         forces = friction * (data.efc_force[edge] - data.efc_force[np.where(has_axis, edge + 1, 0)])
@@ -144,8 +144,23 @@ def friction_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) 
     return np.where(has_axis, forces, 0.0)
 
 
-def _is_pyramidal(model: mujoco.MjModel) -> bool:
+def is_pyramidal(model: mujoco.MjModel) -> bool:
+    """Whether friction cones are pyramids, whose edges share the normal force."""
     return bool(model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL)
+
+
+def points_outside(data: mujoco.MjData, rows: PairRows, extents: Floats) -> tuple[Floats, Floats]:
+    """Points just outside the targets' surfaces [m], and unit normals from the targets to what touches, [k, 3] each.
+
+    Both are in the world; `extents` [c] are those of `CoupledModel`.
+    """
+    each, (contacts, sides, targets, others) = data.contact, rows
+    normals = each.frame[contacts, :3] * (1.0 - 2.0 * sides)[:, None]
+    # an overlap deeper than a geom is not real: a speculative contact's `dist` only says how hard to stop
+    depths = np.minimum(np.abs(each.dist[contacts]), np.minimum(extents[targets], extents[others]))
+    # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's surface is dist/2
+    # away. A little outside it the nearest surface point is on this side, even of a thin part.
+    return each.pos[contacts] + 1.5 * depths[:, None] * normals, normals
 
 
 def geom_contacts(
@@ -189,13 +204,8 @@ def geom_contacts(
         forces += pulls[rows.contacts]
     if not (forces > 0).all():
         rows, forces = PairRows(*(each[forces > 0] for each in rows)), forces[forces > 0]
-    contacts, sides, targets, others = rows
-    normals = each.frame[contacts, :3] * (1.0 - 2.0 * sides)[:, None]
-    # an overlap deeper than a geom is not real: a speculative contact's `dist` only says how hard to stop
-    depths = np.minimum(np.abs(each.dist[contacts]), np.minimum(extents[targets], extents[others]))
-    # MuJoCo's point lies half-way between the two surfaces, which overlap by -dist: the target's surface is dist/2
-    # away. A little outside it the nearest surface point is on this side, even of a thin part.
-    points = each.pos[contacts] + 1.5 * depths[:, None] * normals
+    targets, others = rows.targets, rows.others
+    points, normals = points_outside(data, rows, extents)
     found = Contacts(others, points, forces, normals)
     if pulls is not None or (has_flex is not None and has_flex[others].any()):
         factors = _pair_factors(rows, forces, normals, pulls, has_flex)

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.solver import Load, Material
+from ripple_sim.solver import Material
 from ripple_sim.solver.errors import checked, whole
 
 from .amplitude import AmplitudeCheck
 from .collision_warnings import collision_warnings
+from .energy import BodyEnergy, Energy
 from .geoms import (
     ByGeom,
     GeomKey,
@@ -43,7 +44,7 @@ from .stepping import (
     physics_errors,
 )
 from .targets import Targets
-from .two_way import PushBack
+from .two_way import TwoWay
 
 __all__ = ["Impulse", "Ripples"]
 
@@ -82,9 +83,10 @@ class Ripples(Targets):
     rim : str or mapping
         "free" or "fixed" rims of open surfaces, likewise; see `WaveSolver`.
     two_way : bool
-        Let the moving surfaces push back on the bodies that touch them or are within reach of them while risen. Each
-        `step` hands on the momentum at once, as a change of `data.qvel`: it acts exactly once, and `xfrc_applied` and
-        the other forces in `data` are yours alone.
+        Let surfaces give way to the bodies that touch them, and push back on those within reach of them while risen.
+        Each `step` finds the contact forces of the latest physics step anew, with the motion of both, and corrects
+        `data.qvel` and `data.qpos`; `xfrc_applied` and the other applied forces in `data` are yours alone. See
+        "Two-way coupling" in how-it-works.md.
     contacts : mapping, optional
         Geom to the geoms that collide for it, where a visible geom ripples and others, on its body or on bodies welded
         to it, collide. A target that neither collides nor is named here takes the contacts of all geoms of its body
@@ -138,7 +140,8 @@ class Ripples(Targets):
         self._loads = ContactLoads(coupled, self._waves)
         self._check_tunnelling = TunnellingCheck(coupled, list(rigid))
         self._check_amplitude = AmplitudeCheck(coupled, rigid)
-        self._push_back = PushBack(coupled, self._waves) if two_way else None
+        self._two_way = TwoWay(coupled, self._waves) if two_way else None
+        self._body_energy = BodyEnergy(self.model)
         self._clock, self._solved = StepClock(), SolvedForces(self.model)
         self._warned: set[str] = set()
 
@@ -211,6 +214,19 @@ class Ripples(Targets):
             yield
         self._follow(data)  # what was stepped in other ways is warned of
 
+    def energy(self, data: mujoco.MjData) -> Energy:
+        """Kinetic and potential energy of the bodies, energy of the waves, and their total [J].
+
+        With `two_way` contacts do not raise the total, within the bounds given in how-it-works.md; actuators may.
+
+        Raises
+        ------
+        SceneError
+            If `data` belongs to another model.
+        """
+        bodies = self._body_energy(own_data(self.model, data))
+        return Energy(bodies, sum(waves.energy() for waves in self._waves.values()))
+
     def vertices(self, name: GeomKey, data: mujoco.MjData) -> NDArray[np.float64] | None:
         """Where the vertices of a target's mesh are [m], [n, 3]: of a flex or a skin by `data`, in the world.
 
@@ -243,14 +259,16 @@ class Ripples(Targets):
         self._check_tunnelling(solved)
         for target, surface in self._soft.items():
             self._waves[target].move(surface.vertices(solved))
+        shared = None
+        if self._two_way is not None:
+            shared = self._two_way.solve(data, solved, passed.elapsed, pending=solved_here)
         loads = self._loads.loads(solved, passed.elapsed)
         for target, filtered in self._high_pass.items():
             loads[target] = filtered(loads[target])
-        if self._push_back is not None:
-            for geom, load in self._push_back.exchange(data, self._loads.touches, self._waves, passed.elapsed):
-                loads[geom] = Load.together([loads[geom], load])
         for geom, waves in self._waves.items():
-            waves.step(passed.elapsed, load=loads[geom])
+            waves.step(passed.elapsed, load=loads[geom] if shared is None else shared.get(geom))
+        if self._two_way is not None:
+            self._two_way.settle()
         self._check_amplitude()
 
     def _waves_changed(self, name: GeomKey) -> None:
@@ -264,6 +282,8 @@ class Ripples(Targets):
     def _flatten(self) -> None:
         self._check_amplitude.flush()
         self._loads.clear()
+        if self._two_way is not None:
+            self._two_way.clear()
         for waves in self._waves.values():
             waves.reset()
 

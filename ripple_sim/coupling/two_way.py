@@ -1,217 +1,289 @@
-"""Two-way coupling: where the surface moves outwards under a body, it pushes the body, and is held back by it.
+"""Two-way coupling: the contact force is found with the motion of both, body and surface, and both get it.
 
-`PushBack` exchanges the momentum. `Reach` finds geoms that a risen surface touches though MuJoCo, which knows the
-undeformed one alone, sees them apart: by the point of a geom that lies farthest in a direction (`support_point`).
+MuJoCo's contact problem knows rigid surfaces alone. Here it is solved again with a surface that gives way: a contact's
+gap counts from the displaced surface, and a unit of its force moves that surface as the waves say. What is found
+replaces the forces of the step, and the bodies' motion in it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+import copy
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver import Load, WaveSolver
-from ripple_sim.solver.waves.footprint import footprint
+from ripple_sim.solver.waves.footprint import footprint_at
 
+from .contact_rows import ContactProblem, Key, Pair, affordable_share
+from .contacts import ColliderIds, pair_rows, places_facing, points_outside
 from .load import Touch
 from .model import CoupledModel
+from .reach import Reach
 
-_GEOM = mujoco.mjtGeom
+# A footprint is reused while its points move by less than this share of a texel.
+_SAME_PLACE = 0.3
+# Up to so many contacts of a pair, what is convex presses between them too.
+_MOST_CORNERS = 8
 
-# A side or an edge whose slope against the plane is less than this counts as flat: its middle is the point.
-_FLAT = 0.02
 
+class _Place(NamedTuple):
+    """Where a pair touches.
 
-def support_point(model: mujoco.MjModel, geom: int, direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Point [m], shape [3], of a geom that lies farthest in a direction: the middle of a side where a whole side does.
-
-    Parameters
+    Attributes
     ----------
-    model : mujoco.MjModel
-    geom : int
-        A sphere, ellipsoid, capsule, cylinder or box; of a mesh or sdf geom the convex hull counts.
-    direction : float64 [3]
-        Unit vector in the frame of the geom, as is the result.
+    points : float64 [k, 3]
+        In the target's frame [m].
+    tolerance : float
+        How far they may move before it is another place [m].
+    load : Load
+        A unit force on the texels, each once.
+    moving : float64 [t]
+        The part of it that moves them.
     """
-    size = model.geom_size[geom]
-    match model.geom_type[geom]:
-        case _GEOM.mjGEOM_SPHERE:
-            return size[0] * direction
-        case _GEOM.mjGEOM_ELLIPSOID:
-            return size**2 * direction / np.linalg.norm(size * direction)
-        case _GEOM.mjGEOM_CAPSULE:
-            return size[0] * direction + [0.0, 0.0, size[1] * _side(direction[2])]
-        case _GEOM.mjGEOM_CYLINDER:
-            across = float(np.hypot(direction[0], direction[1]))
-            rim = size[0] * direction[:2] / across if across > _FLAT else np.zeros(2)
-            return np.append(rim, size[1] * _side(direction[2]))
-        case _GEOM.mjGEOM_BOX:
-            return size * [_side(along) for along in direction]
-    mesh = int(model.geom_dataid[geom])
-    begin, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-    vertices = model.mesh_vert[begin : begin + count]
-    heights = vertices @ direction
-    return vertices[heights > heights.max() - _FLAT * model.geom_rbound[geom]].mean(axis=0).astype(np.float64)
+
+    points: NDArray[np.float64]
+    tolerance: float
+    load: Load
+    moving: NDArray[np.float64]
+
+    def mean(self, field: NDArray) -> float:
+        """Mean of a field [C, n, n]: force times mean velocity is the power that the surface gets."""
+        return float(self.moving @ field.reshape(-1)[self.load.texels].astype(np.float64))
 
 
-def _side(along: float) -> float:
-    return 0.0 if abs(along) < _FLAT else float(np.sign(along))
+class TwoWay:
+    """Contacts with surfaces that give way.
 
-
-_ROUNDS = 3  # of the search for the points of surface and geom that are nearest to each other
-_SOLID = tuple(
-    int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}"))
-    for name in ("SPHERE", "ELLIPSOID", "CAPSULE", "CYLINDER", "BOX", "MESH", "SDF")
-)
-
-
-class Reach:
-    """Finds geoms above targets, lower than their waves are high.
-
-    A geom is within reach where its lowest point is less above the undeformed surface than the surface has risen there.
-    That point is found by turns: the surface point nearest to the geom's point, and the geom's point deepest along the
-    normal there.
+    What pairs pay in and get back, see `ContactProblem`, is counted here.
 
     Parameters
     ----------
     coupled : CoupledModel
-    targets : iterable of int
-        Geom ids.
+    waves : mapping
+        Waves of each target, by geom id.
     """
 
-    def __init__(self, coupled: CoupledModel, targets: Iterable[int]) -> None:
-        self._coupled, model = coupled, coupled.model
-        moving = (model.body_weldid[model.geom_bodyid] > 0) & np.isin(model.geom_type, _SOLID)
-        self._others = {target: np.flatnonzero(moving & coupled.can_collide(target)).tolist() for target in targets}
+    def __init__(self, coupled: CoupledModel, waves: Mapping[int, WaveSolver]) -> None:
+        self._coupled, self._waves = coupled, waves
+        self._colliders, self._reach = ColliderIds(coupled), Reach(coupled, waves)
+        self._targets_of: dict[int, list[int]] = {}
+        for target in waves:
+            for geom in coupled.collision_geoms(target):
+                self._targets_of.setdefault(geom, []).append(target)
+        self._is_read = np.zeros(len(coupled.owners), dtype=np.bool_)
+        self._is_read[list(self._targets_of)] = True
+        self._trials: dict[int, tuple[WaveSolver, WaveSolver, WaveSolver]] = {}
+        self.clear()
 
-    def reached(
-        self, data: mujoco.MjData, waves: Mapping[int, WaveSolver], touching: Collection[tuple[int, int]]
-    ) -> Iterator[Touch]:
-        """Find the geoms within reach, but for the pairs (target, other) that touch already.
+    def clear(self) -> None:
+        """Forget all contacts."""
+        self._places: dict[Key, _Place] = {}
+        self._mobilities: dict[Key, tuple[tuple[_Place, ...], tuple[float, float]]] = {}
+        self._forces: dict[Key, float] = {}
+        self._paid: dict[Key, float] = {}
+        self._before: dict[int, NDArray[np.float32]] = {}
+        self._work: list[tuple[Pair, float, float]] = []
 
-        Their loads are unit forces on the footprints.
-        """
-        for target, others in self._others.items():
-            height = waves[target].height.reshape(-1)
-            for other in others if height.max() > 0 else ():
-                if (target, other) not in touching:
-                    touch = self._touch(data, target, other, waves[target], height)
-                    if touch is not None:
-                        yield touch
-
-    def _touch(
-        self, data: mujoco.MjData, target: int, other: int, waves: WaveSolver, height: NDArray[np.float32]
-    ) -> Touch | None:
-        """The touch of a target, whose waves have a height [m], [C n n], with another geom; None out of reach."""
-        model, atlas = self._coupled.model, waves.atlas
-        rotation = data.geom_xmat[target].reshape(3, 3)
-        to_target = rotation.T @ data.geom_xmat[other].reshape(3, 3)
-        centre = (data.geom_xpos[other] - data.geom_xpos[target]) @ rotation
-        reach = float(model.geom_rbound[other] + height.max())
-        box_centre, box_size = model.geom_aabb[target, :3], model.geom_aabb[target, 3:]
-        if np.linalg.norm(np.maximum(np.abs(centre - box_centre) - box_size, 0.0)) > reach:
-            return None
-        point = centre
-        for _ in range(_ROUNDS):
-            (place,), (texel,) = atlas.nearest(point)
-            if np.linalg.norm(point - place) > reach:
-                return None
-            normal = atlas.normals.reshape(-1, 3)[texel]
-            point = centre + to_target @ support_point(model, other, -normal @ to_target)
-        if (point - place) @ normal >= height[texel]:
-            return None
-        radii = self._coupled.footprint_radii
-        where = footprint(atlas, place, min(radii[target], radii[other]))
-        movable = waves.operator.movable.reshape(-1)[where.texels]
-        movable_area = atlas.areas.reshape(-1)[where.texels] * movable
-        in_world = data.geom_xpos[target] + rotation @ place
-        return Touch(target, other, in_world, rotation @ normal, Load(where.texels, where.weights * movable_area))
-
-
-class PushBack:
-    """Exchanges momentum between moving surfaces and the bodies that touch them.
-
-    MuJoCo sees a target's undeformed surface, which stops what comes in. So only the surface's own outward motion is
-    left to pass on, to bodies that touch that surface or are within reach of the displaced one: a patch of mass m_s
-    that moves outwards at u meets a body of effective mass m_b that moves along the normal at w >= 0, both relative to
-    the target. As in a perfectly inelastic collision, which cannot create energy, they exchange
-    J = (u - w) m_s m_b / (m_s + m_b) if u > w: +J on the body, -J on the surface and on the target's body.
-
-    The bodies receive J at once, as a change of `data.qvel`: forces in `data` are the user's, and none is left there.
-
-    Parameters
-    ----------
-    coupled : CoupledModel
-    targets : iterable of int
-        Geom ids.
-    """
-
-    def __init__(self, coupled: CoupledModel, targets: Iterable[int]) -> None:
-        self._model, self._bodies = coupled.model, coupled.bodies
-        self._reach = Reach(coupled, targets)
-
-    def exchange(
-        self, data: mujoco.MjData, touches: Sequence[Touch], waves: Mapping[int, WaveSolver], elapsed: float
-    ) -> list[tuple[int, Load]]:
-        """Push the bodies, and return the loads that push the targets, by geom id, over the elapsed time [s].
+    def solve(self, data: mujoco.MjData, solved: mujoco.MjData, elapsed: float, *, pending: bool) -> dict[int, Load]:
+        """Find the forces of the latest physics step anew, correct the bodies' motion, and return the targets' loads.
 
         Parameters
         ----------
         data : mujoco.MjData
-        touches : sequence of Touch
-            The pairs that touch.
-        waves : mapping
-            Waves of each target before the step, by geom id.
+            Velocities, and positions unless they are those of the step's beginning, are corrected.
+        solved : mujoco.MjData
+            The contact problem of the step: `data`, or a copy, see `SolvedForces`. Gets the new forces.
         elapsed : float
+            Time that the waves are about to step [s].
+        pending : bool
+            Whether `data` has yet to take the step.
         """
-        pairs = {(touch.target, touch.other) for touch in touches}
-        touches = [*touches, *self._reach.reached(data, waves, pairs)]
-        velocities = {touch.target: waves[touch.target].velocity.reshape(-1) for touch in touches}
-        loads = []
-        for touch in touches:
-            mass, velocity = waves[touch.target].operator.mass.reshape(-1), velocities[touch.target]
-            load = touch.load.merged(mass.size)
-            total = load.forces.sum()
-            if total <= 0:
-                continue  # nothing is movable under it
-            texels, shares = load.texels, load.forces / total
-            patch_mass, outward = 1 / float((shares**2 / mass[texels]).sum()), float(shares @ velocity[texels])
-            impulse = self._push(data, touch, patch_mass, outward)
-            if impulse:
-                velocity[texels] -= impulse * shares / mass[texels]  # what the next touch meets
-                loads.append((touch.target, Load(texels, impulse * shares / elapsed)))
-        return loads
+        dt = self._coupled.model.opt.timestep
+        contacts = self._touching(solved)
+        known, self._places = self._places, {}
+        for key, touched in contacts.items():
+            self._places[key] = self._place(key, touched, known.get(key))
+        reached = list(self._reach.reached(solved, self._waves, self._places.keys()))
+        for touch in reached:
+            self._places[touch.target, touch.other] = self._reached_place(touch)
+        asleep = [key for key in known if key not in self._places and self._force_stays(solved, key)]
+        self._places |= {key: known[key] for key in asleep}
+        self._heights = {target: self._waves[target].height for target, _ in self._places}
+        pairs = self._surfaces(dt)
+        forces, self._work = {key: self._forces[key] for key in asleep}, []
+        if contacts:
+            pairs_at: dict[int, list[Pair]] = {}
+            for key, each in contacts.items():
+                for i, _, _ in each:
+                    pairs_at.setdefault(i, []).append(pairs[key])
+            problem = ContactProblem(self._coupled.model, solved, pairs_at)
+            old = solved.qacc.copy()
+            forces |= problem.solve(self._paid)
+            self._move(data, dt * (solved.qacc - old), dt, pending=pending)
+            self._work = problem.works()
+        for touch in reached:
+            key = touch.target, touch.other
+            forces[key] = self._push(data, solved, touch, pairs[key], dt, pending=pending)
+        self._forces = forces
+        self._before = self._heights
+        loads: dict[int, list[Load]] = {}
+        for key, force in forces.items():
+            load = self._places[key].load
+            loads.setdefault(key[0], []).append(Load(load.texels, force * dt / elapsed * load.forces))
+        return {target: Load.together(each) for target, each in loads.items()}
 
-    def _push(self, data: mujoco.MjData, touch: Touch, patch_mass: float, outward: float) -> float:
-        """Push the bodies with the impulse that they exchange with the patch under a touch, and return it [N s].
+    def settle(self) -> None:
+        """Note what was paid, now that the waves have stepped."""
+        paid = {pair.purse: self._paid.get(pair.purse, 0.0) for pair, _, _ in self._work}
+        for pair, body, force in self._work:
+            moved = self._places[pair.key].mean(self._waves[pair.key[0]].height) - pair.height
+            paid[pair.purse] -= body - force * moved
+        self._paid = paid
 
-        Parameters
-        ----------
-        data : mujoco.MjData
-        touch : Touch
-        patch_mass, outward : float
-            Mass [kg] and outward velocity [m/s] of the patch.
-        """
-        if outward <= 0 or self._bodies[touch.other] < 0:
-            return 0.0
-        model, point = self._model, touch.point
-        body, base = int(self._bodies[touch.other]), int(self._bodies[touch.target])
-        along = touch.normal @ (_jacobian(model, data, body, point) - _jacobian(model, data, base, point))
+    # Where bodies touch
+
+    def _touching(self, data: mujoco.MjData) -> dict[Key, list[tuple[int, NDArray, NDArray]]]:
+        """MuJoCo's contacts of each pair: which, and their points and normals in the target's frame."""
+        found: dict[Key, list[tuple[int, NDArray, NDArray]]] = {}
+        if not data.ncon:
+            return found
+        rows = pair_rows(self._colliders(data), data.contact.efc_address >= 0, self._is_read)
+        points, normals = points_outside(data, rows, self._coupled.extents)
+        ids = zip(rows.contacts.tolist(), rows.targets.tolist(), rows.others.tolist(), strict=True)
+        for (i, geom, other), at, normal in zip(ids, points, normals, strict=True):
+            choices = []
+            for target in self._targets_of[geom]:
+                rotation = data.geom_xmat[target].reshape(3, 3)
+                point, outward, off = (at - data.geom_xpos[target]) @ rotation, normal @ rotation, 0.0
+                if target != geom:
+                    (place,) = places_facing(self._waves[target].atlas, point[None], outward[None])
+                    point, off = place, float(np.linalg.norm(place - point))
+                choices.append((off, target, point, outward))
+            _, target, point, outward = min(choices, key=lambda choice: choice[0])
+            found.setdefault((target, other), []).append((i, point, outward))
+        return found
+
+    def _place(self, key: Key, touched: Sequence[tuple[int, NDArray, NDArray]], known: _Place | None) -> _Place:
+        (target, other), atlas = key, self._waves[key[0]].atlas
+        points = np.array([point for _, point, _ in touched])
+        if self._coupled.convex[other] and 1 < len(points) <= _MOST_CORNERS:
+            one, two = np.triu_indices(len(points), 1)
+            points = np.concatenate([points, (points[one] + points[two]) / 2])
+        if (
+            known is not None
+            and known.points.shape == points.shape
+            and np.abs(known.points - points).max() < known.tolerance
+        ):
+            return known
+        (nearest, texels), areas = atlas.nearest(points), atlas.areas.reshape(-1)
+        radius = float(self._coupled.footprint_radii[[target, other]].min())
+        parts = [footprint_at(atlas, *each, radius) for each in zip(nearest, texels.tolist(), strict=True)]
+        loads = [Load(each.texels, each.weights * areas[each.texels] / len(parts)) for each in parts]
+        # what touches an open surface from inside pushes it outwards
+        inside = not atlas.mesh.closed and touched[0][2] @ atlas.normals.reshape(-1, 3)[texels[0]] < 0
+        load = Load.together(loads).merged(areas.size)
+        load = Load(load.texels, -load.forces) if inside else load
+        return _Place(points, _SAME_PLACE * float(np.sqrt(areas[texels[0]])), load, self._moving(target, load))
+
+    def _reached_place(self, touch: Touch) -> _Place:
+        load = touch.load.merged(self._waves[touch.target].atlas.areas.size)
+        return _Place(np.zeros((0, 3)), 0.0, load, self._moving(touch.target, load))
+
+    def _moving(self, target: int, load: Load) -> NDArray[np.float64]:
+        return load.forces * self._waves[target].operator.source_share.reshape(-1)[load.texels]
+
+    def _force_stays(self, data: mujoco.MjData, key: Key) -> bool:
+        """Whether both of a pair sleep or are static, so that they press as before."""
+        bodies = self._coupled.bodies[list(key)]
+        return key in self._forces and bool((bodies >= 0).all() and (data.body_awake[bodies] <= 0).all())
+
+    # How the surfaces move
+
+    def _surfaces(self, dt: float) -> dict[Key, Pair]:
+        pairs = {}
+        for target in dict.fromkeys(target for target, _ in self._places):
+            places = {key: place for key, place in self._places.items() if key[0] == target}
+            held = {key: self._forces.get(key, 0.0) for key in places}
+            waves, trial, rest = self._with_trials(target)
+            trial.state = waves.state
+            trial.step(dt, load=Load.together([_times(place.load, held[key]) for key, place in places.items()]))
+            mobilities = self._mobilities_of(places, rest, dt)
+            now, before, after = self._heights[target], self._before.get(target, self._heights[target]), trial.height
+            velocity, end = waves.velocity, trial.velocity
+            for key, place in places.items():
+                mobility, mean_mobility = mobilities[key]
+                height, mean = place.mean(now), place.mean(after - now) / dt
+                start, free = place.mean(velocity), place.mean(end)
+                if mobility < mean_mobility:
+                    # the surface swings back within the step, and its velocity at the end says little
+                    start, free, mobility = place.mean(now - before) / dt, mean, mean_mobility
+                pairs[key] = Pair(key, height, held[key], start, free, mobility, mean, mean_mobility)
+        return pairs
+
+    def _mobilities_of(
+        self, places: Mapping[Key, _Place], rest: WaveSolver, dt: float
+    ) -> dict[Key, tuple[float, float]]:
+        """Velocity under each place, at the end of a step and its mean, over the step, that unit forces give."""
+        these = tuple(places.values())
+        known = [self._mobilities.get(key, ((), None))[0] for key in places]
+        if not all(len(each) == len(these) and all(map(lambda a, b: a is b, each, these)) for each in known):
+            rest.reset()
+            rest.step(dt, load=Load.together([place.load for place in these]))
+            height, velocity = rest.height, rest.velocity
+            for key, place in places.items():
+                found = -place.mean(velocity) / dt, max(-place.mean(height) / dt**2, 0.0)
+                self._mobilities[key] = these, found
+        return {key: self._mobilities[key][1] for key in places}
+
+    def _with_trials(self, target: int) -> tuple[WaveSolver, WaveSolver, WaveSolver]:
+        """A target's waves, and two solvers to try things on."""
+        waves = self._waves[target]
+        if target not in self._trials or self._trials[target][0] is not waves:
+            self._trials[target] = waves, copy.copy(waves), copy.copy(waves)
+            self._mobilities = {}
+        for trial in self._trials[target][1:]:
+            trial.conserve_volume = waves.conserve_volume
+        return self._trials[target]
+
+    # What happens to the bodies
+
+    def _move(self, data: mujoco.MjData, change: NDArray[np.float64], dt: float, *, pending: bool) -> None:
+        """Change velocities [m/s] as the step would have, and positions with them."""
+        data.qvel += change
+        if not pending:
+            mujoco.mj_integratePos(self._coupled.model, data.qpos, change, dt)
+            data.qacc_warmstart[:] = data.qacc
+
+    def _push(
+        self, data: mujoco.MjData, solved: mujoco.MjData, touch: Touch, pair: Pair, dt: float, *, pending: bool
+    ) -> float:
+        """Push a body that the risen surface has reached, so that they part no slower than they meet; the force [N]."""
+        model, bodies = self._coupled.model, self._coupled.bodies
+        along = np.zeros(model.nv)
+        for sign, geom in ((1, touch.other), (-1, touch.target)):
+            jacobian = np.zeros((3, model.nv))
+            mujoco.mj_jac(model, solved, jacobian, None, touch.point, int(bodies[geom]))
+            along += sign * touch.normal @ jacobian
         response = np.zeros((1, model.nv))
-        mujoco.mj_solveM(model, data, response, along[None])
-        inverse_mass = float(along @ response[0])
-        approach = outward - max(0.0, float(along @ data.qvel))
-        if inverse_mass <= 0 or approach <= 0:
+        mujoco.mj_solveM(model, solved, response, along[None])
+        light = float(along @ response[0])
+        end = float(along @ data.qvel) + (dt * float(along @ solved.qacc) if pending else 0.0)
+        meets = pair.free + pair.mobility * dt * pair.held - end
+        if light + pair.mobility <= 0 or meets <= 0:
             return 0.0
-        impulse = approach / (1 / patch_mass + inverse_mass)
-        data.qvel += impulse * response[0]
-        return impulse
+        force = meets / (light + pair.mobility) / dt
+        start = end - dt * float(along @ solved.qacc)
+        linear = force * dt * ((start + end) / 2 - pair.mean - pair.mean_mobility * dt * pair.held)
+        square = (force * dt) ** 2 * (light / 2 + pair.mean_mobility)
+        force *= affordable_share(linear, square, self._paid.get(pair.purse, 0.0))
+        self._move(data, force * dt * response[0], dt, pending=pending)
+        self._work.append((pair, force * dt * ((start + end) / 2 + force * dt * light / 2), force))
+        return force
 
 
-def _jacobian(model: mujoco.MjModel, data: mujoco.MjData, body: int, point: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Velocity of a body's point over qvel, [3, nv]."""
-    jacobian = np.zeros((3, model.nv))
-    mujoco.mj_jac(model, data, jacobian, None, point, body)
-    return jacobian
+def _times(load: Load, factor: float) -> Load:
+    return Load(load.texels, factor * load.forces)

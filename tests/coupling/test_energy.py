@@ -1,0 +1,116 @@
+"""Bodies and waves together gain no energy in contact, and bodies rest where they rest without waves."""
+
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+from ripple_sim import Material, Ripples, RippleWarning
+
+GRAVITY = 9.81
+CONTACTS = {"default": "", "undamped": 'solref="-10000 0"', "bouncy": 'solref="0.02 0.2"'}
+GEOMS = {
+    "sphere": 'size="0.06"',
+    "capsule": 'size="0.05 0.05" euler="20 80 0"',
+    "box": 'size="0.06 0.05 0.04" euler="10 20 0"',
+    "cube": 'size="0.06 0.06 0.06"',
+}
+TARGETS = {"fixed": "", "slide": '<joint type="slide" axis="0 0 1" stiffness="2e4"/>', "free": "<freejoint/>"}
+
+
+def scene(kind: str, mass: float, dt: float, fall: float, contact: str = "", joint: str = "", cone: str = "pyramidal"):
+    """A body above a box; over a free one it flies down without gravity."""
+    gravity = 0.0 if "free" in joint else -GRAVITY
+    geom = f'type="{"box" if kind == "cube" else kind}" {GEOMS[kind]} mass="{mass}"'
+    return mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="{dt}" cone="{cone}" gravity="0 0 {gravity}"/><default><geom {contact}/></default>
+        <worldbody><body>{joint}<geom name="target" type="box" size="0.5 0.5 0.1" mass="20"/></body>
+        <body pos="0.03 0.02 {0.1 + fall}"><freejoint/><geom {geom}/></body>
+        </worldbody></mujoco>"""
+    )
+
+
+def coupled(model: mujoco.MjModel, material: Material, **options: object) -> Ripples:
+    return Ripples(model, {"target": material}, resolution=16, backend="cpu", two_way=True, **options)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_energy_of_bodies_and_waves_never_rises(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    dt, mass, fall = rng.uniform(1e-3, 4e-3), 10 ** rng.uniform(-3, 3), rng.uniform(0.15, 0.4)
+    kind, joint = str(rng.choice(list(GEOMS))), str(rng.choice(list(TARGETS)))
+    contact = CONTACTS[str(rng.choice(list(CONTACTS)))]
+    model = scene(kind, mass, dt, fall, contact, TARGETS[joint], str(rng.choice(["pyramidal", "elliptic"])))
+    stiffness = float(rng.choice([0.0, (rng.uniform(0, 1) / dt) ** 2]))
+    material = Material() if seed % 3 == 0 else Material(1.0, 0.0, stiffness, density=float(10 ** rng.uniform(0, 4)))
+    data = mujoco.MjData(model)
+    data.qvel[-4] = -1.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RippleWarning)  # of waves that are too high
+        ripples = coupled(model, material)
+        paid, largest = mass * (GRAVITY * fall + 0.5), ripples.energy(data).total
+        touched = False
+        for _ in range(round(0.3 / dt)):
+            ripples.mj_step(data)
+            touched |= bool(data.ncon)
+            total = ripples.energy(data).total
+            assert total <= largest + 0.01 * paid
+            largest = max(largest, total)
+    assert touched
+
+
+@pytest.mark.parametrize(
+    ("mass", "dt", "kind"), [(5.0, 0.002, "sphere"), (20.0, 0.001, "sphere"), (20.0, 0.002, "cube")]
+)
+def test_a_body_laid_at_rest_stays_in_its_dimple(mass: float, dt: float, kind: str) -> None:
+    model = scene(kind, mass, dt, 0.06 - 1e-4)
+    data, rigid = mujoco.MjData(model), mujoco.MjData(model)
+    ripples = coupled(model, Material())
+    given = []
+    for _ in range(round(0.6 / dt)):
+        ripples.mj_step(data)
+        mujoco.mj_step(model, rigid)
+        assert data.qpos[2] < model.body_pos[2, 2] + 5e-4
+        given.append(sum(each.impulse for each in ripples.last_impulses))
+    dimple = float(ripples["target"].height.min())
+    assert rigid.qpos[2] + dimple - 5e-4 < data.qpos[2] < rigid.qpos[2] + 5e-4
+    # and the surface bears the weight
+    assert np.mean(given[len(given) // 2 :]) == pytest.approx(mass * GRAVITY * dt, rel=1e-2)
+
+
+def test_a_ball_gives_its_energy_to_waves_without_damping() -> None:
+    """None is lost between an undamped contact and undamped waves, and the bounce is lower by what the waves have."""
+    model = scene("sphere", 0.5, 0.0005, 0.3, 'solref="-20000 0"')
+    data = mujoco.MjData(model)
+    ripples = coupled(model, Material(1.0, 0.0, 3e4, density=1000.0))
+    before = ripples.energy(data).total
+    ripples.mj_step(data, nstep=900)
+    energy = ripples.energy(data)
+    paid = 0.5 * GRAVITY * 0.24
+    assert energy.waves > 0.01 * paid
+    assert energy.total < before
+    assert energy.total == pytest.approx(before, abs=0.1 * paid)
+
+
+def test_ledger_of_a_free_fall_is_exact() -> None:
+    model = scene("sphere", 2.0, 0.002, 0.5)
+    data = mujoco.MjData(model)
+    ripples = coupled(model, Material())
+    start = ripples.energy(data)
+    ripples.mj_step(data, nstep=100)
+    assert ripples.energy(data).bodies == pytest.approx(start.bodies, rel=1e-12)
+    assert ripples.energy(data).waves == 0
+
+
+def test_momentum_is_what_the_body_loses() -> None:
+    model = scene("box", 0.7, 0.001, 0.3, cone="elliptic")
+    data = mujoco.MjData(model)
+    ripples = coupled(model, Material(1.0, 0.0, 0.0, density=500.0), conserve_volume=False)
+    given = 0.0
+    for _ in range(500):
+        ripples.mj_step(data)
+        given += sum(impulse.impulse for impulse in ripples.last_impulses)
+    assert given > 0.5
+    assert given == pytest.approx(0.7 * (data.qvel[2] + GRAVITY * data.time), rel=1e-6)
+    assert ripples["target"].momentum() == pytest.approx(-given, rel=1e-4)
