@@ -58,7 +58,7 @@ def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.Mon
     [
         ("ripple_sim.solver.waves.load", "loads and height maps"),
         ("ripple_sim.solver.texels.stencil", "the atlas"),
-        ("ripple_sim.coupling.footprints", "the contacts"),
+        ("ripple_sim.coupling.patches", "the contacts"),
         ("my_kernels", "my_kernels"),
     ],
 )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.footprints import Footprints
+from ripple_sim.coupling.patches import Footprints
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Mesh, build_atlas
 from ripple_sim.solver.waves.footprint import footprint
