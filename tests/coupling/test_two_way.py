@@ -13,7 +13,7 @@ import pytest
 from ring_under_ball import GRAVITY, run
 
 from ripple_sim import Material, Ripples
-from ripple_sim.coupling.reach import support_point
+from ripple_sim.coupling.two_way import support_point
 
 
 def test_passing_ripple_kicks_a_resting_ball_only_if_it_may() -> None:
