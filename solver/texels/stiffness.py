@@ -119,7 +119,7 @@ class TexelCells:
     def coefficient(self, values: Floats, softening: Floats, power: float) -> CellCoefficient:
         """Coefficient of a surface that moves, of values at the texels at rest [C, n, n]; see `TexelMesh.stencil`."""
         fields = [self.topology.with_halo(each) for each in (values, softening)]
-        quads = np.where(self._per_area > 0, _padded(conductance(*map(self._at_corners, fields))), _ZERO)
+        quads = np.where(self._per_area > 0, _with_zeros(conductance(*map(self._at_corners, fields))), _ZERO)
         return CellCoefficient(QuadCells(quads, self._per_area, self._scale, power), self._special_coefficient(*fields))
 
     def moved(self, around: Floats, coefficient: CellCoefficient) -> tuple[Stencil, Floats]:
@@ -170,7 +170,7 @@ class TexelCells:
     def _per_area(self) -> Floats32:
         """One over the areas of whole quads at rest, see `QuadCells`; 0 where there is none."""
         areas = self._quad_areas()
-        return _padded(np.divide(1, areas, out=np.zeros_like(areas), where=areas > 0))
+        return _with_zeros(np.divide(1, areas, out=np.zeros_like(areas), where=areas > 0))
 
     def _quad_areas(self) -> Floats:
         """Areas of whole quads at rest in units of 1 / scale^2, [C, n + 1, n + 1]; 0 where there is none."""
@@ -236,7 +236,7 @@ class TexelCells:
         return [field[..., r : rows + r, c : columns + c] for r, c in CORNERS]
 
 
-def _padded(quads: Floats) -> Floats32:
+def _with_zeros(quads: Floats) -> Floats32:
     """Values of quads [C, n + 1, n + 1] at their south-west corners among the places of a field with halo."""
     return np.pad(quads, ((0, 0), (0, 1), (0, 1))).astype(np.float32)
 

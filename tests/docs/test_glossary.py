@@ -60,12 +60,10 @@ RETIRED = {
 
 # Retired words that stay: the beginning of the path, the word, and why.
 ALLOWED = [
-    ("solver/layouts/sphere_map/", "ring", "the one-ring of a vertex"),
+    ("solver/layouts/", "ring", "the one-ring of a vertex"),
     ("solver/layouts/sphere_map/", "carried", "area of collapsed vertices, which the kept ones stand for"),
-    ("solver/layouts/sphere_map/", "ahead", "a trial step of the descent"),
-    ("solver/layouts/sphere_map/", "folded", "a triangle that the map turns over"),
-    ("solver/layouts/patches/", "folded", "a triangle that the map turns over"),
-    ("solver/layouts/patches/", "folded", "a texel whose neighbours turn over"),
+    ("solver/layouts/", "ahead", "a trial step of the descent"),
+    ("solver/layouts/", "folded", "a triangle or a texel that the map turns over"),
     ("solver/texels/texel_mesh.py", "folded", "a texel whose neighbours turn over"),
     ("solver/mesh/", "folded", "a polygon that turns over"),
     ("solver/", "piece", "part of a triangle, cut at the edges of the cube"),
