@@ -187,12 +187,10 @@ def star_energy(terms: Floats, degree: int, density: Density, move: Vector) -> f
 
 
 @kernel
-def star_slopes(
-    terms: Floats, degree: int, density: Density, curved: bool
-) -> tuple[float, float, float, float, float, float]:
+def star_slopes(terms: Floats, degree: int, density: Density) -> tuple[float, float, float, float, float, float]:
     """Energy, gradient x, y and Hessian xx, xy, yy at rest; the energy is infinite if a triangle is folded.
 
-    `curved`: on the sphere a tangent step also falls towards the centre, and the Hessian loses the radial slope.
+    On the sphere a tangent step also falls towards the centre, and the Hessian loses the radial slope.
     """
     energy = gx = gy = radial = hxx = hxy = hyy = 0.0
     for i in range(degree):
@@ -210,8 +208,6 @@ def star_slopes(
         hxx += area * (flat + dx * ddx + jx * jjx)
         hyy += area * (flat + dy * ddy + jy * jjy)
         hxy += area * (dx * ddy + jx * jjy)
-    if not curved:
-        radial = 0.0
     return energy, gx, gy, hxx - radial, hxy, hyy - radial
 
 
@@ -238,41 +234,33 @@ def newton_direction(gx: float, gy: float, hxx: float, hxy: float, hyy: float) -
 
 
 @kernel
-def tangent_move(a: float, b: float, curved: bool) -> Vector:
-    """Move dx, dy, dz that takes p to p + a x + b y, brought back to the sphere if `curved`."""
+def tangent_move(a: float, b: float) -> Vector:
+    """Move dx, dy, dz that takes p to p + a x + b y, brought back to the sphere."""
     square = a * a + b * b
     length = np.sqrt(1.0 + square)
-    if curved:
-        return a / length, b / length, -square / (length * (1.0 + length))
-    return a, b, 0.0
+    return a / length, b / length, -square / (length * (1.0 + length))
 
 
 @kernel
-def descend(terms: Floats, degree: int, density: Density, freedom: int, curved: bool) -> tuple[float, Vector]:
+def descend(terms: Floats, degree: int, density: Density) -> tuple[float, Vector]:
     """How far the energy of a star falls by a Newton step of its vertex that folds nothing, and the move."""
     stay = (0.0, 0.0, 0.0)
-    energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, density, curved)
+    energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, density)
     if not energy < np.inf:
         return 0.0, stay
-    if freedom == FREE:
-        sx, sy = newton_direction(gx, gy, hxx, hxy, hyy)
-    elif freedom == COLUMN:
-        sx, sy = -gx / max(abs(hxx), 1e-300), 0.0
-    else:
-        sx, sy = 0.0, -gy / max(abs(hyy), 1e-300)
+    sx, sy = newton_direction(gx, gy, hxx, hxy, hyy)
     descent = -(gx * sx + gy * sy)
     if not descent > 1e-13 * energy:
         return 0.0, stay
-    length = np.sqrt(sx * sx + sy * sy)
-    step = min(1.0, REACH / length)
+    step = min(1.0, REACH / np.sqrt(sx * sx + sy * sy))
     for _ in range(MOST_TRIALS):
-        move = tangent_move(step * sx, step * sy, curved)
+        move = tangent_move(step * sx, step * sy)
         lower = star_energy(terms, degree, density, move)
         if lower < energy - ARMIJO * step * descent:
             further = 2.0 * lower < energy  # high up a wall a Newton step is far too short
-            while further and (curved or step * length < REACH):
+            while further:
                 step *= 2.0
-                ahead = tangent_move(step * sx, step * sy, curved)
+                ahead = tangent_move(step * sx, step * sy)
                 least = star_energy(terms, degree, density, ahead)
                 further = 2.0 * least < lower
                 if least < lower:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...errors import SphereMapError
 from ...kernel import Floats, Ints32, kernel
 from ...mesh.vectors import Vector, combine, cross, dot, row, subtract, unit
-from ..energy import FOLDED, FREE, TERMS, Density, Reference, descend, energy_density, expand_star, star_energy
+from ..energy import FOLDED, TERMS, Density, Reference, descend, energy_density, expand_star, star_energy
 from ..newton import CG_TOLERANCE, System, add_triangle, conjugate_gradients, descend_by_newton, line_search
 from .certificate import align, areas, certify
 from .decimation import CornerTable, corner_table, decimate, following, gather_star, preceding, undo_collapse
@@ -221,7 +221,7 @@ def relax_vertex(
     p = row(S, v)
     x, y = tangent_frame(p)
     expand_star(p, x, y, ring, shapes, degree, terms)
-    fall, move = descend(terms, degree, density, FREE, True)
+    fall, move = descend(terms, degree, density)
     if fall > 0.0:
         S[v, 0], S[v, 1], S[v, 2] = unit(combine(1.0, combine(move[0], x, move[1], y), 1.0 + move[2], p))
     return fall

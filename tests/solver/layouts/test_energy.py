@@ -201,7 +201,7 @@ def test_the_expanded_star_knows_the_energy_of_every_place(v):
     terms, x, y = star_terms(level, S, reference, v)
     at_rest = total_energy(level.tail, S, reference)
     for a, b in np.random.default_rng(v).uniform(-0.05, 0.05, (10, 2)):
-        move = tangent_move(a, b, True)
+        move = tangent_move(a, b)
         moved = S.copy()
         moved[v] += move[0] * x + move[1] * y + move[2] * S[v]
         assert np.linalg.norm(moved[v]) == pytest.approx(1, abs=1e-15)
@@ -214,8 +214,8 @@ def test_the_expanded_star_sees_folds():
     V, F = icosphere(2)
     level, reference = whole_level(V, F)
     terms, *_ = star_terms(level, V, reference, 20)
-    assert star_energy(terms, len(terms), SPHERE, tangent_move(0.05, 0.0, True)) < np.inf
-    assert star_energy(terms, len(terms), SPHERE, tangent_move(0.9, 0.0, True)) == np.inf
+    assert star_energy(terms, len(terms), SPHERE, tangent_move(0.05, 0.0)) < np.inf
+    assert star_energy(terms, len(terms), SPHERE, tangent_move(0.9, 0.0)) == np.inf
 
 
 def test_slopes_of_the_expanded_star_are_those_of_its_energy():
@@ -225,9 +225,9 @@ def test_slopes_of_the_expanded_star_are_those_of_its_energy():
     degree, h = len(terms), 1e-4
 
     def at(a, b):
-        return star_energy(terms, degree, SPHERE, tangent_move(a, b, True))
+        return star_energy(terms, degree, SPHERE, tangent_move(a, b))
 
-    energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, SPHERE, True)
+    energy, gx, gy, hxx, hxy, hyy = star_slopes(terms, degree, SPHERE)
     assert energy == pytest.approx(at(0.0, 0.0), rel=1e-14)
     assert [gx, gy] == pytest.approx([(at(h, 0) - at(-h, 0)) / (2 * h), (at(0, h) - at(0, -h)) / (2 * h)], rel=1e-4)
     assert hxx == pytest.approx((at(h, 0) - 2 * energy + at(-h, 0)) / h**2, rel=1e-3)
