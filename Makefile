@@ -1,19 +1,20 @@
 # make demo   sets up what running needs, then renders out/demo.mp4
 # make test   sets everything up, then runs the tests
+# make test-mujoco  runs the tests of the coupling with each version of MuJoCo that is supported
 # make fuzz   10,000 strange inputs for each of the tests in tests/fuzz
 # make lint   ruff, mypy and the layers of packages
 # make docs   the documentation, into build/docs
 # make sphere-maps  writes the sphere maps of the shipped scenes again, after a change of a mesh or of the mapping
 # make package  builds the distributions and tries them on every Python that is here
-# make clean  removes what was built and rendered, but not .venv
+# make clean  removes what was built and rendered, but not .venv and .venv-mujoco
 
 BIN := .venv/bin
 RUNNING := .venv/.running
 ALL := .venv/.installed
-KERNELS := solver/__pycache__/.kernels
 TYPES := build/types
+MUJOCOS := mujoco==3.16.0 mujoco==3.17.0 mujoco-core==4.0.1
 
-.PHONY: setup demo test fuzz lint docs package sphere-maps types clean
+.PHONY: setup demo test test-mujoco fuzz lint docs package sphere-maps types clean
 
 # what running needs; the targets for which that is too little set up the rest
 setup: $(RUNNING)
@@ -26,22 +27,27 @@ $(ALL): requirements.txt requirements-dev.txt pyproject.toml .ci/setup .ci/egl.p
 	.ci/setup requirements-dev.txt
 	@touch $(RUNNING) $@
 
-# numba notices a changed kernel only by its own file, not by the files of the kernels that it calls.
-$(KERNELS): $(shell find solver ripple_sim/coupling -name "*.py")
-	@find solver ripple_sim -name '*.nb[ic]' -delete
-	@mkdir -p $(@D) && touch $@
-
-demo: setup $(KERNELS)
+demo: setup
 	$(BIN)/ripple-sim render duck -o out/demo.mp4
 
 # two processes, each with OpenGL and kernels of its own: as many as the smallest machine has cores, which threads of BLAS
 # would only fight for; compiled modules are kept even where the environment says not to, since each of a hundred
 # commands would compile them again
-test: $(ALL) $(KERNELS)
+test: $(ALL)
 	OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal
 
+# each version is alone in a folder, which Python searches before .venv; all else is that of .venv
+test-mujoco: $(ALL)
+	for package in $(MUJOCOS); do \
+	    folder=.venv-mujoco/$$package; \
+	    [ -d $$folder ] || { $(BIN)/pip install -q --no-deps --target $$folder.new $$package && mv $$folder.new $$folder; } || exit 1; \
+	    echo $$package; \
+	    PYTHONPATH=$$folder OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal -q \
+	        tests/coupling || exit 1; \
+	done
+
 # much more of tests/fuzz, by chance; what it finds is kept in .hypothesis, and tried first the next time
-fuzz: $(ALL) $(KERNELS)
+fuzz: $(ALL)
 	RIPPLE_SIM_FUZZ=10000 $(BIN)/python -m pytest tests/fuzz -n 2
 
 # mypy and the documentation know nothing of setuptools' package-dir, so they are shown the package as it is installed,
@@ -62,7 +68,7 @@ docs: $(ALL) types
 package: $(ALL)
 	.ci/package
 
-sphere-maps: setup $(KERNELS)
+sphere-maps: setup
 	$(BIN)/python .ci/sphere_maps.py
 
 clean:

@@ -4,7 +4,7 @@ import numpy as np
 
 from ripple_sim.coupling.geoms import TARGET_TYPES, find_geom
 from ripple_sim.coupling.target_mesh import target_mesh
-from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene import load_scene
 from ripple_sim.scene.scene import shipped_scenes
 from ripple_sim.scenes.sphere_maps import FOLDER, sphere_map_path
 from ripple_sim.solver.errors import MeshError

@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw
 
 from ripple_sim.bench import sphere_modes
 from ripple_sim.solver import WaveSolver, sphere_atlas
-from ripple_sim.solver.operator.assembly import OPERATORS
+from ripple_sim.solver.operator import OPERATORS
 
 sys.path.append(str(Path(__file__).parents[0] / "benchmarks"))
 from arrival import arrivals, plane_arrival

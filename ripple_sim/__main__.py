@@ -1,7 +1,14 @@
-"""`python -m ripple_sim`, the same as the `ripple-sim` command."""
+"""Where the program starts, as `ripple-sim` or `python -m ripple_sim`: first of all, signals follow one rule."""
 
+import atexit
 import sys
 
-from ripple_sim.cli.start import main
+from ripple_sim.cli.signals import end_at_once, finish_undisturbed
 
-sys.exit(main())
+end_at_once()
+atexit.register(finish_undisturbed)  # the first, so that it is called after all others
+
+from ripple_sim.cli.main import main  # noqa: E402
+
+if __name__ == "__main__":
+    sys.exit(main())

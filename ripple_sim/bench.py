@@ -46,11 +46,11 @@ def measure(meshes: Sequence[Path] = (), say: Callable[[str], object] = lambda s
     info = collect()
     report: Report = {
         "machine": {
-            "version": info.versions["ripple-sim"],
-            "system": info.system,
-            "processors": info.processors,
-            "renderer": info.opengl.renderer if info.opengl else "no OpenGL",
-            "software": info.opengl.software if info.opengl else None,
+            "version": info["versions"]["ripple-sim"],
+            "system": info["system"],
+            "processors": info["processors"],
+            "renderer": info["opengl"]["renderer"] if info["opengl"] else "no OpenGL",
+            "software": info["opengl"]["software"] if info["opengl"] else None,
         }
     }
     stages: dict[str, Callable[[], Any]] = {

@@ -8,7 +8,6 @@ driver's own EGL library. Mesa's driver then opens a render node, /dev/dri/rende
 from __future__ import annotations
 
 import ctypes
-import dataclasses
 import grp
 import importlib.metadata
 import json
@@ -17,6 +16,9 @@ import platform
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+
+import mujoco
 
 from ripple_sim.solver.backends.backend import auto_backend, measured
 from ripple_sim.solver.errors import GLError
@@ -49,7 +51,7 @@ def find_problems(software: bool | None, devices: Path = Path("/dev")) -> list[s
         # a missing library explains the rest
         return list(_library_problems()) or list(_vendor_problems()) or list(_device_problems(devices))
     found = [*_device_problems(devices), *_nvidia_problems(devices)]
-    if found or any(_gpus(devices)):
+    if found or _render_nodes(devices) or any(devices.glob("nvidia[0-9]*")):
         return found
     return [
         f"OpenGL runs in software, on the processor: there is no GPU ({devices}/dri/renderD* or {devices}/nvidia*): "
@@ -137,10 +139,6 @@ def _render_nodes(devices: Path) -> list[Path]:
     return sorted((devices / "dri").glob("renderD*"))
 
 
-def _gpus(devices: Path) -> list[Path]:
-    return [*_render_nodes(devices), *devices.glob("nvidia[0-9]*")]
-
-
 def _group_of(path: Path) -> str:
     number = path.stat().st_gid
     try:
@@ -164,29 +162,19 @@ PACKAGES = (
 )
 
 
-@dataclasses.dataclass(frozen=True)
-class OpenGL:
-    """The driver that renders, in its own words."""
+def collect() -> dict[str, Any]:
+    """Examine this machine; a lack of OpenGL is reported, not raised.
 
-    renderer: str
-    vendor: str
-    version: str
-    software: bool
-
-
-@dataclasses.dataclass(frozen=True)
-class Info:
-    """What `ripple-sim info` reports.
-
-    Attributes
-    ----------
+    Returns
+    -------
     versions : dict
         Version of ripple-sim, Python and each main dependency; None if it is not installed.
     system : str
         Operating system and architecture.
     processors : int
-    opengl : OpenGL or None
-        None if there is no usable context; `advice` then says what to install.
+    opengl : dict or None
+        The driver's `renderer`, `vendor` and `version` in its own words, and whether it is `software`; None if there is
+        no usable context; `advice` then says what to install.
     backend : str
         The wave solver of "auto": "gl" or "cpu".
     measured : str
@@ -194,57 +182,47 @@ class Info:
     advice : str
         Problems that prevent or slow down rendering, with their fixes, one per line; "" if there is none.
     """
-
-    versions: dict[str, str | None]
-    system: str
-    processors: int
-    opengl: OpenGL | None
-    backend: str
-    measured: str
-    advice: str
-
-
-def collect() -> Info:
-    """Examine this machine; a lack of OpenGL is reported, not raised."""
     opengl, failure = None, ""
     try:
         context = shared_context()
     except GLError as error:
         failure = str(error)
     else:
-        opengl = OpenGL(context.renderer, context.vendor, context.version, context.software)
-    findings = find_problems(opengl.software if opengl else None)
-    return Info(
-        versions={"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
-        system=platform.platform(),
-        processors=os.cpu_count() or 1,
-        opengl=opengl,
-        backend=auto_backend(),
-        measured=str(measured(context)) if opengl and not opengl.software else "",
-        advice="\n".join(findings) or failure,
-    )
+        opengl = {name: getattr(context, name) for name in ("renderer", "vendor", "version", "software")}
+    findings = find_problems(opengl["software"] if opengl else None)
+    return {
+        "versions": {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
+        "system": platform.platform(),
+        "processors": os.cpu_count() or 1,
+        "opengl": opengl,
+        "backend": auto_backend(),
+        "measured": str(measured(context)) if opengl and not opengl["software"] else "",
+        "advice": "\n".join(findings) or failure,
+    }
 
 
-def as_text(info: Info) -> str:
+def as_text(info: dict[str, Any]) -> str:
     """Format the report as text."""
-    gl = info.opengl
-    where = "on the CPU" if info.backend == "cpu" else "on the GPU, in OpenGL compute shaders"
+    gl = info["opengl"]
+    where = "on the CPU" if info["backend"] == "cpu" else "on the GPU, in OpenGL compute shaders"
     rows = {
-        **{name: version or "not installed" for name, version in info.versions.items()},
-        "system": f"{info.system}, {info.processors} processors",
-        "OpenGL": f"{gl.version}, {gl.vendor}" if gl else "none",
-        "renderer": f"{gl.renderer} ({'software' if gl.software else 'hardware'})"
+        **{name: version or "not installed" for name, version in info["versions"].items()},
+        "system": f"{info['system']}, {info['processors']} processors",
+        "OpenGL": f"{gl['version']}, {gl['vendor']}" if gl else "none",
+        "renderer": f"{gl['renderer']} ({'software' if gl['software'] else 'hardware'})"
         if gl
         else "none: rendering is impossible",
-        "waves": f"{info.backend} (auto: {where})",
-        **({"measured": f"nine substeps: {info.measured}"} if info.measured else {}),
+        "waves": f"{info['backend']} (auto: {where})",
+        **({"measured": f"nine substeps: {info['measured']}"} if info["measured"] else {}),
     }
     width = max(map(len, rows))
     lines = [f"{name:<{width}}  {value}" for name, value in rows.items()]
-    return "\n".join([*lines, *(["", info.advice] if info.advice else [])])
+    return "\n".join([*lines, *(["", info["advice"]] if info["advice"] else [])])
 
 
 def _version(name: str) -> str | None:
+    if name == "mujoco":  # installed under that name, or as `mujoco-core`
+        return mujoco.__version__
     try:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:

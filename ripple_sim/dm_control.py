@@ -2,25 +2,40 @@
 
 from __future__ import annotations
 
+import functools
+import warnings
+from collections.abc import Callable, Mapping
 from typing import Any
+
+import mujoco
+from numpy.typing import NDArray
 
 from ripple_sim.coupling.geoms import ByGeom
 from ripple_sim.coupling.ripples import Ripples
+from ripple_sim.errors import RenderError, RippleWarning
+from ripple_sim.export.renderer import RippleRenderer
 from ripple_sim.solver import Material
 
 
-def couple(physics: Any, materials: ByGeom[Material], **options: Any) -> Ripples:
-    """Make a dm_control `Physics` ripple: from now on each of its physics steps drives the ripples.
+def couple(physics: Any, materials: ByGeom[Material], *, looks: ByGeom[str] | None = None, **options: Any) -> Ripples:
+    """Make a dm_control `Physics` or environment ripple: from now on each of its physics steps drives the ripples.
 
     `physics.step(nstep)` couples every one of its steps, also where dm_control begins the next one already
     (`legacy_step`), so that tasks and environments of dm_control need no change; `physics.reset` flattens the surfaces.
-    To draw, give `physics.model`, the ripples and `physics.data` to a `RippleRenderer`.
+    `physics.render` takes what it took before, and draws with the ripples, through `RippleRenderer`; text (`overlays`)
+    is not drawn, and render flags have no effect.
+
+    An environment of `composer` makes a new physics for each episode: give the environment, and the ripples are made
+    anew with it, in the same `Ripples`.
 
     Parameters
     ----------
     physics : dm_control.mujoco.Physics
+        Or an environment, of `control` or `composer`.
     materials : mapping
         Geom to its `Material`, as for `Ripples`.
+    looks : mapping, optional
+        Geom to its look, as for `RippleRenderer`.
     **options
         Keyword arguments of `Ripples`.
 
@@ -34,7 +49,21 @@ def couple(physics: Any, materials: ByGeom[Material], **options: Any) -> Ripples
     RippleError
         As `Ripples` does.
     """
+    environment, physics = physics, getattr(physics, "physics", physics)
     ripples = Ripples(physics.model, materials, **options)
+    _follow(physics, ripples, looks)
+    if hasattr(environment, "add_extra_hook"):
+
+        def begin_anew(physics: Any, _: Any) -> None:
+            Ripples.__init__(ripples, physics.model, materials, **options)
+            _follow(physics, ripples, looks)
+
+        environment.add_extra_hook("after_compile", begin_anew)
+    return ripples
+
+
+def _follow(physics: Any, ripples: Ripples, looks: ByGeom[str] | None) -> None:
+    """Have a physics drive the ripples and draw with them."""
     step, reset = physics.step, physics.reset
 
     def rippling_step(*args: Any, **kwargs: Any) -> None:
@@ -45,5 +74,35 @@ def couple(physics: Any, materials: ByGeom[Material], **options: Any) -> Ripples
         reset(*args, **kwargs)
         ripples.reset()
 
-    physics.step, physics.reset = rippling_step, rippling_reset
-    return ripples
+    @functools.cache
+    def renderer_of(height: int, width: int) -> RippleRenderer:
+        return RippleRenderer(physics.model, ripples, height, width, looks=looks)
+
+    def rippling_render(
+        height: int = 240,
+        width: int = 320,
+        camera_id: Any = -1,
+        overlays: Any = (),
+        depth: bool = False,
+        segmentation: bool = False,
+        scene_option: Any = None,
+        render_flag_overrides: Mapping[Any, bool] | None = None,
+        scene_callback: Callable[[Any, mujoco.MjvScene], None] | None = None,
+    ) -> NDArray:
+        if depth and segmentation:
+            raise RenderError("both depth and segmentation are True; valid is one of them")
+        renderer = renderer_of(height, width)
+        renderer.update_scene(physics.data, camera_id, getattr(scene_option, "ptr", scene_option))
+        if overlays or render_flag_overrides:
+            warnings.warn("overlays and render_flag_overrides are not drawn", RippleWarning, stacklevel=2)
+        if scene_callback is not None:
+            scene_callback(physics, renderer.scene)
+        renderer.disable_depth_rendering()
+        renderer.disable_segmentation_rendering()
+        if depth:
+            renderer.enable_depth_rendering()
+        if segmentation:
+            renderer.enable_segmentation_rendering()
+        return renderer.render()
+
+    physics.step, physics.reset, physics.render = rippling_step, rippling_reset, rippling_render

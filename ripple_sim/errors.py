@@ -3,8 +3,8 @@
 from ripple_sim.solver.errors import RippleError, RippleWarning
 
 __all__ = [
-    "BatchError", "DisplayError", "EncodingError", "ExportError", "RippleError", "RippleWarning", "SceneError",
-    "SimulationError", "VideoError",
+    "BatchError", "DisplayError", "EncodingError", "ExportError", "RenderError", "RippleError", "RippleWarning",
+    "SceneError", "SimulationError", "VideoError",
 ]  # fmt: skip
 
 
@@ -26,6 +26,10 @@ class EncodingError(RippleError):
 
 class SceneError(RippleError):
     """A scene file, an MJCF, or a geom named in it is invalid."""
+
+
+class RenderError(SceneError, ValueError):
+    """A renderer is given what it cannot take; a ValueError, as in `mujoco.Renderer`."""
 
 
 class SimulationError(RippleError):

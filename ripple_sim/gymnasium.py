@@ -10,12 +10,12 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.coupling.geoms import ByGeom, own_data, own_model
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.export.exporter import RippleRenderer
-from ripple_sim.render import Camera, FixedCamera
+from ripple_sim.export.renderer import RippleRenderer
 from ripple_sim.solver import Material
 
 try:
@@ -27,8 +27,7 @@ except ImportError as error:
         "pip install 'ripple-sim[gymnasium]'"
     ) from error
 
-# Of MuJoCo's cameras, and of frames where an environment does not say.
-_AZIMUTH, _ELEVATION, _SIZE = 90.0, -45.0, 480
+_SIZE = 480  # of frames where an environment does not say [pixels]
 
 
 def model_and_data(env: Any) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -55,43 +54,29 @@ def frame_size(env: Any) -> tuple[int, int]:
     return getattr(viewer, "width", None) or _SIZE, getattr(viewer, "height", None) or _SIZE
 
 
-class EnvironmentCamera:
-    """The camera with which a `MujocoEnv` renders offscreen.
+def environment_camera(env: Any, model: mujoco.MjModel, lookat: NDArray[np.float64]) -> mujoco.MjvCamera:
+    """The camera with which an unwrapped `MujocoEnv` renders offscreen.
 
     That is the one of its `camera_id` or `camera_name`, or else MuJoCo's free camera with the environment's
-    `default_camera_config`, aimed at the median of the geoms as they are when the first frame is drawn.
-
-    Parameters
-    ----------
-    env : gymnasium.Env
-        Unwrapped.
+    `default_camera_config`, aimed at a point [m]: in Gymnasium the median of the geoms when the first frame is drawn.
     """
-
-    def __init__(self, env: Any) -> None:
-        viewer = getattr(env, "mujoco_renderer", None)
-        self._index = int(getattr(viewer, "camera_id", -1))
-        self._settings: dict[str, Any] = dict(getattr(viewer, "default_cam_config", None) or {})
-
-    def __call__(self, model: mujoco.MjModel, data: mujoco.MjData) -> Camera | FixedCamera:
-        """The camera at the present time."""
-        if self._index >= 0:
-            return FixedCamera(
-                position=data.cam_xpos[self._index].copy(),
-                rotation=data.cam_xmat[self._index].reshape(3, 3).copy(),
-                distance=float(model.stat.extent),
-                fovy=float(model.cam_fovy[self._index]),
-            )
-        x, y, z = self._settings.setdefault("lookat", np.median(data.geom_xpos, axis=0))
-        return Camera(
-            lookat=(float(x), float(y), float(z)),
-            distance=float(self._settings.get("distance", model.stat.extent)),
-            azimuth=float(self._settings.get("azimuth", _AZIMUTH)),
-            elevation=float(self._settings.get("elevation", _ELEVATION)),
-            fovy=float(model.vis.global_.fovy),
-        )
+    viewer, camera = getattr(env, "mujoco_renderer", None), mujoco.MjvCamera()
+    camera.lookat, camera.distance = lookat, model.stat.extent
+    for name, value in (getattr(viewer, "default_cam_config", None) or {}).items():
+        setattr(camera, name, value)
+    camera.fixedcamid = int(getattr(viewer, "camera_id", -1))
+    free = camera.fixedcamid == -1
+    camera.type = mujoco.mjtCamera.mjCAMERA_FREE if free else mujoco.mjtCamera.mjCAMERA_FIXED
+    return camera
 
 
-_DRAWN = "rgb_array"
+def depth_buffer(model: mujoco.MjModel, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What Gymnasium returns for depths [m]: MuJoCo's depth buffer, 0 at the near plane and 1 at the far one."""
+    near, far = model.stat.extent * np.array([model.vis.map.znear, model.vis.map.zfar])
+    return np.clip((1 / near - 1 / depth.astype(np.float64)) / (1 / near - 1 / far), 0, 1).astype(np.float32)
+
+
+_DRAWN = ("rgb_array", "depth_array", "rgbd_tuple")
 
 
 class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
@@ -103,8 +88,8 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
     - `"impulses"`: list of `Impulse`, those that the surfaces received since the last `step` or `reset`;
     - `"heights"`: geom name to the heights of its ripples [m], float32 [C, n, n].
 
-    With `render_mode="rgb_array"`, `render` returns a frame with the ripples, drawn by ripple-sim, of the environment's
-    size and from its camera. Other modes draw without them. Observation, reward and their spaces are those of the
+    With the modes "rgb_array", "depth_array" and "rgbd_tuple", `render` returns what Gymnasium's own would, with the
+    ripples, drawn by ripple-sim. Other modes draw without them. Observation, reward and their spaces are those of the
     environment. A pickled or copied environment begins anew, as Gymnasium's own ones do.
 
     Parameters
@@ -142,15 +127,15 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         RecordConstructorArgs.__init__(self, materials=materials, looks=looks, **options)
         EzPickle.__init__(self, env, materials, looks=looks, **options)
         gymnasium.Wrapper.__init__(self, env)
-        if self.render_mode not in (None, _DRAWN):
+        if self.render_mode not in (None, *_DRAWN):
             warnings.warn(
-                f'render_mode is {self.render_mode!r}, which shows no ripples; with "{_DRAWN}" `render` returns frames '
-                "with them",
+                f"render_mode is {self.render_mode!r}, which shows no ripples; with {', '.join(map(repr, _DRAWN))} "
+                "`render` returns frames with them",
                 RippleWarning,
                 stacklevel=2,
             )
         self._materials, self._looks, self._options = materials, looks, options
-        self._camera = EnvironmentCamera(env.unwrapped)
+        self._lookat: NDArray[np.float64] | None = None
         self._couple()
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -171,17 +156,33 @@ class RippleWrapper(gymnasium.Wrapper, EzPickle, RecordConstructorArgs):
         return observation, {**info, **self._info()}
 
     def render(self) -> Any:
-        """Return a frame with the ripples in mode "rgb_array", uint8 [height, width, 3]; else as the environment."""
-        if self.render_mode != _DRAWN:
+        """Return a frame, uint8 [height, width, 3], its depth buffer, float32 [height, width], or both, by the mode.
+
+        The depth buffer is 0 at MuJoCo's near plane and 1 at its far one. Other modes are the environment's.
+        """
+        if self.render_mode not in _DRAWN:
             return self.env.render()
         model, data = model_and_data(self.unwrapped)
         if self._renderer is None:
             width, height = frame_size(self.unwrapped)
             self._renderer = RippleRenderer(model, self.ripples, width=width, height=height, looks=self._looks)
-        return self._renderer.render(data, self._camera(model, data))
+        if self._lookat is None:
+            self._lookat = np.median(data.geom_xpos, axis=0)
+        renderer, option = self._renderer, mujoco.MjvOption()
+        for flag, value in (getattr(getattr(self.unwrapped, "mujoco_renderer", None), "_vopt", None) or {}).items():
+            option.flags[flag] = value
+        renderer.update_scene(data, environment_camera(self.unwrapped, model, self._lookat), option)
+        frames = [] if self.render_mode == "depth_array" else [renderer.render()]
+        if self.render_mode != "rgb_array":
+            renderer.enable_depth_rendering()
+            frames.append(depth_buffer(model, renderer.render()))
+            renderer.disable_depth_rendering()
+        return frames[0] if len(frames) == 1 else tuple(frames)
 
     def close(self) -> None:
         """Close the environment, and release what drawing needs."""
+        if self._renderer is not None:
+            self._renderer.close()
         self._renderer = None
         self.env.close()
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable
-from typing import Protocol, Self
+from typing import Any, Self
 
 import mujoco
 
+from ripple_sim.coupling.energy import Energy
 from ripple_sim.coupling.geoms import find_target, target_name
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.coupling.stepping import divergence, physics_errors
@@ -16,27 +17,11 @@ from ripple_sim.errors import SceneError, SimulationError
 from ripple_sim.scene.events import Script
 from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import apply_maps, uniform_material
+from ripple_sim.solver.errors import FUNCTION, POSITIVE, checked, instance
 from ripple_sim.solver.kernel import work_clock
 
 # More is a mistake in a unit, and would seem to hang.
 _MOST_STEPS_PER_FRAME = 100_000
-
-
-class SimulationOptions(Protocol):
-    """What the options of a video, an export or a batch say of the simulation itself; see `Simulation`."""
-
-    @property
-    def rate(self) -> float:
-        """Frames in a second of the scene's time."""
-
-    @property
-    def resolution(self) -> int | None: ...  # noqa: D102
-    @property
-    def layout(self) -> str | None: ...  # noqa: D102
-    @property
-    def rim(self) -> str | None: ...  # noqa: D102
-    @property
-    def backend(self) -> str: ...  # noqa: D102
 
 
 class Simulation:
@@ -72,6 +57,7 @@ class Simulation:
         Of the present frame, so far.
     """
 
+    @checked(SceneError, scene=instance(Scene, ", from load_scene or drop_scene"), fps=POSITIVE, on_step=FUNCTION)
     def __init__(
         self,
         scene: Scene,
@@ -105,7 +91,11 @@ class Simulation:
         )
         for entry in scene.targets:
             apply_maps(self.ripples, entry)
-        self._apply_limits()
+        self.limited = {}
+        for entry in scene.targets:
+            self.limited[target_name(self.model, find_target(self.model, entry.geom))] = entry.limit
+            if not (entry.limit and entry.warn):
+                self.ripples.allow_any_height(entry.geom)
         self._heights = {
             entry.geom: entry.height.heights(self.ripples, entry.geom)
             for entry in scene.targets
@@ -122,12 +112,12 @@ class Simulation:
     def of(
         cls,
         scene: Scene,
-        options: SimulationOptions,
+        options: Any,
         *,
         operator: str = "fem",
         on_step: Callable[[Simulation], None] | None = None,
     ) -> Self:
-        """Simulation of a scene as options say."""
+        """Simulation of a scene as the options of a video or an export say, by their `rate` and names as above."""
         return cls(
             scene,
             fps=options.rate,
@@ -148,6 +138,11 @@ class Simulation:
     def substeps_taken(self) -> int:
         """Wave steps so far, on all targets."""
         return sum(self.ripples[name].substeps_taken for name in self.ripples)
+
+    @property
+    def energy(self) -> Energy:
+        """Energy of bodies, of waves, and of both [J]; see `Ripples.energy`."""
+        return self.ripples.energy(self.data)
 
     def advance_frame(self) -> None:
         """Advance physics and waves to the next frame; `impulses` then holds all since the last one.
@@ -179,7 +174,12 @@ class Simulation:
         with physics_errors():
             mujoco.mj_step(self.model, self.data)
         stepped = work_clock()
-        self._check_state()
+        broken = divergence(self.data)
+        if broken is not None:
+            raise SimulationError(
+                f"the physics became unstable at {self.data.time:.4g} s ({broken}); "
+                "use a shorter time step in the MJCF's <option>, or softer contacts"
+            )
         self.ripples.step(self.data)
         self.impulses += self.ripples.last_impulses
         self.physics_seconds += stepped - start
@@ -202,13 +202,6 @@ class Simulation:
         for geom, height in self._heights.items():
             self.ripples[geom].add_height(height)
 
-    def _apply_limits(self) -> None:
-        self.limited = {}
-        for entry in self.scene.targets:
-            self.limited[target_name(self.model, find_target(self.model, entry.geom))] = entry.limit
-            if not (entry.limit and entry.warn):
-                self.ripples.allow_any_height(entry.geom)
-
     def _reset_bodies(self) -> None:
         if self.model.nkey:
             mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
@@ -216,14 +209,6 @@ class Simulation:
             mujoco.mj_resetData(self.model, self.data)
         with physics_errors():
             mujoco.mj_forward(self.model, self.data)
-
-    def _check_state(self) -> None:
-        broken = divergence(self.data)
-        if broken is not None:
-            raise SimulationError(
-                f"the physics became unstable at {self.data.time:.4g} s ({broken}); "
-                "use a shorter time step in the MJCF's <option>, or softer contacts"
-            )
 
 
 def _steps_per_frame(fps: float, timestep: float) -> int:

@@ -7,11 +7,16 @@ memory, results are for the next one who asks for the same: the next scene of a 
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import functools
 import hashlib
 import os
 import re
+import shutil
+import stat
+import tempfile
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -22,7 +27,7 @@ import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
-from .errors import RippleError
+from .errors import RippleError, RippleWarning
 
 LIMIT = "RIPPLE_SIM_CACHE_LIMIT"  # the environment variable, in megabytes
 _USUAL_LIMIT = 500
@@ -41,8 +46,36 @@ class CachedFile(NamedTuple):
 
 
 def cache_folder() -> Path:
-    """Where the cache is; it need not exist."""
-    return Path(platformdirs.user_cache_dir("ripple-sim"))
+    """Where the cache is. Without a home that can be written it is private and temporary."""
+    try:
+        folder = Path(platformdirs.user_cache_dir("ripple-sim"))
+        if not folder.is_absolute():  # "~/.cache": no HOME, and no such user
+            raise RuntimeError("there is no home directory")
+        folder.mkdir(parents=True, exist_ok=True)
+    except (RuntimeError, OSError) as error:
+        return _private_folder(str(error))
+    return folder
+
+
+@functools.cache
+def _private_folder(reason: str) -> Path:
+    """A folder for temporary files that only this user can read, and a warning, once a process."""
+    folder = Path(tempfile.gettempdir()) / f"ripple-sim-{os.getuid()}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        status = folder.lstat()
+        safe = stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o077
+    except OSError:
+        safe = False
+    if not safe:  # somebody else's
+        folder = Path(tempfile.mkdtemp(prefix="ripple-sim-"))
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    warnings.warn(
+        f"{reason}: kernels and atlases are kept in {folder}; set XDG_CACHE_HOME to a folder that lasts",
+        RippleWarning,
+        stacklevel=2,
+    )
+    return folder
 
 
 def cache_path(name: str, arrays: Iterable[NDArray]) -> Path:
@@ -127,14 +160,9 @@ Result = TypeVar("Result")
 
 
 class Kept(Generic[Result]):
-    """The latest results by their keys. They are shared by all who ask, and not to be changed.
+    """The latest `count` results by their keys, as far as they are `small` enough to be kept.
 
-    Parameters
-    ----------
-    count : int
-        How many at most.
-    small : callable
-        Whether a result is small enough to be kept.
+    They are shared by all who ask, and not to be changed.
     """
 
     def __init__(self, count: int, small: Callable[[Result], bool]) -> None:

@@ -11,8 +11,11 @@ import inspect
 import math
 import numbers
 import os
-from collections.abc import Callable
+import typing
+from collections.abc import Callable, Sequence
 from typing import Any, ParamSpec, TypeVar
+
+import msgspec
 
 
 class RippleError(Exception):
@@ -38,7 +41,7 @@ class SolverError(RippleError):
     """A wave parameter is invalid, or the wave field is no longer finite."""
 
 
-class GLError(RippleError):
+class GLError(RippleError, RuntimeError):
     """No usable OpenGL context, or the driver reported an error."""
 
 
@@ -71,12 +74,14 @@ def is_finite(value: object) -> bool:
 
 def _is_path(value: object) -> bool:
     try:
-        return "\0" not in os.fsdecode(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+        path = os.fspath(value)  # type: ignore[call-overload]
+    except TypeError:
         return False
+    return isinstance(path, str) and "\0" not in path
 
 
 POSITIVE = Valid(lambda value: is_finite(value) and value > 0, "a finite number greater than 0")
+FUNCTION = Valid(lambda value: value is None or callable(value), "a function, or None")
 PATH = Valid(_is_path, "a path: a str or pathlib.Path without a NUL")
 
 
@@ -95,6 +100,36 @@ def instance(kind: type, hint: str = "", *, optional: bool = False) -> Valid:
     )
 
 
+def check_fields(error: type[RippleError], record: Any, **valid: Valid) -> None:
+    """Check the fields of a dataclass by their annotations, and those of these names by more.
+
+    Raises
+    ------
+    RippleError
+        Of the given kind, for the first that is not valid.
+    """
+    for name, hint in typing.get_type_hints(type(record)).items():
+        value = getattr(record, name)
+        try:
+            msgspec.convert(value, hint)
+        except msgspec.ValidationError:
+            raise error(f"{name.replace('_', ' ')} is {shown(value)}; valid is {_words(hint)}") from None
+        if name in valid and not valid[name].holds(value):
+            raise error(f"{name.replace('_', ' ')} is {shown(value)}; valid is {valid[name].words}")
+
+
+def _words(hint: Any) -> str:
+    """What an annotation allows, as a message says it: "int or None"."""
+    kind, inner = typing.get_origin(hint), typing.get_args(hint)
+    if kind is typing.Literal:
+        return " or ".join(map(repr, inner))
+    if kind is tuple:
+        return f"({', '.join(map(_words, inner))})"
+    if kind is Sequence:
+        return f"a list of {_words(inner[0])}"
+    return "None" if hint is type(None) else " or ".join(map(_words, inner)) if inner else hint.__name__
+
+
 def shown(value: object) -> str:
     """A value as messages show it, not at any length."""
     try:
@@ -107,16 +142,9 @@ def shown(value: object) -> str:
 def checked(
     error: type[RippleError], **valid: Valid
 ) -> Callable[[Callable[Parameters, Result]], Callable[Parameters, Result]]:
-    """Decorate a function so that arguments of these names are checked before it runs.
+    """Decorate a function so that arguments of these names are checked before it runs; `error` is what is raised.
 
     A wrong number of arguments, or a wrong name, stays Python's TypeError.
-
-    Parameters
-    ----------
-    error : type
-        What is raised.
-    valid : Valid
-        By the argument's name.
     """
 
     def decorate(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:

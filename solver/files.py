@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import math
 import os
 import resource
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,40 +93,31 @@ _CGROUPS = {
 }
 
 
-class Room(NamedTuple):
-    """Memory that is left [bytes], and by what."""
-
-    left: float
-    by: str
-
-
 def require_memory(error: type[RippleError], need: float, what: str, advice: str) -> None:
     """Raise an error if something needs more memory [bytes] than is left, naming both and what sets the limit."""
     if need < _SMALL:
         return
-    room = min(rooms(), default=None)
-    if room is not None and need > room.left:
-        raise error(
-            f"{what} takes {_shown(need)} of memory, but {room.by} leaves {_shown(room.left)}; {advice}, or allow more"
-        )
+    left, by = min(rooms(), default=(math.inf, ""))
+    if need > left:
+        raise error(f"{what} takes {_shown(need)} of memory, but {by} leaves {_shown(left)}; {advice}, or allow more")
 
 
-def rooms(root: Path = Path("/")) -> Iterator[Room]:
-    """What each limit leaves: the machine's free memory, the process's address space (`ulimit -v`), its cgroup's."""
+def rooms(root: Path = Path("/")) -> Iterator[tuple[float, str]]:
+    """What each limit leaves [bytes], and its name: the machine's free memory, `ulimit -v`, the cgroup's limits."""
     free = _table(root / "proc/meminfo")
     if "MemAvailable" in free:
-        yield Room(free["MemAvailable"] + free.get("SwapFree", 0.0), "the machine's free memory")
+        yield free["MemAvailable"] + free.get("SwapFree", 0.0), "the machine's free memory"
     most = resource.getrlimit(resource.RLIMIT_AS)[0]
     used = _table(root / "proc/self/status")
     if most != resource.RLIM_INFINITY:
-        yield Room(most - used.get("VmSize", 0.0), f"the limit of the address space (ulimit -v, {_shown(most)})")
+        yield most - used.get("VmSize", 0.0), f"the limit of the address space (ulimit -v, {_shown(most)})"
     for line in _text(root / "proc/self/cgroup").splitlines():
         _, controllers, name = line.split(":", 2)
         if controllers in ("", "memory"):
             yield from _of_cgroups(root, 1 if controllers else 2, name)
 
 
-def _of_cgroups(root: Path, version: int, name: str) -> Iterator[Room]:
+def _of_cgroups(root: Path, version: int, name: str) -> Iterator[tuple[float, str]]:
     """What the limits of a cgroup and of those above it leave; cached files, which make room, are not counted."""
     controller, limit, usage = _CGROUPS[version]
     top = root / "sys/fs/cgroup" / controller
@@ -136,7 +127,7 @@ def _of_cgroups(root: Path, version: int, name: str) -> Iterator[Room]:
         most, used = _text(folder / limit).strip(), _text(folder / usage).strip()
         if most.isdigit() and used.isdigit():
             cached = _table(folder / "memory.stat", scale=1).get("inactive_file", 0.0)
-            yield Room(int(most) - int(used) + cached, f"the memory limit of the cgroup ({_shown(int(most))})")
+            yield int(most) - int(used) + cached, f"the memory limit of the cgroup ({_shown(int(most))})"
 
 
 def _table(path: Path, scale: int = 1024) -> dict[str, float]:

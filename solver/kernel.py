@@ -2,9 +2,10 @@
 
 A kernel has hints for whoever reads it (numba takes its types from the call), and its docstring gives shapes and
 units. Arrays that belong together travel as one NamedTuple. Each thread runs kernels without the interpreter's lock.
-There is no fast-math unless a kernel asks for it: the same input gives the same output, bit for bit. Compiled kernels
-are kept on disk. Numba notices a change of a kernel's own file only: delete the *.nbi files after editing one that
-others call.
+There is no fast-math unless a kernel asks for it: the same input gives the same output, bit for bit.
+
+Compiled kernels are kept on disk, each with a checksum and a fingerprint of its module and of all that this imports:
+one that is damaged, or older than a source, is compiled anew.
 
 A kernel is compiled at its first call, which takes seconds, once a machine: `compile_times` and `work_clock` tell that
 from work.
@@ -12,23 +13,41 @@ from work.
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import gc
+import hashlib
+import importlib.util
+import os
+import pickle
+import re
+import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numba
 import numpy as np
 from numba.core import event
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.serialize import dumps
 from numba.extending import overload, register_jitable
 from numpy.typing import NDArray
 
+from .cache import cache_folder
+
 
 class _Watch(event.Listener):
-    """Seconds of compilation by module, and in this thread; a kernel that is compiled for another is part of it."""
+    """Seconds of compilation by module, and in this thread; a kernel that is compiled for another is part of it.
+
+    Meanwhile Python looks for no garbage: it would go through all that numba makes, a sixth of the time.
+    """
 
     def __init__(self) -> None:
+        self.collects = False  # whether Python does otherwise
         self.seconds: dict[str, float] = {}
         self.running: tuple[str, float] | None = None  # module, and when it began; numba compiles one at a time
         self.own = threading.local()
@@ -37,12 +56,16 @@ class _Watch(event.Listener):
         """A kernel begins to be compiled."""
         self.own.depth = getattr(self.own, "depth", 0) + 1
         if self.own.depth == 1:
+            self.collects = gc.isenabled()
+            gc.disable()
             self.running = event.data["dispatcher"].py_func.__module__, time.perf_counter()
 
     def on_end(self, event: Any) -> None:
         """It has been compiled."""
         self.own.depth -= 1
         if self.own.depth == 0 and self.running is not None:
+            if self.collects:
+                gc.enable()
             module, start = self.running
             spent = time.perf_counter() - start
             self.seconds[module] = self.seconds.get(module, 0.0) + spent
@@ -88,9 +111,104 @@ def kernel(function: Callable | None = None, **options: Any) -> Any:
     `no_cpython_wrapper=True`: without the code that unpacks what Python hands over. With the environment variable
     NUMBA_DISABLE_JIT=1 kernels are plain Python, for a debugger.
     """
+    if function is None:
+        return functools.partial(kernel, **options)
     # nobody calls kernels through pointers: without the wrappers for that a tenth less is compiled
-    options = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
-    return numba.njit(**options) if function is None else numba.njit(**options)(function)
+    options = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
+    compiled = numba.njit(**options)(function)
+    if compiled is not function:  # which it is with NUMBA_DISABLE_JIT
+        compiled._cache = _KernelCache(function)
+    return compiled
+
+
+class _KernelCache(FunctionCache):
+    """Compiled versions of one kernel on disk, in place of numba's own cache, which trusts whatever its files hold."""
+
+    class _Reducer(CompileResultCacheImpl):
+        """How numba turns what it has compiled into what can be pickled; it need not know where that is kept."""
+
+        def __init__(self, function: Callable) -> None:
+            self._locator = self
+            self._py_file, self._lineno = function.__code__.co_filename, function.__code__.co_firstlineno
+
+        def ensure_cache_path(self) -> None:
+            """Do nothing: files make their folder."""
+
+    def __init__(self, function: Callable) -> None:
+        self._name, self._py_func = repr(function), function
+        self._impl, self._cache_file = self._Reducer(function), self
+        self.enable()
+
+    @property
+    def cache_path(self) -> str:
+        """The folder."""
+        return str(kernel_folder())
+
+    def load(self, key: Any) -> Any:
+        """What was compiled for a key of numba's, or None."""
+        path = self._path(key)
+        try:
+            content = path.read_bytes()
+            if content[:32] == _checksum(path, content[32:]):
+                stored, sources, data = pickle.loads(content[32:])
+                if stored == key and sources == fingerprint(self._py_func.__module__):
+                    return data
+        except Exception:  # whatever a file holds, a kernel can be compiled
+            return None
+        return None
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep what was compiled, unless the disk is full or cannot be written."""
+        path, content = self._path(key), dumps((key, fingerprint(self._py_func.__module__), data))
+        unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+        with contextlib.suppress(OSError):
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                unfinished.write_bytes(_checksum(path, content) + content)
+                unfinished.replace(path)
+            finally:
+                unfinished.unlink(missing_ok=True)
+
+    def _path(self, key: Any) -> Path:
+        name = f"{self._py_func.__module__}.{self._py_func.__qualname__}".replace("<", "").replace(">", "")
+        version = hashlib.sha256(f"{sys.version} {numba.__version__} {key}".encode()).hexdigest()[:16]
+        return kernel_folder() / f"{name}-{version}.kernel"
+
+
+def _checksum(path: Path, content: bytes) -> bytes:
+    return hashlib.sha256(path.name.encode() + content).digest()
+
+
+@functools.cache
+def kernel_folder() -> Path:
+    """Where compiled kernels are: in NUMBA_CACHE_DIR, beside the source, or in the user's cache folder."""
+    if numba.config.CACHE_DIR:
+        return Path(numba.config.CACHE_DIR) / "ripple-sim"
+    beside = Path(__file__).parent / "__pycache__" / "kernels"
+    try:
+        beside.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=beside):
+            return beside
+    except OSError:
+        place = hashlib.sha256(os.fsencode(Path(__file__).parent)).hexdigest()[:12]  # each installation has its own
+        return cache_folder() / "kernels" / place
+
+
+# An import at the top of a module, of the project's own
+_IMPORT = re.compile(r"^from +(\.[.\w]*|ripple_sim[.\w]*) +import +(\([^)]*\)|.*)", re.MULTILINE)
+
+
+@functools.cache
+def fingerprint(module: str) -> str:
+    """Hash of the text of a module of the project and of all that it imports, at whatever distance."""
+    source = Path(sys.modules[module].__file__ or "").read_text(encoding="utf-8")
+    imported = set()
+    for base, names in _IMPORT.findall(source):
+        base = importlib.util.resolve_name(base, sys.modules[module].__package__ or "")
+        for name in re.findall(r"\w+", names):
+            imported.add(f"{base}.{name}" if f"{base}.{name}" in sys.modules else base)
+    texts = [source, *map(fingerprint, sorted(imported))]
+    return hashlib.sha256("\0".join(texts).encode()).hexdigest()
 
 
 def shared(function: Callable) -> Any:

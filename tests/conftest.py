@@ -1,7 +1,9 @@
 """Keep the tests' atlases out of the user's cache; what tests of several rooms need."""
 
 import os
+import signal
 import tempfile
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import pytest
@@ -13,8 +15,10 @@ if TYPE_CHECKING:
 # is not shipped
 _ALLOWED_SKIPS = ("pymeshfix", "bpy", "known meshes")
 
-_cache = tempfile.TemporaryDirectory(prefix="ripple-sim-tests-")
-os.environ["XDG_CACHE_HOME"] = _cache.name
+# of the first process: those that it starts find atlases there, and shaders that a software driver has compiled
+if "RIPPLE_SIM_TESTS" not in os.environ:
+    _cache = tempfile.TemporaryDirectory(prefix="ripple-sim-tests-")
+    os.environ |= dict.fromkeys(("RIPPLE_SIM_TESTS", "XDG_CACHE_HOME", "MESA_SHADER_CACHE_DIR"), _cache.name)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
@@ -28,6 +32,15 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         reporter.write_line(f"skipped where nothing may be: {report.nodeid}: {report.longrepr}", red=True)
     if wrong:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+@pytest.fixture
+def signals_as_found() -> Iterator[None]:
+    """Give back the signals that the program takes over."""
+    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    yield
+    for number, handler in kept.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture(scope="session")
@@ -48,4 +61,4 @@ def animal() -> "Atlas":
     from ripple_sim.scenes.shapes import limbed
     from ripple_sim.solver import Mesh, build_atlas
 
-    return build_atlas(Mesh.from_arrays(*limbed()), 32, cache=False)
+    return build_atlas(Mesh.from_arrays(*limbed()), 32)

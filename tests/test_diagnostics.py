@@ -1,6 +1,10 @@
-"""What `ripple-sim info` says where OpenGL does not run, or not on the GPU: each cause is provoked."""
+"""What `ripple-sim info` says where OpenGL does not run, or not on the GPU: each cause is provoked.
+
+What `ripple-sim info` reports, with OpenGL and without.
+"""
 
 import grp
+import importlib.metadata
 import json
 import os
 import subprocess
@@ -8,13 +12,19 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import mujoco
 import pytest
 
+from ripple_sim import diagnostics
+from ripple_sim.cli import main as cli
 from ripple_sim.diagnostics import find_problems
-from ripple_sim.solver.errors import RippleError
-from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver.backends import backend
+from ripple_sim.solver.errors import GLError
+from ripple_sim.solver.gl import context as gl
+from ripple_sim.video import settings
 
 NOBODY = 65534
+pytestmark = pytest.mark.usefixtures("opengl")  # what is to be taken away must be there
 
 
 def info(**environment: str) -> dict:
@@ -27,15 +37,6 @@ def info(**environment: str) -> dict:
         check=True,
     )
     return json.loads(result.stdout)
-
-
-@pytest.fixture(autouse=True)
-def _needs_opengl() -> None:
-    """What is to be taken away must be there."""
-    try:
-        shared_context()
-    except RippleError as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture
@@ -67,20 +68,22 @@ def test_no_vendor_file(tmp_path: Path) -> None:
     assert "apt-get install libegl-mesa0" in report["advice"]
 
 
-def test_a_vendor_file_whose_library_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", " is damaged"),
+        (
+            '{"file_format_version": "1.0.0", "ICD": {"library_path": "libEGL_nvidia_gone.so.0"}}',
+            " names libEGL_nvidia_gone.so.0, which cannot be loaded: apt-get install libnvidia-gl-",
+        ),
+    ],
+)
+def test_a_vendor_file_that_is_damaged_or_whose_library_is_missing(tmp_path, monkeypatch, text: str, said: str) -> None:
     file = tmp_path / "10_nvidia.json"
-    file.write_text('{"file_format_version": "1.0.0", "ICD": {"library_path": "libEGL_nvidia_gone.so.0"}}')
-    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", str(file))
-    [finding] = find_problems(None, tmp_path)
-    assert f"{file} names libEGL_nvidia_gone.so.0, which cannot be loaded: apt-get install libnvidia-gl-" in finding
-
-
-def test_a_damaged_vendor_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = tmp_path / "50_mesa.json"
-    file.write_text("{")
+    file.write_text(text)
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", str(tmp_path))
     [finding] = find_problems(None, tmp_path)
-    assert f"{file} is damaged" in finding
+    assert f"{file}{said}" in finding
 
 
 def test_a_broken_library(tmp_path: Path) -> None:
@@ -134,3 +137,58 @@ def test_an_nvidia_gpu_without_its_egl_library(tmp_path: Path, monkeypatch: pyte
 
 def test_on_a_gpu_there_is_nothing_to_say(devices: Path) -> None:
     assert find_problems(False, devices) == []
+
+
+@pytest.fixture
+def no_egl(monkeypatch):
+    """Let every EGL library be missing, as on a machine without Mesa."""
+    monkeypatch.setattr(gl, "_shared", {})
+    monkeypatch.setattr(gl, "_LIBRARIES", ({"libegl": "libEGL-missing.so", "libgl": "libGL-missing.so"},))
+
+
+def report(capsys) -> dict:
+    assert cli.main(["info", "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_info_names_versions_driver_and_the_backend_that_auto_takes(capsys):
+    got = report(capsys)
+    assert all(got["versions"].values())
+    assert {"ripple-sim", "python", "mujoco", "numpy", "numba", "moderngl", "av"} <= set(got["versions"])
+    context = gl.shared_context()
+    assert got["opengl"]["renderer"] == context.renderer
+    assert got["opengl"]["software"] is context.software
+    assert got["backend"] == ("cpu" if context.software else "gl") == backend.auto_backend()
+
+
+def test_without_egl_info_says_what_to_install(capsys, no_egl):
+    with pytest.raises(GLError):
+        gl.shared_context()
+    got = report(capsys)
+    assert (got["opengl"], got["backend"]) == (None, "cpu")
+    assert "libegl1" in got["advice"]
+    assert cli.main(["info"]) == 0
+    out = capsys.readouterr().out
+    assert "none: rendering is impossible" in out
+    assert "apt-get install" in out
+
+
+def test_mujocos_version_is_that_which_runs_also_where_its_package_is_mujoco_core(monkeypatch):
+    installed = importlib.metadata.version
+
+    def without_mujoco(name: str) -> str:
+        if name == "mujoco":
+            raise importlib.metadata.PackageNotFoundError(name)
+        return installed(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", without_mujoco)
+    monkeypatch.setattr(settings, "version", without_mujoco)
+    assert diagnostics.collect().versions["mujoco"] == mujoco.__version__
+    assert settings.versions.__wrapped__()["mujoco"] == mujoco.__version__
+
+
+def test_a_missing_package_is_reported(monkeypatch):
+    monkeypatch.setattr(diagnostics, "PACKAGES", ("ripple-sim", "no-such-package"))
+    got = diagnostics.collect()
+    assert got["versions"]["no-such-package"] is None
+    assert "not installed" in diagnostics.as_text(got)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from stand_in_physics import StandIn
 
-from ripple_sim import Material, RippleRenderer, Ripples, RippleWarning
+from ripple_sim import Material, Ripples, RippleWarning
 from ripple_sim.dm_control import couple
 
-MASS, GRAVITY = 0.3, 9.81
+MASS = 0.3
 MODEL = f"""<mujoco><option timestep="0.002"/><worldbody>
 <geom name="block" type="box" size="0.3 0.3 0.1" pos="0 0 -0.1" solref="0.01 0.3"/>
 <body name="ball" pos="0.03 0.02 0.06"><freejoint/><geom size="0.05" mass="{MASS}" solref="0.01 0.3"/></body>
@@ -62,8 +62,62 @@ def test_each_physics_step_counts(make: Any, legacy: bool, monkeypatch: pytest.M
     assert given > 0
 
 
-def test_its_wrappers_are_drawn_as_they_are() -> None:
-    physics = StandIn(MODEL)
-    ripples = couple(physics, MATERIALS, **OPTIONS)
-    frame = RippleRenderer(physics.model, ripples, width=32, height=24).render(physics.data)
-    assert frame.shape == (24, 32, 3)
+@pytest.mark.parametrize("make", KINDS)
+def test_render_draws_with_the_ripples_what_dm_control_would(make: Any) -> None:
+    physics = make()
+    ripples = couple(physics, MATERIALS, looks={"block": "clay"}, **OPTIONS)
+    size = {"height": 24, "width": 32}
+    plain = physics.render(**size)
+    depth, segmentation = physics.render(**size, depth=True), physics.render(**size, segmentation=True)
+    assert plain.shape == (24, 32, 3)
+    assert depth.shape == (24, 32)
+    assert {tuple(each) for each in segmentation.reshape(-1, 2)} == {(-1, -1), (0, 5), (1, 5)}
+    ripples["block"].velocity = np.random.default_rng(2).standard_normal((6, 16, 16)) / 10
+    ripples["block"].step(0.02)
+    assert np.abs(physics.render(**size).astype(int) - plain).mean() > 0.5
+    moved = np.abs(physics.render(**size, depth=True) - depth)[segmentation[..., 0] == 0]
+    assert 1e-4 < np.median(moved) < 0.05
+    option = mujoco.MjvOption()
+    option.geomgroup[:] = 0
+    assert (physics.render(**size, segmentation=True, scene_option=option) == -1).all()
+
+    def added(_: Any, scene: mujoco.MjvScene) -> None:
+        ball, size = mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.2)
+        mujoco.mjv_initGeom(scene.geoms[scene.ngeom], ball, size, np.zeros(3), np.eye(3).ravel(), [1.0, 0.0, 0.0, 1.0])
+        scene.ngeom += 1
+
+    assert np.abs(physics.render(**size, scene_callback=added).astype(int) - plain).max() > 50
+    with pytest.raises(ValueError, match="both depth and segmentation are True; valid is one"):
+        physics.render(depth=True, segmentation=True)
+    with pytest.warns(RippleWarning, match="overlays and render_flag_overrides are not drawn"):
+        physics.render(**size, render_flag_overrides={"wireframe": True})
+
+
+class Composed:
+    """As `dm_control.composer.Environment`: a new physics for each episode, of which hooks are told."""
+
+    def __init__(self) -> None:
+        self.physics, self._hooks = StandIn(MODEL), []
+
+    def add_extra_hook(self, name: str, hook: Any) -> None:
+        assert name == "after_compile"
+        self._hooks.append(hook)
+
+    def reset(self) -> None:
+        self.physics = StandIn(MODEL)
+        for hook in self._hooks:
+            hook(self.physics, np.random.RandomState(0))
+
+
+def test_each_episode_of_a_composed_environment_ripples_anew() -> None:
+    environment = Composed()
+    ripples = couple(environment, MATERIALS, **OPTIONS)
+    heights = []
+    for _ in range(2):
+        environment.reset()
+        assert not ripples["block"].height.any()
+        assert ripples.model is environment.physics.model.ptr
+        environment.physics.step(100)
+        heights.append(ripples["block"].height)
+    assert heights[0].any()
+    np.testing.assert_array_equal(*heights)

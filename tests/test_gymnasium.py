@@ -1,8 +1,13 @@
-"""Environments of Gymnasium ripple with each of their physics steps, and stay environments of Gymnasium."""
+"""Environments of Gymnasium ripple with each of their physics steps, and stay environments of Gymnasium.
 
+Their camera is held against the one that MuJoCo's own visualiser would set up.
+"""
+
+import functools
 import importlib
 import pickle
 import sys
+import types
 import warnings
 from pathlib import Path
 from typing import Any
@@ -16,7 +21,14 @@ from gymnasium.envs.mujoco import MujocoEnv  # noqa: E402
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 from ripple_sim import Material, RippleError, Ripples, RippleWarning  # noqa: E402
-from ripple_sim.gymnasium import RippleWrapper  # noqa: E402
+from ripple_sim.gymnasium import (  # noqa: E402
+    RippleWrapper,
+    depth_buffer,
+    environment_camera,
+    frame_size,
+    model_and_data,
+)
+from ripple_sim.render import find_viewpoint  # noqa: E402
 
 N = 16
 MASS, GRAVITY = 0.3, 9.81
@@ -27,13 +39,14 @@ MODEL = f"""<mujoco><option timestep="0.002"/><worldbody><light pos="0 0 3"/>
 <actuator><motor joint="idle" ctrlrange="-1 1"/></actuator></mujoco>"""
 MATERIALS = {"block": Material(speed=1.0, density=100.0)}
 OPTIONS: dict[str, Any] = {"resolution": N, "backend": "cpu"}
+STATIC = int(mujoco.mjtVisFlag.mjVIS_STATIC)
 SPACE = gymnasium.spaces.Box(-np.inf, np.inf, (8,))
 
 
 class BallEnv(MujocoEnv):
     """As Gymnasium's own: five physics steps at once."""
 
-    metadata = {"render_modes": ["rgb_array", "depth_array"], "render_fps": 100}  # noqa: RUF012
+    metadata = {"render_modes": ["human", "rgb_array", "depth_array", "rgbd_tuple"], "render_fps": 100}  # noqa: RUF012
 
     def __init__(self, path: Path, **options: Any) -> None:
         super().__init__(str(path), 5, SPACE, width=64, height=48, **options)
@@ -108,24 +121,46 @@ def test_info_of_the_environment_stays_and_a_reset_flattens(path: Path) -> None:
     assert env.ripples["block"].time == 0.0
 
 
-def test_frames_show_the_ripples_in_the_size_of_the_environment(path: Path) -> None:
+@pytest.mark.parametrize("mode", ["rgb_array", "depth_array", "rgbd_tuple"])
+def test_frames_show_the_ripples_in_the_size_of_the_environment(path: Path, mode: str) -> None:
     near = {"distance": 0.7, "lookat": np.zeros(3)}
-    ball = BallEnv(path, render_mode="rgb_array", default_camera_config=near)
+    ball = BallEnv(path, render_mode=mode, default_camera_config=near, visual_options={STATIC: True})
     env = RippleWrapper(ball, MATERIALS, looks={"block": "jelly"}, **OPTIONS)
+
+    def frames() -> list[np.ndarray]:
+        drawn = env.render()
+        return list(drawn) if isinstance(drawn, tuple) else [drawn]
+
     env.reset()
     env.step(np.zeros(1))
-    flat = env.render()
-    assert flat.shape == (48, 64, 3)
-    assert flat.dtype == np.uint8
+    flat = frames()
     env.ripples["block"].velocity = np.random.default_rng(2).standard_normal((6, N, N)) / 10
     env.ripples["block"].step(0.02)
-    assert np.abs(env.render().astype(int) - flat).mean() > 1
+    rippled = frames()
+    for before, after in zip(flat, rippled, strict=True):
+        assert before.shape == after.shape
+        if before.dtype == np.uint8:
+            assert before.shape == (48, 64, 3)
+            assert np.abs(after.astype(int) - before).mean() > 1
+        else:
+            assert before.shape == (48, 64)
+            assert before.dtype == np.float32
+            assert 1e-5 < np.abs(after - before).max() < 0.1
+    assert len(flat) == 1 + (mode == "rgbd_tuple")
     env.close()
 
 
+def test_depths_are_those_of_a_depth_buffer() -> None:
+    """As OpenGL has them: 0 at the near plane, 1 at the far one, and hyperbolic between."""
+    model = mujoco.MjModel.from_xml_string(VIEWED)
+    near, far = model.stat.extent * np.array([model.vis.map.znear, model.vis.map.zfar])
+    depth = np.array([near, 2 * near, far], np.float32)
+    np.testing.assert_allclose(depth_buffer(model, depth), [0.0, 0.5 / (1 - near / far), 1.0], atol=1e-6)
+
+
 def test_modes_without_ripples_say_so(path: Path) -> None:
-    with pytest.warns(RippleWarning, match="'depth_array', which shows no ripples"):
-        RippleWrapper(BallEnv(path, render_mode="depth_array"), MATERIALS, **OPTIONS)
+    with pytest.warns(RippleWarning, match="'human', which shows no ripples"):
+        RippleWrapper(BallEnv(path, render_mode="human"), MATERIALS, **OPTIONS)
 
 
 def test_environments_in_parallel(path: Path) -> None:
@@ -136,6 +171,34 @@ def test_environments_in_parallel(path: Path) -> None:
     assert info["heights"]["block"].shape == (2, 6, N, N)
     assert info["heights"]["block"][1].any()
     envs.close()
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize(("mode", "keywords"), [("sync", {}), ("async", {"context": "spawn"})])
+def test_make_vec_makes_ripples_in_this_process_and_in_others(mode: str, keywords: dict[str, Any]) -> None:
+    wrapper = functools.partial(RippleWrapper, materials={"torso_geom": Material(density=100.0)}, **OPTIONS)
+    envs = gymnasium.make_vec(
+        "Ant-v5", num_envs=2, vectorization_mode=mode, vector_kwargs=keywords, wrappers=[wrapper], max_episode_steps=3
+    )
+    _, info = envs.reset(seed=1)
+    assert info["heights"]["torso_geom"].shape == (2, 6, N, N)
+    for _ in range(3):
+        *_, truncated, info = envs.step(np.zeros(envs.action_space.shape))
+    assert truncated.all()
+    *_, info = envs.step(np.zeros(envs.action_space.shape))
+    assert not info["heights"]["torso_geom"].any(), "flat in the new episode"
+    envs.close()
+
+
+def test_frames_and_limits_of_gymnasiums_wrappers_go_around_it(path: Path) -> None:
+    env = RippleWrapper(BallEnv(path, render_mode="rgb_array"), MATERIALS, **OPTIONS)
+    env = gymnasium.wrappers.TimeLimit(gymnasium.wrappers.PassiveEnvChecker(env), 2)
+    env = gymnasium.wrappers.RenderCollection(env)
+    env.reset(seed=0)
+    truncated = [env.step(np.zeros(1, np.float32))[3] for _ in range(2)]
+    assert truncated == [False, True]
+    assert np.shape(env.render()) == (3, 48, 64, 3)
+    env.close()
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
@@ -169,3 +232,60 @@ def test_without_gymnasium_the_message_names_the_extra(monkeypatch: pytest.Monke
     monkeypatch.setitem(sys.modules, "gymnasium", None)
     with pytest.raises(ImportError, match=r"pip install 'ripple-sim\[gymnasium\]'"):
         importlib.import_module("ripple_sim.gymnasium")
+
+
+VIEWED = """<mujoco><visual><global fovy="38"/></visual><worldbody><geom type="plane" size="2 2 1"/>
+<body pos="0.3 -0.2 1"><freejoint/><geom size="0.1"/><geom size="0.1" pos="0.2 0 0"/>
+<camera name="track" mode="trackcom" pos="0 -3 0.3" xyaxes="1 0 0 0 0 1" fovy="50"/></body></worldbody></mujoco>"""
+
+
+def pose_of_mujoco(
+    model: mujoco.MjModel, data: mujoco.MjData, camera_id: int, config: dict[str, object]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Position and view of Gymnasium's camera: free by default, aimed at the median, with the settings on top."""
+    camera, scene = mujoco.MjvCamera(), mujoco.MjvScene(model, 100)
+    camera.type = mujoco.mjtCamera.mjCAMERA_FREE if camera_id < 0 else mujoco.mjtCamera.mjCAMERA_FIXED
+    camera.fixedcamid = camera_id
+    camera.lookat, camera.distance = np.median(data.geom_xpos, axis=0), model.stat.extent
+    for name, value in config.items():
+        setattr(camera, name, value)
+    option, perturb, everything = mujoco.MjvOption(), mujoco.MjvPerturb(), mujoco.mjtCatBit.mjCAT_ALL
+    mujoco.mjv_updateScene(model, data, option, perturb, camera, everything, scene)
+    eyes = scene.camera[:2]
+    return np.mean([eye.pos for eye in eyes], axis=0), np.array([eyes[0].forward, eyes[0].up])
+
+
+@pytest.mark.parametrize("camera_id", [-1, 0])
+@pytest.mark.parametrize(
+    "config",
+    [
+        {},
+        {"distance": 4.0},
+        {"trackbodyid": 1, "lookat": np.array([0.0, 0.1, 2.0]), "elevation": -20.0, "azimuth": 30.0},
+    ],
+)
+def test_the_camera_is_gymnasiums(camera_id: int, config: dict[str, object]) -> None:
+    model = mujoco.MjModel.from_xml_string(VIEWED)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    viewer = types.SimpleNamespace(camera_id=camera_id, default_cam_config=config or None, width=320, height=200)
+    env = types.SimpleNamespace(model=model, data=data, mujoco_renderer=viewer)
+    camera = environment_camera(env, model, np.median(data.geom_xpos, axis=0))
+    pose = find_viewpoint(model, data, camera).pose()
+    position, (forward, up) = pose_of_mujoco(model, data, camera_id, config)
+    np.testing.assert_allclose(pose.position, position, atol=1e-5)
+    np.testing.assert_allclose(-pose.rotation[:, 2], forward, atol=1e-5)
+    np.testing.assert_allclose(pose.rotation[:, 1], up, atol=1e-5)
+    assert pose.fovy == (38 if camera_id < 0 else 50)
+    assert frame_size(env) == (320, 200)
+
+
+def test_environments_that_do_not_say_have_defaults() -> None:
+    model = mujoco.MjModel.from_xml_string(VIEWED)
+    data = mujoco.MjData(model)
+    wrapped = types.SimpleNamespace(model=types.SimpleNamespace(ptr=model), data=types.SimpleNamespace(ptr=data))
+    env = types.SimpleNamespace(physics=wrapped)
+    assert model_and_data(env) == (model, data)
+    assert frame_size(env) == (480, 480)
+    camera = environment_camera(env, model, np.median(data.geom_xpos, axis=0))
+    assert (camera.type, camera.distance) == (mujoco.mjtCamera.mjCAMERA_FREE, model.stat.extent)

@@ -16,7 +16,7 @@ import msgspec
 from ripple_sim.batch.plan import Distribution, MeshesEntry, PlanFile, StoreEntry
 from ripple_sim.render import LIGHTING, LOOKS
 from ripple_sim.scene import scene_file
-from ripple_sim.scene.drop_model import BODY_SHAPES
+from ripple_sim.scene.bodies import BODY_SHAPES
 from ripple_sim.scene.material_entry import LAWS
 from ripple_sim.scene.scene import NAMES as OVERLAYS
 from ripple_sim.solver import Material

@@ -30,9 +30,8 @@ from scipy.special import j0
 from ripple_sim.bench import table
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Material, Mesh, RippleError, WaveSolver, build_atlas, load_mesh
-from ripple_sim.solver.operator.assembly import OPERATORS
-from ripple_sim.solver.texels.distance import distance_from_point
-from ripple_sim.solver.texels.topology import sampling_matrix
+from ripple_sim.solver.operator import OPERATORS
+from ripple_sim.solver.texels import TexelMesh, distance_scratch, march_from_point, sampling_matrix
 
 # A ripple below this share of the strongest signal is no crest.
 _LEAST = 0.2
@@ -82,15 +81,17 @@ NEAREST = 5.0
 
 def plane_arrival(distance: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times of the front and the crest on the plane for the same bump; lengths in widths, wave speed 1."""
-    grid, front, crest = _plane_table(float(max(np.max(distance, initial=0), NEAREST + 1)))
+    # as far as the next power of 2: a table takes a second, and every source has another farthest vertex
+    farthest = 2 ** np.ceil(np.log2(max(np.max(distance, initial=0), NEAREST + 1)))
+    grid, front, crest = _plane_table(float(farthest))
     return np.interp(distance, grid, front), np.interp(distance, grid, crest)
 
 
 @functools.lru_cache(maxsize=16)
 def _plane_table(farthest: float) -> tuple[NDArray[np.float64], ...]:
     """h(r, t) = integral of exp(-q^2 / 2) J0(q r) cos(q t) q dq, the bump's Hankel transform carried on in time."""
-    grid = np.linspace(NEAREST - 1, farthest, 48)
-    q = np.linspace(0, 8, 4001)[1:]
+    grid = np.linspace(NEAREST - 1, farthest, 96)
+    q = np.linspace(0, 8, 2001)[1:]
     spectrum = q * np.exp(-q * q / 2)
     around = np.linspace(-4, 3, 281)
     picked = []
@@ -174,6 +175,25 @@ def _vertex_coordinates(atlas: Atlas) -> NDArray[np.float64]:
     triangle = np.zeros(len(mesh.V), np.int64)
     triangle[mesh.F] = np.arange(len(mesh.F))[:, None]
     return atlas.chart_map.coordinates(mesh, triangle, mesh.V)
+
+
+def distance_from_point(
+    texels: TexelMesh, center: int, point: NDArray[np.float64], limit: float
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Texels within `limit` [m] of a surface point, ascending, and their distances along the surface [m].
+
+    Parameters
+    ----------
+    center : int
+        Flat index of the texel nearest to the point.
+    point : [3]
+        [m].
+    """
+    grid = texels.grid
+    scratch = distance_scratch(len(grid.positions))
+    reached, distance = march_from_point(grid.halo, grid.positions, center, point, limit, scratch)
+    order = np.argsort(reached)
+    return reached[order], distance[order]
 
 
 def arrival_times(

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ripple_sim.solver import RippleError, WaveSolver, build_atlas, load_mesh
-from ripple_sim.solver.operator.wave_operator import SAFETY
+from ripple_sim.solver.operator import SAFETY
 
 ROW = "{:<24} {:>8} {:>6} {:>7} {:>8} {:>9} {:>10} {:>7} {:>11} {:>6} {:>7}"
 

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim import load_batch
-from ripple_sim.batch.executors import DaskExecutor
-from ripple_sim.batch.make_scene import Outcome
+from ripple_sim.batch import DaskExecutor, Outcome
 
 SCENES, FRAMES = 10_000, 24
 START = 20.0  # of a worker: Python, its imports, the driver [s]

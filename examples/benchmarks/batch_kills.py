@@ -20,7 +20,7 @@ from pathlib import Path
 from sample_batch import SMALL, start, write_plan
 
 from ripple_sim import load_batch
-from ripple_sim.batch.folder import BatchFolder
+from ripple_sim.batch import BatchFolder
 
 STORE = f'{SMALL}format = "webdataset"\nscenes_per_tar = 8\n'
 

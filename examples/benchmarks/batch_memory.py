@@ -14,8 +14,7 @@ import numpy as np
 from sample_batch import write_plan
 
 from ripple_sim import read_plan
-from ripple_sim.batch.folder import BatchFolder, keep_plan, stored
-from ripple_sim.batch.make_scene import make_scene
+from ripple_sim.batch import BatchFolder, keep_plan, make_scene, stored
 
 
 def resident() -> float:

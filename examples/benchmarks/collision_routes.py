@@ -19,7 +19,7 @@ import numpy as np
 import trimesh
 
 from ripple_sim import Material, Ripples, RippleWarning, make_collidable
-from ripple_sim.coupling.colliders import ROUTES
+from ripple_sim.coupling import ROUTES
 from ripple_sim.scenes.shapes import limbed, peanut
 
 GEOM = mujoco.mjtGeom

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ripple_sim import Exporter, ExportOptions, Simulation, load_scene
-from ripple_sim.capture.frame_source import FrameSource
-from ripple_sim.capture.snapshot import snapshots
-from ripple_sim.cycles.render import blender_settings, frames_of_cycles, python_with_bpy, tone_mapped
-from ripple_sim.export.scene import scene_source
+from ripple_sim.capture import FrameSource, snapshots
+from ripple_sim.cycles import blender_settings, frames_of_cycles, python_with_bpy
+from ripple_sim.export import scene_source
+from ripple_sim.render import tone_mapped
 
 WIDTH, HEIGHT, FPS = 480, 270, 20
 SCENES = (("sphere", 0.9), ("face", 0.8), ("duck", 1.65))  # and the moment [s]
@@ -64,7 +64,7 @@ def by_cycles(name: str, simulation: Simulation, samples: int) -> tuple[NDArray[
         told = {**settings, "stage": str(stage), "frames": 1, "samples": samples}
         start = time.perf_counter()
         (frame,) = frames_of_cycles(python_with_bpy(), told, Path(folder))
-        return tone_mapped(frame), time.perf_counter() - start
+        return np.rint(255 * tone_mapped(frame)).astype(np.uint8), time.perf_counter() - start
 
 
 if __name__ == "__main__":

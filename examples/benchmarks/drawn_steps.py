@@ -16,10 +16,10 @@ from scipy.spatial import ConvexHull
 
 from ripple_sim import Camera
 from ripple_sim.render import Renderer, Surface
-from ripple_sim.render.surfaces.surface import Charts
+from ripple_sim.render.surfaces import Charts
 from ripple_sim.solver import Atlas, HeightMap, Material, Mesh, WaveSolver, build_atlas
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.solver.layouts.build import atlas_from_sphere_map
+from ripple_sim.solver.layouts import atlas_from_sphere_map
 
 RESOLUTIONS = (20, 28, 40, 56, 128, 256, 512)
 POLYGONS = (2_700, 5_700, 10_700, 21_300)

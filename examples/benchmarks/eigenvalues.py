@@ -22,7 +22,7 @@ from scipy.spatial import Delaunay
 from scipy.special import jn_zeros, jnp_zeros
 
 from ripple_sim.solver import Atlas, Material, Mesh, TexelMesh, build_atlas, build_operator
-from ripple_sim.solver.texels.stencil import stiffness_matrix
+from ripple_sim.solver.texels import stiffness_matrix
 
 COUNT = 20
 RING, TUBE = 1.0, 0.4  # radii of the torus and of its tube

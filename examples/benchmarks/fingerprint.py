@@ -13,7 +13,7 @@ from PIL import Image
 
 from ripple_sim import Simulation, load_scene
 from ripple_sim.cli.main import main as ripple_sim
-from ripple_sim.scene.scene import shipped_scenes
+from ripple_sim.scene import shipped_scenes
 
 FPS = 12
 OPTIONS = ("--size", "480x270", "--fps", str(FPS), "--backend", "cpu")

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 
 from ripple_sim.solver import Material, WaveSolver, sphere_atlas
-from ripple_sim.solver.waves.finite import EVERY
+from ripple_sim.solver.waves import EVERY
 
 TIMES = 3000
 

@@ -20,10 +20,8 @@ import mujoco
 import numpy as np
 
 from ripple_sim import Scene, Simulation, drop_scene, load_scene, make_collidable
-from ripple_sim.capture.frame_source import FrameSource
-from ripple_sim.capture.snapshot import snapshots
-from ripple_sim.scene.material_entry import MaterialEntry
-from ripple_sim.scene.scene_file import CameraEntry, RippleEntry
+from ripple_sim.capture import FrameSource, snapshots
+from ripple_sim.scene import CameraEntry, MaterialEntry, RippleEntry
 from ripple_sim.scenes.shapes import duck
 from ripple_sim.solver import build_atlas, load_mesh
 

@@ -17,7 +17,7 @@ import numpy as np
 from ripple_sim import Camera
 from ripple_sim.bench import backend_advance, race
 from ripple_sim.render import Renderer, Surface
-from ripple_sim.render.surfaces.surface import Charts
+from ripple_sim.render.surfaces import Charts
 from ripple_sim.solver import Atlas, GLError, HeightMap, Material, Mesh, build_atlas, build_operator, load_mesh
 from ripple_sim.solver.gl import shared_context
 

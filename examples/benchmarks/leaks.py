@@ -61,9 +61,7 @@ def everything() -> Callable[[], None]:
 
 def viewer() -> Callable[[], None]:
     """A window of the viewer, off screen, opened, drawn in and closed."""
-    from ripple_sim.viewer.opening import open_scene
-    from ripple_sim.viewer.session import Session
-    from ripple_sim.viewer.window import Window
+    from ripple_sim.viewer import Session, Window, open_scene
 
     scene = open_scene("sphere")
 

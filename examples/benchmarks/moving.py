@@ -15,10 +15,10 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from ripple_sim import Camera, Material, RippleRenderer, Ripples, Simulation, load_scene
-from ripple_sim.coupling.soft import coarse_motions
+from ripple_sim.coupling import coarse_motions
 from ripple_sim.solver import WaveSolver, build_atlas, sphere_atlas
-from ripple_sim.solver.operator.assembly import MovingOperator
-from ripple_sim.solver.texels.moving import MovedPlaces, SurfaceRide
+from ripple_sim.solver.operator import MovingOperator
+from ripple_sim.solver.texels import MovedPlaces, SurfaceRide
 
 SPEED = Material(speed=1.0)
 # Blender's Dynamic Paint on a canvas of 160,000 vertices that moves, a frame [ms]

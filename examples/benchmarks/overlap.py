@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ripple_sim import Simulation, VideoOptions, load_scene, render_video
-from ripple_sim.capture.frame_source import FrameSource
-from ripple_sim.capture.snapshot import snapshots
+from ripple_sim.capture import FrameSource, snapshots
 from ripple_sim.encode import open_writer
 
 Result = TypeVar("Result")

@@ -13,10 +13,10 @@ from itertools import islice
 import numpy as np
 
 from ripple_sim import Simulation, VideoOptions, load_scene
-from ripple_sim.overlay.notes import Notebook
-from ripple_sim.scene.scene import parse_request
+from ripple_sim.overlay import Notebook
+from ripple_sim.scene import parse_request
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.video.film import Film
+from ripple_sim.video import Film
 
 KINDS = ([], ["height"], ["grid"], ["contacts"], ["time"], ["energy"], ["height", "contacts", "grid", "time", "energy"])
 RATE, START = 30, 1.0

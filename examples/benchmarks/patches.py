@@ -24,8 +24,7 @@ import trimesh
 
 import ripple_sim.scenes
 from ripple_sim.solver import Atlas, Mesh, RippleError, build_atlas, load_mesh
-from ripple_sim.solver.layouts.patches.atlas import atlas_from_patch_map, cells_for
-from ripple_sim.solver.layouts.patches.layout import patch_map
+from ripple_sim.solver.layouts.patches import atlas_from_patch_map, cells_for, patch_map
 
 SHIPPED = ("pretzel", "duck", "limbed", "teapot")
 RESOLUTIONS = (48, 96, 128)

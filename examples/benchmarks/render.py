@@ -67,7 +67,7 @@ def rippled(width: int, height: int, resolution: int, look: str) -> tuple[Callab
 
     from ripple_sim import Camera
     from ripple_sim.render import Renderer, Surface
-    from ripple_sim.render.surfaces.surface import Charts
+    from ripple_sim.render.surfaces import Charts
     from ripple_sim.solver import HeightMap, Mesh, build_atlas
     from ripple_sim.solver.gl import shared_context
 

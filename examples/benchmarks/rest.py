@@ -10,8 +10,7 @@ import mujoco
 import numpy as np
 
 from ripple_sim import Material, Ripples
-from ripple_sim.coupling.load import ContactLoads
-from ripple_sim.coupling.model import CoupledModel
+from ripple_sim.coupling import ContactLoads, CoupledModel
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Load, WaveSolver
 

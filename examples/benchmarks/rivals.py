@@ -22,8 +22,8 @@ from ripple_sim.bench import Advance, backend_advance, memory_fields, memory_str
 from ripple_sim.solver import GLError, Material, build_operator, sphere_atlas
 from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.kernel import Floats32, Ints, kernel
-from ripple_sim.solver.operator.wave_operator import WaveOperator
-from ripple_sim.solver.texels.stencil import stiffness_matrix
+from ripple_sim.solver.operator import WaveOperator
+from ripple_sim.solver.texels import stiffness_matrix
 
 
 class NaiveLoop:
@@ -33,8 +33,7 @@ class NaiveLoop:
         n = operator.mass.shape[1]
         self._weights = operator.stencil.weights.astype(np.float32)
         self._gain = (1 / operator.mass).astype(np.float32)
-        addresses = operator.topology.addresses
-        self._halo, self._source = addresses.ghosts, addresses.sources
+        _, self._halo, self._source = operator.topology.addresses
         self._h = np.zeros((6, n + 2, n + 2), np.float32)
         self._h_next, self._v = np.zeros_like(self._h), np.zeros((6, n, n), np.float32)
         self._update = _update_parallel if parallel else _update
@@ -122,18 +121,18 @@ class PlainShader:
     def __init__(self, operator: WaveOperator) -> None:
         self._gl = shared_context()
         self._n = n = operator.mass.shape[1]
-        addresses = operator.topology.addresses
+        _, ghosts, sources = operator.topology.addresses
         with self._gl as ctx:
             self._h, self._h_next, self._v = (ctx.buffer(reserve=4 * 6 * (n + 2) ** 2) for _ in range(3))
             for buffer in (self._h, self._h_next, self._v):
                 buffer.clear()
             self._stencil = ctx.buffer(operator.stencil.weights.astype(np.float32).tobytes())
             self._gain = ctx.buffer((1 / operator.mass).astype(np.float32).tobytes())
-            self._pairs = ctx.buffer(np.stack([addresses.ghosts, addresses.sources], axis=1).astype(np.int32).tobytes())
+            self._pairs = ctx.buffer(np.stack([ghosts, sources], axis=1).astype(np.int32).tobytes())
             version = "#version 430\n"
             update = UPDATE.read_text().replace(version, f"{version}#define N {n}\n")
             self._update, self._halo = ctx.compute_shader(update), ctx.compute_shader(_HALO)
-        self._count = len(addresses.ghosts)
+        self._count = len(ghosts)
 
     def set_height(self, height: Floats32) -> None:
         """Replace the height [m], [C, n, n]."""

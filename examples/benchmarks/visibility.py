@@ -72,7 +72,7 @@ def ours(headlight: str, look: str, lighting: str = "model", floor: str = BRIGHT
 
     from ripple_sim import Camera
     from ripple_sim.render import Renderer, Surface
-    from ripple_sim.render.surfaces.surface import Charts
+    from ripple_sim.render.surfaces import Charts
     from ripple_sim.solver import HeightMap, sphere_atlas
     from ripple_sim.solver.gl import shared_context
 

@@ -13,7 +13,7 @@ from PIL import Image
 from stills import strip
 
 from ripple_sim import Scene, load_scene
-from ripple_sim.scene.scene_file import MapEntry, MaterialEntry
+from ripple_sim.scene import MapEntry, MaterialEntry
 
 TIMES, SIZE = [0.25, 0.4, 0.6, 0.8], (400, 400)
 MATERIALS = {"speed": (0.15, 0.6), "damping": (0.5, 20.0)}  # black and white: m/s, 1/s

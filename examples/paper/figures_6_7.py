@@ -13,7 +13,7 @@ from page import Part
 from stills import strip
 
 from ripple_sim import drop_scene
-from ripple_sim.scene.events import Events, PokeEntry
+from ripple_sim.scene import Events, PokeEntry
 from ripple_sim.scenes.shapes import LIMBED_FILE
 from ripple_sim.solver import Material, build_atlas, build_operator, load_mesh
 

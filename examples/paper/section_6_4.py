@@ -17,7 +17,7 @@ from page import Part
 from stills import strip
 
 from ripple_sim import drop_scene
-from ripple_sim.scene.events import Events, PokeEntry
+from ripple_sim.scene import Events, PokeEntry
 from ripple_sim.scenes.shapes import pebble, polygonise, rounded_cone, smooth_intersection, smooth_union
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
 

@@ -11,8 +11,8 @@ import numpy as np
 from page import Part
 
 from ripple_sim.solver import Material, build_atlas, build_operator
-from ripple_sim.solver.backends.backend import make_backend
-from ripple_sim.solver.layouts.build import atlas_from_sphere_map
+from ripple_sim.solver.backends import make_backend
+from ripple_sim.solver.layouts import atlas_from_sphere_map
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 from drawn_steps import POLYGONS, RESOLUTIONS, knobbly_body

@@ -2,7 +2,8 @@
 
 Folders stand where they are installed: solver/ is ripple_sim.solver, scenes/ is ripple_sim.scenes. An import of a
 public name, such as `from ripple_sim.solver import Material`, counts as one of the module that the name comes from.
-The `__init__` files, which only hand such names on, are not counted as modules.
+What a room offers stands in its `__init__.pyi`; the `__init__` files, which only hand such names on, are not counted
+as modules.
 """
 
 import ast
@@ -40,10 +41,11 @@ def read(root: Path = ROOT) -> dict[str, Module]:
             inside = path.relative_to(root / folder).with_suffix("")
             paths[".".join((package, *inside.parts))] = path
     trees = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in paths.items()}
+    stubs = {name: path.with_suffix(".pyi") for name, path in paths.items()}
+    offers = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in stubs.items() if path.is_file()}
     public = {
         f"{name.removesuffix('.__init__')}.{given}": f"{module}.{original}"
-        for name, tree in trees.items()
-        if name.endswith(".__init__")
+        for name, tree in offers.items()
         for module, original, given in _imported(name, tree)
     }
     modules = {}

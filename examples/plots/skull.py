@@ -17,7 +17,7 @@ import numpy as np
 from figure import FAINT, FOLDER, TEXT, plain, save, sheet
 
 from ripple_sim import Scene, Simulation, load_scene
-from ripple_sim.scene.target_maps import InsideEntry
+from ripple_sim.scene import InsideEntry
 
 sys.path.append(str(Path(__file__).parents[1] / "scene_meshes"))
 from head import BONE_THRESHOLD, head_volume

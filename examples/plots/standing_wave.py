@@ -3,7 +3,7 @@
 import numpy as np
 
 from ripple_sim.solver import Atlas, Material, TexelMesh, WaveSolver, glue, texel_atlas
-from ripple_sim.solver.operator.material import decay_time, frequency
+from ripple_sim.solver.operator import decay_time, frequency
 
 STEPS, PERIODS = 120, 1.5
 

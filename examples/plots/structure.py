@@ -21,7 +21,7 @@ from pathlib import Path
 from imports import FOLDERS, ROOT, Module, cycles, read
 
 PAGE = ROOT / "docs" / "architecture.md"
-MOST_MODULES, MOST_LINES, MOST_WITH_ONE_IMPORTER = 260, 450, 0.25  # what tests/docs/test_architecture.py allows
+MOST_MODULES, MOST_LINES, MOST_WITH_ONE_IMPORTER = 260, 450, 0.20  # what tests/docs/test_architecture.py allows
 
 # A ball lies on a sphere: what a step and a frame run, in the order in which it is first entered. Kernels run as plain
 # Python, so that their modules are seen, too.

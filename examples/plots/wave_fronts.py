@@ -14,11 +14,11 @@ import numpy as np
 from figure import FAINT, FOLDER, NAMES, TEXT, save, sheet
 from matplotlib.colors import ListedColormap
 
-from ripple_sim.figures.atlas_view import AtlasPainter, View
-from ripple_sim.overlay.notes import color_table, colors
-from ripple_sim.scene.drop import usual_up
+from ripple_sim.figures import AtlasPainter, View
+from ripple_sim.overlay import color_table, colors
+from ripple_sim.scene import usual_up
 from ripple_sim.solver import Atlas, build_atlas, load_mesh
-from ripple_sim.solver.texels.topology import sampling_matrix
+from ripple_sim.solver.texels import sampling_matrix
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 from arrival import NEAREST, arrival_times, geodesic_distance, ideal_width, plane_arrival

@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import functools
 import itertools
+import logging
 import math
 import multiprocessing
 import os
@@ -52,6 +53,9 @@ class DaskExecutor(Executor):
             raise BatchError(
                 f"no Dask scheduler answers at {shown(address)} ({error}); valid is an address such as tcp://host:8786"
             ) from error
+        self._address = address
+        self._log = logging.getLogger("distributed.client")
+        self._log.addFilter(_nothing)  # that the scheduler is gone is said once, by `refusal`
         self._places, self._counted = 0, -math.inf
         self._executor = self._client.get_executor(pure=False, retries=0)
 
@@ -69,8 +73,22 @@ class DaskExecutor(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Leave the cluster; without `wait` what is not yet done is given up."""
+        self._log.removeFilter(_nothing)
         self._executor.shutdown(wait=wait)
         self._client.close()
+
+    def refusal(self) -> BatchError | None:
+        """What to raise in place of Dask's own errors if its scheduler is gone."""
+        if self._client.status == "running":
+            return None
+        return BatchError(
+            f"the Dask scheduler at {self._address} is gone; finished scenes are kept: start it, and run the same "
+            "command again to go on"
+        )
+
+
+def _nothing(_: logging.LogRecord) -> bool:
+    return False
 
 
 def available_cores() -> list[int]:
@@ -97,17 +115,8 @@ def shares(cores: list[int], workers: int) -> list[list[int]]:
 class LocalExecutor(Executor):
     """Spawned processes, each with a core or more and an OpenGL context of its own.
 
-    One that dies fails what it was at, and is replaced; all of them end with this process, however it ends.
-
-    Parameters
-    ----------
-    workers : int
-        How many.
-
-    Attributes
-    ----------
-    places : int
-        How many tasks may be submitted at a time.
+    One that dies fails what it was at, and is replaced; all of them end with this process, however it ends. At most
+    `places` tasks may be submitted at a time, one a worker.
     """
 
     def __init__(self, workers: int) -> None:
@@ -177,15 +186,7 @@ def _end_with_parent() -> None:
 
 @contextlib.contextmanager
 def first_alone(work: Path, what: str) -> Iterator[None]:
-    """Let the first of something be done alone on each machine, while all others wait.
-
-    Parameters
-    ----------
-    work : path
-        Folder that the processes share.
-    what : str
-        Name of what is done.
-    """
+    """Let the first of something, by its name, be done alone on each machine; others that share `work` wait."""
     ready = work / f"ready-{socket.gethostname()}-{what}"
     if ready.exists():
         yield

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import fcntl
+import hashlib
 import io
 import shutil
 from collections.abc import Container, Iterator
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 from ripple_sim.errors import BatchError
+from ripple_sim.export.fields import DTYPES
 from ripple_sim.export.tables import COLUMNS
 from ripple_sim.solver.files import atomic_write
 
@@ -27,21 +29,14 @@ from .records import HEIGHTS, IMPULSES, POSITIONS, read_heights
 
 FACTS, TIMES = "scene.json", "times.json"
 
-_KINDS = {"int64": "i8", "float64": "f8", "bool": "?", "string": "U64"}
+
+def facts_hash(facts: dict[str, Any]) -> str:
+    """Hash of what is known of a scene, which its files' hashes are part of."""
+    return hashlib.blake2b(msgspec.json.encode(facts), digest_size=16).hexdigest()
 
 
 class FinishedScene:
-    """A scene of a batch.
-
-    Parameters
-    ----------
-    number : int
-        Of the scene.
-    path : path
-        Its folder, or the tar file that it is in.
-    members : dict, optional
-        Its files in the tar file, by the parts of their names behind the scene's number.
-    """
+    """A scene of a batch: in a folder, or in a tar file, whose `members` it has by their names behind its number."""
 
     def __init__(self, number: int, path: Path, members: dict[str, TarInfo] | None = None) -> None:
         self.number, self._path, self._members = number, path, members
@@ -62,35 +57,57 @@ class FinishedScene:
         found = next((each for each in (name, name.replace("/", ".")) if each in names), None)
         if found is None:
             raise BatchError(f"scene {self.number} has no file {name!r}; it has {', '.join(names)}")
-        if self._members is None:
-            return (self._path / found).read_bytes()
-        with self._path.open("rb") as file:
-            file.seek(self._members[found].offset_data)
-            return file.read(self._members[found].size)
+        with self._reported():
+            if self._members is None:
+                return (self._path / found).read_bytes()
+            with self._path.open("rb") as file:
+                file.seek(self._members[found].offset_data)
+                return file.read(self._members[found].size)
+
+    @contextlib.contextmanager
+    def _reported(self) -> Iterator[None]:
+        """Say of what cannot be read which scene it is of."""
+        try:
+            yield
+        except BatchError:
+            raise
+        except Exception as error:  # whatever a damaged file holds
+            raise BatchError(
+                f"scene {self.number} in {self._path} is damaged: {error}; remove it, and run the batch again"
+            ) from error
 
     def facts(self) -> dict[str, Any]:
         """What is known of it: seed, source, values drawn, counts, energies [J], files and their hashes."""
-        return msgspec.json.decode(self.read(FACTS))
+        with self._reported():
+            found = msgspec.json.decode(self.read(FACTS), type=dict[str, Any])
+            if found["hash"] != facts_hash({name: value for name, value in found.items() if name != "hash"}):
+                raise ValueError(f"{FACTS} is not as it was written")
+            return found
 
     def times(self) -> dict[str, Any]:
         """How long it took [s], and where it was made."""
-        if self._members is None:
-            return msgspec.json.decode((self._path / TIMES).read_bytes())
-        return msgspec.json.decode(times_of(self._path).read_bytes())[str(self.number)]
+        with self._reported():
+            kept = (self._path / TIMES if self._members is None else times_of(self._path)).read_bytes()
+            found = msgspec.json.decode(kept, type=dict[str, Any])
+            found = found if self._members is None else found[str(self.number)]
+            return {**found, "seconds": float(found["seconds"]), "cpu_seconds": float(found["cpu_seconds"])}
 
     def positions(self) -> NDArray[np.float64]:
         """MuJoCo's generalised positions at every frame, [frames, nq]."""
-        return np.load(io.BytesIO(self.read(POSITIONS)))
+        with self._reported():
+            return np.load(io.BytesIO(self.read(POSITIONS)))
 
     def heights(self) -> dict[str, NDArray[np.float32]]:
         """The height of each target at every frame [m], [frames, C, n, n]."""
-        return read_heights(self.read(HEIGHTS))
+        with self._reported():
+            return read_heights(self.read(HEIGHTS))
 
     def impulses(self) -> NDArray:
         """The impulses, a structured array: frame, time, geom, other, x, y, z, impulse, chart, row, column, inner."""
-        lines = list(csv.reader(io.StringIO(self.read(IMPULSES).decode())))[1:]
-        dtype = np.dtype([(name, _KINDS[kind]) for name, (_, kind) in COLUMNS.items()])
-        return np.array([(*line[:-1], line[-1] == "True") for line in lines], dtype)
+        dtype = np.dtype([(name, DTYPES[kind]) for name, (_, kind) in COLUMNS.items()])
+        with self._reported():
+            lines = list(csv.reader(io.StringIO(self.read(IMPULSES).decode())))[1:]
+            return np.array([(*line[:-1], line[-1] == "True") for line in lines], dtype)
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
         """The frames of its video or folder of PNG frames, [height, width, 3].
@@ -101,21 +118,17 @@ class FinishedScene:
             If there are none, as with EXR frames.
         """
         images = [name for name in self.names() if name.startswith("frames") and name.endswith(".png")]
-        for name in images:
-            yield np.asarray(Image.open(io.BytesIO(self.read(name))).convert("RGB"))
-        if images:
-            return
         video = next((name for name in self.names() if name.startswith("video.") and name.count(".") == 1), None)
-        if video is None:
+        if not images and video is None:
             raise BatchError(f"scene {self.number} has no video and no PNG frames; it has {', '.join(self.names())}")
-        content = io.BytesIO(self.read(video))
-        if video.endswith((".gif", ".webp")):
-            for frame in ImageSequence.Iterator(Image.open(content)):
-                yield np.asarray(frame.convert("RGB"))
-            return
-        with av.open(content) as container:
-            for decoded in container.decode(video=0):
-                yield decoded.to_ndarray(format="rgb24")
+        with self._reported():
+            for name in images or ([video] if video and video.endswith((".gif", ".webp")) else []):
+                for frame in ImageSequence.Iterator(Image.open(io.BytesIO(self.read(name)))):
+                    yield np.asarray(frame.convert("RGB"))
+            if video and video.endswith((".mp4", ".webm")):
+                with av.open(io.BytesIO(self.read(video))) as container:
+                    for decoded in container.decode(video=0):
+                        yield decoded.to_ndarray(format="rgb24")
 
     def passes(self) -> Iterator[dict[str, NDArray]]:
         """The passes of each frame by their names, from .npz files.
@@ -128,9 +141,10 @@ class FinishedScene:
         names = [name for name in self.names() if "passes" in name and name.endswith(".npz")]
         if not names:
             raise BatchError(f"scene {self.number} has no passes in .npz files; it has {', '.join(self.names())}")
-        for name in names:
-            with np.load(io.BytesIO(self.read(name))) as arrays:
-                yield {each: arrays[each] for each in arrays.files}
+        with self._reported():
+            for name in names:
+                with np.load(io.BytesIO(self.read(name))) as arrays:
+                    yield {each: arrays[each] for each in arrays.files}
 
 
 def scenes_in_tar(tar: Path) -> Iterator[FinishedScene]:
@@ -141,7 +155,7 @@ def scenes_in_tar(tar: Path) -> Iterator[FinishedScene]:
 
 def finished_scenes(batch: BatchFolder, known: Container[int] = ()) -> Iterator[FinishedScene]:
     """The scenes that are there, each once, but for those that are known."""
-    loose = [int(folder.name) for folder in sorted(batch.scenes.iterdir()) if folder.name.isdecimal()]
+    loose = sorted(batch.loose())
     packed: set[int] = set()
     for tar in batch.tar_files():  # looked at later than the folders, so that no scene is missed on its way into one
         for scene in scenes_in_tar(tar):
@@ -169,27 +183,20 @@ def pack(batch: BatchFolder, first: int, end: int) -> None:
         times = {str(number): scene.times() for number, scene in scenes.items()}
         with atomic_write(times_of(tar)) as path:
             path.write_bytes(msgspec.json.encode(times))
-        write_tar(tar, _files(scenes))
-        for number in loose:
-            _remove_whole(batch.scene(number), batch.work / f"packed-{number:06d}")
-
-
-def _files(scenes: dict[int, FinishedScene]) -> Iterator[tuple[str, bytes]]:
-    for number, scene in scenes.items():
-        for name in scene.names():
-            yield member_name(number, name), scene.read(name)
-
-
-def _remove_whole(folder: Path, hidden: Path) -> None:
-    """Remove a folder of which others shall see everything or nothing."""
-    shutil.rmtree(hidden, ignore_errors=True)  # of a process that was killed
-    folder.rename(hidden)
-    shutil.rmtree(hidden)
+        files = (
+            (member_name(number, name), scene.read(name)) for number, scene in scenes.items() for name in scene.names()
+        )
+        write_tar(tar, files)
+        for number in loose:  # others shall see everything of a folder or nothing
+            hidden = batch.work / f"packed-{number:06d}"
+            shutil.rmtree(hidden, ignore_errors=True)  # of a process that was killed
+            batch.scene(number).rename(hidden)
+            shutil.rmtree(hidden)
 
 
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
     """One process at a time."""
-    with path.open("w") as file:
+    with path.open("a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield

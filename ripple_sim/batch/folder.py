@@ -18,19 +18,18 @@ import re
 import shutil
 import tarfile
 from collections.abc import Iterable, Iterator
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from ripple_sim.errors import BatchError
-from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.errors import BatchError, SceneError
+from ripple_sim.scene.loading import load_scene
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.files import atomic_write
-from ripple_sim.video.settings import scene_digest
+from ripple_sim.video.settings import scene_digest, versions
 
-from .plan import Plan
+from .plan import Plan, check_plan
 
 NUMBER = re.compile(r"\d{6,}")
 
@@ -46,12 +45,15 @@ def times_of(tar: Path) -> Path:
 
 
 def members(tar: Path) -> dict[int, dict[str, tarfile.TarInfo]]:
-    """The files in a tar file by their names, by scene."""
+    """The files in a tar file by their names, by scene; raises `BatchError` if it is damaged."""
     found: dict[int, dict[str, tarfile.TarInfo]] = {}
-    with tarfile.open(tar) as file:
-        for member in file:
-            number, name = member.name.split(".", 1)
-            found.setdefault(int(number), {})[name] = member
+    try:
+        with tarfile.open(tar) as file:
+            for member in file:
+                number, name = member.name.split(".", 1)
+                found.setdefault(int(number), {})[name] = member
+    except (tarfile.TarError, EOFError, ValueError, OSError) as error:
+        raise BatchError(f"{tar} is damaged: {error}; remove it, and run the batch again") from error
     return found
 
 
@@ -147,7 +149,8 @@ class BatchFolder:
                 yield None
                 return
             if self.is_finished(number):  # by another process, meanwhile
-                _remove_empty(work)
+                with contextlib.suppress(OSError):  # it is not empty
+                    work.rmdir()
                 yield None
             else:
                 yield work
@@ -197,19 +200,12 @@ class BatchFolder:
 def clear(folder: Path) -> None:
     """Remove everything in a folder."""
     for path in folder.iterdir():
-        shutil.rmtree(path) if path.is_dir() else path.unlink()
+        shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
 
 
 def _entries(folder: Path) -> list[Path]:
     return sorted(folder.iterdir()) if folder.is_dir() else []
 
-
-def _remove_empty(folder: Path) -> None:
-    with contextlib.suppress(OSError):
-        folder.rmdir()
-
-
-_PACKAGES = ("ripple-sim", "mujoco", "numpy", "numba", "moderngl", "av", "pillow")
 
 # A larger batch begins like a smaller one; tar files tell themselves what is in them.
 _MAY_CHANGE = ("plan.count",)
@@ -232,7 +228,7 @@ def stored(plan: Plan) -> StoredPlan:
         If one is invalid.
     """
     files = {source: _fingerprint(source) for source in dict.fromkeys(plan.sources)}
-    return StoredPlan(plan, files, {package: version(package) for package in _PACKAGES})
+    return StoredPlan(plan, files, versions())
 
 
 def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
@@ -265,8 +261,10 @@ def keep_plan(batch: BatchFolder, plan: StoredPlan) -> None:
 def load_stored(path: Path) -> StoredPlan:
     """Read the plan in the folder of a batch; raises `BatchError`."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=StoredPlan)
-    except (OSError, msgspec.MsgspecError) as error:
+        found = msgspec.json.decode(path.read_bytes(), type=StoredPlan)
+        check_plan(found.plan)
+        return found
+    except (OSError, RecursionError, msgspec.MsgspecError, SceneError) as error:
         raise BatchError(f"{path} cannot be read: {error}; it is the plan of a batch and must stay as it is") from error
 
 

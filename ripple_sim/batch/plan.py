@@ -149,17 +149,8 @@ def _plain(value: Any) -> Any:
 _STEP = re.compile(r"([A-Za-z_][A-Za-z_0-9]*)(?:\[([^\]]+)\])?(?:\.|$)")
 
 
-@dataclasses.dataclass(frozen=True)
-class Step:
-    """A part of a key: a name, and what stands in brackets behind it: a number, a name, or a pattern with *."""
-
-    name: str
-    chosen: str | None = None
-
-    @property
-    def index(self) -> int | None:
-        """The number in brackets."""
-        return int(self.chosen) if self.chosen is not None and self.chosen.isdecimal() else None
+# A part of a key: a name, and what stands in brackets behind it: a number, a name, or a pattern with *; "" without.
+Step = tuple[str, str]
 
 
 def parse_key(key: str) -> tuple[Step, ...]:
@@ -175,7 +166,7 @@ def parse_key(key: str) -> tuple[Step, ...]:
         found = _STEP.match(key, place)
         if found is None:
             break
-        steps.append(Step(found[1], found[2]))
+        steps.append((found[1], found[2] or ""))
         place = found.end()
     if not steps or place < len(key) or key.endswith("."):
         raise SceneError(
@@ -193,15 +184,16 @@ def choose(names: Sequence[str], step: Step, where: str) -> list[int]:
     SceneError
         If there is none.
     """
-    if step.chosen is None:
+    kind, chosen = step
+    if not chosen:
         found = list(range(len(names)))
-    elif step.index is not None and step.chosen not in names:
-        found = [step.index] if step.index < len(names) else []
+    elif chosen.isdecimal() and chosen not in names:
+        found = [int(chosen)] if int(chosen) < len(names) else []
     else:
-        found = [number for number, name in enumerate(names) if fnmatchcase(name, step.chosen)]
+        found = [number for number, name in enumerate(names) if fnmatchcase(name, chosen)]
     if not found:
         listed = ", ".join(name or f"number {number}" for number, name in enumerate(names)) or "none"
-        raise SceneError(f"plan: {where} has no {step.name}[{step.chosen or '*'}]; there is {listed}")
+        raise SceneError(f"plan: {where} has no {kind}[{chosen or '*'}]; there is {listed}")
     return found
 
 
@@ -250,18 +242,9 @@ def video_name(store: StoreEntry) -> str | None:
 
 def options_of(store: StoreEntry) -> VideoOptions:
     """How the scenes of a batch are rendered."""
-    return VideoOptions(
-        size=store.size,
-        fps=store.fps,
-        duration=store.duration,
-        supersample=store.supersample,
-        resolution=store.resolution,
-        backend=store.backend,
-        overlay=store.overlay,
-        passes=store.passes,
-        pass_format=store.pass_format,
-        frame_format="exr" if store.video == "exr" else "png",
-    )
+    shared = {field.name for field in dataclasses.fields(VideoOptions)} & set(StoreEntry.__struct_fields__)
+    options = VideoOptions(**{name: getattr(store, name) for name in shared})
+    return dataclasses.replace(options, frame_format="exr" if store.video == "exr" else "png")
 
 
 def check_store(store: StoreEntry) -> None:
@@ -360,11 +343,7 @@ def read_plan(path: Path) -> Plan:
         content = msgspec.convert(table, PlanFile)
     except msgspec.ValidationError as error:
         raise SceneError(f"plan {str(path)!r}: {str(error).replace('`$.', '`')}") from error
-    _check_numbers(content)
-    check_store(content.store)
-    if content.meshes is not None and isinstance(content.meshes.bodies, Distribution):
-        content.meshes.bodies.check("meshes.bodies")
-    return Plan(
+    plan = Plan(
         count=content.count,
         seed=content.seed,
         sources=tuple(_sources(content, path.parent)),
@@ -373,16 +352,27 @@ def read_plan(path: Path) -> Plan:
         model=dict(_distributions(content.model, "")),
         store=content.store,
     )
+    check_plan(plan)
+    return plan
 
 
-def _check_numbers(content: PlanFile) -> None:
-    for key, value, least, most in (
-        ("count", content.count, 1, MOST_SCENES),
-        ("seed", content.seed, 0, 2**63),
-        ("store.scenes_per_tar", content.store.scenes_per_tar, 1, MOST_SCENES),
+def check_plan(plan: Plan) -> None:
+    """Make sure that scenes can be made by a plan; raises `SceneError` with the key, its value and what is valid."""
+    for name, value, least, most in (
+        ("count", plan.count, 1, MOST_SCENES),
+        ("seed", plan.seed, 0, 2**63),
+        ("store.scenes_per_tar", plan.store.scenes_per_tar, 1, MOST_SCENES),
     ):
         if not least <= value <= most:
-            raise SceneError(f"plan: {key} is {value}; valid is a whole number from {least} to {most}")
+            raise SceneError(f"plan: {name} is {value}; valid is a whole number from {least} to {most}")
+    if not plan.sources:
+        raise SceneError("plan: it names no scene; write scenes = ['duck'], or [meshes] with files = ['*.obj']")
+    check_store(plan.store)
+    if plan.meshes is not None and isinstance(plan.meshes.bodies, Distribution):
+        plan.meshes.bodies.check("meshes.bodies")
+    for key, given in (*plan.vary.items(), *plan.model.items()):
+        parse_key(key)
+        given.check(key)
 
 
 def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
@@ -402,8 +392,6 @@ def _sources(content: PlanFile, folder: Path) -> Iterator[str]:
                 f"plan: no mesh fits {pattern!r}; valid is a file, a folder or a pattern, relative to the plan"
             )
         yield from map(str, found)
-    if not content.scenes and content.meshes is None:
-        raise SceneError("plan: it names no scene; write scenes = ['duck'], or [meshes] with files = ['*.obj']")
 
 
 def _meshes(pattern: Path) -> list[Path]:
@@ -425,6 +413,4 @@ def _distributions(table: dict[str, Any], before: str) -> Iterator[tuple[str, Di
             given = msgspec.convert(value if isinstance(value, dict) else {"constant": value}, Distribution)
         except msgspec.ValidationError as error:
             raise SceneError(f"plan: {key}: {str(error).replace('`$.', '`')}") from error
-        parse_key(key)
-        given.check(key)
         yield key, given

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import html
 import json
 import shutil
@@ -23,9 +22,9 @@ from ripple_sim.solver.kernel import compile_times
 from .executors import usual_workers
 from .finished import FinishedScene, finished_scenes
 from .folder import BatchFolder, keep_plan, load_stored, stored
-from .make_scene import make_scene
 from .plan import Plan
 from .variation import Variation
+from .worker import make_scene
 
 _MOST = 5_000  # scenes on the page
 
@@ -81,35 +80,27 @@ def parquet() -> Any:
     return pyarrow.parquet
 
 
-class Index:
-    """The rows of a batch's scenes, those that are there and those that are added."""
+def write_index(batch: BatchFolder, rows: dict[int, dict[str, Any]]) -> None:
+    """Write the table and the page of a batch's scenes, those that anybody has finished and those put aside.
 
-    def __init__(self, batch: BatchFolder) -> None:
-        self._batch, self._parquet = batch, parquet()
-        self._rows: dict[int, dict[str, Any]] = {}
+    `rows` has what is known by number, see `row`; finished scenes that it lacks are added to it.
+    """
+    import pyarrow
 
-    def add(self, facts: dict[str, Any], times: dict[str, Any]) -> None:
-        """Add a finished scene."""
-        self._rows[facts["number"]] = row(facts, times)
-
-    def write(self) -> None:
-        """Write the table and the page, with all scenes that anybody has finished, and those put aside."""
-        import pyarrow
-
-        for scene in finished_scenes(self._batch, self._rows):
-            with contextlib.suppress(FileNotFoundError):  # another process packs it, and will write the index too
-                self._rows[scene.number] = row(scene.facts(), scene.times())
-        failures = self._batch.failures()
-        rows = [self._rows[number] for number in sorted(self._rows)]
-        rows += [
-            {"number": number, "status": "failed", "attempts": failure.attempts, "error": failure.error}
-            for number, failure in sorted(failures.items())
-            if number not in self._rows
-        ]
-        rows.sort(key=lambda each: each["number"])
-        with atomic_write(self._batch.index) as path:
-            self._parquet.write_table(pyarrow.table(_columns(rows)), path)
-        write_page(self._batch, rows)
+    damaged = {}
+    for scene in finished_scenes(batch, rows):
+        try:
+            rows[scene.number] = row(scene.facts(), scene.times())
+        except BatchError as error:  # or another process packs it, and will write the index too
+            damaged[scene.number] = {"number": scene.number, "status": "failed", "attempts": 0, "error": str(error)}
+    failed = {
+        number: {"number": number, "status": "failed", "attempts": failure.attempts, "error": failure.error}
+        for number, failure in batch.failures().items()
+    }
+    listed = [each for _, each in sorted((failed | damaged | rows).items())]
+    with atomic_write(batch.index) as path:
+        parquet().write_table(pyarrow.table(_columns(listed)), path)
+    write_page(batch, listed)
 
 
 def row(facts: dict[str, Any], times: dict[str, Any]) -> dict[str, Any]:
@@ -247,8 +238,7 @@ def trial_text(plan: Plan | None, folder: Path, workers: int | None) -> str:
         seconds = time.perf_counter() - start - (sum(compile_times().values()) - compiled)
         size = sum(path.stat().st_size for path in batch.scene(0).rglob("*") if path.is_file())
     count = workers or usual_workers()
-    while not folder.exists():
-        folder = folder.absolute().parent
+    folder = next(each for each in (folder, *folder.absolute().parents) if each.exists())
     lines.append(
         f"{plan.count} scenes of {outcome.row['frames']} frames: {seconds:.1f} s and {size / 1e6:.2f} MB for one, "
         f"so about {plan.count * seconds / 3600:.2g} h of work (here by {count} workers, at best "

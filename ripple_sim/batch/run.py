@@ -14,16 +14,17 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from pathlib import Path
+from typing import Any
 
 from ripple_sim.errors import BatchError
 
 from .executors import DaskExecutor, LocalExecutor, first_alone, usual_workers
 from .finished import pack
 from .folder import BatchFolder, Failure, keep_plan, load_plan, load_stored, stored
-from .make_scene import Outcome, make_scene
 from .plan import Plan
-from .report import Index
+from .report import parquet, row, write_index
 from .variation import Variation
+from .worker import Outcome, make_scene
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -81,7 +82,7 @@ class BatchRun:
 
     def __init__(self, batch: BatchFolder, plan: Plan, options: RunOptions) -> None:
         self.batch, self.options = batch, options
-        self.index = Index(batch)
+        self.rows: dict[int, dict[str, Any]] = {}  # of the index, by scene
         self.failures, finished = batch.failures(), batch.finished()
         share = [number for number in range(plan.count) if in_shard(number, plan, options.shard)]
         self._share = set(share)
@@ -117,7 +118,7 @@ class BatchRun:
                 progress(self.progress)
             if time.monotonic() - indexed > pause:
                 before = time.monotonic()
-                self.index.write()
+                write_index(self.batch, self.rows)
                 indexed = time.monotonic()
                 pause = max(_INDEXED, _REST * (indexed - before))
 
@@ -151,7 +152,7 @@ class BatchRun:
                 self.progress.made += 1
                 self.progress.frames += outcome.row["frames"]
                 self.progress.bytes += outcome.row["bytes"]
-                self.index.add(outcome.row, outcome.times)
+                self.rows[number] = row(outcome.row, outcome.times)
             if self.failures.pop(number, None) is not None:
                 self.batch.forget_failure(number)
             self._close(number)
@@ -245,10 +246,11 @@ def run_batch(
     if options.retry_failed:
         for number in batch.failures():
             batch.forget_failure(number)
+    parquet()  # before anything that takes time
     run = BatchRun(batch, plan, options)
     with _executor(options, run) as executor:
         run.work(executor, progress)
-    run.index.write()
+    write_index(batch, run.rows)
     if run.full is not None:
         raise BatchError(f"{run.full}; make room, or lower --keep-free, and run the same command again to go on")
     return run.progress
@@ -263,7 +265,10 @@ def _executor(options: RunOptions, run: BatchRun) -> Iterator[LocalExecutor | Da
         executor = LocalExecutor(min(options.workers or usual_workers(), max(1, len(run.pending))))
     try:
         yield executor
-    except BaseException:  # such as Ctrl-C: what is unfinished goes on next time
+    except BaseException as error:  # such as Ctrl-C: what is unfinished goes on next time
+        gone = executor.refusal() if isinstance(executor, DaskExecutor) and isinstance(error, Exception) else None
         executor.shutdown(wait=False, cancel_futures=True)
+        if gone is not None:
+            raise gone from ConnectionError(str(error))
         raise
     executor.shutdown()

@@ -5,7 +5,6 @@ Values go into the table of a scene file, and into a MuJoCo model before it is c
 
 from __future__ import annotations
 
-import dataclasses
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -17,8 +16,7 @@ import numpy as np
 
 from ripple_sim.errors import SceneError
 from ripple_sim.scene.drop import drop_scene
-from ripple_sim.scene.events import Events
-from ripple_sim.scene.load_scene import check_scene, load_scene
+from ripple_sim.scene.loading import load_scene, scene_of
 from ripple_sim.scene.scene import Scene
 from ripple_sim.scene.scene_file import parse_scene
 from ripple_sim.solver.errors import shown
@@ -55,27 +53,27 @@ def vary_table(table: dict[str, Any], entries: Mapping[str, Distribution], strea
 
 def _places(table: dict[str, Any], steps: Sequence[Step], before: str) -> Iterator[tuple[Any, Any, str]]:
     """Where values stand: the table or list that holds each, the key or number there, and the whole key."""
-    step, rest = steps[0], steps[1:]
-    here = f"{before}.{step.name}" if before else step.name
-    if not rest and step.chosen is None:
-        yield table, step.name, here
+    (key, chosen), rest = steps[0], steps[1:]
+    here = f"{before}.{key}" if before else key
+    if not rest and not chosen:
+        yield table, key, here
         return
-    inner = table.get(step.name)
-    if inner is None and step.chosen is None:
-        inner = table[step.name] = {}
+    inner = table.get(key)
+    if inner is None and not chosen:
+        inner = table[key] = {}
     if isinstance(inner, list) and all(isinstance(item, dict) for item in inner):
-        names = [next((str(item[key]) for key in _NAMES if key in item), "") for item in inner]
-        for number in choose(names, step, "the scene"):
+        names = [next((str(item[name]) for name in _NAMES if name in item), "") for item in inner]
+        for number in choose(names, steps[0], "the scene"):
             item = f"{here}[{names[number] or number}]"
             if not rest:
                 raise SceneError(f"plan: {item} is a table; name one of its keys")
             yield from _places(inner[number], rest, item)
-    elif isinstance(inner, list) and not rest and step.index is not None and step.index < len(inner):
-        yield inner, step.index, f"{here}[{step.index}]"
-    elif isinstance(inner, dict) and step.chosen is None:
+    elif isinstance(inner, list) and not rest and chosen.isdecimal() and int(chosen) < len(inner):
+        yield inner, int(chosen), f"{here}[{int(chosen)}]"
+    elif isinstance(inner, dict) and not chosen:
         yield from _places(inner, rest, here)
     else:
-        raise SceneError(f"plan: the scene has no {'.'.join([here, *(each.name for each in rest)])} to vary")
+        raise SceneError(f"plan: the scene has no {'.'.join([here, *(name for name, _ in rest)])} to vary")
 
 
 def _put(holder: Any, place: Any, name: str, value: Any, apply: str) -> None:
@@ -85,9 +83,9 @@ def _put(holder: Any, place: Any, name: str, value: Any, apply: str) -> None:
             if old is None:  # left out, which numpy takes for NaN
                 raise TypeError
             value = combined(np.asarray(old, float), value, apply).tolist()
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise SceneError(
-                f"plan: {name} is {old!r} in the scene, which {value!r} cannot {apply}; write a "
+                f"plan: {name} is {shown(old)} in the scene, which {shown(value)} cannot {apply}; write a "
                 "number into the scene file, or set the value"
             ) from error
     holder[place] = value
@@ -126,7 +124,7 @@ def vary_model(spec: mujoco.MjSpec, entries: Mapping[str, Distribution], stream:
             values[name] = value
             try:
                 _assign(element, attribute, index, value, distribution.apply)
-            except (TypeError, ValueError, IndexError) as error:
+            except (TypeError, ValueError, IndexError, OverflowError) as error:
                 raise SceneError(
                     f"plan: {name} cannot {distribution.apply} {shown(value)}; in the model it is "
                     f"{shown(getattr(element, attribute))}"
@@ -137,24 +135,26 @@ def vary_model(spec: mujoco.MjSpec, entries: Mapping[str, Distribution], stream:
 def _attributes(spec: mujoco.MjSpec, key: str) -> Iterator[tuple[Any, str, int | None, str]]:
     """Each element that a key fits, its attribute, the number in the attribute's brackets, and the whole key."""
     first, *steps = parse_key(key)
-    if not steps or first.name not in (*ELEMENTS, *_GROUPS):
+    kind, _ = first
+    if not steps or kind not in (*ELEMENTS, *_GROUPS):
         raise SceneError(
             f"plan: {key!r} is no attribute of a model; valid are an element and its attribute, such as "
             f"geom[ball].size, of {', '.join((*ELEMENTS, *_GROUPS))}"
         )
-    if first.name in _GROUPS:
-        found = [(getattr(spec, first.name), first.name)]
+    if kind in _GROUPS:
+        found = [(getattr(spec, kind), kind)]
     else:
-        elements = getattr(spec, ELEMENTS[first.name])
+        elements = getattr(spec, ELEMENTS[kind])
         names = [each.name for each in elements]
-        chosen = choose(names, first, "the model")
-        found = [(elements[number], f"{first.name}[{names[number] or number}]") for number in chosen]
-    last = steps[-1]
+        numbers = choose(names, first, "the model")
+        found = [(elements[number], f"{kind}[{names[number] or number}]") for number in numbers]
+    attribute, chosen = steps[-1]
+    index = int(chosen) if chosen.isdecimal() else None
     for element, name in found:
-        for step in steps[:-1]:
-            element, name = _inner(element, step.name, key), f"{name}.{step.name}"
-        _inner(element, last.name, key)
-        yield element, last.name, last.index, f"{name}.{last.name}" + (f"[{last.chosen}]" if last.chosen else "")
+        for inner, _ in steps[:-1]:
+            element, name = _inner(element, inner, key), f"{name}.{inner}"
+        _inner(element, attribute, key)
+        yield element, attribute, index, f"{name}.{attribute}" + (f"[{chosen}]" if chosen else "")
 
 
 def _inner(element: Any, attribute: str, key: str) -> Any:
@@ -185,8 +185,6 @@ def _assign(element: Any, attribute: str, index: int | None, value: Any, apply: 
 
 
 _SEED_BITS = 29  # so that `ripple-sim render --seed` takes it: nine digits
-
-_EVENTS = tuple(field.name for field in dataclasses.fields(Events))
 
 
 class Variation:
@@ -247,7 +245,7 @@ class Variation:
             )
             table = _table(scene)
             change(table)
-            scene = _scene(scene, table)
+            scene = scene_of(scene.name, scene.model, parse_scene(table, scene.name), scene.notes)
         return scene, dict(sorted(values.items()))
 
     def _bodies(self) -> int:
@@ -261,41 +259,7 @@ class Variation:
 
 
 def _table(scene: Scene) -> dict[str, Any]:
-    """What a scene file would say of a scene that was made without one."""
-    parts = {"ripple": list(scene.targets), "camera": scene.camera}
-    parts |= {name: list(getattr(scene.events, name)) for name in _EVENTS}
-    table = {name: _given(part) for name, part in parts.items() if part}
-    return {"model": scene.name, "duration": scene.duration, "two_way": scene.two_way} | table
-
-
-def _given(entry: Any) -> Any:
-    """The fields of an entry that are not as by default, as plain values."""
-    if isinstance(entry, list):
-        return [_given(each) for each in entry]
-    if not isinstance(entry, msgspec.Struct):
-        return msgspec.to_builtins(entry)
-    fields = msgspec.structs.fields(entry)
-    given = {field.name: getattr(entry, field.name) for field in fields}
-    defaults = {field.name: field.default for field in fields}
-    return {
-        name: _given(value)
-        for name, value in given.items()
-        if value is not None and value != [] and value != defaults[name]
-    }
-
-
-def _scene(scene: Scene, table: dict[str, Any]) -> Scene:
-    """The scene with what a table says."""
-    content = parse_scene(table, scene.name)
-    varied = dataclasses.replace(
-        scene,
-        targets=tuple(content.ripple),
-        camera=content.camera,
-        duration=content.duration,
-        events=Events(**{name: tuple(getattr(content, name)) for name in _EVENTS}),
-        two_way=content.two_way,
-        overlay=tuple(content.overlay),
-        lighting=content.lighting,
-    )
-    check_scene(varied)
-    return varied
+    """What a scene file would say of a scene that was made without one: what is not as by default, as plain values."""
+    parts = {"ripple": scene.targets, "camera": scene.camera, **vars(scene.events)}
+    table = {key: msgspec.to_builtins(list(part) if key != "camera" else part) for key, part in parts.items() if part}
+    return {"model": scene.name, "duration": scene.duration, "two_way": scene.two_way, **table}

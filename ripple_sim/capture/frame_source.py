@@ -7,17 +7,18 @@ that averages the finer pixels and the exposures of a frame in linear light.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.soft import first_skin
 from ripple_sim.render import Camera, FixedCamera, Renderer, Surface
 from ripple_sim.render.camera import Pose, Viewpoint
-from ripple_sim.render.contract import linear_to_srgb, srgb_to_linear
-from ripple_sim.render.resources import AnyHeightMap, MovedHeightMap
+from ripple_sim.render.resources import MovedHeightMap
 from ripple_sim.render.surfaces.surface import Charts
+from ripple_sim.render.tone_mapping import linear_to_srgb, srgb_to_linear
 from ripple_sim.scene.scene_file import CameraEntry
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import SphereAtlas, WaveSolver, sphere_atlas
@@ -25,7 +26,7 @@ from ripple_sim.solver.gl import shared_context
 from ripple_sim.solver.kernel import Floats32, kernel
 
 from .passes import Sighting
-from .snapshot import Exposures, Snapshot
+from .snapshot import Snapshot, exposures_of
 
 # Steps of the table from linear light to sRGB: enough that each of the 256 values has entries, the darkest too.
 _FINE = 1 << 14
@@ -233,8 +234,8 @@ class FrameSource:
     ) -> None:
         self.width, self.height = width, height
         self._simulation = simulation
-        self._exposures = Exposures.of(simulation.scene.camera)
-        self._sensor = Sensor(supersample, len(self._exposures))
+        _, self._lens_points = exposures_of(simulation.scene.camera)
+        self._sensor = Sensor(supersample, len(self._lens_points))
         self._geoms = simulation.ripples.geom_ids
         surfaces = {
             self._geoms[entry.geom]: annotate(surface_of(simulation.ripples[entry.geom], entry.look, entry.color))
@@ -259,7 +260,7 @@ class FrameSource:
         """Draw a snapshot without waiting for it: `fetch` returns it, after those submitted before."""
         height_maps = {self._geoms[name]: height_map for name, height_map in snapshot.height_maps.items()}
         camera: Viewpoint = self.camera(snapshot)
-        lens = self._exposures.offsets[snapshot.exposure]
+        lens = self._lens_points[snapshot.exposure]
         if lens.any():
             sim = self._simulation
             pose = camera.pose()
@@ -276,16 +277,16 @@ class FrameSource:
         height_maps = {self._geoms[name]: height_map for name, height_map in snapshot.height_maps.items()}
         camera = self.camera(snapshot)
         image = self.renderer.surfaces(snapshot.data, height_maps, camera, (self.width, self.height))
-        read = {geom: np.asarray(height_map) for geom, height_map in height_maps.items()}
-        return Sighting.of(image, camera.pose(), snapshot.data, read, self._meshes(height_maps))
-
-    def _meshes(self, height_maps: Mapping[int, AnyHeightMap]) -> dict[int, tuple[NDArray, NDArray]]:
-        """Vertices [m] and triangles of the targets where they are at a snapshot."""
-        meshes = {}
+        read, meshes = {}, {}
         for name, geom in self._geoms.items():
             mesh, height_map = self._simulation.ripples[name].rest.mesh, height_maps[geom]
+            read[geom] = np.asarray(height_map)
             meshes[geom] = height_map.V if isinstance(height_map, MovedHeightMap) else mesh.V, mesh.F
-        return meshes
+        data, model = snapshot.data, self._simulation.model
+        more = first_skin(model) + model.nskin - model.ngeom  # what is soft is in the world
+        positions = np.concatenate([data.geom_xpos, np.zeros((more, 3))])
+        rotations = np.concatenate([data.geom_xmat.reshape(-1, 3, 3), np.tile(np.eye(3), (more, 1, 1))])
+        return Sighting(image, camera.pose(), positions, rotations, read, meshes)
 
     def camera(self, snapshot: Snapshot) -> Camera | FixedCamera:
         """Camera of a snapshot, through the middle of its lens."""

@@ -5,11 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.soft import first_skin
 from ripple_sim.render.camera import Pose
 from ripple_sim.render.passes.surface_buffers import SurfaceImage
 from ripple_sim.render.surfaces.adaptive import spline_heights, spline_samples
@@ -40,22 +38,6 @@ class Sighting:
     rotations: NDArray[np.float64]
     height_maps: Mapping[int, NDArray[np.float32]]
     meshes: Mapping[int, tuple[NDArray, NDArray]]
-
-    @classmethod
-    def of(
-        cls,
-        image: SurfaceImage,
-        pose: Pose,
-        data: mujoco.MjData,
-        height_maps: Mapping[int, NDArray[np.float32]],
-        meshes: Mapping[int, tuple[NDArray, NDArray]],
-    ) -> Sighting:
-        """Sighting with the poses in `data`, which are copied."""
-        model = data.model
-        more = first_skin(model) + model.nskin - model.ngeom  # what is soft is in the world
-        positions = np.concatenate([data.geom_xpos, np.zeros((more, 3))])
-        rotations = np.concatenate([data.geom_xmat.reshape(-1, 3, 3), np.tile(np.eye(3), (more, 1, 1))])
-        return cls(image, pose, positions, rotations, height_maps, meshes)
 
     @property
     def positions_seen(self) -> NDArray[np.float64]:

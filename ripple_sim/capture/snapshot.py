@@ -1,15 +1,16 @@
 """Frozen copies of a running simulation's state, one for each exposure of a frame.
 
-`Exposures` says at which times while the shutter is open, and through which points of the lens; `ShutterTimes` takes
-the simulation there, between its physics steps, and `DrawnHeights` makes height maps, wherever a surface is.
+`exposures_of` says at which times while the shutter is open, and through which points of the lens; `ShutterTimes` takes
+the simulation there, between its physics steps, and `drawn_heights` makes height maps, wherever a surface is.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TypeAlias
 
 import mujoco
@@ -39,7 +40,6 @@ class ShutterTimes:
 
     Parameters
     ----------
-    simulation : Simulation
     times : float64 [n]
         In frames from a frame's beginning, ascending, from 0 to 1.
     """
@@ -102,62 +102,48 @@ def _blend(first: Field, second: Field, share: float) -> Field:
     return first + np.float32(share) * (second - first)
 
 
-class DrawnHeights:
-    """What a renderer needs of a target's heights.
+def drawn_heights(ripples: Ripples, name: str, limit: bool) -> Callable[[Field, mujoco.MjData], AnyHeightMap]:
+    """What makes height maps of a target's heights [m], [C, n, n]; with the mesh's vertices, where these have moved.
 
     Parameters
     ----------
-    ripples : Ripples
     name : str
         Of the target.
     limit : bool
         Whether heights that are too large for the object are bent, see `DisplacementLimit`.
     """
+    still = HeightMap.drawn(ripples[name].rest, limit)
+    gradients = functools.cache(lambda: MovedGradients(ripples[name].rest))
 
-    def __init__(self, ripples: Ripples, name: str, limit: bool) -> None:
-        self._ripples, self._name = ripples, name
-        self._height_map = HeightMap.drawn(ripples[name].rest, limit)
-        self._gradients: MovedGradients | None = None
+    def drawn(height: Field, data: mujoco.MjData) -> AnyHeightMap:
+        height_map, V = still(height), ripples.vertices(name, data)
+        return height_map if V is None else MovedHeightMap(gradients()(np.asarray(height_map), V), V)
 
-    def __call__(self, height: Field, data: mujoco.MjData) -> AnyHeightMap:
-        """Height map of heights [m], [C, n, n], with the vertices where they are in `data`, if they have moved."""
-        height_map: AnyHeightMap = self._height_map(height)
-        V = self._ripples.vertices(self._name, data)
-        if V is None:
-            return height_map
-        if self._gradients is None:
-            self._gradients = MovedGradients(self._ripples[self._name].rest)
-        return MovedHeightMap(self._gradients(np.asarray(height_map), V), V)
+    return drawn
 
 
 _GOLDEN_RATIO = (np.sqrt(5.0) - 1.0) / 2.0
 _FULL_TURN = 360.0  # degrees of a rotary shutter: open from one frame to the next
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Exposures:
+def exposures_of(camera: CameraEntry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The exposures whose mean is a frame, the same for every frame, in the order of time.
 
-    Attributes
-    ----------
+    A single one, through the middle of the lens, without shutter and aperture.
+
+    Returns
+    -------
     times : float64 [n]
         In frames after the frame's own time, when the shutter opens. The first is 0.
     offsets : float64 [n, 2]
         Point of the lens, to the right and up of its middle [m].
     """
-
-    times: NDArray[np.float64]
-    offsets: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.times)
-
-    @classmethod
-    def of(cls, camera: CameraEntry) -> Exposures:
-        """Exposures of a scene's camera: a single one, through the middle of the lens, without shutter and aperture."""
-        count = camera.exposures if camera.shutter > 0 or camera.aperture > 0 else 1
-        times = camera.shutter / _FULL_TURN * np.arange(count) / count
-        return cls(times, camera.aperture / 2 * _shuffled(disc_points(count)))
+    count = camera.exposures if camera.shutter > 0 or camera.aperture > 0 else 1
+    times = camera.shutter / _FULL_TURN * np.arange(count) / count
+    # the points in an order that visits all parts of the lens in any part of the time: from the middle outwards, moving
+    # bodies would begin sharp and end blurred
+    order = np.argsort(np.argsort(np.arange(count) * _GOLDEN_RATIO % 1.0))
+    return times, camera.aperture / 2 * disc_points(count)[order]
 
 
 def disc_points(count: int) -> NDArray[np.float64]:
@@ -170,14 +156,6 @@ def disc_points(count: int) -> NDArray[np.float64]:
     radius, angle = np.sqrt((index + 0.5) / count), 2 * np.pi * _GOLDEN_RATIO * index
     points = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return points - points.mean(axis=0)
-
-
-def _shuffled(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The points in an order that visits all parts of the lens in any part of the time.
-
-    From the middle outwards, moving bodies would begin sharp and end blurred.
-    """
-    return points[np.argsort(np.argsort(np.arange(len(points)) * _GOLDEN_RATIO % 1.0))]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -233,8 +211,8 @@ def snapshots(simulation: Simulation, frames: int, *, alive: int = 1) -> Iterato
     """
     states = itertools.cycle([mujoco.MjData(simulation.model) for _ in range(alive)])
     ripples = simulation.ripples
-    drawn = {name: DrawnHeights(ripples, name, simulation.limited[name]) for name in ripples}
-    shutter_times = ShutterTimes(simulation, Exposures.of(simulation.scene.camera).times)
+    drawn = {name: drawn_heights(ripples, name, simulation.limited[name]) for name in ripples}
+    shutter_times = ShutterTimes(simulation, exposures_of(simulation.scene.camera)[0])
     for number in range(frames):
         if number:
             simulation.advance_frame()

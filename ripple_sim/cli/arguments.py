@@ -1,22 +1,17 @@
-"""Types of command line arguments: how a word is parsed, and the message if it is invalid.
-
-`VideoArguments` is `VideoOptions` with these types: its fields, defaults and help are the options'.
-"""
+"""Types of command line arguments: how a word is parsed, and the message if it is invalid."""
 
 from __future__ import annotations
 
-import dataclasses
+import contextlib
 import math
 import re
 from collections.abc import Callable
-from pathlib import Path
 from typing import Annotated, Any
 
 from tyro.conf import arg
 from tyro.constructors import PrimitiveConstructorSpec
 
 from ripple_sim.solver.errors import shown
-from ripple_sim.video.options import VideoOptions
 
 # Written out, since the modules that have these names take seconds to import; a test compares them.
 UP_AXES, RIMS = ("y", "z"), ("free", "fixed")
@@ -31,103 +26,52 @@ def parse_size(word: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def parse_count(word: str) -> int:
-    """Read a whole number of 1 or more."""
-    return _whole(word, 1)
+def _reader(read: Callable[[str], Any], right: Callable[[Any], bool], valid: str) -> Callable[[str], Any]:
+    """What reads a word to a value that is right; its message says what is valid."""
+
+    def parse(word: str) -> Any:
+        with contextlib.suppress(ValueError):
+            if right(value := read(word)):
+                return value
+        raise ValueError(f"{shown(word)} is not valid; it must be {valid}")
+
+    return parse
 
 
-def parse_seed(word: str) -> int:
-    """Read a whole number of 0 or more."""
-    return _whole(word, 0)
-
-
-def _whole(word: str, least: int) -> int:
-    if not re.fullmatch(r"[0-9]{1,9}", word) or int(word) < least:
-        raise ValueError(f"{shown(word)} is not valid; it must be a whole number, {least} or more")
+def _whole(word: str) -> int:
+    if not re.fullmatch(r"[0-9]{1,9}", word):
+        raise ValueError
     return int(word)
 
 
-def parse_seconds(word: str) -> float:
-    """Read a positive, finite time [s]."""
-    return _positive(word, "a positive number of seconds")
+def _part(word: str) -> tuple[int, int]:
+    match = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", word)
+    return (int(match[1]), int(match[2])) if match else (0, 0)
 
 
-def parse_factor(word: str) -> float:
-    """Read a positive, finite factor."""
-    return _positive(word, "a positive number, such as 4")
+def _one_of(names: tuple[str, ...]) -> Callable[[str], Any]:
+    *most, last = names
+    return _reader(str, lambda word: word in names, f"{', '.join(most)} or {last}")
 
 
-def parse_angle(word: str) -> float:
-    """Read a shutter angle [degrees]."""
-    number = _number(word)
-    if not 0 <= number <= 360:
-        raise ValueError(f"{shown(word)} is not valid; it must be an angle from 0 to 360 degrees, such as 180")
-    return number
-
-
-def parse_diameter(word: str) -> float:
-    """Read the diameter of a lens [m]."""
-    number = _number(word)
-    if not 0 <= number < math.inf:
-        raise ValueError(f"{shown(word)} is not valid; it must be a number of metres, 0 or more, such as 0.02")
-    return number
+parse_count = _reader(_whole, lambda number: number >= 1, "a whole number, 1 or more")
+parse_seed = _reader(_whole, lambda number: True, "a whole number, 0 or more")
+parse_seconds = _reader(float, lambda seconds: 0 < seconds < math.inf, "a positive number of seconds")
+parse_factor = _reader(float, lambda factor: 0 < factor < math.inf, "a positive number, such as 4")
+parse_angle = _reader(float, lambda angle: 0 <= angle <= 360, "an angle from 0 to 360 degrees, such as 180")
+parse_diameter = _reader(float, lambda metres: 0 <= metres < math.inf, "a number of metres, 0 or more, such as 0.02")
+parse_supersample = _reader(_whole, lambda number: 1 <= number <= 4, "1, 2, 3 or 4")
+parse_shard = _reader(_part, lambda part: 1 <= part[0] <= part[1], "a part of how many, such as 1/4, 2/4, 3/4 or 4/4")
+parse_axis, parse_layout, parse_rim = map(_one_of, (UP_AXES, LAYOUTS, RIMS))
 
 
 def parse_focus(word: str) -> float | str:
     """Read a distance [m], or a name."""
-    number = _number(word)
-    return word if math.isnan(number) else number
-
-
-def _positive(word: str, valid: str) -> float:
-    number = _number(word)
-    if not 0 < number < math.inf:
-        raise ValueError(f"{shown(word)} is not valid; it must be {valid}")
-    return number
-
-
-def _number(word: str) -> float:
     try:
-        return float(word)
+        distance = float(word)
     except ValueError:
-        return math.nan
-
-
-def parse_supersample(word: str) -> int:
-    """Read a supersampling factor."""
-    if not re.fullmatch(r"[1-4]", word):
-        raise ValueError(f"{shown(word)} is not valid; it must be 1, 2, 3 or 4")
-    return int(word)
-
-
-def parse_shard(word: str) -> tuple[int, int]:
-    """Read which part of how many, such as "1/4"."""
-    match = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", word)
-    if match is None or not 1 <= int(match[1]) <= int(match[2]):
-        raise ValueError(f"{shown(word)} is not valid; it must be a part of how many, such as 1/4, 2/4, 3/4 or 4/4")
-    return int(match[1]), int(match[2])
-
-
-def parse_axis(word: str) -> str:
-    """Read the axis that points up."""
-    return _one_of(word, UP_AXES)
-
-
-def parse_layout(word: str) -> str:
-    """Read the name of a layout."""
-    return _one_of(word, LAYOUTS)
-
-
-def parse_rim(word: str) -> str:
-    """Read what rims do."""
-    return _one_of(word, RIMS)
-
-
-def _one_of(word: str, names: tuple[str, ...]) -> str:
-    if word not in names:
-        *most, last = names
-        raise ValueError(f"{shown(word)} is not valid; it must be {', '.join(most)} or {last}")
-    return word
+        return word
+    return word if math.isnan(distance) else distance
 
 
 def parse_overlay(word: str) -> tuple[str, ...]:
@@ -154,16 +98,9 @@ SceneSeed = Annotated[int | None, _one_word(parse_seed, "N"), arg(help_behavior_
 FrameRate = Annotated[int | None, _one_word(parse_count, "FPS"), arg(help_behavior_hint="(default: 60, for a GIF 25)")]
 Duration = Annotated[float | None, _one_word(parse_seconds, "S"), arg(help_behavior_hint="(default: the scene's)")]
 Resolution = Annotated[int | None, _one_word(parse_count, "N"), arg(help_behavior_hint="(default: the scene's)")]
-Overlay = Annotated[
-    tuple[str, ...] | None,
-    _one_word(parse_overlay, "NAME[,NAME ...]", lambda words: ",".join(words or ())),
-    arg(help_behavior_hint="(default: the scene's, or none)"),
-]
-Passes = Annotated[
-    tuple[str, ...],
-    _one_word(parse_overlay, "NAME[,NAME ...]", lambda words: ",".join(words or ())),
-    arg(help_behavior_hint="(optional)"),
-]
+_names = _one_word(parse_overlay, "NAME[,NAME ...]", lambda words: ",".join(words or ()))
+Overlay = Annotated[tuple[str, ...] | None, _names, arg(help_behavior_hint="(default: the scene's, or none)")]
+Passes = Annotated[tuple[str, ...], _names, arg(help_behavior_hint="(optional)")]
 Baseline = Annotated[
     str | None,
     _one_word(str, "{" + ",".join(BASELINES) + "}", lambda name: name or ""),
@@ -189,34 +126,3 @@ SceneLayout = Annotated[
     str | None, _one_word(parse_layout, "{auto,cube,patches}"), arg(help_behavior_hint="(default: the scene's)")
 ]
 Rim = Annotated[str | None, _one_word(parse_rim, "{free,fixed}"), arg(help_behavior_hint="(default: the scene's)")]
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class _Output:
-    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
-    """Output file ending in .mp4, .webm, .gif or .webp, or a name without ending for a folder of frames."""
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class VideoArguments(VideoOptions, _Output):
-    """Arguments of every command that renders a video; options not named here are read as their types say."""
-
-    size: Size = VideoOptions.size
-    fps: FrameRate = VideoOptions.fps
-    duration: Duration = VideoOptions.duration
-    slow_motion: Factor = VideoOptions.slow_motion
-    supersample: Supersample = VideoOptions.supersample
-    shutter: Shutter = VideoOptions.shutter
-    aperture: Aperture = VideoOptions.aperture
-    focus: Focus = None
-    exposures: Exposures = VideoOptions.exposures
-    passes: Passes = ()
-    overlay: Overlay = None
-    compare: Baseline = VideoOptions.compare
-    resolution: Resolution = VideoOptions.resolution
-    layout: SceneLayout = VideoOptions.layout
-    rim: Rim = VideoOptions.rim
-
-    def options(self) -> VideoOptions:
-        """Options that the user chose."""
-        return VideoOptions(**{field.name: getattr(self, field.name) for field in dataclasses.fields(VideoOptions)})

@@ -1,18 +1,30 @@
 """The `ripple-sim` program: reads the command line, runs a command, turns errors into one line and an exit status.
 
+A command is a class: its fields are the arguments, the docstrings the help, and `run` does the work. Heavy imports are
+inside `run`, so that `--help` and usage errors are answered at once.
 Exit status: 0 done, 1 something failed, 2 bad input, 128 + a signal's number after one.
 """
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
+import io
 import os
 import re
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
+import tyro.conf
+import tyro.extras
+from tyro.conf import Positional, arg
+
+from .batch import BatchCommand
+from .render import DropCommand, ExportCommand, RenderCommand, ViewCommand
+from .reports import AtlasCommand, BenchCommand, CacheCommand, InfoCommand, MaterialsCommand
 from .signals import INTERRUPTED, end_at_once, end_in_good_order, word_of
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -28,7 +40,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if isinstance(command, int):
         return command
     with warnings.catch_warnings():
-        warnings.showwarning = _show_warning
+        # in one line, without the place in the code
+        warnings.showwarning = lambda message, *_, **__: _say(f"warning: {message}")
         return _run(command)
 
 
@@ -53,8 +66,8 @@ def _run(command: Any) -> int:
         return _fail(error, FAILED)
     except RippleError as error:
         cause = error.__cause__
-        full = isinstance(cause, OSError) and cause.errno in OF_THE_DISK
-        return _fail(error, FAILED if full else BAD_INPUT)
+        failed = isinstance(cause, ConnectionError) or (isinstance(cause, OSError) and cause.errno in OF_THE_DISK)
+        return _fail(error, FAILED if failed else BAD_INPUT)
     except MemoryError as error:
         return _fail(
             f"not enough memory{f': {error}' if str(error) else ''}; ask for a lower resolution or size", FAILED
@@ -81,11 +94,6 @@ def _fail(message: object, status: int, ending: BaseException | None = None) -> 
     notes = getattr(message if ending is None else ending, "__notes__", [])
     _say("; ".join([str(message), *notes]))
     return status
-
-
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    """Print a warning in one line, without the place in the code: takes the place of `warnings.showwarning`."""
-    _say(f"warning: {message}")
 
 
 def _say(message: str) -> None:
@@ -115,9 +123,6 @@ def _one_line(message: str) -> str:
 
 def _parse(argv: list[str]) -> Any:
     """Return the command to run, or the exit status if there is nothing to run."""
-    # here, where the signals are handled: importing it takes a third of a second
-    from .parser import UsageError, parse
-
     if any("\0" in word for word in argv):
         return _fail("a word of the command line holds a NUL; no name can", BAD_INPUT)
     try:
@@ -128,3 +133,75 @@ def _parse(argv: list[str]) -> Any:
     except OSError as error:
         return _give_up_output(error)
     return DONE if command is None else command
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CompletionCommand:
+    """Print a shell completion script. To use it: source <(ripple-sim completion bash)."""
+
+    shell: Annotated[Positional[Literal["bash", "zsh"]], arg(metavar="SHELL")]
+    """Shell to complete in: bash or zsh."""
+
+
+COMMANDS: dict[str, Callable[..., Any]] = {
+    "render": RenderCommand,
+    "drop": DropCommand,
+    "export": ExportCommand,
+    "batch": BatchCommand,
+    "atlas": AtlasCommand,
+    "info": InfoCommand,
+    "bench": BenchCommand,
+    "view": ViewCommand,
+    "materials": MaterialsCommand,
+    "cache": CacheCommand,
+    "completion": CompletionCommand,
+}
+
+_DESCRIPTION = "Surface ripples on any mesh, driven by the contact forces of a MuJoCo simulation."
+
+
+class UsageError(Exception):
+    """The command line is invalid; the message says where, and names the help."""
+
+
+def parse(argv: Sequence[str]) -> Any:
+    """Return the command to run, or None if the help or a completion script was printed instead.
+
+    Raises
+    ------
+    UsageError
+    """
+    command = _read(argv)
+    if isinstance(command, CompletionCommand):  # which tyro makes from all the commands
+        command = _read(["--tyro-print-completion", command.shell])
+    return command
+
+
+def _read(argv: Sequence[str]) -> Any:
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return tyro.extras.subcommand_cli_from_dict(
+                COMMANDS,
+                prog="ripple-sim",
+                description=_DESCRIPTION,
+                args=list(argv),
+                config=(tyro.conf.FlagCreatePairsOff,),
+            )
+    except SystemExit as ending:
+        if ending.code:
+            command = f" {argv[0]}" if argv and argv[0] in COMMANDS else ""
+            raise UsageError(f"{_first_part(complaint.getvalue())}; see ripple-sim{command} --help") from None
+        return None
+
+
+def _first_part(box: str) -> str:
+    """Reduce tyro's complaint to the text between its first two rules, without the help texts (indented by 8).
+
+    A complaint is a title, a rule, what is wrong, a rule, and hints; it is framed where stdout is UTF-8.
+    """
+    text = re.sub(r"\x1b\[[0-9;]*m", "", box)
+    parts = re.split(r"^[│╭╰ ]*(?:─ .* ─+|─{3,}|-{3,})[│╮╯ ]*$", text, flags=re.MULTILINE)
+    part = parts[1] if len(parts) > 1 else text
+    said = [line.strip("│ ") for line in part.splitlines() if not re.match(r"│? {9}", line)]
+    return " ".join(said).strip().rstrip(".")

@@ -1,6 +1,6 @@
-"""Commands that make a film or a file of a scene: `render`, `drop` and `export`.
+"""Commands that show a scene or write it to a file: `render`, `drop`, `export` and `view`.
 
-On a terminal they show a progress bar, which tells what is being compiled; a pipe or a log stays silent.
+On a terminal those that write show a progress bar, which tells what is being compiled; a pipe or a log stays silent.
 """
 
 from __future__ import annotations
@@ -18,26 +18,36 @@ from rich.text import Text
 from tyro.conf import Positional, arg
 
 from ripple_sim.export.options import ExportOptions
+from ripple_sim.video.options import VideoOptions
 
 from .arguments import (
+    Aperture,
+    Baseline,
     Count,
     Device,
     Duration,
+    Exposures,
     Factor,
+    Focus,
+    FrameRate,
     Limit,
+    Overlay,
+    Passes,
     Resolution,
     Rim,
     SceneLayout,
     SceneSeed,
     Seed,
+    Shutter,
     Size,
+    Supersample,
     UpAxis,
-    VideoArguments,
 )
 
 if TYPE_CHECKING:
     from ripple_sim.scene.scene import Scene
     from ripple_sim.video.render_video import Summary
+    from ripple_sim.viewer.window import Window
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -107,15 +117,15 @@ _STAGES = {
 }
 
 
-class _Compiling(ProgressColumn):
-    """What is being compiled, and for how many seconds so far; nothing while nothing is."""
+class _Rate(ProgressColumn):
+    """The rate; or what is being compiled, and for how many seconds so far."""
 
     def render(self, task: Task) -> Text:
         from ripple_sim.solver.kernel import compile_times, compiling
 
         module = compiling()
         if module is None:
-            return Text("")
+            return Text(f"{task.speed:.1f} frames/s" if task.speed else "", style="progress.data.speed")
         stage = _stage(module)
         seconds = sum(time for each, time in compile_times().items() if _stage(each) == stage)
         return Text(f"compiling {stage} (once): {seconds:.0f} s")
@@ -127,11 +137,6 @@ def _stage(module: str) -> str:
     return _STAGES[max(fitting, key=len)] if fitting else module
 
 
-class _Rate(ProgressColumn):
-    def render(self, task: Task) -> Text:
-        return Text(f"{task.speed:.1f} frames/s" if task.speed else "", style="progress.data.speed")
-
-
 @contextlib.contextmanager
 def frame_progress(title: str, total: int | None = None) -> Iterator[Report | None]:
     """Show a title, and below it frames done of a total, rate and remaining time, on stderr while the block runs.
@@ -141,7 +146,7 @@ def frame_progress(title: str, total: int | None = None) -> Iterator[Report | No
     if not sys.stderr.isatty():
         yield None
         return
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("frames"), _Rate(), TimeRemainingColumn(), _Compiling())
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("frames"), _Rate(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         progress.console.print(title, markup=False, highlight=False)
         task = progress.add_task("", total=total)
@@ -149,7 +154,25 @@ def frame_progress(title: str, total: int | None = None) -> Iterator[Report | No
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class _VideoCommand(VideoArguments):
+class _VideoCommand(VideoOptions):
+    # the fields, defaults and help of the options; those that are not here are read as their types say
+    size: Size = VideoOptions.size
+    fps: FrameRate = VideoOptions.fps
+    duration: Duration = VideoOptions.duration
+    slow_motion: Factor = VideoOptions.slow_motion
+    supersample: Supersample = VideoOptions.supersample
+    shutter: Shutter = VideoOptions.shutter
+    aperture: Aperture = VideoOptions.aperture
+    focus: Focus = None
+    exposures: Exposures = VideoOptions.exposures
+    passes: Passes = ()
+    overlay: Overlay = None
+    compare: Baseline = VideoOptions.compare
+    resolution: Resolution = VideoOptions.resolution
+    layout: SceneLayout = VideoOptions.layout
+    rim: Rim = VideoOptions.rim
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
+    """Output file ending in .mp4, .webm, .gif or .webp, or a name without ending for a folder of frames."""
     camera: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: the scene's)")] = None
     """Camera of the MJCF to render from."""
     device: Device = None
@@ -158,6 +181,10 @@ class _VideoCommand(VideoArguments):
     """Ours, with OpenGL, or Cycles, Blender's path tracer (needs bpy), which takes seconds to minutes a frame."""
     samples: Count = 64
     """Paths a pixel that Cycles takes."""
+
+    def options(self) -> VideoOptions:
+        """Options that the user chose."""
+        return VideoOptions(**{field.name: getattr(self, field.name) for field in dataclasses.fields(VideoOptions)})
 
     def check_input(self) -> None:
         """Make sure that what is to be rendered exists."""
@@ -232,7 +259,7 @@ class RenderCommand(_VideoCommand):
 
     def load(self) -> Scene:
         """Load the scene."""
-        from ripple_sim.scene.load_scene import load_scene
+        from ripple_sim.scene.loading import load_scene
 
         return load_scene(self.scene, seed=self.seed)
 
@@ -291,3 +318,78 @@ def _summary_text(summary: Summary) -> str:
         f"waves {summary.wave_seconds:.1f} s, rendering {summary.render_seconds:.1f} s, "
         f"encoding {summary.encode_seconds:.1f} s"
     )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ViewCommand:
+    """Open a scene or a mesh in an interactive window.
+
+    Click: poke the surface. Drag: orbit; with shift: pan; wheel: zoom. Space: pause or resume. N: next frame. R: reset.
+    T: throw a ball at the pointer. O: next operator (fem, uncorrected, paper). C: heatmap on or off. S: screenshot.
+    V: start or stop a recording. H: list of keys. Q: quit. Sliders set the poke's impulse and the material.
+    """
+
+    scene: Annotated[Positional[str], arg(metavar="SCENE|MESH")]
+    """Name of a shipped scene, path of a scene file (TOML), or a mesh (OBJ, OFF, PLY, STL, GLB ...)."""
+    size: Size = (800, 600)
+    """Window size in pixels."""
+    resolution: Count = 64
+    """Texels along the edge of a chart; more resolve finer waves and take longer."""
+    bodies: Seed = 3
+    """Number of bodies that fall on a mesh; 0 for none."""
+    seed: Seed = 0
+    """Seed for the bodies' places and sizes."""
+    up: UpAxis = None
+    """Axis of the mesh that points up; a flat sheet lies down."""
+    repair: bool = False
+    """Close the mesh's holes (needs the package pymeshfix)."""
+    wrap: bool = False
+    """Take a closed surface round the mesh: for parts that pass through each other, or scans in pieces."""
+    folder: Annotated[Path, arg(metavar="FOLDER")] = Path()
+    """Folder for screenshots and videos."""
+    web: bool = False
+    """Serve a web page to a browser on this machine instead of a window (needs the extra ripple-sim[web])."""
+    port: Count = 8080
+    """Port of the web page."""
+    host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1"
+    """Address of the web page; any other than this machine's own lets other machines see and drive the viewer."""
+    benchmark: bool = False
+    """Measure the window's update rate, print it, and exit."""
+
+    def run(self) -> None:
+        """Show the scene until the user quits."""
+        from ripple_sim.encode.output import check_size
+        from ripple_sim.scene.drop import is_scene
+        from ripple_sim.viewer.opening import display_problem
+        from ripple_sim.viewer.window import check_display
+
+        # refuse what cannot work before anything that takes time: first what is asked for, then what this machine lacks
+        is_scene(self.scene)
+        check_size(*self.size)
+        if self.benchmark:
+            from ripple_sim.viewer.window import benchmark
+
+            print(benchmark(self._window(off_screen=display_problem() is not None)))
+        elif self.web:
+            from ripple_sim.viewer.web import check_web, serve
+
+            check_web(self.port, self.host)
+            serve(self._window(off_screen=True), self.port, self.host)
+        else:
+            from ripple_sim.viewer.window import run
+
+            check_display()
+            run(self._window(off_screen=False))
+
+    def _window(self, off_screen: bool) -> Window:
+        from ripple_sim.viewer.opening import open_scene
+        from ripple_sim.viewer.session import Session
+
+        scene = open_scene(
+            self.scene, bodies=self.bodies, seed=self.seed, up=self.up, repair=self.repair, wrap=self.wrap
+        )
+        session = Session(scene, resolution=self.resolution)
+
+        from ripple_sim.viewer.window import Window
+
+        return Window(session, size=self.size, off_screen=off_screen, folder=self.folder)

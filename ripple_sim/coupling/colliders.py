@@ -389,5 +389,5 @@ def inset(mesh: Mesh, depth: float) -> NDArray[np.float64]:
 
 def _thickness(V: NDArray[np.float64], F: NDArray[np.int64], inward: NDArray[Any], start: float) -> NDArray[np.float64]:
     """Distance from each vertex inwards to the other side of a mesh [m], [n]; infinite where there is none."""
-    distance: NDArray[Any] = RayScene(V, F).cast(V + start * inward, inward).distance
+    distance: NDArray[Any] = RayScene(V, F).cast(V + start * inward, inward)[1]
     return start + distance

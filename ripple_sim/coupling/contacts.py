@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.solver import Atlas
-from ripple_sim.solver.kernel import Bools, Floats, Ints, Ints32, kernel
+from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 
 from .flex_contacts import FlexContacts
 from .model import CoupledModel
@@ -117,17 +117,10 @@ def normal_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) ->
     address, dim = data.contact.efc_address[contacts], data.contact.dim[contacts]
     # the edges of a friction pyramid share the normal force among them
     edges = np.maximum(2 * dim - 2, 1) if is_pyramidal(model) else np.ones_like(dim)
-    return _edge_sums(data.efc_force, address, edges)
-
-
-@kernel
-def _edge_sums(efc_force: Floats, address: Ints32, edges: Ints32) -> Floats:
-    """Sums of some forces from each address on, 0 where that is negative."""
-    sums = np.zeros(len(address))
-    for i in range(len(address)):
-        for k in range(edges[i] if address[i] >= 0 else 0):
-            sums[i] += efc_force[address[i] + k]
-    return sums
+    edges = np.where(address >= 0, edges, 0)
+    ends = edges.cumsum()
+    rows = np.repeat(address - ends + edges, edges) + np.arange(edges.sum())
+    return np.bincount(np.repeat(np.arange(len(edges)), edges), data.efc_force[rows], len(edges)).astype(np.float64)
 
 
 def friction_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) -> Floats:
@@ -144,9 +137,12 @@ def friction_forces(model: mujoco.MjModel, data: mujoco.MjData, contacts: Ints) 
     return np.where(has_axis, forces, 0.0)
 
 
+_PYRAMIDAL = int(mujoco.mjtCone.mjCONE_PYRAMIDAL)
+
+
 def is_pyramidal(model: mujoco.MjModel) -> bool:
     """Whether friction cones are pyramids, whose edges share the normal force."""
-    return bool(model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL)
+    return bool(model.opt.cone == _PYRAMIDAL)
 
 
 def points_outside(data: mujoco.MjData, rows: PairRows, extents: Floats) -> tuple[Floats, Floats]:
@@ -202,8 +198,9 @@ def geom_contacts(
     forces = normal_forces(model, data, rows.contacts)
     if pulls is not None:
         forces += pulls[rows.contacts]
-    if not (forces > 0).all():
-        rows, forces = PairRows(*(each[forces > 0] for each in rows)), forces[forces > 0]
+    pushing = forces > 0
+    if not pushing.all():
+        rows, forces = PairRows(*(each[pushing] for each in rows)), forces[pushing]
     targets, others = rows.targets, rows.others
     points, normals = points_outside(data, rows, extents)
     found = Contacts(others, points, forces, normals)

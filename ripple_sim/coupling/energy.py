@@ -1,10 +1,14 @@
-"""The energy of bodies and waves together, as their schemes conserve it."""
+"""The energy of bodies and waves together, as their schemes conserve it, and MuJoCo's own scheme for new forces."""
 
 from __future__ import annotations
 
+import copy
 from typing import NamedTuple
 
 import mujoco
+import numpy as np
+
+from ripple_sim.solver.kernel import Floats
 
 
 class Energy(NamedTuple):
@@ -59,3 +63,67 @@ class BodyEnergy:
     def _update(self) -> None:
         for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_flex, mujoco.mj_tendon):
             update(self._model, self._scratch)
+
+
+_INTEGRATORS = mujoco.mjtIntegrator
+# Rounds in which the velocity at the beginning of a step is found from that at its end.
+_ROUNDS = 3
+
+
+class VelocityChange:
+    """What other contact forces would have changed in the velocities after a step.
+
+    MuJoCo's integrators are implicit in joint damping, and some in the gyroscopic terms of what spins: velocities then
+    change by another mass matrix than accelerations tell, and forces that are taken back would leave a rest behind.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._model = model
+        self._scratch: mujoco.MjData | None = None
+        self._latest: Floats | None = None
+
+    def note(self, data: mujoco.MjData) -> None:
+        """Take the velocities with which the next step begins, unless somebody changes them."""
+        self._latest = data.qvel.copy()
+
+    def __call__(self, data: mujoco.MjData, qacc: Floats, force: Floats, *, pending: bool) -> Floats:
+        """Change of velocities [nv].
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+            With the new accelerations and constraint forces.
+        qacc, force : float64 [nv]
+            The old ones.
+        pending : bool
+            Whether the velocities are those before the step.
+        """
+        dt, integrator = self._model.opt.timestep, self._model.opt.integrator
+        if integrator in (_INTEGRATORS.mjINT_IMPLICIT, _INTEGRATORS.mjINT_IMPLICITFAST):
+            integrate = mujoco.mj_implicit
+        elif integrator == _INTEGRATORS.mjINT_EULER and self._model.dof_damping.any():
+            integrate = mujoco.mj_Euler
+        else:
+            return np.asarray(dt * (data.qacc - qacc))
+        if self._scratch is None:
+            self._scratch = copy.copy(data)
+        scratch = self._scratch
+
+        def end(start: Floats, acceleration: Floats, forces: Floats) -> Floats:
+            mujoco.mj_copyData(scratch, self._model, data)
+            scratch.qvel[:], scratch.qacc[:], scratch.qfrc_constraint[:] = start, acceleration, forces
+            integrate(self._model, scratch)
+            return scratch.qvel.copy()
+
+        start = data.qvel if pending else self._latest if self._latest is not None else data.qvel - dt * qacc
+        old = end(start, qacc, force)
+        for _ in range(0 if pending else _ROUNDS):
+            if np.array_equal(old, data.qvel):
+                break
+            start = start + data.qvel - old
+            old = end(start, qacc, force)
+        return end(start, data.qacc, data.qfrc_constraint) - old

@@ -7,6 +7,7 @@ together; arguments by geom; and collision geoms, which collide in place of a ta
 from __future__ import annotations
 
 import copy
+import operator
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary, WeakSet
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Material
+from ripple_sim.solver.errors import shown
 
 from .soft import find_soft, is_soft, soft_name, soft_names
 
@@ -98,8 +100,10 @@ def by_name(model: mujoco.MjModel, values: ByGeom[Value], what: str) -> dict[str
     Raises
     ------
     SceneError
-        If a geom is missing, or has two values.
+        If they are no mapping, or a geom is missing, or has two values.
     """
+    if not isinstance(values, Mapping):
+        raise SceneError(f"{what} is {shown(values)}; valid is a dict of them by geom")
     found: dict[str, Value] = {}
     for key, value in values.items():
         name = target_name(model, find_any(model, key))
@@ -157,7 +161,7 @@ def own_model(model: Any) -> mujoco.MjModel:
     Raises
     ------
     SceneError
-        If it is something else.
+        If it is something else, or has a time step, a place, a size, a mass or a gravity out of range.
     """
     found = getattr(model, "ptr", model)
     if not isinstance(found, mujoco.MjModel):
@@ -167,6 +171,11 @@ def own_model(model: Any) -> mujoco.MjModel:
             f"the model's timestep is {found.opt.timestep:g} s; valid is a number greater than 0 and up to "
             f"{_LONGEST_STEP:g}, such as 0.002 (<option timestep=...>)"
         )
+    for name in ("opt.gravity", "opt.wind", "body_pos", "body_quat", "body_mass", "geom_pos", "geom_size", "qpos0"):
+        values = operator.attrgetter(name)(found)
+        wrong = values[~(np.abs(values) <= mujoco.mjMAXVAL)]  # NaN, too
+        if len(wrong):
+            raise SceneError(f"the model's {name} holds {wrong[0]:g}; valid are numbers up to {mujoco.mjMAXVAL:g}")
     return found
 
 

@@ -23,8 +23,8 @@ from ripple_sim.solver.texels.chart_map import nearest_places
 
 from .contacts import ContactReader, Contacts, first_rows
 from .model import CoupledModel
-from .patches import Footprints, load_points
-from .rest_filter import NO_FORCES, RestFilter, TexelForces
+from .patches import Footprints, corners, load_points
+from .rest_filter import DEFAULT_TIME_CONSTANT, NO_FORCES, RestFilter, TexelForces
 from .soft import target_pose
 
 SLEEP, _STATE = int(mujoco.mjtEnableBit.mjENBL_SLEEP), int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -32,6 +32,7 @@ SLEEP, _STATE = int(mujoco.mjtEnableBit.mjENBL_SLEEP), int(mujoco.mjtState.mjSTA
 # Contacts of these parameters have no spring, and a share of nearly 1 in what holds bodies: their forces are those of
 # statics, however deep the bodies lie in each other.
 _NO_SPRING, _RIGID = (1e6, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
+_TINY = 1e-12
 # Geoms that are apart by this share of the smaller one's size are meant to touch.
 _NEAR = 1e-3
 
@@ -111,7 +112,7 @@ def _by_other(contacts: Contacts) -> list[Contacts]:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Impulse:
-    """The impulse that one geom gave to one target in one physics step.
+    """The impulse that one geom gave to one target in one physics step; one at each place where it is wedged.
 
     Attributes
     ----------
@@ -194,7 +195,7 @@ class StepContacts(NamedTuple):
     on_texels: TexelForces
 
     def impulses(self, names: Sequence[str], owners: Ints, atlas: Atlas, timestep: float) -> Iterator[Impulse]:
-        """One record for each geom or flex that touches.
+        """One record for each geom or flex that touches; for each place of one that touches in several.
 
         Parameters
         ----------
@@ -213,11 +214,30 @@ class StepContacts(NamedTuple):
             weighted = np.add.reduceat(forces[:, None] * places, first)
             forces, others, inner = np.add.reduceat(forces, first), others[first], inner[first]
             places, texels = atlas.nearest(weighted / forces[:, None])
+        elif (apart := self._touch_apart()).any():
+            whose, middles, forces = self._corners()
+            kept = np.concatenate([(~apart).nonzero()[0], apart[whose].nonzero()[0] + len(apart)])
+            whose = np.concatenate([np.arange(len(apart)), whose])[kept]
+            forces = np.concatenate([self.forces, forces])[kept]
+            places, texels = atlas.nearest(np.concatenate([places, middles])[kept])
+            others, inner = others[whose], inner[whose]
         points = self.position + places @ self.rotation.T
         rows = zip(others.tolist(), points, forces.tolist(), texels.tolist(), inner.tolist(), strict=True)
         for other, point, force, texel, behind in rows:
             row = texel // n
             yield Impulse(geom, names[other], point, force * timestep, (row // n, row % n, texel % n), behind)
+
+    def _touch_apart(self) -> Bools:
+        """Whether each collider touches in several places, and not in their middle: as what is wedged does."""
+        away = self.places - self.on_texels.middles
+        return np.asarray((away**2).sum(axis=1) > self.on_texels.place_radii**2)
+
+    def _corners(self) -> tuple[Ints, Floats, Floats]:
+        """Places where each collider touches: its row, points in the target's frame [m], and forces [N]."""
+        ends = np.append(self.starts[1:], len(self.contacts.forces))
+        points = (self.contacts.points - self.position) @ self.rotation
+        rows = np.repeat(np.arange(len(self.starts)), ends - self.starts)
+        return corners(rows, points, self.contacts.forces, 2 * self.on_texels.place_radii)
 
     def touches(self) -> Iterator[Touch]:
         """One record for each geom that touches."""
@@ -244,12 +264,17 @@ class TargetLoad:
         Footprint radius of each collider [m]: of a pair the smaller one counts.
     convex : bool [c]
         Whether what touches at two points touches between them too.
+    time_constant : float
+        Of contacts with it [s].
     """
 
-    def __init__(self, waves: WaveSolver, target: int, radii: NDArray[np.float64], convex: NDArray[np.bool_]) -> None:
+    def __init__(
+        self, waves: WaveSolver, target: int, radii: NDArray[np.float64], convex: NDArray[np.bool_],
+        time_constant: float = DEFAULT_TIME_CONSTANT,
+    ) -> None:  # fmt: skip
         self._target, self._radii, self._convex = target, np.minimum(radii, radii[target]), convex
         self._is_open = not waves.atlas.mesh.closed
-        self._filter = RestFilter(len(radii), waves.atlas.areas.size)
+        self._filter = RestFilter(len(radii), waves.atlas.areas.size, time_constant)
         self.set_waves(waves)
 
     def set_waves(self, waves: WaveSolver) -> None:
@@ -298,6 +323,7 @@ class TargetLoad:
             geoms, middles, loads.radii[first[:-1]] / 2, begins, texels, shares * np.repeat(pushes, counts)
         )
         done = StepContacts(self._target, *pose, contacts, starts, places, at, forces, inner, on_texels)
+        self._filter.set_timestep(timestep)
         return self._filter(on_texels, elapsed), done
 
     def untouched(self, elapsed: float) -> Load:
@@ -310,6 +336,17 @@ class TargetLoad:
             return np.zeros(len(starts), dtype=np.bool_)
         pushes = np.add.reduceat(np.abs(contacts.forces)[:, None] * contacts.normals, starts) @ rotation
         return np.asarray((pushes * self._atlas.texels.grid.normals[texels]).sum(axis=1) < 0)
+
+
+def time_constant(coupled: CoupledModel, target: int) -> float:
+    """Of a target's contacts [s]; of a spring without a time constant that of its frequency, 1 / omega."""
+    surface = coupled.soft.get(target)
+    if surface is None:
+        constant = float(coupled.solref[target, 0])
+    else:
+        constant = float(coupled.model.flex_solref[surface.flex, 0]) if surface.flex >= 0 else DEFAULT_TIME_CONSTANT
+    # of a pair that is not positive this is -omega^2
+    return constant if constant > 0 else 1 / float(np.sqrt(max(-constant, _TINY)))
 
 
 class ContactLoads:
@@ -330,10 +367,10 @@ class ContactLoads:
     def clear(self) -> None:
         """Forget all contacts."""
         self._sleeping: SleepingContacts | None = None
-        radii, convex = self._coupled.footprint_radii, self._coupled.convex
+        radii, convex, soft = self._coupled.footprint_radii, self._coupled.convex, self._coupled.soft
         # a flex has a contact at each of its vertices: nothing touches between them
         self._targets = {
-            geom: TargetLoad(waves, geom, radii, convex & (geom not in self._coupled.soft))
+            geom: TargetLoad(waves, geom, radii, convex & (geom not in soft), time_constant(self._coupled, geom))
             for geom, waves in self._waves.items()
         }
         self.skip()
@@ -379,7 +416,7 @@ class ContactLoads:
 
     @property
     def impulses(self) -> list[Impulse]:
-        """The impulses given since `skip`, one record for each pair and step."""
+        """The impulses given since `skip`, one record for each pair and step, or for each place of what is wedged."""
         if self._impulses is None:
             names, owners = self._coupled.names, self._coupled.owners
             self._impulses = [

@@ -9,6 +9,7 @@ The texels round these points are a geom's footprint, which is reused while its 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -19,7 +20,7 @@ from ripple_sim.solver import Atlas
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
 from ripple_sim.solver.texels.chart_map import nearest_places
 from ripple_sim.solver.texels.distance import distance_scratch
-from ripple_sim.solver.waves.footprint import weigh
+from ripple_sim.solver.waves.footprint import weigh_each
 
 MAX_CORNERS = 8
 # Points on the rim of a patch stand for half a cell, those at its corners for a quarter: their centres lie farther in.
@@ -79,46 +80,74 @@ def load_points(
     patches = np.zeros(len(forces), dtype=np.int64)
     patches[starts[1:]] = 1
     patches, points, forces = corners(patches.cumsum(), points, forces, radii)
-    counts = np.bincount(patches)
-    wide = convex & (counts > 1)
-    if not wide.any():
+    pairs = _pairs(patches, convex)
+    if not len(pairs):
         return LoadPoints(patches, points, forces, radii[patches])
-    return _spread(patches, points, forces, counts, wide, radii, closest)
+    probes = np.concatenate([points, points[pairs].sum(axis=1) / 2])
+    # contact points lie a little outside the surface, by up to their depth: so may the midpoints
+    away = _length(closest(probes) - probes)
+    patches, points, forces, near, radii = _spread(patches, forces, radii, pairs, probes, away)
+    patches, points, forces = _joined(patches, points, forces, near, len(forces))
+    return LoadPoints(patches, points, forces, radii[patches])
+
+
+def _pairs(patches: Ints, convex: Bools) -> Ints:
+    """All pairs of corners of a convex patch, [m, 2] in ascending order; `patches` [k] are those of the corners."""
+    row = np.arange(len(patches))
+    later = np.where(convex[patches], np.searchsorted(patches, patches, "right") - row - 1, 0)
+    first = np.repeat(row, later)
+    return np.column_stack([first, first + 1 + np.arange(len(first)) - np.repeat(later.cumsum() - later, later)])
 
 
 def _spread(
-    patches: Ints, points: Floats, forces: Floats, counts: Ints, wide: Bools, radii: Floats,
-    closest: Callable[[Floats], Floats],
-) -> LoadPoints:  # fmt: skip
-    """Spread the forces at the corners of patches, some of which are wide: touched between their corners too."""
-    total, is_wide = np.bincount(patches, forces), wide[patches]
-    first, second = _pairs(np.where(is_wide, np.cumsum(counts)[patches] - np.arange(len(patches)) - 1, 0))
-    of_pair, between = patches[first], (points[first] + points[second]) / 2
-    shares, distances = forces[first] * forces[second] / total[of_pair], _length(points[first] - points[second])
-    # contact points lie a little outside the surface, by up to their depth: so may the midpoints
-    probes = np.concatenate([points, between])
-    away, limit = _length(closest(probes) - probes), np.zeros(len(wide))
-    np.maximum.at(limit, patches, away[: len(patches)])
-    touching = away[len(patches) :] <= (limit + radii / 10)[of_pair]
+    patches: Ints, forces: Floats, radii: Floats, pairs: Ints, probes: Floats, away: Floats
+) -> tuple[Ints, Floats, Floats, Floats, Floats]:
+    """Share the forces at the corners of patches among these and the midpoints of pairs: points that carry a force.
+
+    Parameters
+    ----------
+    patches, forces, radii
+        Of the corners; radii of the patches.
+    pairs : int64 [m, 2]
+    probes : float64 [k + m, 3]
+        The corners, and then the pairs' midpoints [m].
+    away : float64 [k + m]
+        Distances of the probes from the surface [m].
+
+    Returns
+    -------
+    patches, points, forces
+        As in `LoadPoints`, but for points of a lattice that have yet to be joined: of each patch its corners, then the
+        midpoints.
+    near, radii : float64 [p]
+        Of the patches: within which distance their points are to be joined, and footprint radii [m].
+    """
+    corner_count, patch_count, of_pair = len(patches), len(radii), patches[pairs[:, 0]]
+    total, limit = np.bincount(patches, forces), np.zeros(patch_count)
+    np.maximum.at(limit, patches, away[:corner_count])
+    weighted = forces[:, None] * probes[:corner_count]
+    middles = np.column_stack([np.bincount(patches, each) for each in weighted.T]) / total[:, None]
+    size = np.zeros(patch_count)
+    np.maximum.at(size, of_pair, np.sqrt(((probes[pairs[:, 0]] - probes[pairs[:, 1]]) ** 2).sum(axis=1)))
     # where there is no touch between two corners, they keep their shares
-    kept = np.where(touching, 0.0, shares)
-    at_corners = np.where(is_wide, forces**2 / total[patches], forces)
-    at_corners += np.bincount(first, kept, len(forces)) + np.bincount(second, kept, len(forces))
-    # where all touch, the points stand for the cells of a lattice
-    size, filled = np.zeros(len(wide)), wide.copy()
-    np.maximum.at(size, of_pair, distances)
-    filled[of_pair[~touching]] = False
-    middles = _sums(patches, forces[:, None] * points) / total[:, None]
-    patches = np.concatenate([patches, of_pair[touching]])
-    order = np.argsort(patches, kind="stable")
-    patches, points = patches[order], np.concatenate([points, between[touching]])[order]
-    forces = np.concatenate([at_corners, 2 * shares[touching]])[order]
-    if filled.any():
-        inset = np.where(filled, _INSET, 1.0)[patches, None]
-        points = inset * points + (1 - inset) * middles[patches]
-        patches, points, forces = _joined(patches, points, forces, np.where(filled, size / 8, 0.0), len(points))
-        radii = np.where(filled, np.maximum(radii, _OVERLAP * size), radii)
-    return LoadPoints(patches, points, forces, radii[patches])
+    touch = away[corner_count:] <= (limit + radii / 10)[of_pair]
+    filled = np.zeros(patch_count, np.bool_)
+    filled[of_pair] = True
+    filled[of_pair[~touch]] = False
+    share = forces[pairs[:, 0]] * forces[pairs[:, 1]] / total[of_pair]
+    shares = np.concatenate([forces, np.where(touch, 2 * share, 0.0)])
+    paired = pairs.ravel()
+    shares[paired] = forces[paired] ** 2 / total[patches[paired]]
+    np.add.at(shares, pairs[~touch].ravel(), np.repeat(share[~touch], 2))
+    kept = shares.nonzero()[0]
+    of = np.concatenate([patches, of_pair])
+    kept = kept[of[kept].argsort(kind="stable")]
+    of = of[kept]
+    # the points of a patch that is filled stand for the cells of a lattice
+    inset = np.where(filled, _INSET, 1.0)[of, None]
+    points = inset * probes[kept] + (1 - inset) * middles[of]
+    near, wide = np.where(filled, size / 8, 0.0), np.where(filled, np.maximum(radii, _OVERLAP * size), radii)
+    return of, points, shares[kept], near, wide
 
 
 def corners(patches: Ints, points: Floats, forces: Floats, radii: Floats) -> tuple[Ints, Floats, Floats]:
@@ -142,55 +171,46 @@ def corners(patches: Ints, points: Floats, forces: Floats, radii: Floats) -> tup
     return _joined(patches, points[strongest_first], forces[strongest_first], radii, MAX_CORNERS)
 
 
-def _pairs(followers: Ints) -> tuple[Ints, Ints]:
-    """All pairs of a row with one of those that follow it, of which each has so many."""
-    first = np.repeat(np.arange(len(followers)), followers)
-    before = np.cumsum(followers) - followers
-    return first, first + 1 + np.arange(len(first)) - np.repeat(before, followers)
-
-
-def _joined(patches: Ints, points: Floats, forces: Floats, near: Floats, most: int) -> tuple[Ints, Floats, Floats]:
-    """Points of each patch joined with the first one near them; see `_seeds`."""
-    seeds = _seeds(patches, points, near, most)
-    found = np.flatnonzero(seeds == np.arange(len(seeds)))
-    if len(found) == len(seeds):
-        return patches, points, forces
-    number = np.searchsorted(found, seeds)
-    totals = np.bincount(number, forces).astype(np.float64, copy=False)
-    return patches[found], _sums(number, forces[:, None] * points) / totals[:, None], totals
-
-
 @kernel
-def _seeds(patches: Ints, points: Floats, near: Floats, most: int) -> Ints:
-    """The first point of its patch near each point [k]: itself, unless one that is a seed of its own comes before.
+def _joined(patches: Ints, points: Floats, forces: Floats, near: Floats, most: int) -> tuple[Ints, Floats, Floats]:
+    """Points of each patch joined with the first one near them that is a seed: force-weighted, with summed forces.
 
-    `near` are the distances of the patches [m]. After so many seeds of a patch the rest joins the nearest of them.
+    A point is a seed unless one of its patch that is a seed of its own comes before. `near` are the distances of the
+    patches [m]. After so many seeds of a patch the rest joins the nearest of them.
     """
-    seeds, begin, count = np.empty(len(patches), np.int64), 0, 0
-    for i in range(len(patches)):
-        if patches[i] != patches[begin]:
-            begin, count = i, 0
-        seeds[i], nearest, least = -1, i, np.inf
-        for j in range(begin, i):
-            if seeds[j] == j and seeds[i] < 0:
-                distance2 = 0.0
-                for k in range(3):
-                    distance2 += (points[i, k] - points[j, k]) ** 2
-                if distance2 < least:
-                    nearest, least = j, distance2
-                if distance2 <= near[patches[i]] ** 2:
-                    seeds[i] = j
-        if seeds[i] < 0 and count < most:
-            seeds[i] = i
-            count += 1
-        elif seeds[i] < 0:
-            seeds[i] = nearest
-    return seeds
+    size, found, begin = len(patches), 0, 0
+    seeds, of, at, totals = np.empty(size, np.int64), np.empty(size, np.int64), np.empty((size, 3)), np.empty(size)
+    for i in range(size):
+        if found > 0 and of[found - 1] != patches[i]:
+            begin = found
+        joins, nearest, least = -1, -1, np.inf
+        for row in range(begin, found):
+            distance2 = _distance2(points, i, points, seeds[row])
+            if distance2 < least:
+                nearest, least = row, distance2
+            if joins < 0 and distance2 <= near[patches[i]] ** 2:
+                joins = row
+        if joins < 0 and found - begin == most:
+            joins = nearest
+        if joins < 0:
+            seeds[found], of[found], totals[found] = i, patches[i], forces[i]
+            for k in range(3):
+                at[found, k] = points[i, k]
+            found += 1
+        else:
+            totals[joins] += forces[i]
+            for k in range(3):
+                at[joins, k] += forces[i] / totals[joins] * (points[i, k] - at[joins, k])
+    return of[:found], at[:found], totals[:found]
 
 
-def _sums(groups: Ints, vectors: Floats) -> Floats:
-    """Sums of vectors [k, 3] by group."""
-    return np.stack([np.bincount(groups, vectors[:, k]) for k in range(3)], axis=1)
+@kernel(no_cpython_wrapper=True)
+def _distance2(points: Floats, i: int, others: Floats, j: int) -> float:
+    """Square of the distance between two points of two lists."""
+    distance2 = 0.0
+    for k in range(3):
+        distance2 += (points[i, k] - others[j, k]) ** 2
+    return distance2
 
 
 def _length(vectors: Floats) -> Floats:
@@ -262,10 +282,9 @@ class Footprints:
         """New footprints, and how far they may be from their points [m]."""
         grid, scratch = self._grid, distance_scratch(len(self._movable))
         places, centres = nearest_places(self._surface, points)
-        under = []
-        for place, centre, radius in zip(places, centres.tolist(), radii.tolist(), strict=True):
-            texels, weights, _ = weigh(grid, centre, place, radius, scratch)
-            under.append((texels, weights * self._movable_area[texels]))
+        begins, texels, weights, _ = weigh_each(grid, centres, places, radii, scratch)
+        shares = weights * self._movable_area[texels]
+        under = [(texels[first:last], shares[first:last]) for first, last in itertools.pairwise(begins.tolist())]
         return under, _SAME_PLACE * np.sqrt(grid.areas[centres])
 
 
@@ -290,10 +309,8 @@ def _serving(
         touching[geoms[i]] = True
         for row in range(len(made)):
             if made[row] == geoms[i] and rows[i] < 0:
-                distance2 = 0.0
-                for k in range(3):
-                    distance2 += (at[row, k] - points[i, k]) ** 2
-                if max(np.sqrt(distance2), abs(sizes[row] - radii[i])) <= near[row]:
+                moved = np.sqrt(_distance2(at, row, points, i))
+                if max(moved, abs(sizes[row] - radii[i])) <= near[row]:
                     rows[i] = row
     for row in range(len(made)):
         if active[made[row]] and not touching[made[row]]:

@@ -9,6 +9,8 @@ surface has yet to receive, so that nothing is lost.
 
 A geom on stiff, springy contacts chatters: contact opens for a step and closes again, at the natural frequency of the
 contact's spring, and the force jumps between nothing and twice the weight.
+
+All times are for time steps of 2 ms and contacts with MuJoCo's default time constant; longer ones make them longer.
 """
 
 from __future__ import annotations
@@ -19,7 +21,6 @@ import numpy as np
 
 from ripple_sim.solver import Load
 from ripple_sim.solver.kernel import Bools, Floats, Ints, kernel
-from ripple_sim.solver.waves.load import slot_scratch
 
 # A first hit is over within this time [s]; until then nothing is averaged.
 _ONSET = 0.1
@@ -41,6 +42,9 @@ _JITTERS, _LEAST_MOVE, _MOST_MOVE = 4.0, 0.1, 0.6
 # Shares below this are dropped from a mean.
 _LEAST_SHARE = 1e-6
 _TINY = np.finfo(np.float64).tiny
+
+# What the times above are for: a time step, and a contact's time constant [s].
+_TIME_STEP, DEFAULT_TIME_CONSTANT = 0.002, 0.02
 
 # records, so that the fields are attributes in plain Python as well as in kernels
 _FIELDS = [
@@ -103,13 +107,16 @@ class RestFilter:
     ----------
     geoms, texels : int
         How many there are.
+    time_constant : float
+        Of contacts [s].
     """
 
-    def __init__(self, geoms: int, texels: int) -> None:
+    def __init__(self, geoms: int, texels: int, time_constant: float = DEFAULT_TIME_CONSTANT) -> None:
+        self._time_constant, self._unit = time_constant, 1.0
         self._states = np.zeros(geoms, CONTACT_STATE)
         # texels under the geoms, and the mean share of each in the force of its geom; those of a geom add up to 1
         self._texels, self._shares = np.zeros(0, np.int64), np.zeros(0)
-        self._size, self._is_over = texels, True
+        self._slots, self._is_over = np.full(texels, -1), True
 
     @property
     def active(self) -> Bools:
@@ -120,12 +127,19 @@ class RestFilter:
         """Begin to average anew, as where other texels carry loads than before."""
         self._states["memory"] = 0.0
 
+    def set_timestep(self, timestep: float) -> None:
+        """Scale all times for physics steps of this length [s]."""
+        unit = max(timestep / _TIME_STEP, self._time_constant / DEFAULT_TIME_CONSTANT)
+        if unit != self._unit:
+            self._states["deficit"] *= self._unit / unit
+            self._unit = unit
+
     def __call__(self, present: TexelForces, dt: float) -> Load:
-        """Load over a time step [s] in which these forces act."""
+        """Load over a time [s] in which these forces act."""
         if self._is_over and not len(present.geoms):
             return Load.none()
         self._texels, self._shares, forces, self._is_over = _filtered(
-            self._states, self._texels, self._shares, present, dt, slot_scratch(self._size)
+            self._states, self._texels, self._shares, present, dt / self._unit, self._slots
         )
         return Load(self._texels, forces)
 
@@ -146,7 +160,7 @@ def _filtered(
     dt : float
         Time step [s].
     slots : int64 [C n n]
-        See `slot_scratch`.
+        Scratch: -1 everywhere, before and after, so that a step costs no more on a larger grid.
     """
     size = len(texels) + len(present.texels)
     under, mean, given = np.empty(size, np.int64), np.empty(size), np.empty(size)
@@ -165,17 +179,10 @@ def _filtered(
                 # what the target has not received yet stays as it is
                 state.side, state.deficit = side, -state.deficit
             total = side * _touch(state, abs(force), present.middles[row - 1], present.place_radii[row - 1], dt)
-            weight, whole = dt / (dt + state.memory) if state.first < state.last else 1.0, 0.0
+            weight = dt / (dt + state.memory) if state.first < state.last else 1.0
             if weight < 1:
-                for i in range(state.first, state.last):
-                    if shares[i] > _LEAST_SHARE:
-                        whole += shares[i]
-                fading = (1 - weight) / whole
-                for i in range(state.first, state.last):
-                    if shares[i] > _LEAST_SHARE:
-                        under[end], mean[end], given[end] = texels[i], fading * shares[i], 0.0
-                        slots[texels[i]] = end
-                        end += 1
+                old, before = texels[state.first : state.last], shares[state.first : state.last]
+                end = _faded(old, before, 1 - weight, under, mean, given, slots, end)
             for i in range(first, last):
                 slot = slots[at[i]]
                 if slot < 0:
@@ -184,8 +191,7 @@ def _filtered(
                     end += 1
                 mean[slot] += weight * (forces[i] / force)
                 given[slot] += forces[i] / force
-            for i in range(begin, end):
-                slots[under[i]] = -1
+            slots[under[begin:end]] = -1
             state.active = True
             steady = side * min(state.mean_force, side * total)
         elif state.active:
@@ -202,13 +208,31 @@ def _filtered(
     return under[:end], mean[:end], given[:end], over
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
+def _faded(
+    texels: Ints, shares: Floats, left: float, under: Ints, mean: Floats, given: Floats, slots: Ints, end: int
+) -> int:
+    """Enter the mean shares of a geom's texels from `end` on, so that what is left adds up; one after the last."""
+    whole = 0.0
+    for i in range(len(texels)):
+        if shares[i] > _LEAST_SHARE:
+            whole += shares[i]
+    fading = left / whole
+    for i in range(len(texels)):
+        if shares[i] > _LEAST_SHARE:
+            under[end], mean[end], given[end] = texels[i], fading * shares[i], 0.0
+            slots[texels[i]] = end
+            end += 1
+    return end
+
+
+@kernel(no_cpython_wrapper=True)
 def _has_left(state: Any, dt: float) -> bool:
     """Whether a geom is gone, and not open for a moment only."""
     return state.absent > max(_LEFT, 1.5 * dt)
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _touch(state: Any, force: float, middle: Floats, place_radius: float, dt: float) -> float:
     """Follow a contact for a step; force that the target gets [N].
 
@@ -245,7 +269,7 @@ def _touch(state: Any, force: float, middle: Floats, place_radius: float, dt: fl
     return _given(state, force, hit, dt)
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _miss(state: Any, dt: float) -> float:
     """Follow a contact for a step without touch; force that the target gets [N]."""
     state.absent += dt
@@ -258,7 +282,7 @@ def _miss(state: Any, dt: float) -> float:
     return given
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _given(state: Any, force: float, hit: float, dt: float) -> float:
     """Force that the target gets [N]; the difference goes to the deficit, of which a part is paid."""
     given = state.level + hit if state.chatters else force
@@ -274,7 +298,7 @@ def _given(state: Any, force: float, hit: float, dt: float) -> float:
     return given
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _follow_force(state: Any, force: float, dt: float) -> None:
     """Let the mean force follow; a hit ends the memory."""
     if state.age < _ONSET:
@@ -288,7 +312,7 @@ def _follow_force(state: Any, force: float, dt: float) -> None:
     state.mean_force += dt / (dt + state.memory) * (now - state.mean_force)
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _follow_place(state: Any, middle: Floats, place_radius: float, dt: float) -> None:
     """Let the mean place follow; where the latest one leaves it, the memory becomes shorter."""
     jump2 = lag2 = 0.0

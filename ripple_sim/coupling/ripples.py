@@ -33,7 +33,6 @@ from .model import CoupledModel
 from .soft import HighPass
 from .step_checks import TunnellingCheck
 from .stepping import (
-    UNSOLVED_WARNING,
     SolvedForces,
     StepClock,
     adopt_warnings,
@@ -128,7 +127,10 @@ class Ripples(Targets):
             for message in collision_warnings(coupled, geom, waves.atlas):
                 _warn(message)
         if two_way and coupled.soft:
-            raise SceneError("flexes and skins cannot push back yet; take two_way=False, or geoms as targets alone")
+            raise SceneError(
+                "flexes and skins cannot push back: their waves have the masses that their nodes and bones have "
+                "already; take two_way=False, or geoms as targets alone"
+            )
         self._soft = coupled.soft
         fine = for_each(self.model, self, "high_pass", high_pass)
         self._high_pass = {
@@ -149,7 +151,8 @@ class Ripples(Targets):
     def last_impulses(self) -> list[Impulse]:
         """The impulses given to the surfaces in the latest call of `step` or `mj_step`, or within `following`.
 
-        One record for each pair of geoms and each physics step.
+        One record for each pair of geoms and each physics step; of a geom that is wedged between parts of the surface
+        one for each place where it touches.
         """
         return self._loads.impulses
 
@@ -254,14 +257,14 @@ class Ripples(Targets):
         self._warn_once("missed", missed_warning(passed.missed))
         if broken or not passed.elapsed:
             return
-        solved, solved_here = self._solved.of(data)
-        self._warn_once("unsolved", UNSOLVED_WARNING if solved_here else None)
+        solved, unsolved = self._solved.of(data)
+        self._warn_once("unsolved", unsolved)
         self._check_tunnelling(solved)
         for target, surface in self._soft.items():
             self._waves[target].move(surface.vertices(solved))
         shared = None
         if self._two_way is not None:
-            shared = self._two_way.solve(data, solved, passed.elapsed, pending=solved_here)
+            shared = self._two_way.solve(data, solved, passed.elapsed, pending=unsolved is not None)
         loads = self._loads.loads(solved, passed.elapsed)
         for target, filtered in self._high_pass.items():
             loads[target] = filtered(loads[target])

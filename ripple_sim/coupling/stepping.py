@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ripple_sim.errors import RippleWarning, SimulationError
 
@@ -248,6 +249,10 @@ def physics_errors() -> Iterator[None]:
         raise SimulationError(f"MuJoCo cannot go on: {reason}{advice}") from error
 
 
+# MuJoCo's mark of a contact that the constraint solver takes.
+_HAS_ROWS = 0
+# Forces found from accelerations are those of the step if their sums on the bodies are, up to this share.
+_RESTORED = 1e-3
 # The order of a loop's calls shows as soon as something moves: so many steps are looked at then, later one in so many.
 _FIRST, _EVERY = 5, 20
 # Movement within a step, in radians or metres, that shows in the poses whatever their scale.
@@ -258,6 +263,11 @@ UNSOLVED_WARNING = (
     "they are solved for with the controls as they are, and may differ from those of the coming `mj_step2`; call "
     "`step` between `mj_step2` and `mj_step1`, or take steps within `with ripples.following(data):`"
 )
+LOST_WARNING = (
+    "the contact forces of the latest physics step were gone when `Ripples.step` was called: `mj_collision`, called "
+    "after `mj_step`, throws them away; those of the coming step are taken in their place, so that hits begin too "
+    "late; call `step` right after `mj_step`, or take steps with `ripples.mj_step(data)`"
+)
 
 
 class SolvedForces:
@@ -265,7 +275,7 @@ class SolvedForces:
 
     After `mj_step`, or `mj_step1` and `mj_step2`, poses, contacts and their forces are those at the beginning of the
     step. But a loop that ends with `mj_step1` has moved on to the poses and contacts of the next step, and the forces
-    beside them mean nothing until `mj_step2`.
+    beside them mean nothing until `mj_step2`. After `mj_collision` there are contacts, but no forces.
 
     Parameters
     ----------
@@ -277,26 +287,34 @@ class SolvedForces:
         self._poses = mujoco.MjData(model)
         self._steps = 0
         self._completed: mujoco.MjData | None = None
+        self._has_moved_on = False
 
-    def of(self, data: mujoco.MjData) -> tuple[mujoco.MjData, bool]:
-        """Data with solved forces, and whether those of `data` were not.
+    def of(self, data: mujoco.MjData) -> tuple[mujoco.MjData, str | None]:
+        """Data with solved forces, and what to warn of where they are those of the coming step.
 
         That is `data` itself, or, from the first time on that `data` has moved on to the next step, a copy of it,
         completed as `mj_step2` will do with the controls as they are. Forces that are solved already, as after
-        `mj_forward`, come out the same.
+        `mj_forward`, come out the same. Where forces are lost, the copy has them as they were, if they can be found.
         """
+        lost, model = _lost(data), self._model
+        self._has_moved_on = self._has_moved_on or self._moved_on(data)
+        if not lost and not (self._has_moved_on and data.nefc):
+            return data, None
         if self._completed is None:
-            if not self._moved_on(data):
-                return data, False
             self._completed = copy.copy(data)
-        if not data.nefc:
-            return data, False
-        model = self._model
         mujoco.mj_copyData(self._completed, model, data)
+        if lost:
+            if _restore_forces(model, self._completed):
+                return self._completed, None
+            mujoco.mj_copyData(self._completed, model, data)
+            mujoco.mj_fwdPosition(model, self._completed)
+            mujoco.mj_fwdVelocity(model, self._completed)
         mujoco.mj_fwdActuation(model, self._completed)
         mujoco.mj_fwdAcceleration(model, self._completed)
         mujoco.mj_fwdConstraint(model, self._completed)
-        return self._completed, not _solved(model, data)
+        if lost:
+            return self._completed, LOST_WARNING
+        return self._completed, None if _solved(model, data) else UNSOLVED_WARNING
 
     def _moved_on(self, data: mujoco.MjData) -> bool:
         """Whether the poses are already those that follow from the positions."""
@@ -313,10 +331,35 @@ class SolvedForces:
         return np.array_equal(poses.xpos, data.xpos) and np.array_equal(poses.xquat, data.xquat)
 
 
+def _lost(data: mujoco.MjData) -> bool:
+    """Whether there is no row of the constraint solver, but contacts that should have rows."""
+    return bool(not data.nefc and data.ncon and (data.contact.exclude == _HAS_ROWS).any())
+
+
+def _restore_forces(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
+    """Find the forces of the latest step from its acceleration, if contacts were found anew at the poses of that step.
+
+    Whether they are those of that step: their sums on the bodies are.
+    """
+    expected = data.qfrc_constraint.copy()
+    data.qvel -= model.opt.timestep * data.qacc
+    mujoco.mj_makeConstraint(model, data)
+    mujoco.mj_island(model, data)
+    mujoco.mj_projectConstraint(model, data)
+    mujoco.mj_referenceConstraint(model, data)
+    excess = np.zeros(data.nefc)
+    mujoco.mj_mulJacVec(model, data, excess, data.qacc)
+    mujoco.mj_constraintUpdate(model, data, excess - data.efc_aref, None, 0)
+    return _agree(data.qfrc_constraint, expected, _RESTORED)
+
+
 def _solved(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
     """Whether the forces f give on the Jacobian J what MuJoCo solved for, J^T f."""
     force = np.zeros(model.nv)
     mujoco.mj_mulJacTVec(model, data, force, data.efc_force)
-    expected = data.qfrc_constraint
     # the sums may be made in another order
-    return float(np.abs(force - expected).max()) <= 1e-9 * (1.0 + float(np.abs(expected).max()))
+    return _agree(force, data.qfrc_constraint, 1e-9)
+
+
+def _agree(force: NDArray[np.float64], expected: NDArray[np.float64], tolerance: float) -> bool:
+    return float(np.abs(force - expected).max()) <= tolerance * (1.0 + float(np.abs(expected).max()))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.errors import SceneError
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver
-from ripple_sim.solver.operator.regions import hold
+from ripple_sim.solver.operator.assembly import hold
 from ripple_sim.solver.texels.atlas import check_points
 from ripple_sim.solver.waves.footprint import Footprint, footprint
 

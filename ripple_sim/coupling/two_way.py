@@ -18,11 +18,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.solver import Load, WaveSolver
+from ripple_sim.solver import Atlas, Load, WaveSolver
 from ripple_sim.solver.waves.footprint import footprint, footprint_at
 
 from .contact_rows import ContactProblem, Key, Pair, affordable_share
 from .contacts import ColliderIds, pair_rows, places_facing, points_outside
+from .energy import VelocityChange
 from .load import Touch
 from .model import CoupledModel
 
@@ -75,15 +76,6 @@ _SOLID = tuple(
 )
 
 
-class _Surface(NamedTuple):
-    """A target's waves, their height [m], [C n n], and its maximum."""
-
-    target: int
-    waves: WaveSolver
-    height: NDArray[np.float32]
-    highest: float
-
-
 class Reach:
     """Finds geoms above targets, lower than their waves are high.
 
@@ -112,19 +104,22 @@ class Reach:
         """
         for target, others in self._others.items():
             height = waves[target].height.reshape(-1)
-            surface = _Surface(target, waves[target], height, float(height.max()))
+            highest = float(height.max())
             for other in others:
-                if surface.highest > 0 and (target, other) not in touching:
-                    touch = self._touch(data, surface, other)
+                if highest > 0 and (target, other) not in touching:
+                    touch = self._touch(data, (target, other), waves[target], height, highest)
                     if touch is not None:
                         yield touch
 
-    def _touch(self, data: mujoco.MjData, surface: _Surface, other: int) -> Touch | None:
-        model, target, atlas = self._coupled.model, surface.target, surface.waves.atlas
+    def _touch(
+        self, data: mujoco.MjData, pair: Key, waves: WaveSolver, height: NDArray[np.float32], highest: float
+    ) -> Touch | None:
+        """The touch of a pair, if it is within reach of the target's waves of a height [m], [C n n]."""
+        model, (target, other), atlas = self._coupled.model, pair, waves.atlas
         rotation = data.geom_xmat[target].reshape(3, 3)
         to_target = rotation.T @ data.geom_xmat[other].reshape(3, 3)
         centre = (data.geom_xpos[other] - data.geom_xpos[target]) @ rotation
-        reach = float(model.geom_rbound[other]) + surface.highest
+        reach = float(model.geom_rbound[other]) + highest
         box_centre, box_size = model.geom_aabb[target, :3], model.geom_aabb[target, 3:]
         if np.linalg.norm(np.maximum(np.abs(centre - box_centre) - box_size, 0.0)) > reach:
             return None
@@ -135,11 +130,11 @@ class Reach:
                 return None
             normal = atlas.normals.reshape(-1, 3)[texel]
             point = centre + to_target @ support_point(model, other, -normal @ to_target)
-        if (point - place) @ normal >= surface.height[texel]:
+        if (point - place) @ normal >= height[texel]:
             return None
         radii = self._coupled.footprint_radii
         where = footprint(atlas, place, min(radii[target], radii[other]))
-        movable = surface.waves.operator.movable.reshape(-1)[where.texels]
+        movable = waves.operator.movable.reshape(-1)[where.texels]
         movable_area = atlas.areas.reshape(-1)[where.texels] * movable
         in_world = data.geom_xpos[target] + rotation @ place
         return Touch(target, other, in_world, rotation @ normal, Load(where.texels, where.weights * movable_area))
@@ -156,6 +151,8 @@ class _Place(NamedTuple):
 
     Attributes
     ----------
+    atlas : Atlas
+        Of the target, where it is now.
     points : float64 [k, 3]
         In the target's frame [m].
     tolerance : float
@@ -166,6 +163,7 @@ class _Place(NamedTuple):
         The part of it that moves them.
     """
 
+    atlas: Atlas
     points: NDArray[np.float64]
     tolerance: float
     load: Load
@@ -202,6 +200,7 @@ class TwoWay:
 
     def clear(self) -> None:
         """Forget all contacts."""
+        self._velocity_change = VelocityChange(self._coupled.model)
         self._places: dict[Key, _Place] = {}
         self._mobilities: dict[Key, tuple[tuple[_Place, ...], tuple[float, float]]] = {}
         self._forces: dict[Key, float] = {}
@@ -242,14 +241,15 @@ class TwoWay:
                 for i, _, _ in each:
                     pairs_at.setdefault(i, []).append(pairs[key])
             problem = ContactProblem(self._coupled.model, solved, pairs_at)
-            old = solved.qacc.copy()
+            old = solved.qacc.copy(), solved.qfrc_constraint.copy()
             forces |= problem.solve(self._paid)
-            self._move(data, dt * (solved.qacc - old), dt, pending=pending)
+            self._move(data, self._velocity_change(solved, *old, pending=pending), dt, pending=pending)
             self._work = problem.works()
         for touch in reached:
             key = touch.target, touch.other
             forces[key] = self._push(data, solved, touch, pairs[key], dt, pending=pending)
         self._forces = forces
+        self._velocity_change.note(data)
         self._before = self._heights
         loads: dict[int, list[Load]] = {}
         for key, force in forces.items():
@@ -296,6 +296,7 @@ class TwoWay:
             points = np.concatenate([points, (points[one] + points[two]) / 2])
         if (
             known is not None
+            and known.atlas is atlas
             and known.points.shape == points.shape
             and np.abs(known.points - points).max() < known.tolerance
         ):
@@ -308,11 +309,12 @@ class TwoWay:
         inside = not atlas.mesh.closed and touched[0][2] @ atlas.normals.reshape(-1, 3)[texels[0]] < 0
         load = Load.together(loads).merged(areas.size)
         load = Load(load.texels, -load.forces) if inside else load
-        return _Place(points, _SAME_PLACE * float(np.sqrt(areas[texels[0]])), load, self._moving(target, load))
+        return _Place(atlas, points, _SAME_PLACE * float(np.sqrt(areas[texels[0]])), load, self._moving(target, load))
 
     def _reached_place(self, touch: Touch) -> _Place:
-        load = touch.load.merged(self._waves[touch.target].atlas.areas.size)
-        return _Place(np.zeros((0, 3)), 0.0, load, self._moving(touch.target, load))
+        atlas = self._waves[touch.target].atlas
+        load = touch.load.merged(atlas.areas.size)
+        return _Place(atlas, np.zeros((0, 3)), 0.0, load, self._moving(touch.target, load))
 
     def _moving(self, target: int, load: Load) -> NDArray[np.float64]:
         return load.forces * self._waves[target].operator.source_share.reshape(-1)[load.texels]
@@ -363,7 +365,9 @@ class TwoWay:
     def _with_trials(self, target: int) -> tuple[WaveSolver, WaveSolver, WaveSolver]:
         """A target's waves, and two solvers to try things on."""
         waves = self._waves[target]
-        if target not in self._trials or self._trials[target][0] is not waves:
+        of, *trials = self._trials.get(target, (None,))
+        # what moves gets another operator
+        if of is not waves or trials[0].operator is not waves.operator:
             self._trials[target] = waves, copy.copy(waves), copy.copy(waves)
             self._mobilities = {}
         for trial in self._trials[target][1:]:

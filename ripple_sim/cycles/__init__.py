@@ -1,5 +1,5 @@
 """Frames by Cycles, Blender's path tracer, of the USD of a run."""
 
-from .render import render_cycles
+import lazy_loader
 
-__all__ = ["render_cycles"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

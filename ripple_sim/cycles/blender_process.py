@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-_DEEP = 0.02  # how far light of a translucent look gets, likewise
+_SCATTER = 0.02  # how far light gets under a translucent surface, in distances of the focus
 
 
 def main(settings):
@@ -31,7 +31,7 @@ def main(settings):
         if lamp.data.type == "SUN":
             lamp.data.angle = lamp.data["angle"]
     for material in bpy.data.materials:
-        set_look(material, _DEEP * settings["distance"])
+        set_look(material, _SCATTER * settings["distance"])
     fade = fading_floor(settings)
     for number in range(settings["frames"]):
         scene.frame_set(number)

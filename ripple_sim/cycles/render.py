@@ -1,7 +1,7 @@
 """`render_cycles`: a scene simulated, written as USD, and rendered by Cycles in a process of Blender's own.
 
 Beside the stage Blender is told frames, sky, soft boxes, and the floor that fades into the sky. The linear radiance
-that it gives back gets the colours of a frame, as the renderer's shader makes them (render/glsl/tone_mapping.glsl).
+that it gives back gets the colours of a frame as the renderer's.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -33,22 +33,21 @@ from ripple_sim.export.scene import scene_source
 from ripple_sim.export.source import Source
 from ripple_sim.export.visuals import mean_color
 from ripple_sim.render.passes.floor import find_floor
+from ripple_sim.render.tone_mapping import tone_mapped
 from ripple_sim.render.visuals.lights import (
     BESIDE_LIGHTS,
     FADE,
     SOFT_BOX_LIGHTS,
     STUDIO_FADE,
-    is_lit,
-    model_lighting,
+    lighting_of,
     sky_colors,
-    studio_lighting,
 )
 from ripple_sim.render.visuals.texture_mapping import mapping_of
 from ripple_sim.render.visuals.visual import geom_visual, visible_geoms
 from ripple_sim.scene.scene import Scene, with_exposure
 from ripple_sim.simulation import Simulation
 from ripple_sim.video.options import VideoOptions
-from ripple_sim.video.render_video import open_video
+from ripple_sim.video.render_video import Progress, open_video
 from ripple_sim.video.settings import EXPOSURE, check_options, frame_count, settled
 
 PYTHON = "RIPPLE_SIM_BPY_PYTHON"
@@ -152,8 +151,8 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     """Light and background of a source at its first frame, and its camera's shutter and size, as JSON has them."""
     model = source.model
     pose, _ = source.pose(data)
-    studio = source.lighting == "studio" or (source.lighting == "auto" and not is_lit(model))
-    lighting = studio_lighting(pose) if studio else model_lighting(model, data, pose)
+    lighting = lighting_of(model, data, pose, source.lighting)
+    studio = lighting.studio
     floor = find_floor(model, [geom for geom in visible_geoms(model) if geom not in source.ripples.geom_ids.values()])
     albedo = None
     if floor is not None:
@@ -181,24 +180,6 @@ def blender_settings(source: Source, data: mujoco.MjData) -> dict[str, Any]:
         ],
     }
 
-
-_SHOULDER = 0.72  # radiance from which on brightness rolls off
-_BLEACHING = 0.18
-
-
-def tone_mapped(radiance: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Colours, sRGB [height, width, 3], of linear radiance of the same shape."""
-    radiance = np.maximum(radiance, 0.0)
-    peak = radiance.max(axis=-1, keepdims=True)
-    excess = np.maximum(peak - _SHOULDER, 0.0)
-    compressed = np.minimum(peak, _SHOULDER) + (1 - _SHOULDER) * excess / (excess + 1 - _SHOULDER)
-    color = radiance * (compressed / np.maximum(peak, 1e-4))
-    color += (compressed - color) * (1 - 1 / (1 + _BLEACHING * excess))
-    coded = np.where(color <= 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)
-    return np.rint(255 * np.clip(coded, 0.0, 1.0)).astype(np.uint8)
-
-
-Progress = Callable[[int, int], None]
 
 SAMPLES = 64
 _OURS_ALONE = ("compare", "overlay", "passes", "resume", "transparent")
@@ -259,7 +240,8 @@ def render_cycles(
         exported = time.perf_counter()
         told = {**settings, "stage": str(stage), "frames": frames, "samples": samples}
         for frame in frames_of_cycles(python, told, Path(folder)):
-            writer.write(frame.astype(np.float16) if options.linear else tone_mapped(frame))
+            coded = frame.astype(np.float16) if options.linear else np.rint(255 * tone_mapped(frame)).astype(np.uint8)
+            writer.write(coded)
             if progress is not None:
                 progress(writer.frames, frames)
     return CyclesSummary(output, frames, exported - start, time.perf_counter() - exported)

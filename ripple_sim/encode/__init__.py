@@ -1,6 +1,5 @@
 """Encoding: frames go in one by one, a finished file or folder of frames appears at the end or not at all."""
 
-from .output import check_output, default_fps
-from .writer import FrameWriter, open_writer
+import lazy_loader
 
-__all__ = ["FrameWriter", "check_output", "default_fps", "open_writer"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

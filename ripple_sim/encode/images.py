@@ -15,7 +15,7 @@ import json
 import re
 import struct
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -49,33 +49,21 @@ def check_exr() -> None:
         )
 
 
-class Exr:
-    """One frame in a file of its own; the same frame gives the same bytes."""
+def write_exr(path: Path, frame: NDArray[np.float16], fps: int) -> None:
+    """Write a frame, float16 [height, width, 3 or 4], with colours multiplied by opacity."""
+    channels = {"RGBA"[: frame.shape[2]]: np.ascontiguousarray(frame)}
+    _write_channels(path, channels, chromaticities=_CHROMATICITIES, framesPerSecond=Fraction(fps))
 
-    def __init__(self, path: Path, stream: Stream) -> None:
-        self._path, self._rate = path, stream.fps
 
-    def write(self, frame: NDArray[np.float16]) -> None:
-        """Write the image, float16 [height, width, 3 or 4], with colours multiplied by opacity."""
-        import OpenEXR
+def _write_channels(path: Path, channels: Mapping[str, NDArray], **attributes: Any) -> None:
+    """Write an EXR file; the same content gives the same bytes."""
+    import OpenEXR
 
-        header = {
-            "type": OpenEXR.scanlineimage,
-            "compression": OpenEXR.ZIP_COMPRESSION,
-            "chromaticities": _CHROMATICITIES,
-            "software": MARK,
-            "framesPerSecond": Fraction(self._rate),
-        }
-        # through memory: the library does not notice a disk that fills up with the last bytes of a file
-        file = io.BytesIO()
-        OpenEXR.File(header, {"RGBA"[: frame.shape[2]]: np.ascontiguousarray(frame)}).write(file)
-        self._path.write_bytes(file.getbuffer())
-
-    def finish(self) -> None:
-        """Do nothing: the image is complete."""
-
-    def close(self) -> None:
-        """Do nothing: no file is open."""
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, "software": MARK, **attributes}
+    # through memory: the library does not notice a disk that fills up with the last bytes of a file
+    file = io.BytesIO()
+    OpenEXR.File(header, dict(channels)).write(file)
+    path.write_bytes(file.getbuffer())
 
 
 # Ordered dithering is the same from frame to frame: it does not shimmer, and it compresses well.
@@ -150,7 +138,8 @@ def _ready(sink: Any) -> Iterator[av.VideoFrame]:
 
 PASSES = ("depth", "normal", "segmentation", "flow", "position", "height")
 PASS_FORMATS = ("npz", "exr")
-_NAME = re.compile(rf"passes_\d{{5,}}\.({'|'.join(PASS_FORMATS)})|segmentation\.json")
+_CONTENTS = "segmentation.json"
+_NAME = re.compile(rf"passes_\d{{5,}}\.({'|'.join(PASS_FORMATS)})|{re.escape(_CONTENTS)}")
 _CHANNELS = {"normal": "XYZ", "position": "XYZ", "flow": "XY"}  # of an EXR; one channel has the pass's own name
 
 
@@ -165,19 +154,32 @@ class PassFiles:
         One of `PASS_FORMATS`.
     geoms : mapping
         Name of what each number of the segmentation stands for.
+    frames : int
+        Frames that the video has already, where its render is resumed: their passes stay.
+
+    Attributes
+    ----------
+    complete : int
+        The first so many frames have their passes.
     """
 
-    def __init__(self, video: Path, form: str, geoms: Mapping[int, str]) -> None:
-        self._video, self._form = video, form
+    def __init__(self, video: Path, form: str, geoms: Mapping[int, str], frames: int = 0) -> None:
+        self._form = form
         self.folder = passes_folder(video)
+        self.complete = 0
+        while self.complete < frames and self._path(self.complete).exists():
+            self.complete += 1
+        kept = {self._path(frame) for frame in range(self.complete)}
+        owner = {"software": MARK, "video": final_path(video).name}
+        text = json.dumps({**owner, "geoms": {str(k): name for k, name in geoms.items()}}, indent=1)
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             for each in self.folder.iterdir():  # of an earlier run; they were looked at
-                each.unlink()
-            text = json.dumps({"software": MARK, "geoms": {str(k): name for k, name in geoms.items()}}, indent=1)
-            self._write(self.folder / "segmentation.json", text.encode())
+                if each not in kept:
+                    each.unlink()
         except OSError as error:
             raise self._error(error) from error
+        self._write(self.folder / _CONTENTS, lambda path: path.write_text(text, encoding="utf-8"))
 
     def write(self, frame: int, passes: Mapping[str, NDArray]) -> None:
         """Write the passes of a frame, by name, [height, width] or [height, width, 2 or 3].
@@ -187,19 +189,20 @@ class PassFiles:
         EncodingError
             If they cannot be written.
         """
-        path = self.folder / f"passes_{frame:05d}.{self._form}"
+        write = _write_npz if self._form == "npz" else _write_exr
+        self._write(self._path(frame), lambda path: write(path, passes))
+
+    def _path(self, frame: int) -> Path:
+        return self.folder / f"passes_{frame:05d}.{self._form}"
+
+    def _write(self, path: Path, write: Callable[[Path], object]) -> None:
         unfinished = path.with_name(f".{path.name}")
         try:
-            (_write_npz if self._form == "npz" else _write_exr)(unfinished, passes)
+            write(unfinished)
             unfinished.replace(path)
         except OSError as error:
             unfinished.unlink(missing_ok=True)
             raise self._error(error) from error
-
-    def _write(self, path: Path, content: bytes) -> None:
-        unfinished = path.with_name(f".{path.name}")
-        unfinished.write_bytes(content)
-        unfinished.replace(path)
 
     def _error(self, error: OSError) -> EncodingError:
         return EncodingError(f"cannot write passes to {self.folder}: {error.strerror or error}")
@@ -217,7 +220,8 @@ def check_passes(video: Path, passes: tuple[str, ...], form: str, overwrite: boo
     Raises
     ------
     VideoError
-        If there is no such pass or format, OpenEXR is missing, or the folder holds anything that was not made here.
+        If there is no such pass or format, OpenEXR is missing, or the folder holds the passes of another video or
+        anything that was not made here.
     """
     if unknown := [name for name in passes if name not in PASSES]:
         raise VideoError(f"there is no pass {unknown[0]!r}; valid are {', '.join(PASSES)}")
@@ -234,6 +238,19 @@ def check_passes(video: Path, passes: tuple[str, ...], form: str, overwrite: boo
             raise VideoError(
                 f"cannot write passes to {folder}: it holds other files ({each.name}); name another output"
             )
+    owner = _owner(folder)
+    if owner not in (None, final_path(video).name) and not overwrite:
+        raise VideoError(
+            f"cannot write passes to {folder}: they are those of {owner}; name another output, or add --overwrite"
+        )
+
+
+def _owner(folder: Path) -> str | None:
+    """Name of the video that a folder's passes belong to, if it says so."""
+    try:
+        return json.loads((folder / _CONTENTS).read_text()).get("video")
+    except (OSError, ValueError, AttributeError):
+        return None
 
 
 def _write_npz(path: Path, passes: Mapping[str, NDArray]) -> None:
@@ -246,18 +263,13 @@ def _write_npz(path: Path, passes: Mapping[str, NDArray]) -> None:
 
 
 def _write_exr(path: Path, passes: Mapping[str, NDArray]) -> None:
-    import OpenEXR
-
-    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, "software": MARK}
     channels = {}
     for name, values in passes.items():
         for index, axis in enumerate(_CHANNELS.get(name, "")):
             channels[f"{name}.{axis}"] = np.ascontiguousarray(values[..., index])
         if name not in _CHANNELS:
             channels[name] = np.ascontiguousarray(values)
-    file = io.BytesIO()
-    OpenEXR.File(header, channels).write(file)
-    path.write_bytes(file.getbuffer())
+    _write_channels(path, channels)
 
 
 _ANIMATION, _METADATA, _OPACITY = 0x02, 0x04, 0x10

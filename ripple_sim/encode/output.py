@@ -10,9 +10,9 @@ import re
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from types import SimpleNamespace
+from typing import Any, TypeAlias
 
-import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -20,7 +20,7 @@ from ripple_sim.errors import EncodingError, VideoError
 from ripple_sim.solver.files import NO_NAME, final_path
 
 from .clip import H264, LOSSLESS, VP9, Clip, Codec, Stream, join_clips
-from .images import Exr, check_exr, join_gif, join_webp
+from .images import check_exr, join_gif, join_webp, write_exr
 from .replace import MARK, made_here, png_mark
 
 # As many frames may be lost when a render is killed; each clip begins with a key frame.
@@ -29,34 +29,16 @@ FRAMES_IN_CLIP = 48
 Segments = Sequence[tuple[Path, int]]
 
 
-class Segment(Protocol):
-    """A file of some frames that is being written."""
-
-    def write(self, frame: NDArray) -> None:
-        """Add one frame, [height, width, 3 or 4], of the format's type."""
-
-    def finish(self) -> None:
-        """Complete the file."""
-
-    def close(self) -> None:
-        """Leave the file incomplete."""
+def _still(write: Callable[[NDArray], None]) -> SimpleNamespace:
+    """One frame in an image file of its own: written by a function of the frame it is complete, and no file is open."""
+    return SimpleNamespace(write=write, finish=lambda: None, close=lambda: None)
 
 
-class Still:
-    """One frame in an image file of its own."""
+def _by_pillow(path: Path, **settings: Any) -> SimpleNamespace:
+    return _still(lambda frame: Image.fromarray(frame).save(path, **settings))
 
-    def __init__(self, path: Path, **settings: Any) -> None:
-        self._path, self._settings = path, settings
 
-    def write(self, frame: NDArray[np.uint8]) -> None:
-        """Write the image."""
-        Image.fromarray(frame).save(self._path, **self._settings)
-
-    def finish(self) -> None:
-        """Do nothing: the image is complete."""
-
-    def close(self) -> None:
-        """Do nothing: no file is open."""
+Segment: TypeAlias = Clip | SimpleNamespace
 
 
 @dataclasses.dataclass(frozen=True)
@@ -102,16 +84,22 @@ FORMATS = {
     ".webp": Format(
         suffix=".webp",
         length=1,
-        start=lambda path, stream: Still(path, format="WEBP", quality=88, method=3, xmp=MARK.encode()),
+        start=lambda path, stream: _by_pillow(path, format="WEBP", quality=88, method=3, xmp=MARK.encode()),
         join=lambda stills, path, stream: join_webp([still for still, _ in stills], path, stream),
     ),
     "png": Format(
         suffix=".png",
         length=1,
-        start=lambda path, stream: Still(path, format="PNG", compress_level=3, pnginfo=png_mark()),
+        start=lambda path, stream: _by_pillow(path, format="PNG", compress_level=3, pnginfo=png_mark()),
         join=None,
     ),
-    "exr": Format(suffix=".exr", length=1, start=Exr, join=None, linear=True),
+    "exr": Format(
+        suffix=".exr",
+        length=1,
+        start=lambda path, stream: _still(lambda frame: write_exr(path, frame, stream.fps)),
+        join=None,
+        linear=True,
+    ),
 }
 
 
@@ -184,7 +172,12 @@ def check_output(
         if frame_format != "png" and form != frame_format:
             raise VideoError(f"cannot write {frame_format.upper()} frames to {path}: name a folder, without an ending")
         if form == "exr":
-            _check_exr(overlaid)
+            check_exr()
+            if overlaid:
+                raise VideoError(
+                    "EXR frames are linear light, without overlays and comparisons; leave these out (--overlay '', and "
+                    "no --compare), or write PNG frames"
+                )
         if transparent and form not in _WITH_OPACITY:
             raise VideoError(f"{path} cannot be transparent; valid is .webp or a folder of frames")
         _check_size(form, width, height)
@@ -228,15 +221,6 @@ def _check_fps(form: str, fps: int) -> None:
         raise VideoError(f"{what} is {fps}; valid is a whole number from 1 to {highest} frames per second")
 
 
-def _check_exr(overlaid: bool) -> None:
-    check_exr()
-    if overlaid:
-        raise VideoError(
-            "EXR frames are linear light, without overlays and comparisons; leave these out (--overlay '', and no "
-            "--compare), or write PNG frames"
-        )
-
-
 def check_replaceable(path: Path, overwrite: bool) -> None:
     """Make sure that a file was made here, or that a folder holds frames from here and nothing else.
 
@@ -251,7 +235,11 @@ def check_replaceable(path: Path, overwrite: bool) -> None:
                 f"cannot write {path}: it exists and was not {MARK}; name another file, or add --overwrite"
             )
         return
-    strangers = [each.name for each in path.iterdir() if each.is_symlink() or not each.is_file() or not _is_frame(each)]
+    strangers = [
+        each.name
+        for each in path.iterdir()
+        if each.is_symlink() or not each.is_file() or not _FRAME_PATTERN.fullmatch(each.name)
+    ]
     if strangers:
         raise VideoError(f"cannot write frames to {path}: it holds other files ({min(strangers)}); name a new folder")
     if not overwrite and (others := [each.name for each in path.iterdir() if not made_here(each)]):
@@ -259,10 +247,6 @@ def check_replaceable(path: Path, overwrite: bool) -> None:
             f"cannot write frames to {path}: it holds frames that were not {MARK} ({min(others)}); name a new folder, "
             "or add --overwrite"
         )
-
-
-def _is_frame(path: Path) -> bool:
-    return _FRAME_PATTERN.fullmatch(path.name) is not None
 
 
 def _check_place(path: Path, form: str, overwrite: bool) -> None:
@@ -278,9 +262,7 @@ def _check_place(path: Path, form: str, overwrite: bool) -> None:
             raise VideoError(f"cannot write {path}: it exists and is not a {'file' if is_file else 'folder'}")
         check_replaceable(final_path(path), overwrite)
     path = final_path(path)  # a link is written through
-    folder = path.absolute().parent
-    while not folder.exists():
-        folder = folder.parent
+    folder = next(each for each in path.absolute().parents if each.exists())
     # Permission bits do not tell the truth for root or on a read-only disk; a real file does.
     with tempfile.TemporaryFile(dir=folder):
         pass

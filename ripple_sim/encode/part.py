@@ -8,6 +8,7 @@ the simulation against which a resumed render is checked.
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 import re
 import shutil
@@ -17,9 +18,11 @@ from pathlib import Path
 from ripple_sim.errors import VideoError
 
 from .output import check_replaceable
-from .replace import SETTINGS, STATES, Record, made_here, move
+from .replace import MARK, made_here, move
 
+SETTINGS, STATES = "settings.json", "states.txt"
 _FRAMES, _WHOLE = "frames", "whole"
+_STATE = re.compile(r"([0-9]{1,9}) ([0-9a-f]+);")  # the semicolon is missing where a killed process cut the line off
 _SEGMENT = re.compile(r"frames?_(\d+)(?:-(\d+))?")
 
 
@@ -68,7 +71,6 @@ class Part:
         self.folder = video.with_name(video.name + ".part")
         self._suffix, self._length = suffix, length
         self._segments = self.folder / _FRAMES
-        self._record = Record(video, self.folder)
         if self.folder.is_symlink():
             raise VideoError(f"cannot write {video}: its folder {self.folder.name} is a link; move it away")
         if self.folder.exists() and not self.folder.is_dir():
@@ -77,14 +79,21 @@ class Part:
         self._lock = os.open(self.folder, os.O_RDONLY | os.O_NOFOLLOW)
         try:
             self._claim()
-            if resume and self._record.exists:
-                self._record.compare(settings)
+            if resume and (self.folder / SETTINGS).exists():
+                self._compare({MARK: True, **settings})
                 self._drop_unfinished()
             else:
-                self._clear()
+                (self.folder / SETTINGS).unlink(missing_ok=True)  # first: without it nothing is continued
+                for entry in self.folder.iterdir():
+                    shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
                 self._segments.mkdir()
-                self._record.start(settings)
-            self._states = self._record.states()
+                unfinished = self.folder / f".{SETTINGS}"
+                unfinished.write_text(json.dumps({MARK: True, **settings}, indent=1))
+                move(unfinished, self.folder / SETTINGS)  # last: while it is missing there is nothing to continue
+            states = self.folder / STATES
+            lines = states.read_text(errors="replace").splitlines() if states.exists() else []
+            # fingerprints of the simulation that were recorded, by frame
+            self._states = {int(line[1]): line[2] for line in map(_STATE.fullmatch, lines) if line is not None}
         except BaseException:
             os.close(self._lock)
             raise
@@ -112,8 +121,22 @@ class Part:
         return [(path, first) for path, first, _ in self._stored()]
 
     def check_state(self, frame: int, digest: str) -> None:
-        """Record the simulation's fingerprint at a frame, or compare it; raises as `Record.check_state` does."""
-        self._record.check_state(self._states, frame, digest)
+        """Record the simulation's fingerprint at a frame, or compare it with the one that is known.
+
+        Raises
+        ------
+        VideoError
+            If it differs.
+        """
+        if frame not in self._states:
+            self._states[frame] = digest
+            with (self.folder / STATES).open("a") as file:
+                file.write(f"\n{frame} {digest};\n")  # on a line of its own even if the last one was cut off
+        elif self._states[frame] != digest:
+            raise VideoError(
+                f"cannot resume {self.video}: at frame {frame} the simulation is not in the state it was in before; a "
+                "hook, a library or the processor has changed: leave --resume out to start again"
+            )
 
     def finish(self) -> None:
         """Put the file, or else the folder of segments, in the video's place, and remove everything else.
@@ -149,6 +172,17 @@ class Part:
         shutil.rmtree(self.folder, ignore_errors=True)
         os.close(self._lock)
 
+    def _compare(self, settings: Mapping[str, object]) -> None:
+        """Raise `VideoError` naming the first setting in which the interrupted video differs."""
+        old, new = json.loads((self.folder / SETTINGS).read_text()), json.loads(json.dumps(settings))
+        for name in sorted({*old, *new}):
+            before, now = old.get(name), new.get(name)
+            if before != now:
+                raise VideoError(
+                    f"cannot resume {self.video}: {name} was {before} and now is {now}; restore it, or leave --resume "
+                    "out to start again"
+                )
+
     def _claim(self) -> None:
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -168,18 +202,20 @@ class Part:
         if entry.name == _FRAMES and entry.is_dir() and not entry.is_symlink():
             return [f"{_FRAMES}/{each.name}" for each in entry.iterdir() if not self._is_segment(each)]
         own = entry.name.lstrip(".") in (SETTINGS, STATES, _WHOLE) and entry.is_file() and not entry.is_symlink()
-        return [] if own and (entry.name != SETTINGS or self._record.made_here) else [entry.name]
+        return [] if own and (entry.name != SETTINGS or self._settings_made_here()) else [entry.name]
 
     def _is_segment(self, path: Path) -> bool:
         if path.name.startswith(".unfinished."):
             return path.is_file() and not path.is_symlink()
-        own = path.is_file() and not path.is_symlink() and (self._record.made_here or made_here(path))
+        own = path.is_file() and not path.is_symlink() and (self._settings_made_here() or made_here(path))
         return own and _SEGMENT.fullmatch(path.stem) is not None
 
-    def _clear(self) -> None:
-        self._record.forget()
-        for entry in self.folder.iterdir():
-            shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+    def _settings_made_here(self) -> bool:
+        try:
+            found = json.loads((self.folder / SETTINGS).read_text())
+        except (OSError, ValueError, RecursionError):
+            return False
+        return isinstance(found, dict) and MARK in found
 
     def _drop_unfinished(self) -> None:
         self.unfinished.unlink(missing_ok=True)

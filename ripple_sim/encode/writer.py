@@ -1,6 +1,6 @@
 """Frames go in one by one, a video comes out at the end or not at all: `open_writer` starts or continues one.
 
-`FrameWriter` takes the frames, and `Encoder` stores them as segments, in a thread of its own, and joins these.
+`FrameWriter` takes the frames and stores them as segments, in a thread of its own, and joins these.
 """
 
 from __future__ import annotations
@@ -29,56 +29,139 @@ from .part import Part
 QUEUE_FRAMES = 8
 
 
-class Encoder:
-    """A thread that takes frames, stores them as segments of a `Part`, and finally joins these.
+# Errors that would occur again when the render is resumed.
+_HOPELESS = (SimulationError, SolverError)
 
-    Parameters
-    ----------
-    part : Part
-    video : Format
-    stream : Stream
+
+class FrameWriter:
+    """Takes frames, stores them as segments of a `Part`, in a thread of its own, and joins these to the finished video.
+
+    Use it as a context manager: leaving it normally closes it, leaving it by an exception ends it. A resumable writer
+    then keeps what is finished, unless the same exception would occur again.
 
     Attributes
     ----------
-    error : Exception or None
-        What made encoding fail. Frames after that are dropped.
-    seconds : float
-        Time spent encoding [s]; complete after `stop`.
-    finished : bool
-        Whether the video is in its place.
+    frames : int
+        Frames written so far, including those of interrupted writers before this one.
+    encode_seconds : float
+        Time spent encoding [s]; complete after `close`.
     """
 
-    def __init__(self, part: Part, video: Format, stream: Stream) -> None:
+    def __init__(
+        self, part: Part, video: Format, stream: Stream, shape: tuple[int, int, int], *, resumable: bool
+    ) -> None:
+        self.path, self.frames, self.encode_seconds = part.video, part.frames, 0.0
         self._part, self._format, self._stream = part, video, stream
+        self._shape, self._resumable = shape, resumable
+        self._type = np.dtype(np.float16 if video.linear else np.uint8)
         self._segment: Segment | None = None
-        self._pending = 0
+        self._pending = 0  # frames of the segment
+        self._error: Exception | None = None  # what made encoding fail; frames after that are dropped
+        self._abandoned = self._finished = False  # whether the video is given up, or in its place
         self._queue: queue.Queue[NDArray | None] = queue.Queue(QUEUE_FRAMES)
-        self._abandoned = False
-        self.error: Exception | None = None
-        self.seconds = 0.0
-        self.finished = False
         self._thread = threading.Thread(target=self._run, name="video encoder", daemon=True)
         self._thread.start()
 
-    @property
-    def running(self) -> bool:
-        """Whether it still takes frames."""
-        return self._thread.is_alive()
+    def write(self, frame: NDArray) -> None:
+        """Add one frame, first row on top. It is copied; this waits while the queue is full.
 
-    def put(self, frame: NDArray) -> None:
-        """Add a frame, which must stay as it is; waits while the queue is full."""
-        self._queue.put(frame)
+        Parameters
+        ----------
+        frame : uint8 (sRGB) or for EXR float16 (linear light), [height, width, 3 or 4]
 
-    def stop(self) -> None:
-        """Encode what is in the queue, put the video in its place, and end the thread."""
+        Raises
+        ------
+        VideoError
+            If the frame's shape or type is another, or the writer is closed.
+        EncodingError
+            If an earlier frame could not be encoded.
+        """
+        if not self._thread.is_alive():
+            raise VideoError(f"the video {self.path} is closed; open another writer")
+        if frame.shape != self._shape or frame.dtype != self._type:
+            raise VideoError(f"frame is {frame.dtype} {list(frame.shape)}; valid is {self._type} {list(self._shape)}")
+        self._raise_error()
+        self._queue.put(frame.copy())
+        self.frames += 1
+
+    def check_state(self, frame: int, digest: str) -> None:
+        """Record the fingerprint, in hexadecimal digits, of a frame's state, or compare it with the recorded one.
+
+        Raises
+        ------
+        VideoError
+            If it differs from the one before the interruption.
+        EncodingError
+            If it cannot be recorded.
+        """
+        try:
+            self._part.check_state(frame, digest)
+        except OSError as error:
+            raise EncodingError(f"cannot write the video {self.path}: {error.strerror}") from error
+
+    def close(self) -> None:
+        """Finish the video and move it to its place. Repeated calls do nothing.
+
+        Raises
+        ------
+        VideoError
+            If there is no frame.
+        EncodingError
+            If a frame could not be encoded, or the file not be written.
+        """
+        if not self._thread.is_alive():
+            return
+        if self.frames == 0:
+            self.discard()
+            raise VideoError(f"the video {self.path} has no frame; write at least one")
+        try:
+            self._stop()
+            self._raise_error()
+        except BaseException as error:  # such as Ctrl-C while the last frames are encoded
+            self._give_up(error)
+            raise
+
+    def discard(self) -> None:
+        """Stop, and remove what was written. A previous video in the same place stays."""
+        self._abandoned = True
+        self._stop()
+        if not self._finished:
+            self._part.remove()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        else:
+            self._give_up(error)
+
+    def _give_up(self, error: BaseException) -> None:
+        """End the work on an exception, and add a note of what is kept."""
+        if not self._resumable or isinstance(error, _HOPELESS):
+            self.discard()
+            return
+        self._abandoned = True
+        self._stop()
+        if not self._finished and self._part.keep():
+            error.add_note(
+                f"{self._part.frames} frames are kept in {self._part.folder}; --resume carries on from there"
+            )
+
+    def _raise_error(self) -> None:
+        error = self._error
+        if error is not None:
+            reason = getattr(error, "strerror", None) or error
+            raise EncodingError(f"cannot write the video {self.path}: {reason}") from error
+
+    def _stop(self) -> None:
+        """Encode what is in the queue, put the video in its place unless it is given up, and end the thread."""
         if self._thread.is_alive():
             self._queue.put(None)
             self._thread.join()
-
-    def abandon(self) -> None:
-        """End the thread without finishing the video."""
-        self._abandoned = True
-        self.stop()
 
     def _run(self) -> None:
         while (frame := self._queue.get()) is not None:
@@ -108,145 +191,21 @@ class Encoder:
             self._format.join(self._part.segments(), self._part.whole, self._stream)
         if not self._abandoned:
             self._part.finish()
-            self.finished = True
+            self._finished = True
 
     def _timed(self, work: Callable[..., None], *arguments: object) -> None:
         """Do the work unless it has become useless, and keep an error instead of ending the thread.
 
-        The thread must go on taking frames from the queue, or `put` would wait for ever.
+        The thread must go on taking frames from the queue, or `write` would wait for ever.
         """
-        if self._abandoned or self.error is not None:
+        if self._abandoned or self._error is not None:
             return
         start = time.perf_counter()
         try:
             work(*arguments)
         except Exception as error:  # of any kind: it is raised in the caller's thread
-            self.error = error
-        self.seconds += time.perf_counter() - start
-
-
-# Errors that would occur again when the render is resumed.
-_HOPELESS = (SimulationError, SolverError)
-
-
-class FrameWriter:
-    """Takes frames, hands them to a thread that encodes them, and moves the finished video to its place.
-
-    Use it as a context manager: leaving it normally closes it, leaving it by an exception ends it. A resumable writer
-    then keeps what is finished, unless the same exception would occur again.
-
-    Attributes
-    ----------
-    frames : int
-        Frames written so far, including those of interrupted writers before this one.
-    """
-
-    def __init__(
-        self, part: Part, video: Format, stream: Stream, shape: tuple[int, int, int], *, resumable: bool
-    ) -> None:
-        self.path = part.video
-        self.frames = part.frames
-        self._part, self._shape, self._resumable = part, shape, resumable
-        self._type = np.dtype(np.float16 if video.linear else np.uint8)
-        self._encoder = Encoder(part, video, stream)
-
-    @property
-    def encode_seconds(self) -> float:
-        """Time spent encoding [s]; complete after `close`."""
-        return self._encoder.seconds
-
-    def write(self, frame: NDArray) -> None:
-        """Add one frame, first row on top. It is copied; this waits while the queue is full.
-
-        Parameters
-        ----------
-        frame : uint8 (sRGB) or for EXR float16 (linear light), [height, width, 3 or 4]
-
-        Raises
-        ------
-        VideoError
-            If the frame's shape or type is another, or the writer is closed.
-        EncodingError
-            If an earlier frame could not be encoded.
-        """
-        if not self._encoder.running:
-            raise VideoError(f"the video {self.path} is closed; open another writer")
-        if frame.shape != self._shape or frame.dtype != self._type:
-            raise VideoError(f"frame is {frame.dtype} {list(frame.shape)}; valid is {self._type} {list(self._shape)}")
-        self._raise_error()
-        self._encoder.put(frame.copy())
-        self.frames += 1
-
-    def check_state(self, frame: int, digest: str) -> None:
-        """Record the fingerprint, in hexadecimal digits, of a frame's state, or compare it with the recorded one.
-
-        Raises
-        ------
-        VideoError
-            If it differs from the one before the interruption.
-        EncodingError
-            If it cannot be recorded.
-        """
-        try:
-            self._part.check_state(frame, digest)
-        except OSError as error:
-            raise EncodingError(f"cannot write the video {self.path}: {error.strerror}") from error
-
-    def close(self) -> None:
-        """Finish the video and move it to its place. Repeated calls do nothing.
-
-        Raises
-        ------
-        VideoError
-            If there is no frame.
-        EncodingError
-            If a frame could not be encoded, or the file not be written.
-        """
-        if not self._encoder.running:
-            return
-        if self.frames == 0:
-            self.discard()
-            raise VideoError(f"the video {self.path} has no frame; write at least one")
-        try:
-            self._encoder.stop()
-            self._raise_error()
-        except BaseException as error:  # such as Ctrl-C while the last frames are encoded
-            self._give_up(error)
-            raise
-
-    def discard(self) -> None:
-        """Stop, and remove what was written. A previous video in the same place stays."""
-        self._encoder.abandon()
-        if not self._encoder.finished:
-            self._part.remove()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        if error is None:
-            self.close()
-        else:
-            self._give_up(error)
-
-    def _give_up(self, error: BaseException) -> None:
-        """End the work on an exception, and add a note of what is kept."""
-        if not self._resumable or isinstance(error, _HOPELESS):
-            self.discard()
-            return
-        self._encoder.abandon()
-        if not self._encoder.finished and self._part.keep():
-            error.add_note(
-                f"{self._part.frames} frames are kept in {self._part.folder}; --resume carries on from there"
-            )
-
-    def _raise_error(self) -> None:
-        error = self._encoder.error
-        if error is not None:
-            reason = getattr(error, "strerror", None) or error
-            raise EncodingError(f"cannot write the video {self.path}: {reason}") from error
+            self._error = error
+        self.encode_seconds += time.perf_counter() - start
 
 
 def open_writer(

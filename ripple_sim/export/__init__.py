@@ -1,1 +1,5 @@
 """Results that leave the house: moving geometry, fields and tables in the formats of other programs."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

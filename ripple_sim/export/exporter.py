@@ -1,36 +1,26 @@
-"""For a loop of one's own: `Exporter` writes it to the file of another program, `RippleRenderer` renders frames."""
+"""`Exporter` writes a loop of one's own, frame by frame, to the file of another program."""
 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import html
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TypeAlias, Unpack
+from typing import Self, Unpack
 
 import mujoco
-import numpy as np
-from numpy.typing import NDArray
 
-from ripple_sim.capture.frame_source import surface_of
-from ripple_sim.capture.snapshot import DrawnHeights
 from ripple_sim.coupling.geoms import ByGeom, by_name, check_targets, own_data, own_model, posed
 from ripple_sim.coupling.ripples import Impulse, Ripples
 from ripple_sim.errors import EncodingError, ExportError
-from ripple_sim.render import Camera, FixedCamera, Renderer
-from ripple_sim.render.camera import Viewpoint, find_viewpoint
 from ripple_sim.render.visuals.visual import find_look
 from ripple_sim.scene.scene_file import CameraEntry, check_camera
 from ripple_sim.solver.errors import PATH, POSITIVE, checked, instance
-from ripple_sim.solver.gl import GLContext, shared_context
 
 from .options import WRITE_OPTIONS, WriteOptions
-from .page import framed
 from .place import Unfinished, check_export, check_write_options
-from .source import Chunking, Moment, Paint, Source
+from .source import Chunking, Source
 
 
 class Exporter:
@@ -104,7 +94,7 @@ class Exporter:
             camera=camera_entry(model, camera),
             size=written["size"],
             lighting=lighting,
-            paints={name: Paint(named.get(name, "rubber")) for name in ripples},
+            paints={name: (named.get(name, "rubber"), None) for name in ripples},
             limited=dict.fromkeys(ripples, written["limit"]),
             tessellation=written["tessellation"],
             triangles=written["triangles"],
@@ -152,7 +142,7 @@ class Exporter:
         given = self._source.ripples.last_impulses if impulses is None else impulses
         with self._reported():
             model = self._source.model
-            self._writer.write(Moment(self.frames, posed(model, own_data(model, data, drawn=True)), list(given)))
+            self._writer.write(self.frames, posed(model, own_data(model, data, drawn=True)), given)
         self.frames += 1
 
     def close(self) -> None:
@@ -235,107 +225,11 @@ def camera_entry(model: mujoco.MjModel, camera: str | CameraEntry | None) -> Cam
     return entry
 
 
-AnyCamera: TypeAlias = Camera | FixedCamera | str | int | mujoco.MjvCamera
+_HEIGHT = 420  # [pixels]
 
 
-class RippleRenderer:
-    """Renders a model and its rippling surfaces offscreen, as `mujoco.Renderer` renders a model.
-
-    Parameters
-    ----------
-    model : mujoco.MjModel
-        That of the ripples, or one that differs in its looks alone; or dm_control's wrapper of one, likewise the data
-        of each frame.
-    ripples : Ripples
-        Whose targets are drawn with their ripples.
-    width : int
-        [pixels].
-    height : int
-        [pixels].
-    looks : mapping
-        Geom, by its name or id, to the look of its surface, one of `LOOKS`: rubber (the default), jelly, clay and so
-        on. Its colour is the geom's, where the model gives it a texture or a colour, as in a scene file.
-    gl : GLContext, optional
-        By default the process's shared one.
-    limit : bool
-        Whether heights that are too large for the object are drawn smaller, so that its surface does not pass through
-        itself; see `DisplacementLimit`.
-
-    Raises
-    ------
-    RippleError
-        If the ripples belong to another model, for an unknown look or geom, or if the driver cannot render frames of
-        this size.
-    """
-
-    def __init__(
-        self,
-        model: mujoco.MjModel,
-        ripples: Ripples,
-        *,
-        width: int = 1280,
-        height: int = 720,
-        looks: ByGeom[str] | None = None,
-        gl: GLContext | None = None,
-        limit: bool = True,
-    ) -> None:
-        self._model, self._ripples = own_model(model), ripples
-        check_targets(self._model, ripples.model, ripples.geom_ids)
-        self._height_maps = {name: DrawnHeights(ripples, name, limit) for name in ripples}
-        named = by_name(self._model, looks or {}, "looks")
-        surfaces = {
-            geom: surface_of(ripples[name], named.get(name, "rubber")) for name, geom in ripples.geom_ids.items()
-        }
-        self._size, self._looks, self._limit = (width, height), named, limit
-        self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
-        self._renderer = Renderer(gl or shared_context(), self._model, surfaces, size=(width, height))
-
-    def render(self, data: mujoco.MjData, camera: AnyCamera | None = None) -> NDArray[np.uint8]:
-        """Render the present state to pixels, uint8 [height, width, 3].
-
-        Parameters
-        ----------
-        data : mujoco.MjData
-            After `mj_step` or `mj_forward`. Where no poses were ever computed, those of its `qpos` are drawn.
-        camera : Camera, FixedCamera, str, int or mujoco.MjvCamera, optional
-            A camera, or the name or the id of one in the MJCF, or one of MuJoCo's that is free, tracks a body or is
-            fixed; by default, and with -1, MuJoCo's free camera, aimed at the model's middle.
-
-        Raises
-        ------
-        SceneError
-            If the data belongs to another model, or the camera is none of these or not in the model.
-        """
-        data = posed(self._model, own_data(self._model, data, drawn=True))
-        seen = find_viewpoint(self._model, data, -1 if camera is None else camera)
-        self._seen = data, self._entry(camera if isinstance(camera, str) else seen)
-        height_maps = {
-            self._ripples.geom_ids[name]: height_map(self._ripples[name].snapshot(), data)
-            for name, height_map in self._height_maps.items()
-        }
-        return self._renderer.render(data, height_maps, seen)
-
-    def _entry(self, camera: Viewpoint | str) -> CameraEntry:
-        """What `[camera]` of a scene file would say; MuJoCo's free camera where it has no words for it."""
-        if isinstance(camera, Camera):
-            return CameraEntry(**dataclasses.asdict(camera))
-        return camera_entry(self._model, camera if isinstance(camera, str) else None)
-
-    def _repr_html_(self) -> str | None:
-        """In a notebook: the present state of what was rendered last, to turn and to zoom."""
-        if self._seen is None:
-            return None
-        data, camera = self._seen
-        with tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder:
-            page = Path(folder) / "now.html"
-            with Exporter(
-                self._model,
-                self._ripples,
-                page,
-                camera=camera,
-                looks=self._looks,
-                size=self._size,
-                limit=self._limit,
-            ) as exporter:
-                exporter.write(data)
-            return framed(page, self._size[0] / self._size[1])
+def framed(page: Path, aspect: float) -> str:
+    """A page as HTML to be shown within another, `aspect` times as wide as high."""
+    source = html.escape(page.read_text(encoding="utf-8"), quote=True)
+    size = f'width="{round(_HEIGHT * aspect)}" height="{_HEIGHT}"'
+    return f'<iframe srcdoc="{source}" {size} style="border: 0; max-width: 100%" allowfullscreen></iframe>'

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,33 +12,26 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.encode.replace import MARK
 from ripple_sim.solver.texels.moving import SurfaceRide
 
-from .source import Moment, Source
+from .source import Source
 from .tables import COLUMNS, rows
-
-__all__ = ["FieldWriter", "made_here", "writer"]
 
 CHUNK = 16  # entries that are kept in memory, and lie in one chunk
 _METADATA, _CHUNK_NAME = (".zgroup", ".zattrs", ".zarray", ".zmetadata"), re.compile(r"\d+(\.\d+)*")
 
 
 class Store:
-    """Arrays that are fixed and arrays that grow, the latter written chunk by chunk.
-
-    Parameters
-    ----------
-    path : Path
-    attributes : mapping
-        Of the store.
-    """
+    """Arrays that are fixed and arrays that grow, the latter written chunk by chunk, and attributes of the whole."""
 
     def __init__(self, path: Path, attributes: Mapping[str, Any]) -> None:
         import zarr
 
         self._group = zarr.open_group(str(path), mode="w", zarr_format=2)
-        self._group.attrs.update({"software": MARK, **attributes})
+        if attributes:
+            self._group.attrs.update(attributes)
         self._growing: dict[str, Any] = {}
         self._waiting: dict[str, list[NDArray]] = {}
 
@@ -56,11 +49,11 @@ class Store:
         dimensions: list[str],
         like: NDArray,
         unit: str,
-        text: str,
+        text: str = "",
         *,
         chunk: int = CHUNK,
         before: int = 0,
-    ) -> None:
+    ) -> Any:
         """Begin an array of entries like one, which stands `before` times in it already; replace one of this name."""
         if name in self._group:
             del self._group[name]
@@ -72,6 +65,7 @@ class Store:
             array[first:last] = np.broadcast_to(like, (last - first, *like.shape))
         array.attrs.update(_attributes(dimensions, unit, text))
         self._growing[name], self._waiting[name] = array, []
+        return array
 
     def add(self, name: str, value: ArrayLike) -> None:
         """Add an entry to an array that grows."""
@@ -112,7 +106,7 @@ def _attributes(dimensions: list[str], unit: str, text: str) -> Mapping[str, Any
 
 
 _IMPULSES = 4096  # in one chunk
-_KINDS: dict[str, Any] = {"int64": np.int64, "float64": np.float64, "bool": np.bool_, "string": "<U64"}
+DTYPES = {"int64": "i8", "float64": "f8", "bool": "?", "string": "U64"}  # of the columns of impulses in NumPy
 
 
 class FieldWriter:
@@ -120,16 +114,11 @@ class FieldWriter:
 
     Variables of a target end in its name: `height_duck` has the dimensions time, chart_duck, row_duck and column_duck.
     The places of texels have no time, but for surfaces that move.
-
-    Parameters
-    ----------
-    source : Source
-    path : Path
     """
 
     def __init__(self, source: Source, path: Path) -> None:
-        self._source, self._frames = source, 0
-        self._store = store = Store(path, {"fps": source.fps, "slow_motion": source.slow_motion})
+        self._source = source
+        self._store = store = Store(path, {"software": MARK, "fps": source.fps, "slow_motion": source.slow_motion})
         model = source.model
         bodies = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, i) or f"body {i}" for i in range(model.nbody)]
         store.fixed("body", ["body"], np.array(bodies))
@@ -141,22 +130,20 @@ class FieldWriter:
         store.grow("orientation", ["time", "body", "component"], turns, "1", "quaternion of bodies")
         self._targets = {name: _TargetFields(source, name, store) for name in source.ripples}
         for column, (unit, kind) in COLUMNS.items():
-            one = np.zeros((), _KINDS[kind])
+            one = np.zeros((), DTYPES[kind])
             store.grow(f"impulse_{column}", ["impulse"], one, unit, f"{column} of an impulse", chunk=_IMPULSES)
 
-    def write(self, moment: Moment) -> None:
+    def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add a frame."""
-        data = moment.data
         self._store.add("time", data.time)
         self._store.add("position", data.xpos)
         self._store.add("orientation", data.xquat)
         for name, fields in self._targets.items():
-            fields.write(self._source.ripples.vertices(name, data), self._frames)
-        for row in rows(moment):
+            fields.write(self._source.ripples.vertices(name, data), number)
+        for row in rows(number, data, impulses):
             for column, value in zip(COLUMNS, row, strict=True):
                 self._store.add(f"impulse_{column}", value)
-        self._frames += 1
-        if self._frames % CHUNK == 0:
+        if number % CHUNK == CHUNK - 1:
             self._store.flush()
 
     def finish(self) -> None:
@@ -193,20 +180,10 @@ class _TargetFields:
         self._store.add(f"energy_{suffix}", waves.energy())
         if V is not None and self._ride is None:
             self._ride = SurfaceRide(waves.rest)
-            self._begin_motion(number)
+            for axis, each in enumerate("xyz"):  # the places get a time: at rest in the frames so far
+                rest, text = waves.rest.positions[..., axis], f"{each} of texels, geom's frame; the world's if soft"
+                self._store.grow(f"{each}_{suffix}", ["time", *self._dimensions], rest, "m", text, before=number)
         if self._ride is not None:
             positions, _ = self._ride.positions(waves.rest.mesh.V if V is None else V)
             for axis, each in enumerate("xyz"):
                 self._store.add(f"{each}_{suffix}", positions[..., axis])
-
-    def _begin_motion(self, frames: int) -> None:
-        """Give the places of texels a time: at rest in the frames so far."""
-        for axis, each in enumerate("xyz"):
-            rest, text = self._waves.rest.positions[..., axis], f"{each} of texels, geom's frame; the world's if soft"
-            dimensions = ["time", *self._dimensions]
-            self._store.grow(f"{each}_{self._suffix}", dimensions, rest, "m", text, before=frames)
-
-
-def writer(source: Source, path: Path) -> FieldWriter:
-    """Begin a store."""
-    return FieldWriter(source, path)

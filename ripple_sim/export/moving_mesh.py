@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.surfaces.adaptive import spline_weights
-from ripple_sim.render.surfaces.moving import Attachment, MovingSurface
+from ripple_sim.render.surfaces.moving import MovingVertices
 from ripple_sim.render.surfaces.surface import Charts
 from ripple_sim.render.surfaces.vertices import COORDINATES, DIRECTION, NORMAL, POSITION, UV, tessellated
 from ripple_sim.render.visuals.corners import normalized, smooth_normals, split_corners
 from ripple_sim.solver import Atlas, HeightMap
 from ripple_sim.solver.kernel import Floats32, Ints32, kernel
+from ripple_sim.solver.waves.motion import MovedGradients
 
 from .options import MOST_TRIANGLES
 
 
-class Shape(NamedTuple):
+class Displaced(NamedTuple):
     """A displaced surface in the frame of its geom.
 
     Attributes
@@ -29,14 +31,14 @@ class Shape(NamedTuple):
         Unit vectors.
     velocities : float32 [n, 3]
         [m/s].
-    heights : float32 [n]
+    height : float32 [n]
         [m].
     """
 
     points: NDArray[np.float32]
     normals: NDArray[np.float32]
     velocities: NDArray[np.float32]
-    heights: NDArray[np.float32]
+    height: NDArray[np.float32]
 
 
 class MovingMesh:
@@ -77,31 +79,35 @@ class MovingMesh:
         nearest = np.clip(np.floor(place + 0.5), 0, atlas.resolution - 1)
         texels = np.column_stack([chart, nearest]).astype(np.int32)
         offsets, normals = (place - nearest).astype(np.float32), normalized(normals).astype(np.float32)
-        self._rest = _Rest(self.rest, self.directions, normals, texels, offsets)
+        self._normals, self._texels, self._offsets = normals, texels, offsets
         self._height_map = HeightMap.drawn(atlas, limit)
-        self._moving = MovingSurface(atlas, self.rest, self.directions, normals)
+        self._atlas = atlas
 
-    @property
-    def riding(self) -> Attachment:
-        """How the points ride on the mesh's own vertices."""
-        return self._moving.vertices.rest
+    @functools.cached_property
+    def vertices(self) -> MovingVertices:
+        """The points as they ride on the mesh's own vertices."""
+        mesh = self._atlas.mesh
+        return MovingVertices(mesh.V, mesh.F, self.rest, self.directions, self._normals)
+
+    @functools.cached_property
+    def _gradients(self) -> MovedGradients:
+        return MovedGradients(self._atlas)
 
     def shape(
         self, height: NDArray[np.float32], velocity: NDArray[np.float32], V: NDArray[np.float64] | None = None
-    ) -> Shape:
+    ) -> Displaced:
         """The surface under waves of a height [m] and a velocity [m/s], float32 [C, n, n] both.
 
         With the vertices of its mesh at V [vertex_count, 3] [m], where they have moved; velocities are those of the
         waves alone.
         """
         points, normals, velocities = (np.empty_like(self.rest) for _ in range(3))
-        shape = Shape(points, normals, velocities, np.empty(len(self.rest), np.float32))
+        shape = Displaced(points, normals, velocities, np.empty(len(self.rest), np.float32))
         height_map, rates = self._height_map(height), self._height_map.rates(height, velocity)
-        rest = self._rest
+        still = self.rest, self.directions, self._normals
         if V is not None:
-            height_map, (points, directions, normals) = self._moving(height_map, V)
-            rest = rest._replace(points=points, directions=directions, normals=normals)
-        _displace(height_map, rates, rest, shape)
+            still, height_map = self.vertices(V), self._gradients(height_map, V)
+        _displace(height_map, rates, *still, self._texels, self._offsets, shape)
         return shape
 
 
@@ -112,11 +118,10 @@ _Vertices = tuple[NDArray, NDArray | None, NDArray, NDArray, NDArray, tuple[NDAr
 def _own(atlas: Atlas, triangles: int) -> _Vertices:
     """The mesh's own triangles, their vertices split at creases."""
     V, F = atlas.mesh.V, atlas.mesh.F
-    split = split_corners(V, F)
-    each = split.vertices
+    each, split_F, normals, _, _ = split_corners(V, F)
     chart, row, column = atlas.locate(V)
     places = chart[each], row[each], column[each]
-    return split.F, atlas.mesh.corner_uv, V[each], smooth_normals(V, F)[each], split.normals, places
+    return split_F, atlas.mesh.corner_uv, V[each], smooth_normals(V, F)[each], normals, places
 
 
 def _refined(atlas: Atlas, triangles: int) -> _Vertices:
@@ -137,27 +142,26 @@ def _refined(atlas: Atlas, triangles: int) -> _Vertices:
     return point.ravel()[F], uv, vertices[:, POSITION], vertices[:, DIRECTION], vertices[:, NORMAL], places
 
 
-class _Rest(NamedTuple):
-    """The surface without waves: points, directions and normals [n, 3], and where the points lie on the texels.
-
-    `texels` [n, 3] are the first of 3 x 3 (chart, row, column) on charts with halo, `offsets` [n, 2] are from the
-    middle one [texels].
-    """
-
-    points: Floats32
-    directions: Floats32
-    normals: Floats32
-    texels: Ints32
-    offsets: Floats32
-
-
 @kernel
-def _displace(height_map: Floats32, rates: Floats32, rest: _Rest, shape: Shape) -> None:
-    """Fill in a shape from a height map [C, n + 2, n + 2, 4] and the rates of its heights [C, n + 2, n + 2]."""
+def _displace(
+    height_map: Floats32,
+    rates: Floats32,
+    still: Floats32,
+    directions: Floats32,
+    upright: Floats32,
+    texels: Ints32,
+    offsets: Floats32,
+    shape: Displaced,
+) -> None:
+    """Fill in a shape from a height map [C, n + 2, n + 2, 4] and the rates of its heights [C, n + 2, n + 2].
+
+    The surface without waves has its points `still`, directions and normals `upright`, [n, 3]. `texels` [n, 3] are the
+    first of 3 x 3 (chart, row, column) on charts with halo, `offsets` [n, 2] are from the middle one [texels].
+    """
     points, normals, velocities, heights = shape
     for i in range(len(points)):
-        chart, row, column = rest.texels[i]
-        down, across = spline_weights(rest.offsets[i, 0]), spline_weights(rest.offsets[i, 1])
+        chart, row, column = texels[i]
+        down, across = spline_weights(offsets[i, 0]), spline_weights(offsets[i, 1])
         gx = gy = gz = h = v = np.float32(0)
         for j in range(3):
             for k in range(3):
@@ -169,8 +173,8 @@ def _displace(height_map: Floats32, rates: Floats32, rest: _Rest, shape: Shape) 
                 v += weight * rates[chart, row + j, column + k]
         heights[i] = h
         for k in range(3):
-            points[i, k] = rest.points[i, k] + h * rest.directions[i, k]
-            velocities[i, k] = v * rest.directions[i, k]
-        x, y, z = rest.normals[i, 0] - gx, rest.normals[i, 1] - gy, rest.normals[i, 2] - gz
+            points[i, k] = still[i, k] + h * directions[i, k]
+            velocities[i, k] = v * directions[i, k]
+        x, y, z = upright[i, 0] - gx, upright[i, 1] - gy, upright[i, 2] - gz
         scale = 1 / np.sqrt(x * x + y * y + z * z)
         normals[i, 0], normals[i, 1], normals[i, 2] = x * scale, y * scale, z * scale

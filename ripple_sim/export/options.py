@@ -8,10 +8,12 @@ from __future__ import annotations
 import dataclasses
 from typing import Literal, TypedDict
 
+from ripple_sim.errors import ExportError
+from ripple_sim.solver.errors import check_fields
+from ripple_sim.video.options import Backend
+
 TESSELLATIONS = ("refined", "own")
 MOST_TRIANGLES = 100_000
-
-Backend = Literal["auto", "gl", "cpu"]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -47,6 +49,9 @@ class ExportOptions:
     """Keep the complete chunks of an interrupted export of the same scene with the same options."""
     overwrite: bool = False
     """Replace an output that ripple-sim has not made."""
+
+    def __post_init__(self) -> None:
+        check_fields(ExportError, self)
 
     @property
     def rate(self) -> float:

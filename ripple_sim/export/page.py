@@ -1,6 +1,9 @@
 """`PageWriter`: a run as one self-contained page, which plays in any browser and inside a notebook.
 
-What stays the same over time, meshes, looks, textures, camera and light, is written once; `page_motion` has the rest.
+What stays the same over time, meshes, looks, textures, camera and light, is written once. Heights and moving vertices
+are predicted from earlier ones and the frame before, and deflated. Triangles and vertices come in an order in which
+neighbours are close together: drawing then computes a vertex about once and not once for each of its triangles, and
+heights are predicted well from earlier ones.
 """
 
 from __future__ import annotations
@@ -11,6 +14,8 @@ import html
 import importlib.resources
 import io
 import json
+import zlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,29 +24,22 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.coupling.soft import is_soft, target_pose
 from ripple_sim.encode.replace import MARK, made_here
 from ripple_sim.overlay.notes import color_table
 from ripple_sim.render.passes.floor import find_floor
-from ripple_sim.render.visuals.lights import SOFT_BOX_LIGHTS, is_lit, model_lighting, studio_lighting
-from ripple_sim.render.visuals.visual import texture_pixels, visible_geoms
+from ripple_sim.render.surfaces.vertices import memory_order
+from ripple_sim.render.visuals.lights import SOFT_BOX_LIGHTS, lighting_of
+from ripple_sim.render.visuals.texture_mapping import mapping_of
+from ripple_sim.render.visuals.visual import geom_visual, texture_pixels, visible_geoms
+from ripple_sim.solver import Mesh
 
 from .moving_mesh import MovingMesh
-from .page_motion import PageMotion, local_order, packed, parents_of, quantised, residuals
-from .source import Moment, Source
-from .visuals import Finish, Solid, solid_finish, solids, target_finish, target_uv
+from .source import Source
+from .visuals import Finish, Solid, mean_color, solid_finish, solids, target_finish, target_uv
 
-__all__ = ["PageWriter", "made_here", "writer"]
-
-_HEIGHT = 420  # [pixels]
-
-
-def framed(page: Path, aspect: float) -> str:
-    """A page as HTML to be shown within another, `aspect` times as wide as high."""
-    source = html.escape(page.read_text(encoding="utf-8"), quote=True)
-    size = f'width="{round(_HEIGHT * aspect)}" height="{_HEIGHT}"'
-    return f'<iframe srcdoc="{source}" {size} style="border: 0; max-width: 100%" allowfullscreen></iframe>'
-
+__all__ = ["PageWriter", "made_here"]
 
 _TRIANGLES, _SEGMENTS = 16_000, 6  # of a target, and of a primitive to a right angle
 _LARGEST_IMAGE = 1024  # [pixels]
@@ -56,15 +54,10 @@ class PagePart(NamedTuple):
     vertices: NDArray[np.int64]
 
 
-def target_mesh(source: Source, name: str) -> MovingMesh:
-    """The surface of a target as the page shows it."""
-    return MovingMesh(source.ripples[name].rest, source.tessellation, source.limited[name], _TRIANGLES)
-
-
 def target_part(source: Source, name: str, mesh: MovingMesh) -> PagePart:
     """A target at rest; its points follow along `directions`, and with its mesh's own vertices."""
     model, geom = source.model, source.ripples.geom_ids[name]
-    finish = target_finish(model, geom, source.paints[name], mesh.uv is not None)
+    finish = target_finish(model, geom, *source.paints[name], mesh.uv is not None)
     uv = target_uv(model, geom, mesh) if finish.texture >= 0 else None
     soft = is_soft(model, geom)  # and so in the world
     meta = {
@@ -79,27 +72,8 @@ def target_part(source: Source, name: str, mesh: MovingMesh) -> PagePart:
     return _part(meta, mesh.F, [mesh.rest, mesh.directions], uv)
 
 
-def solid_parts(source: Source, floor: int) -> list[PagePart]:
-    """Everything else but the floor, which is a geom id."""
-    model = source.model
-    found = solids(model, {*source.ripples.geom_ids.values(), floor}, _SEGMENTS)
-    return [_solid_part(model, solid) for solid in found]
-
-
-def images(model: mujoco.MjModel, parts: list[dict[str, Any]]) -> dict[int, str]:
-    """Textures that parts use, as data URIs, by their ids."""
-    return {part["texture"]: _data_uri(model, part["texture"]) for part in parts if part["texture"] >= 0}
-
-
-def floor_of(model: mujoco.MjModel, geom: int | None) -> dict[str, Any] | None:
+def floor_of(model: mujoco.MjModel, geom: int) -> dict[str, Any]:
     """The floor: height, albedo and texture."""
-    if geom is None:
-        return None
-    from ripple_sim.render.visuals.texture_mapping import mapping_of
-    from ripple_sim.render.visuals.visual import geom_visual
-
-    from .visuals import mean_color
-
     visual = geom_visual(model, geom)
     mapping = mapping_of(model, visual)
     half = [float(x) if x > 0 else 0.0 for x in visual.size[:2]]
@@ -118,8 +92,8 @@ def floor_of(model: mujoco.MjModel, geom: int | None) -> dict[str, Any] | None:
 def light_of(source: Source, data: mujoco.MjData) -> dict[str, Any]:
     """Lamps, soft boxes and ambient light, as the renderer has them at the first frame."""
     pose, _ = source.pose(data)
-    studio = source.lighting == "studio" or (source.lighting == "auto" and not is_lit(source.model))
-    lighting = studio_lighting(pose) if studio else model_lighting(source.model, data, pose)
+    lighting = lighting_of(source.model, data, pose, source.lighting)
+    studio = lighting.studio
     lamps = [
         {
             # in the camera's frame where the lamp turns with it
@@ -140,11 +114,6 @@ def light_of(source: Source, data: mujoco.MjData) -> dict[str, Any]:
         "ambient": lighting.ambient.tolist(),
         "boxes": [[*map(float, box[:4]), *map(float, box[4])] for box in SOFT_BOX_LIGHTS],
     }
-
-
-def heat_colors() -> list[list[int]]:
-    """Colours of the heights, from the lowest to the highest, sRGB."""
-    return color_table()[::8].tolist()
 
 
 def _solid_part(model: mujoco.MjModel, solid: Solid) -> PagePart:
@@ -169,7 +138,7 @@ def _look(finish: Finish) -> dict[str, Any]:
 
 def _part(meta: dict[str, Any], F: NDArray, fields: list[NDArray], uv: NDArray | None) -> PagePart:
     """Points and directions in 16 bits each, triangles, and texture coordinates of their corners."""
-    triangles, vertices, F = local_order(fields[0], F)
+    F, vertices, triangles = memory_order(F, fields[0])
     points, directions = (np.asarray(field, np.float64)[vertices] for field in fields)
     low, size = points.min(axis=0), max(float(np.ptp(points, axis=0).max()), 1e-9)
     place = np.rint((points - low) / size * 65535).astype("<u2")
@@ -189,6 +158,100 @@ def _data_uri(model: mujoco.MjModel, texture: int) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(file.getvalue()).decode()}"
 
 
+_LARGEST = 1 << 20
+
+
+def parents_of(F: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Two earlier vertices from which each vertex is predicted, [count, 2]; -1 without.
+
+    They are the other two of the first triangle in which it is the last, or else twice the first of the first triangle
+    in which it is the second. decode.js finds the same ones.
+    """
+    ordered = np.sort(F, axis=1)
+    parents = np.full((count, 2), -1)
+    vertices, first = np.unique(ordered[:, 1], return_index=True)
+    parents[vertices] = ordered[first, :1]
+    vertices, first = np.unique(ordered[:, 2], return_index=True)
+    parents[vertices] = ordered[first, :2]
+    return parents
+
+
+def quantised(heights: NDArray[np.float32], step: float) -> NDArray[np.int64]:
+    """Heights [n] in whole steps [m]."""
+    return np.clip(np.rint(heights / step), -_LARGEST, _LARGEST).astype(np.int64)
+
+
+def residuals(now: NDArray[np.int64], before: NDArray[np.int64], parents: NDArray[np.int64]) -> bytes:
+    """What is left of the steps [n] since the frame before after prediction: low bytes of all, then high bytes."""
+    change = np.append(now - before, 0)  # -1: no parent, no change
+    left = change[:-1] - (change[parents[:, 0]] + change[parents[:, 1]] >> 1)
+    zigzag = np.where(left < 0, -2 * left - 1, 2 * left).astype("<u4")
+    # the prediction's error may take 23 bits
+    return b"".join((zigzag >> shift & 255).astype(np.uint8).tobytes() for shift in (0, 8, 16))
+
+
+def packed(content: bytes) -> str:
+    """Deflated bytes as text."""
+    return base64.b64encode(zlib.compress(content, 9)).decode()
+
+
+_PLACE_STEP = 2e-5  # of moving vertices, in sizes of the mesh
+
+
+class PageMotion:
+    """The vertices of a target's own mesh over time; nothing is written of one that rests.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        At rest.
+    surface : MovingMesh
+        The finer surface, which follows it.
+    points : int64 [n]
+        Which of its points the page has, in the page's order.
+    """
+
+    def __init__(self, mesh: Mesh, surface: MovingMesh, points: NDArray[np.int64]) -> None:
+        self._rest, self._surface, self._points = mesh.V, surface, points
+        self._F, self._order, _ = memory_order(mesh.F, mesh.V)
+        self._parents = parents_of(self._F, len(mesh.V))
+        self._step = _PLACE_STEP * float(np.ptp(mesh.V, axis=0).max())
+        self._frames: list[NDArray[np.float64]] = []
+        self.moves = False
+
+    def add(self, V: NDArray[np.float64] | None) -> None:
+        """Add a frame, with the vertices at V [m], or at rest."""
+        self.moves = self.moves or V is not None
+        self._frames.append(self._rest if V is None else np.array(V))
+
+    def told(self) -> dict[str, Any]:
+        """The mesh at rest, and how the page's points ride on it."""
+        corners, weights, off, *_ = self._surface.vertices.rest
+        far = max(float(np.abs(off).max()), 1e-30)
+        arrays = [
+            self._rest[self._order].astype("<f4"),
+            self._F.astype("<u4"),
+            np.argsort(self._order)[corners[self._points]].astype("<u4"),
+            np.rint(weights[self._points, :2] * 65535).astype("<u2"),
+            np.rint(off[self._points] / far * 32767).astype("<i2"),
+        ]
+        counts = {"points": len(self._order), "triangles": len(self._F)}
+        return {**counts, "step": self._step, "far": far, "arrays": packed(b"".join(each.tobytes() for each in arrays))}
+
+    def chunk(self) -> tuple[list[list[float]], bytes]:
+        """Middles [m] and coded vertices of the frames since the last chunk, both empty if the surface never moved."""
+        middles, planes, frames = [], [], self._frames
+        before = np.zeros((3, len(self._order)), np.int64)  # a chunk can be decoded alone
+        self._frames = []
+        for V in frames if self.moves else ():
+            middle = np.round(V.mean(axis=0), 6)
+            steps = quantised((V - middle)[self._order].T, self._step)
+            planes += [residuals(now, last, self._parents) for now, last in zip(steps, before, strict=True)]
+            middles.append(middle.tolist())
+            before = steps
+        return middles, b"".join(planes)
+
+
 _CHUNK = 16  # frames that are decoded together
 _STEP = 5e-5  # of heights, in sizes of the object
 _SCRIPTS = (
@@ -198,17 +261,14 @@ _SCRIPTS = (
 
 
 class PageWriter:
-    """Writes a page that plays a run: the player, what stays the same, and chunks of frames, each when it is full.
-
-    Parameters
-    ----------
-    source : Source
-    path : Path
-    """
+    """Writes a page that plays a run: the player, what stays the same, and chunks of frames, each when it is full."""
 
     def __init__(self, source: Source, path: Path) -> None:
         self._source, self._file = source, path.open("w", encoding="utf-8")
-        self._meshes = {name: target_mesh(source, name) for name in source.ripples}
+        self._meshes = {
+            name: MovingMesh(source.ripples[name].rest, source.tessellation, source.limited[name], _TRIANGLES)
+            for name in source.ripples
+        }
         self._targets = {name: target_part(source, name, mesh) for name, mesh in self._meshes.items()}
         self._parents = {name: parents_of(part.F, len(part.vertices)) for name, part in self._targets.items()}
         self._steps = {name: _STEP * float(np.ptp(mesh.rest, axis=0).max()) for name, mesh in self._meshes.items()}
@@ -223,22 +283,22 @@ class PageWriter:
         self._planes: list[bytes] = []
         self._frames = 0
 
-    def write(self, moment: Moment) -> None:
+    def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add a frame."""
-        if not self._frames:
-            self._begin(moment.data)
-        self._poses.append(self._pose(moment.data))
-        self._arrows.append([self._arrow(moment.data, impulse) for impulse in moment.impulses])
+        if number == 0:
+            self._begin(data)
+        self._poses.append(self._pose(data))
+        self._arrows.append([self._arrow(data, impulse) for impulse in impulses])
         for (name, mesh), motion in zip(self._meshes.items(), self._motions, strict=True):
             waves = self._source.ripples[name]
-            motion.add(self._source.ripples.vertices(name, moment.data))
-            heights = mesh.shape(waves.height, waves.velocity).heights[self._targets[name].vertices]
+            motion.add(self._source.ripples.vertices(name, data))
+            heights = mesh.shape(waves.height, waves.velocity).height[self._targets[name].vertices]
             steps = quantised(heights, self._steps[name])
             # a chunk begins from nothing, so that it can be decoded alone
             before = self._last[name] if len(self._poses) > 1 else np.zeros_like(steps)
             self._planes.append(residuals(steps, before, self._parents[name]))
             self._last[name] = steps
-        self._frames += 1
+        self._frames = number + 1
         if len(self._poses) == _CHUNK:
             self._flush()
 
@@ -259,21 +319,23 @@ class PageWriter:
         source, model = self._source, self._source.model
         targets = set(source.ripples.geom_ids.values())
         floor = find_floor(model, [geom for geom in visible_geoms(model) if geom not in targets])
-        parts = [*self._targets.values(), *solid_parts(source, -1 if floor is None else floor)]
+        found = solids(model, targets if floor is None else {*targets, floor}, _SEGMENTS)
+        parts = [*self._targets.values(), *(_solid_part(model, solid) for solid in found)]
         pose, _ = source.pose(data)
-        floor_meta = floor_of(model, floor)
+        floor_meta = None if floor is None else floor_of(model, floor)
+        textured = [part.meta for part in parts] + ([floor_meta] if floor_meta else [])
         meta = {
             "fps": source.fps,
             "chunk": _CHUNK,
             "steps": list(self._steps.values()),
             "parts": [part.meta for part in parts],
-            "images": images(model, [part.meta for part in parts] + ([floor_meta] if floor_meta else [])),
+            "images": {each["texture"]: _data_uri(model, each["texture"]) for each in textured if each["texture"] >= 0},
             "floor": floor_meta,
             "light": light_of(source, data),
             "fovy": pose.fovy,
             "distance": pose.distance,
             "aspect": source.size[0] / source.size[1],
-            "heat": heat_colors(),
+            "heat": color_table()[::8].tolist(),  # of the heights, from the lowest to the highest, sRGB
         }
         self._file.write(_head(", ".join(self._meshes)))
         arrays = b"".join(array.tobytes() for part in parts for array in part.arrays)
@@ -288,7 +350,7 @@ class PageWriter:
         rows = np.concatenate([[[*pose.position, *quaternion]], np.concatenate([data.xpos, data.xquat], axis=1)])
         return np.round(rows, 5).tolist()
 
-    def _arrow(self, data: mujoco.MjData, impulse: Any) -> list[float]:
+    def _arrow(self, data: mujoco.MjData, impulse: Impulse) -> list[float]:
         """Point and inward direction in the world, and impulse [N s]."""
         ripples = self._source.ripples
         _, rotation = target_pose(data, ripples.geom_ids[impulse.geom])
@@ -321,11 +383,6 @@ class PageWriter:
             middles[number] = places
             planes.append(coded)
         return middles, planes
-
-
-def writer(source: Source, path: Path) -> PageWriter:
-    """Begin a page."""
-    return PageWriter(source, path)
 
 
 def _head(title: str) -> str:

@@ -15,8 +15,8 @@ from pathlib import Path
 
 from ripple_sim.encode.output import check_size
 from ripple_sim.encode.replace import MARK, made_here, move
-from ripple_sim.errors import EncodingError, ExportError, SceneError
-from ripple_sim.scene.scene import MAX_DURATION, Scene
+from ripple_sim.errors import EncodingError, ExportError
+from ripple_sim.scene.scene import Scene, check_duration
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.files import NO_NAME, final_path
 
@@ -26,49 +26,12 @@ from .source import Source, Writer
 Recognised = Callable[[Path], bool]
 
 
-def check_place(path: Path, recognised: Recognised, overwrite: bool) -> None:
-    """Make sure that an export may be written to a path; leave nothing behind.
-
-    Parameters
-    ----------
-    path : Path
-    recognised : callable
-        Whether a file or folder at a path was made here.
-    overwrite : bool
-        Replace what was not, but never a folder of other things.
-
-    Raises
-    ------
-    ExportError
-        If something foreign stands there, or there can be no such name.
-    EncodingError
-        If nothing can be written there.
-    """
-    try:
-        final = final_path(path)
-        _check_replaceable(final, recognised, overwrite)
-        with tempfile.TemporaryFile(dir=_existing(final.parent)):
-            pass
-    except OSError as error:
-        kind = ExportError if error.errno in NO_NAME else EncodingError
-        raise kind(f"cannot write {path}: {error.strerror}; name a file in a folder you can write to") from error
-
-
 class Unfinished:
     """A hidden folder beside a path, in which all is written that then moves to its place.
 
-    Parameters
-    ----------
-    target : Path
-        Followed where it is a link.
-    recognised : callable
-    overwrite : bool
-        As for `check_place`.
-
-    Attributes
-    ----------
-    path : Path
-        In the folder, of the target's name. What lies beside it there moves to its place too, and first.
+    `path` lies in the folder and has the target's name. What lies beside it there moves to its place too, and first.
+    The target is followed where it is a link. `recognised` says whether a file or folder at a path was made here; with
+    `overwrite` what was not is replaced, but never a folder of other things.
     """
 
     def __init__(self, target: Path, recognised: Recognised, overwrite: bool) -> None:
@@ -128,20 +91,14 @@ def _check_replaceable(path: Path, recognised: Recognised, overwrite: bool) -> N
             )
 
 
-def _existing(folder: Path) -> Path:
-    while not folder.exists():
-        folder = folder.parent
-    return folder
-
-
 @dataclasses.dataclass(frozen=True)
 class Ending:
     """How the files of an ending are written.
 
     Attributes
     ----------
-    home : str
-        Module, below this package, that has `writer` and `made_here`.
+    home, kind : str
+        Module, below this package, and its class that writes the files; `made_here` of the module tells them.
     package, extra : str, optional
         What it needs beside ripple-sim, and the extra that brings it.
     chunks : bool
@@ -149,28 +106,29 @@ class Ending:
     """
 
     home: str
+    kind: str
     package: str | None = None
     extra: str | None = None
     chunks: bool = False
 
     def writer(self, source: Source, path: Path) -> Writer:
         """Begin a file."""
-        return importlib.import_module(self.home, __package__).writer(source, path)
+        return getattr(importlib.import_module(self.home, __package__), self.kind)(source, path)
 
     def made_here(self, path: Path) -> bool:
         """Whether a file of this ending was written here."""
         return importlib.import_module(self.home, __package__).made_here(path)
 
 
-_LAYER = Ending(".usd", package="pxr", extra="usd", chunks=True)
+_LAYER = Ending(".usd", "UsdWriter", package="pxr", extra="usd", chunks=True)
 ENDINGS = {
     ".usdc": _LAYER,
     ".usda": _LAYER,
     ".usdz": dataclasses.replace(_LAYER, chunks=False),
-    ".zarr": Ending(".fields", package="zarr", extra="zarr"),
-    ".html": Ending(".page"),
-    ".csv": Ending(".tables"),
-    ".parquet": Ending(".tables", package="pyarrow", extra="parquet"),
+    ".zarr": Ending(".fields", "FieldWriter", package="zarr", extra="zarr"),
+    ".html": Ending(".page", "PageWriter"),
+    ".csv": Ending(".tables", "CsvWriter"),
+    ".parquet": Ending(".tables", "ParquetWriter", package="pyarrow", extra="parquet"),
 }
 
 
@@ -196,13 +154,13 @@ def ending_of(path: Path) -> Ending:
 
 
 def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Ending:
-    """Make sure, before anything that takes time, that an export can be written to a path; return how.
+    """Make sure, before anything that takes time, that an export can be written to a path; return how. Leaves nothing.
 
     Raises
     ------
     ExportError
-        If the ending is unknown, needs what is not installed, has no chunks where they are wanted, or something foreign
-        stands in the path's place.
+        If the ending is unknown, needs what is not installed, has no chunks where they are wanted, something foreign
+        stands in the path's place, or there can be no such name.
     EncodingError
         If nothing can be written there.
     """
@@ -210,11 +168,17 @@ def check_export(path: Path, overwrite: bool, *, chunked: bool = False) -> Endin
     if chunked and not ending.chunks:
         able = " and ".join(suffix for suffix, each in ENDINGS.items() if each.chunks)
         raise ExportError(f"there are chunks of {able} files alone, not of {path.name}; leave --chunk out")
-    check_place(path, ending.made_here, overwrite)
-    return ending
+    try:
+        final = final_path(path)
+        _check_replaceable(final, ending.made_here, overwrite)
+        with tempfile.TemporaryFile(dir=next(each for each in final.parents if each.exists())):
+            return ending
+    except OSError as error:
+        kind = ExportError if error.errno in NO_NAME else EncodingError
+        raise kind(f"cannot write {path}: {error.strerror}; name a file in a folder you can write to") from error
 
 
-MAX_FPS, MAX_SLOW_MOTION, LARGEST_MESH = 1000, 1000, 10_000_000
+MAX_FPS, LARGEST_MESH = 1000, 10_000_000
 
 
 def check_options(options: ExportOptions) -> None:
@@ -228,14 +192,8 @@ def check_options(options: ExportOptions) -> None:
         raise ExportError(f"frame rate is {options.fps!r}; valid is a whole number from 1 to {MAX_FPS} frames a second")
     if options.resume and options.chunk is None:
         raise ExportError("only an export in chunks can be resumed; add --chunk, or leave --resume out")
-    check_write_options(
-        {
-            "size": options.size,
-            "tessellation": options.tessellation,
-            "triangles": options.triangles,
-            "chunk": options.chunk,
-        }
-    )
+    shared = WriteOptions(size=options.size, tessellation=options.tessellation, triangles=options.triangles)
+    check_write_options(shared | {"chunk": options.chunk})
 
 
 def check_write_options(options: WriteOptions) -> None:
@@ -267,8 +225,5 @@ def frame_count(options: ExportOptions, scene: Scene) -> int:
         If the duration or the slow motion is out of range.
     """
     duration = scene.duration if options.duration is None else options.duration
-    if not 0 < duration < MAX_DURATION:
-        raise SceneError(f"duration is {duration!r} s; valid is a positive number, less than {MAX_DURATION}")
-    if not 0 < options.slow_motion <= MAX_SLOW_MOTION:
-        raise SceneError(f"slow motion is {options.slow_motion!r}; valid is a positive number up to {MAX_SLOW_MOTION}")
+    check_duration(duration, options.slow_motion)
     return max(1, round(duration * options.fps * options.slow_motion))

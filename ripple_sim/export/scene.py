@@ -17,7 +17,7 @@ from ripple_sim.video.settings import origin
 from .exporter import Exporter
 from .options import ExportOptions
 from .place import check_export, check_options, frame_count
-from .source import Chunking, Paint, Source
+from .source import Chunking, Source
 
 Progress = Callable[[int, int], None]
 
@@ -105,7 +105,7 @@ def scene_source(scene: Scene, simulation: Simulation, options: ExportOptions) -
         camera=scene.camera,
         size=options.size,
         lighting=scene.lighting,
-        paints={entry.geom: Paint(entry.look, entry.color) for entry in scene.targets},
+        paints={entry.geom: (entry.look, entry.color) for entry in scene.targets},
         limited=simulation.limited,
         tessellation=options.tessellation,
         triangles=options.triangles,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -15,14 +15,6 @@ from ripple_sim.render.camera import Pose
 from ripple_sim.scene.scene_file import CameraEntry
 
 from .moving_mesh import MovingMesh
-
-
-@dataclasses.dataclass(frozen=True)
-class Paint:
-    """What colours a target: its look, one of `LOOKS`, and its sRGB colour if it is given one."""
-
-    look: str = "rubber"
-    color: tuple[float, float, float] | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,7 +57,7 @@ class Source:
     lighting : str
         One of `LIGHTING`.
     paints : mapping
-        By the target's name.
+        Look, one of `LOOKS`, and sRGB colour of a target if it is given one, by its name.
     limited : mapping
         Whether heights are bent, by the target's name.
     tessellation, triangles : str, int
@@ -80,7 +72,7 @@ class Source:
     camera: CameraEntry
     size: tuple[int, int]
     lighting: str
-    paints: Mapping[str, Paint]
+    paints: Mapping[str, tuple[str, tuple[float, float, float] | None]]
     limited: Mapping[str, bool]
     tessellation: str
     triangles: int
@@ -97,29 +89,11 @@ class Source:
         return pose, focal_distance(self.model, data, self.camera, pose)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Moment:
-    """A frame of an export. The waves are those of the source's ripples at the same time.
-
-    Attributes
-    ----------
-    number : int
-        Of the frame, from 0.
-    data : mujoco.MjData
-    impulses : list of Impulse
-        Since the frame before.
-    """
-
-    number: int
-    data: mujoco.MjData
-    impulses: list[Impulse]
-
-
 class Writer(Protocol):
     """Writes a run to a file or folder, frame by frame; it is made with its source and path."""
 
-    def write(self, moment: Moment) -> None:
-        """Add a frame."""
+    def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
+        """Add a frame, of a number from 0, with the impulses since the frame before; the ripples are the source's."""
 
     def finish(self) -> None:
         """Complete the file."""

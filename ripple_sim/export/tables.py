@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import mujoco
+
+from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.encode.replace import MARK
 
-from .source import Moment, Source
+from .source import Source
 
 # Name and unit of every column, and its type for pyarrow.
 COLUMNS = {
@@ -31,11 +34,11 @@ HEADER = [f"{name} [{unit}]" if unit else name for name, (unit, _) in COLUMNS.it
 _GROUP = 10_000  # rows that are kept in memory
 
 
-def rows(moment: Moment) -> Iterator[tuple]:
-    """The impulses of a frame, in the order of the columns."""
-    for each in moment.impulses:
+def rows(number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> Iterator[tuple]:
+    """The impulses of a frame of a number, in the order of the columns."""
+    for each in impulses:
         point = (float(x) for x in each.point)
-        yield (moment.number, moment.data.time, each.geom, each.other, *point, each.impulse, *each.texel, each.inner)
+        yield (number, data.time, each.geom, each.other, *point, each.impulse, *each.texel, each.inner)
 
 
 class CsvWriter:
@@ -46,9 +49,9 @@ class CsvWriter:
         self._writer = csv.writer(self._file)
         self._writer.writerow(HEADER)
 
-    def write(self, moment: Moment) -> None:
+    def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add the impulses of a frame."""
-        self._writer.writerows(rows(moment))
+        self._writer.writerows(rows(number, data, impulses))
 
     def finish(self) -> None:
         """Complete the file."""
@@ -76,9 +79,9 @@ class ParquetWriter:
         self._writer = pyarrow.parquet.ParquetWriter(path, self._schema)
         self._rows: list[tuple] = []
 
-    def write(self, moment: Moment) -> None:
+    def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add the impulses of a frame."""
-        self._rows += rows(moment)
+        self._rows += rows(number, data, impulses)
         if len(self._rows) >= _GROUP:
             self._flush()
 
@@ -99,11 +102,6 @@ class ParquetWriter:
         columns: list[Any] = [list(column) for column in zip(*self._rows, strict=True)] or [[] for _ in COLUMNS]
         self._writer.write_table(pyarrow.table(columns, schema=self._schema))
         self._rows = []
-
-
-def writer(source: Source, path: Path) -> CsvWriter | ParquetWriter:
-    """Begin a file."""
-    return (CsvWriter if path.suffix.lower() == ".csv" else ParquetWriter)(source, path)
 
 
 def made_here(path: Path) -> bool:

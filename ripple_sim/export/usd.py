@@ -7,8 +7,10 @@ a root layer joins. Metadata tell a file made here from others.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,25 +19,16 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdUtils, Vt
 
 from ripple_sim.capture.snapshot import state_digest
 from ripple_sim.coupling.geoms import target_name
+from ripple_sim.coupling.ripples import Impulse
 from ripple_sim.coupling.soft import is_soft
 from ripple_sim.encode.part import Part
 from ripple_sim.encode.replace import MARK
 from ripple_sim.solver.files import final_path
 
-from .moving_mesh import MovingMesh, Shape
-from .source import Chunking, Moment, Source
+from .moving_mesh import Displaced, MovingMesh
+from .source import Chunking, Source
 from .usd_looks import Lamps, Materials, child, define_mesh, extent, place, placing, vectors
 from .visuals import solid_finish, solids, target_finish, target_uv
-
-
-def save(layer: Sdf.Layer) -> None:
-    """Write a layer to its file.
-
-    Raises
-    ------
-    OSError
-    """
-    succeed(layer.Save)
 
 
 def succeed(work: Callable[..., bool], *arguments: object) -> None:
@@ -58,14 +51,13 @@ class Chunks:
     """Takes time samples into layers of some frames each, which wait in a folder until the run is complete.
 
     A layer has the first frame of the next one, too, so that readers interpolate between the two. What is the same at
-    all times belongs in the stage's root layer.
+    all times belongs in the stage's root layer. A layer is in memory until it is complete: one whose file could not be
+    written, as on a full disk, ends the process as soon as the stage lets go of it.
 
     Parameters
     ----------
-    stage : Usd.Stage
     path : Sdf.Path
-        Prim under which everything lies that has time samples.
-    chunking : Chunking
+        Prim of the stage under which everything lies that has time samples.
 
     Raises
     ------
@@ -75,7 +67,7 @@ class Chunks:
 
     def __init__(self, stage: Usd.Stage, path: Sdf.Path, chunking: Chunking) -> None:
         self._stage, self._path, self._chunking = stage, path, chunking
-        self._part: Part | None = Part(
+        self._part: Any = Part(  # None once it is handed over or closed
             final_path(chunking.output),
             suffix=".usdc",
             length=chunking.frames,
@@ -93,29 +85,28 @@ class Chunks:
             self._sample(write)
             self._end()
         if self._layer is None:
-            self._begin()
+            layer = Sdf.Layer.CreateAnonymous(".usdc")
+            layer.comment = MARK
+            root = self._stage.GetRootLayer()
+            layer.timeCodesPerSecond, layer.framesPerSecond = root.timeCodesPerSecond, root.framesPerSecond
+            self._stage.GetSessionLayer().subLayerPaths = [layer.identifier]
+            self._layer = layer
         self._sample(write)
         self._waiting += 1
 
-    def check_state(self, source: Source, moment: Moment) -> None:
+    def check_state(self, source: Source, number: int, data: mujoco.MjData) -> None:
         """Record the fingerprint of a frame's state, or compare it with that of the run which is resumed."""
-        if moment.number % min(_CHECKED, self._chunking.frames) == 0:
+        if number % min(_CHECKED, self._chunking.frames) == 0:
             heights = (source.ripples[name].height for name in source.ripples)
-            self._open.check_state(moment.number, state_digest(moment.data, heights))
-
-    def save(self) -> None:
-        """Bring what is in memory to the disk."""
-        if self._layer is not None:
-            save(self._layer)
+            self._part.check_state(number, state_digest(data, heights))
 
     def finish(self, folder: Path, last: int) -> None:
         """Complete the layers, hand them over to a folder, and join them in the root layer up to the last frame."""
         if self._layer is not None:
             self._end()
-        part = self._open
+        part, self._part = self._part, None
         names = [(segment.name, first) for segment, first in part.segments()]
         part.hand_over(folder)
-        self._part = None
         first_layer = Sdf.Layer.FindOrOpen(str(folder / names[0][0]))
         manifest = Usd.ClipsAPI.GenerateClipManifestFromLayers([first_layer], self._path)
         manifest.comment = MARK
@@ -138,28 +129,15 @@ class Chunks:
             return ""
         return f"{part.frames} frames are kept in {part.folder}; --resume carries on from there" if part.keep() else ""
 
-    @property
-    def _open(self) -> Part:
-        if self._part is None:
-            raise ValueError("the chunks are closed")
-        return self._part
-
-    def _begin(self) -> None:
-        layer = Sdf.Layer.CreateNew(str(self._open.unfinished))
-        layer.comment = MARK
-        root = self._stage.GetRootLayer()
-        layer.timeCodesPerSecond, layer.framesPerSecond = root.timeCodesPerSecond, root.framesPerSecond
-        self._stage.GetSessionLayer().subLayerPaths = [layer.identifier]
-        self._layer = layer
-
     def _sample(self, write: Callable[[], None]) -> None:
         with Usd.EditContext(self._stage, self._layer):
             write()
 
     def _end(self) -> None:
-        self.save()
+        if self._layer is not None:
+            succeed(self._layer.Export, str(self._part.unfinished))
         self._drop()
-        self._open.store(self._waiting)
+        self._part.store(self._waiting)
         self._waiting = 0
 
     def _drop(self) -> None:
@@ -172,56 +150,12 @@ _TENTHS = 10.0  # USD gives lengths in a camera in tenths of a unit
 _NEAR, _FAR = 0.01, 1000.0  # of the camera's distance
 
 
-class MovingCamera:
-    """A camera in a stage, with the motion of the source's.
-
-    Parameters
-    ----------
-    stage : Usd.Stage
-    path : Sdf.Path
-    source : Source
-    """
-
-    def __init__(self, stage: Usd.Stage, path: Sdf.Path, source: Source) -> None:
-        self._source = source
-        self._camera = UsdGeom.Camera.Define(stage, path)
-        width, height = source.size
-        self._camera.CreateVerticalApertureAttr(_TENTHS * _SENSOR)
-        self._camera.CreateHorizontalApertureAttr(_TENTHS * _SENSOR * width / height)
-        self._camera.CreateShutterOpenAttr(0.0)
-        self._camera.CreateShutterCloseAttr(source.camera.shutter / 360)
-
-    def begin(self, data: mujoco.MjData) -> None:
-        """Define what stays as it is at the first frame."""
-        pose, _ = self._source.pose(data)
-        focal, aperture = _SENSOR / 2 / np.tan(np.radians(pose.fovy) / 2), self._source.camera.aperture
-        placing(self._camera)
-        self._camera.CreateFocalLengthAttr(_TENTHS * focal)
-        self._camera.CreateFStopAttr(focal / aperture if aperture else 0.0)  # 0: all is sharp
-        self._camera.CreateClippingRangeAttr(Gf.Vec2f(_NEAR * pose.distance, _FAR * pose.distance))
-        self._camera.CreateFocusDistanceAttr()
-
-    def write(self, data: mujoco.MjData, time: float) -> None:
-        """Add a frame."""
-        pose, focus = self._source.pose(data)
-        quaternion = np.zeros(4)
-        mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
-        place(self._camera, pose.position, quaternion, time)
-        self._camera.GetFocusDistanceAttr().Set(float(focus), Usd.TimeCode(time))
-
-
 # Frames are kept in memory until so many are there, and then appended to the file.
 _KEPT = 8
 
 
 class UsdWriter:
-    """Writes a run to a .usdc, .usda or .usdz file, in metres, with z up, a time code a frame.
-
-    Parameters
-    ----------
-    source : Source
-    path : Path
-    """
+    """Writes a run to a .usdc, .usda or .usdz file, in metres, with z up, a time code a frame."""
 
     def __init__(self, source: Source, path: Path) -> None:
         self._source, self._path = source, path
@@ -238,7 +172,12 @@ class UsdWriter:
         world = UsdGeom.Xform.Define(stage, "/World")
         stage.SetDefaultPrim(world.GetPrim())
         self._materials = Materials(stage, world.GetPath().AppendChild("Looks"), source.model, self._images)
-        self._camera = MovingCamera(stage, world.GetPath().AppendChild("camera"), source)
+        self._camera = UsdGeom.Camera.Define(stage, world.GetPath().AppendChild("camera"))
+        width, height = source.size
+        self._camera.CreateVerticalApertureAttr(_TENTHS * _SENSOR)
+        self._camera.CreateHorizontalApertureAttr(_TENTHS * _SENSOR * width / height)
+        self._camera.CreateShutterOpenAttr(0.0)
+        self._camera.CreateShutterCloseAttr(source.camera.shutter / 360)
         self._lamps = Lamps(stage, world.GetPath().AppendChild("lights"), source)
         self._bodies = self._define_bodies(UsdGeom.Scope.Define(stage, "/World/bodies").GetPath())
         self._define_solids()
@@ -247,22 +186,22 @@ class UsdWriter:
         self._last = 0
         self._chunks = None if source.chunking is None else Chunks(stage, world.GetPath(), source.chunking)
 
-    def write(self, moment: Moment) -> None:
+    def write(self, number: int, data: mujoco.MjData, impulses: Sequence[Impulse]) -> None:
         """Add a frame, unless it is there from an earlier run."""
-        number, chunks = moment.number, self._chunks
+        chunks = self._chunks
         if number == 0:
-            self._begin(moment.data)
+            self._begin(data)
         if chunks is None:
-            self._sample(moment, self._shapes(moment.data))
+            self._sample(number, data, self._shapes(data))
         else:
-            chunks.check_state(self._source, moment)
+            chunks.check_state(self._source, number, data)
             if number >= chunks.stored - 1:  # the one before tells of motion
-                shapes = self._shapes(moment.data)
+                shapes = self._shapes(data)
             if number >= chunks.stored:
-                chunks.write(number, lambda: self._sample(moment, shapes))
+                chunks.write(number, lambda: self._sample(number, data, shapes))
         self._last = number
         if number % _KEPT == _KEPT - 1:
-            self._save()
+            succeed(self._stage.GetRootLayer().Save)
 
     def finish(self) -> None:
         """Complete the file."""
@@ -270,13 +209,13 @@ class UsdWriter:
         self._stage.SetEndTimeCode(self._last)
         if self._chunks is not None:
             self._chunks.finish(self._path.with_name(f"{self._path.stem}.chunks"), self._last)
-        self._save()
+        succeed(self._stage.GetRootLayer().Save)
         match self._path.suffix.lower():
             case ".usda":
                 succeed(self._stage.GetRootLayer().Export, str(self._path))
             case ".usdz":
                 succeed(UsdUtils.CreateNewUsdzPackage, Sdf.AssetPath(str(self._binary)), str(self._path))
-                self._clear_images()
+                shutil.rmtree(self._images, ignore_errors=True)  # they are in the package now
         if self._binary != self._path:
             self._binary.unlink()
 
@@ -286,7 +225,13 @@ class UsdWriter:
 
     def _begin(self, data: mujoco.MjData) -> None:
         """Define what stays as it is at the first frame."""
-        self._camera.begin(data)
+        pose, _ = self._source.pose(data)
+        focal, aperture = _SENSOR / 2 / np.tan(np.radians(pose.fovy) / 2), self._source.camera.aperture
+        placing(self._camera)
+        self._camera.CreateFocalLengthAttr(_TENTHS * focal)
+        self._camera.CreateFStopAttr(focal / aperture if aperture else 0.0)  # 0: all is sharp
+        self._camera.CreateClippingRangeAttr(Gf.Vec2f(_NEAR * pose.distance, _FAR * pose.distance))
+        self._camera.CreateFocusDistanceAttr()
         self._lamps.begin(data)
         for body, prim in self._bodies.items():
             if _stands(self._source.model, body):
@@ -294,7 +239,7 @@ class UsdWriter:
             else:
                 placing(prim)
 
-    def _shapes(self, data: mujoco.MjData) -> dict[str, Shape]:
+    def _shapes(self, data: mujoco.MjData) -> dict[str, Displaced]:
         """The surfaces of a frame; call it frame by frame."""
         source, shapes = self._source, {}
         for name, (surface, _) in self._surfaces.items():
@@ -308,13 +253,16 @@ class UsdWriter:
             shapes[name] = shape
         return shapes
 
-    def _sample(self, moment: Moment, shapes: dict[str, Shape]) -> None:
+    def _sample(self, time: int, data: mujoco.MjData, shapes: dict[str, Displaced]) -> None:
         """Set the time samples of a frame."""
-        time, data = moment.number, moment.data
         for body, prim in self._bodies.items():
             if not _stands(self._source.model, body):
                 place(prim, data.xpos[body], data.xquat[body], time)
-        self._camera.write(data, time)
+        pose, focus = self._source.pose(data)
+        quaternion = np.zeros(4)
+        mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(pose.rotation).ravel())
+        place(self._camera, pose.position, quaternion, time)
+        self._camera.GetFocusDistanceAttr().Set(float(focus), Usd.TimeCode(time))
         self._lamps.write(data, time)
         for name, (_, mesh) in self._surfaces.items():
             shape = shapes[name]
@@ -322,18 +270,6 @@ class UsdWriter:
             mesh.GetNormalsAttr().Set(vectors(shape.normals), time)
             mesh.GetVelocitiesAttr().Set(vectors(shape.velocities), time)
             mesh.GetExtentAttr().Set(extent(shape.points), time)
-
-    def _save(self) -> None:
-        save(self._stage.GetRootLayer())
-        if self._chunks is not None:
-            self._chunks.save()
-
-    def _clear_images(self) -> None:
-        """Remove the images, which are in the package now."""
-        if self._images.exists():
-            for image in self._images.iterdir():
-                image.unlink()
-            self._images.rmdir()
 
     def _define_bodies(self, path: Sdf.Path) -> dict[int, UsdGeom.Xform]:
         model, prims = self._source.model, {}
@@ -357,7 +293,7 @@ class UsdWriter:
         source, model = self._source, self._source.model
         geom = source.ripples.geom_ids[name]
         surface, atlas, soft = source.mesh(name), source.ripples[name].rest, is_soft(model, geom)
-        finish = target_finish(model, geom, source.paints[name], surface.uv is not None)
+        finish = target_finish(model, geom, *source.paints[name], surface.uv is not None)
         uv = surface.uv if finish.texture < 0 else target_uv(model, geom, surface)
         body = self._bodies[0 if soft else int(model.geom_bodyid[geom])]
         path = child(self._stage, body.GetPath(), target_name(model, geom))
@@ -373,11 +309,6 @@ def _stands(model: mujoco.MjModel, body: int) -> bool:
     """Whether a body is fixed to the world."""
     root = int(model.body_weldid[body])
     return root == 0 and int(model.body_mocapid[int(model.body_rootid[body])]) < 0
-
-
-def writer(source: Source, path: Path) -> UsdWriter:
-    """Begin a file."""
-    return UsdWriter(source, path)
 
 
 def made_here(path: Path) -> bool:

@@ -14,7 +14,7 @@ from PIL import Image
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 
 from ripple_sim.encode.replace import png_mark
-from ripple_sim.render.visuals.lights import Light, Lighting, is_lit, model_lighting, studio_lighting
+from ripple_sim.render.visuals.lights import Light, Lighting, lighting_of
 from ripple_sim.render.visuals.visual import texture_pixels
 
 from .source import Source
@@ -90,20 +90,13 @@ class Lamps:
     """The lights of a source, which stand still or turn with the camera as its renderer's do.
 
     A white surface that faces a far light has the radiance that it has in the renderer; so it has at the model's middle
-    for a near one, which falls off with the square of the distance everywhere else, as light does.
-
-    Parameters
-    ----------
-    stage : Usd.Stage
-    path : Sdf.Path
-        Under which the lights stand.
-    source : Source
+    for a near one, which falls off with the square of the distance everywhere else, as light does. They stand under the
+    prim at a path.
     """
 
     def __init__(self, stage: Usd.Stage, path: Sdf.Path, source: Source) -> None:
         self._stage, self._source = stage, source
         self._path = UsdGeom.Scope.Define(stage, path).GetPath()
-        self._studio = source.lighting == "studio" or (source.lighting == "auto" and not is_lit(source.model))
         self._lamps: list[UsdGeom.Xformable] = []
 
     def begin(self, data: mujoco.MjData) -> None:
@@ -114,7 +107,7 @@ class Lamps:
             define = _far if light.position is None else _near
             self._lamps.append(define(self._stage, path, light, self._source.model.stat.center))
             placing(self._lamps[-1])
-        sky = lighting.ambient + (_STUDIO_SKY if self._studio else 0.0)
+        sky = lighting.ambient + (_STUDIO_SKY if lighting.studio else 0.0)
         if sky.any():
             dome = UsdLux.DomeLight.Define(self._stage, self._path.AppendChild("sky"))
             _set_light(dome, sky, 1.0)
@@ -127,7 +120,7 @@ class Lamps:
 
     def _lighting(self, data: mujoco.MjData) -> Lighting:
         pose, _ = self._source.pose(data)
-        return studio_lighting(pose) if self._studio else model_lighting(self._source.model, data, pose)
+        return lighting_of(self._source.model, data, pose, self._source.lighting)
 
 
 def _far(stage: Usd.Stage, path: Sdf.Path, light: Light, middle: NDArray) -> UsdGeom.Xformable:
@@ -175,17 +168,7 @@ _WATER = 1.33  # refractive index of what is transparent
 
 
 class Materials:
-    """Materials under a prim, and their images in a folder beside the stage's file.
-
-    Parameters
-    ----------
-    stage : Usd.Stage
-    path : Sdf.Path
-        Of the prim.
-    model : mujoco.MjModel
-    images : Path
-        The folder; made when it is first needed.
-    """
+    """Materials under the prim at a path, and their images in a folder beside the stage's file, made when needed."""
 
     def __init__(self, stage: Usd.Stage, path: Sdf.Path, model: mujoco.MjModel, images: Path) -> None:
         self._stage, self._model, self._images = stage, model, images

@@ -8,24 +8,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.contract import MappingKind, srgb_to_linear
-from ripple_sim.render.visuals.shapes import shape_of, sizes
-from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of
-from ripple_sim.render.visuals.visual import (
-    MODEL_LOOK,
-    Look,
-    Visual,
-    find_look,
-    geom_visual,
-    look_of,
-    site_visual,
-    texture_pixels,
-    visible_geoms,
-    visible_sites,
-)
+from ripple_sim.render.contract import MappingKind
+from ripple_sim.render.surfaces.surface import painted
+from ripple_sim.render.tone_mapping import srgb_to_linear
+from ripple_sim.render.visuals.geoms import visuals_of
+from ripple_sim.render.visuals.shapes import Shape, sizes
+from ripple_sim.render.visuals.texture_mapping import TextureMapping, mapping_of
+from ripple_sim.render.visuals.visual import Look, Visual, geom_visual, look_of, texture_pixels, visible_geoms
 
 from .moving_mesh import MovingMesh
-from .source import Paint
 
 _SEGMENTS = 12  # to a right angle
 
@@ -68,35 +59,29 @@ class Finish(NamedTuple):
 
 def solids(model: mujoco.MjModel, targets: set[int], segments: int = _SEGMENTS) -> list[Solid]:
     """Everything that is drawn of a model but its targets, which are geom ids."""
-    visuals = [geom_visual(model, geom) for geom in visible_geoms(model) if geom not in targets]
-    visuals += [site_visual(model, site) for site in visible_sites(model)]
-    found = (_solid(model, visual, segments) for visual in visuals)
-    return [each for each in found if each is not None]
+    geoms = [geom for geom in visible_geoms(model) if geom not in targets]
+    return [_solid(model, visual, make(segments)) for visual, (_, make) in visuals_of(model, geoms)]
 
 
 def solid_finish(model: mujoco.MjModel, visual: Visual) -> Finish:
     """How a geom or site looks."""
-    mapping = mapping_of(model, visual)
-    look, color = look_of(model, visual), visual.color
-    flat = mapping.kind == MappingKind.FLAT_IMAGE
-    return Finish(look, color if flat else color * mean_color(model, mapping), visual.opacity, _flat_texture(mapping))
+    return _finish(model, look_of(model, visual), visual.color, mapping_of(model, visual), visual.opacity)
 
 
-def target_finish(model: mujoco.MjModel, geom: int, paint: Paint, has_uv: bool) -> Finish:
-    """How a target looks; see `appearance` of the renderer."""
-    visual = geom_visual(model, geom)
-    mapping, modelled = mapping_of(model, visual), paint.look == MODEL_LOOK
-    if mapping.own and not has_uv:
-        mapping = Mapping()
-    look = look_of(model, visual) if modelled else find_look(paint.look)
-    if paint.color is not None:
-        color = srgb_to_linear(paint.color)
-        return Finish(look, color, 1.0, _flat_texture(mapping) if modelled else -1)
-    if modelled or mapping.kind != MappingKind.NO_IMAGE:
-        flat = mapping.kind == MappingKind.FLAT_IMAGE
-        mean = 1.0 if flat else mean_color(model, mapping)
-        return Finish(look, visual.color * mean, 1.0, _flat_texture(mapping))
-    return Finish(look, visual.color if visual.colored else srgb_to_linear(look.color), 1.0, -1)
+def target_finish(
+    model: mujoco.MjModel, geom: int, chosen: str, color: tuple[float, float, float] | None, has_uv: bool
+) -> Finish:
+    """How a target of a chosen look, and sRGB colour if it is given one, looks, as in the renderer."""
+    return _finish(model, *painted(model, geom, chosen, color, has_uv))
+
+
+def _finish(
+    model: mujoco.MjModel, look: Look, color: NDArray[np.float64], mapping: TextureMapping, opacity: float = 1.0
+) -> Finish:
+    """With a flat texture, or else the mean colour of any other."""
+    if mapping.kind == MappingKind.FLAT_IMAGE:
+        return Finish(look, color, opacity, mapping.texture)
+    return Finish(look, color * mean_color(model, mapping), opacity, -1)
 
 
 def target_uv(model: mujoco.MjModel, geom: int, mesh: MovingMesh) -> NDArray[np.float64]:
@@ -107,29 +92,21 @@ def target_uv(model: mujoco.MjModel, geom: int, mesh: MovingMesh) -> NDArray[np.
     return texture_places(mapping, np.array([0.0, 1.0]) + np.array([1.0, -1.0]) * mesh.uv)  # v from the upper edge
 
 
-def texture_places(mapping: Mapping, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
+def texture_places(mapping: TextureMapping, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
     """Places [..., 2] in a flat texture, v from its lower edge, of a mapping's coordinates [..., 2 or 3]."""
     scale, offset = np.array(mapping.tiling[:2]), np.array(mapping.tiling[2:])
     places = coordinates[..., :2] * scale + offset
     return np.stack([places[..., 0], 1.0 - places[..., 1]], axis=-1)
 
 
-def mean_color(model: mujoco.MjModel, mapping: Mapping) -> NDArray[np.float64]:
+def mean_color(model: mujoco.MjModel, mapping: TextureMapping) -> NDArray[np.float64]:
     """Mean linear colour of a mapping's texture [3], white without one."""
     if mapping.texture < 0:
         return np.ones(3)
     return srgb_to_linear(texture_pixels(model, mapping.texture)[::4, ::4] / 255.0).mean(axis=(0, 1))
 
 
-def _flat_texture(mapping: Mapping) -> int:
-    return mapping.texture if mapping.kind == MappingKind.FLAT_IMAGE else -1
-
-
-def _solid(model: mujoco.MjModel, visual: Visual, segments: int) -> Solid | None:
-    shape = shape_of(model, visual)
-    if shape is None:
-        return None
-    mesh = shape[1](segments)
+def _solid(model: mujoco.MjModel, visual: Visual, mesh: Shape) -> Solid:
     points, mapping = mesh.positions(*sizes(model, visual)), mapping_of(model, visual)
     uv = None
     if mapping.kind == MappingKind.FLAT_IMAGE:

@@ -1,1 +1,5 @@
 """Overlays on frames: heatmap, contacts, texel grid, time, energy; titles for two runs side by side."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -147,7 +147,6 @@ def draw_arrow(sprite: Sprite, tip: ArrayLike, tail: ArrayLike, thickness: float
 
     Parameters
     ----------
-    sprite : Sprite
     tip, tail : [2]
         [pixels], x to the right, y down.
     thickness : float
@@ -222,7 +221,6 @@ class ContactMarks:
 
     Parameters
     ----------
-    simulation : Simulation
     dt : float
         Time between frames [s].
     """

@@ -14,12 +14,14 @@ import dataclasses
 import functools
 import math
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.coupling.energy import Energy
 from ripple_sim.errors import SceneError
-from ripple_sim.render.contract import linear_to_srgb
+from ripple_sim.render.tone_mapping import linear_to_srgb
 from ripple_sim.scene.scene import Request
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver.texels.topology import with_filled_halo
@@ -221,12 +223,7 @@ _LEAST = 1e-3
 _MEMORY = 0.25
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Scale:
-    """The present end of a scale, and the round number that it approaches."""
-
-    value: float
-    goal: float
+Scale: TypeAlias = tuple[float, float]  # its present end, and the round number that this approaches
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -242,7 +239,9 @@ class Notes:
     heatmap_scale, mark_scale, energy_scale : Scale
     marks : sequence of list of Mark
     energies : sequence of (times [s], energies [J])
-        From the beginning.
+        Of the waves, from the beginning.
+    ledgers : sequence of Energy
+        Of bodies, waves and both, now.
     """
 
     time: float
@@ -252,6 +251,7 @@ class Notes:
     mark_scale: Scale
     energies: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
     energy_scale: Scale
+    ledgers: Sequence[Energy] = ()
 
 
 class Notebook:
@@ -259,7 +259,6 @@ class Notebook:
 
     Parameters
     ----------
-    request : Request
     simulations : sequence of Simulation
         All of one scene; they share their scales.
     frames : int
@@ -280,9 +279,9 @@ class Notebook:
         request = self._request
         heatmaps = [self._heatmaps(simulation) for simulation in self._simulations] if request.heatmap else []
         marks = [gatherer.follow() for gatherer in self._marks] if request.contacts else []
-        if request.energy:
-            for history, simulation in zip(self._energies, self._simulations, strict=True):
-                history.add(sum(simulation.ripples[name].energy() for name in simulation.ripples))
+        ledgers = [simulation.energy for simulation in self._simulations] if request.energy else []
+        for history, ledger in zip(self._energies, ledgers, strict=False):
+            history.add(ledger.waves)
         magnitudes = [magnitude(heatmap) for run in heatmaps for heatmap in run.values()]
         curves = [history.curve() for history in self._energies]
         return Notes(
@@ -293,10 +292,11 @@ class Notebook:
             mark_scale=self._scale(self._mark_limit, [mark.impulse for run in marks for mark in run]),
             energies=[(frames * self._dt, values) for frames, values in curves],
             energy_scale=self._scale(self._energy_limit, [values[-1] for _, values in curves if len(values)]),
+            ledgers=ledgers,
         )
 
     def _scale(self, limit: Limit, magnitudes: Sequence[float]) -> Scale:
-        return Scale(limit.follow(max(magnitudes, default=0.0), self._dt), limit.goal)
+        return limit.follow(max(magnitudes, default=0.0), self._dt), limit.goal
 
     def _heatmaps(self, simulation: Simulation) -> dict[str, NDArray[np.float32]]:
         ripples = simulation.ripples

@@ -1,24 +1,28 @@
-"""What overlays put on a frame of any size, and where: small panels and contact marks.
+"""What overlays put on a frame of any size, and where: contact marks, and panels stacked in the corners.
 
-Panels are a bar of colours, a clock, a label, the scale of the arrows. Contact marks are arrows as long as the impulse
-is large, projected onto the frame, and faint where a geom hides them.
+Panels are a bar of colours, a clock, a label, the scale of the arrows, and the plot of energy, which grows with the
+video. Contact marks are arrows as long as the impulse is large, projected onto the frame, and faint where a geom hides
+them.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ripple_sim.coupling.energy import Energy
 from ripple_sim.render.camera import Pose
+from ripple_sim.scene.scene import HEATMAPS, Request
 
 from .marks import FAINT, HEAD_WIDTH, INK, RIM, Color, Mark, Sprite, draw_arrow, text_width
-from .notes import colors, number, readable
+from .notes import Notes, colors, number, readable, round_up
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,12 +120,8 @@ _HIDDEN = 0.3  # opacity behind other geoms
 _SAMPLES = 9  # along an arrow, to find its hidden parts
 
 
-class PlacedMark(NamedTuple):
-    """An arrow on a frame: its ends [pixels], and its opacity along it."""
-
-    tip: NDArray[np.float64]
-    tail: NDArray[np.float64]
-    opacity: NDArray[np.float64]
+# an arrow on a frame: tip and tail [pixels], and the opacity along it
+PlacedMark: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
 def place_marks(
@@ -136,7 +136,6 @@ def place_marks(
     marks : sequence of Mark
     scale : float
         Impulse [N s] of an arrow of length `Layout.arrow_length`, seen from the side.
-    layout : Layout
     projection : Projection
         Of this frame.
     model, data : mujoco.MjModel, mujoco.MjData
@@ -149,7 +148,7 @@ def place_marks(
         pixels = projection.pixels(points)
         if np.isfinite(pixels).all():
             opacity = mark.opacity * np.where(projection.seen(model, data, points), 1.0, _HIDDEN)
-            placed.append(PlacedMark(pixels[0], pixels[-1], opacity))
+            placed.append((pixels[0], pixels[-1], opacity))
     return placed
 
 
@@ -229,3 +228,206 @@ def arrow_key(layout: Layout, scale: float, goal: float) -> Sprite:
     draw_arrow(sprite, (pad + length, 0.95 * em), (pad, 0.95 * em), layout.arrow_thickness)
     sprite.text(pad + length + gap, 1.3 * em, text, em)
     return sprite
+
+
+Curve = tuple[NDArray[np.float64], NDArray[np.float64]]  # times [s], values
+
+COLORS = ((38, 92, 160), (196, 88, 52))  # of the curves
+_GRID = (150, 158, 170)
+_LEDGER, _LONGEST_ENTRY = 1.3, "bodies \N{MINUS SIGN}0.88 mJ"  # height of its line, in ems; the longest of its texts
+
+
+class EnergyPlot:
+    """Draws curves over the time of the whole video.
+
+    Parameters
+    ----------
+    title, unit : str
+    duration : float
+        [s].
+    names : sequence of str
+        Of several curves.
+    ledger : bool
+        Whether a line of numbers stands under the title.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        title: str,
+        unit: str,
+        duration: float,
+        names: Sequence[str] = (),
+        *,
+        ledger: bool = False,
+    ) -> None:
+        self._em, self._title, self._unit = layout.em, title, unit
+        self._duration, self._names = duration, names
+        em = layout.em
+        self._width = layout.panel_width(26 if ledger else 23)
+        self._column_width = (self._width - 1.4 * em) / 3
+        self._has_ledger = ledger and text_width(_LONGEST_ENTRY, round(0.85 * em)) + 0.4 * em < self._column_width
+        line = round(_LEDGER * em) if self._has_ledger else 0
+        self._height = round(min(8.6 * em, 0.38 * layout.height)) + line
+        self._left, self._right = round(3.6 * em), self._width - round(1.1 * em)
+        self._top, self._bottom = round(2.4 * em) + line, self._height - round(1.95 * em)
+        self._axes: tuple[tuple[float, float], Sprite] | None = None
+
+    def draw(self, curves: Sequence[Curve], limit: float, goal: float, ledger: Energy | None = None) -> Sprite:
+        """Draw curves up to the present, from 0 to `limit`, with labels at half and whole of `goal`, and a ledger."""
+        if self._axes is None or self._axes[0] != (limit, goal):
+            self._axes = (limit, goal), self._draw_axes(limit, goal)
+        sprite = self._axes[1].copy()
+        for color, (times, values) in zip(COLORS, curves, strict=False):
+            self._draw_curve(sprite, times, values, limit, color)
+        if ledger is not None and self._has_ledger:
+            self._draw_ledger(sprite, ledger)
+        return sprite
+
+    def _draw_ledger(self, sprite: Sprite, ledger: Energy) -> None:
+        size, inks = round(0.85 * self._em), {"bodies": INK, "waves": COLORS[0], "total": INK}
+        for column, (name, ink) in enumerate(inks.items()):
+            value = getattr(ledger, name)
+            factor, unit = readable(abs(value), self._unit) if value else (1.0, self._unit)
+            x = 0.7 * self._em + column * self._column_width
+            sprite.text(x, 2.75 * self._em, name, size, FAINT if ink == INK else ink)
+            x += text_width(name, size) + 0.4 * self._em
+            sprite.text(x, 2.75 * self._em, f"{number(float(f'{factor * value:.3g}'))} {unit}", size, ink)
+
+    def _draw_axes(self, limit: float, goal: float) -> Sprite:
+        em, small = self._em, round(0.85 * self._em)
+        factor, prefixed = readable(goal, self._unit) if goal else (1.0, self._unit)
+        sprite = panel(self._width, self._height, em)
+        sprite.text(round(0.7 * em), 1.4 * em, self._title, em)
+        sprite.text(round(0.7 * em) + text_width(self._title, em) + 0.5 * em, 1.4 * em, prefixed, small, FAINT)
+        self._draw_names(sprite, small)
+        hair = max(1, round(em / 16))
+        half = [goal / 2] if self._bottom - self._top > 2.6 * small else []
+        for value in [0.0, *half, goal] if goal else [0.0]:
+            if value <= 1.001 * limit or not value:
+                y = round(float(self._row(value, limit)))
+                sprite.box(self._left, y - hair, self._right, y, INK if not value else _GRID, 0.9 if not value else 0.5)
+                sprite.text(self._left - 0.4 * em, y + 0.3 * em, number(value * factor), small, INK, "right")
+        step = round_up(self._duration / 4, (1.0, 2.0, 5.0))
+        last = int(self._duration / step + 1e-9)
+        for k in range(last + 1):
+            x = round(float(self._column(k * step)))
+            sprite.box(x, self._bottom, x + hair, self._bottom + 0.25 * em, INK)
+            unit = " s" if k == last else ""
+            sprite.text(x, self._bottom + 1.25 * em, number(k * step) + unit, small, INK, "middle")
+        return sprite
+
+    def _draw_names(self, sprite: Sprite, size: int) -> None:
+        x = float(self._width - round(0.7 * self._em))
+        titles = text_width(f"{self._title} {self._unit}", self._em) + self._em
+        if sum(text_width(name, size) + 0.9 * self._em for name in self._names) > x - titles:
+            return  # too narrow; the runs' titles have the curves' colours anyway
+        for color, name in reversed(list(zip(COLORS, self._names, strict=False))):
+            sprite.text(x, 1.4 * self._em, name, size, color, "right")
+            x -= text_width(name, size) + 0.9 * self._em
+
+    def _draw_curve(self, sprite: Sprite, times: NDArray, values: NDArray, limit: float, color: Color) -> None:
+        if len(times) == 0 or limit <= 0:
+            return
+        end = float(self._column(times[-1]))
+        edges = np.arange(self._left, int(np.ceil(end)) + 1)
+        rows = np.interp(edges, self._column(times), self._row(values, limit))
+        thick = self._em / 9
+        slope = np.hypot(1.0, np.diff(rows))
+        low, high = np.minimum(rows[1:], rows[:-1]), np.maximum(rows[1:], rows[:-1])
+        line = _columns_between(low - thick / 2 * slope**0.5, high + thick / 2 * slope**0.5, self._height)
+        under = _columns_between((low + high) / 2, np.full(len(low), float(self._bottom)), self._height)
+        coverage = np.zeros((2, self._height, self._width), np.float32)
+        coverage[:, :, edges[:-1]] = under, line
+        if len(self._names) < 2:
+            sprite.fill(coverage[0], color, 0.14)
+        sprite.fill(coverage[1], color)
+        sprite.disc(end, float(self._row(values[-1], limit)), 0.26 * self._em, color)
+
+    def _column(self, time: ArrayLike) -> NDArray[np.float64]:
+        return self._left + (self._right - self._left) * np.asarray(time, dtype=np.float64) / self._duration
+
+    def _row(self, value: ArrayLike, limit: float) -> NDArray[np.float64]:
+        share = np.asarray(value, dtype=np.float64) / (limit or 1.0)
+        return self._bottom - (self._bottom - self._top) * np.clip(share, 0, 1)
+
+
+def _columns_between(low: NDArray[np.float64], high: NDArray[np.float64], height: int) -> NDArray[np.float32]:
+    """Share of each pixel [height, k] that lies between two rows, column by column."""
+    edge = np.arange(height + 1)[:, None]
+    return np.diff(np.clip(edge, low, high), axis=0).astype(np.float32)
+
+
+class Painter:
+    """Draws the requested panels.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of the frames.
+    duration : float
+        Of the video [s].
+    spacing : int
+        Texels between the lines of the grid, where all targets have the same; 0 where they differ.
+    titles : sequence of (str, str)
+        Names of two runs side by side, and a remark about each.
+    """
+
+    def __init__(
+        self,
+        request: Request,
+        layout: Layout,
+        *,
+        duration: float,
+        spacing: int = 0,
+        titles: Sequence[tuple[str, str]] = (),
+    ) -> None:
+        self._request, self._layout, self._titles = request, layout, titles
+        names = [title for title, _ in titles]
+        self._energy_plot = EnergyPlot(self._layout, "wave energy", "J", duration, names, ledger=not names)
+        self._spacing = spacing
+        self._decimals = 2 if duration < 100 else 1
+        # a title leaves room for the clock on the seam
+        self._title_width = layout.width / 2 - 2 * layout.margin - 4.5 * layout.em
+        # static panels are drawn once
+        self._label = functools.lru_cache(maxsize=8)(label)
+        self._bar = functools.lru_cache(maxsize=1)(color_bar)
+        self._key = functools.lru_cache(maxsize=1)(arrow_key)
+
+    def paint(self, frame: NDArray[np.uint8], notes: Notes) -> None:
+        """Draw the panels over a frame, uint8 [height, width, 3 or 4], in place; there are none on a tiny one."""
+        if self._layout.width < 20 * self._layout.em or self._layout.height < 10 * self._layout.em:
+            return
+        for corner, panels in self._panels(notes).items():
+            offset = 0
+            for sprite in panels:
+                left, top = self._layout.place(corner, sprite.width, sprite.height)
+                sprite.over(frame, left, top + (offset if "top" in corner else -offset))
+                offset += sprite.height + self._layout.margin // 2
+
+    def _panels(self, notes: Notes) -> dict[str, list[Sprite]]:
+        """Panels by corner, those nearest to the frame's border first."""
+        request, layout, em = self._request, self._layout, self._layout.em
+        corners: dict[str, list[Sprite]] = {
+            name: [] for name in ("top left", "top", "top right", "bottom left", "bottom right")
+        }
+        for corner, title, color in zip(("top left", "top right"), self._titles, COLORS, strict=False):
+            named = self._label(title[0], em, title[1], color)
+            if named.width > self._title_width:
+                named = self._label(title[0], em, "", color)
+            corners[corner].append(named)
+        if request.time:
+            clock = label(f"t = {notes.time:.{self._decimals}f} s", em)
+            corners["top" if self._titles else "top left"].append(clock)
+        if request.grid and self._spacing:
+            cells = f"{self._spacing} \N{MULTIPLICATION SIGN} {self._spacing} texels"
+            corners["top left"].append(self._label("grid", em, cells))
+        if request.contacts and notes.mark_scale[0] > 0:
+            corners["top right"].append(self._key(layout, *notes.mark_scale))
+        if request.heatmap:
+            bar = self._bar(layout, request.heatmap, HEATMAPS[request.heatmap], *notes.heatmap_scale)
+            corners["bottom left"].append(bar)
+        if request.energy:
+            ledger = None if self._titles or not notes.ledgers else notes.ledgers[0]
+            corners["bottom right"].append(self._energy_plot.draw(notes.energies, *notes.energy_scale, ledger))
+        return corners

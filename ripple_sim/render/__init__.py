@@ -1,9 +1,5 @@
 """Offscreen renderer: a MuJoCo model and its rippled targets, drawn headless into RGB frames."""
 
-from .camera import Camera, FixedCamera
-from .renderer import Renderer
-from .surfaces.surface import Surface
-from .visuals.lights import LIGHTING
-from .visuals.visual import LOOKS
+import lazy_loader
 
-__all__ = ["LIGHTING", "LOOKS", "Camera", "FixedCamera", "Renderer", "Surface"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numbers
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.errors import SceneError
-from ripple_sim.solver.errors import RippleError
+from ripple_sim.solver.errors import RippleError, shown
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Pose:
     position: NDArray[np.float64]
     rotation: NDArray[np.float64]
     distance: float
-    fovy: float
+    fovy: float = 45.0
     lens: tuple[float, float] = (0.0, 0.0)
     focal_distance: float = np.inf
 
@@ -56,13 +56,6 @@ class Pose:
         return self.position - self.distance * self.rotation[:, 2]
 
 
-class Viewpoint(Protocol):
-    """Anything that has a `pose()`."""
-
-    def pose(self) -> Pose:
-        """Return position and axes in the world."""
-
-
 @dataclass(frozen=True)
 class Camera:
     """MuJoCo's free camera: looks at a point from a distance [m], at an azimuth and an elevation [degrees].
@@ -77,11 +70,15 @@ class Camera:
     fovy: float = 45.0
 
     def __post_init__(self) -> None:
-        numbers = (*self.lookat, self.distance, self.azimuth, self.elevation, self.fovy)
-        if not (np.all(np.isfinite(numbers)) and self.distance > 0 and 0 < self.fovy < 180):
+        try:
+            values = np.array([*self.lookat, self.distance, self.azimuth, self.elevation, self.fovy])
+        except (TypeError, ValueError):  # no sequence, or sequences in place of numbers
+            values = np.array(None)
+        valid = values.shape == (7,) and values.dtype.kind in "iuf" and np.isfinite(values).all()
+        if not (valid and self.distance > 0 and 0 < self.fovy < 180):
             raise RippleError(
-                f"camera {self} is invalid: every number must be finite, the distance positive [m], "
-                "and fovy between 0 and 180 degrees"
+                f"camera {shown(self)} is invalid: lookat must be three numbers, every number finite, the distance "
+                "positive [m], and fovy between 0 and 180 degrees"
             )
 
     def pose(self) -> Pose:
@@ -115,18 +112,11 @@ class Camera:
         )
 
 
-@dataclass(frozen=True)
-class FixedCamera:
-    """A camera with a given pose, such as one that a MuJoCo model fixes to a body."""
+# A camera with a given pose, such as one that a MuJoCo model fixes to a body.
+FixedCamera: TypeAlias = Pose
 
-    position: NDArray[np.float64]
-    rotation: NDArray[np.float64]
-    distance: float
-    fovy: float = 45.0
-
-    def pose(self) -> Pose:
-        """Return position and axes in the world."""
-        return Pose(self.position, self.rotation, self.distance, self.fovy)
+# Both have a `pose()`; where the renderer takes a viewpoint, anything that has one will do.
+Viewpoint: TypeAlias = Camera | Pose
 
 
 def find_viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: Any) -> Viewpoint:
@@ -134,8 +124,6 @@ def find_viewpoint(model: mujoco.MjModel, data: mujoco.MjData, camera: Any) -> V
 
     Parameters
     ----------
-    model : mujoco.MjModel
-    data : mujoco.MjData
     camera : Viewpoint, str, int or mujoco.MjvCamera
         A viewpoint itself; the name or the id of a camera in the MJCF; -1 for MuJoCo's free camera, aimed at the
         model's middle; or a camera of MuJoCo's that is free, tracks a body or is fixed.

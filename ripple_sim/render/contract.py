@@ -1,4 +1,4 @@
-"""What the renderer and its shaders agree on: units and bindings, struct layouts, the sRGB curve.
+"""What the renderer and its shaders agree on: units and bindings, struct layouts, numbers.
 
 Every shader gets all of this as defines; see `DEFINES`.
 """
@@ -9,7 +9,8 @@ from enum import IntEnum
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+
+from .tone_mapping import CURVES
 
 MAX_LIGHTS, MAX_SHADOWS, MAX_OCCLUDERS, SOFT_BOXES = 8, 4, 16, 3
 HELD_LIGHTS = 2  # that come to fragments as varyings
@@ -189,25 +190,6 @@ OBJECT = Struct(
     rotation="mat3",  # of the height map's gradients, into the world
 )
 
-# The sRGB transfer curve (IEC 61966-2-1): SLOPE x up to BREAK, and (1 + OFFSET) x^(1 / EXPONENT) - OFFSET above it.
-_BREAK, _SLOPE, _OFFSET, _EXPONENT = 0.0031308, 12.92, 0.055, 2.4
-_ENCODED_BREAK = 0.04045
-
-
-def srgb_to_linear(srgb: ArrayLike) -> NDArray[np.float64]:
-    """Linear values of sRGB values, 0 to 1 both, any shape."""
-    value = np.asarray(srgb, dtype=np.float64)
-    above = np.maximum(value, _ENCODED_BREAK)
-    return np.where(value <= _ENCODED_BREAK, value / _SLOPE, ((above + _OFFSET) / (1 + _OFFSET)) ** _EXPONENT)
-
-
-def linear_to_srgb(linear: ArrayLike) -> NDArray[np.float64]:
-    """Inverse of `srgb_to_linear`; values beyond 0 to 1 continue the curve."""
-    value = np.asarray(linear, dtype=np.float64)
-    above = np.maximum(value, _BREAK)
-    return np.where(value <= _BREAK, _SLOPE * value, (1 + _OFFSET) * above ** (1 / _EXPONENT) - _OFFSET)
-
-
 DEFINES: dict[str, object] = {
     "MAX_LIGHTS": MAX_LIGHTS,
     "MAX_OCCLUDERS": MAX_OCCLUDERS,
@@ -224,8 +206,5 @@ DEFINES: dict[str, object] = {
     **OBJECT.defines(),
     "OBJECT_TEXELS": OBJECT.dtype.itemsize // 16,
     "OBJECT_COLUMNS": OBJECT_COLUMNS,
-    "SRGB_BREAK": _BREAK,
-    "SRGB_SLOPE": _SLOPE,
-    "SRGB_OFFSET": _OFFSET,
-    "SRGB_EXPONENT": _EXPONENT,
+    **CURVES,
 }

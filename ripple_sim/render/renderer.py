@@ -5,8 +5,8 @@ The passes of one frame in their order: shadow maps, floor map, reflection, G-bu
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import TracebackType
+import warnings
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import moderngl
@@ -14,17 +14,20 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from ripple_sim.coupling.model import find_flex_colliders
 from ripple_sim.coupling.soft import target_pose
+from ripple_sim.errors import RippleWarning
 from ripple_sim.render.passes.deferred import DeferredShading, Mirror, TransparentLayers
 from ripple_sim.render.passes.floor import Floor, FloorOcclusion, find_floor
 from ripple_sim.render.passes.shadow import ShadowMaps, TransmissionMaps
 from ripple_sim.render.passes.surface_buffers import SurfaceBuffers, SurfaceImage
 from ripple_sim.render.surfaces.surface import Surface
 from ripple_sim.render.surfaces.surface_mesh import SurfaceMesh
-from ripple_sim.render.visuals.geoms import Instances, instances_of, visuals_of, warn_of_unsupported
+from ripple_sim.render.visuals.geoms import Instances, instances_of, shaped
 from ripple_sim.render.visuals.lights import SceneLight
 from ripple_sim.render.visuals.objects import Assets, Occluders
-from ripple_sim.render.visuals.visual import ball_of, visible_geoms
+from ripple_sim.render.visuals.shapes import NamedShape
+from ripple_sim.render.visuals.visual import Visual, ball_of, content_of, geom_visual, visible_geoms, visuals_in
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.files import require_memory
 from ripple_sim.solver.gl import GLContext
@@ -42,11 +45,8 @@ class DrawnScene:
 
     Parameters
     ----------
-    assets : Assets
     targets : mapping
         Geom id to the surface that is drawn in place of the geom.
-    geoms : list of int
-        The other geoms, without the floor.
     size : (width, height)
         Of the frame [pixels].
 
@@ -57,7 +57,7 @@ class DrawnScene:
         Each can draw itself: into the G-buffer, or its depth, colour or transmission under a matrix.
     """
 
-    def __init__(self, assets: Assets, targets: Mapping[int, Surface], geoms: list[int], size: tuple[int, int]) -> None:
+    def __init__(self, assets: Assets, targets: Mapping[int, Surface], size: tuple[int, int]) -> None:
         self._assets, self._model, self._height = assets, assets.model, size[1]
         ordered = sorted(targets.items())
         self.height_maps = HeightMapTextures(assets.resources, [surface.charts.page for _, surface in ordered])
@@ -65,14 +65,21 @@ class DrawnScene:
             SurfaceMesh(assets, geom, surface, self.height_maps, index, size)
             for index, (geom, surface) in enumerate(ordered)
         ]
-        visuals = visuals_of(assets.model, geoms)
+        self._occluders = Occluders(assets.resources, assets.model, np.zeros(0, dtype=np.int64))
+        self._made: dict[tuple[Any, ...], Instances] = {}
+        self.show([])
+
+    def show(self, visuals: list[tuple[Visual, NamedShape]], hidden: Sequence[int] = ()) -> None:
+        """Draw these from now on, without the floor, and all targets but the hidden ones."""
+        of_geoms = [visual for visual, _ in visuals if visual.index >= 0 and not visual.site]
         plane = mujoco.mjtGeom.mjGEOM_PLANE
-        solid = [visual.index for visual in visuals if not visual.site and visual.kind != plane]
-        self._planes = [visual for visual in visuals if not visual.site and visual.kind == plane]
-        self._sites = [visual for visual in visuals if visual.site]
-        self._occluders = Occluders(assets.resources, assets.model, np.array(solid, dtype=np.int64))
-        self._instances = instances_of(assets, visuals)
-        drawn: list[SurfaceMesh | Instances] = [*self.targets, *self._instances]
+        self._planes = [visual for visual in of_geoms if visual.kind == plane]
+        self._others = [visual for visual, _ in visuals if (visual.site or visual.index < 0) and visual.casts]
+        self._occluders.hold(np.array([visual.index for visual in of_geoms if visual.kind != plane], dtype=np.int64))
+        self._assets.objects.keep(len(self.targets))
+        self._instances = instances_of(self._assets, visuals, self._made)
+        surfaces = [target for target in self.targets if target.geom not in hidden]
+        drawn: list[SurfaceMesh | Instances] = [*surfaces, *self._instances]
         self.opaque = [each for each in drawn if not each.transparent]
         self.transparent = [each for each in drawn if each.transparent]
         self._occluding = [each for each in drawn if each.occludes]
@@ -91,8 +98,15 @@ class DrawnScene:
         geoms = ", ".join(str(target.geom) for target in self.targets) or "none"
         raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
 
-    def update(self, ctx: moderngl.Context, data: Any, height_maps: Mapping[int, AnyHeightMap], pose: Pose) -> None:
-        """Bring everything on the GPU up to date."""
+    def update(
+        self,
+        ctx: moderngl.Context,
+        data: Any,
+        height_maps: Mapping[int, AnyHeightMap],
+        pose: Pose,
+        sharp: bool = False,
+    ) -> None:
+        """Bring everything on the GPU up to date; `sharp` is as for `Instances.update`."""
         for target in self.targets:
             target.ripple(ctx, height_maps.get(target.geom))
         self._occluders.bind(data, pose.focus)
@@ -101,7 +115,7 @@ class DrawnScene:
             target.update(ctx, rotation, origin, self._occluders)
         pixels = self._height / (2 * np.tan(np.radians(pose.fovy) / 2))
         for instances in self._instances:
-            instances.update(data, pose.position, pixels, self._occluders)
+            instances.update(data, pose.position, pixels, self._occluders, sharp)
         self._assets.objects.bind()
 
     def balls(self, data: Any) -> NDArray[np.float64]:
@@ -118,7 +132,7 @@ class DrawnScene:
 
     def _geom_balls(self, data: Any) -> list[NDArray[np.float64]]:
         """Of everything but the targets that may cast a shadow."""
-        return [self._occluders.balls(data), *(ball_of(self._model, data, site) for site in self._sites)]
+        return [self._occluders.balls(data), *(ball_of(self._model, data, each) for each in self._others)]
 
     def draw(self) -> None:
         """Draw everything opaque into the G-buffer."""
@@ -128,12 +142,14 @@ class DrawnScene:
     def draw_shadow(self, view_projection: tuple[float, ...]) -> None:
         """Draw the depth of everything opaque, which casts shadows, under a matrix of 16 numbers, column by column."""
         for each in self.opaque:
-            each.draw_depth(view_projection)
+            if each.casts:
+                each.draw_depth(view_projection)
 
     def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
         """Draw everything transparent into the transmission map of a light, likewise."""
         for each in self.transparent:
-            each.draw_transmission(view_projection, light)
+            if each.casts:
+                each.draw_transmission(view_projection, light)
 
     def draw_occluders(self, view_projection: tuple[float, ...]) -> None:
         """Draw everything that occludes the sky in its linear colour, likewise."""
@@ -146,6 +162,7 @@ class DrawnScene:
         return sorted(layers, key=lambda layer: -np.linalg.norm(layer[0][:, :3].mean(axis=0) - pose.eye))
 
 
+_MOST_GEOMS = 10_000  # of a scene, as of mujoco.Renderer
 # Memory for a pixel and for each of its samples, at least [bytes].
 _PIXEL, _SAMPLE = 8, 20
 
@@ -194,40 +211,90 @@ class Renderer:
             raise RippleError(
                 "heatmaps and grids have the screen's colours, which linear light lacks: take linear=False"
             )
-        warn_of_unsupported(model, targets)
-        self._gl, self._size = gl, size
+        self._gl, self._model, self._size = gl, model, size
         self._resources = resources = Resources(gl, self)
         self._format = frame_format = FrameFormat(size, samples, alpha, linear)
-        _check_memory(gl, frame_format)
+        if gl.software:  # which takes the machine's memory; a GPU says itself that it has too little
+            width, height = size
+            need = width * height * (_PIXEL + _SAMPLE * max(samples, 1))
+            require_memory(RippleError, need, f"drawing frames of {width}x{height} pixels", "take smaller frames")
         with gl:
-            assets = Assets(model, resources)
+            self._assets = assets = Assets(model, resources)
             self._light = light = SceneLight(assets, lighting)
             geoms = [geom for geom in visible_geoms(model) if geom not in targets]
             plane = find_floor(model, geoms)
-            self._floor = floor = None if plane is None else Floor(assets, plane)
-            self._scene = scene = DrawnScene(assets, targets, [geom for geom in geoms if geom != plane], size)
+            self._floor = None if plane is None else Floor(assets, plane)
+            self._scene = DrawnScene(assets, targets, size)
+            self._targets = {target: geom_visual(model, target) for target in targets}
+            # what is not drawn as MuJoCo has it, with its opacity
+            replaced = [*self._targets.values(), *(geom_visual(model, each) for each in (plane,) if each is not None)]
+            self._replaced = {visual.identity: visual.opacity for visual in replaced}
+            colliders = find_flex_colliders(model).values()
+            self._replaced |= dict.fromkeys([(flex, int(mujoco.mjtObj.mjOBJ_FLEX)) for flex in colliders], 0.0)
+            self._own_scene = mujoco.MjvScene(model, _MOST_GEOMS)
+            self._shown: list[tuple[Any, ...]] | None = None  # the content of the scene
+            self._told: set[str] = set()
             self._frame = FrameUniforms(resources)
-            count = light.options["SHADOWS"]
-            self._shadows = ShadowMaps(resources, count, size[1])
-            options = {**light.options, "TRANSMISSION": int(bool(scene.transparent))}
-            self._occlusion = FloorOcclusion(resources, options, floor)
-            self._shading = DeferredShading(resources, frame_format, floor, options)
-            self._transmission, self._layers = None, None
-            if scene.transparent:
-                self._transmission = TransmissionMaps(resources, count, self._shadows.size // _TRANSMISSION_TEXEL)
-                self._layers = TransparentLayers(resources, frame_format, self._shading)
-            self._mirror = None
-            if floor is not None and floor.reflects and not alpha:
-                self._mirror = Mirror(resources, frame_format, floor, options)
+            self._shadows = ShadowMaps(resources, light.options["SHADOWS"], size[1])
+            self._make_passes()
             self._buffers: SurfaceBuffers | None = None
         self._readback = Readback(resources, frame_format)
+
+    def _make_passes(self) -> None:
+        """Make the passes for what is drawn, with something transparent or without."""
+        resources, floor, transparent = self._resources, self._floor, bool(self._scene.transparent)
+        options = {**self._light.options, "TRANSMISSION": int(transparent)}
+        self._occlusion = FloorOcclusion(resources, options, floor)
+        self._shading = DeferredShading(resources, self._format, floor, options)
+        self._transmission, self._layers = None, None
+        if transparent:
+            texels = self._shadows.size // _TRANSMISSION_TEXEL
+            self._transmission = TransmissionMaps(resources, options["SHADOWS"], texels)
+            self._layers = TransparentLayers(resources, self._format, self._shading)
+        self._mirror = None
+        if floor is not None and floor.reflects and not self._format.alpha:
+            self._mirror = Mirror(resources, self._format, floor, options)
+
+    def _show(self, data: Any, scene: mujoco.MjvScene | None, segmented: bool = False) -> None:
+        """Draw what a scene of MuJoCo's has, by default all that it shows of the data, with surfaces for the targets.
+
+        Surfaces of targets that MuJoCo shows by default are drawn only if the scene has the target. What is `segmented`
+        has a `segid`. What is not drawn is told once.
+        """
+        if scene is None:
+            scene, kinds = self._own_scene, int(mujoco.mjtCatBit.mjCAT_ALL)
+            mujoco.mjv_updateScene(self._model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), kinds, scene)
+        drawn = [each for each in scene.geoms[: scene.ngeom] if each.segid >= 0 or not segmented]
+        contents = [content_of(each) for each in drawn]
+        if contents == self._shown:
+            return
+        self._shown, there, left_out, visuals = contents, set(), set(), []
+        for each in drawn:
+            identity = int(each.objid), int(each.objtype)
+            there.add(identity)
+            if each.label:
+                left_out.add("labels")
+            if identity not in self._replaced:
+                visuals += visuals_in(self._model, scene, each)
+            elif each.rgba[3] < self._replaced[identity]:
+                left_out.add("transparency of rippling surfaces and of the floor")
+        with_shape = shaped(self._model, visuals)
+        kinds_of = ({visual.kind for visual in each} for each in (visuals, [visual for visual, _ in with_shape]))
+        left_out |= {mujoco.mjtGeom(kind).name for kind in set.difference(*kinds_of)}
+        hidden = [target for target, each in self._targets.items() if each.visible and each.identity not in there]
+        self._scene.show(with_shape, hidden)
+        if self._scene.transparent and self._layers is None:
+            self._make_passes()
+        if self._floor is not None:
+            self._floor.shown = geom_visual(self._model, self._floor.geom).identity in there
+        if new := left_out - self._told:
+            self._told |= new
+            warnings.warn(f"not drawn: {', '.join(sorted(new))}; all else of the scene is", RippleWarning, stacklevel=5)
 
     def __enter__(self) -> Renderer:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -255,7 +322,12 @@ class Renderer:
             self._scene.target(geom).set_heatmap(values, limit)
 
     def render(
-        self, data: Any, height_maps: Mapping[int, AnyHeightMap], camera: Viewpoint, exposure: int = 0
+        self,
+        data: Any,
+        height_maps: Mapping[int, AnyHeightMap],
+        camera: Viewpoint,
+        exposure: int = 0,
+        scene: mujoco.MjvScene | None = None,
     ) -> NDArray:
         """Draw one frame and return its pixels.
 
@@ -270,6 +342,8 @@ class Renderer:
         camera : Camera, FixedCamera or ThroughLens
         exposure : int
             Number of this exposure among those whose mean is a frame: each has another noise in its shadows.
+        scene : mujoco.MjvScene, optional
+            What is drawn beside the targets, and which of them; by default what MuJoCo shows of the data.
 
         Returns
         -------
@@ -277,20 +351,32 @@ class Renderer:
             Top row first; a new array for every frame. uint8 in sRGB, alpha straight; or, of linear light, float16,
             with ITU-R BT.709's primaries, multiplied by alpha.
         """
-        self.submit(data, height_maps, camera, exposure)
+        self.submit(data, height_maps, camera, exposure, scene)
         return self.fetch()
 
-    def submit(self, data: Any, height_maps: Mapping[int, AnyHeightMap], camera: Viewpoint, exposure: int = 0) -> None:
+    def submit(
+        self,
+        data: Any,
+        height_maps: Mapping[int, AnyHeightMap],
+        camera: Viewpoint,
+        exposure: int = 0,
+        scene: mujoco.MjvScene | None = None,
+    ) -> None:
         """Draw one frame as `render` does without waiting for it; `fetch` returns frames in the order of submission."""
         with self._gl:
-            self._readback.submit(self.draw(data, height_maps, camera, exposure))
+            self._readback.submit(self.draw(data, height_maps, camera, exposure, scene))
 
     def fetch(self) -> NDArray:
         """Wait for the earliest submitted frame, and return it as `render` does."""
         return self._readback.fetch()
 
     def draw(
-        self, data: Any, height_maps: Mapping[int, AnyHeightMap], camera: Viewpoint, exposure: int = 0
+        self,
+        data: Any,
+        height_maps: Mapping[int, AnyHeightMap],
+        camera: Viewpoint,
+        exposure: int = 0,
+        scene: mujoco.MjvScene | None = None,
     ) -> moderngl.Framebuffer:
         """Draw one frame and leave it on the GPU.
 
@@ -300,25 +386,27 @@ class Renderer:
             RGBA8 in sRGB, or RGBA16F of linear light; bottom row first, multiplied by alpha. The next frame is drawn
             over it.
         """
-        scene, shading, pose = self._scene, self._shading, camera.pose()
+        drawn, pose = self._scene, camera.pose()
         with self._gl as ctx:
-            scene.update(ctx, data, height_maps, pose)
+            self._show(data, scene)
+            shading = self._shading
+            drawn.update(ctx, data, height_maps, pose)
             shading.clear(ctx)  # which a software driver does during what follows
             self._update(data, pose, exposure)
             self._draw_maps(ctx)
             shading.begin(ctx)
-            scene.draw()
-            balls = scene.balls(data)
+            drawn.draw()
+            balls = drawn.balls(data)
             boxes = boxes_of(balls, pose, self._size)
             if self._gl.software:  # which would draw all this in the next call, holding the interpreter's lock
                 self._gl.wait()
             self._occlusion.average()
-            if self._mirror is not None:
-                self._mirror.draw(ctx, self._frame, pose, balls, scene.draw, self._bind)
+            if self._mirror is not None and self._floor is not None and self._floor.shown:
+                self._mirror.draw(ctx, self._frame, pose, balls, drawn.draw, self._bind)
             self._bind()
             shading.shade(ctx, boxes)
             if self._layers is not None:
-                for bounds, layer in scene.layers(data, pose):
+                for bounds, layer in drawn.layers(data, pose):
                     self._layers.add(ctx, layer.numbers[0], layer.draw, boxes_of(bounds, pose, self._size))
         return shading.frame
 
@@ -328,26 +416,28 @@ class Renderer:
         height_maps: Mapping[int, AnyHeightMap],
         camera: Viewpoint,
         size: tuple[int, int] | None = None,
+        scene: mujoco.MjvScene | None = None,
     ) -> SurfaceImage:
         """Draw what is seen at the middle of each pixel, without light: distances, normals, geoms.
 
         Transparent objects count as solid. Arguments are as for `render`; `size` (width, height) may be another than
-        that of the frames, of the same shape.
+        that of the frames, of the same shape. Of a `scene` there is what MuJoCo would segment, in MuJoCo's shapes:
+        boxes and cylinders without round edges.
         """
-        scene, pose, size = self._scene, camera.pose(), size or self._size
+        drawn, pose, size = self._scene, camera.pose(), size or self._size
         with self._gl as ctx:
             if self._buffers is None or self._buffers.size != size:
-                floor_geom = -1 if self._floor is None else self._floor.geom
-                self._buffers = SurfaceBuffers(self._resources, size, floor_geom)
-            scene.update(ctx, data, height_maps, pose)
+                self._buffers = SurfaceBuffers(self._resources, size)
+            self._show(data, scene, segmented=scene is not None)
+            drawn.update(ctx, data, height_maps, pose, sharp=scene is not None)
             self._update(data, pose, 0)
-            scene.height_maps.bind()
+            drawn.height_maps.bind()
 
             def draw() -> None:
-                for each in (*scene.opaque, *scene.transparent):
+                for each in (*drawn.opaque, *drawn.transparent):
                     each.draw()
 
-            return self._buffers.draw(ctx, draw)
+            return self._buffers.draw(ctx, draw, self._assets.objects, -1 if self._floor is None else self._floor.geom)
 
     def _update(self, data: Any, pose: Pose, exposure: int) -> None:
         """Bring the frame's uniforms up to date."""
@@ -391,11 +481,3 @@ class Renderer:
         self._light.bind()
         if self._mirror is not None:
             self._mirror.bind()
-
-
-def _check_memory(gl: GLContext, frame: FrameFormat) -> None:
-    """A software driver takes the machine's memory; a GPU says itself that it has too little."""
-    if gl.software:
-        width, height = frame.size
-        need = width * height * (_PIXEL + _SAMPLE * max(frame.samples, 1))
-        require_memory(RippleError, need, f"drawing frames of {width}x{height} pixels", "take smaller frames")

@@ -36,7 +36,6 @@ class Resources:
 
     Parameters
     ----------
-    gl : GLContext
     owner : object
         Whoever uses the objects.
 
@@ -67,6 +66,15 @@ class Resources:
         """One of the renderer's compute shaders, likewise."""
         return self._own(self.gl.compute_shader(_PACKAGE, name, stage, **DEFINES, **options))
 
+    def clamped_texture(
+        self, size: tuple[int, int], components: int, *, mipmaps: bool = False, **options: Any
+    ) -> moderngl.Texture:
+        """Texture (width, height) that does not repeat, read linearly, over its mipmaps too where it has some."""
+        texture = self.texture(size, components, **options)
+        texture.repeat_x = texture.repeat_y = False
+        texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR if mipmaps else moderngl.LINEAR, moderngl.LINEAR)
+        return texture
+
     def release(self) -> None:
         """Release everything; a second time does nothing."""
         self._finalizer()
@@ -91,10 +99,6 @@ _NEAR, _FAR = 0.02, 200.0  # clip planes, in camera distances
 class FrameUniforms:
     """The block's values and its buffer.
 
-    Parameters
-    ----------
-    resources : Resources
-
     Attributes
     ----------
     values : structured array, shape []
@@ -111,16 +115,12 @@ class FrameUniforms:
         self.values[name][:3] = xyz
         self.values[name][3] = w
 
-    def set_matrix(self, name: str, matrix: NDArray) -> None:
-        """Set a matrix for column vectors."""
-        self.values[name] = matrix.T
-
     def set_camera(self, pose: Pose, aspect: float) -> None:
         """Set whatever depends on the camera only; `aspect` is width over height."""
         near, far = _NEAR * pose.distance, _FAR * pose.distance
         matrix = perspective(pose.fovy, aspect, near, far, pose.shear) @ view_matrix(pose)
         half = np.tan(np.radians(pose.fovy) / 2)
-        self.set_matrix("view_projection", matrix)
+        self.values["view_projection"] = matrix.T  # column by column
         self.set_vector("eye", pose.eye, pose.distance)
         self.set_vector("focus", pose.focus)
         self.set_vector("ray", pose.rotation @ [*pose.shear, -1.0], near)
@@ -218,7 +218,6 @@ class HeightMapTextures:
 
     Parameters
     ----------
-    resources : Resources
     pages : sequence of ChartPage
         Of the targets.
     """

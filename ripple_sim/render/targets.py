@@ -53,7 +53,6 @@ class GBuffer:
 
     Parameters
     ----------
-    resources : Resources
     size : (width, height)
         [pixels].
     samples : int
@@ -102,7 +101,6 @@ class FramePass:
 
     Parameters
     ----------
-    resources : Resources
     name : str
         Path of the shader.
     size : (width, height)
@@ -134,19 +132,11 @@ class FramePass:
         framebuffer.viewport = (0, 0, width, height)
 
 
-_PACKED = 4  # pixels of three bytes that are whole words
-
-
 class Readback:
     """Frames on their way from the GPU, first in, first out.
 
     There are as many buffers as frames were ever on their way at a time: pixel buffers of the GPU, or plain memory
     where the driver draws in that itself.
-
-    Parameters
-    ----------
-    resources : Resources
-    frame_format : FrameFormat
     """
 
     def __init__(self, resources: Resources, frame_format: FrameFormat) -> None:
@@ -168,7 +158,12 @@ class Readback:
         with self._gl:
             if self._gl.software:  # which would draw the frame in the next call, holding the interpreter's lock
                 self._gl.wait()
-            buffer = self._free.pop() if self._free else self._new_buffer()
+            if self._free:
+                buffer = self._free.pop()
+            elif self._gl.software:
+                buffer = np.empty_like(self._pixels)
+            else:
+                buffer = self._resources.buffer(reserve=self._pixels.nbytes, dynamic=True)
             frame.read_into(buffer, components=4, alignment=1, dtype=self._format.dtype)
             self._pending.append((buffer, self._gl.put_fence()))
 
@@ -205,32 +200,11 @@ class Readback:
             _unpremultiply(frame)
         return frame
 
-    def _new_buffer(self) -> moderngl.Buffer | NDArray:
-        if self._gl.software:
-            return np.empty_like(self._pixels)
-        return self._resources.buffer(reserve=self._pixels.nbytes, dynamic=True)
-
 
 def _turn(pixels: NDArray, frame: NDArray) -> None:
     """Copy pixels [height, width, 4], bottom row first, to a frame [height, width, 3 or 4], top row first."""
-    width, channels = frame.shape[1:]
-    if channels == 3 and width % _PACKED == 0 and frame.dtype == np.uint8:
-        words = frame.reshape(len(frame), -1).view(np.uint32)
-        return _pack(pixels.view(np.uint32)[::-1, :, 0], words)
-    for channel in range(channels):  # all at once would be rows of three numbers, which are slow
+    for channel in range(frame.shape[2]):  # all at once would be rows of three numbers, which are slow
         frame[..., channel] = pixels[::-1, :, channel]
-
-
-@kernel
-def _pack(pixels: NDArray[np.uint32], words: NDArray[np.uint32]) -> None:
-    """Drop the fourth bytes of pixels [height, width]: every four of them become three words [height, 3 width / 4]."""
-    for row in range(pixels.shape[0]):
-        for group in range(pixels.shape[1] // _PACKED):
-            a, b = pixels[row, 4 * group], pixels[row, 4 * group + 1]
-            c, d = pixels[row, 4 * group + 2], pixels[row, 4 * group + 3]
-            words[row, 3 * group] = (a & np.uint32(0xFFFFFF)) | (b << np.uint32(24))
-            words[row, 3 * group + 1] = ((b >> np.uint32(8)) & np.uint32(0xFFFF)) | (c << np.uint32(16))
-            words[row, 3 * group + 2] = ((c >> np.uint32(16)) & np.uint32(0xFF)) | (d << np.uint32(8))
 
 
 @kernel

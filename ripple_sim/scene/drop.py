@@ -6,6 +6,7 @@ The target has the image of its file, and the side up that its format has.
 from __future__ import annotations
 
 import logging
+import numbers
 import warnings
 from pathlib import Path
 from typing import Any
@@ -19,12 +20,13 @@ from PIL import Image
 from ripple_sim.coupling.colliders import make_collidable
 from ripple_sim.errors import RippleWarning, SceneError
 from ripple_sim.solver import Material, Mesh, load_mesh
+from ripple_sim.solver.errors import shown
 from ripple_sim.solver.files import read_image
 from ripple_sim.solver.texels.thickness import half_thickness_at
 
-from .drop_model import BODY_SHAPES, TYPICAL_FOOTPRINT, TYPICAL_HIT, drop_model
+from .bodies import BODY_SHAPES, TYPICAL_FOOTPRINT, TYPICAL_HIT, drop_model
 from .events import Events
-from .load_scene import Edit, load_scene, refusal_of
+from .loading import Edit, load_scene, refusal_of
 from .material_entry import COEFFICIENTS, MaterialEntry
 from .scene import Scene, scene_path, shipped_scenes
 from .scene_file import CameraEntry, RippleEntry
@@ -102,34 +104,31 @@ def _statements(path: Path) -> list[tuple[str, str]]:
 
 def _embedded(mesh_path: Path) -> list[Image.Image]:
     """Base colour images in a GLB or glTF file."""
-    bombs, log = _Bombs(), logging.getLogger("trimesh")
+    log, handler = logging.getLogger("trimesh"), logging.Handler()
+    logged: list[Any] = []
+
+    def hear(record: logging.LogRecord) -> bool:
+        logged.append(record.exc_info and record.exc_info[1])
+        return False
+
+    # an image beyond pillow's limit is logged, at the lowest level, and left out
     level = log.level
-    log.addHandler(bombs)
+    handler.addFilter(hear)
+    log.addHandler(handler)
     log.setLevel(logging.DEBUG)
     try:
         parts = trimesh.load_scene(mesh_path).geometry.values()
     finally:
-        log.removeHandler(bombs)
+        log.removeHandler(handler)
         log.setLevel(level)
-    if bombs.first is not None:
-        raise SceneError(f"an image in {mesh_path.name} cannot be read: {bombs.first} Scale it down")
+    for error in logged:
+        if isinstance(error, Image.DecompressionBombError):
+            raise SceneError(f"an image in {mesh_path.name} cannot be read: {error} Scale it down")
     materials = {
         id(material): material for part in parts if (material := getattr(part.visual, "material", None)) is not None
     }
     images = (getattr(material, "baseColorTexture", None) for material in materials.values())
     return list({id(image): image for image in images if image is not None}.values())
-
-
-class _Bombs(logging.Handler):
-    """Hears of images beyond pillow's limit, which trimesh logs and leaves out."""
-
-    first: BaseException | None = None
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Keep the first."""
-        error = record.exc_info[1] if record.exc_info else None
-        if self.first is None and isinstance(error, Image.DecompressionBombError):
-            self.first = error
 
 
 def paint_target(spec: mujoco.MjSpec, mesh: Mesh, mesh_path: str | Path, texture: str | Path | None) -> None:
@@ -221,8 +220,8 @@ def drop_scene(
     SceneError
         For any other invalid argument, or if MuJoCo refuses the mesh.
     """
-    if not 0 <= bodies <= 100:
-        raise SceneError(f"the number of bodies is {bodies}; valid is 0 to 100")
+    if not (isinstance(bodies, numbers.Integral) and 0 <= int(bodies) <= 100):
+        raise SceneError(f"the number of bodies is {shown(bodies)}; valid is 0 to 100")
     if up is not None and up not in UP_AXES:
         raise SceneError(f"the up axis is {up!r}; valid are {' and '.join(map(repr, UP_AXES))}")
     mesh = load_mesh(mesh_path, **reading)

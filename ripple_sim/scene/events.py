@@ -23,7 +23,7 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-class DropEntry(msgspec.Struct, forbid_unknown_fields=True):
+class DropEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """`[[drop]]`: hold a free body in place until a time, then release it."""
 
     body: str

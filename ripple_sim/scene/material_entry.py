@@ -97,7 +97,7 @@ class PresetEntry(msgspec.Struct, forbid_unknown_fields=True):
         return getattr(Material, self.name)(**given)
 
 
-class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True):
+class MaterialEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """`[ripple.material]`: the wave equation's coefficients, by their names and in their units in `Material`.
 
     Each is a number, the path of an image, or a table {map = ..., low = ..., high = ...}. Without a preset, those that

@@ -26,6 +26,15 @@ from .events import Events
 from .scene_file import CameraEntry, RippleEntry, check_camera
 
 MAX_DURATION = 86_400  # [s], a day
+MAX_SLOW_MOTION = 1000
+
+
+def check_duration(duration: float, slow_motion: float = 1.0) -> None:
+    """Raise `SceneError` if the duration [s] of a run or its slow motion is out of range."""
+    if not 0 < duration < MAX_DURATION:
+        raise SceneError(f"duration is {duration!r} s; valid is a positive number, less than {MAX_DURATION}")
+    if not 0 < slow_motion <= MAX_SLOW_MOTION:
+        raise SceneError(f"slow motion is {slow_motion!r}; valid is a positive number up to {MAX_SLOW_MOTION}")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -121,7 +130,8 @@ class Request:
     limit : float or None
         End of the colours, in m or m/s; None: adapts to the waves during the video.
     contacts, grid, time, energy : bool
-        Arrows of the impulses at the contact points; the texel grid; a clock; a plot of the waves' energy.
+        Arrows of the impulses at the contact points; the texel grid; a clock; a plot of the waves' energy, with that of
+        bodies and both.
     """
 
     heatmap: str | None = None

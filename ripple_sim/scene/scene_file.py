@@ -18,18 +18,18 @@ import numpy as np
 
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Material, texture_map
+from ripple_sim.solver import Material, texture_map, thickness_map
 from ripple_sim.solver.errors import shown
 
-from .drop_model import RandomEntry
+from .bodies import RandomEntry
 from .events import ChangeEntry, ControlEntry, DropEntry, PlaceEntry, PokeEntry, ThrowEntry, Vector
 from .material_entry import MapEntry, MaterialChange, MaterialEntry, PresetEntry
-from .target_maps import HeightEntry, InsideEntry, layer_thickness
+from .target_maps import HeightEntry, InsideEntry, moved
 
 MAX_EXPOSURES = 1024
 
 
-class CameraEntry(msgspec.Struct, forbid_unknown_fields=True):
+class CameraEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """`[camera]`: where the video is seen from."""
 
     name: str | None = None
@@ -107,7 +107,7 @@ class StillEntry(msgspec.Struct, forbid_unknown_fields=True):
     """Along the surface [m]."""
 
 
-class RippleEntry(msgspec.Struct, forbid_unknown_fields=True):
+class RippleEntry(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """`[[ripple]]`: one target, its material and its look."""
 
     geom: str
@@ -283,7 +283,8 @@ def apply_maps(ripples: Ripples, entry: RippleEntry) -> None:
     atlas, coefficients = ripples[entry.geom].atlas, {}
     if entry.inside:
         to_atlas = functools.partial(ripples.to_geom, entry.geom)
-        thickness = layer_thickness(atlas, entry.inside, entry.thickness_limits, to_atlas)
+        bodies = [moved(each.body(), to_atlas) for each in entry.inside]
+        thickness = thickness_map(atlas, bodies, entry.thickness_limits)
         coefficients.update(vars(entry.material.material(thickness)))
     for name, each in entry.material.maps().items():
         coefficients[name] = texture_map(atlas, each.map, each.low, each.high, each.channel)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 import operator
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.ripples import Ripples
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Atlas, Mesh, Volume, load_mesh, load_volume, texture_map, thickness_map
+from ripple_sim.solver import Atlas, Mesh, Volume, load_mesh, load_volume, texture_map
 from ripple_sim.solver.errors import shown
 from ripple_sim.solver.mesh.volume import is_volume
 
@@ -72,12 +72,12 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
     """
     try:
         if len(text) > _LONGEST:
-            raise _WrongError(f"it has {len(text)} characters, valid are {_LONGEST} at most")
+            raise SceneError(f"it has {len(text)} characters, valid are {_LONGEST} at most")
         tree = ast.parse(text.strip(), mode="eval")
         with np.errstate(all="ignore"):
             value = _value(tree.body, {**_CONSTANTS, **variables})
         result = np.zeros_like(next(iter(variables.values()))) + np.asarray(value, dtype=np.float64)
-    except _WrongError as wrong:
+    except SceneError as wrong:
         raise SceneError(f"the expression {shown(text)} cannot be used: {wrong}") from None
     except (SyntaxError, ValueError, RecursionError, MemoryError, TypeError) as error:
         raise SceneError(f"the expression {shown(text)} is not valid: {str(error).splitlines()[0]}") from error
@@ -86,11 +86,8 @@ def evaluate(text: str, variables: Mapping[str, NDArray[np.float64]]) -> NDArray
     return result
 
 
-class _WrongError(Exception):
-    """What an expression may not hold."""
-
-
 def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
+    """Value of a part of an expression; raises `SceneError` with what it may not hold."""
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
             return np.float64(number)
@@ -105,10 +102,10 @@ def _value(node: ast.AST, names: Mapping[str, Any]) -> Any:
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
             function, count = FUNCTIONS[name]
             if len(arguments) != count:
-                raise _WrongError(f"{name} has {len(arguments)} arguments, valid are {count}")
+                raise SceneError(f"{name} has {len(arguments)} arguments, valid are {count}")
             return function(*[_value(argument, names) for argument in arguments])
     what, valid = shown(ast.unparse(node)), f"numbers, {', '.join(names)}, + - * / % **, and {', '.join(FUNCTIONS)}"
-    raise _WrongError(f"{what} is unknown; valid are {valid}")
+    raise SceneError(f"{what} is unknown; valid are {valid}")
 
 
 class HeightEntry(msgspec.Struct, forbid_unknown_fields=True):
@@ -242,17 +239,8 @@ class InsideEntry(msgspec.Struct, forbid_unknown_fields=True):
         return load_inside(self.mesh or self.volume or "", self.threshold, self.spacing, self.origin, self.scale)
 
 
-def layer_thickness(
-    atlas: Atlas,
-    entries: Sequence[InsideEntry],
-    limits: tuple[float, float],
-    to_atlas: Callable[[ArrayLike], Array],
-) -> Array:
-    """Thickness of the layer over some bodies, [C, n, n], and its limits [m]; `to_atlas` moves points to the atlas."""
-    return thickness_map(atlas, [_moved(entry.body(), to_atlas) for entry in entries], limits)
-
-
-def _moved(body: Mesh | Volume, to_atlas: Callable[[ArrayLike], Array]) -> Mesh | Volume:
+def moved(body: Mesh | Volume, to_atlas: Callable[[ArrayLike], Array]) -> Mesh | Volume:
+    """A body where a function that moves points [..., 3] [m] puts it."""
     if isinstance(body, Mesh):
         return dataclasses.replace(body, V=to_atlas(body.V))
     origin = np.asarray(body.origin, dtype=np.float64)

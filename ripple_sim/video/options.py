@@ -9,6 +9,9 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Literal
 
+from ripple_sim.errors import VideoError
+from ripple_sim.solver.errors import check_fields, whole
+
 Backend = Literal["auto", "gl", "cpu"]
 
 
@@ -64,6 +67,9 @@ class VideoOptions:
     """Continue an interrupted render of the same scene with the same options."""
     overwrite: bool = False
     """Replace an output that ripple-sim has not made."""
+
+    def __post_init__(self) -> None:
+        check_fields(VideoError, self, supersample=whole(1))
 
     @property
     def rate(self) -> float:

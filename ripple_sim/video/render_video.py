@@ -1,6 +1,8 @@
 """`render_video`: a scene rendered to a video. Simulation, rendering and encoding overlap.
 
-The simulation runs in a thread of its own, a few frames ahead (`Prefetch`); `Summary` is what it all took.
+A `Film` is one simulation, or two side by side, rendered to frames with overlays, and with passes beside them; a `Shot`
+is everything that one exposure of it shows. The simulation runs in a thread of its own, a few frames ahead
+(`prefetched`); `Summary` is what it all took.
 """
 
 from __future__ import annotations
@@ -10,23 +12,224 @@ import dataclasses
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.capture.frame_source import FrameSource
+from ripple_sim.capture.passes import Sighting, passes_of
+from ripple_sim.capture.snapshot import Snapshot, snapshots
+from ripple_sim.coupling.geoms import geom_name
 from ripple_sim.coupling.stepping import adopt_warnings
 from ripple_sim.encode import FrameWriter, open_writer
+from ripple_sim.encode.images import PassFiles
 from ripple_sim.errors import VideoError
-from ripple_sim.overlay.notes import compared_operators
-from ripple_sim.scene.scene import Scene, with_exposure
+from ripple_sim.overlay.notes import TITLES, Notebook, Notes, color_table, compared_operators, grid_spacing
+from ripple_sim.overlay.panels import Layout, Painter, PlacedMark, Projection, draw_marks, place_marks
+from ripple_sim.render import Surface
+from ripple_sim.scene.scene import Scene, parse_request, with_exposure
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver.errors import PATH, checked, instance
+from ripple_sim.solver.errors import FUNCTION, PATH, checked, instance
 from ripple_sim.solver.gl import GLContext, shared_context
 from ripple_sim.solver.kernel import compile_times, work_clock
 
-from .film import Film, Shot
 from .options import VideoOptions
 from .settings import EXPOSURE, check_options, frame_count, render_settings, settled
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Shot:
+    """An exposure of a film's frame: a snapshot of each run, and the overlays' content, which a whole frame shares."""
+
+    snapshots: tuple[Snapshot, ...]
+    notes: Notes
+
+    @property
+    def number(self) -> int:
+        """Of the frame, from 0."""
+        return self.snapshots[0].number
+
+    @property
+    def exposure(self) -> int:
+        """Of the frame's exposures, from 0."""
+        return self.snapshots[0].exposure
+
+    def digest(self) -> str:
+        """Fingerprint of all runs, see `Snapshot.digest`."""
+        return "".join(snapshot.digest() for snapshot in self.snapshots)
+
+
+class Film:
+    """Simulations of one scene that run in step, and their frames.
+
+    Parameters
+    ----------
+    simulations : sequence of Simulation
+        One, or two that are shown side by side and share the width.
+    options : VideoOptions
+        Settled. Linear frames are without overlays, and of one run.
+    on_frame : callable, optional
+        Called with the first simulation at the time of each frame, in the thread that runs `shots`.
+    """
+
+    def __init__(
+        self,
+        simulations: Sequence[Simulation],
+        options: VideoOptions,
+        frames: int,
+        on_frame: Callable[[Simulation], None] | None = None,
+    ) -> None:
+        self.simulations, self._options, self._frames, self._on_frame = simulations, options, frames, on_frame
+        self._request = parse_request(options.overlay or ())
+        self._layout = Layout(*options.size)
+        self._notebook = Notebook(self._request, simulations, frames, options.rate)
+        self._sources: list[FrameSource] = []
+        self._submitted: deque[Shot] = deque()
+        self._marks: list[list[PlacedMark]] = []
+        self._pass_files: PassFiles | None = None
+        self._last_seen: tuple[int, Sighting] | None = None  # the number of a frame whose passes are not written yet
+        self.seconds = 0.0  # spent on frames so far
+        operators = compared_operators(options.compare)
+        ripples = simulations[0].ripples
+        spacings = {grid_spacing(ripples[name].atlas.resolution) for name in ripples}
+        self._painter = Painter(
+            self._request,
+            self._layout,
+            duration=frames / options.rate,
+            spacing=spacings.pop() if len(spacings) == 1 else 0,  # one that the targets share
+            titles=[TITLES[operator] for operator in operators] if len(operators) > 1 else [],
+        )
+
+    def write_passes(self, output: Path, frames: int = 0) -> None:
+        """Write the passes that the options ask for beside an output, which has so many frames already."""
+        model, geoms = self.simulations[0].model, self.simulations[0].ripples.geom_ids
+        soft = {target + 1: name for name, target in geoms.items() if target >= model.ngeom}
+        # what each number of the segmentation stands for
+        segments = {0: "background", **{geom + 1: geom_name(model, geom) for geom in range(model.ngeom)}, **soft}
+        self._pass_files = PassFiles(output, self._options.pass_format, segments, frames)
+
+    def see(self, shot: Shot) -> None:
+        """Look at a shot whose frame is there already, for its passes, if they are not."""
+        if self._pass_files is not None and shot.exposure == 0 and shot.number >= self._pass_files.complete:
+            self.prepare()
+            start = work_clock()
+            self._see((shot.number, self._sources[0].sighting(shot.snapshots[0])))
+            self.seconds += work_clock() - start
+
+    def prepare(self) -> None:
+        """Make the renderers, which takes a while, before the first frame; the simulations may run meanwhile."""
+        if self._sources:
+            return
+        count, options = len(self.simulations), self._options
+        ends = [round(self._layout.width * k / count) for k in range(count + 1)]
+        self._sources = [
+            FrameSource(
+                simulation,
+                width=right - left,
+                height=self._layout.height,
+                supersample=options.supersample,
+                transparent=options.transparent,
+                linear=options.linear,
+                annotate=self._annotated,
+            )
+            for simulation, left, right in zip(self.simulations, ends[:-1], ends[1:], strict=True)
+        ]
+
+    def shots(self, alive: int = 1) -> Iterator[Shot]:
+        """Run the simulations; `alive` of the latest shots stay valid, see `snapshots`."""
+        runs = [snapshots(simulation, self._frames, alive=alive) for simulation in self.simulations]
+        for exposures in zip(*runs, strict=True):
+            if exposures[0].exposure == 0:
+                notes = self._notebook.follow()
+                if self._on_frame is not None:
+                    self._on_frame(self.simulations[0])
+            yield Shot(exposures, notes)
+
+    def render_all(self, shots: Iterable[Shot], ahead: int = 0) -> Iterator[NDArray]:
+        """Render frames in their order, and wait for each shot when `ahead` later ones are submitted."""
+        for shot in shots:
+            self.submit(shot)
+            if len(self._submitted) > ahead and (frame := self.fetch()) is not None:
+                yield frame
+        while self._submitted:
+            if (frame := self.fetch()) is not None:
+                yield frame
+        self._see(None)
+
+    def render(self, shot: Shot) -> NDArray | None:
+        """Render an exposure; return the frame after its last, [height, width, 3], or 4 if it is transparent."""
+        self.submit(shot)
+        return self.fetch()
+
+    def submit(self, shot: Shot) -> None:
+        """Draw an exposure without waiting for it: `fetch` returns it, after those submitted before.
+
+        The shot must stay as it is until then.
+        """
+        self.prepare()
+        start = work_clock()
+        for number, (source, snapshot) in enumerate(zip(self._sources, shot.snapshots, strict=True)):
+            if self._request.heatmap and shot.exposure == 0:
+                geoms = self.simulations[number].ripples.geom_ids
+                for name, heatmap in shot.notes.heatmaps[number].items():
+                    source.renderer.set_heatmap(geoms[name], heatmap, shot.notes.heatmap_scale[0])
+            source.submit(snapshot)
+            if self._pass_files is not None and shot.exposure == 0:
+                self._see((shot.number, source.sighting(snapshot)))
+        self._submitted.append(shot)
+        self.seconds += work_clock() - start
+
+    def _see(self, seen: tuple[int, Sighting] | None) -> None:
+        """Write the passes of the last frame, whose pixels flow to what is seen now, if anything."""
+        if self._pass_files is not None and self._last_seen is not None:
+            number, sighting = self._last_seen
+            passes = passes_of(sighting, None if seen is None else seen[1], tuple(self._options.passes))
+            self._pass_files.write(number, passes)
+        self._last_seen = seen
+
+    def fetch(self) -> NDArray | None:
+        """Wait for the earliest exposure submitted, and return what `render` does."""
+        start = work_clock()
+        shot = self._submitted.popleft()
+        if shot.exposure == 0:
+            self._marks = [self._placed_marks(run, shot) for run in range(len(self._sources))]
+        halves = [half for source in self._sources if (half := source.fetch()) is not None]
+        frame = self._composed(halves, shot) if halves else None
+        self.seconds += work_clock() - start
+        return frame
+
+    def _composed(self, halves: list[NDArray], shot: Shot) -> NDArray:
+        """The runs' images side by side, under the overlays."""
+        for half, marks in zip(halves, self._marks, strict=True):
+            draw_marks(half, marks, self._layout)
+        frame = halves[0]
+        if len(halves) > 1:
+            frame = np.concatenate(halves, axis=1)
+            middle, seam = halves[0].shape[1], max(1, round(self._layout.em / 16))
+            frame[:, middle - seam : middle + seam] = 255
+        self._painter.paint(frame, shot.notes)
+        return frame
+
+    def _placed_marks(self, run: int, shot: Shot) -> list[PlacedMark]:
+        """Contact marks of a run, in pixels of its image."""
+        if not self._request.contacts:
+            return []
+        source, snapshot, notes = self._sources[run], shot.snapshots[run], shot.notes
+        projection = Projection(source.camera(snapshot).pose(), source.width, source.height)
+        hiding = self.simulations[run].model, snapshot.data
+        return place_marks(notes.marks[run], notes.mark_scale[0], self._layout, projection, *hiding)
+
+    def _annotated(self, surface: Surface) -> Surface:
+        """A target's surface with the heatmap and the grid that the request asks for."""
+        return dataclasses.replace(
+            surface,
+            heatmap_colors=color_table() if self._request.heatmap else None,
+            grid=grid_spacing(surface.charts.page.resolution) if self._request.grid else 0,
+        )
 
 
 def open_video(
@@ -51,68 +254,45 @@ Item = TypeVar("Item")
 _END = object()
 
 
-class Prefetch(Generic[Item]):
-    """Runs an iterable in a thread, at most `depth` items ahead; iterate over this instead, inside a `with`.
+@contextlib.contextmanager
+def prefetched(items: Iterable[Item], depth: int) -> Iterator[Iterator[Item]]:
+    """Run an iterable in a thread, at most `depth` items ahead; iterate over what this yields instead.
 
-    Items come in their order. An exception of the iterable is raised in place of its next item. Leaving the block stops
-    the thread at its current item.
-
-    Parameters
-    ----------
-    items : iterable
-        Consumed by the thread alone.
-    depth : int
-        How many finished items may wait.
+    Items come in their order; the thread alone consumes them. An exception of the iterable is raised in place of its
+    next item. Leaving the block stops the thread at its current item.
     """
+    ready: queue.Queue[tuple[Any, BaseException | None]] = queue.Queue(depth)
+    stopped = threading.Event()
 
-    def __init__(self, items: Iterable[Item], depth: int) -> None:
-        self._items = items
-        self._queue: queue.Queue[tuple[object, BaseException | None]] = queue.Queue(depth)
-        self._stopped = False
-        self._thread = threading.Thread(target=self._run, name="simulation", daemon=True)
-
-    def __enter__(self) -> Iterator[Item]:
-        self._thread.start()
-        return self._take()
-
-    def __exit__(self, *error: object) -> None:
-        self._stopped = True
-        while self._thread.is_alive():
-            with contextlib.suppress(queue.Empty):  # makes room for the thread's current item
-                self._queue.get(timeout=0.05)
-
-    def _run(self) -> None:
+    def run() -> None:
         error: BaseException | None = None
         try:
-            for item in self._items:
-                if self._stopped:
+            for item in items:
+                if stopped.is_set():
                     return
-                self._queue.put((item, None))
+                ready.put((item, None))
         except BaseException as failure:  # of any kind: it is raised in the consumer's thread
             error = failure
-        self._queue.put((_END, error))
+        ready.put((_END, error))
 
-    def _take(self) -> Iterator[Item]:
+    def take() -> Iterator[Item]:
         while True:
-            item, error = self._queue.get()
+            item, error = ready.get()
             if error is not None:
                 raise error
             if item is _END:
                 return
-            yield item  # type: ignore[misc]
+            yield item
 
-
-class Times(NamedTuple):
-    """A moment [s]: on the wall's clock, on this thread's `work_clock`, and the time of compilation so far."""
-
-    wall: float
-    work: float
-    compiled: float
-
-    @classmethod
-    def now(cls) -> Times:
-        """Take the time."""
-        return cls(time.perf_counter(), work_clock(), sum(compile_times().values()))
+    thread = threading.Thread(target=run, name="simulation", daemon=True)
+    thread.start()
+    try:
+        yield take()
+    finally:
+        stopped.set()
+        while thread.is_alive():
+            with contextlib.suppress(queue.Empty):  # makes room for the thread's current item
+                ready.get(timeout=0.05)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,25 +319,20 @@ class Summary:
     wall_seconds: float
 
     @classmethod
-    def of(
-        cls, film: Film, writer: FrameWriter, gl: GLContext, *, resumed_at: int, started: Times, ready: Times
-    ) -> Summary:
-        """Summary of a film that has been written; it was started, and its first frame could begin, at these times."""
-        simulations, ended = film.simulations, Times.now()
+    def of(cls, film: Film, writer: FrameWriter, gl: GLContext, **measured: Any) -> Summary:
+        """Summary of a film that has been written; given is what neither the film nor its writer knows."""
+        simulations = film.simulations
         return cls(
             output=writer.path,
             frames=writer.frames,
-            resumed_at=resumed_at,
             renderer=gl.renderer,
             backend=simulations[0].backend,
             substeps_per_frame=sum(each.substeps_taken for each in simulations) / max(writer.frames - 1, 1),
-            compile_seconds=ended.compiled - started.compiled,
-            setup_seconds=ready.work - started.work,
             physics_seconds=sum(each.physics_seconds for each in simulations),
             wave_seconds=sum(each.wave_seconds for each in simulations),
             render_seconds=film.seconds,
             encode_seconds=writer.encode_seconds,
-            wall_seconds=ended.wall - started.wall,
+            **measured,
         )
 
 
@@ -175,6 +350,9 @@ Progress = Callable[[int, int], None]
     scene=instance(Scene, ", from load_scene or drop_scene"),
     output=PATH,
     options=instance(VideoOptions, ", for instance VideoOptions(fps=30)"),
+    progress=FUNCTION,
+    on_step=FUNCTION,
+    on_frame=FUNCTION,
 )
 def render_video(
     scene: Scene,
@@ -193,10 +371,8 @@ def render_video(
 
     Parameters
     ----------
-    scene : Scene
     output : path
         .mp4, .webm, .gif, .webp, or a folder for frames. It appears once it is complete.
-    options : VideoOptions
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
     on_step : callable, optional
@@ -210,7 +386,7 @@ def render_video(
         Before anything is simulated if the output, an option, the scene or the render to resume is invalid; later if
         the physics becomes unstable or the video cannot be written.
     """
-    times = Times.now()
+    start, work_start, compiled = time.perf_counter(), work_clock(), sum(compile_times().values())
     adopt_warnings()
     output = Path(output)
     options = settled(options, scene, output)
@@ -219,37 +395,43 @@ def render_video(
     frames, gl = frame_count(options), shared_context()
     with open_video(output, options, render_settings(scene, options, frames, gl)) as writer:
         resumed_at = writer.frames
-        film = Film(_simulations(scene, options, on_step), options, frames, on_frame)
+        operators = compared_operators(options.compare)
+        simulations = [Simulation.of(scene, options, operator=operator, on_step=on_step) for operator in operators]
+        film = Film(simulations, options, frames, on_frame)
         if options.passes:
-            film.write_passes(output)
+            film.write_passes(output, resumed_at)
         ready = _write_frames(film, writer, frames, gl, progress)
-    return Summary.of(film, writer, gl, resumed_at=resumed_at, started=times, ready=ready)
+    return Summary.of(
+        film,
+        writer,
+        gl,
+        resumed_at=resumed_at,
+        compile_seconds=sum(compile_times().values()) - compiled,
+        setup_seconds=ready - work_start,
+        wall_seconds=time.perf_counter() - start,
+    )
 
 
-def _simulations(scene: Scene, options: VideoOptions, on_step: Callable[[Simulation], None] | None) -> list[Simulation]:
-    """One simulation for each of the wave operators that are shown."""
-    operators = compared_operators(options.compare)
-    return [Simulation.of(scene, options, operator=operator, on_step=on_step) for operator in operators]
-
-
-def _write_frames(film: Film, writer: FrameWriter, frames: int, gl: GLContext, progress: Progress | None) -> Times:
-    """Render and write the frames that the video still lacks; return when the first could begin."""
+def _write_frames(film: Film, writer: FrameWriter, frames: int, gl: GLContext, progress: Progress | None) -> float:
+    """Render and write the frames that the video still lacks; return the `work_clock` when the first could begin."""
     # a software driver renders on the processor, which is busy enough with one frame
     ahead = 0 if gl.software else 1
     shots = film.shots(alive=_WAITING + ahead + 2)
     # waves on a GPU and the renderer take turns with the OpenGL context; a software driver computes during its turn
     own_thread = film.simulations[0].backend == "cpu" or not gl.software
-    with Prefetch(shots, _WAITING) if own_thread else contextlib.nullcontext(shots) as shots:
+    with prefetched(shots, _WAITING) if own_thread else contextlib.nullcontext(shots) as shots:
         film.prepare()
-        ready = Times.now()
-        for frame in film.render_all(_missing(shots, writer, progress, frames), ahead):
+        ready = work_clock()
+        for frame in film.render_all(_missing(shots, film, writer, progress, frames), ahead):
             writer.write(frame)
             if progress is not None:
                 progress(writer.frames, frames)
     return ready
 
 
-def _missing(shots: Iterable[Shot], writer: FrameWriter, progress: Progress | None, frames: int) -> Iterator[Shot]:
+def _missing(
+    shots: Iterable[Shot], film: Film, writer: FrameWriter, progress: Progress | None, frames: int
+) -> Iterator[Shot]:
     """Check the simulation's states, and skip the frames that are there already."""
     resumed_at = writer.frames
     for shot in shots:
@@ -257,5 +439,7 @@ def _missing(shots: Iterable[Shot], writer: FrameWriter, progress: Progress | No
             writer.check_state(shot.number, shot.digest())
         if shot.number >= resumed_at:
             yield shot
-        elif progress is not None and shot.exposure == 0:
+            continue
+        film.see(shot)
+        if progress is not None and shot.exposure == 0:
             progress(shot.number + 1, frames)

@@ -19,30 +19,28 @@ import numpy as np
 
 from ripple_sim.encode import check_output, default_fps
 from ripple_sim.encode.images import check_passes
-from ripple_sim.errors import SceneError, VideoError
+from ripple_sim.errors import VideoError
 from ripple_sim.overlay.notes import compared_operators
-from ripple_sim.scene.scene import MAX_DURATION, Scene, parse_request
+from ripple_sim.scene.scene import Scene, check_duration, parse_request
 from ripple_sim.solver.backends.backend import auto_backend
 from ripple_sim.solver.gl import GLContext
 
 from .options import Backend, VideoOptions
 
-_PACKAGES = ("ripple-sim", "mujoco", "numpy", "numba", "moderngl", "av", "pillow")
-
-
-def provenance(scene: Scene, gl: GLContext) -> dict[str, str]:
-    """Fingerprint of a scene, name of the OpenGL driver, and versions of the packages, by name."""
-    return {**origin(scene), "the OpenGL driver": f"{gl.renderer}, {gl.version}"}
+_PACKAGES = ("ripple-sim", "numpy", "numba", "moderngl", "av", "pillow")
 
 
 def origin(scene: Scene) -> dict[str, str]:
     """Fingerprint of a scene and versions of the packages, by name."""
-    return {"the scene's fingerprint": scene_digest(scene), **_versions()}
+    told = {f"the version of {package}": number for package, number in versions().items()}
+    return {"the scene's fingerprint": scene_digest(scene), **told}
 
 
 @functools.cache
-def _versions() -> dict[str, str]:
-    return {f"the version of {package}": version(package) for package in _PACKAGES}
+def versions() -> dict[str, str]:
+    """Versions of the packages on which frames depend, by name."""
+    # MuJoCo is installed as `mujoco` or as `mujoco-core`
+    return {"mujoco": mujoco.__version__, **{package: version(package) for package in _PACKAGES}}
 
 
 def scene_digest(scene: Scene) -> str:
@@ -59,8 +57,6 @@ def scene_digest(scene: Scene) -> str:
     hasher.update(msgspec.json.encode((scene.targets, scene.camera, scene.events, scene.two_way)))
     return hasher.hexdigest()
 
-
-MAX_SLOW_MOTION = 1000
 
 # Options that replace those of the scene's camera, by the same names.
 EXPOSURE = ("shutter", "aperture", "focus", "exposures")
@@ -97,16 +93,7 @@ def _backend(options: VideoOptions, scene: Scene) -> Backend:
 def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLContext) -> dict[str, str | int | float]:
     """What decides the pixels of a video, by the names in messages.
 
-    Parameters
-    ----------
-    scene : Scene
-        With the exposure that the options ask for.
-    options : VideoOptions
-        Settled.
-    frames : int
-        Of the video.
-    gl : GLContext
-        That renders.
+    The options are settled, and the scene has the exposure that they ask for.
     """
     width, height = options.size
     return {
@@ -127,7 +114,9 @@ def render_settings(scene: Scene, options: VideoOptions, frames: int, gl: GLCont
         "the layout": options.layout or "the scene's",
         "the rims": options.rim or "the scene's",
         "the wave solver": options.backend,
-        **provenance(scene, gl),
+        **origin(scene),
+        "the OpenGL driver": f"{gl.renderer}, {gl.version}",
+        **({"the passes": f"{','.join(options.passes)} in {options.pass_format}"} if options.passes else {}),
         **({"the version of OpenEXR": version("OpenEXR")} if options.linear else {}),
     }
 
@@ -152,9 +141,8 @@ def check_options(options: VideoOptions, output: Path) -> None:
     )
     if options.passes:
         check_passes(output, tuple(options.passes), options.pass_format, options.overwrite)
-        if options.resume or len(operators) > 1:
-            other = "--resume" if options.resume else "--compare"
-            raise VideoError(f"passes cannot be written with {other}; leave one of the two out")
+        if len(operators) > 1:
+            raise VideoError("passes cannot be written with --compare; leave one of the two out")
 
 
 def frame_count(options: VideoOptions) -> int:
@@ -165,9 +153,6 @@ def frame_count(options: VideoOptions) -> int:
     SceneError
         If the duration or the slow motion is out of range.
     """
-    duration, slow_motion = options.duration or 0.0, options.slow_motion
-    if not 0 < duration < MAX_DURATION:
-        raise SceneError(f"duration is {options.duration!r} s; valid is a positive number, less than {MAX_DURATION}")
-    if not 0 < slow_motion <= MAX_SLOW_MOTION:
-        raise SceneError(f"slow motion is {slow_motion!r}; valid is a positive number up to {MAX_SLOW_MOTION}")
-    return max(1, round(duration * (options.fps or 0) * slow_motion))
+    duration = 0.0 if options.duration is None else options.duration
+    check_duration(duration, options.slow_motion)
+    return max(1, round(duration * (options.fps or 0) * options.slow_motion))

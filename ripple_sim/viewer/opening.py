@@ -6,7 +6,10 @@ The balls are free bodies in the model, parked far away until they are thrown.
 from __future__ import annotations
 
 import colorsys
+import ctypes
 import functools
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,7 +21,7 @@ from ripple_sim.coupling.geoms import find_target
 from ripple_sim.coupling.soft import SoftSurface, is_soft
 from ripple_sim.coupling.suited import suited_targets
 from ripple_sim.scene.drop import drop_scene, is_scene
-from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.scene.loading import load_scene
 from ripple_sim.scene.scene import Scene
 from ripple_sim.solver import Material
 
@@ -28,18 +31,7 @@ _AWAY, _APART = 2000.0, 4.0
 
 
 def add_balls(spec: mujoco.MjSpec, count: int, radius: float, mass: float) -> None:
-    """Add balls to a specification, parked above the scene.
-
-    Parameters
-    ----------
-    spec : mujoco.MjSpec
-        Changed in place, before it is compiled.
-    count : int
-    radius : float
-        [m].
-    mass : float
-        Of each [kg].
-    """
+    """Add balls of a radius [m] and a mass [kg] each to a specification, parked above the scene."""
     poses = []
     for i in range(count):
         place = [0.0, 0.0, (_AWAY + _APART * i) * radius]
@@ -64,13 +56,7 @@ def add_balls(spec: mujoco.MjSpec, count: int, radius: float, mass: float) -> No
 
 
 class Balls:
-    """The balls of a model, parked or thrown. When all are thrown, the oldest is thrown again.
-
-    Parameters
-    ----------
-    model : mujoco.MjModel
-        With balls from `add_balls`, or none.
-    """
+    """The balls that `add_balls` gave a model, parked or thrown. When all are thrown, the oldest is thrown again."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         bodies = [i for i in range(model.nbody) if model.body(i).name.startswith(_NAME.format(""))]
@@ -96,20 +82,9 @@ class Balls:
             self._set(data, i, self._home[i], np.zeros(3))
 
     def throw(self, data: mujoco.MjData, origin: ArrayLike, through: ArrayLike, seconds: float) -> bool:
-        """Throw a ball so that it is at a point after a time, on a parabola.
+        """Throw a ball from one point of the world to be at another after a time [s], on a parabola.
 
-        Parameters
-        ----------
-        data : mujoco.MjData
-        origin, through : [3]
-            Where it starts and where it goes, in the world [m].
-        seconds : float
-            Time of flight [s].
-
-        Returns
-        -------
-        bool
-            Whether there was a ball to throw.
+        Returns whether there was a ball to throw.
         """
         if not self.geoms:
             return False
@@ -197,11 +172,31 @@ def open_scene(
 
 def surface_size(scene: Scene) -> float:
     """Longest extent of the smallest rippling surface [m]."""
-    targets = [find_target(scene.model, entry.geom) for entry in scene.targets]
-    return min(_extent(scene.model, target) for target in targets)
+    model, extents = scene.model, []
+    for target in (find_target(model, entry.geom) for entry in scene.targets):
+        extent = (
+            np.ptp(SoftSurface(model, target).mesh.V, axis=0)
+            if is_soft(model, target)
+            else 2 * model.geom_aabb[target, 3:]
+        )
+        extents.append(float(extent.max()))
+    return min(extents)
 
 
-def _extent(model: mujoco.MjModel, target: int) -> float:
-    if is_soft(model, target):
-        return float(np.ptp(SoftSurface(model, target).mesh.V, axis=0).max())
-    return float(2 * model.geom_aabb[target, 3:].max())
+def display_problem() -> str | None:
+    """Why no window can be opened, or None. Wayland desktops serve X11 too, and set DISPLAY."""
+    if not sys.platform.startswith("linux"):
+        return None
+    name = os.environ.get("DISPLAY")
+    if not name:
+        return "the environment variable DISPLAY is not set"
+    try:
+        x11 = ctypes.CDLL("libX11.so.6")
+    except OSError:
+        return "the library libX11.so.6 is missing (on Debian and Ubuntu: apt-get install libx11-6)"
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    display = x11.XOpenDisplay(None)
+    if not display:
+        return f"there is no X server at DISPLAY={name}"
+    x11.XCloseDisplay(ctypes.c_void_p(display))
+    return None

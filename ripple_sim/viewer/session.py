@@ -1,6 +1,6 @@
 """`Session`: a running scene that the user can poke and change, without a window.
 
-`Picker` finds the rippling surface under a ray, and `Skin` is such a surface as it is drawn.
+It finds the rippling surface under a ray, and has the triangles that are drawn of each.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ripple_sim.coupling.soft import target_pose
 from ripple_sim.coupling.stepping import adopt_warnings
-from ripple_sim.export.moving_mesh import MovingMesh
+from ripple_sim.export.moving_mesh import Displaced, MovingMesh
 from ripple_sim.scene.scene import Scene
 from ripple_sim.simulation import Simulation
-from ripple_sim.solver import Atlas, RippleError
+from ripple_sim.solver import RippleError
 from ripple_sim.solver.mesh.rays import RayScene
 
 from .opening import FLIGHT, Balls, poke_strength, surface_size
@@ -40,91 +40,8 @@ class Hit:
     distance: float
 
 
-class Picker:
-    """Casts rays at the undisplaced targets of a simulation."""
-
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
-        self._scenes: dict[str, tuple[NDArray[np.float64] | None, RayScene]] = {
-            name: (None, _ray_scene(simulation, name)) for name in simulation.ripples
-        }
-
-    def pick(self, origin: ArrayLike, direction: ArrayLike) -> Hit | None:
-        """Nearest point of a target on a ray from a point [m] of the world, or None."""
-        start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
-        hits = []
-        for name in self._scenes:
-            scene = self._scene(name)
-            position, rotation = self._pose(name)
-            local, heading = (start - position) @ rotation, along @ rotation
-            found = scene.cast(local[None], heading[None])
-            if found.triangle[0] >= 0:
-                distance = float(found.distance[0])
-                hits.append(Hit(name, local + distance * heading, distance))
-        return min(hits, key=lambda hit: hit.distance, default=None)
-
-    def reach(self, origin: ArrayLike, direction: ArrayLike) -> float:
-        """How far along a ray a target is met, or passed most closely by its first one's middle, in its lengths."""
-        start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
-        hit = self.pick(start, along)
-        if hit is not None:
-            return hit.distance
-        middle, _ = self._pose(self._simulation.scene.targets[0].geom)
-        return max(float((middle - start) @ along / (along @ along)), 0.0)
-
-    def _scene(self, name: str) -> RayScene:
-        """A target's surface where it is."""
-        V, scene = self._scenes[name]
-        if self._simulation.ripples[name].vertices is not V:
-            scene = _ray_scene(self._simulation, name)
-            self._scenes[name] = self._simulation.ripples[name].vertices, scene
-        return scene
-
-    def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Position [m] and rotation matrix of a geom in the world."""
-        return target_pose(self._simulation.data, self._simulation.ripples.geom_ids[name])
-
-
-def _ray_scene(simulation: Simulation, name: str) -> RayScene:
-    mesh = simulation.ripples[name].atlas.mesh
-    return RayScene(mesh.V, mesh.F)
-
-
 # Software OpenGL draws this many triangles 30 times a second beside the simulation, on two cores.
 MAX_TRIANGLES = 24_000
-
-
-class Skin:
-    """The surface of an atlas as a mesh of triangles of about its texels, whose points follow the waves in place.
-
-    Parameters
-    ----------
-    atlas : Atlas
-    limit : bool
-        Whether heights that are too large for the object are bent, see `DisplacementLimit`.
-
-    Attributes
-    ----------
-    F : int64 [m, 3]
-        Triangles, counter-clockwise from outside.
-    points : float32 [n, 3]
-        Displaced vertices in the frame of the mesh [m].
-    normals : float32 [n, 3]
-        Unit normals of the displaced surface; creases of the mesh stay sharp.
-    height : float32 [n]
-        [m].
-    """
-
-    def __init__(self, atlas: Atlas, limit: bool = True) -> None:
-        self._mesh = MovingMesh(atlas, limit=limit, triangles=MAX_TRIANGLES)
-        self._still = np.zeros(atlas.areas.shape, np.float32)
-        self.F = self._mesh.F
-        self.points, self.normals, _, self.height = self._mesh.shape(self._still, self._still)
-
-    def update(self, height: NDArray[np.float32], V: NDArray[np.float64] | None = None) -> None:
-        """Follow a height field, float32 [C, n, n], and the vertices of the mesh, [vertex_count, 3], in metres."""
-        self.points[:], self.normals[:], _, self.height[:] = self._mesh.shape(height, self._still, V)
-
 
 OPERATORS = ("fem", "uncorrected", "paper")
 # Coefficients of the material that the user can change, with their units.
@@ -152,8 +69,10 @@ class Session:
 
     Attributes
     ----------
+    meshes : dict
+        `MovingMesh` of each rippling geom, by name: triangles of about its texels.
     skins : dict
-        `Skin` of each rippling geom, by name, as of the latest frame.
+        Likewise, its points, normals and heights as of the latest frame, see `Displaced`.
     poke_impulse : float
         Of a poke [N s].
     paused : bool
@@ -161,6 +80,8 @@ class Session:
         The wave operator, one of `OPERATORS`.
     color_range : float
         Height at the end of the colours [m].
+    size : float
+        Longest extent of the smallest rippling surface [m].
     """
 
     def __init__(self, scene: Scene, *, fps: int = 30, resolution: int | None = None) -> None:
@@ -170,24 +91,23 @@ class Session:
         self._balls = Balls(self.simulation.model)
         self._material: dict[str, float] = {}
         ripples, limited = self.simulation.ripples, self.simulation.limited
-        self.skins = {name: Skin(ripples[name].rest, limited[name]) for name in ripples}
-        self._picker = Picker(self.simulation)
-        self._size = surface_size(scene)
+        self.meshes = {
+            name: MovingMesh(ripples[name].rest, limit=limited[name], triangles=MAX_TRIANGLES) for name in ripples
+        }
+        self.skins: dict[str, Displaced] = {}
+        self._scenes: dict[str, tuple[NDArray[np.float64] | None, RayScene]] = {}  # for rays, with their vertices
+        self.size = surface_size(scene)
         material = ripples[scene.targets[0].geom].material
-        self._poke_radius, self.poke_impulse = poke_strength(material, self._size)
+        self._poke_radius, self.poke_impulse = poke_strength(material, self.size)
         self.operator = OPERATORS[0]
         self.paused = False
-        self.color_range = _FAINT * self._size
+        self.color_range = 0.0
+        self.refresh()
 
     @property
     def time(self) -> float:
         """Simulated time [s]."""
         return float(self.simulation.data.time)
-
-    @property
-    def size(self) -> float:
-        """Longest extent of the smallest rippling surface [m]."""
-        return self._size
 
     @property
     def parked(self) -> set[int]:
@@ -222,11 +142,11 @@ class Session:
 
     def refresh(self) -> None:
         """Bring the skins and the range of the colours up to date."""
-        wanted = _FAINT * self._size
-        for name, skin in self.skins.items():
-            ripples = self.simulation.ripples
-            skin.update(ripples[name].height, ripples.vertices(name, self.simulation.data))
-            wanted = max(wanted, _FULL * float(np.abs(skin.height).max()))
+        ripples, wanted = self.simulation.ripples, _FAINT * self.size
+        for name, mesh in self.meshes.items():
+            V = ripples.vertices(name, self.simulation.data)
+            self.skins[name] = shape = mesh.shape(ripples[name].height, ripples[name].velocity, V)
+            wanted = max(wanted, _FULL * float(np.abs(shape.height).max()))
         self.color_range = max(wanted, _FADE * self.color_range)
 
     def reset(self) -> None:
@@ -262,7 +182,16 @@ class Session:
 
     def pick(self, origin: ArrayLike, direction: ArrayLike) -> Hit | None:
         """Nearest point of an undisplaced rippling surface on a ray from a point [m] of the world, or None."""
-        return self._picker.pick(origin, direction)
+        start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
+        hits = []
+        for name in self.simulation.ripples:
+            position, rotation = self._pose(name)
+            local, heading = (start - position) @ rotation, along @ rotation
+            triangle, far, _, _ = self._scene(name).cast(local[None], heading[None])
+            if triangle[0] >= 0:
+                distance = float(far[0])
+                hits.append(Hit(name, local + distance * heading, distance))
+        return min(hits, key=lambda hit: hit.distance, default=None)
 
     def poke(self, origin: ArrayLike, direction: ArrayLike) -> Hit | None:
         """Press on the first surface on a ray, with `poke_impulse`; return the place, if there is one."""
@@ -278,8 +207,23 @@ class Session:
         whether there was a ball.
         """
         start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
-        through = start + self._picker.reach(start, along) * along
-        return self._balls.throw(self.simulation.data, start, through, FLIGHT)
+        hit = self.pick(start, along)
+        middle, _ = self._pose(self.simulation.scene.targets[0].geom)
+        reach = max(float((middle - start) @ along / (along @ along)), 0.0) if hit is None else hit.distance
+        return self._balls.throw(self.simulation.data, start, start + reach * along, FLIGHT)
+
+    def _scene(self, name: str) -> RayScene:
+        """A target's undisplaced surface where it is."""
+        waves = self.simulation.ripples[name]
+        V, scene = self._scenes.get(name, (None, None))
+        if scene is None or waves.vertices is not V:
+            scene = RayScene(waves.atlas.mesh.V, waves.atlas.mesh.F)
+            self._scenes[name] = waves.vertices, scene
+        return scene
+
+    def _pose(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Position [m] and rotation matrix of a geom in the world."""
+        return target_pose(self.simulation.data, self.simulation.ripples.geom_ids[name])
 
     def _before_step(self, simulation: Simulation) -> None:
         self._balls.hold(simulation.data)

@@ -5,7 +5,6 @@ Soft round shadows on the floor show how high bodies and targets are.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import mujoco
@@ -15,11 +14,13 @@ from numpy.typing import NDArray
 
 from ripple_sim.capture.frame_source import viewpoint
 from ripple_sim.coupling.soft import is_soft, target_pose
+from ripple_sim.export.moving_mesh import Displaced
+from ripple_sim.overlay.notes import round_up
 from ripple_sim.render.surfaces.surface import target_color
 from ripple_sim.render.visuals.shapes import shape_of, sizes
 from ripple_sim.render.visuals.visual import geom_visual, visible_geoms
 
-from .session import Session, Skin
+from .session import Session
 
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 BACKGROUND = (0.74, 0.77, 0.81)
@@ -57,20 +58,14 @@ _PER_METRE = 1000.0
 
 _GEOM = mujoco.mjtGeom
 _COLORMAP = "coolwarm"
+_STEPS = (1.0, 2.0, 5.0)  # times a power of ten end the colours, so that these do not change with every frame
 _SEGMENTS = 8  # of a geom, per right angle
 
 
 class BodyActors:
     """The geoms of a model that do not ripple, moved by MuJoCo's poses.
 
-    Parameters
-    ----------
-    plotter : pyvista.Plotter
-    session : Session
-    middle : float64 [3]
-        Of the view [m].
-    reach : float
-        Bodies farther than this from the middle wait for their turn, and are hidden [m].
+    Those farther than `reach` from the middle of the view [m] wait for their turn, and are hidden.
     """
 
     def __init__(self, plotter: pv.Plotter, session: Session, middle: NDArray[np.float64], reach: float) -> None:
@@ -82,7 +77,7 @@ class BodyActors:
                 continue
             rgba = geom_visual(model, geom).rgba
             if is_endless(model, geom, reach):
-                position, rotation = self._pose(geom)
+                position, rotation = target_pose(session.simulation.data, geom)
                 self._actors[geom] = add_floor(plotter, (middle - position) @ rotation, reach, rgba)
             elif (mesh := geom_mesh(model, geom)) is not None:
                 self._actors[geom] = _add(plotter, mesh, rgba)
@@ -98,34 +93,20 @@ class BodyActors:
         """Take the poses from the session."""
         parked, solid = self._session.parked, set(self.solid)
         for geom, actor in self._actors.items():
-            position, rotation = self._pose(geom)
+            position, rotation = target_pose(self._session.simulation.data, geom)
             _place(actor, position, rotation)
             far = geom in solid and np.linalg.norm(position - self._middle) > self._reach
             actor.SetVisibility(not (far or geom in parked))
 
-    def _pose(self, geom: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Position [m] and rotation matrix in the world."""
-        data = self._session.simulation.data
-        return data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
-
 
 class SkinActor:
-    """A rippling surface: its points, normals and heights are written into the arrays that VTK reads.
+    """A rippling surface of an sRGB colour: points, normals and heights are written into the arrays that VTK reads."""
 
-    Parameters
-    ----------
-    plotter : pyvista.Plotter
-    skin : Skin
-    color : tuple
-        sRGB, 0 to 1.
-    """
-
-    def __init__(self, plotter: pv.Plotter, skin: Skin, color: NDArray[np.float64]) -> None:
-        mesh = pv.PolyData.from_regular_faces(skin.points, skin.F)
-        mesh.point_data.active_normals = skin.normals
-        mesh.point_data.set_array(_PER_METRE * skin.height, HEIGHT)
+    def __init__(self, plotter: pv.Plotter, F: NDArray[np.int64], shape: Displaced, color: NDArray[np.float64]) -> None:
+        self._mesh = mesh = pv.PolyData.from_regular_faces(shape.points, F)
+        mesh.point_data.active_normals = shape.normals
+        mesh.point_data.set_array(_PER_METRE * shape.height, HEIGHT)
         mesh.set_active_scalars(HEIGHT)
-        self._skin, self._mesh = skin, mesh
         self.actor = plotter.add_mesh(
             mesh,
             scalars=HEIGHT,
@@ -139,20 +120,19 @@ class SkinActor:
         )
         self.actor.prop.specular_color = "white"
 
-    def update(self, position: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
-        """Take the skin's present points, normals and heights, and its pose in the world."""
-        mesh, skin = self._mesh, self._skin
-        mesh.points[:] = skin.points
+    def update(self, shape: Displaced, pose: tuple[NDArray, NDArray], limit: float | None) -> None:
+        """Take the present points, normals and heights, and the pose in the world.
+
+        Heights are shown as colours from minus to plus a limit [m]; with None, the surface is in its own colour.
+        """
+        mesh, mapper = self._mesh, self.actor.mapper
+        mesh.points[:] = shape.points
         data = mesh.GetPointData()
-        for array, new in ((data.GetNormals(), skin.normals), (data.GetArray(HEIGHT), _PER_METRE * skin.height)):
+        for array, new in ((data.GetNormals(), shape.normals), (data.GetArray(HEIGHT), _PER_METRE * shape.height)):
             pv.convert_array(array)[:] = new
             array.Modified()
         mesh.GetPoints().Modified()
-        _place(self.actor, position, rotation)
-
-    def color_by_height(self, limit: float | None) -> None:
-        """Show the height as colours from minus to plus a limit [m]; with None, the surface in its own colour."""
-        mapper = self.actor.mapper
+        _place(self.actor, *pose)
         mapper.scalar_visibility = limit is not None
         if limit is not None:
             mapper.scalar_range = (-_PER_METRE * limit, _PER_METRE * limit)
@@ -194,17 +174,7 @@ _RINGS, _SIDES = 8, 32
 
 
 class Shadows:
-    """A shadow for each of some geoms on a horizontal plane.
-
-    Parameters
-    ----------
-    plotter : pyvista.Plotter
-    session : Session
-    geoms : list of int
-        That cast shadows.
-    floor : int
-        Geom id of the plane.
-    """
+    """A shadow for each of some geoms on a horizontal plane, the `floor`; all by their geom ids."""
 
     def __init__(self, plotter: pv.Plotter, session: Session, geoms: list[int], floor: int) -> None:
         self._session, self._floor = session, floor
@@ -228,7 +198,8 @@ class Shadows:
         parked = self._session.parked
         for geom, actor in self._actors.items():
             x, y, z = data.geom_xpos[geom]
-            half = _half_height(model, data, geom)
+            # half the vertical extent of its bounding box in the world [m]
+            half = float(np.abs(data.geom_xmat[geom].reshape(3, 3)[2]) @ model.geom_aabb[geom, 3:])
             radius = float(model.geom_rbound[geom])
             above = z - half - ground
             dark = _DARKEST * max(0.0, 1 - above / (_HIGHEST * radius))
@@ -240,22 +211,12 @@ class Shadows:
             actor.user_matrix = pose
 
 
-def _half_height(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
-    """Half the vertical extent of a geom's bounding box in the world [m]."""
-    return float(np.abs(data.geom_xmat[geom].reshape(3, 3)[2]) @ model.geom_aabb[geom, 3:])
-
-
 # Bodies farther away than this many distances of the first camera wait for their turn, and are hidden.
 _REACH = 4.0
 
 
 class Stage:
     """Everything that a plotter shows of a session.
-
-    Parameters
-    ----------
-    plotter : pyvista.Plotter
-    session : Session
 
     Attributes
     ----------
@@ -279,6 +240,7 @@ class Stage:
         self.skins = {
             entry.geom: SkinActor(
                 plotter,
+                session.meshes[entry.geom].F,
                 session.skins[entry.geom],
                 target_color(simulation.model, simulation.ripples.geom_ids[entry.geom], entry.look, entry.color),
             )
@@ -297,11 +259,10 @@ class Stage:
     def update(self) -> None:
         """Bring the actors up to date with the session."""
         session = self._session
-        data, limit = session.simulation.data, _round_up(session.color_range)
+        data, limit = session.simulation.data, round_up(session.color_range, _STEPS)
         for name, skin in self.skins.items():
             geom = session.simulation.ripples.geom_ids[name]
-            skin.update(*target_pose(data, geom))
-            skin.color_by_height(limit if self._heatmap else None)
+            skin.update(session.skins[name], target_pose(data, geom), limit if self._heatmap else None)
         self._bodies.update()
         if self.shadows is not None:
             self.shadows.update()
@@ -319,9 +280,3 @@ class Stage:
             n_labels=3, fmt="%.3g", title_font_size=13, label_font_size=12, color="black",
         )  # fmt: skip
         self._bar.SetVerticalTitleSeparation(10)
-
-
-def _round_up(value: float) -> float:
-    """Round up to 1, 2 or 5 times a power of ten, so that a scale does not change with every frame."""
-    power = 10.0 ** math.floor(math.log10(value))
-    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if value <= step * power * (1 + 1e-12))

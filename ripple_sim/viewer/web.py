@@ -26,7 +26,7 @@ from aiohttp import web
 
 from ripple_sim.errors import DisplayError
 
-from .canvas import CONTROLS
+from .controls import CONTROLS
 from .window import Window
 
 LOOPBACK = "127.0.0.1"
@@ -165,18 +165,8 @@ def check_web(port: int, host: str) -> None:
 
 
 def serve(window: Window, port: int, host: str) -> None:
-    """Serve an off-screen window until it is closed or the program is interrupted.
-
-    Parameters
-    ----------
-    window : Window
-    port : int
-    host : str
-        Name or address to listen at.
-    """
+    """Serve an off-screen window at a host's name or address until it is closed or the program is interrupted."""
     from trame.app import get_server
-
-    pass
 
     server, secret = get_server("ripple-sim"), new_secret()
     restrict(server, host=host, port=port, secret=secret)
@@ -233,13 +223,9 @@ class _Page:
             client.ClientStateChange(value="sent", change=(self._acknowledge, "[sent]"))
             with html.Main(tabindex=0, style=f"width: {width}px", keydown=(self._key, "[$event.key]")):
                 with html.Nav():
-                    for control in CONTROLS:
-                        if control.action != "help":
-                            html.Button(
-                                f"{control.label} ({control.key})",
-                                id=control.action,
-                                click=getattr(window.actions, control.action),
-                            )
+                    for key, action, label in CONTROLS:
+                        if action != "help":
+                            html.Button(f"{label} ({key})", id=action, click=getattr(window, action))
                 with html.Div(id="picture", style=f"height: {height}px"):
                     self._view = vtk.VtkRemoteView(
                         window.plotter.render_window, interactive_ratio=1, interactive_quality=_QUALITY

@@ -1,159 +1,73 @@
-"""`Window`: a canvas that runs, with the user's keys, clicks and sliders; its loop on the desktop, and its speed.
+"""`Window`: a session that is drawn, with the user's keys, clicks and sliders; its loop on the desktop, and its speed.
 
-`Actions` has one method for each of `CONTROLS`, and for a click.
+It has one method for each of `CONTROLS`, and for a click.
 """
 
 from __future__ import annotations
 
-import ctypes
-import os
-import sys
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pyvista as pv
+from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkLogger, vtkUnsignedCharArray
 
+from ripple_sim.encode.output import check_size
 from ripple_sim.errors import DisplayError
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import is_software
 
-from .canvas import CONTROLS, Canvas, add_sliders, ray
+from .controls import CONTROLS, Recorder, add_sliders, help_text, level, ray
+from .opening import display_problem
 from .session import OPERATORS, Session
+from .stage import Stage
 
 # A click that moves the pointer farther than this turns the camera and pokes nothing [pixels].
 _STILL = 4
 
 
-class Input:
-    """The pointer and the keyboard of a plotter's window.
+_MULTISAMPLES = 8
+# The status line is rewritten this often [s]: text is slow to draw.
+_STATUS_EVERY = 0.25
+
+
+class Window:
+    """A session in a PyVista plotter, on screen or off, frame by frame, with its user's input and texts over it.
 
     Parameters
     ----------
-    plotter : pyvista.Plotter
-    """
-
-    def __init__(self, plotter: pv.Plotter) -> None:
-        self._iren = plotter.iren
-        self._pressed: tuple[int, int] | None = None
-
-    def observe(self, on_key: Callable[[str], object], on_click: Callable[[int, int], object]) -> None:
-        """Call `on_key` with each key's name, and `on_click` with the pixel, from the lower left, of each click."""
-        iren = self._iren
-        iren.clear_key_event_callbacks()
-        # keys are ours: the style's own ones end the program, draw wire frames and the like
-        iren.style.AddObserver("CharEvent", lambda *_: None)
-        iren.add_observer("KeyPressEvent", lambda *_: on_key(iren.interactor.GetKeySym()))
-        iren.add_observer("LeftButtonPressEvent", lambda *_: self._press())
-        iren.add_observer("LeftButtonReleaseEvent", lambda *_: self._release(on_click))
-
-    def place(self) -> tuple[int, int] | None:
-        """Pixel under the pointer, from the lower left; None if it has never been over the window."""
-        x, y = self._iren.get_event_position()
-        return None if (x, y) == (0, 0) else (x, y)
-
-    def _press(self) -> None:
-        self._pressed = self._iren.get_event_position()
-
-    def _release(self, on_click: Callable[[int, int], object]) -> None:
-        pressed, self._pressed = self._pressed, None
-        x, y = self._iren.get_event_position()
-        if pressed is not None and max(abs(x - pressed[0]), abs(y - pressed[1])) <= _STILL:
-            on_click(x, y)
-
-
-class Actions:
-    """The actions on a canvas.
+    session : Session
+    size : (width, height)
+        [pixels].
+    off_screen : bool
+        Draw without a window: for the web page and for tests.
+    folder : path
+        Where screenshots and videos go.
 
     Attributes
     ----------
+    plotter : pyvista.Plotter
+    stage : Stage
+    recorder : Recorder
     closed : bool
         Whether the user wants to leave.
-    """
+    drawn : bool
+        Whether the latest frame shows the present state.
+    message : str
+        Latest message to the user.
+    seconds_drawing : float
+        Time that drawing has taken so far [s].
+    render : callable
+        Draws the frame; a web page replaces it by its own, which also sends the frame.
 
-    def __init__(self, canvas: Canvas, pointer: Input) -> None:
-        self._canvas, self._pointer, self._session = canvas, pointer, canvas.session
-        self.closed = False
-
-    def pause(self) -> None:
-        """Pause, or resume."""
-        self._session.paused = not self._session.paused
-        self._canvas.say("")
-
-    def step(self) -> None:
-        """Advance by one frame and pause."""
-        self._session.paused = True
-        try:
-            self._session.step()
-        except RippleError as error:
-            self._canvas.say(f"{error}; r: reset")
-        self._canvas.update()
-
-    def reset(self) -> None:
-        """Start again."""
-        self._session.reset()
-        self._canvas.say("")
-        self._canvas.update()
-
-    def poke_at(self, x: int, y: int) -> bool:
-        """Poke the surface under a pixel, counted from the lower left; return whether there is a rippling one."""
-        return self._session.poke(*ray(self._canvas.plotter.renderer, x, y)) is not None
-
-    def throw(self) -> None:
-        """Throw a ball from the camera at the pointer, or at the middle if that has never been over the window."""
-        width, height = self._canvas.size()
-        x, y = self._pointer.place() or (width // 2, height // 2)
-        if not self._session.throw(*ray(self._canvas.plotter.renderer, x, y)):
-            self._canvas.say("this scene has no ball to throw")
-
-    def operator(self) -> None:
-        """Switch to the next wave operator."""
-        following = OPERATORS[(OPERATORS.index(self._session.operator) + 1) % len(OPERATORS)]
-        self._session.set_operator(following)
-        self._canvas.say("")
-
-    def colors(self) -> None:
-        """Show the height as colours, or the surface in its own."""
-        self._canvas.stage.toggle_heatmap()
-        self._canvas.mark_stale()
-
-    def screenshot(self) -> None:
-        """Write an image."""
-        self._canvas.draw()
-        try:
-            self._canvas.say(f"wrote {self._canvas.recorder.save(self._canvas.pixels())}")
-        except RippleError as error:
-            self._canvas.say(str(error))
-
-    def record(self) -> None:
-        """Begin a video, or end it."""
-        recorder = self._canvas.recorder
-        try:
-            if recorder.recording:
-                self._canvas.say(f"wrote {recorder.stop()}")
-            else:
-                self._canvas.say(f"recording {recorder.start(self._canvas.pixels())}")
-        except RippleError as error:
-            self._canvas.say(str(error))
-
-    def help(self) -> None:
-        """Show or hide the list of keys."""
-        self._canvas.toggle_help()
-
-    def quit(self) -> None:
-        """Leave."""
-        self.closed = True
-
-
-_MULTISAMPLES = 8
-
-
-class Window(Canvas):
-    """A session on screen or off, see `Canvas`, with its user's input.
-
-    Attributes
-    ----------
-    actions : Actions
+    Raises
+    ------
+    VideoError
+        If the size cannot be drawn.
     """
 
     def __init__(
@@ -164,18 +78,170 @@ class Window(Canvas):
         off_screen: bool = False,
         folder: str | Path = ".",
     ) -> None:
-        super().__init__(session, size=size, off_screen=off_screen, folder=folder)
+        check_size(*size)
+        self.session = session
+        self.message = ""
+        self.seconds_drawing = 0.0
+        self.drawn = False
+        self._updates, self._since, self._rate = 0, time.perf_counter(), math.nan
+        scene = session.simulation.scene
+        self.recorder = Recorder(Path(folder), scene.name, session.fps)
+        # where there is no display VTK warns of that, and then does without one
+        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+        self.plotter = pv.Plotter(off_screen=off_screen, window_size=list(size), lighting="none", title=scene.name)
+        # smooth edges cost software OpenGL four fifths of its speed
+        self.plotter.render_window.SetMultiSamples(0)
+        self.stage = Stage(self.plotter, session)
+        self._text, self._help = (
+            self.plotter.add_text(text, position=corner, font_size=size, color="black", shadow=False)
+            for text, corner, size in (("", "upper_left", 9), (help_text(), "upper_right", 8))
+        )
+        self.render: Callable[[], object] = self.plotter.render_window.Render
+        self.update()
         self._sliders = add_sliders(self.plotter, session)
-        self._input = Input(self.plotter)
-        self.actions = Actions(self, self._input)
-        self._input.observe(self.key, self.actions.poke_at)
-        self.plotter.iren.add_observer("RenderEvent", lambda *_: self.mark_stale())
-        self.plotter.iren.add_observer("ExitEvent", lambda *_: self.actions.quit())
+        self.closed = False
+        self._pressed: tuple[int, int] | None = None
+        iren = self.plotter.iren
+        iren.clear_key_event_callbacks()
+        # keys are ours: the style's own ones end the program, draw wire frames and the like
+        iren.style.AddObserver("CharEvent", lambda *_: None)
+        iren.add_observer("KeyPressEvent", lambda *_: self.key(iren.interactor.GetKeySym()))
+        iren.add_observer("LeftButtonPressEvent", lambda *_: self._press())
+        iren.add_observer("LeftButtonReleaseEvent", lambda *_: self._release())
+        iren.add_observer("RenderEvent", lambda *_: self.mark_stale())
+        iren.add_observer("ExitEvent", lambda *_: self.quit())
 
-    @property
-    def closed(self) -> bool:
-        """Whether the user wants to leave."""
-        return self.actions.closed
+    def pause(self) -> None:
+        """Pause, or resume."""
+        self.session.paused = not self.session.paused
+        self.say("")
+
+    def step(self) -> None:
+        """Advance by one frame and pause."""
+        self.session.paused = True
+        try:
+            self.session.step()
+        except RippleError as error:
+            self.say(f"{error}; r: reset")
+        self.update()
+
+    def reset(self) -> None:
+        """Start again."""
+        self.session.reset()
+        self.say("")
+        self.update()
+
+    def poke_at(self, x: int, y: int) -> bool:
+        """Poke the surface under a pixel, counted from the lower left; return whether there is a rippling one."""
+        return self.session.poke(*ray(self.plotter.renderer, x, y)) is not None
+
+    def throw(self) -> None:
+        """Throw a ball from the camera at the pointer, or at the middle if that has never been over the window."""
+        width, height = self.size()
+        x, y = self.pointer() or (width // 2, height // 2)
+        if not self.session.throw(*ray(self.plotter.renderer, x, y)):
+            self.say("this scene has no ball to throw")
+
+    def operator(self) -> None:
+        """Switch to the next wave operator."""
+        following = OPERATORS[(OPERATORS.index(self.session.operator) + 1) % len(OPERATORS)]
+        self.session.set_operator(following)
+        self.say("")
+
+    def colors(self) -> None:
+        """Show the height as colours, or the surface in its own."""
+        self.stage.toggle_heatmap()
+        self.mark_stale()
+
+    def screenshot(self) -> None:
+        """Write an image."""
+        self.draw()
+        try:
+            self.say(f"wrote {self.recorder.save(self.pixels())}")
+        except RippleError as error:
+            self.say(str(error))
+
+    def record(self) -> None:
+        """Begin a video, or end it."""
+        recorder = self.recorder
+        try:
+            if recorder.recording:
+                self.say(f"wrote {recorder.stop()}")
+            else:
+                self.say(f"recording {recorder.start(self.pixels())}")
+        except RippleError as error:
+            self.say(str(error))
+
+    def help(self) -> None:
+        """Show or hide the list of keys."""
+        self._help.SetVisibility(not self._help.GetVisibility())
+        self.mark_stale()
+
+    def quit(self) -> None:
+        """Leave."""
+        self.closed = True
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """The latest frame, uint8 [height, width, 3]."""
+        window, pixels = self.plotter.render_window, vtkUnsignedCharArray()
+        width, height = window.GetSize()
+        window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
+        return vtk_to_numpy(pixels).reshape(height, width, 3)[::-1]
+
+    def size(self) -> tuple[int, int]:
+        """Width and height [pixels]."""
+        return self.plotter.render_window.GetSize()
+
+    def status(self) -> str:
+        """Time, operator and state; in a second line the latest message."""
+        session = self.session
+        state = "paused" if session.paused else f"{self._rate:.0f} updates/s" if self._rate > 0 else ""
+        recording = "   recording" if self.recorder.recording else ""
+        return f"{session.time:.2f} s   operator {session.operator}   {state}{recording}\n{self.message}"
+
+    def say(self, message: str) -> None:
+        """Show a message in the status line."""
+        self.message = message
+        self._show_status()
+
+    def hide_texts(self) -> None:
+        """Leave the status line and the list of keys out of the frame."""
+        for text in (self._text, self._help):
+            text.SetVisibility(False)
+
+    def update(self) -> None:
+        """Bring the stage up to date with the session."""
+        self.stage.update()
+        self.mark_stale()
+
+    def mark_stale(self) -> None:
+        """Have the frame drawn again at the next tick."""
+        self.drawn = False
+
+    def draw(self) -> None:
+        """Draw the frame, and add it to a video that is being recorded."""
+        now = time.perf_counter()
+        self._updates += 1
+        if now - self._since > _STATUS_EVERY:
+            self._rate = self._updates / (now - self._since)
+            self._updates, self._since = 0, now
+            self._show_status()
+        level(self.plotter.camera)
+        self.plotter.renderer.ResetCameraClippingRange()
+        self.render()
+        self.drawn = True
+        self.seconds_drawing += time.perf_counter() - now
+        if self.recorder.recording:
+            try:
+                if not self.recorder.add(self.pixels()):
+                    self.say("the window has changed its size: the recording has ended")
+            except RippleError as error:
+                self.say(str(error))
+
+    def _show_status(self) -> None:
+        if self._text.GetVisibility():
+            self._text.set_text("upper_left", self.status())
+        self.mark_stale()
 
     def open(self) -> None:
         """Show the window."""
@@ -188,7 +254,7 @@ class Window(Canvas):
 
     def close(self) -> None:
         """Close the window and finish a video."""
-        self.actions.quit()
+        self.quit()
         try:
             self.recorder.stop()
         finally:
@@ -214,11 +280,26 @@ class Window(Canvas):
         lines = self.plotter.render_window.ReportCapabilities().splitlines()
         return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("OpenGL renderer")), "none")
 
+    def pointer(self) -> tuple[int, int] | None:
+        """Pixel under the pointer, from the lower left; None if it has never been over the window."""
+        x, y = self.plotter.iren.get_event_position()
+        return None if (x, y) == (0, 0) else (x, y)
+
+    def _press(self) -> None:
+        self._pressed = self.plotter.iren.get_event_position()
+
+    def _release(self) -> None:
+        """Poke where the pointer is, if it was pressed there."""
+        pressed, self._pressed = self._pressed, None
+        x, y = self.plotter.iren.get_event_position()
+        if pressed is not None and max(abs(x - pressed[0]), abs(y - pressed[1])) <= _STILL:
+            self.poke_at(x, y)
+
     def key(self, name: str) -> None:
         """Carry out the action of a key, in upper or lower case; other keys do nothing."""
-        for control in CONTROLS:
-            if name.lower() == control.key:
-                getattr(self.actions, control.action)()
+        for key, action, _ in CONTROLS:
+            if name.lower() == key:
+                getattr(self, action)()
 
 
 def run(window: Window) -> None:
@@ -243,12 +324,12 @@ def benchmark(window: Window, updates: int = 60, tries: int = 3) -> str:
     is that of all threads, which other programs hardly change.
     """
     window.open()
-    width, height = window.plotter.render_window.GetSize()
+    width, height = window.size()
     trials = []
     for _ in range(tries):
-        window.actions.reset()
-        window.actions.poke_at(width // 2, height // 2)
-        window.actions.throw()
+        window.reset()
+        window.poke_at(width // 2, height // 2)
+        window.throw()
         start, processor, drawing = time.perf_counter(), time.process_time(), window.seconds_drawing
         for _ in range(updates):
             window.tick()
@@ -283,22 +364,3 @@ def check_display() -> None:
             f"no window can be opened: {problem}; add --web to use a browser instead, or render a video with "
             "`ripple-sim render` or `ripple-sim drop`"
         )
-
-
-def display_problem() -> str | None:
-    """Why VTK cannot open a window, or None. Wayland desktops serve X11 too, and set DISPLAY."""
-    if not sys.platform.startswith("linux"):
-        return None
-    name = os.environ.get("DISPLAY")
-    if not name:
-        return "the environment variable DISPLAY is not set"
-    try:
-        x11 = ctypes.CDLL("libX11.so.6")
-    except OSError:
-        return "the library libX11.so.6 is missing (on Debian and Ubuntu: apt-get install libx11-6)"
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    display = x11.XOpenDisplay(None)
-    if not display:
-        return f"there is no X server at DISPLAY={name}"
-    x11.XCloseDisplay(ctypes.c_void_p(display))
-    return None

@@ -33,10 +33,6 @@ class RowLayout:
     Side by side, all charts with their halo are one, [1, n + 2, (C + 1)(n + 2)]: loops run over the halo between them
     too, where coefficients are 0, and what they leave there is filled again. The last n + 2 columns stay 0.
 
-    Parameters
-    ----------
-    topology : TexelTopology
-
     Attributes
     ----------
     n : int
@@ -57,9 +53,9 @@ class RowLayout:
             self.columns, self._pitch = self.n, -(-width // LINE) * LINE
         else:
             self.columns, self._pitch = self._charts * width - 2, (self._charts + 1) * width
-        table = topology.addresses
-        self.addresses = self._address(table.texels)
-        self.halo = np.stack([self._address(table.ghosts), self._address(table.sources)])
+        texels, ghosts, sources = topology.addresses
+        self.addresses = self._address(texels)
+        self.halo = np.stack([self._address(ghosts), self._address(sources)])
         if topology.fixed_rim and not self._alone:
             # loops run over these: they are set to 0 again
             beside = np.flatnonzero(topology.rim)
@@ -71,19 +67,19 @@ class RowLayout:
         return aligned((self._charts if self._alone else 1, self.n + 2, self._pitch), 1, shift)
 
     def coefficients(self, field: NDArray | np.float32) -> Any:
-        """A field [C, n, n] as loops read it beside one with halo, [C, n, columns], 0 between charts; or a number."""
+        """A field [C, n, n] as loops read it beside one with halo: flat, [C n columns], 0 between; or a number."""
         if np.ndim(field) == 0:
             return field
         field = np.asarray(field)
         if self._alone:
             laid = aligned(field.shape, 0, dtype=field.dtype)
             laid[:] = field
-            return laid
+            return laid.reshape(-1)
         spread = np.zeros((self.n, self._charts, self.n + 2), field.dtype)
         spread[:, :, 1:-1] = field.transpose(1, 0, 2)
         laid = aligned((1, self.n, self.columns), 0, dtype=field.dtype)
         laid[0] = spread.reshape(self.n, -1)[:, 1:-1]
-        return laid
+        return laid.reshape(-1)
 
     @functools.cached_property
     def places(self) -> NDArray[np.int64]:
@@ -144,11 +140,6 @@ def aligned(shape: tuple[int, ...], column: int, shift: int = 0, dtype: DTypeLik
     return memory[start : start + size].reshape(shape)
 
 
-def is_varied(k: StepCoefficients) -> bool:
-    """Whether a coefficient other than the gain is a field."""
-    return any(np.ndim(each) for each in (k.decay, k.spring, k.span))
-
-
 def laid_out(k: StepCoefficients, fields: RowLayout, *, varied: bool) -> StepCoefficients:
     """Coefficients as the loops read them: beside the gain all fields, or none."""
     each = (k.gain, k.decay, k.spring, k.span)
@@ -158,7 +149,7 @@ def laid_out(k: StepCoefficients, fields: RowLayout, *, varied: bool) -> StepCoe
 def part_runs(operator: WaveOperator, fields: RowLayout) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Runs of texels in coefficients that belong to one part: where each begins, [k + 1], and its part, [k]."""
     parts = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts
-    beside = fields.coefficients(parts).reshape(-1)
+    beside = fields.coefficients(parts)
     begins = np.flatnonzero(np.diff(beside, prepend=-1))
     return np.append(begins, beside.size), beside[begins].astype(np.int64)
 
@@ -187,14 +178,7 @@ def volume_balance(operator: WaveOperator, dt: float, fields: RowLayout) -> Bala
 
 
 class CPUBackend:
-    """Height and velocity in float32 charts with halo; see `backends.Backend`.
-
-    Parameters
-    ----------
-    operator : WaveOperator
-    keeps_volume : bool
-        See `backends.Backend`.
-    """
+    """Height and velocity in float32 charts with halo; see `backends.Backend`."""
 
     name = "cpu"
 
@@ -208,23 +192,24 @@ class CPUBackend:
         self._h, self._h_next, self._v = (fields.zeros(shift * PAGE // 3 // LINE * LINE) for shift in range(3))
         self._dent: NDArray[np.float32] | None = None
         features = NO_FEATURES
-        if operator.viscous_stencil is not None:
-            features = features._replace(viscous=fields.weights(operator.viscous_stencil))
+        if operator.viscosity_stencil is not None:
+            features = features._replace(viscosity=fields.weights(operator.viscosity_stencil))
         if operator.laplace_stencil is not None and operator.rigidity is not None:
             rigidity = fields.coefficients(operator.rigidity.astype(np.float32))
             laplace = fields.weights(operator.laplace_stencil)
-            features = features._replace(laplace=laplace, rigidity=rigidity, moment=fields.zeros())
+            features = features._replace(laplace=laplace, rigidity=rigidity, moment=fields.zeros().reshape(-1))
         if operator.yield_height is not None:
             self._dent = fields.zeros()
-            limit = fields.coefficients(operator.yield_height.astype(np.float32))
-            features = features._replace(limit=limit, dent=self._dent)
+            limit = np.full_like(self._dent, np.inf)
+            fields.texels(limit)[:] = operator.yield_height
+            features = features._replace(limit=limit.reshape(-1), dent=self._dent.reshape(-1))
         self._features = features
         self._response = fields.coefficients(number_or_field(operator.response))
         self._part_runs = None if operator.parts is None else part_runs(operator, fields)
         self._part_count = 1 if operator.parts is None else int(operator.parts.max()) + 1
         self._balance: Balance | None = None
         self._extra: Coefficient = np.float32(0)
-        self._shift: Amplitude = 0.0
+        self._shift: Amplitude | None = None  # of velocities, which the next drift adds
         self._crests: NDArray[np.float32] | None = None
         self._prepared = (0.0, keeps_volume)
         self.load(np.zeros(0, np.int64), np.zeros(0), 0.0)
@@ -276,7 +261,7 @@ class CPUBackend:
         """Replace the velocity."""
         self._v[:] = 0
         self._fields.texels(self._v)[:] = velocity
-        self._shift = 0.0
+        self._shift = None
 
     def kick(self, texels: NDArray[np.int64], velocities: NDArray[np.float32], everywhere: Amplitude) -> None:
         """Add velocities [m/s] to some texels (each named once), and one to all, as they respond.
@@ -284,7 +269,7 @@ class CPUBackend:
         The latter is only noted: the next drift, which touches every texel anyway, adds it.
         """
         self._v.reshape(-1)[self._fields.addresses[texels]] += velocities
-        self._shift = self._shift + everywhere
+        self._shift = everywhere if self._shift is None else self._shift + everywhere
 
     def load(self, texels: NDArray[np.int64], forces: NDArray[np.float64], everywhere: Amplitude) -> None:
         """Hold forces [N] on some texels, and one acceleration [m/s^2] on all, until the next call."""
@@ -295,21 +280,20 @@ class CPUBackend:
         """Take leapfrog substeps of dt [s]: drift, kick, drift, with touching drifts joined."""
         k, balance = self._prepare(dt), self._balance
         acceleration = self._pressure(self._acceleration) if balance is None else balance.pressure
-        kick = Kick(self._stencil.rows, k.gain, k.decay, k.spring, k.span, self._extra, acceleration)
+        kick = Kick(self._stencil, k.gain, k.decay, k.spring, k.span, self._extra, acceleration)
         self._drift(dt / 2)
         features = self._features
         if len(features.dent):
-            kernels.flow(self._h, features.limit, features.dent)
-        drags = self._plain and len(features.viscous.rows) > 0
+            kernels.flow(self._h.reshape(-1), features.limit, features.dent)
+        drags = self._plain and len(features.viscosity.rows) > 0
         kernels.advance(
             substeps,
             np.float32(dt),
-            *(self._h, self._v, self._h_next),
+            *(field.reshape(-1) for field in (self._h, self._v, self._h_next)),
             self._fields.halo,
             kick,
-            self._stencil.irregular,
             *self._kicks,
-            features.viscous if drags else None,
+            features.viscosity if drags else None,
             None if self._plain else features,
         )
         if substeps % 2:
@@ -322,8 +306,8 @@ class CPUBackend:
         self._operator, fields = operator, self._fields
         self._stencil = fields.fill(self._stencil.rows, operator.stencil)
         features = self._features
-        if operator.viscous_stencil is not None:
-            features = features._replace(viscous=fields.fill(features.viscous.rows, operator.viscous_stencil))
+        if operator.viscosity_stencil is not None:
+            features = features._replace(viscosity=fields.fill(features.viscosity.rows, operator.viscosity_stencil))
         if operator.laplace_stencil is not None and operator.rigidity is not None:
             rigidity = fields.coefficients(operator.rigidity.astype(np.float32))
             laplace = fields.fill(features.laplace.rows, operator.laplace_stencil)
@@ -347,20 +331,20 @@ class CPUBackend:
 
     def _drift(self, dt: float) -> None:
         """The drift by which a step begins; the noted shift is in it."""
-        if dt or np.any(self._shift):
-            shift = self._pressure(self._shift)
-            kernels.drift(self._h, self._v, self._response, shift, self._fields.columns, np.float32(dt))
-            self._shift = 0.0
+        if self._shift is not None:
+            shift = self._pressure(self._shift) * self._response
+            velocities = self._v[:, 1:-1, 1 : self._fields.columns + 1]
+            velocities += shift.reshape(velocities.shape) if shift.ndim else shift
+            self._shift = None
+        if dt:
+            kernels.drift(self._h.reshape(-1), self._v.reshape(-1), np.float32(dt))
 
     def _pressure(self, amplitude: Amplitude) -> Coefficient:
-        """An amplitude, one for all or one for each part, as the loops take it."""
+        """An amplitude, one for all or one for each part, as the loops take it: a number, or a flat field."""
         if self._part_runs is None:
             return np.float32(amplitude)
         begins, parts = self._part_runs
-        field: NDArray[np.float32] = np.repeat(
-            np.broadcast_to(np.float32(amplitude), self._part_count)[parts], np.diff(begins)
-        )
-        return field.reshape(-1, self._fields.n, self._fields.columns)
+        return np.repeat(np.broadcast_to(np.float32(amplitude), self._part_count)[parts], np.diff(begins))
 
     def _prepare(self, dt: float) -> StepCoefficients:
         """Coefficients of the kick, computed once a step length, and the load's, once a load as well."""
@@ -371,18 +355,19 @@ class CPUBackend:
                 self._balance = volume_balance(self._operator, dt, self._fields)
             self._features = self._features._replace(balance=self._balance or NO_BALANCE)
             k = step_coefficients(self._operator, dt)
-            varied = is_varied(k) or self._part_runs is not None or self._balance is not None
+            varied = any(np.ndim(each) for each in (k.decay, k.spring, k.span))
+            varied = varied or self._part_runs is not None or self._balance is not None
             self._coefficients = laid_out(k, self._fields, varied=varied)
             features = self._features
             self._plain = not (varied or len(features.moment) or len(features.dent))
             # a field where forces are added up, or the number 0
-            drags = len(features.viscous.rows) > 0 or not self._plain
+            drags = len(features.viscosity.rows) > 0 or not self._plain
             if drags != bool(np.ndim(self._extra)):
-                self._extra = self._fields.zeros() if drags else np.float32(0)
+                self._extra = self._fields.zeros().reshape(-1) if drags else np.float32(0)
             self._prepared = (dt, self.keeps_volume)
         k = self._coefficients
         if new_length or self._load_is_new:
-            kicks = k.gain.reshape(-1)[self._fields.places[self._loaded]] * self._forces.astype(np.float32)
+            kicks = k.gain[self._fields.places[self._loaded]] * self._forces.astype(np.float32)
             self._kicks = self._fields.addresses[self._loaded], kicks
             if self._balance is not None:
                 self._balance.loaded[:] = self._acceleration

@@ -1,4 +1,7 @@
-"""GPU backend: the same leapfrog update as compute shaders, one file a stage in `shaders/`."""
+"""GPU backend: the same leapfrog update as compute shaders, one file a stage in `shaders/`.
+
+The stiffness of a moving surface is made there too, from its vertices, in a storage buffer.
+"""
 
 from __future__ import annotations
 
@@ -7,46 +10,173 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gl import GLContext, shared_context
+from ..kernel import Ints
 from ..operator.volume import volume_rate
 from ..operator.wave_operator import WaveOperator, step_coefficients
+from ..texels.cells import EVEN, LEAST_AREA, PER_HOURGLASS, PER_TINY, SHARE, TINY
+from ..texels.moving import MovedStencil, Ride
+from ..texels.stencil import NO_LINKS, IrregularLinks, Stencil, crossing_links, missing_links
+from ..texels.stiffness import LEAST_RATIO
+from ..texels.topology import TexelTopology
 from .gl_dispatch import Dispatch, Pressure, VolumeKeeper
-from .gl_fields import DeviceField, FieldLayout, LinkBuffers, TexelList
-from .gl_stiffness import StencilBuffer
+from .gl_fields import DeviceField, FieldLayout, TexelList, link_buffers
 from .kernels import Amplitude
+
+_LAW = {
+    "PER_HOURGLASS": float(PER_HOURGLASS),
+    "SHARE": float(SHARE),
+    "EVEN": float(EVEN),
+    "LEAST_AREA": float(LEAST_AREA),
+    "TINY": float(TINY),
+    "PER_TINY": float(PER_TINY),
+    "LEAST_RATIO": float(LEAST_RATIO),
+}
+
+
+class DeviceStiffness:
+    """Makes stencils such as `stencil`, of one set of cells for one coefficient, wherever the vertices are.
+
+    The quads are the GPU's; the few other cells are worked out on the CPU, and what they give is uploaded. `mass`
+    [C, n, n] is in kg.
+    """
+
+    def __init__(self, gl: GLContext, dispatch: Dispatch, stencil: MovedStencil, mass: NDArray[np.float64]) -> None:
+        self._gl, self._dispatch, self._mass = gl, dispatch, mass
+        topology, cells, ride = stencil.topology, stencil.cells, stencil.places.ride.ride
+        self._width, self._count = topology.halo.shape[1], topology.halo.size
+        self._special: Ride = ride.of_each(cells.special_places)
+        self._around = np.zeros((3, self._count))
+        added, crossing, missing = cells.special_links, crossing_links(topology), missing_links(topology)
+        self._added = _link_groups(gl, topology, added, np.arange(len(added) + 1))
+        self._copies = _link_groups(gl, topology, crossing.copies, crossing.begins)
+        self._missing = _link_groups(gl, topology, missing, np.arange(len(missing) + 1))
+        shares = np.where(topology.rim, 0.5, 1.0) if topology.fixed_rim else np.ones(self._count)
+        with gl as ctx:
+            self._vertices = ctx.buffer(reserve=stencil.places.V.nbytes)
+            self._places, self._sides = ctx.buffer(reserve=24 * self._count), ctx.buffer(reserve=24 * self._count)
+            self._values, self._peak = ctx.buffer(reserve=4 * (1 + len(added))), ctx.buffer(bytes(4))
+        self._corners, self._texels = (_upload(gl, each, np.int32) for each in (ride.corners, topology.addresses[0]))
+        self._weights, quads = _upload(gl, np.nan_to_num(ride.weights), np.float64), stencil.coefficient[0]
+        self._conductance, self._per_area, self._shares, self._masses, self._beside = (
+            _upload(gl, each, np.float32)
+            for each in (quads.conductance, quads.per_area, shares, mass, np.zeros(mass.size))
+        )
+        names = ("ride", "quad_links", "close_links", "add_links", "link_rates")
+        self._shaders = {name: dispatch.shader(name) for name in names}
+        self._shaders["quads"] = dispatch.shader("quads", **_LAW)
+
+    def write(self, stencil: MovedStencil, buffer: moderngl.Buffer) -> IrregularLinks | None:
+        """Write the nine-point stencil into a buffer of `FieldLayout.upload_stencil`; return the irregular links."""
+        V, (quads, _) = stencil.places.V, stencil.coefficient
+        self._around[:, stencil.cells.special_places] = self._special.at(V)
+        values, irregular = stencil.cells.special(self._around, stencil.coefficient)
+        with self._gl:
+            self._vertices.write(V.tobytes())
+            self._values.write(values.astype(np.float32).tobytes() or bytes(4))
+            self._run("ride", self._count, self._vertices, self._corners, self._weights, self._places)
+            shape = {"width": self._width, "scale": quads.scale, "power": quads.power}
+            self._run("quads", self._count, self._places, self._conductance, self._per_area, self._sides, **shape)
+            self._run("quad_links", self._count, self._sides, buffer, width=self._width)
+            for (groups, *links), factor in ((self._missing, 0.0), (self._copies, 1.0)):
+                self._run("close_links", groups, buffer, *links, factor=factor)
+            self._run("add_links", self._added[0], buffer, self._added[1], self._values)
+            stencil.note_fastest(self._fastest(irregular, buffer))
+        return irregular
+
+    def _fastest(self, irregular: IrregularLinks | None, buffer: moderngl.Buffer) -> float:
+        """Gershgorin's bound for what was made last."""
+        links = irregular if irregular is not None else NO_LINKS
+        if len(links.texels):
+            beside = np.zeros(self._mass.size, np.float32)
+            beside[links.texels] = np.add.reduceat(np.abs(links.weights), links.begins[:-1])
+            self._beside.write(beside.tobytes())
+        self._peak.write(bytes(4))
+        buffers = buffer, self._peak, self._texels, self._shares, self._beside, self._masses
+        self._run("link_rates", self._mass.size, *buffers, width=self._width)
+        return float(np.frombuffer(self._peak.read(), np.float32)[0])
+
+    def _run(self, name: str, count: int, *buffers: moderngl.Buffer, **uniforms: float) -> None:
+        """Run a shader over a list of so many entries, if there are any."""
+        if not count:
+            return
+        shader = self._shaders[name]
+        for uniform, value in {"count": count, **uniforms}.items():
+            shader[uniform] = value
+        self._dispatch.bind(*buffers)
+        self._dispatch.run_list(shader, count)
+
+
+def _link_groups(
+    gl: GLContext, topology: TexelTopology, links: Ints, begins: Ints
+) -> tuple[int, moderngl.Buffer, moderngl.Buffer]:
+    """How many groups of links, where these lie among those of all places, and first of each group and one after.
+
+    A link is 4 times its place with halo, plus 0 to 3: east, north, north-east, or across that.
+    """
+    charts, n, _ = topology.shape
+    chart, link, r, c = np.unravel_index(links, (charts, 4, n + 1, n + 1))
+    places = _upload(gl, 4 * ((chart * (n + 2) + r) * (n + 2) + c) + link, np.int32)
+    return len(begins) - 1, places, _upload(gl, np.stack([begins[:-1], begins[1:]], axis=1), np.int32)
+
+
+def _upload(gl: GLContext, values: NDArray, kind: type) -> moderngl.Buffer:
+    with gl as ctx:
+        return ctx.buffer(np.ascontiguousarray(values, kind).tobytes() or bytes(8))
+
+
+class StencilBuffer:
+    """The nine-point stencil as the wave step reads it, and the irregular links."""
+
+    def __init__(self, gl: GLContext, fields: FieldLayout, dispatch: Dispatch, stencil: Stencil) -> None:
+        self._gl, self._fields, self._dispatch = gl, fields, dispatch
+        self.buffer, self.irregular = fields.upload_stencil(stencil), stencil.irregular
+        self._device: DeviceStiffness | None = None
+
+    def write(self, stencil: Stencil, mass: NDArray[np.float64]) -> None:
+        """Take over another stencil of the same topology: made on the GPU where that can be, else uploaded.
+
+        It can be where texels lie on their triangles, and none of them twice. A software driver's shaders run on the
+        processor's own cores, where the CPU's loops take a fifth of the time.
+        """
+        moved = stencil if isinstance(stencil, MovedStencil) and not self._gl.software else None
+        if moved and not len(moved.places.ride.ride.offsets) and not len(moved.places.ride.images):
+            if self._device is None:
+                self._device = DeviceStiffness(self._gl, self._dispatch, moved, mass)
+            self.irregular = self._device.write(moved, self.buffer)
+        else:
+            self._fields.write_stencil(self.buffer, stencil)
+            self.irregular = stencil.irregular
 
 
 class ExtraForces:
     """The forces that need stencils of their own, gathered in a field before a substep's kick.
 
-    Attributes
-    ----------
-    field : moderngl.Buffer or None
-        The sum of these forces; None for a material without any.
+    `field` is the sum of these forces; None for a material without any.
     """
 
     def __init__(self, gl: GLContext, fields: FieldLayout, dispatch: Dispatch, operator: WaveOperator) -> None:
         self._gl, self._fields, self._dispatch = gl, fields, dispatch
         self.field: moderngl.Buffer | None = None
-        self._viscous: StencilBuffer | None = None
+        self._viscosity: StencilBuffer | None = None
         self._laplace: StencilBuffer | None = None
-        if operator.viscous_stencil is not None:
-            self._viscous = StencilBuffer(gl, fields, dispatch, operator.viscous_stencil)
-            self._apply_viscous = dispatch.texel_shader("apply")
+        if operator.viscosity_stencil is not None:
+            self._viscosity = StencilBuffer(gl, fields, dispatch, operator.viscosity_stencil)
+            self._apply_viscosity = dispatch.texel_shader("apply")
         if operator.laplace_stencil is not None and operator.rigidity is not None:
             self._laplace = StencilBuffer(gl, fields, dispatch, operator.laplace_stencil)
             self._rigidity, self._moment = fields.upload(operator.rigidity), fields.zeros()
             self._apply_rigidity = dispatch.texel_shader("apply", FACTOR=1)
-            added = {"ADD": 1} if self._viscous else {}
+            added = {"ADD": 1} if self._viscosity else {}
             self._subtract_laplace = dispatch.texel_shader("apply", SUBTRACT=1, **added)
-        if self._viscous or self._laplace:
+        if self._viscosity or self._laplace:
             self.field = fields.zeros()
         self._irregular = dispatch.shader("irregular", KICK=0)
         self._link(operator)
 
     def move(self, operator: WaveOperator) -> None:
         """Take over the stencils of the same surface with its texels elsewhere."""
-        if self._viscous and operator.viscous_stencil is not None:
-            self._viscous.write(operator.viscous_stencil, operator.mass)
+        if self._viscosity and operator.viscosity_stencil is not None:
+            self._viscosity.write(operator.viscosity_stencil, operator.mass)
         if self._laplace and operator.laplace_stencil is not None and operator.rigidity is not None:
             self._laplace.write(operator.laplace_stencil, operator.mass)
             self._fields.write(self._rigidity, operator.rigidity.astype(np.float32))
@@ -57,11 +187,11 @@ class ExtraForces:
         if self.field is None:
             return
         dispatch = self._dispatch
-        if self._viscous:
+        if self._viscosity:
             dispatch.fill_halo(velocity)
-            dispatch.bind(velocity, self.field, None, self._viscous.buffer)
-            dispatch.run_texels(self._apply_viscous)
-            self._apply_links(self._viscous_links, velocity, self.field)
+            dispatch.bind(velocity, self.field, None, self._viscosity.buffer)
+            dispatch.run_texels(self._apply_viscosity)
+            self._apply_links(self._viscosity_links, velocity, self.field)
         if self._laplace:
             dispatch.bind(height, self._moment, None, self._laplace.buffer, self._rigidity)
             dispatch.run_texels(self._apply_rigidity)
@@ -74,18 +204,21 @@ class ExtraForces:
     def _link(self, operator: WaveOperator) -> None:
         """Upload the links at irregular vertices."""
         ones = np.ones_like(operator.mass)
-        if self._viscous:
-            self._viscous_links = LinkBuffers(self._gl, self._fields, self._viscous.irregular, ones)
+        if self._viscosity:
+            self._viscosity_links = link_buffers(self._gl, self._fields, self._viscosity.irregular, ones)
         if self._laplace and operator.rigidity is not None:
             self._moment_links, self._bending_links = (
-                LinkBuffers(self._gl, self._fields, self._laplace.irregular, factors)
+                link_buffers(self._gl, self._fields, self._laplace.irregular, factors)
                 for factors in (operator.rigidity, -ones)
             )
 
-    def _apply_links(self, links: LinkBuffers, field: moderngl.Buffer, result: moderngl.Buffer) -> None:
-        if links.count:
-            self._dispatch.bind(field, result, None, links.texels, links.links)
-            self._dispatch.run_list(self._irregular, links.count)
+    def _apply_links(
+        self, links: tuple[int, moderngl.Buffer, moderngl.Buffer], field: moderngl.Buffer, result: moderngl.Buffer
+    ) -> None:
+        count, *buffers = links
+        if count:
+            self._dispatch.bind(field, result, None, *buffers)
+            self._dispatch.run_list(self._irregular, count)
 
 
 class GLBackend:
@@ -110,7 +243,9 @@ class GLBackend:
         self._extra = ExtraForces(self._gl, fields, self._dispatch, operator)
         if operator.yield_height is not None:
             self._dent, self._yield = fields.zeros(), fields.upload(operator.yield_height)
-        self._compile()
+            self._yielding = self._dispatch.texel_shader("flow")
+        self._kick, self._irregular_kick = self._dispatch.shader("kick"), self._dispatch.shader("irregular", KICK=1)
+        self._drift = self._dispatch.texel_shader("drift", **({} if self._given is None else {"PARTS": 1}))
         self._shift: Amplitude = 0.0
         self._crests: moderngl.Buffer | None = None
         self._prepared = (0.0, keeps_volume)
@@ -198,15 +333,8 @@ class GLBackend:
                     self._held.follow(self._h, self._v)
                 kick_drift["dt"] = drift
                 pressure = (self._held.parts, self._held.amplitudes) if self._held is not None else ()
-                self._dispatch.bind(
-                    self._h,
-                    self._v,
-                    self._h_next,
-                    self._stencil.buffer,
-                    self._coefficients,
-                    self._extra.field,
-                    *pressure,
-                )
+                operator = self._stencil.buffer, self._coefficients, self._extra.field
+                self._dispatch.bind(self._h, self._v, self._h_next, *operator, *pressure)
                 self._dispatch.run_texels(kick_drift)
                 self._kick_irregular(drift)
                 self._h, self._h_next = self._h_next, self._h
@@ -221,7 +349,7 @@ class GLBackend:
         self._stencil.write(operator.stencil, operator.mass)
         self._extra.move(operator)
         if self._prepared[0]:
-            self._links = LinkBuffers(self._gl, self._fields, self._stencil.irregular, self._step.gain)
+            self._links = link_buffers(self._gl, self._fields, self._stencil.irregular, self._step.gain)
         if operator.density is not None:
             self._prepared = (0.0, self.keeps_volume)  # what keeps the volume follows the stencils
 
@@ -232,13 +360,6 @@ class GLBackend:
     def finite(self) -> bool:
         """True: nothing is known without waiting for the GPU."""
         return True
-
-    def _compile(self) -> None:
-        self._kick = self._dispatch.shader("kick")
-        self._drift = self._dispatch.texel_shader("drift", **({} if self._given is None else {"PARTS": 1}))
-        self._irregular_kick = self._dispatch.shader("irregular", KICK=1)
-        if self._yield:
-            self._yielding = self._dispatch.texel_shader("flow")
 
     def _start(self, dt: float) -> None:
         """Apply the kicks that wait, and drift."""
@@ -271,10 +392,11 @@ class GLBackend:
 
     def _kick_irregular(self, dt: float) -> None:
         """What the irregular links add to a substep."""
-        if self._links.count:
+        count, *buffers = self._links
+        if count:
             self._irregular_kick["dt"] = dt
-            self._dispatch.bind(self._h, self._v, self._h_next, self._links.texels, self._links.links)
-            self._dispatch.run_list(self._irregular_kick, self._links.count)
+            self._dispatch.bind(self._h, self._v, self._h_next, *buffers)
+            self._dispatch.run_list(self._irregular_kick, count)
 
     def _prepare(self, dt: float) -> moderngl.ComputeShader:
         """Compile the kick for this material; upload its coefficients once a step length, and the load once."""
@@ -283,7 +405,7 @@ class GLBackend:
             self._step = k = step_coefficients(self._operator, dt)
             self._maps = any(np.ndim(value) for value in (k.decay, k.spring, k.span))
             self._coefficients = self._fields.upload(k.gain, *((k.decay, k.spring, k.span) if self._maps else ()))
-            self._links = LinkBuffers(self._gl, self._fields, self._stencil.irregular, k.gain)
+            self._links = link_buffers(self._gl, self._fields, self._stencil.irregular, k.gain)
             self._keep_volume(dt)
             self._prepared = (dt, self.keeps_volume)
         k = self._step

@@ -73,15 +73,7 @@ _CHUNK = 2048
 
 
 class Pressure:
-    """Amplitudes of the operator's response, one for each part.
-
-    Attributes
-    ----------
-    parts : moderngl.Buffer
-        A field with the number of each texel's part.
-    amplitudes : moderngl.Buffer
-        One number for each part.
-    """
+    """Amplitudes of the operator's response, one for each part, of which the field `parts` has the numbers."""
 
     def __init__(self, gl: GLContext, fields: FieldLayout, operator: WaveOperator) -> None:
         numbers = np.zeros(operator.mass.shape, np.int32) if operator.parts is None else operator.parts

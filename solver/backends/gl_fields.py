@@ -23,12 +23,7 @@ _SHADERS = "ripple_sim.solver"
 class DeviceField:
     """A frozen field [C, n, n] in a storage buffer, made by `gathered` or `blend`; `numpy.asarray` reads it back.
 
-    Attributes
-    ----------
-    gl : GLContext
-    shape : (C, n, n)
-    buffer : moderngl.Buffer
-        float32, chart by chart and row by row.
+    The buffer has float32, chart by chart and row by row.
     """
 
     def __init__(
@@ -91,11 +86,10 @@ class FieldLayout:
 
     def __init__(self, gl: GLContext, topology: TexelTopology) -> None:
         self._gl, self._places = gl, topology.halo.shape
-        table = topology.addresses
-        self.n, self.count, self.texels = topology.shape[1], len(table.texels), table.texels
-        self.halo_count = len(table.ghosts)
+        self.texels, ghosts, sources = topology.addresses
+        self.n, self.count, self.halo_count = topology.shape[1], len(self.texels), len(ghosts)
         with gl as ctx:
-            pairs = np.stack([table.ghosts, table.sources], axis=1).astype(np.int32)
+            pairs = np.stack([ghosts, sources], axis=1).astype(np.int32)
             # one chart within fixed rims has none
             self.halo_pairs = ctx.buffer(pairs.tobytes() or bytes(8))
 
@@ -124,11 +118,6 @@ class FieldLayout:
         with self._gl:
             buffer.write(self._links(stencil))
 
-    def link_addresses(self) -> NDArray[np.int64]:
-        """Pairs [k, 2]: a place of [C, n + 2, n + 2], and where the links that start there lie in a stencil."""
-        places = np.arange(np.prod(self._places)).reshape(self._places)[:, :-1, :-1].reshape(-1)
-        return np.stack([places, places], axis=1)
-
     def read(self, buffer: moderngl.Buffer) -> NDArray[np.float32]:
         """A field's texels, [C, n, n]."""
         with self._gl:
@@ -153,34 +142,29 @@ class FieldLayout:
         return links
 
 
-class LinkBuffers:
-    """The irregular links of a stencil, with the addresses of their ends.
+def link_buffers(
+    gl: GLContext, fields: FieldLayout, links: IrregularLinks | None, factors: NDArray
+) -> tuple[int, moderngl.Buffer, moderngl.Buffer]:
+    """The irregular links of a stencil, with the addresses of their ends, as shaders read them.
 
-    Parameters
-    ----------
-    links : IrregularLinks or None
-    factors : [C, n, n]
-        By which the forces on each texel are multiplied.
+    `factors` [C, n, n] are those by which the forces on each texel are multiplied.
 
-    Attributes
-    ----------
-    count : int
+    Returns
+    -------
+    int
         Texels that have any.
     texels, links : moderngl.Buffer
         (address, first link, one after its last) of each such texel, and the address of each link's other end with the
         bits of its weight.
     """
-
-    def __init__(self, gl: GLContext, fields: FieldLayout, links: IrregularLinks | None, factors: NDArray) -> None:
-        irregular = links if links is not None else NO_LINKS
-        self.count = len(irregular.texels)
-        scale = np.repeat(factors.reshape(-1)[irregular.texels], np.diff(irregular.begins))
-        texels = [fields.texels[irregular.texels], irregular.begins[:-1], irregular.begins[1:]]
-        bits = (scale * irregular.weights).astype(np.float32).view(np.int32)
-        others = np.stack([fields.texels[irregular.others].astype(np.int32), bits], axis=1)
-        with gl as ctx:
-            self.texels = ctx.buffer(np.stack(texels, axis=1).astype(np.int32).tobytes() or bytes(4))
-            self.links = ctx.buffer(others.tobytes() or bytes(4))
+    irregular = links if links is not None else NO_LINKS
+    scale = np.repeat(factors.reshape(-1)[irregular.texels], np.diff(irregular.begins))
+    texels = np.stack([fields.texels[irregular.texels], irregular.begins[:-1], irregular.begins[1:]], axis=1)
+    bits = (scale * irregular.weights).astype(np.float32).view(np.int32)
+    others = np.stack([fields.texels[irregular.others].astype(np.int32), bits], axis=1)
+    with gl as ctx:
+        heads, tails = (ctx.buffer(each.astype(np.int32).tobytes() or bytes(4)) for each in (texels, others))
+    return len(irregular.texels), heads, tails
 
 
 class TexelList:

@@ -1,5 +1,5 @@
 """OpenGL: the one context of the process, its shaders and fences."""
 
-from .context import GLContext, is_software, load_shader, select_device, shared_context
+import lazy_loader
 
-__all__ = ["GLContext", "is_software", "load_shader", "select_device", "shared_context"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -15,10 +15,12 @@ import functools
 import importlib.resources
 import os
 import re
+import shutil
 import threading
 import time
 from collections.abc import Callable
 from importlib.resources.abc import Traversable
+from pathlib import Path
 from typing import Any
 
 import moderngl
@@ -93,8 +95,22 @@ def is_software(renderer: str) -> bool:
 _LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libegl": "libEGL.so.1", "libgl": "libGL.so.1"})
 
 
+# What Mesa's shader cache may come to need while a process runs [bytes].
+_SHADER_CACHE = 64e6
+
+
+def _spare_full_disks() -> None:
+    """Switch Mesa's shader cache off where its disk is nearly full: it is mapped, and a page without room kills."""
+    names = ("MESA_SHADER_CACHE_DIR", "MESA_GLSL_CACHE_DIR", "XDG_CACHE_HOME", "HOME")
+    folder = Path(next((os.environ[name] for name in names if os.environ.get(name)), "/"))
+    with contextlib.suppress(OSError):
+        if shutil.disk_usage(next(each for each in (folder, *folder.parents) if each.exists())).free < _SHADER_CACHE:
+            os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
+
+
 def create_context(device: int | None) -> moderngl.Context:
     """Create a headless OpenGL 4.3 context on a device, or on the first that yields one; raises GLError."""
+    _spare_full_disks()
     devices = range(8) if device is None else [device]
     reasons = []
     for libraries in _LIBRARIES:
@@ -148,10 +164,7 @@ _TIMEOUT_EXPIRED, _FAILED = 0x911B, 0x911D
 class Fences:
     """Creates fences in the current context, and waits for them without holding the interpreter's lock.
 
-    Parameters
-    ----------
-    address : callable
-        Address of an OpenGL function, by its name.
+    `address` gives that of an OpenGL function by its name.
     """
 
     def __init__(self, address: Callable[[bytes], int]) -> None:
@@ -379,15 +392,12 @@ class GLContext:
 
         `VARYING` is what the one hands to the other: `out` and `in`.
         """
-        vertex_source = load_shader(package, name, "vertex", VARYING="out", **defines)
-        fragment_source = load_shader(package, name, "fragment", VARYING="in", **defines)
+        vertex = load_shader(package, name, "vertex", VARYING="out", **defines)
+        fragment = load_shader(package, name, "fragment", VARYING="in", **defines)
         with self as ctx:
             return self._pool.take(
-                (vertex_source, fragment_source),
-                lambda: _compiled(
-                    name,
-                    lambda: ctx.program(vertex_shader=vertex_source, fragment_shader=fragment_source),
-                ),
+                (vertex, fragment),
+                lambda: _compiled(name, lambda: ctx.program(vertex_shader=vertex, fragment_shader=fragment)),
             )
 
     def release(self, created: Any) -> None:

@@ -1,1 +1,5 @@
 """From a mesh to its atlas: the cube and patch layouts, the cache, the files."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

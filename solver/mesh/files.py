@@ -30,7 +30,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import PATH, MeshError, checked
 from ..files import require_memory
-from .corners import counted, place
+from .clean import counted, place
 from .mesh import Mesh, many_parts
 from .ply import Soup, read_ply, too_small, triangulate
 from .wrap import wrap as wrapped
@@ -48,7 +48,6 @@ def repaired(soup: Soup, name: str) -> Mesh:
 
     Parameters
     ----------
-    soup : Soup
     name : str
         Its name in messages.
 
@@ -294,7 +293,8 @@ def load_mesh(path: str | Path, repair: bool = False, wrap: bool = False) -> Mes
     check_mesh_file(path)
     soup = _read(path)
     if len(soup.F) == 0:
-        raise MeshError(f"mesh file {str(path)!r} holds no triangles{_points_only(soup)}")
+        points = f", only {counted(len(soup.V), 'point')}; make a surface of them first" if len(soup.V) else ""
+        raise MeshError(f"mesh file {str(path)!r} holds no triangles{points}")
     mesh = repaired(soup, path.name) if repair else Mesh.from_arrays(soup.V, soup.F, soup.corner_uv, path.name)
     mesh = dataclasses.replace(mesh, notes=(*soup.notes, *mesh.notes))
     if wrap:
@@ -318,10 +318,6 @@ def check_mesh_file(path: Path) -> None:
             raise MeshError(f"mesh file {str(path)!r} {problem}; give the path of an OBJ, PLY, STL, OFF or GLB file")
     except OSError as error:  # a name longer than the system's
         raise MeshError(f"mesh file {str(path)!r} cannot be read: {error.strerror or error}") from error
-
-
-def _points_only(soup: Soup) -> str:
-    return f", only {counted(len(soup.V), 'point')}; make a surface of them first" if len(soup.V) else ""
 
 
 def _read(path: Path) -> Soup:

@@ -12,8 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import MeshError
-from .clean import cleaned
-from .corners import counted, part_volumes, place
+from .clean import (
+    Corners,
+    collapsed,
+    counted,
+    distinct_triangles,
+    merged_vertices,
+    oriented,
+    part_volumes,
+    place,
+    without_slivers,
+)
+from .sheets import cut_apart
 from .topology import distinct, genera, labels, rims_of, sides_of
 
 _STEEP = 0.1  # cosine between a vertex's normal and a triangle's below which another direction is looked for
@@ -135,7 +145,7 @@ class Mesh:
         points, triangles = _checked(V, F, name)
         corner_uv = None if uv is None else _corner_uv(uv, points, triangles, name)
         with np.errstate(under="ignore"):
-            points, corners, notes = cleaned(points, triangles, corner_uv, name)
+            points, corners, notes = _cleaned(points, triangles, corner_uv, name)
         vertex_uv = None
         if corners.uv is not None:
             vertex_uv = np.zeros((len(points), 2))
@@ -170,7 +180,8 @@ class Mesh:
     @functools.cached_property
     def triangle_areas(self) -> NDArray[np.float64]:
         """Triangle areas [m^2], shape [triangle_count]."""
-        return _area_vectors(self.V, self.F)[1] / 2
+        sides = self.V[self.F[:, 1:]] - self.V[self.F[:, :1]]
+        return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
 
     @property
     def area(self) -> float:
@@ -215,6 +226,47 @@ def _checked(V: ArrayLike, F: ArrayLike, name: str) -> tuple[NDArray[np.float64]
     return points, triangles
 
 
+def _cleaned(
+    V: NDArray[np.float64], F: NDArray[np.int64], uv: NDArray[np.float64] | None, name: str
+) -> tuple[NDArray[np.float64], Corners, tuple[str, ...]]:
+    """Make a triangle soup a manifold, oriented surface of triangles that have an area; what was done, one line each.
+
+    A surface that needs nothing stays unchanged.
+    """
+    unused = len(V) - len(distinct(F))
+    notes = [f"{counted(unused, 'unreferenced vertex')} dropped"] if unused else []
+    merged, joined = merged_vertices(V, F)
+    empty, keep = collapsed(merged), distinct_triangles(merged)
+    corners, slivers = without_slivers(V, Corners(merged, F, uv).kept(keep))
+    if len(corners.F) == 0:
+        raise MeshError(f"{name} has no triangle with an area: none has three different corners that lie on no line")
+    first_given = distinct(corners.F)
+    compact = np.searchsorted(first_given, corners.F)
+    points, corners, cuts = cut_apart(V[first_given], Corners(compact, corners.given, corners.uv), first_given)
+    merges, splits = _changes(corners)
+    turned, turns = oriented(points, corners)
+    said = {
+        f"{counted(merges - joined, 'duplicate vertex')} merged": merges > joined,
+        f"cracks closed: {counted(joined, 'boundary vertex')} joined": joined,
+        f"{counted(int(empty.sum()), 'triangle')} with a repeated vertex dropped": empty.any(),
+        f"{counted(int((~keep & ~empty).sum()), 'repeated triangle')} dropped": (~keep & ~empty).any(),
+        f"{counted(slivers, 'triangle')} without area dropped": slivers,
+    }
+    notes += [note for note, true in said.items() if true]
+    # of a surface that was cut before, equal positions are merged and cut again, which nobody needs to know
+    notes += cuts if merges or splits else []
+    return points, turned, (*notes, *turns)
+
+
+def _changes(corners: Corners) -> tuple[int, int]:
+    """How many vertices became one with others, and how many came to be by cutting."""
+    vertices, given = corners.F.max() + 1, corners.given.ravel()
+    old = given >= 0
+    pairs = distinct(given[old] * vertices + corners.F.ravel()[old])
+    kept = len(distinct(pairs % vertices))
+    return len(pairs) - kept, len(pairs) - len(distinct(given[old])) + int(vertices) - kept
+
+
 def _corner_uv(uv: ArrayLike, V: NDArray, F: NDArray, name: str) -> NDArray[np.float64]:
     pairs = np.asarray(uv, dtype=np.float64)
     if pairs.shape == (len(V), 2):
@@ -222,12 +274,6 @@ def _corner_uv(uv: ArrayLike, V: NDArray, F: NDArray, name: str) -> NDArray[np.f
     if pairs.shape == (*F.shape, 2):
         return pairs
     raise MeshError(f"{name}: uv has shape {pairs.shape}; valid is {(len(V), 2)} or {(*F.shape, 2)}")
-
-
-def _area_vectors(V: NDArray, F: NDArray) -> tuple[NDArray, NDArray]:
-    """Normals of the triangles as long as twice their areas, and those lengths."""
-    vectors = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
-    return vectors, np.linalg.norm(vectors, axis=1)
 
 
 # A surface that encloses less, relative to the cube of its size, has no inside.

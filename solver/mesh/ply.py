@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MeshError
-from .corners import counted
+from .clean import counted
 
 
 @dataclasses.dataclass
@@ -66,10 +66,7 @@ def read_binary(element: Element, data: bytes, order: str) -> tuple[dict[str, An
     MeshError
         If the data end early.
     """
-    columns = _read_table(element, data, order)
-    if columns is not None:
-        return columns
-    return _read_rows(element, data, order)
+    return _read_table(element, data, order) or _read_rows(element, data, order)
 
 
 def _read_table(element: Element, data: bytes, order: str) -> tuple[dict[str, Any], bytes] | None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
@@ -12,25 +10,6 @@ from numpy.typing import NDArray
 from ..kernel import Floats32, Ints
 
 _FAR = 1e36  # Embree's distance of nothing is 1e37
-
-
-class Hits(NamedTuple):
-    """What rays meet first.
-
-    Attributes
-    ----------
-    triangle : int64 [k]
-        -1 where a ray meets none.
-    distance : float32 [k]
-        In lengths of the direction; infinite where a ray meets none.
-    u, v : float32 [k]
-        Barycentric coordinates of the triangle's second and third corner.
-    """
-
-    triangle: Ints
-    distance: Floats32
-    u: Floats32
-    v: Floats32
 
 
 class RayScene:
@@ -48,11 +27,15 @@ class RayScene:
         indices = () if F is None else (np.ascontiguousarray(F, dtype=np.int32),)
         TriangleMesh(self._scene, np.ascontiguousarray(V, dtype=np.float32), *indices)
 
-    def cast(self, origins: NDArray, directions: NDArray) -> Hits:
-        """What rays from origins [k, 3] along directions [k, 3] meet first."""
+    def cast(self, origins: NDArray, directions: NDArray) -> tuple[Ints, Floats32, Floats32, Floats32]:
+        """What rays from origins [k, 3] along directions [k, 3] meet first.
+
+        The triangle of each, -1 for none; the distance, in lengths of the direction, infinite for none; and barycentric
+        coordinates of the triangle's second and third corner; each [k].
+        """
         found = self._scene.run(_float32(origins), _float32(directions), output=1)
         triangle = np.asarray(found["primID"], dtype=np.int64)
-        return Hits(triangle, np.where(triangle >= 0, found["tfar"], np.float32(np.inf)), found["u"], found["v"])
+        return triangle, np.where(triangle >= 0, found["tfar"], np.float32(np.inf)), found["u"], found["v"]
 
     def distances(self, origins: NDArray, directions: NDArray) -> Floats32:
         """How far rays go, as `cast` says, in less time."""
@@ -67,5 +50,6 @@ def _float32(vectors: NDArray) -> Floats32:
 def downward_hits(V: NDArray[np.float64], F: NDArray[np.int64], xy: NDArray[np.float64]) -> NDArray[np.float64]:
     """Height [m] at which vertical rays from above at xy [k, 2] first meet a mesh; NaN where they miss. Shape [k]."""
     top = V[:, 2].max() + np.ptp(V, axis=0).max()
-    hits = RayScene(V, F).cast(np.column_stack([xy, np.full(len(xy), top)]), np.tile([0.0, 0.0, -1.0], (len(xy), 1)))
-    return np.where(hits.triangle >= 0, top - hits.distance, np.nan)
+    starts, down = np.column_stack([xy, np.full(len(xy), top)]), np.tile([0.0, 0.0, -1.0], (len(xy), 1))
+    triangle, distance, _, _ = RayScene(V, F).cast(starts, down)
+    return np.where(triangle >= 0, top - distance, np.nan)

@@ -6,13 +6,12 @@ sheet goes on in which.
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .corners import Corners, counted
+from .clean import Corners, counted
 from .topology import labels, turned, undirected
 
 # Sides on one edge up to which every pair is weighed; beyond, only neighbours round the edge.
@@ -84,8 +83,7 @@ def _angles(
 
 def _candidates(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of places in a sorted list that have the same key: all, or, of very many, neighbours in turn."""
-    starts = np.flatnonzero(np.append(True, key[1:] != key[:-1]))
-    sizes = np.diff(np.append(starts, len(key)))
+    starts, sizes = _runs(key)
     first, second = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for size in np.unique(sizes[sizes > 1]).tolist():
         pairs = (
@@ -96,6 +94,12 @@ def _candidates(key: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.i
         first.append((base + i).ravel())
         second.append((base + j).ravel())
     return np.concatenate(first), np.concatenate(second)
+
+
+def _runs(ordered: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where each run of equal numbers in a sorted list begins, and how long it is."""
+    first = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
+    return first, np.diff(np.append(first, len(ordered)))
 
 
 def _chosen(pairs: NDArray[np.int64], against: NDArray[np.bool_], sheet: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -152,64 +156,44 @@ def join_sides(
     one_sided : int64 [i]
         Sides of pairs left apart, since joining them would make a one-sided surface.
     """
-    edges = _Edges.of(corners.F)
-    firm, cost = edges.firm(corners.given)
+    key, forward = undirected(corners.F)
+    order = np.argsort(key, kind="stable")
+    first, size = _runs(key[order])
+    of_crowded = order[np.repeat(size > 2, size)]
+    firm, cost = _firm(order, first[size == 2], of_crowded, undirected(corners.given)[0])
     middle = V[corners.F].mean(axis=1)
     cost = cost + np.linalg.norm(np.diff(middle[firm // 3], axis=1)[:, 0], axis=1) / np.ptp(V, axis=0).max()
-    against = edges.forward[firm[:, 0]] == edges.forward[firm[:, 1]]
+    against = forward[firm[:, 0]] == forward[firm[:, 1]]
     count = len(corners.F)
     flip = turned(firm // 3, against, count, cost)
     apart = against ^ flip[firm[:, 0] // 3] ^ flip[firm[:, 1] // 3]
     pairs = firm[~apart]
-    crowded = np.flatnonzero(edges.size > 2)
-    if len(crowded):
+    if len(of_crowded):
         free = np.ones(3 * count, dtype=bool)
         free[pairs] = False
         sheet = labels(pairs // 3, count)
-        sides = edges.order[np.repeat(edges.size > 2, edges.size)]
-        pairs = np.vstack([pairs, matched(V, corners.F, sides[free[sides]], sheet, _most_as_given(flip, sheet))])
-    return pairs, edges.order[edges.first[crowded]], firm[apart][:, 0]
+        # the same agreement of windings, but with most triangles of every sheet as they are
+        flip ^= (2 * np.bincount(sheet, weights=flip) > np.bincount(sheet))[sheet]
+        pairs = np.vstack([pairs, matched(V, corners.F, of_crowded[free[of_crowded]], sheet, flip)])
+    return pairs, order[first[size > 2]], firm[apart][:, 0]
 
 
-@dataclasses.dataclass(frozen=True)
-class _Edges:
-    """Sides sorted by edge: `order[first[e] : first[e] + size[e]]` lie on e; `forward` ones run up in number."""
+def _firm(
+    order: NDArray[np.int64], twos: NDArray[np.int64], of_crowded: NDArray[np.int64], given: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Pairs that belong together without a choice, and what it costs to join them.
 
-    order: NDArray[np.int64]
-    first: NDArray[np.int64]
-    size: NDArray[np.int64]
-    forward: NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, F: NDArray[np.int64]) -> _Edges:
-        key, forward = undirected(F)
-        order = np.argsort(key, kind="stable")
-        ordered = key[order]
-        first = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
-        return cls(order, first, np.diff(np.append(first, len(key))), forward)
-
-    def firm(self, given: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Pairs that belong together without a choice, and what it costs to join them."""
-        twos = self.first[self.size == 2]
-        pairs = self.order[np.stack([twos, twos + 1], axis=1)]
-        key, _ = undirected(given)
-        together = key[pairs[:, 0]] == key[pairs[:, 1]]
-        cost = np.where(together, 0.0, _APART)
-        many = self.order[np.repeat(self.size > 2, self.size)]
-        if len(many) == 0:
-            return pairs, cost
-        by_given = many[np.argsort(key[many], kind="stable")]
-        ordered = key[by_given]
-        first = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1]))
-        first = first[np.diff(np.append(first, len(by_given))) == 2]
-        shared = by_given[np.stack([first, first + 1], axis=1)]
-        return np.vstack([pairs, shared]), np.append(cost, np.zeros(len(shared)))
-
-
-def _most_as_given(flip: NDArray[np.bool_], sheet: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """The same agreement of windings, but with most triangles of every sheet as they are."""
-    size, flipped = np.bincount(sheet), np.bincount(sheet, weights=flip)
-    return flip ^ (2 * flipped > size)[sheet]
+    Sides are in order of their edges, `twos` the first of those that lie by twos; `given` are the edges as given.
+    """
+    pairs = order[np.stack([twos, twos + 1], axis=1)]
+    cost = np.where(given[pairs[:, 0]] == given[pairs[:, 1]], 0.0, _APART)
+    if len(of_crowded) == 0:
+        return pairs, cost
+    by_given = of_crowded[np.argsort(given[of_crowded], kind="stable")]
+    first, size = _runs(given[by_given])
+    first = first[size == 2]
+    shared = by_given[np.stack([first, first + 1], axis=1)]
+    return np.vstack([pairs, shared]), np.append(cost, np.zeros(len(shared)))
 
 
 # Where a vertex is put into an edge, counted from the lower one: not in the middle, where another may lie already.
@@ -224,7 +208,6 @@ def cut_apart(
     Parameters
     ----------
     V : [vertex_count, 3]
-    corners : Corners
     first_given : [vertex_count]
         Lowest number under which each vertex was given.
 
@@ -252,8 +235,8 @@ def cut_apart(
         notes.append(f"cut apart along {counted(len(crowded), 'edge')} where more than two triangles met")
     if len(one_sided):
         notes.append(f"cut open along {counted(len(one_sided), 'edge')}: one-sided, like a Moebius band")
-    touched = _ends(corners.F, np.append(crowded, one_sided))
-    pinched = np.setdiff1d(vertex[~whole], touched)
+    start, end, touched = corners.F.ravel(), np.roll(corners.F, -1, axis=1).ravel(), np.append(crowded, one_sided)
+    pinched = np.setdiff1d(vertex[~whole], np.append(start[touched], end[touched]))
     if len(pinched):
         notes.append(f"cut apart at {counted(len(pinched), 'vertex')} where the surface touched itself")
     return V, cut, notes
@@ -268,10 +251,6 @@ def _fans(F: NDArray[np.int64], pairs: NDArray[np.int64]) -> NDArray[np.int64]:
     ends = np.where(same_way, two, next_corner[two]), np.where(same_way, next_corner[two], two)
     links = np.concatenate([np.stack([one, ends[0]], axis=1), np.stack([next_corner[one], ends[1]], axis=1)])
     return labels(links, len(start))
-
-
-def _ends(F: NDArray[np.int64], sides: NDArray[np.int64]) -> NDArray[np.int64]:
-    return np.concatenate([F.ravel()[sides], np.roll(F, -1, axis=1).ravel()[sides]])
 
 
 def _without_double_edges(

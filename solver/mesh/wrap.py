@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import label
 
 from ..errors import MeshError
-from .corners import counted
+from .clean import counted
 from .mesh import Mesh
 
 _COARSEST = 16  # spacings along the side of the largest blocks

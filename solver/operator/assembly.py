@@ -1,21 +1,24 @@
 """From an atlas and a material to the wave operator: finite elements, or a baseline to compare them with.
 
-On a surface that moves masses stay with the texels, and stiffness follows their positions.
+On a surface that moves masses stay with the texels, and stiffness follows their positions. Regions of an atlas are held
+still along their outline, or absorb waves, by what they do to the material.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SolverError
 from ..texels.atlas import Atlas
+from ..texels.distance import depth_in_region
 from ..texels.moving import MovedPlaces, MovedStencil
 from ..texels.stencil import EAST, LINK_ENDS, NORTH, Stencil, crossing_links, link_lengths
-from ..texels.texel_mesh import TexelMesh, softening
+from ..texels.texel_mesh import TexelMesh, smoothed, softening
 from .coefficients import LIMITS
 from .deep_water import FluidOperator, over_fluid
 from .material import Material
@@ -64,13 +67,13 @@ def build_operator(atlas: Atlas, material: Material, kind: str, rim: str = "free
         # these formulas give accelerations without masses: one area for all keeps the units, one density as well
         area, density = np.full_like(area, area.mean()), np.full_like(density, density.mean())
         assemble = functools.partial(_difference_stencil, texels, kind, area[0, 0, 0])
-    viscous, bends, yields = field["viscosity"].any(), field["bending"].any(), np.isfinite(field["yield_height"]).any()
+    drags, bends, yields = field["viscosity"].any(), field["bending"].any(), np.isfinite(field["yield_height"]).any()
     operator = WaveOperator(
         stencil=assemble(density * field["speed"] ** 2),
         mass=density * area,
         damping=field["damping"],
         stiffness=field["stiffness"],
-        viscous_stencil=assemble(density * field["viscosity"]) if viscous else None,
+        viscosity_stencil=assemble(density * field["viscosity"]) if drags else None,
         laplace_stencil=assemble(np.ones_like(area)) if bends else None,
         rigidity=density * field["bending"] / area if bends else None,
         yield_height=field["yield_height"] if yields else None,
@@ -138,7 +141,6 @@ class MovingOperator:
     ----------
     atlas : Atlas
         At rest.
-    material : Material
     operator : WaveOperator
         At rest, of kind "fem".
 
@@ -156,28 +158,29 @@ class MovingOperator:
         self._rest, self._cells = operator, texels.cells
         soft, density = softening(texels), field["density"]
         self._tension = self._cells.coefficient(density * field["speed"] ** 2, soft, material.tightening - 1.0)
-        self._viscous = self._laplace = None
-        self._viscous_share = None
-        if operator.viscous_stencil is not None:
-            self._viscous_share = _share(field["viscosity"], field["speed"] ** 2, material.tightening)
-            self._viscous = self._cells.coefficient(density * field["viscosity"], soft, -1.0)
+        self._viscosity = self._laplace = None
+        self._viscosity_share = None
+        if operator.viscosity_stencil is not None:
+            self._viscosity_share = _share(field["viscosity"], field["speed"] ** 2, material.tightening)
+            self._viscosity = self._cells.coefficient(density * field["viscosity"], soft, -1.0)
         if operator.laplace_stencil is not None:
             self._laplace = self._cells.coefficient(np.ones_like(density), soft, 0.0)
-        self._level = atlas.areas / self._cells.moved(_coordinates(texels.halo_positions), self._tension)[1]
+        around = np.ascontiguousarray(np.moveaxis(texels.halo_positions, -1, 0))
+        self._level = atlas.areas / self._cells.moved(around, self._tension)[1]
         self._areas = atlas.areas
 
     def at(self, places: MovedPlaces) -> WaveOperator:
         """Operator where the places are."""
         tension, rigidity = MovedStencil(self._cells, self._tension, places), self._rest.rigidity
-        viscous = laplace = None
-        if self._viscous is not None:
-            like = None if self._viscous_share is None else (tension, self._viscous_share)
-            viscous = MovedStencil(self._cells, self._viscous, places, like)
+        viscosity = laplace = None
+        if self._viscosity is not None:
+            like = None if self._viscosity_share is None else (tension, self._viscosity_share)
+            viscosity = MovedStencil(self._cells, self._viscosity, places, like)
         if self._laplace is not None and rigidity is not None:
             laplace = MovedStencil(self._cells, self._laplace, places)
             # sigma b / A, with sigma = M / A
             rigidity = rigidity * (self._areas / self.areas(laplace)) ** 2
-        return self._rest.moved(tension, viscous, laplace, rigidity)
+        return self._rest.moved(tension, viscosity, laplace, rigidity)
 
     def areas(self, stencil: Stencil) -> Floats:
         """Area of each texel [m^2], [C, n, n], under a stencil of `at`; that at rest under any other."""
@@ -186,14 +189,109 @@ class MovingOperator:
         return np.maximum(stencil.areas * self._level, 1e-3 * self._areas)
 
 
-def _coordinates(halo_positions: Floats) -> Floats:
-    """Positions [C, n + 2, n + 2, 3] as coordinates [3, C, n + 2, n + 2]."""
-    return np.ascontiguousarray(np.moveaxis(halo_positions, -1, 0))
-
-
 def _share(viscosity: Floats, squared_speed: Floats, tightening: float) -> float | None:
-    """What the viscous stencil is of that of tension, where it is the same share everywhere and at any time."""
+    """What the stencil of viscosity is of that of tension, where it is the same share everywhere and at any time."""
     if tightening or not squared_speed.all():
         return None
     share = viscosity / squared_speed
     return float(share.flat[0]) if (share == share.flat[0]).all() else None
+
+
+def absorbing_damping(
+    atlas: Atlas, region: ArrayLike, speed: float, reflection: float = 1e-3, width: float | None = None
+) -> NDArray[np.float64]:
+    """Damping that grows with the square of the depth in a region, so gently that little is reflected.
+
+    A wave that goes through a layer of width w and back loses the factor exp(-integral of zeta / c), which for
+    zeta = z (depth / w)^2 is exp(-z w / 3 c). Waves longer than the layer is wide are partly reflected whatever the
+    damping (Israeli and Orszag 1981).
+
+    Parameters
+    ----------
+    atlas : Atlas
+    region : bool [C, n, n]
+        Where waves are to die.
+    speed : float
+        Wave speed in the region [m/s].
+    reflection : float
+        Amplitude that may come back, over that which went in.
+    width : float, optional
+        Depth from which on the damping grows no more [m]; by default the region's deepest place.
+
+    Returns
+    -------
+    float64 [C, n, n]
+        zeta [1/s] for `Material`, 0 outside the region.
+
+    Raises
+    ------
+    SolverError
+        If the region is not a mask of the atlas, covers nothing or everything, or a number is out of range.
+    """
+    mask = np.asarray(region)
+    shape = atlas.areas.shape
+    if mask.dtype != bool or mask.shape != shape:
+        raise SolverError(f"absorbing region has type {mask.dtype} and shape {mask.shape}; valid is bool, {shape}")
+    if mask.all() or not mask.any():
+        raise SolverError(f"absorbing region holds {mask.sum()} of {mask.size} texels; valid is some, but not all")
+    if not 0 < reflection < 1:
+        raise SolverError(f"reflection is {reflection!r}; valid is a number between 0 and 1")
+    if not 0 < speed < np.inf:
+        raise SolverError(f"speed is {speed!r} m/s; valid is a finite number greater than 0")
+    depth = depth_in_region(atlas.texels, mask)
+    if width is None:
+        width = float(depth.max())
+    if not 0 < width < np.inf:
+        raise SolverError(f"width is {width!r} m; valid is a finite number greater than 0")
+    return 3 * speed * np.log(1 / reflection) / width * np.minimum(depth / width, 1) ** 2
+
+
+# Stiffness of the rim, in units of what a texel's neighbours have: a wave falls to 1/e within a texel.
+_STIFFNESS = 1.0
+
+# Where so much of the neighbourhood is held a texel is held wholly: at the outline it is a half.
+_WHOLE = 0.8
+
+# Texels that are held by this much and more are clamped.
+_CLAMPED = 0.98
+
+
+def hold(atlas: Atlas, material: Material, region: ArrayLike) -> Material:
+    """Material that holds a region still: waves reflect from it inverted, as from a clamp, and pushes do not move it.
+
+    A clamp, like a region of speed 0, ends at texels: its rim is a staircase, and the surface is torn or kinked along
+    it. Here springs lead up to the clamp, over a few texels about the rim. They stiffen with the share of the
+    neighbourhood that is held, so that the height fades out along the region's true outline. They take no energy. Waves
+    turn at the outline, within a texel.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    material : Material
+        Of the free surface.
+    region : bool or float [C, n, n]
+        Held share of each texel, from 0 to 1.
+
+    Returns
+    -------
+    Material
+        With springs added to `stiffness`, and the inner part of the region in `fixed`.
+
+    Raises
+    ------
+    SolverError
+        If the region is not a mask of the atlas, or holds shares that are not from 0 to 1.
+    """
+    share = np.asarray(region, dtype=np.float64)
+    if share.shape != atlas.areas.shape:
+        raise SolverError(f"held region has shape {share.shape}; valid is {atlas.areas.shape}")
+    if not ((share >= 0) & (share <= 1)).all():
+        raise SolverError("held region has shares below 0, above 1 or NaN; valid are numbers from 0 to 1")
+    share = np.clip(smoothed(atlas.texels.topology, share) / _WHOLE, 0, 1)
+    speed, bending, stiffness, fixed = (
+        material.texels(name, atlas.areas.shape) for name in ("speed", "bending", "stiffness", "fixed")
+    )
+    neighbours = speed**2 / atlas.areas + bending / atlas.areas**2
+    return dataclasses.replace(
+        material, stiffness=stiffness + _STIFFNESS * share**2 * neighbours, fixed=fixed | (share >= _CLAMPED)
+    )

@@ -125,9 +125,9 @@ class FluidOperator(WaveOperator):
         wave = largest_eigenvalue(self.link_force, self.mass, self.free, self.stencil.fastest(self.mass))
         square = (wave + self.stiffness.max()) * self.root.most / self.deep
         viscous = 0.0
-        if self.viscous_stencil is not None:
-            bound = self.viscous_stencil.fastest(self.mass)
-            viscous = largest_eigenvalue(self.viscous_stencil, self.mass, self.free, bound)
+        if self.viscosity_stencil is not None:
+            bound = self.viscosity_stencil.fastest(self.mass)
+            viscous = largest_eigenvalue(self.viscosity_stencil, self.mass, self.free, bound)
         return float(SAFETY * 4 / (viscous + np.sqrt(viscous**2 + 4 * square)))
 
 

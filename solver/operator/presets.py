@@ -190,12 +190,7 @@ def stiffness_after(
 def density_under(force: float, depth: float, *, radius: float, speed: float, stiffness: float) -> float:
     """Density with which a resting load sinks by a depth at most [kg/m^2]; infinite without speed and stiffness.
 
-    Parameters
-    ----------
-    force, depth, radius, speed : float
-        As for `stiffness_under`.
-    stiffness : float
-        Of the material [1/s^2].
+    Arguments are as for `stiffness_under`; `stiffness` is the material's [1/s^2].
     """
     if not force > 0:
         return 0.0

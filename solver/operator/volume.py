@@ -21,10 +21,6 @@ class VolumeBalance:
 
     A pressure moves each texel by one over its density. Taking that much of it out of a momentum leaves the sum of area
     times velocity unchanged, and is the orthogonal projection with masses as weights: it adds no energy.
-
-    Parameters
-    ----------
-    operator : WaveOperator
     """
 
     def __init__(self, operator: WaveOperator) -> None:
@@ -113,8 +109,8 @@ def volume_rate(operator: WaveOperator, dt: float) -> VolumeRate | None:
     moved = span * operator.inverse_density
     heights = operator.link_force(moved) - weight * operator.stiffness * (span - even_span)
     velocities = weight * (decay - even_decay)
-    if operator.viscous_stencil is not None:
-        velocities = velocities + operator.viscous_stencil(moved)
+    if operator.viscosity_stencil is not None:
+        velocities = velocities + operator.viscosity_stencil(moved)
     heights, velocities = (_cleared(scale * each).reshape(-1) for each in (heights, velocities))
     texels = np.flatnonzero((heights != 0) | (velocities != 0))
     texels = texels[np.argsort(parts.reshape(-1)[texels], kind="stable")]

@@ -106,7 +106,7 @@ class WaveOperator:
         sigma A [kg].
     damping, stiffness : float64 [C, n, n]
         zeta [1/s] and k [1/s^2].
-    viscous_stencil : Stencil or None
+    viscosity_stencil : Stencil or None
         Link weights of D [kg/s]; None without viscosity.
     laplace_stencil : Stencil or None
         Link weights of L, which gives the area integral of the Laplacian; None without bending.
@@ -128,7 +128,7 @@ class WaveOperator:
     mass: NDArray[np.float64]
     damping: NDArray[np.float64]
     stiffness: NDArray[np.float64]
-    viscous_stencil: Stencil | None = None
+    viscosity_stencil: Stencil | None = None
     laplace_stencil: Stencil | None = None
     rigidity: NDArray[np.float64] | None = None
     yield_height: NDArray[np.float64] | None = None
@@ -191,7 +191,7 @@ class WaveOperator:
     def moved(
         self,
         stencil: Stencil,
-        viscous_stencil: Stencil | None,
+        viscosity_stencil: Stencil | None,
         laplace_stencil: Stencil | None,
         rigidity: NDArray[np.float64] | None,
     ) -> WaveOperator:
@@ -199,7 +199,7 @@ class WaveOperator:
         moved = dataclasses.replace(
             self,
             stencil=stencil,
-            viscous_stencil=viscous_stencil,
+            viscosity_stencil=viscosity_stencil,
             laplace_stencil=laplace_stencil,
             rigidity=rigidity,
             bounded=True,
@@ -236,9 +236,9 @@ class WaveOperator:
             bound += bending * float((self.rigidity * self.mass).max()) * bending
         wave = self._rate(self.link_force, bound) + self.stiffness.max()
         viscous = 0.0
-        if self.viscous_stencil is not None:
-            bound = self.viscous_stencil.fastest(self.mass)
-            viscous = self._rate(self.viscous_stencil, bound)
+        if self.viscosity_stencil is not None:
+            bound = self.viscosity_stencil.fastest(self.mass)
+            viscous = self._rate(self.viscosity_stencil, bound)
         # the positive root, written so that nothing cancels
         rate = viscous + np.sqrt(viscous**2 + 4 * wave)
         return np.inf if rate == 0 else float(SAFETY * 4 / rate)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,11 @@ def barycentrics_at(corners: Floats, x: float, y: float, z: float) -> tuple[floa
     return s, min(max((uu * pv - uv * pu) / area, 0.0), 1.0 - s)
 
 
+# Parts of triangles: the triangle of each, in ascending order, [p]; where in it the part's three corners lie, in its
+# winding, [p, 3, 3]; and what belongs to the parts, [p, ...].
+Parts: TypeAlias = tuple[NDArray[np.int64], NDArray[np.float64], NDArray]
+
+
 class ChartMap(Protocol):
     """Maps the triangles of a mesh to charts.
 
@@ -69,11 +74,11 @@ class ChartMap(Protocol):
     def compiled(self, mesh: Mesh, topology: TexelTopology) -> Any:
         """What compiled code asks for the texels of points, a NamedTuple of arrays; see `texel_on`."""
 
-    def linear_parts(self, mesh: Mesh) -> LinearParts:
-        """Parts of the mesh's triangles in which map coordinates are linear."""
+    def linear_parts(self, mesh: Mesh) -> Parts:
+        """Parts of the mesh's triangles in which map coordinates are linear, and these at their corners [p, 3, d]."""
 
-    def split(self, corners: NDArray[np.float64]) -> ChartPieces:
-        """Cut triangles with the map coordinates [m, 3, d] at their corners where they leave a chart."""
+    def split(self, corners: NDArray[np.float64]) -> Parts:
+        """Triangles, with map coordinates [m, 3, d] at their corners, cut where they leave a chart; the charts [p]."""
 
     def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
         """Place [k, ..., 2] in charts [k], 0 to 1, of map coordinates [k, ..., d] that belong to them."""
@@ -85,50 +90,9 @@ class ChartMap(Protocol):
         """What has to be stored to make the chart map again."""
 
 
-class ChartPieces(NamedTuple):
-    """Triangles cut so that each piece lies in one chart; most are not cut: one piece, the whole.
-
-    Attributes
-    ----------
-    triangle : int64 [piece_count]
-        Of which each piece is a part, in ascending order.
-    barycentrics : float64 [piece_count, 3, 3]
-        Where in that triangle the piece's three corners lie, in its winding.
-    chart : int64 [piece_count]
-    """
-
-    triangle: NDArray[np.int64]
-    barycentrics: NDArray[np.float64]
-    chart: NDArray[np.int64]
-
-    @classmethod
-    def uncut(cls, chart: NDArray[np.int64]) -> ChartPieces:
-        """Triangles that each lie in one chart [m]."""
-        return cls(np.arange(len(chart)), np.tile(np.eye(3), (len(chart), 1, 1)), chart)
-
-
-class LinearParts(NamedTuple):
-    """Parts of a mesh's triangles in which map coordinates are linear.
-
-    Attributes
-    ----------
-    triangle : int64 [part_count]
-        Of which each is a part, in ascending order.
-    barycentrics : float64 [part_count, 3, 3]
-        Where in that triangle the part's three corners lie, in its winding.
-    coordinates : float64 [part_count, 3, d]
-        Map coordinates of the corners.
-    """
-
-    triangle: NDArray[np.int64]
-    barycentrics: NDArray[np.float64]
-    coordinates: NDArray[np.float64]
-
-    @classmethod
-    def whole(cls, coordinates: NDArray[np.float64]) -> LinearParts:
-        """Triangles with the map coordinates [face_count, 3, d] at their corners, each one part."""
-        count = len(coordinates)
-        return cls(np.arange(count), np.broadcast_to(np.eye(3), (count, 3, 3)), coordinates)
+def uncut(values: NDArray) -> Parts:
+    """Triangles that are not cut, each one part, with what belongs to them [m, ...]."""
+    return np.arange(len(values)), np.broadcast_to(np.eye(3), (len(values), 3, 3)), values
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -173,11 +137,10 @@ class TextureCoordinates:
 
 def texture_coordinates(chart_map: ChartMap, mesh: Mesh) -> TextureCoordinates:
     """Coordinates into the atlas at every corner of every triangle of a mesh; see `Atlas.texture_coordinates`."""
-    parts = chart_map.linear_parts(mesh)
-    part, within, chart = chart_map.split(parts.coordinates)
-    coordinates = np.einsum("pij,pjk->pik", within, parts.coordinates[part])
-    barycentrics = np.einsum("pij,pjk->pik", within, parts.barycentrics[part])
-    return TextureCoordinates(parts.triangle[part], barycentrics, chart, coordinates, chart_map.uv(coordinates, chart))
+    triangle, barycentrics, linear = chart_map.linear_parts(mesh)
+    part, within, chart = chart_map.split(linear)
+    barycentrics, coordinates = (np.einsum("pij,pjk->pik", within, each[part]) for each in (barycentrics, linear))
+    return TextureCoordinates(triangle[part], barycentrics, chart, coordinates, chart_map.uv(coordinates, chart))
 
 
 class MeshPlaces(NamedTuple):
@@ -271,14 +234,14 @@ class LinearChartMap:
         """The triangles in space and on the charts."""
         return LinearCharts(mesh.V[mesh.F], self.charts, np.ascontiguousarray(self.corners), topology.shape[1])
 
-    def linear_parts(self, mesh: Mesh) -> LinearParts:
+    def linear_parts(self, mesh: Mesh) -> Parts:
         """The triangles, with chart, row and column of their corners."""
         chart = np.broadcast_to(self.charts[:, None, None], (len(self.charts), 3, 1))
-        return LinearParts.whole(np.concatenate([chart, self.corners], axis=2))
+        return uncut(np.concatenate([chart, self.corners], axis=2))
 
-    def split(self, corners: NDArray[np.float64]) -> ChartPieces:
+    def split(self, corners: NDArray[np.float64]) -> Parts:
         """The triangles as they are: each lies in one chart."""
-        return ChartPieces.uncut(corners[:, 0, 0].astype(np.int64))
+        return uncut(corners[:, 0, 0].astype(np.int64))
 
     def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
         """Place [k, ..., 2] in the charts, 0 to 1, of map coordinates [k, ..., 3]."""

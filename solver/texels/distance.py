@@ -13,25 +13,6 @@ from ..kernel import Floats, Ints, kernel
 from .texel_mesh import TexelMesh
 
 
-def distance_from_point(
-    texels: TexelMesh, center: int, point: NDArray[np.float64], limit: float
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Texels within `limit` [m] of a surface point, ascending, and their distances along the surface [m].
-
-    Parameters
-    ----------
-    center : int
-        Flat index of the texel nearest to the point.
-    point : [3]
-        [m].
-    """
-    grid = texels.grid
-    scratch = distance_scratch(len(grid.positions))
-    reached, distance = march_from_point(grid.halo, grid.positions, center, point, limit, scratch)
-    order = np.argsort(reached)
-    return reached[order], distance[order]
-
-
 def depth_in_region(texels: TexelMesh, region: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Distance of every texel of a region to the texels outside of it [m], [C, n, n]; 0 outside, at most 8 % too long.
 
@@ -85,6 +66,19 @@ def _through(positions: Floats, p: int, q: int, s: int, dp: float, dq: float) ->
 
 
 @kernel
+def _beside(positions: Floats, distance: Floats, around: Ints, k: int, t: int, d: float) -> float:
+    """Distance at neighbour k of those round a texel, which is d away, by way of it and of those that are known."""
+    a = around[k]
+    best = d + distance_to(positions, a, positions[t])
+    # triangles (t, b, a): b one step round the texel, or two where a is straight ahead (the other diagonal)
+    for turn in (-2, -1, 1, 2):
+        b = around[(k + turn) % 8]
+        if b >= 0 and distance[b] < np.inf and (turn % 2 or k % 2 == 0):
+            best = min(best, _through(positions, t, b, a, d, distance[b]))
+    return best
+
+
+@kernel
 def march(halo: Ints, positions: Floats, seeds: Ints, limit: float, distance: Floats) -> tuple[Ints, Ints]:
     """Fast marching with point-source updates over the triangles of both triangulations of every quad.
 
@@ -118,14 +112,7 @@ def march(halo: Ints, positions: Floats, seeds: Ints, limit: float, distance: Fl
             a = around[k]
             if a < 0 or done[a]:
                 continue
-            best = d + distance_to(positions, a, positions[t])
-            # triangles (t, b, a): b one step round the texel, or two where a is straight ahead (the other diagonal)
-            for turn in (-2, -1, 1, 2):
-                if (turn == 2 or turn == -2) and k % 2 == 1:
-                    continue
-                b = around[(k + turn) % 8]
-                if b >= 0 and distance[b] < np.inf:
-                    best = min(best, _through(positions, t, b, a, d, distance[b]))
+            best = _beside(positions, distance, around, k, t, d)
             if best < distance[a]:
                 if distance[a] == np.inf:
                     touched.append(a)

@@ -118,14 +118,7 @@ class SurfaceRide:
 
 
 class MovedPlaces:
-    """Where the places of an atlas are.
-
-    Attributes
-    ----------
-    ride : SurfaceRide
-    V : float64 [n, 3]
-        Vertices [m].
-    """
+    """Where the places of an atlas are, with its vertices at V [n, 3] [m]."""
 
     def __init__(self, ride: SurfaceRide, V: NDArray[np.float64]) -> None:
         self.ride, self.V = ride, V
@@ -141,9 +134,6 @@ class MovedStencil(Stencil):
 
     Parameters
     ----------
-    cells : TexelCells
-    coefficient : CellCoefficient
-    places : MovedPlaces
     multiple : (MovedStencil, float), optional
         One of which this is a multiple, and by how much.
     """

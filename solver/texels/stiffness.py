@@ -11,14 +11,13 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel import Floats, Floats32, Ints, kernel
-from .cells import conductance, quad, quad_area
-from .special_cells import CORNERS, special_cells
+from .cells import CORNERS, conductance, quad, quad_area, special_cells
 from .stencil import IrregularLinks, Stencil, crossing_links, missing_links
 from .topology import TexelTopology
 
@@ -52,11 +51,8 @@ class QuadCells(NamedTuple):
     power: float
 
 
-class CellCoefficient(NamedTuple):
-    """A coefficient at rest: of the quads, and of the special cells, kind by kind, each [k]."""
-
-    quads: QuadCells
-    special: tuple[Floats, ...]
+# A coefficient at rest: of the quads, and of the special cells, kind by kind, each [k]
+CellCoefficient: TypeAlias = tuple[QuadCells, tuple[Floats, ...]]
 
 
 class TexelCells:
@@ -65,11 +61,7 @@ class TexelCells:
     A coefficient of a surface that moves goes with a power of each cell's area over that at rest: with -1 what is
     spread over the surface, such as its density, gets thinner as that stretches.
 
-    Parameters
-    ----------
-    topology : TexelTopology
-    halo_positions : float64 [C, n + 2, n + 2, 3]
-        Of the texels at rest, with halo [m]; see `TexelMesh`.
+    `halo_positions` [C, n + 2, n + 2, 3] [m] are those of the texels at rest; see `TexelMesh`.
     """
 
     def __init__(self, topology: TexelTopology, halo_positions: Floats) -> None:
@@ -120,21 +112,17 @@ class TexelCells:
         """Coefficient of a surface that moves, of values at the texels at rest [C, n, n]; see `TexelMesh.stencil`."""
         fields = [self.topology.with_halo(each) for each in (values, softening)]
         quads = np.where(self._per_area > 0, _with_zeros(conductance(*map(self._at_corners, fields))), _ZERO)
-        return CellCoefficient(QuadCells(quads, self._per_area, self._scale, power), self._special_coefficient(*fields))
+        return QuadCells(quads, self._per_area, self._scale, power), self._special_coefficient(*fields)
 
     def moved(self, around: Floats, coefficient: CellCoefficient) -> tuple[Stencil, Floats]:
         """Stencil of texels that have moved, and the area that belongs to each [m^2], [C, n, n].
 
-        Parameters
-        ----------
-        around : float64 [3, C, n + 2, n + 2]
-            Coordinates of the texels with halo [m].
-        coefficient : CellCoefficient
+        `around` [3, C, n + 2, n + 2] are the coordinates of the texels with halo [m].
         """
         weights, areas = np.empty(self._shape), np.empty(self.topology.shape)
-        quad_pass(around, coefficient.quads, weights, areas)
-        power = coefficient.quads.power
-        links = self._add_special(around.reshape(3, -1), coefficient.special, power, weights, areas)
+        quads, special = coefficient
+        quad_pass(around, quads, weights, areas)
+        links = self._add_special(around.reshape(3, -1), special, quads.power, weights, areas)
         return Stencil(self.topology, weights, links), areas
 
     def special(self, around: Floats, coefficient: CellCoefficient) -> tuple[Floats, IrregularLinks | None]:
@@ -142,8 +130,8 @@ class TexelCells:
 
         Only the places at `special_places` of those around are looked at.
         """
-        weights, power = self._empty, coefficient.quads.power
-        links = self._add_special(around.reshape(3, -1), coefficient.special, power, weights, None)
+        weights, (quads, special) = self._empty, coefficient
+        links = self._add_special(around.reshape(3, -1), special, quads.power, weights, None)
         values = weights.reshape(-1)[self.special_links]
         weights.reshape(-1)[self.special_links] = 0.0
         return values, links

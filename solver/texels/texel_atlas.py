@@ -66,15 +66,10 @@ class ChartPage:
 
 
 def texel_atlas(texels: TexelMesh) -> Atlas:
-    """Atlas of the surface that the texels themselves span.
+    """Atlas of the surface that texels of any topology span themselves.
 
     Each chart is a grid of its texel centres, closed by half a texel up to the points in the middle between them and
     those beyond its border, or up to the rim; so every triangle of the mesh lies in one chart.
-
-    Parameters
-    ----------
-    texels : TexelMesh
-        Of any topology.
     """
     charts, n, _ = texels.shape
     V, nodes = _welded_nodes(texels)

@@ -5,8 +5,7 @@ or too large at N = 96. The map onto the charts knows better: a texel's share is
 area for each unit of that in the texel's triangle. Alone that is one sample a texel, exact in the mean and noisy where
 triangles are uneven; so the texel mesh gives the shape of the field, the map its level in every neighbourhood.
 
-Here are also the softening of the few texels that would set the time step for all, and figures of how good a texel mesh
-is.
+Here is also what keeps a few small texels from setting the time step for all, and figures of how good a texel mesh is.
 """
 
 from __future__ import annotations
@@ -18,6 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import spsolve
 
 from ..errors import AtlasError, shown
 from ..kernel import Floats, Ints
@@ -57,7 +58,6 @@ def levelled_areas(
 
     Parameters
     ----------
-    topology : TexelTopology
     spanned : float64 [C, n, n]
         Area that the texel mesh spans [m^2]; see `TexelCells.areas`.
     sampled : float64 [C, n, n]
@@ -99,8 +99,12 @@ class TexelMesh:
         *,
         normals: NDArray[np.float64] | None = None,
         beyond: NDArray[np.float64] | None = None,
+        sampled: NDArray[np.float64] | None = None,
     ) -> TexelMesh:
-        """Texel mesh with the areas that it spans itself, and the normals of its grid lines where none are given.
+        """Texel mesh with the normals of its grid lines where none are given.
+
+        Its areas are those that it spans itself, or levelled to `sampled`; see `levelled_areas`. A few of them are
+        evened out for the sake of the time step; see `evened_areas`.
 
         Raises
         ------
@@ -110,8 +114,13 @@ class TexelMesh:
         points = _checked(positions, (*topology.shape, 3))
         around = _with_halo(topology, points, beyond)
         if normals is None:
-            normals = _grid_normals(around)
-        return cls(topology, points, normals, TexelCells(topology, around).areas, beyond)
+            normals = np.cross(*tangents(around))
+            normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
+        cells = TexelCells(topology, around)
+        areas = cells.areas if sampled is None else levelled_areas(topology, cells.areas, sampled)
+        if (areas > 0).all():
+            areas = evened_areas(areas, cells.at_rest(np.ones_like(areas), np.ones_like(areas)))
+        return cls(topology, points, normals, areas, beyond)
 
     def with_positions(
         self,
@@ -127,7 +136,7 @@ class TexelMesh:
         moved = TexelMesh.of(self.topology, positions, normals=normals, beyond=beyond)
         spanned = self.cells.areas
         level = np.divide(self.areas, spanned, out=np.ones_like(spanned), where=spanned > 0)
-        return dataclasses.replace(moved, areas=moved.areas * level)
+        return dataclasses.replace(moved, areas=moved.cells.areas * level)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -231,13 +240,12 @@ def _with_halo(
     return around
 
 
-def _grid_normals(around: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit normals [C, n, n, 3] from the differences along rows and columns, one-sided at a rim without positions."""
+def tangents(around: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Differences of positions with halo along rows and along columns, each [C, n, n, 3], one-sided at a bare rim."""
     own = around[:, 1:-1, 1:-1]
     beside = (around[:, 1:-1, 2:], around[:, 1:-1, :-2], around[:, 2:, 1:-1], around[:, :-2, 1:-1])
     east, west, north, south = (np.where(np.isfinite(each), each, own) for each in beside)
-    normals = np.cross(east - west, north - south)
-    return normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
+    return east - west, north - south
 
 
 # What softening may take from a smooth surface, in texels, for each halving of the fastest rate. It falls with the
@@ -250,17 +258,71 @@ _STEP = 0.45
 # All but this share of the surface at most stays as it is, and texels that are hardly faster.
 _BULK, _FASTER = 0.99, 1.2
 
+# How far eigenvalues may change for the sake of the time step, in units of about the operator's own error.
+_CHANGE = 0.07
+
+_HEAVIEST = 3.0  # mean texels to which a texel may grow: more would leave a hole round a needle
+_SCARCE = 0.2  # of a part's area, at most, that its texels may lack together: tiny parts are too fast altogether
+_MOST_TURNS, _HALVINGS = 50, 6
+
+
+def evened_areas(areas: NDArray[np.float64], stencil: Stencil) -> NDArray[np.float64]:
+    """Areas [C, n, n] with mass of their neighbours' moved to the few texels that would set the time step for all.
+
+    To the areas is added K w, with the stiffness K of a uniform surface and the least w >= 0 for which no texel is
+    faster than a bound. K w has no sum and, but for the curvature, no first moment: total area and centre of mass stay.
+    A mode of wave number k has a mean square of its heights that changes by 2 k^2 times the mean of w, where the error
+    of the operator is k^2 h^2 / 12; the bound is as low as a share of that allows.
+    """
+    flat, pull, matrix = areas.ravel(), stencil.absolute_sums().ravel(), stiffness_matrix(stencil)
+    rate, part = pull / flat, connected_components(matrix, directed=False)[1]
+    best, low, high = flat, _FASTER * _bulk(rate, flat), float(rate.max())
+    bound = max(low, _even(flat))  # beyond which texels are softened, if need be
+    for _ in range(_HALVINGS):
+        lack = np.minimum(pull / bound, np.maximum(flat, _HEAVIEST * flat.mean())) - flat
+        scarce = np.bincount(part, np.maximum(lack, 0)) > _SCARCE * np.bincount(part, flat)
+        lack[scarce[part]] = -np.inf
+        w = _least_potential(matrix, lack)
+        if w is not None and 24 * (w @ flat) <= _CHANGE * flat.mean() * flat.sum():
+            best, high = flat + matrix @ w, bound
+        else:
+            low = bound
+        bound = np.sqrt(low * high)
+    return best.reshape(areas.shape)
+
+
+def _least_potential(matrix: csr_array, lack: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """The least w >= 0 with K w >= lack, an obstacle problem; None if it is not found.
+
+    Where it is not 0 is found by Newton's method (Hintermueller, Ito and Kunisch 2002).
+    """
+    w, touching = np.zeros_like(lack), lack > 0
+    for _ in range(_MOST_TURNS):
+        inside = np.flatnonzero(touching)
+        w[:] = 0
+        if len(inside):
+            w[inside] = spsolve(matrix[inside][:, inside].tocsc(), lack[inside])
+        before, touching = touching, np.where(touching, w > 0, matrix @ w < lack - 1e-9 * np.abs(lack[inside]).sum())
+        if (touching == before).all():
+            return w
+    return None
+
+
+def _even(areas: NDArray[np.float64]) -> float:
+    """Rate at which the time step is the least wanted share of an even grid's."""
+    return float(EVEN_RATE / (2 * areas.mean() * _STEP**2))
+
 
 def softening(texels: TexelMesh) -> NDArray[np.float64]:
-    """Factors that slow those few texels down that would set the time step for all others, [C, n, n].
+    """Factors that slow down those few texels that evened areas leave too fast for the others, [C, n, n].
 
-    Where the texel mesh crosses a crease, single texels are needles. Waves are through them in no time, even slowed
-    down. On smooth surfaces that the texels resolve little is softened, or nothing, as on the sphere.
+    Where the texel mesh crosses a crease, single texels are needles, for which no mass of their neighbours would do.
+    Waves are through them in no time, even slowed down. On smooth surfaces that the texels resolve little is softened,
+    or nothing, as on the sphere.
     """
     areas = texels.areas
     rate = texels.stencil(np.ones_like(areas)).absolute_sums() / areas
-    even = EVEN_RATE / (2 * areas.mean() * _STEP**2)
-    bound = min(_cheapest(rate.ravel(), areas.ravel() / areas.mean()), even)
+    bound = min(_cheapest(rate.ravel(), areas.ravel() / areas.mean()), _even(areas))
     return np.minimum(1, max(bound, _FASTER * _bulk(rate.ravel(), areas.ravel())) / rate)
 
 

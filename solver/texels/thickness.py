@@ -185,8 +185,7 @@ def _cast(
     """
     middle = points.mean(axis=0)
     starts = points - _LEAST_THICKNESS * size * ways
-    found = RayScene((corners - middle) / size).cast((starts - middle) / size, ways)
-    triangle = found.triangle
+    triangle, near, _, _ = RayScene((corners - middle) / size).cast((starts - middle) / size, ways)
     met = np.flatnonzero(triangle >= 0)
     a, b, c = (corners[triangle[met], k] for k in range(3))
     normal = np.cross(b - a, c - a)
@@ -194,7 +193,7 @@ def _cast(
     distance, out = np.full(len(points), np.inf), np.zeros(len(points), np.bool_)
     with np.errstate(divide="ignore", invalid="ignore"):
         exact = ((a - points[met]) * normal).sum(axis=1) / along
-    distance[met] = np.where(np.isfinite(exact), np.maximum(exact, 0.0), found.distance[met] * size)
+    distance[met] = np.where(np.isfinite(exact), np.maximum(exact, 0.0), near[met] * size)
     out[met] = along > 0  # the first that is met is the far side
     distance[out] = 0.0
     return distance, out

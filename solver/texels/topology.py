@@ -92,31 +92,15 @@ class TexelTopology:
         return around
 
     @functools.cached_property
-    def addresses(self) -> HaloAddresses:
-        """Where texels and halo lie in a field with halo."""
-        address = np.arange(self.halo.size).reshape(self.halo.shape)
-        ghosts = self.ghosts
+    def addresses(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """Flat addresses in a field with halo, [C, n + 2, n + 2].
+
+        Those of every texel, by flat index [C n^2]; of the places of the halo that show a texel [k]; and of the texels
+        that they show [k].
+        """
+        address, ghosts = np.arange(self.halo.size).reshape(self.halo.shape), self.ghosts
         texels = address[self.own]
-        return HaloAddresses(texels, address[ghosts], texels[self.halo[ghosts]])
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class HaloAddresses:
-    """Flat addresses in a field with halo, [C, n + 2, n + 2].
-
-    Attributes
-    ----------
-    texels : int64 [C n^2]
-        Of every texel, by flat index.
-    ghosts : int64 [k]
-        Of the places of the halo that show a texel.
-    sources : int64 [k]
-        Of the texels that they show.
-    """
-
-    texels: NDArray[np.int64]
-    ghosts: NDArray[np.int64]
-    sources: NDArray[np.int64]
+        return texels, address[ghosts], texels[self.halo[ghosts]]
 
 
 # Row and column of the four corners of a chart with halo, in units of n + 1.
@@ -246,9 +230,9 @@ def fill_halo(topology: TexelTopology, field: NDArray) -> None:
     Where no texel lies, in corners of other than four charts, comes the mean of the three next to it: bilinear
     interpolation is then continuous where three charts meet. Beyond a rim the last texels are repeated.
     """
-    addresses = topology.addresses
+    _, ghosts, sources = topology.addresses
     flat = field.reshape(topology.halo.size, *field.shape[3:])
-    flat[addresses.ghosts] = flat[addresses.sources]
+    flat[ghosts] = flat[sources]
     last = field.shape[1] - 1
     for r, r_in in ((0, 1), (last, last - 1)):
         for c, c_in in ((0, 1), (last, last - 1)):

@@ -5,8 +5,6 @@ The guard names the source that was too much for them.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -103,26 +101,8 @@ EVERY = 32
 _GREATEST = float(np.finfo(np.float32).max)
 
 
-class Source(NamedTuple):
-    """What was given to the waves: "impulse", 2.0, "N s"; when [s]; and how fast it moves a texel at most [m/s]."""
-
-    kind: str
-    value: float
-    unit: str
-    time: float
-    speed: float
-
-    def __str__(self) -> str:
-        return f"the {self.kind} of {self.value:.4g} {self.unit} at time {self.time:.6g} s"
-
-
 class FiniteGuard:
-    """Reports once, with its place, time and source, that a field is no longer finite.
-
-    Parameters
-    ----------
-    atlas : Atlas
-    """
+    """Reports once, with its place, time and source, that a field is no longer finite."""
 
     def __init__(self, atlas: Atlas) -> None:
         self._atlas = atlas
@@ -130,14 +110,14 @@ class FiniteGuard:
 
     def clear(self) -> None:
         """Begin anew, at rest."""
-        self._largest: Source | None = None
+        self._fastest, self._largest = -np.inf, ("", 0.0, "", 0.0)
         self._reported = False
         self._unseen = 0
 
-    def note(self, source: Source) -> None:
-        """Remember a source, if it is the largest."""
-        if self._largest is None or not source.speed <= self._largest.speed:
-            self._largest = source
+    def note(self, kind: str, value: float, unit: str, time: float, speed: float) -> None:
+        """Remember a source, if it is the largest: "impulse", 2.0, "N s", when [s], and a texel's speed by it [m/s]."""
+        if not speed <= self._fastest:
+            self._fastest, self._largest = speed, (kind, value, unit, time)
 
     def due(self, substeps: int) -> bool:
         """Whether it is time for a look, after so many more substeps."""
@@ -156,8 +136,10 @@ class FiniteGuard:
             return
         self._reported = True
         cause = "no source was given: the state held it"
-        if self._largest is not None:
-            cause = f"the largest source is {self._largest}, too much for float32: make it smaller"
+        kind, value, unit, given = self._largest
+        if kind:
+            source = f"the {kind} of {value:.4g} {unit} at time {given:.6g} s"
+            cause = f"the largest source is {source}, too much for float32: make it smaller"
         raise SolverError(f"{name} is no longer finite {where}, at time {time:.6g} s; {cause}, and `reset()` the waves")
 
 

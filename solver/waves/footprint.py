@@ -1,6 +1,6 @@
 """The footprint of a source: smooth weights on the texels within a radius, measured along the surface.
 
-Contacts ask for the weights at every step; `weigh` is what compiled code calls.
+Contacts ask for those of several sources at every step: `weigh_each` makes them in one call.
 """
 
 from __future__ import annotations
@@ -26,26 +26,48 @@ _FLAT, _BENT = 1.05, 1.5
 
 
 @kernel
-def weigh(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats, float]:
-    """Texels, weights and radius of a footprint; `scratch` is `distance_scratch`."""
-    radius = max(radius, MIN_TEXELS * _spacing(grid, center))
-    texels, distance, flat = _nearby(grid, center, point, radius, scratch)
-    if not flat:
-        texels, distance = _blended(grid, center, point, radius, scratch)
-    weights = np.empty(len(texels))
-    kept, total = 0, 0.0
-    for i in range(len(texels)):
-        weight = max(1 - (distance[i] / radius) ** 2, 0.0) ** 3
-        if weight > 0:
-            texels[kept], weights[kept] = texels[i], weight
-            total += weight * grid.areas[texels[i]]
-            kept += 1
-    for i in range(kept):
-        weights[i] /= total
-    return texels[:kept], weights[:kept], radius
+def weigh_each(
+    grid: TexelGrid, centers: Ints, points: Floats, radii: Floats, scratch: Floats
+) -> tuple[Ints, Ints, Floats, Floats]:
+    """Footprints round points [k, 3] whose nearest texels are `centers`; `scratch` is `distance_scratch`.
+
+    Returns
+    -------
+    begins : int64 [k + 1]
+        Texels and weights of footprint i are those from begins[i] to begins[i + 1].
+    texels : int64 [m]
+    weights : float64 [m]
+    radii : float64 [k]
+        Those used [m].
+    """
+    begins, used, room = np.zeros(len(centers) + 1, np.int64), np.empty(len(centers)), 1024
+    texels, weights = np.empty(room, np.int64), np.empty(room)
+    for i in range(len(centers)):
+        radius = used[i] = max(radii[i], MIN_TEXELS * _spacing(grid, centers[i]))
+        near, distance, flat = _nearby(grid, centers[i], points[i], radius, scratch)
+        if not flat:
+            near, distance = _blended(grid, centers[i], points[i], radius, scratch)
+        first = end = begins[i]
+        if first + len(near) > room:
+            room = 2 * (first + len(near))
+            more_texels, more_weights = np.empty(room, np.int64), np.empty(room)
+            for k in range(first):
+                more_texels[k], more_weights[k] = texels[k], weights[k]
+            texels, weights = more_texels, more_weights
+        total = 0.0
+        for k in range(len(near)):
+            weight = max(1 - (distance[k] / radius) ** 2, 0.0) ** 3
+            if weight > 0:
+                texels[end], weights[end] = near[k], weight
+                total += weight * grid.areas[near[k]]
+                end += 1
+        for k in range(first, end):
+            weights[k] /= total
+        begins[i + 1] = end
+    return begins, texels[: begins[-1]], weights[: begins[-1]], used
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _spacing(grid: TexelGrid, center: int) -> float:
     """Greatest distance from a texel to the four beside it."""
     halo, positions = grid.halo, grid.positions
@@ -59,7 +81,7 @@ def _spacing(grid: TexelGrid, center: int) -> float:
     return greatest
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats, bool]:
     """Connected texels within a straight distance of a point, their distances, and whether they lie flat.
 
@@ -100,7 +122,7 @@ def _nearby(grid: TexelGrid, center: int, point: Floats, radius: float, scratch:
     return texels, taken(scratch, texels, texels), flat
 
 
-@kernel
+@kernel(no_cpython_wrapper=True)
 def _blended(grid: TexelGrid, center: int, point: Floats, radius: float, scratch: Floats) -> tuple[Ints, Floats]:
     """Texels within a little more than the radius along the surface, and the distances that count."""
     texels, distance = march_from_point(grid.halo, grid.positions, center, point, 1.1 * radius, scratch)
@@ -146,7 +168,6 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
 
     Parameters
     ----------
-    atlas : Atlas
     point : [3]
         Any point [m]; its nearest surface point is the source.
     radius : float
@@ -170,8 +191,9 @@ def footprint(atlas: Atlas, point: ArrayLike, radius: float) -> Footprint:
 
 def footprint_at(atlas: Atlas, point: NDArray[np.float64], center: int, radius: float) -> Footprint:
     """The footprint round a point of the surface whose nearest texel is known, see `Atlas.nearest`."""
-    texels, weights, radius = weigh(atlas.texels.grid, center, point, radius, distance_scratch(atlas.areas.size))
-    return Footprint(texels, weights, center, point, radius)
+    grid, scratch = atlas.texels.grid, distance_scratch(atlas.areas.size)
+    _, texels, weights, radii = weigh_each(grid, np.array([center]), point[None], np.array([radius]), scratch)
+    return Footprint(texels, weights, center, point, float(radii[0]))
 
 
 def spread(

@@ -36,10 +36,6 @@ class DisplacementLimit:
     With R the medial radius at a texel (see `medial_radius`), a height h is drawn as it is up to R / 4. Beyond, it is
     drawn as R (a + (b - a) tanh((|h| / R - a) / (b - a))) with its sign, a = 1/4 and b = 0.6: twice continuously
     differentiable, growing with h, and never more than 0.6 R. The waves themselves know nothing of it.
-
-    Parameters
-    ----------
-    atlas : Atlas
     """
 
     def __init__(self, atlas: Atlas) -> None:
@@ -90,16 +86,7 @@ _NONE = -1  # of the table of sources: no texel lies there; below: a texel's mir
 
 
 class HeightMapShaders:
-    """What turns heights into height maps on the GPU, see `HeightMap`.
-
-    Parameters
-    ----------
-    gl : GLContext
-    topology : TexelTopology
-    weights : float32 [C n^2, 8, 3]
-        Of the gradient.
-    limit : DisplacementLimit, optional
-    """
+    """What turns heights into height maps on the GPU, see `HeightMap`; gradients have `weights` [C n^2, 8, 3]."""
 
     def __init__(
         self, gl: GLContext, topology: TexelTopology, weights: NDArray[np.float32], limit: DisplacementLimit | None
@@ -171,10 +158,7 @@ class HeightMapShaders:
 class DeviceHeightMap:
     """The height map of a field on the GPU, not yet made; `numpy.asarray` gives it as `HeightMap` does.
 
-    Attributes
-    ----------
-    gl : GLContext
-    shape : (C, n + 2, n + 2, 4)
+    Its shape is (C, n + 2, n + 2, 4).
     """
 
     def __init__(self, shaders: HeightMapShaders, field: DeviceField, on_host: Callable[[NDArray], NDArray]) -> None:
@@ -264,7 +248,9 @@ class HeightMap:
             to 0 at the rim.
         """
         if isinstance(height, DeviceField):
-            return DeviceHeightMap(self._shaders_on(height.gl), height, self)
+            if self._shaders is None:
+                self._shaders = HeightMapShaders(height.gl, self._topology, self._weights, self._limit)
+            return DeviceHeightMap(self._shaders, height, self)
         around = np.zeros(self._topology.halo.shape, np.float32)
         around[:, 1:-1, 1:-1] = height if self._limit is None else self._limit(height)
         fill_halo(self._topology, around)
@@ -281,11 +267,6 @@ class HeightMap:
         fill_halo(self._topology, rates)
         mirror_at_rim(self._topology, rates)
         return rates[..., 3]
-
-    def _shaders_on(self, gl: GLContext) -> HeightMapShaders:
-        if self._shaders is None:
-            self._shaders = HeightMapShaders(gl, self._topology, self._weights, self._limit)
-        return self._shaders
 
 
 def mirror_at_rim(topology: TexelTopology, height_map: NDArray[np.float32]) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
-import threading
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +10,6 @@ from numpy.typing import NDArray
 
 from ..backends.backend import Backend
 from ..errors import SolverError
-from ..kernel import Floats, Ints, kernel
 from ..operator.volume import VolumeBalance
 
 
@@ -61,37 +58,12 @@ class Load:
             )
         if (texels[1:] > texels[:-1]).all():
             return self
-        texels, (forces,) = add_up_by(slot_scratch(size), texels, self.forces[None])
-        return Load(texels, forces)
-
-
-def slot_scratch(size: int) -> NDArray[np.int64]:
-    """Scratch for `add_up_by`, which cleans it up: a sum must not cost more on a larger grid. One for each thread."""
-    return _slot_scratch(size, threading.get_ident())
-
-
-@functools.lru_cache(maxsize=8)
-def _slot_scratch(size: int, thread: int) -> NDArray[np.int64]:
-    return np.full(size, -1)
-
-
-@kernel
-def add_up_by(place: Ints, texels: Ints, values: Floats) -> tuple[Ints, Floats]:
-    """Sum the values [m, k] of equal texels [k]: each texel once, in order of first appearance, and its sums."""
-    once = np.empty_like(texels)
-    sums = np.zeros_like(values)
-    count = 0
-    for i in range(len(texels)):
-        t = texels[i]
-        if place[t] < 0:
-            place[t] = count
-            once[count] = t
-            count += 1
-        for row in range(len(values)):
-            sums[row, place[t]] += values[row, i]
-    for i in range(count):
-        place[once[i]] = -1
-    return once[:count].copy(), sums[:, :count].copy()
+        row, place = np.arange(len(texels)), np.empty(size, np.int64)
+        place[texels[::-1]] = row[::-1]
+        first = place[texels]  # the row in which each texel appears first
+        once = (first == row).nonzero()[0]
+        place[texels[once]] = row[: len(once)]
+        return Load(texels[once], np.bincount(place[texels], self.forces).astype(np.float64, copy=False))
 
 
 class HeldLoad:
@@ -99,11 +71,15 @@ class HeldLoad:
 
     Parameters
     ----------
-    backend : Backend
     share : float64 [C, n, n]
         Of a force that sets a texel in motion.
     balance : VolumeBalance
         Of the forces, where the backend keeps the volume.
+
+    Attributes
+    ----------
+    load : Load
+        What is held; assign to change it.
     """
 
     def __init__(self, backend: Backend, share: NDArray[np.float64], balance: VolumeBalance) -> None:
@@ -111,26 +87,16 @@ class HeldLoad:
         self._shape = share.shape
         self._share = share.reshape(-1)
         self._size = share.size
-        self._held = Load.none()
-        self._uploaded = self._held
+        self.load = self._uploaded = Load.none()
 
     def forces(self) -> NDArray[np.float64]:
         """Forces held at every texel [N], positive inwards, [C, n, n]."""
-        forces = np.bincount(self._held.texels, self._held.forces, self._size).astype(np.float64, copy=False)
+        forces = np.bincount(self.load.texels, self.load.forces, self._size).astype(np.float64, copy=False)
         return forces.reshape(self._shape)
-
-    @property
-    def load(self) -> Load:
-        """What is held; assign to change it."""
-        return self._held
-
-    @load.setter
-    def load(self, load: Load) -> None:
-        self._held = load
 
     def add(self, load: Load) -> None:
         """Hold a load beside what is held."""
-        self._held = Load.together([self._held, load]).merged(self._size)
+        self.load = Load.together([self.load, load]).merged(self._size)
 
     def counterpart(self, texels: NDArray[np.int64], momenta: NDArray[np.float64]) -> float | NDArray[np.float64]:
         """What balances the momenta of a source on some texels, or forces, outwards, where volume is conserved."""
@@ -149,7 +115,7 @@ class HeldLoad:
         SolverError
             If the forces are not finite, or a texel does not exist.
         """
-        load = self._held if extra is None else Load.together([self._held, extra])
+        load = self.load if extra is None else Load.together([self.load, extra])
         if load is self._uploaded or not (len(load.texels) or len(self._uploaded.texels)):
             return None
         once = load.merged(self._size)

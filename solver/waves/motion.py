@@ -18,7 +18,7 @@ from ..operator.material import Material
 from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
 from ..texels.moving import MovedPlaces, SurfaceRide
-from ..texels.texel_mesh import TexelMesh
+from ..texels.texel_mesh import TexelMesh, tangents
 from ..texels.topology import fill_halo
 from .height_map import mirror_at_rim
 
@@ -39,7 +39,6 @@ class Motion:
     ----------
     atlas : Atlas
         At rest.
-    material : Material
     operator : WaveOperator
         At rest.
 
@@ -158,31 +157,19 @@ class MovedGradients:
     """Turns a height map of the surface at rest into that of the moved one.
 
     Heights stay with the texels, so that their differences along rows and columns stay, while the ways there change.
-
-    Parameters
-    ----------
-    rest : Atlas
     """
 
     def __init__(self, rest: Atlas) -> None:
         self._texels, self._ride = rest.texels, SurfaceRide(rest)
-        self._rest = _tangents(rest.texels.halo_positions)
+        self._rest = np.stack(tangents(rest.texels.halo_positions), axis=3)
 
     def __call__(self, height_map: NDArray[np.float32], V: NDArray[np.float64]) -> NDArray[np.float32]:
         """Height map [C, n + 2, n + 2, 4], see `HeightMap`, where the vertices are at V [vertex_count, 3] [m]."""
         moved = np.array(height_map, np.float32)
-        _carry(self._rest, _tangents(np.moveaxis(self._ride.around(V), 0, -1)), moved)
+        _carry(self._rest, np.stack(tangents(np.moveaxis(self._ride.around(V), 0, -1)), axis=3), moved)
         fill_halo(self._texels.topology, moved)
         mirror_at_rim(self._texels.topology, moved)
         return moved
-
-
-def _tangents(around: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Differences of positions along rows and columns, [C, n, n, 2, 3], one-sided at a rim without positions."""
-    own = around[:, 1:-1, 1:-1]
-    beside = (around[:, 1:-1, 2:], around[:, 1:-1, :-2], around[:, 2:, 1:-1], around[:, :-2, 1:-1])
-    east, west, north, south = (np.where(np.isfinite(each), each, own) for each in beside)
-    return np.stack([east - west, north - south], axis=3)
 
 
 @kernel

@@ -17,7 +17,7 @@ from ..operator.material import Material, warn_of_wavelengths
 from ..operator.volume import VolumeBalance
 from ..operator.wave_operator import WaveOperator
 from ..texels.atlas import Atlas
-from .finite import FiniteGuard, Source, as_field, check_kick, count_substeps, require_finite
+from .finite import FiniteGuard, as_field, check_kick, count_substeps, require_finite
 from .footprint import Footprint, spread
 from .load import HeldLoad, Load
 from .motion import Motion
@@ -176,7 +176,7 @@ class WaveSolver:
             force = self._held.upload(load)
             self._backend.advance(substeps, self._substep)
         if force is not None:
-            self._guard.note(Source("forces", force, "N", self.time, abs(force) * dt / self._least_mass))
+            self._guard.note("forces", force, "N", self.time, abs(force) * dt / self._least_mass)
         self.time += dt
         self.substeps_taken += substeps
         if self._guard.due(substeps) and not self._backend.finite():
@@ -266,7 +266,7 @@ class WaveSolver:
         momentum = -impulses * self.operator.source_share.reshape(-1)[where.texels]
         velocities = momentum / self.operator.mass.reshape(-1)[where.texels]
         fastest = check_kick(velocities, "impulse", impulse, "N s")
-        self._guard.note(Source("impulse", impulse, "N s", self.time, fastest))
+        self._guard.note("impulse", impulse, "N s", self.time, fastest)
         # sums too large for float32 become infinite here, and are reported later
         with np.errstate(over="ignore"):
             self._backend.kick(
@@ -447,4 +447,4 @@ class WaveSolver:
         """Tell the guard of a height or a velocity that is given."""
         unit, time = ("m", self.operator.stable_timestep) if kind == "height" else ("m/s", 1.0)
         largest = float(np.abs(field).max())
-        self._guard.note(Source(kind, largest, unit, self.time, largest / time))
+        self._guard.note(kind, largest, unit, self.time, largest / time)

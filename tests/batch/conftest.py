@@ -3,8 +3,7 @@
 import pytest
 from small_batch import new_batch
 
-from ripple_sim.batch.folder import BatchFolder
-from ripple_sim.batch.make_scene import make_scene
+from ripple_sim.batch import BatchFolder, make_scene
 
 
 @pytest.fixture(scope="session")

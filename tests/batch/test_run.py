@@ -4,39 +4,29 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from pathlib import Path
+from types import SimpleNamespace
 
 import pyarrow.parquet
 import pytest
-from small_batch import PLAN, files, new_batch, small_plan
+from small_batch import PLAN, Here, files, new_batch, small_plan
 
-from ripple_sim.batch import run
-from ripple_sim.batch import run as command
-from ripple_sim.batch.folder import BatchFolder
-from ripple_sim.batch.make_scene import Outcome, make_scene
-from ripple_sim.batch.report import status_text
-from ripple_sim.batch.run import RunOptions, run_batch
+from ripple_sim.batch import (
+    BatchFolder,
+    DaskExecutor,
+    Outcome,
+    RunOptions,
+    make_scene,
+    run,
+    run as command,
+    run_batch,
+    status_text,
+)
+from ripple_sim.cli.main import main
 from ripple_sim.errors import BatchError, SceneError
 
 DATA = 'video = "none"\nheights = true\n'
-
-
-class Here(Executor):
-    """Does the work in this process, at once."""
-
-    places = 2
-
-    def __init__(self, workers):
-        self.workers = workers
-
-    def submit(self, function, /, *arguments, **named):
-        future = Future()
-        try:
-            future.set_result(function(*arguments, **named))
-        except BaseException as error:
-            future.set_exception(error)
-        return future
 
 
 @pytest.fixture
@@ -253,3 +243,26 @@ def test_a_scheduler_that_does_not_answer_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(distributed, "Client", refuse)
     with pytest.raises(BatchError, match=r"no Dask scheduler answers at 'tcp://nowhere:1' \(timed out\)"):
         run_batch(small_plan(tmp_path, DATA), tmp_path / "out", RunOptions(dask="tcp://nowhere:1"))
+
+
+def test_a_dask_scheduler_that_is_gone_is_one_line(tmp_path, monkeypatch, capsys) -> None:
+    """Dask says "ConnectionPool closing.", after a line in its log."""
+
+    class Lost(DaskExecutor):
+        places = 1
+
+        def __init__(self, address: str) -> None:
+            self._address, self._client = address, SimpleNamespace(status="closed")
+
+        def submit(self, *_: object, **__: object) -> Future:
+            raise RuntimeError("ConnectionPool closing.")
+
+        def shutdown(self, *_: object, **__: object) -> None:
+            pass
+
+    monkeypatch.setattr("ripple_sim.batch.run.DaskExecutor", Lost)
+    (tmp_path / "plan.toml").write_text('count = 2\nscenes = ["sphere"]\n[store]\nresolution = 8\nduration = 0.1\n')
+    assert main(["batch", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "out"), "--dask", "tcp://host:1"]) == 1
+    error = capsys.readouterr().err
+    assert "the Dask scheduler at tcp://host:1 is gone; finished scenes are kept" in error
+    assert "ConnectionPool" not in error and error.count("\n") == 1

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 from exposed_scene import MJCF, SHOT, THROW, TOML
 
-from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.scene.scene import Scene, with_exposure
+from ripple_sim.scene import Scene, load_scene, with_exposure
 
 
 @pytest.fixture

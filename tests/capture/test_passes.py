@@ -6,11 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ripple_sim.capture.frame_source import FrameSource
-from ripple_sim.capture.passes import Sighting, passes_of
-from ripple_sim.capture.snapshot import snapshots
-from ripple_sim.export.moving_mesh import MovingMesh
-from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.capture import FrameSource, Sighting, passes_of, snapshots
+from ripple_sim.export import MovingMesh
+from ripple_sim.scene import load_scene
 from ripple_sim.simulation import Simulation
 
 WIDTH, HEIGHT = 160, 120

@@ -40,9 +40,5 @@ def test_the_status_is_told_from_the_folder(tmp_path, capsys):
     ],
     ids=["no folder", "shard", "full", "no batch", "no plan"],
 )
-def test_what_is_wrong_is_told_in_a_line(plan, capsys, options, message):
-    words = [each.format(plan=plan, folder=plan.parent) for each in options]
-    assert main(["batch", *words]) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
+def test_what_is_wrong_is_told_in_a_line(plan, refusal, options, message):
+    assert message in refusal("batch", *(each.format(plan=plan, folder=plan.parent) for each in options))

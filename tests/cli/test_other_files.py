@@ -7,19 +7,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ripple_sim.cli import main as cli
-from ripple_sim.encode import FrameWriter, check_output, open_writer
-from ripple_sim.encode.replace import made_here
+from ripple_sim.encode import FrameWriter, check_output, made_here, open_writer
 from ripple_sim.errors import EncodingError, ExportError, VideoError
-from ripple_sim.export.place import check_export
-from ripple_sim.figures.atlas_plot import check_plot_path
+from ripple_sim.export import check_export
+from ripple_sim.figures import check_plot_path
 from ripple_sim.solver import AtlasError, RippleError, load_atlas, sphere_atlas
-from ripple_sim.solver.texels.atlas import check_atlas_place
+from ripple_sim.solver.texels import check_atlas_place
 
 SIZE = {"width": 32, "height": 16, "fps": 25}
 FRAME = np.full((16, 32, 3), 90, np.uint8)
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 
 
 def write(path: Path, overwrite: bool = False, count: int = 2, **settings: str) -> FrameWriter:
@@ -133,25 +130,18 @@ def test_strangers_in_a_part_folder_are_left_alone(tmp_path: Path, name: str) ->
     assert stranger.read_text() == "[1]"
 
 
-def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
-    assert cli.main(argv) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count("\n")) == ("", 1)
-    return err
-
-
-def test_an_atlas_never_takes_its_meshs_place(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    mesh, link = tmp_path / "mesh.obj", tmp_path / "link.npz"
-    mesh.write_text(TETRAHEDRON)
-    link.symlink_to(mesh)
-    for output in (mesh, link):
+def test_an_atlas_never_takes_its_meshs_place(tmp_path: Path, refusal: Callable[..., str], tetrahedron: Path) -> None:
+    before, link = tetrahedron.read_bytes(), tmp_path / "link.npz"
+    link.symlink_to(tetrahedron)
+    command = "atlas", str(tetrahedron)
+    for output in (tetrahedron, link):
         for more in ([], ["--overwrite"]):
-            assert "it is the mesh itself" in refusal(capsys, "atlas", str(mesh), "-o", str(output), *more)
+            assert "it is the mesh itself" in refusal(*command, "-o", str(output), *more)
     (tmp_path / "notes.npz").write_text("mine")
     (tmp_path / "photo.png").write_text("mine")
-    assert "is no atlas" in refusal(capsys, "atlas", str(mesh), "-o", str(tmp_path / "notes.npz"))
-    assert "--overwrite" in refusal(capsys, "atlas", str(mesh), "--plot", str(tmp_path / "photo.png"))
-    assert mesh.read_text() == TETRAHEDRON
+    assert "is no atlas" in refusal(*command, "-o", str(tmp_path / "notes.npz"))
+    assert "--overwrite" in refusal(*command, "--plot", str(tmp_path / "photo.png"))
+    assert tetrahedron.read_bytes() == before
     assert {each.read_text() for each in (tmp_path / "notes.npz", tmp_path / "photo.png")} == {"mine"}
 
 

@@ -1,12 +1,18 @@
-"""Progress is drawn on a terminal alone, and everything written to it is taken literally."""
+"""What the program prints: progress on a terminal alone and literally, a completion script, the table of materials."""
 
 import io
+import json
+import math
+import re
+import shutil
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from ripple_sim.cli import render
-from ripple_sim.cli.render import frame_progress
+from ripple_sim.cli import frame_progress, main as cli
+from ripple_sim.solver.operator import PRESETS
 
 
 class Terminal(io.StringIO):
@@ -53,21 +59,76 @@ def test_what_is_being_compiled_is_told_with_its_seconds(monkeypatch: pytest.Mon
     assert "0/120" in text
 
 
-@pytest.mark.parametrize(
-    ("module", "stage"),
-    [
-        ("ripple_sim.solver.waves.load", "loads and height maps"),
-        ("ripple_sim.solver.texels.stencil", "the atlas"),
-        ("ripple_sim.coupling.patches", "the contacts"),
-        ("my_kernels", "my_kernels"),
-    ],
-)
-def test_kernels_are_told_by_what_they_do(module: str, stage: str) -> None:
-    assert render._stage(module) == stage
-
-
 def test_an_error_goes_on_through_the_progress(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(sys, "stderr", Terminal())
     with pytest.raises(KeyboardInterrupt), frame_progress("renderer"):
         raise KeyboardInterrupt
+
+
+def completed(script: str, line: str) -> set[str]:
+    """What bash offers for the last word of a line."""
+    words = line.split(" ")
+    quoted = " ".join(f"'{word}'" for word in words)
+    # the script says itself which function completes the program's name
+    trial = f"""{script}
+set -- $(complete -p ripple-sim)
+while [ "$1" != -F ]; do shift; done
+COMP_WORDS=({quoted}); COMP_CWORD={len(words) - 1}; COMP_LINE='{line}'; COMP_POINT={len(line)}
+"$2" ripple-sim '{words[-1]}' '{words[-2]}'
+printf '%s\\n' "${{COMPREPLY[@]}}"
+"""
+    result = subprocess.run(["bash", "--norc", "-c", trial], capture_output=True, text=True, check=True)
+    return {word.strip() for word in result.stdout.split()}
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+def test_bash_completes_commands_options_and_choices(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["completion", "bash"]) == 0
+    script = capsys.readouterr().out
+    for line, offered in (
+        ("ripple-sim re", {"render"}),
+        ("ripple-sim vi", {"view"}),
+        ("ripple-sim render --dur", {"--duration"}),
+        ("ripple-sim view --bench", {"--benchmark"}),
+        ("ripple-sim render --backend c", {"cpu"}),
+    ):
+        assert completed(script, line) == offered
+
+
+def test_zsh_gets_a_script_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["completion", "zsh"]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("#compdef ripple-sim")
+    assert "render" in out
+    assert err == ""
+
+
+def test_every_material_is_listed_with_source_speed_and_decay(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["materials", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert list(told) == list(PRESETS)
+    q = 2 * math.pi / 0.05
+    skin = told["drum-skin"]
+    damping = skin["parameters"]["damping"] / 2
+    expected = math.sqrt(3990 / 0.262 - (damping / q) ** 2)
+    assert skin["speed [m/s]"] == pytest.approx(expected)
+    assert skin["decay [s]"] == pytest.approx(1 / damping)
+    assert all(row["source"] and row["valid"] for row in told.values())
+    assert cli.main(["materials"]) == 0
+    assert "gelatine-5" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "1e300"])
+@pytest.mark.parametrize("place", ["gravity", "size", "body"])
+def test_a_number_out_of_range_in_an_mjcf_is_one_line(refusal, tmp_path: Path, number: str, place: str) -> None:
+    """Not MuJoCo's warning and ours, nor NumPy's of what they lead to."""
+    numbers = {"gravity": "-9.81", "size": "0.3", "body": "0.7"} | {place: number}
+    (tmp_path / "model.xml").write_text(
+        f"""<mujoco><option gravity="0 0 {numbers["gravity"]}"/><worldbody>
+        <geom name="egg" type="ellipsoid" size="0.4 {numbers["size"]} 0.3"/>
+        <body pos="0 0 {numbers["body"]}"><freejoint/><geom size="0.06"/></body></worldbody></mujoco>"""
+    )
+    (tmp_path / "scene.toml").write_text('model = "model.xml"\n[[ripple]]\ngeom = "egg"\nresolution = 8\n')
+    message = refusal("render", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "o.mp4"), "--duration", "0.1")
+    assert re.search(r"(nan|inf|1e\+300).*valid are numbers up to 1e\+10|MuJoCo refuses .*nan", message)

@@ -1,5 +1,10 @@
-"""Signals become exceptions where there is something to clean up, and end the process at once where there is not."""
+"""The program as a process: signals, streams and disks.
 
+Signals become exceptions where there is something to clean up, and end the process at once where there is not. A full
+disk, closed and full standard streams, no home, no cache: the right status, nothing in the wrong place.
+"""
+
+import errno
 import os
 import signal
 import subprocess
@@ -7,28 +12,36 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 import pytest
 
-from ripple_sim.cli import signals
+from ripple_sim.cli import main as cli, signals
 from ripple_sim.encode import open_writer
+from ripple_sim.solver import load_atlas
+from ripple_sim.solver.texels import atlas
 
 BOTH = [signal.SIGINT, signal.SIGTERM]
 ALL = [*BOTH, signal.SIGHUP]
 
 
 @pytest.fixture(autouse=True)
-def _left_as_found() -> Iterator[None]:
-    handlers = {number: signal.getsignal(number) for number in (*ALL, signal.SIGALRM)}
-    hook = sys.unraisablehook
-    # a shell in the background starts us with Ctrl-C ignored, which children would inherit
+def _no_timer() -> Iterator[None]:
+    handler, hook = signal.getsignal(signal.SIGALRM), sys.unraisablehook
+    # a shell in the background starts us with Ctrl-C ignored, and nohup with SIGHUP, which children would inherit
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
     yield
     sys.unraisablehook = hook
     signal.setitimer(signal.ITIMER_REAL, 0)
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
+    signal.signal(signal.SIGALRM, handler)
+
+
+def ended(program: str) -> tuple[int, str, str]:
+    """Exit status and both outputs of a Python program."""
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=False)
+    return result.returncode, result.stdout, result.stderr
 
 
 def test_ctrl_c_and_termination_are_exceptions() -> None:
@@ -61,9 +74,7 @@ def test_before_a_command_the_process_ends_with_one_line(number: int, line: str)
         "import signal\nfrom ripple_sim.cli import signals\nsignals.end_at_once()\n"
         f"try:\n    signal.raise_signal({int(number)})\nexcept BaseException as error:\n    print(repr(error))\n"
     )
-    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert result.returncode == 128 + number
-    assert (result.stdout, result.stderr) == ("", f"ripple-sim: {line}\n")
+    assert ended(program) == (128 + number, "", f"ripple-sim: {line}\n")
 
 
 def test_an_import_is_waited_for(tmp_path: Path) -> None:
@@ -74,34 +85,30 @@ def test_an_import_is_waited_for(tmp_path: Path) -> None:
         "signals.end_in_good_order()\n"
         "try:\n    import slow\n    for _ in range(500): time.sleep(0.01)\nfinally:\n    print('cleaned up')\n"
     )
-    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert (result.returncode, result.stdout) == (128 + signal.SIGTERM, "imported\ncleaned up\n")
+    assert ended(program)[:2] == (128 + signal.SIGTERM, "imported\ncleaned up\n")
 
 
-@pytest.mark.parametrize(("number", "line"), [(signal.SIGTERM, "terminated"), (signal.SIGHUP, "hung up")])
-def test_the_rule_holds_from_the_first_import_on(number: int, line: str) -> None:
+def test_the_rule_holds_from_the_first_import_on() -> None:
     program = (
         "import signal, sys\n"
         "class Meanwhile:\n"
         "    def find_spec(self, name, *rest):\n"
-        f"        name == 'ripple_sim.cli.main' and signal.raise_signal({int(number)})\n"
+        "        name == 'ripple_sim.cli.main' and signal.raise_signal(signal.SIGHUP)\n"
         "sys.meta_path.insert(0, Meanwhile())\n"
         "sys.argv = ['ripple-sim', 'info']\nimport ripple_sim.__main__\n"
     )
-    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert (result.returncode, result.stdout, result.stderr) == (128 + number, "", f"ripple-sim: {line}\n")
+    assert ended(program) == (128 + signal.SIGHUP, "", "ripple-sim: hung up\n")
 
 
-@pytest.mark.parametrize("number", ALL)
-def test_after_the_command_while_the_interpreter_shuts_down_its_status_stands(number: int) -> None:
+def test_after_the_command_while_the_interpreter_shuts_down_its_status_stands() -> None:
     program = (
-        "import os\nimport ripple_sim.cli.start\n"
+        "import os\nimport ripple_sim.__main__\n"
         "class Last:\n"
-        f"    def __del__(self, kill=os.kill, own=os.getpid()):\n        kill(own, {int(number)})\n"
+        f"    def __del__(self, kill=os.kill, own=os.getpid(), numbers={[*map(int, ALL)]}):\n"
+        "        for number in numbers: kill(own, number)\n"
         "last = Last()\nprint('done')\n"
     )
-    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert (result.returncode, result.stdout, result.stderr) == (0, "done\n", "")
+    assert ended(program) == (0, "done\n", "")
 
 
 def within(module: str, number: int, function: str = "call") -> list[str]:
@@ -151,6 +158,56 @@ def test_a_second_signal_ends_the_process_while_the_first_is_cleaned_up() -> Non
         "try:\n    signal.raise_signal(signal.SIGTERM)\nfinally:\n    signal.raise_signal(signal.SIGINT)\n"
         "    print('cleaned up')\n"
     )
-    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    status, _, err = ended(program)
     # a job in the background has Ctrl-C ignored, and then cleans up
-    assert (result.returncode, result.stderr) in ((130, "ripple-sim: interrupted\n"), (143, ""))
+    assert (status, err) in ((130, "ripple-sim: interrupted\n"), (143, ""))
+
+
+def run(folder: Path, words: str, redirections: str = "", **environment: str | None) -> subprocess.CompletedProcess:
+    """The program in a shell."""
+    command = f"{sys.executable} -m ripple_sim {words} {redirections}"
+    kept = {name: value for name, value in os.environ.items() if environment.get(name, "") is not None}
+    return subprocess.run(
+        ["sh", "-c", command],
+        cwd=folder,
+        env={**kept, **{name: value for name, value in environment.items() if value is not None}},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "redirections", "status"),
+    [
+        ("fly", ">&- 2>&-", 2),
+        ("fly", "2>/dev/full", 2),
+        ("completion bash", ">&-", 0),
+        ("--help", "| head -c 0", 0),
+    ],
+)
+def test_closed_and_full_streams(tmp_path: Path, words: str, redirections: str, status: int) -> None:
+    result = run(tmp_path, words, redirections)
+    assert (result.returncode, result.stdout, result.stderr) == (status, "", "")
+
+
+def test_without_streams_home_and_cache_an_atlas_is_whole(tmp_path: Path, tetrahedron: Path) -> None:
+    words, cache = f"atlas {tetrahedron} --resolution 4 -o mesh.npz", "/dev/null"
+    result = run(tmp_path, words, "<&- >&- 2>&-", HOME=None, XDG_CACHE_HOME=cache)
+    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
+    assert load_atlas(tmp_path / "mesh.npz").resolution == 4
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["mesh.npz", tetrahedron.name]
+
+
+def test_a_full_disk_is_no_bad_input(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tetrahedron: Path
+) -> None:
+    def full(file: BinaryIO, *_: object) -> None:
+        file.write(b"half")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(atlas, "write_arrays", full)
+    assert cli.main(["atlas", str(tetrahedron), "--resolution", "4", "-o", str(tmp_path / "a.npz")]) == 1
+    assert capsys.readouterr().err.endswith("a.npz' cannot be written: No space left on device\n")
+    assert list(tmp_path.iterdir()) == [tetrahedron]

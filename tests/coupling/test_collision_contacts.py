@@ -1,17 +1,22 @@
 """Contacts off the surface find the nearest part of it that faces them.
 
-Contacts of collision geoms load the visible surface: the whole force, once, on the right target and side.
+Contacts of collision geoms load the visible surface: the whole force, once, on the right target and side. Targets that
+collide other than as their true surface are warned of.
 """
+
+import warnings
 
 import mujoco
 import numpy as np
 import pytest
 import trimesh
-from mujoco_models import BALL, mesh_asset, model_of
+from hits import Run
+from mujoco_models import BALL, add_ball, mesh_asset, mesh_spec, model_of
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling.contacts import places_facing
-from ripple_sim.scenes.shapes import limbed
+from ripple_sim.coupling import hull_gap, places_facing
+from ripple_sim.errors import RippleWarning
+from ripple_sim.scenes.shapes import limbed, peanut
 from ripple_sim.solver import Atlas, Mesh, build_atlas, sphere_atlas
 
 
@@ -62,21 +67,15 @@ SEEN = 'contype="0" conaffinity="0" group="2"'
 
 
 def play(model: mujoco.MjModel, targets: tuple[str, ...], seconds: float = 0.3, **options: object) -> tuple:
-    """Run; the ripples, the records with the data's poses, and the momentum that the ball lost [N s]."""
-    data = mujoco.MjData(model)
-    material = Material(speed=0.5, density=50.0)
-    ripples = Ripples(
-        model, dict.fromkeys(targets, material), resolution=24, backend="cpu", conserve_volume=False, **options
-    )
-    start, record, lost = model.joint(model.body("ball").jntadr[0]).dofadr[0], [], np.zeros(3)
-    joint = slice(start, start + 3)
-    while data.time < seconds:
-        before = data.qvel[joint].copy()
-        mujoco.mj_step(model, data)
-        ripples.step(data)
-        lost += MASS * (data.qvel[joint] - before - model.opt.gravity * model.opt.timestep)
-        record += [(each, data.geom(each.geom).xpos.copy()) for each in ripples.last_impulses]
-    return ripples, record, float(np.linalg.norm(lost))
+    """The run, and the momentum that the ball lost [N s]."""
+    run, lost = Run(model, *targets, resolution=24, **options), np.zeros(3)
+    start = model.joint(model.body("ball").jntadr[0]).dofadr[0]
+    velocity = run.data.qvel[start : start + 3]
+    while run.data.time < seconds:
+        before = velocity.copy()
+        run.step()
+        lost += MASS * (velocity - before - model.opt.gravity * model.opt.timestep)
+    return run, float(np.linalg.norm(lost))
 
 
 def slab(offset: float, body: str = "") -> mujoco.MjModel:
@@ -90,32 +89,15 @@ def slab(offset: float, body: str = "") -> mujoco.MjModel:
 @pytest.mark.parametrize("offset", [-0.03, 0.0, 0.03])
 def test_visible_plate_is_loaded_on_the_side_that_is_hit_with_all_that_the_ball_loses(offset: float) -> None:
     """The lower side is nearer to a core that lies low. Nothing was given to a geom that does not collide itself."""
-    ripples, record, lost = play(slab(offset), ("plate",))
-    given = sum(each.impulse for each, _ in record)
+    run, lost = play(slab(offset), ("plate",))
     assert lost > 0.5
-    assert given == pytest.approx(lost, rel=0.01)
-    assert -ripples["plate"].momentum() == pytest.approx(given, rel=1e-4)
-    texel = np.sqrt(ripples["plate"].atlas.areas.max())
-    for each, position in record:
-        assert (each.geom, each.other) == ("plate", "ball")
-        np.testing.assert_allclose(each.point - position, [0.13, -0.07, 0.05], atol=1.5 * texel)
-        assert each.point[2] - position[2] == pytest.approx(0.05, abs=1e-9)
-
-
-@pytest.mark.parametrize("joint", ["<freejoint/>", '<joint axis="0 1 0" pos="-0.5 0 0"/>'])
-def test_moving_body_with_collision_geoms_keeps_momentum(joint: str) -> None:
-    model = slab(0.02, joint)
-    model.opt.gravity[:] = 0
-    model.qpos0[-5] = 0.15  # the ball's height
-    data = mujoco.MjData(model)
-    data.qvel[-4] = -2.0
-    ripples = Ripples(model, {"plate": Material(density=50)}, resolution=16, backend="cpu", conserve_volume=False)
-    given = 0.0
-    while data.time < 0.4:
-        mujoco.mj_step(model, data)
-        ripples.step(data)
-        given += sum(each.impulse for each in ripples.last_impulses)
-    assert given == pytest.approx(MASS * np.linalg.norm(data.qvel[-6:-3] - [0, 0, -2.0]), rel=0.01)
+    assert run.given() == pytest.approx(lost, rel=0.01)
+    assert -run.ripples["plate"].momentum() == pytest.approx(run.given(), rel=1e-4)
+    assert run.pairs == {("plate", "ball")}
+    points = np.array([hit.point for hits in run.hits for hit in hits]) - run.data.geom("plate").xpos
+    texel = np.sqrt(run.ripples["plate"].atlas.areas.max())
+    np.testing.assert_allclose(points[:, :2], np.tile([0.13, -0.07], (len(points), 1)), atol=1.5 * texel)
+    np.testing.assert_allclose(points[:, 2], 0.05, atol=1e-9)
 
 
 ARM = f"""<body name="arm" pos="0 0 0.5">
@@ -124,41 +106,38 @@ ARM = f"""<body name="arm" pos="0 0 0.5">
 <geom name="bone" type="capsule" fromto="-0.5 0 0 0.5 0 0" size="0.09" group="3"/></body>"""
 
 
-@pytest.mark.parametrize(("x", "expected"), [(-0.4, {"left"}), (0.4, {"right"})])
-def test_targets_that_share_a_geom_get_each_contact_once(x: float, expected: set[str]) -> None:
-    _, record, lost = play(model_of(ARM + BALL.format(f"{x} 0.01 0.8")), ("left", "right"))
-    assert {each.geom for each, _ in record} == expected
-    assert sum(each.impulse for each, _ in record) == pytest.approx(lost, rel=0.01)
+@pytest.mark.parametrize(("x", "expected"), [(-0.4, "left"), (0.4, "right")])
+def test_targets_that_share_a_geom_get_each_contact_once(x: float, expected: str) -> None:
+    run, lost = play(model_of(ARM + BALL.format(f"{x} 0.01 0.8")), ("left", "right"))
+    assert run.pairs == {(expected, "ball")}
+    assert run.given() == pytest.approx(lost, rel=0.01)
 
 
 def test_a_plank_across_two_targets_weighs_on_both_what_it_weighs() -> None:
     plank = """<body name="ball" pos="0 0 0.605"><freejoint/>
         <geom name="plank" type="box" size="0.4 0.05 0.015" mass="0.3"/></body>"""
-    _, record, lost = play(model_of(ARM + plank), ("left", "right"), 0.5)
-    given = {name: sum(each.impulse for each, _ in record if each.geom == name) for name in ("left", "right")}
-    assert given["left"] + given["right"] == pytest.approx(lost, rel=0.01)
-    assert given["left"] == pytest.approx(given["right"], rel=0.1)
+    run, lost = play(model_of(ARM + plank), ("left", "right"), 0.5)
+    assert run.given() == pytest.approx(lost, rel=0.01)
+    assert run.given("left") == pytest.approx(run.given("right"), rel=0.1)
 
 
 @pytest.mark.filterwarnings("ignore:geom .* collides as")
 def test_named_geoms_alone_load_a_target_that_names_them() -> None:
     arm = ARM.replace("</body>", '<geom name="knob" size="0.12" pos="0.4 0 0"/></body>')
     model = model_of(arm + BALL.format("0.4 0.01 0.8"))
-    _, _, lost = play(model, ("left",), contacts={"left": ["bone"]})
-    _, bone, _ = play(model, ("left",), contacts={"left": ["bone"]})
-    _, knob, _ = play(model, ("right",), contacts={"right": ["knob"]})
-    assert not bone
-    assert sum(each.impulse for each, _ in knob) == pytest.approx(lost, rel=0.01)
+    bone, lost = play(model, ("left",), contacts={"left": ["bone"]})
+    knob, _ = play(model, ("right",), contacts={"right": ["knob"]})
+    assert not bone.pairs
+    assert knob.given() == pytest.approx(lost, rel=0.01)
 
 
 def test_two_links_that_are_only_visible_hit_each_other_with_one_momentum() -> None:
     fist = f"""<body name="ball" pos="0.3 0 0.8"><freejoint/><geom name="fist" size="0.06" {SEEN} mass="0"/>
         <geom name="core" size="0.05" mass="{MASS}"/></body>"""
-    _, record, lost = play(model_of(ARM + fist), ("right", "fist"))
-    given = {name: sum(each.impulse for each, _ in record if each.geom == name) for name in ("right", "fist")}
-    assert {(each.geom, each.other) for each, _ in record} == {("right", "core"), ("fist", "bone")}
-    assert given["right"] == pytest.approx(lost, rel=0.01)
-    assert given["fist"] == pytest.approx(lost, rel=0.01)
+    run, lost = play(model_of(ARM + fist), ("right", "fist"))
+    assert run.pairs == {("right", "core"), ("fist", "bone")}
+    assert run.given("right") == pytest.approx(lost, rel=0.01)
+    assert run.given("fist") == pytest.approx(lost, rel=0.01)
 
 
 @pytest.mark.filterwarnings("ignore:geom .* collides as")
@@ -170,10 +149,10 @@ def test_collision_geom_with_a_flex_collider_and_the_target_that_it_stands_for()
         {BALL.format("-0.03 0 0.7")}</worldbody></mujoco>"""
     )
     make_collidable(spec, "core", "flex")
-    _, record, lost = play(spec.compile(), ("shell",), 0.5)
-    assert {(each.geom, each.other) for each, _ in record} == {("shell", "ball")}
+    run, lost = play(spec.compile(), ("shell",), 0.5)
+    assert run.pairs == {("shell", "ball")}
     assert lost > 0.3
-    assert sum(each.impulse for each, _ in record) == pytest.approx(lost, rel=0.03)
+    assert run.given() == pytest.approx(lost, rel=0.03)
 
 
 def test_surface_that_is_only_visible_pushes_back() -> None:
@@ -188,7 +167,117 @@ def test_surface_that_is_only_visible_pushes_back() -> None:
             if data.time == 0:
                 mujoco.mj_forward(model, data)
                 waves.add_impulse(ripples.to_geom("right", [0.3, 0, 0.1]), -2.0, 0.06)
-            mujoco.mj_step(model, data)
-            ripples.step(data)
+            ripples.mj_step(data)
             heights[two_way] = max(heights.get(two_way, 0.0), float(data.qpos[2]))
     assert heights[True] > heights[False] + 0.002
+
+
+def test_hull_over_a_waist_is_as_far_off_as_the_waist_is_deep() -> None:
+    V, F = peanut(0.03)
+    widest = np.hypot(V[:, 1], V[:, 2]).max()
+    waist = np.hypot(V[:, 1], V[:, 2])[np.abs(V[:, 0]) < 0.01].min()
+    atlas = build_atlas(Mesh.from_arrays(V, F), 16, cache=False)
+    assert hull_gap(atlas) == pytest.approx(widest - waist, rel=0.1)
+
+
+def test_hull_that_matters_is_warned_of_by_name_and_distance() -> None:
+    model = mesh_spec(limbed(0.05), route=None).compile()
+    with pytest.warns(RippleWarning, match=r"geom 'target'.*hull, up to 0\.\d+ m.*make_collidable"):
+        Ripples(model, {"target": Material()}, resolution=8, backend="cpu")
+
+
+def test_no_warning_without_a_gap_or_without_collisions() -> None:
+    V, F = peanut(0.05)
+    convex = mesh_spec((0.3 * V / np.linalg.norm(V, axis=1, keepdims=True), F), route=None)
+    ghost = mesh_spec(limbed(0.05), route=None)
+    ghost.geom("target").contype = ghost.geom("target").conaffinity = 0
+    true = mesh_spec(limbed(0.05), route=None)
+    make_collidable(true, "target")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for spec in (convex, ghost, true):
+            Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")
+
+
+def test_geoms_that_a_flex_meets_badly_are_named() -> None:
+    spec = mesh_spec(peanut(0.06), "free")
+    base = spec.body("base")
+    arm = base.add_body(name="arm", pos=[0, 0, 0.5])
+    arm.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE)
+    arm.add_geom(name="arm", size=[0.05, 0, 0], mass=0.1)
+    base.add_body(name="horn", pos=[0, 0, 0.4]).add_geom(name="horn", size=[0.05, 0, 0], mass=0.1)
+    add_ball(spec, "excluded", [0, 0, 2])
+    spec.add_exclude(bodyname1="excluded", bodyname2="base")
+    add_ball(spec, "ball", [0, 0, 3])
+    add_ball(spec, "pebble", [0, 0, 4], type=mujoco.mjtGeom.mjGEOM_SDF, meshname="shape")
+    add_ball(spec, "crate", [0, 0, 5], type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.1])
+    with pytest.warns(RippleWarning) as caught:
+        Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")
+    [message] = [str(warning.message) for warning in caught]
+    assert "'target' collides through a flex" in message
+    assert "boxes ('crate') aside" in message
+    assert "SDF geoms ('pebble') sink" in message
+    assert "excluded ('arm', 'excluded')" in message
+    for geom in ("crate", "pebble", "arm", "excluded"):
+        spec.geom(geom).contype = spec.geom(geom).conaffinity = 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")
+
+
+LINK = '<body name="link">{}</body>' + BALL.format("0 0 2")
+
+
+@pytest.mark.parametrize(
+    ("link", "contacts", "message"),
+    [
+        (f'<geom name="shell" size="0.3" {SEEN}/>', {}, r"does not collide .*contacts=\{'shell': \[\.\.\.\]\}"),
+        ('<geom name="shell" size="0.3" contype="4" conaffinity="4"/>', {}, "'shell' has contype 4 and conaffinity 4"),
+        (
+            f'<geom name="shell" size="0.3" {SEEN}/><geom name="core" size="0.29" contype="0" conaffinity="2"/>',
+            {},
+            "nothing can touch geom 'shell': 'core' has contype 0 and conaffinity 2, which match no geom",
+        ),
+        (f'<geom name="shell" size="0.3" {SEEN}/><geom size="0.3"/>', {"shell": []}, "nothing can touch geom 'shell'"),
+    ],
+)
+def test_target_that_nothing_can_touch_says_so(link: str, contacts: dict, message: str) -> None:
+    with pytest.warns(RippleWarning, match=message):
+        Ripples(model_of(LINK.format(link)), {"shell": Material()}, contacts=contacts, resolution=8, backend="cpu")
+
+
+@pytest.mark.parametrize(
+    ("core", "gap"),
+    [
+        ('<geom name="core" size="0.2"/>', "0.1 m"),
+        ('<geom name="core" size="0.4"/>', "0.1 m"),
+        ('<geom name="core" size="0.3" pos="0 0 0.12"/>', "0.12 m"),
+        ('<geom name="core" type="box" size="0.28 0.28 0.28"/>', None),
+        ('<geom name="core" size="0.3" pos="0 0 0.02"/><geom name="other" size="0.2"/>', None),
+        # named below, since planes and height fields are not taken by themselves
+        ('<geom name="core" type="plane" size="1 1 1" pos="0 0 0.29"/>', None),
+        ('<geom name="core" type="hfield" hfield="flat" pos="0 0 0.29"/>', None),
+    ],
+)
+def test_collision_geoms_off_the_surface_are_warned_of(core: str, gap: str | None) -> None:
+    model = model_of(
+        LINK.format(f'<geom name="shell" size="0.3" {SEEN}/>{core}'),
+        '<hfield name="flat" nrow="2" ncol="2" size="1 1 0.1 0.1"/>',
+    )
+    contacts = {"shell": ["core"]} if "plane" in core or "hfield" in core else None
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        Ripples(model, {"shell": Material()}, contacts=contacts, resolution=16, backend="cpu")
+    messages = [str(each.message) for each in caught]
+    assert len(messages) == (gap is not None)
+    if gap is not None:
+        assert "'shell' collides as 'core'" in messages[0]
+        assert float(messages[0].split("up to ")[1].split()[0]) == pytest.approx(float(gap.split()[0]), rel=0.05)
+
+
+def test_sdf_geoms_that_height_fields_let_through_are_warned_of() -> None:
+    spec = mesh_spec(peanut(0.06), "free", "sdf")
+    spec.add_hfield(name="hills", nrow=2, ncol=2, size=[1, 1, 0.1, 0.1], userdata=[0, 1, 1, 0])
+    spec.worldbody.add_geom(name="hills", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="hills")
+    with pytest.warns(RippleWarning, match=r"SDF geom 'target' with height fields \('hills'\).*\"flex\""):
+        Ripples(spec.compile(), {"target": Material()}, resolution=8, backend="cpu")

@@ -10,29 +10,16 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
+from hits import Run
 from mujoco_models import add_ball, mesh_asset, mesh_spec
 
 from ripple_sim import Material, Ripples, make_collidable
-from ripple_sim.coupling.contacts import ContactReader
-from ripple_sim.coupling.flex_contacts import FlexContacts
-from ripple_sim.coupling.model import CoupledModel
-from ripple_sim.coupling.target_mesh import target_atlas, target_mesh
+from ripple_sim.coupling import ContactReader, CoupledModel, FlexContacts, target_atlas
+from ripple_sim.coupling.target_mesh import target_mesh
 from ripple_sim.errors import RippleWarning
 from ripple_sim.scenes.shapes import limbed, peanut
 
 GEOM = mujoco.mjtGeom
-
-
-def run(spec: mujoco.MjSpec, targets: list[str], seconds: float) -> tuple[Ripples, list, mujoco.MjData]:
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    material = {name: Material(density=50) for name in targets}
-    ripples, impulses = Ripples(model, material, resolution=12, backend="cpu", conserve_volume=False), []
-    while data.time < seconds:
-        mujoco.mj_step(model, data)
-        ripples.step(data)
-        impulses += ripples.last_impulses
-    return ripples, impulses, data
 
 
 ROUND = {
@@ -54,27 +41,23 @@ def test_bodies_in_any_pose_give_what_they_lose_on_their_side(body: str, seed: i
     spec.add_mesh(name="pebble", uservert=pebble.ravel(), userface=F.ravel())
     spec.option.gravity = [0, 0, 0]
     add_ball(spec, "body", [0, 0, 9], condim=1, **ROUND[body])
-    model = spec.compile()
-    data, joint = mujoco.MjData(model), model.joint(model.body("body").jntadr[0])
-    mujoco.mj_forward(model, data)
+    run, lost = Run(spec, "target"), 0.0
+    data, joint, waves = run.data, run.model.joint(run.model.body("body").jntadr[0]), run.ripples["target"]
+    mujoco.mj_forward(run.model, data)
     way, place, start = rng.standard_normal(3), joint.qposadr[0], joint.dofadr[0]
     way /= np.linalg.norm(way)
     data.qpos[place : place + 7] = [*(data.geom("target").xpos + 0.6 * way), *rng.standard_normal(4)]
     data.qvel[start : start + 6] = [*(-2 * way + rng.uniform(-0.1, 0.1, 3)), *rng.uniform(-3, 3, 3)]
-    ripples = Ripples(model, {"target": Material(density=50)}, resolution=12, backend="cpu", conserve_volume=False)
-    atlas, given, lost = ripples["target"].atlas, 0.0, 0.0
     while data.time < 0.5:
         before = data.qvel[start : start + 3].copy()
-        mujoco.mj_step(model, data)
-        ripples.step(data)
+        hits = run.step()
         change = 0.2 * (data.qvel[start : start + 3] - before)
         lost += float(np.linalg.norm(change))
-        for impulse in ripples.last_impulses:
-            given += impulse.impulse
-            assert data.geom("target").xmat.reshape(3, 3) @ atlas.normals[impulse.texel] @ change > 0
-    assert given > 0.1
-    assert given == pytest.approx(lost, rel=0.03)
-    assert -ripples["target"].momentum() == pytest.approx(given, rel=0.03)
+        for hit in hits:
+            assert data.geom("target").xmat.reshape(3, 3) @ waves.atlas.normals[hit.texel] @ change > 0
+    assert run.given() > 0.1
+    assert run.given() == pytest.approx(lost, rel=0.03)
+    assert -waves.momentum() == pytest.approx(run.given(), rel=0.03)
 
 
 def test_impulses_lie_where_the_balls_are_nearest_to_the_true_surface() -> None:
@@ -94,8 +77,7 @@ def test_impulses_lie_where_the_balls_are_nearest_to_the_true_surface() -> None:
     ripples = Ripples(model, {"target": Material()}, resolution=48, backend="cpu")
     atlas, off, hit = ripples["target"].atlas, [], set()
     while data.time < 0.6:
-        mujoco.mj_step(model, data)
-        ripples.step(data)
+        ripples.mj_step(data)
         position, rotation = data.geom("target").xpos, data.geom("target").xmat.reshape(3, 3)
         for impulse in ripples.last_impulses:
             nearest, _ = atlas.project((data.geom(impulse.other).xpos - position) @ rotation)
@@ -107,75 +89,48 @@ def test_impulses_lie_where_the_balls_are_nearest_to_the_true_surface() -> None:
     assert np.quantile(off, 0.99) < texel
 
 
-def test_two_targets_with_flexes_ripple_with_one_momentum() -> None:
+@pytest.mark.parametrize("route", ["flex", "convex"])
+def test_two_targets_ripple_with_one_momentum(route: str) -> None:
+    if route == "convex":
+        pytest.importorskip("coacd")
     V, F = peanut(0.05)
     spec = mujoco.MjSpec()
     spec.option.gravity = [0, 0, 0]
     spec.add_mesh(name="shape", uservert=V.ravel(), userface=F.ravel())
     for name, height in (("lower", 0.0), ("upper", 0.45)):
         body = spec.worldbody.add_body(name=name, pos=[0.01, 0.02, height])
-        joint = body.add_freejoint()
-        joint.name = name
+        body.add_freejoint()
         body.add_geom(name=name, type=GEOM.mjGEOM_MESH, meshname="shape", mass=2.0)
-        make_collidable(spec, name, "flex")
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    data.joint("upper").qvel[2] = -1.5
-    ripples = Ripples(
-        model, {"lower": Material(), "upper": Material()}, resolution=12, backend="cpu", conserve_volume=False
-    )
-    given = {"lower": 0.0, "upper": 0.0}
-    while data.time < 0.3:
-        mujoco.mj_step(model, data)
-        ripples.step(data)
-        for impulse in ripples.last_impulses:
-            given[impulse.geom] += impulse.impulse
-            assert {impulse.geom, impulse.other} == {"lower", "upper"}
-    lost = 2.0 * np.linalg.norm(data.joint("upper").qvel[:3] - [0, 0, -1.5])
-    assert given["lower"] == pytest.approx(lost, rel=0.03)
-    assert given["upper"] == pytest.approx(lost, rel=0.03)
+        make_collidable(spec, name, route)
+    run = Run(spec, "lower", "upper")
+    run.data.qvel[8] = -1.5
+    run.until(0.3)
+    lost = 2.0 * np.linalg.norm(run.data.qvel[6:9] - [0, 0, -1.5])
+    assert lost > 0.5
+    assert run.pairs == {("lower", "upper"), ("upper", "lower")}
+    assert run.given("lower") == pytest.approx(lost, rel=0.03)
+    assert run.given("upper") == pytest.approx(lost, rel=0.03)
 
 
-@pytest.mark.parametrize("ripples_too", [True, False])
-def test_what_hits_a_flex_and_ripples_itself_gets_as_much_as_it_loses(ripples_too: bool) -> None:
+@pytest.mark.parametrize("targets", [["target", "body"], ["body"]])
+def test_what_hits_a_flex_and_ripples_itself_gets_as_much_as_it_loses(targets: list[str]) -> None:
     spec = mesh_spec(limbed(0.04), condim=1)
     spec.option.gravity = [0, 0, 0]
     add_ball(spec, "body", [0, 0, 9], condim=1, **ROUND["cylinder"])
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    run, lost = Run(spec, *targets), 0.0
+    data = run.data
+    mujoco.mj_forward(run.model, data)
     data.qpos[:3] = data.geom("target").xpos + np.array([0, 0, 0.6])
     data.qpos[3:7] = np.random.default_rng(2).standard_normal(4)
     data.qvel[2:6] = -2.0, 3.0, 2.0, 1.0
-    materials = {name: Material(density=50) for name in (["target"] if ripples_too else []) + ["body"]}
-    ripples, given = Ripples(model, materials, resolution=12, backend="cpu", conserve_volume=False), {}
-    lost, mass = 0.0, model.body("body").mass[0]
     for _ in range(150):
         before = data.qvel[:3].copy()
-        ripples.mj_step(data)
-        lost += mass * np.linalg.norm(data.qvel[:3] - before)
-        for hit in ripples.last_impulses:
-            given[hit.geom] = given.get(hit.geom, 0.0) + hit.impulse
+        run.step()
+        lost += run.model.body("body").mass[0] * np.linalg.norm(data.qvel[:3] - before)
     assert lost > 0.2
-    assert given.keys() == materials.keys()
-    for impulse in given.values():
-        assert impulse == pytest.approx(lost, rel=1e-3)
-
-
-def test_flex_of_a_geom_that_does_not_ripple_goes_by_the_geoms_name() -> None:
-    spec = mujoco.MjSpec()
-    V, F = peanut(0.05)
-    spec.add_mesh(name="shape", uservert=V.ravel(), userface=F.ravel())
-    spec.default.geom.condim = 1
-    spec.worldbody.add_geom(name="ball", size=[0.3, 0, 0])
-    body = spec.worldbody.add_body(name="animal", pos=[0, 0, 0.7])
-    body.add_freejoint()
-    body.add_geom(name="animal", type=GEOM.mjGEOM_MESH, meshname="shape", mass=0.5)
-    make_collidable(spec, "animal", "flex")
-    _, impulses, data = run(spec, ["ball"], 0.4)
-    assert {(impulse.geom, impulse.other) for impulse in impulses} == {("ball", "animal")}
-    lost = 0.5 * (data.body("animal").cvel[5] + 9.81 * data.time)
-    assert sum(impulse.impulse for impulse in impulses) == pytest.approx(lost, rel=0.1)
+    assert {geom for geom, _ in run.pairs} == set(targets)
+    for name in targets:
+        assert run.given(name) == pytest.approx(lost, rel=1e-3)
 
 
 def test_flex_written_by_hand_is_known_by_its_name() -> None:
@@ -188,43 +143,11 @@ def test_flex_written_by_hand_is_known_by_its_name() -> None:
         element="{triangles}"/></worldbody></mujoco>"""
     )
     add_ball(spec, "ball", [-0.17, 0.01, 0.35])
-    ripples, impulses, data = run(spec, ["target"], 0.25)
-    assert {(impulse.geom, impulse.other) for impulse in impulses} == {("target", "ball")}
-    lost = 0.2 * np.linalg.norm(data.body("ball").cvel[3:] + np.array([0, 0, 9.81]) * data.time)
-    assert sum(impulse.impulse for impulse in impulses) == pytest.approx(lost, rel=0.03)
-    assert -ripples["target"].momentum() == pytest.approx(lost, rel=0.05)
-
-
-def cylinder_on_flex(speed: float) -> tuple[list[str], float, float]:
-    """Warnings of pushes sideways, impulses, and the momentum that a cylinder lost."""
-    spec = mesh_spec(limbed(0.04), condim=1)
-    spec.option.gravity, spec.option.timestep = [0, 0, 0], 0.002
-    add_ball(spec, "body", [0.1, -0.2, 1.4], condim=1, type=GEOM.mjGEOM_CYLINDER, size=[0.05, 0.03, 0])
-    model = spec.compile()
-    data, given, lost = mujoco.MjData(model), 0.0, 0.0
-    mujoco.mj_forward(model, data)
-    data.qpos[:3], data.qvel[:3] = data.geom("target").xpos, [0, 0, -speed]
-    data.qpos[2] += 0.8
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", RippleWarning)
-        ripples = Ripples(model, {"target": Material(density=50)}, resolution=12, backend="cpu")
-        while data.time < 1.5 / speed:
-            before = data.qvel[:3].copy()
-            mujoco.mj_step(model, data)
-            ripples.step(data)
-            given += sum(impulse.impulse for impulse in ripples.last_impulses)
-            lost += 0.2 * np.linalg.norm(data.qvel[:3] - before)
-    return [str(each.message) for each in caught if "sideways" in str(each.message)], given, lost
-
-
-def test_what_sinks_into_a_flex_and_is_pushed_sideways_is_warned_of() -> None:
-    messages, given, lost = cylinder_on_flex(4.0)
-    assert given == pytest.approx(lost, rel=1e-3)
-    assert not messages
-    messages, given, lost = cylinder_on_flex(30.0)
-    assert abs(given - lost) > 0.05 * lost
-    assert len(messages) == 1
-    assert "the impulses on geom 'target' are wrong by about" in messages[0]
+    run = Run(spec, "target").until(0.25)
+    assert run.pairs == {("target", "ball")}
+    lost = 0.2 * np.linalg.norm(run.data.body("ball").cvel[3:] + np.array([0, 0, 9.81]) * run.data.time)
+    assert run.given() == pytest.approx(lost, rel=0.03)
+    assert -run.ripples["target"].momentum() == pytest.approx(lost, rel=0.05)
 
 
 UP, ASIDE = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
@@ -253,14 +176,9 @@ def frame_along(normal: np.ndarray) -> np.ndarray:
 def summed(
     slab: tuple[mujoco.MjModel, np.ndarray],
     contacts: list[tuple[tuple[float, ...], tuple[float, float, float]]],
-    *,
     surface: tuple[float, ...] | None = UP,
-    swapped: bool = False,
-    rotation: np.ndarray = np.eye(3),  # noqa: B008
-    dist: float = -0.002,
-    margin: float = 0.0,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Which contacts of the ball with the block are kept, and their points (from MuJoCo's), forces and normals.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which contacts of the ball with the block are kept, and their forces and normals.
 
     Parameters
     ----------
@@ -268,27 +186,22 @@ def summed(
         Outward normal, and force on the ball in the world [N], of each.
     surface
         Normal of the triangle that is touched in the world; None for a vertex.
-    swapped
-        Whether the ball is the first geom of the contacts.
-    rotation
-        Of the block.
     """
     model, normals = slab
-    k, side = len(contacts), int(swapped)
-    frames = np.array([frame_along(np.multiply(-1 if swapped else 1, normal)) for normal, _ in contacts])
-    forces = np.array([force for _, force in contacts]) * (-1 if swapped else 1)
+    k = len(contacts)
+    frames = np.array([frame_along(normal) for normal, _ in contacts])
     elements = np.full((k, 2), -1, np.int32)
     if surface is not None:
-        elements[:, side] = (normals @ rotation.T @ surface).argmax()
+        elements[:, 0] = (normals @ surface).argmax()
     contact = SimpleNamespace(
         dim=np.full(k, 3, np.int32), friction=np.ones((k, 5)), elem=elements, frame=frames.reshape(k, 9),
-        pos=np.arange(3.0 * k).reshape(k, 3), dist=np.full(k, dist), includemargin=np.full(k, margin),
+        pos=np.zeros((k, 3)), dist=np.full(k, -0.002), includemargin=np.zeros(k),
     )  # fmt: skip
-    data = SimpleNamespace(contact=contact, geom_xmat=np.tile(rotation.ravel(), (2, 1)))
-    coupled, rows = CoupledModel(model), (np.arange(k), np.full(k, side), np.zeros(k, int), np.ones(k, int))
-    along = np.einsum("kij,kj->ki", frames, forces)
-    kept, points, *loads = FlexContacts(coupled, {0: target_mesh(model, 0)}).loads(data, *rows, np.zeros(1, int), along)
-    return kept, points - contact.pos[kept], *loads
+    data = SimpleNamespace(contact=contact, geom_xmat=np.tile(np.eye(3).ravel(), (2, 1)))
+    rows = np.arange(k), np.zeros(k, int), np.zeros(k, int), np.ones(k, int), np.zeros(1, int)
+    along = np.einsum("kij,kj->ki", frames, [force for _, force in contacts])
+    kept, _, *loads = FlexContacts(CoupledModel(model), {0: target_mesh(model, 0)}).loads(data, *rows, along)
+    return kept, *loads
 
 
 RIM = [(UP, (0, 0, 3)), (ASIDE, (50, 0, 1)), ((-1, 0, 0), (-50, 0, 2))]
@@ -297,56 +210,10 @@ RIM = [(UP, (0, 0, 3)), (ASIDE, (50, 0, 1)), ((-1, 0, 0), (-50, 0, 2))]
 def test_friction_of_contacts_that_push_sideways_counts_along_the_normal(slab: tuple) -> None:
     """Two opposite contacts at a rim cancel along x, but their friction pushes upwards: 3 + 1 + 2 N."""
     assert summed(slab, RIM, surface=None)[0].all(), "without the surface's normals all three would count as normals"
-    kept, _, forces, normals = summed(slab, RIM)
+    kept, forces, normals = summed(slab, RIM)
     assert kept.tolist() == [True, False, False]
     np.testing.assert_allclose(forces, [6])
     np.testing.assert_allclose(normals, [UP], atol=1e-15)
-
-
-def test_the_load_is_shared_by_normal_force_and_by_how_straight_it_is(slab: tuple) -> None:
-    _, _, forces, _ = summed(slab, [(UP, (0, 0, 4)), ((0.6, 0.0, 0.8), (1.2, 0, 1.6))])
-    # 4 and 2 N along their own normals; the whole force of (1.2, 0, 5.6) lies along their mean normal as it is
-    assert forces.sum() == pytest.approx(np.hypot(1.2, 5.6))
-    assert forces[1] / forces[0] == pytest.approx(2 * 0.8**2 / 4)
-
-
-@pytest.mark.filterwarnings("ignore:the impulses on geom")
-@pytest.mark.parametrize(
-    "contacts",
-    [
-        [(UP, (0, 0, -2))],
-        [(UP, (0, 0, 1)), (ASIDE, (0, 0, -3))],
-        [(ASIDE, (5, 0, 0)), ((0, 1, 0), (0, 5, 0))],
-        [(UP, (0, 0, 0))],
-    ],
-    ids=["pulled", "pulled in sum", "sideways only", "no force"],
-)
-def test_a_pair_that_does_not_push_is_left_out(slab: tuple, contacts: list) -> None:
-    assert [len(each) for each in summed(slab, contacts)[1:]] == [0, 0, 0]
-
-
-def test_it_does_not_matter_which_of_the_two_mujoco_names_first(slab: tuple) -> None:
-    contacts = [(UP, (1, 0, 3)), ((0.6, 0, 0.8), (0, 1, 5)), (ASIDE, (4, 0, 2))]
-    for one, other in zip(summed(slab, contacts), summed(slab, contacts, swapped=True), strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("dist", "margin", "height"),
-    [(-0.002, 0.0, -0.001 + 2 * 0.002), (-0.1, 0.0, -0.05 + 0.1 + 0.03), (0.01, 0.014, 0.005 + 2 * 0.004)],
-    ids=["shallow", "deeper than the ball", "within the margin"],
-)
-def test_points_lie_outside_by_the_depth_but_not_by_more_than_the_geom(
-    slab: tuple, dist: float, margin: float, height: float
-) -> None:
-    """MuJoCo's point is half-way between the two surfaces, the ball's is out by its depth in the margin, twice."""
-    _, [point], _, _ = summed(slab, [(UP, (0, 0, 3))], dist=dist, margin=margin)
-    assert point[2] == pytest.approx(height)
-
-
-def test_normals_turn_with_the_geom(slab: tuple) -> None:
-    rotation = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
-    np.testing.assert_allclose(summed(slab, [(UP, (0, 0, 3))], rotation=rotation)[3], [UP], atol=1e-15)
 
 
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])

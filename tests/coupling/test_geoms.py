@@ -1,8 +1,7 @@
 """Geoms go by one name each, however they are asked for; those that cannot ripple are refused by name.
 
-Which geoms collide for a target: those it names, itself, or those of its body.
-
-Arguments of `Ripples` that cannot be right.
+Which geoms collide for a target: those it names, itself, those of its body, or a flex that stands for it. Arguments
+of `Ripples` that cannot be right are named.
 """
 
 import copy
@@ -11,27 +10,23 @@ import pickle
 import mujoco
 import numpy as np
 import pytest
-from mujoco_models import BALL, model_of
+from mujoco_models import BALL, add_ball, mesh_spec, model_of
 
 from ripple_sim import Material, RippleError, Ripples
-from ripple_sim.coupling.geoms import by_name, find_geom, geom_name, named_collision_geoms
-from ripple_sim.coupling.model import CoupledModel
+from ripple_sim.coupling import (
+    CoupledModel,
+    by_name,
+    find_flex_colliders,
+    find_geom,
+    flex_thickness,
+    geom_name,
+    named_collision_geoms,
+)
+from ripple_sim.scenes.shapes import peanut
 
 NAMELESS = """<geom type="plane" size="1 1 1"/>
 <body name="torso" pos="0 0 2"><geom name="chest" size="0.1"/><geom size="0.1"/><geom name="torso/3" size="0.1"/>
 <geom size="0.1"/><body pos="0 0 1"><geom size="0.1"/></body></body>"""
-
-
-@pytest.mark.parametrize(
-    ("geom", "message"),
-    [("nothing", "its geoms are 'target', 'ball'"), ("floor", "plane, which cannot ripple")],
-)
-def test_geoms_that_cannot_ripple_are_refused_by_name(geom: str, message: str) -> None:
-    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
-    if geom == "floor":
-        model = model_of('<geom name="floor" type="plane" size="1 1 1"/>' + BALL.format("0 0 2"))
-    with pytest.raises(RippleError, match=message):
-        Ripples(model, {geom: Material()}, resolution=8)
 
 
 def test_every_geom_has_a_name_of_its_own_by_which_it_is_found() -> None:
@@ -41,9 +36,7 @@ def test_every_geom_has_a_name_of_its_own_by_which_it_is_found() -> None:
     assert names == ["world/0", "chest", "torso/1", "torso/3", "geom 4", "geom 5"]
     assert [find_geom(model, name) for name in names] == list(range(6))
     assert find_geom(model, "torso/0") == find_geom(model, np.int64(1)) == 1
-
-
-def test_names_with_a_slash_as_dm_control_gives_them_are_found() -> None:
+    # names with a slash, as dm_control gives them
     model = model_of('<body name="walker/arm"><geom size="0.1"/><geom name="walker/hand" size="0.1"/></body>')
     assert [geom_name(model, geom) for geom in range(2)] == ["walker/arm/0", "walker/hand"]
     assert [find_geom(model, key) for key in ("walker/arm/0", "walker/arm/1", "walker/hand")] == [0, 1, 1]
@@ -105,12 +98,6 @@ def model() -> mujoco.MjModel:
     return model_of(ROBOT)
 
 
-def colliders(model: mujoco.MjModel, targets: tuple[str, ...], **contacts: list[str]) -> list[list[str]]:
-    ids = [find_geom(model, name) for name in targets]
-    coupled = CoupledModel(model, ids, named_collision_geoms(model, targets, contacts))
-    return [[coupled.names[geom] for geom in coupled.collision_geoms(target)] for target in ids]
-
-
 @pytest.mark.parametrize(
     ("targets", "contacts", "expected"),
     [
@@ -132,7 +119,9 @@ def colliders(model: mujoco.MjModel, targets: tuple[str, ...], **contacts: list[
     ],
 )
 def test_colliders_of_targets(model, targets, contacts, expected) -> None:
-    assert colliders(model, targets, **contacts) == expected
+    ids = [find_geom(model, name) for name in targets]
+    coupled = CoupledModel(model, ids, named_collision_geoms(model, targets, contacts))
+    assert [[coupled.names[geom] for geom in coupled.collision_geoms(target)] for target in ids] == expected
 
 
 def test_a_pair_collides_whatever_its_masks_say() -> None:
@@ -169,10 +158,7 @@ def test_contacts_that_cannot_be_are_named(model, contacts, message: str) -> Non
         Ripples(model, {"shell": Material(), "cap": Material()}, contacts=contacts, resolution=8, backend="cpu")
 
 
-def test_unknown_key_lists_the_rippling_geoms() -> None:
-    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
-    with pytest.raises(RippleError, match="'target'"):
-        Ripples(model, {"target": Material()}, resolution=8, backend="cpu")["ball"]
+SCENE = '<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2")
 
 
 @pytest.mark.parametrize(
@@ -186,9 +172,8 @@ def test_unknown_key_lists_the_rippling_geoms() -> None:
     ],
 )
 def test_arguments_of_a_wrong_kind_are_named(materials, options: dict, message: str) -> None:
-    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
     with pytest.raises(RippleError, match=message):
-        Ripples(model, materials, backend="cpu", **options)
+        Ripples(model_of(SCENE), materials, backend="cpu", **options)
 
 
 @pytest.mark.parametrize(
@@ -198,15 +183,12 @@ def test_arguments_of_a_wrong_kind_are_named(materials, options: dict, message: 
         (lambda ripples: ripples.poke("target", [0.0, np.nan, 0.0], 0.1), "points"),
         (lambda ripples: ripples.to_geom("target", [1.0, 2.0]), "points have shape"),
         (lambda ripples: ripples.hold("target", "all"), "region is 'all'"),
+        (lambda ripples: ripples["ball"], "'target'"),
     ],
 )
-def test_places_that_are_none_are_named(call, message: str) -> None:
-    model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2"))
+def test_places_and_keys_that_are_none_are_named(call, message: str) -> None:
     with pytest.raises(RippleError, match=message):
-        call(Ripples(model, {"target": Material()}, resolution=8, backend="cpu"))
-
-
-SCENE = '<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 2")
+        call(Ripples(model_of(SCENE), {"target": Material()}, resolution=8, backend="cpu"))
 
 
 def stepping(model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -252,3 +234,50 @@ def test_a_model_may_be_changed_in_place() -> None:
         model.body_mass[1] *= 1.1
         ripples.step(data)
         model.body_mass[1] /= 1.1
+
+
+@pytest.fixture(scope="module")
+def coupled() -> CoupledModel:
+    """A mesh with a flex collider, and a ball, a plane and an SDF geom beside it."""
+    spec = mesh_spec(peanut(0.06), "free", contype=2, conaffinity=5, solref=[0.03, 1.0])
+    add_ball(spec, "ball", [0, 0, 2], contype=1, conaffinity=0, solref=[0.01, 1.0])
+    add_ball(spec, "", [0, 0, 3], contype=0, conaffinity=0)
+    add_ball(spec, "pebble", [0, 0, 4], type=mujoco.mjtGeom.mjGEOM_SDF, meshname="shape", contype=8, conaffinity=8)
+    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1], contype=2, conaffinity=2)
+    return CoupledModel(spec.compile())
+
+
+def numbers(coupled: CoupledModel, *names: str) -> list[int]:
+    return [coupled.names.index(name) for name in names]
+
+
+def test_flex_speaks_for_its_geom(coupled: CoupledModel) -> None:
+    [target] = numbers(coupled, "target")
+    assert coupled.flex_colliders == {target: 0}
+    np.testing.assert_array_equal(np.flatnonzero(coupled.has_flex), [target])
+    np.testing.assert_allclose(coupled.solref[target], [0.03, 1.0])
+    assert coupled.collider_extents[target] == flex_thickness(coupled.model, 0) < coupled.extents[target]
+    # the geom's own masks are 0 now
+    np.testing.assert_array_equal(
+        np.flatnonzero(coupled.can_collide(target)), sorted(numbers(coupled, "ball", "floor"))
+    )
+
+
+def test_geoms_collide_where_either_mask_says_so_but_not_on_one_body(coupled: CoupledModel) -> None:
+    ball, pebble = numbers(coupled, "ball", "pebble")
+    np.testing.assert_array_equal(np.flatnonzero(coupled.can_collide(ball)), numbers(coupled, "target"))
+    assert coupled.masks_match(pebble)[pebble]
+    assert not coupled.can_collide(pebble).any()
+
+
+def test_flex_of_another_name_body_or_kind_stands_for_nothing() -> None:
+    V, F = peanut(0.06)
+    mesh = {"vert": V.ravel(), "elem": F.ravel()}
+    spec = mesh_spec((V, F), route=None)
+    spec.worldbody.add_body(name="elsewhere")
+    spec.add_flex(name="other", dim=2, vertbody=["base"], **mesh)
+    assert find_flex_colliders(spec.compile()) == {}
+    for body, geom in (("base", {0: 1}), ("elsewhere", {})):
+        changed = spec.copy()
+        changed.add_flex(name="target", dim=2, vertbody=[body], **mesh)
+        assert find_flex_colliders(changed.compile()) == geom

@@ -136,6 +136,43 @@ def test_forces_that_are_not_solved_yet_are_solved_for() -> None:
     assert given == pytest.approx(MASS * (data.qvel[2] + GRAVITY * data.time), rel=2e-3)
 
 
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+@pytest.mark.parametrize("two_way", [False, True])
+def test_forces_lost_to_a_new_collision_are_found_again(two_way: bool, integrator: str) -> None:
+    """`mj_collision` takes the rows of the constraint solver away."""
+    waves, places = [], []
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RippleWarning)
+        for collide in (False, True):
+            ripples, model, data = bounce(two_way=two_way)
+            model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+            for _ in range(200):
+                mujoco.mj_step(model, data)
+                if collide:
+                    mujoco.mj_collision(model, data)
+                ripples.step(data)
+            waves.append(ripples["block"].height)
+            places.append(data.qpos.copy())
+    np.testing.assert_allclose(waves[1], waves[0], atol=1e-4 * np.abs(waves[0]).max())
+    np.testing.assert_allclose(places[1], places[0], atol=1e-6)
+
+
+def test_forces_that_cannot_be_found_again_are_told_of() -> None:
+    """With poses of the coming step its forces are taken."""
+    ripples, model, data = bounce()
+    given = 0.0
+    with pytest.warns(RippleWarning, match="`mj_collision`, called after `mj_step`, throws them away") as told:
+        for _ in range(200):
+            mujoco.mj_step(model, data)
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_collision(model, data)
+            ripples.step(data)
+            given += sum(impulse.impulse for impulse in ripples.last_impulses)
+    assert len(told) == 1
+    assert given > 0.5 * MASS * (data.qvel[2] + GRAVITY * data.time)
+
+
 def test_data_of_another_model_is_refused() -> None:
     ripples, _, _ = bounce()
     other = mujoco.MjModel.from_xml_string('<mujoco model="chair"><worldbody><geom size="1"/></worldbody></mujoco>')

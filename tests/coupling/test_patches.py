@@ -1,11 +1,15 @@
-"""Contacts mark the corners of a patch: the force is spread over it, and force and torque stay the same."""
+"""Contacts mark the corners of a patch: the force is spread over it, and force and torque stay the same.
+
+Footprints under the points of a patch.
+"""
 
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.patches import MAX_CORNERS, corners, load_points
+from ripple_sim.coupling import Footprints, corners, load_points
 from ripple_sim.scenes.shapes import limbed
 from ripple_sim.solver import Atlas, Mesh, build_atlas
+from ripple_sim.solver.waves.footprint import footprint
 
 SQUARE = 0.1 * np.array([[-1, -1, 5], [1, -1, 5], [-1, 1, 5], [1, 1, 5]])
 
@@ -45,15 +49,6 @@ def test_force_and_torque_stay_what_they_are(block: Atlas, seed: int) -> None:
     np.testing.assert_allclose(forces @ points, loads @ corners, atol=1e-12)
 
 
-def test_number_of_points_is_bounded_however_many_contacts_there_are(block: Atlas) -> None:
-    rng = np.random.default_rng(5)
-    corners = np.column_stack([rng.uniform(-0.4, 0.4, (200, 2)), np.full(200, 0.5)])
-    loads = rng.uniform(0.1, 1.0, 200)
-    points, forces, _ = spread_patch(block, corners, loads, 0.001, convex=True)
-    assert len(forces) <= MAX_CORNERS * (MAX_CORNERS + 1) // 2
-    np.testing.assert_allclose(forces @ points, loads @ corners)
-
-
 def test_no_force_where_the_surface_is_not(block: Atlas) -> None:
     """Two contacts on the head and on the rump of an animal load it there, and not on the saddle between them."""
     V, F = limbed(0.05)
@@ -80,15 +75,6 @@ def test_far_contacts_of_one_pair_stay_apart_and_add_up() -> None:
     np.testing.assert_allclose(middles, [[0.0075, 0, 0], [1, 0, 0]])
 
 
-def test_number_of_corners_is_bounded_however_many_contacts_there_are() -> None:
-    rng = np.random.default_rng(5)
-    points = np.column_stack([rng.uniform(-0.4, 0.4, (200, 2)), np.full(200, 0.5)])
-    forces = rng.uniform(0.1, 1.0, 200)
-    _, middles, totals = corners(np.zeros(200, int), points, forces, np.array([0.001]))
-    assert len(totals) == MAX_CORNERS
-    np.testing.assert_allclose(totals @ middles, forces @ points)
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_patches_do_not_depend_on_one_another(block: Atlas, seed: int) -> None:
     """Four geoms on the upper side of a cube, of which one has a single contact and one is not convex."""
@@ -107,3 +93,16 @@ def test_patches_do_not_depend_on_one_another(block: Atlas, seed: int) -> None:
         np.testing.assert_allclose(together.points[mine], at, atol=1e-12)
         np.testing.assert_allclose(together.forces[mine], pushes, rtol=1e-9)
         np.testing.assert_allclose(together.radii[mine], radius)
+
+
+def test_footprints_under_many_points_are_those_of_each() -> None:
+    animal = build_atlas(Mesh.from_arrays(*limbed(0.05)), 24, cache=False)
+    rng, areas = np.random.default_rng(2), animal.areas.reshape(-1)
+    movable = rng.uniform(0.5, 1.0, areas.size)
+    points = animal.mesh.V[rng.choice(len(animal.mesh.V), 60, replace=False)]
+    found = Footprints(animal, movable).under(np.zeros(60, int), points, np.full(60, 0.08), np.zeros(1, bool))
+    for point, (texels, shares) in zip(points, found, strict=True):
+        where = footprint(animal, point, 0.08)
+        np.testing.assert_array_equal(texels, where.texels)
+        np.testing.assert_allclose(shares, where.weights * areas[where.texels] * movable[where.texels])
+        assert (where.weights * areas[where.texels]).sum() == pytest.approx(1.0)

@@ -1,4 +1,7 @@
-"""Bodies that come to rest: the surface becomes still, and bears their weight."""
+"""Bodies that come to rest: the surface becomes still, and bears their weight.
+
+The rest filter: forces pass as they are, places and chatter are averaged, and no impulse is lost.
+"""
 
 import mujoco
 import numpy as np
@@ -7,6 +10,9 @@ from mujoco_models import limbed_asset
 from unfiltered import WithAndWithout, rms
 
 from ripple_sim import Material, Ripples, make_collidable
+from ripple_sim.coupling import NO_FORCES, RestFilter, TexelForces
+from ripple_sim.solver import Load, sphere_atlas
+from ripple_sim.solver.waves.footprint import footprint
 
 GRAVITY = 9.81
 # of the softest material that still becomes still within a few seconds
@@ -31,7 +37,7 @@ BODIES = {
 def model_of(target: str, body: str, solref: str) -> mujoco.MjModel:
     geom, top = TARGETS[target]
     spec = mujoco.MjSpec.from_string(
-        f"""<mujoco><option timestep="0.002" sdf_initpoints="10"/>
+        f"""<mujoco><option timestep="0.002" sdf_initpoints="40"/>
         <default><geom solref="{solref}" friction="1 0.05 0.05" condim="6"/></default>
         <asset>{limbed_asset()}</asset>
         <worldbody>{geom}<body name="body" pos="0 0 {top + 0.2}"><freejoint/><geom {BODIES[body]} mass="0.5"/></body>
@@ -45,23 +51,28 @@ def model_of(target: str, body: str, solref: str) -> mujoco.MjModel:
 pytestmark = pytest.mark.filterwarnings("ignore:geom 'target' collides through a flex", "ignore:the waves on geom")
 
 
-# solref 0.01 0.2 never comes quite to rest: contacts of flat bodies break and close at every other step
-@pytest.mark.parametrize("solref", ["0.02 1", "0.01 0.2"])
+CALM, CHATTERING = "0.02 1", "0.01 0.2"
+
+
+# the latter never comes quite to rest: contacts of flat bodies break and close at every other step
 @pytest.mark.parametrize(
-    ("target", "body"),
-    [("sphere", "ball"), ("box", "box"), ("box", "capsule"), ("animal", "box"), ("flex", "box")],
+    ("target", "body", "solref"),
+    [
+        ("sphere", "ball", CALM),
+        ("box", "box", CALM),
+        *((*each, CHATTERING) for each in (("box", "box"), ("box", "capsule"), ("animal", "box"), ("flex", "box"))),
+    ],
 )
 def test_surface_under_a_body_at_rest_becomes_still_in_its_dimple(target: str, body: str, solref: str) -> None:
     model = model_of(target, body, solref)
     data = mujoco.MjData(model)
     ripples = Ripples(model, {"target": MATERIAL}, resolution=24, backend="cpu", conserve_volume=False)
-    waves, after_impact = ripples["target"], 0.0
-    while data.time < 5:
-        mujoco.mj_step(model, data)
-        ripples.step(data)
-        if data.time < 0.5:
-            after_impact = max(after_impact, rms(waves))
-    assert rms(waves) < 0.001 * after_impact
+    waves, history = ripples["target"], []
+    while data.time < 4:
+        ripples.mj_step(data)
+        history.append(rms(waves))
+    # a body that still rocks on a chattering contact disturbs the surface now and then
+    assert np.median(history[-250:]) < 0.001 * max(history[:250])
     # the springs under the whole surface bear the weight
     support = -(waves.operator.mass * MATERIAL.stiffness * waves.height.astype(np.float64)).sum()
     # ... of which the slope of the animal's back takes a little along the surface
@@ -77,8 +88,7 @@ def test_box_that_lies_flat_loads_the_surface_under_its_middle_too() -> None:
     material = Material(speed=0.1, damping=20.0, stiffness=1000.0, density=100.0)
     ripples = Ripples(model, {"target": material}, resolution=64, backend="cpu")
     while data.time < 1.5:
-        mujoco.mj_step(model, data)
-        ripples.step(data)
+        ripples.mj_step(data)
     waves = ripples["target"]
     place, height = waves.atlas.positions.reshape(-1, 3), waves.height.reshape(-1)
     above = place[:, 2] > 0.099
@@ -93,11 +103,8 @@ def test_box_that_lies_flat_loads_the_surface_under_its_middle_too() -> None:
 @pytest.mark.parametrize(("target", "dt"), [("animal", 0.004), ("box", 0.002)])
 def test_surface_under_a_stack_and_its_neighbours_becomes_still(target: str, dt: float) -> None:
     _, top = TARGETS[target]
-    places = [
-        ("box", 0.0, 0.1),
-        ("box", 0.0, 0.2),
-        *([("capsule", -0.3, 0.05), ("ball", 0.3, 0.06)] * (target == "box")),
-    ]
+    places = [("box", 0.0, 0.1), ("box", 0.0, 0.2)]
+    places += [("capsule", -0.3, 0.05), ("ball", 0.3, 0.06)] * (target == "box")
     bodies = "".join(
         f'<body pos="{x} 0 {top + z}"><freejoint/><geom {BODIES[kind]} mass="0.5"/></body>' for kind, x, z in places
     )
@@ -107,9 +114,8 @@ def test_surface_under_a_stack_and_its_neighbours_becomes_still(target: str, dt:
     )
     data, history = mujoco.MjData(model), []
     ripples = Ripples(model, {"target": MATERIAL}, resolution=16, backend="cpu", conserve_volume=False)
-    while data.time < 5:
-        mujoco.mj_step(model, data)
-        ripples.step(data)
+    while data.time < 4:
+        ripples.mj_step(data)
         history.append(rms(ripples["target"]))
     assert len(ripples.last_impulses) == len(places) - 1
     assert max(history[-50:]) < 0.001 * max(history)
@@ -179,3 +185,143 @@ def test_a_body_that_rolls_slowly_leaves_a_calm_surface() -> None:
     # it is where the body is
     deepest = waves.filtered.atlas.positions.reshape(-1, 3)[waves.filtered.height.argmin()]
     assert np.linalg.norm(deepest[:2] - data.qpos[:2]) < 0.05
+
+
+def dropped(scale: float) -> np.ndarray:
+    """Heights over the scale under a box and a ball that chatter: lengths by the scale, times by its square root."""
+    s, t = scale, np.sqrt(scale)
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="{0.002 * t}" tolerance="1e-14" iterations="200"/>
+        <default><geom solref="{0.01 * t} 0.2" solimp="0.9 0.95 {0.001 * s} 0.5 2"/></default><worldbody>
+        <geom name="target" type="box" size="{0.5 * s} {0.5 * s} {0.1 * s}"/>
+        <body pos="{0.05 * s} {0.02 * s} {0.3 * s}"><freejoint/>
+        <geom type="box" size="{0.06 * s} {0.05 * s} {0.04 * s}" mass="{0.5 * s**3}"/></body>
+        <body pos="{-0.25 * s} {0.1 * s} {0.25 * s}"><freejoint/><geom size="{0.06 * s}" mass="{0.3 * s**3}"/></body>
+        </worldbody></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    material = Material(t, 1 / t, 200 / s, density=100 * s, viscosity=1e-3 * s * t)
+    ripples = Ripples(model, {"target": material}, resolution=16, backend="cpu")
+    heights = []
+    for _ in range(50):
+        ripples.mj_step(data, nstep=10)
+        heights.append(ripples["target"].height / s)
+    return np.array(heights)
+
+
+@pytest.mark.parametrize("scale", [1 / 64, 64.0])  # powers of 4: round-off is the same
+def test_scaled_scenes_have_scaled_waves(scale: float) -> None:
+    heights = dropped(1.0)
+    np.testing.assert_allclose(dropped(scale), heights, atol=1e-3 * np.abs(heights).max())
+
+
+class LoadedSphere:
+    """A sphere of 1 m under the load of one geom, geom 0."""
+
+    def __init__(self, resolution: int, radius: float, dt: float) -> None:
+        self.atlas, self.radius, self.dt = sphere_atlas(1.0, resolution), radius, dt
+        self.filter = RestFilter(1, self.atlas.areas.size)
+
+    def at(self, point: np.ndarray, force: float) -> Load:
+        where = footprint(self.atlas, point, self.radius)
+        forces = force * where.weights * self.atlas.areas.reshape(-1)[where.texels]
+        rows = np.array([0, len(forces)])
+        present = TexelForces(
+            np.zeros(1, np.int64), point[None], np.array([self.radius / 2]), rows, where.texels, forces
+        )
+        return self.filter(present, self.dt)
+
+
+def given_over_time(forces: np.ndarray, dt: float) -> np.ndarray:
+    """Force that the surface receives in each step, while a geom touches and for a second after."""
+    sphere, given = LoadedSphere(16, 0.3, dt), []
+    for force in np.concatenate([forces, np.zeros(round(1.0 / dt))]):
+        out = sphere.at(np.array([0.0, 0.0, 1.0]), force) if force > 0 else sphere.filter(NO_FORCES, dt)
+        given.append(out.forces.sum())
+    assert not sphere.filter.active.any()
+    return np.array(given)
+
+
+@pytest.mark.parametrize("kind", ["steady", "driven", "noise", "hit"])
+def test_the_force_of_unbroken_contact_passes_as_it_is(kind: str) -> None:
+    dt, steps = 0.002, 2000
+    force = np.full(steps, 3.0)
+    if kind == "driven":
+        force += 2.9 * np.sin(2 * np.pi * 5.0 * dt * np.arange(steps))
+    elif kind == "noise":
+        force = np.random.default_rng(0).exponential(3.0, steps)
+    elif kind == "hit":
+        force[1500:1510] += 300.0
+    given = given_over_time(force, dt)
+    np.testing.assert_allclose(given[:steps], force, rtol=1e-9)
+    assert np.abs(given[steps:]).max() < 1e-9
+
+
+# openings of a step, after two to five of contact
+CHATTER = {"each other step": (0, 6), "sixth": (1.5, 4.4, 4.2, 3.5, 2.9, 0), "third": (0, 6, 4)}
+
+
+@pytest.mark.parametrize(
+    ("kind", "dt"),
+    [("each other step", 0.004), ("third", 0.004), *((kind, dt) for kind in CHATTER for dt in (0.0005, 0.002))],
+)
+def test_nothing_of_chatter_is_lost_and_it_is_averaged(kind: str, dt: float) -> None:
+    steps = round(6.0 / dt)
+    force = np.resize(CHATTER[kind], steps).astype(np.float64)
+    given = given_over_time(force, dt)
+    assert given.sum() == pytest.approx(force.sum(), rel=1e-9)
+    late = given[steps - 500 : steps]
+    assert late.std() < 0.2 * force.std()
+    assert late.mean() == pytest.approx(force.mean(), rel=0.02)
+    assert np.abs(given[steps:]).max() < force.max()
+
+
+def test_a_hit_on_a_chattering_geom_passes() -> None:
+    dt, steps = 0.002, 2500
+    force = np.resize([0.0, 6.0, 4.0], steps)
+    hit = np.zeros(steps)
+    hit[2000:2006] = [100, 300, 500, 500, 300, 100]
+    given = given_over_time(force + hit, dt)
+    assert given.sum() == pytest.approx((force + hit).sum(), rel=1e-9)
+    passed = given - given_over_time(force, dt)
+    assert passed[2000:2007].sum() == pytest.approx(hit.sum(), rel=0.05)
+    assert np.abs(passed[2020:2500]).max() < 0.01 * hit.max()
+
+
+def test_the_place_of_a_geom_at_rest_is_averaged() -> None:
+    """Its weight jumps between two points, which a hit does not wait for."""
+    sphere, rng, given = LoadedSphere(32, 0.2, 0.002), np.random.default_rng(1), []
+    for step in range(2000):
+        angle = 0.04 * rng.integers(2)
+        load = sphere.at(np.array([np.sin(angle), 0.0, np.cos(angle)]), 3.0 if step < 1990 else 300.0)
+        given.append(np.bincount(load.texels, load.forces, sphere.atlas.areas.size))
+    given = np.array(given)
+    change = np.abs(np.diff(given, axis=0)).sum(axis=1)
+    assert change[1500:1988].max() < 0.01 * change[:30].max()
+    assert change[1990:].max() > 50 * change[:30].max()
+
+
+def forces_of(geoms: list[int], texels: list[np.ndarray], forces: list[np.ndarray]) -> TexelForces:
+    """Geoms that load eight texels each, and stay in their places."""
+    begins, middles = 8 * np.arange(len(geoms) + 1), np.zeros((len(geoms), 3))
+    at, loads = np.array(texels, np.int64).reshape(-1), np.array(forces, np.float64).reshape(-1)
+    return TexelForces(np.array(geoms, np.int64), middles, np.full(len(geoms), 0.05), begins, at, loads)
+
+
+def test_geoms_are_filtered_each_for_itself() -> None:
+    """Three geoms that come and go, together and alone."""
+    size, dt, rng = 96, 0.002, np.random.default_rng(3)
+    alone, every = [RestFilter(4, size) for _ in range(4)], RestFilter(4, size)
+    for step in range(400):
+        present = [g for g in range(1, 4) if rng.random() < (0.9, 0.5, 0.02)[g - 1] and step < 200]
+        texels = [rng.permutation(8) + 10 * g for g in present]
+        forces = [rng.exponential(1.0, 8) for _ in present]
+        load = every(forces_of(present, texels, forces), dt)
+        together, apart = np.bincount(load.texels, load.forces, size), np.zeros(size)
+        for g in range(1, 4):
+            mine = slice(present.index(g), present.index(g) + 1) if g in present else slice(0, 0)
+            own = alone[g](forces_of(present[mine], texels[mine], forces[mine]), dt)
+            apart += np.bincount(own.texels, own.forces, size)
+        np.testing.assert_array_equal(together, apart)
+    assert not every.active.any()
+    assert not len(every(NO_FORCES, dt).texels)

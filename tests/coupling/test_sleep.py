@@ -57,17 +57,6 @@ def test_a_sleeping_body_keeps_its_dimple_and_presses(solref: str, tolerance: fl
     assert rms(run.waves) < 1e-5
 
 
-def test_a_sleeping_body_loads_its_target_as_a_waking_one() -> None:
-    sleeping, waking = Run(model_of()), Run(model_of(flag="disable"))
-    for run in (sleeping, waking):
-        run.until(1.5)
-    assert sleeping.asleep
-    assert waking.data.ncon
-    np.testing.assert_allclose(
-        sleeping.waves.height, waking.waves.height, atol=0.01 * np.abs(waking.waves.height).max()
-    )
-
-
 def test_a_sleeping_target_is_loaded_by_body_and_floor() -> None:
     run = Run(model_of("<freejoint/>"))
     run.until(1.5)

@@ -1,4 +1,4 @@
-"""Flexes and skins as targets: where their texels are, and what contacts give them."""
+"""Flexes and skins as targets: where their texels are, what contacts give them, and what the high-pass leaves of it."""
 
 import mujoco
 import numpy as np
@@ -6,8 +6,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from ripple_sim import Ripples
+from ripple_sim.coupling import HighPass, SoftSurface, coarse_motions, first_flex
 from ripple_sim.errors import SceneError
-from ripple_sim.solver import Material
+from ripple_sim.solver import Load, Material
 
 SOFT = Material(speed=1.0, density=5.0, damping=2.0, stiffness=100.0)
 HEAD = '<option timestep="0.001" solver="CG" tolerance="1e-8"/><size memory="20M"/>'
@@ -77,6 +78,33 @@ def test_the_balls_momentum_reaches_the_surface(xml, name):
     assert ripples[name].atlas.layout == ("patches" if name == "cloth" else "cube")
 
 
+HAMMOCK = f"""<mujoco>{HEAD}<worldbody>
+<flexcomp name="cloth" type="grid" count="9 9 1" spacing=".05 .05 .05" pos="0 0 .5" dim="2" radius=".005" mass=".5">
+<contact selfcollide="none"/><edge equality="true" damping=".01"/><pin id="0 8 72 80"/></flexcomp>
+<body name="ball" pos=".01 .02 .655"><freejoint/><geom name="ball" type="sphere" size=".05" mass=".1"/></body>
+</worldbody></mujoco>"""
+
+
+def test_a_cloth_that_wraps_round_a_ball_is_pressed_by_more_than_the_ball_loses():
+    """Forces on its slopes cancel as vectors, and those are exact; the surface gets the amounts of the normal ones."""
+    model = mujoco.MjModel.from_xml_string(HAMMOCK)
+    data = mujoco.MjData(model)
+    ripples = Ripples(model, {"cloth": SOFT}, resolution=8, backend="cpu")
+    impulse, amounts, whole, force = 0.0, 0.0, np.zeros(3), np.zeros(6)
+    for _ in range(400):
+        ripples.mj_step(data)
+        impulse += sum(each.impulse for each in ripples.last_impulses)
+        for i in range(data.ncon):
+            mujoco.mj_contactForce(model, data, i, force)
+            amounts += 0.001 * force[0]
+            on_ball = 1 if data.contact.geom[i, 1] >= 0 else -1
+            whole += 0.001 * on_ball * force[:3] @ data.contact.frame[i].reshape(3, 3)
+    dof, gained = model.body("ball").dofadr[0], np.array([0.0, 0.0, 0.1 * 9.81 * data.time])
+    assert_allclose(whole, 0.1 * data.qvel[dof : dof + 3] + gained, atol=1e-6)
+    assert impulse == pytest.approx(amounts, rel=1e-6)
+    assert impulse > 1.1 * np.linalg.norm(whole)
+
+
 def test_texels_lie_where_the_flex_is():
     ripples, data, _, _ = run(JELLY, "jelly", 100)
     corners = data.flexvert_xpos
@@ -100,7 +128,7 @@ def test_names_that_no_surface_has_are_refused():
     model = mujoco.MjModel.from_xml_string(JELLY)
     with pytest.raises(SceneError, match="its flexes and skins are 'jelly'"):
         Ripples(model, {"jam": SOFT})
-    with pytest.raises(SceneError, match="cannot push back yet"):
+    with pytest.raises(SceneError, match="cannot push back: their waves have the masses"):
         Ripples(model, {"jelly": SOFT}, resolution=8, two_way=True)
 
 
@@ -123,3 +151,34 @@ def test_a_geom_moved_by_hand_takes_its_contacts_along():
     assert ripples.last_impulses[0].point[2] == pytest.approx(0.2 * (1 - 0.002 * 99), rel=0.01)
     ripples.change_material("target", damping=5.0)
     assert_allclose(ripples["target"].vertices, ripples["target"].atlas.mesh.V)
+
+
+def flexed(dof: str) -> tuple[mujoco.MjModel, Ripples, SoftSurface]:
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><worldbody><flexcomp name="jelly" type="grid" count="3 3 3" spacing=".1 .1 .1" dim="3" dof="{dof}"
+        radius=".005" mass="5"><contact selfcollide="none"/><elasticity young="4e3" poisson=".3"/></flexcomp>
+        </worldbody></mujoco>"""
+    )
+    ripples = Ripples(model, {"jelly": Material(speed=1.0, density=5.0)}, resolution=8, high_pass={"jelly": True})
+    return model, ripples, SoftSurface(model, first_flex(model))
+
+
+@pytest.mark.parametrize("dof", ["full", "trilinear"])
+def test_what_is_left_does_no_work_on_the_motions_of_the_flex(dof):
+    _, ripples, surface = flexed(dof)
+    waves = ripples["jelly"]
+    texels = np.arange(40)
+    load = Load(texels, np.linspace(1, 2, 40))
+    fine = HighPass(waves, surface)(load)
+    basis = coarse_motions(waves, surface)
+    assert np.abs(basis.T @ fine.forces).max() < 1e-6 * np.abs(load.forces).sum()
+    assert np.abs(fine.forces).max() > 0.1
+
+
+def test_a_coarse_load_is_taken_off_whole():
+    _, ripples, surface = flexed("trilinear")
+    waves = ripples["jelly"]
+    mass = waves.operator.mass.reshape(-1)
+    motion = waves.rest.normals.reshape(-1, 3) @ [1.0, 2.0, 3.0]
+    fine = HighPass(waves, surface)(Load(np.arange(len(mass)), mass * motion))
+    assert np.abs(fine.forces).max() < 1e-6 * np.abs(mass * motion).max()

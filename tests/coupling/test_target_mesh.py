@@ -9,30 +9,10 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from mujoco_models import BALL, add_ball, model_of
+from hits import Run
+from mujoco_models import add_ball, model_of
 
-from ripple_sim import Material, Ripples
-from ripple_sim.coupling.target_mesh import height_field_triangles, primitive_triangles, target_atlas
-
-
-@pytest.mark.parametrize(
-    ("kind", "size", "volume", "half_extents"),
-    [
-        ("box", (0.2, 0.3, 0.1), 8 * 0.006, (0.2, 0.3, 0.1)),
-        ("capsule", (0.1, 0.2), np.pi * 0.01 * (0.4 + 0.4 / 3), (0.1, 0.1, 0.3)),
-        ("cylinder", (0.2, 0.1), 2 * np.pi * 0.004, (0.2, 0.2, 0.1)),
-        ("ellipsoid", (0.3, 0.2, 0.1), 4 / 3 * np.pi * 0.006, (0.3, 0.2, 0.1)),
-    ],
-)
-def test_primitives_ripple_on_their_own_surface(
-    kind: str, size: tuple[float, ...], volume: float, half_extents: tuple[float, ...]
-) -> None:
-    numbers = " ".join(map(str, size))
-    model = model_of(f'<geom name="target" type="{kind}" size="{numbers}"/>' + BALL.format("0 0 2"))
-    mesh = Ripples(model, {"target": Material()}, resolution=24, backend="cpu")["target"].atlas.mesh
-    assert mesh.volume == pytest.approx(volume, rel=0.005)
-    np.testing.assert_allclose(mesh.V.max(axis=0), half_extents, rtol=0.01)
-    np.testing.assert_allclose(mesh.V.min(axis=0), np.negative(half_extents), rtol=0.01)
+from ripple_sim.coupling import height_field_triangles, primitive_triangles, target_atlas
 
 
 def test_equal_geoms_share_one_atlas_whatever_their_names() -> None:
@@ -74,21 +54,16 @@ def test_triangles_lie_where_mujocos_rays_meet_the_field_and_face_up() -> None:
 def test_a_ball_that_falls_on_land_gives_it_its_momentum() -> None:
     spec = land(9, 12)
     add_ball(spec, "ball", [0.3, 0.2, 1.0], condim=1)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    ripples = Ripples(model, {"land": Material(speed=1.0, density=20.0)}, resolution=16, conserve_volume=False)
-    assert ripples["land"].atlas.layout == "patches"
-    given, before = np.zeros(3), data.qvel[:3].copy()
-    while data.time < 0.5:
-        mujoco.mj_step(model, data)
-        ripples.step(data)
-        forces = np.zeros(6)
-        for i in range(data.ncon):
-            mujoco.mj_contactForce(model, data, i, forces)
-            given += forces[0] * data.contact[i].frame[:3] * model.opt.timestep
-    lost = 0.2 * (data.qvel[:3] - before - [0, 0, -9.81 * data.time])
-    np.testing.assert_allclose(given, lost, rtol=0.01, atol=1e-3)
-    assert ripples["land"].momentum() < -0.1
+    run, lost = Run(spec, "land", density=20.0, resolution=16), 0.0
+    waves, velocity = run.ripples["land"], run.data.qvel[:3]
+    assert waves.atlas.layout == "patches"
+    while run.data.time < 0.5:
+        before = velocity.copy()
+        run.step()
+        lost += 0.2 * np.linalg.norm(velocity - before - run.model.opt.gravity * run.model.opt.timestep)
+    assert run.given() > 0.1
+    assert run.given() == pytest.approx(lost, rel=0.01)
+    assert waves.momentum() == pytest.approx(-run.given(), rel=0.01)
 
 
 SOLIDS = [
@@ -126,44 +101,33 @@ def mesh_of(kind: str, size: tuple[float, ...]) -> trimesh.Trimesh:
 
 
 @every_solid
-def test_vertices_lie_on_the_exact_surface(kind: str, size: tuple[float, ...]) -> None:
-    V, _ = triangles(kind, size)
-    np.testing.assert_allclose(distances(kind, size, V), 0, atol=1e-12)
-
-
-@every_solid
-def test_the_surface_is_closed_without_handles_and_faces_outwards(kind: str, size: tuple[float, ...]) -> None:
-    mesh = mesh_of(kind, size)
-    mesh.merge_vertices()
-    assert mesh.is_watertight
-    assert mesh.is_winding_consistent
-    assert mesh.euler_number == 2
-    assert mesh.volume > 0
-
-
-@every_solid
-def test_no_edge_is_longer_than_a_24th_of_the_solid(kind: str, size: tuple[float, ...]) -> None:
+def test_short_edges_cover_the_exact_surface_which_is_closed_and_faces_outwards(
+    kind: str, size: tuple[float, ...]
+) -> None:
     V, F = triangles(kind, size)
+    np.testing.assert_allclose(distances(kind, size, V), 0, atol=1e-12)
     edges = np.linalg.norm(V[F] - V[np.roll(F, -1, axis=1)], axis=2)
     # moved outwards onto a round surface, an edge grows a little
     assert edges.max() <= 1.02 * np.ptp(V, axis=0).max() / 24
     assert np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1).min() > 0
+    mesh = mesh_of(kind, size)
+    mesh.merge_vertices()
+    assert mesh.is_watertight and mesh.is_winding_consistent
+    assert mesh.euler_number == 2
+    assert mesh.volume > 0
 
 
 @pytest.mark.parametrize(
-    ("kind", "size", "volume", "area"),
+    ("kind", "size", "area"),
     [
-        ("box", (0.2, 0.3, 0.1), 0.048, 0.88),
-        ("capsule", (0.1, 0.2), np.pi * (0.004 + 0.004 / 3), np.pi * (0.08 + 0.04)),
-        ("cylinder", (0.2, 0.1), np.pi * 0.008, np.pi * (0.08 + 0.08)),
-        ("ellipsoid", (0.3, 0.3, 0.3), 4 / 3 * np.pi * 0.027, 4 * np.pi * 0.09),
+        ("box", (0.2, 0.3, 0.1), 0.88),
+        ("capsule", (0.1, 0.2), np.pi * (0.08 + 0.04)),
+        ("cylinder", (0.2, 0.1), np.pi * (0.08 + 0.08)),
+        ("ellipsoid", (0.3, 0.3, 0.3), 4 * np.pi * 0.09),
     ],
 )
-def test_volume_area_and_moments_are_those_of_the_solid(
-    kind: str, size: tuple[float, ...], volume: float, area: float
-) -> None:
+def test_volume_area_and_moments_are_those_of_the_solid(kind: str, size: tuple[float, ...], area: float) -> None:
     mesh = mesh_of(kind, size)
-    assert mesh.volume == pytest.approx(volume, rel=3e-3)
     assert mesh.area == pytest.approx(area, rel=3e-3)
     np.testing.assert_allclose(mesh.center_mass, 0, atol=1e-6)
     # MuJoCo's own inertia of the same solid, at a density of 1

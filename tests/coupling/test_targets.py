@@ -16,14 +16,9 @@ def test_material_may_change_under_a_body_at_rest() -> None:
     """What the surface has not got yet of a long contact is not lost."""
     momenta = []
     for change in (False, True):
-        model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 0.6"))
-        data = mujoco.MjData(model)
-        ripples = Ripples(
-            model, {"target": Material(density=50.0)}, resolution=16, backend="cpu", conserve_volume=False
-        )
+        data, ripples = ball_on_sphere(Material(density=50.0))
         for step in range(800):
-            mujoco.mj_step(model, data)
-            ripples.step(data)
+            ripples.mj_step(data)
             if change and step == 300:
                 ripples.change_material("target", speed=2.0)
         momenta.append(ripples["target"].momentum())
@@ -56,10 +51,10 @@ def test_places_are_in_the_frame_of_the_body_as_in_the_model(place: str) -> None
     assert np.linalg.norm(world - data.site("end").xpos, axis=1).max() < 0.12
 
 
-def ball_on_sphere(material: Material) -> tuple[mujoco.MjModel, mujoco.MjData, Ripples]:
+def ball_on_sphere(material: Material) -> tuple[mujoco.MjData, Ripples]:
     model = model_of('<geom name="target" type="sphere" size="0.5"/>' + BALL.format("0 0 0.6"))
     ripples = Ripples(model, {"target": material}, resolution=16, backend="cpu", conserve_volume=False)
-    return model, mujoco.MjData(model), ripples
+    return mujoco.MjData(model), ripples
 
 
 @pytest.mark.parametrize(
@@ -74,7 +69,7 @@ def ball_on_sphere(material: Material) -> tuple[mujoco.MjModel, mujoco.MjData, R
     ids=["damping", "yield height", "hold", "make rigid", "operator"],
 )
 def test_a_dent_outlives_a_change_of_the_material(change: Callable[[Ripples], None]) -> None:
-    _, _, ripples = ball_on_sphere(Material.dent(yield_height=1e-3, stiffness=2000.0, damping=20.0))
+    _, ripples = ball_on_sphere(Material.dent(yield_height=1e-3, stiffness=2000.0, damping=20.0))
     ripples["target"].add_impulse([0, 0, 0.5], 0.3, 0.2)
     ripples["target"].step(2.0)
     dent = ripples["target"].dent
@@ -89,16 +84,14 @@ def test_a_dent_outlives_a_change_of_the_material(change: Callable[[Ripples], No
 
 def test_texels_without_waves_do_not_drift_under_a_body_at_rest() -> None:
     """They were given their velocity, and a share in the forces to come, before they became rigid."""
-    model, data, ripples = ball_on_sphere(Material(density=50.0, stiffness=50.0, damping=5.0))
+    data, ripples = ball_on_sphere(Material(density=50.0, stiffness=50.0, damping=5.0))
     for _ in range(1500):
-        mujoco.mj_step(model, data)
-        ripples.step(data)
+        ripples.mj_step(data)
     z = ripples["target"].atlas.positions[..., 2]
     ripples.change_material("target", speed=np.where(z > 0.4, 0.0, 1.0), stiffness=0.0, damping=0.0)
     before = ripples["target"].height
     for _ in range(1000):
-        mujoco.mj_step(model, data)
-        ripples.step(data)
+        ripples.mj_step(data)
     rigid = ~ripples["target"].operator.movable
     assert rigid[z > 0.4].all()
     assert (ripples["target"].height == before)[rigid].all()
@@ -110,8 +103,7 @@ def test_copied_ripples_go_on_as_the_original(copied: Callable[[Ripples], Ripple
     data = mujoco.MjData(model)
     ripples = Ripples(model, {"target": Material(density=50.0)}, resolution=16, backend="cpu")
     for _ in range(150):
-        mujoco.mj_step(model, data)
-        ripples.step(data)
+        ripples.mj_step(data)
     twin, twin_data = copied(ripples), copy.copy(data)
     for each, state in ((ripples, data), (twin, twin_data)):
         for _ in range(50):

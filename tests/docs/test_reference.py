@@ -1,4 +1,4 @@
-"""The pages on scene files and on Python say what the code does."""
+"""The pages on scene files and on Python say what the code does, and that on troubleshooting what the program says."""
 
 import importlib
 import importlib.util
@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from ripple_sim.encode import MARK
 from ripple_sim.render import LOOKS
 from ripple_sim.scene import scene_file
 
@@ -96,3 +97,23 @@ def test_the_tables_of_a_plan_that_take_any_key_are_told_as_tables() -> None:
     text = hook("scene_tables").plan_tables()
     assert "| `vary` | table |" in text
     assert "| `model` | table |" in text
+
+
+ROOT = Path(__file__).parents[2]
+QUOTED = re.findall(
+    r"(?<![*\w])\*([^*|]+)\*(?![*\w])", (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+)
+
+
+@pytest.fixture(scope="module")
+def messages() -> str:
+    """The source, with strings that go on in the next line in one piece."""
+    sources = [
+        file.read_text(encoding="utf-8") for name in ("ripple_sim", "solver") for file in (ROOT / name).rglob("*.py")
+    ]
+    return re.sub(r'"\s*\n\s*f?"', "", "\n".join(sources)).replace("{MARK}", MARK)
+
+
+@pytest.mark.parametrize("words", QUOTED)
+def test_a_quoted_message_is_the_programs(words: str, messages: str) -> None:
+    assert words in messages

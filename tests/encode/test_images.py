@@ -1,9 +1,9 @@
-"""EXR frames: linear light as the shaders reckon it, whole in the file, and refused in time where it cannot be had."""
+"""Image files: linear light as the shaders reckon it, whole in EXR frames or refused in time; and files of passes."""
 
-import signal
+import dataclasses
+import json
 import subprocess
 import sys
-from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,18 +11,18 @@ import mujoco
 import numpy as np
 import pytest
 from sphere_height_maps import cube_charts
+from unfinished_videos import contents, egg_scene, interrupting_at
 
 from ripple_sim.cli import main as cli
-from ripple_sim.encode import check_output, open_writer
+from ripple_sim.encode import PassFiles, check_passes, open_writer
 from ripple_sim.errors import VideoError
-from ripple_sim.overlay.notes import color_table
-from ripple_sim.render import Camera, Renderer, Surface
+from ripple_sim.overlay import color_table
+from ripple_sim.render import Camera, Renderer, Surface, tone_mapped
 from ripple_sim.render.visuals import shapes as meshes
-from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.scene.scene import Scene
+from ripple_sim.scene import Scene
 from ripple_sim.solver import RippleError
 from ripple_sim.solver.gl import shared_context
-from ripple_sim.video.options import VideoOptions
+from ripple_sim.video import VideoOptions
 from ripple_sim.video.render_video import render_video
 
 WIDTH, HEIGHT = 64, 48
@@ -30,25 +30,10 @@ FRONT = Camera((0.0, 0.0, 0.0), 5.0, 70.0, -20.0, 40.0)
 BODIES = """<body pos="1 0 0"><geom type="box" size=".3 .3 .5" rgba=".1 .2 .7 1"/></body>
 <body pos="-1 0 .2"><geom size=".4" rgba=".8 .3 .1 1"/></body>"""
 FLOOR = '<geom type="plane" size="0 0 1" pos="0 0 -.5"/>'
-MJCF = f"""<mujoco><option timestep="0.005"/><worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
-{FLOOR}<body name="stone" pos="0.05 0 0.3"><freejoint/><geom name="stone" size="0.05"/></body></worldbody></mujoco>"""
-TOML = """model = "scene.xml"
-duration = 0.4
-[[ripple]]
-geom = "egg"
-resolution = 12
-material = {speed = 0.3, density = 20.0}
-"""
 OPTIONS = {"size": (WIDTH, HEIGHT), "fps": 30, "frame_format": "exr"}
 
 
-@pytest.fixture(autouse=True)
-def _left_as_found() -> Iterator[None]:
-    """Keep the program's signal handlers to these tests."""
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
+pytestmark = pytest.mark.usefixtures("signals_as_found")
 
 
 @pytest.fixture
@@ -59,9 +44,7 @@ def exr() -> None:
 
 @pytest.fixture
 def scene(tmp_path: Path, opengl: None) -> Scene:
-    (tmp_path / "scene.xml").write_text(MJCF)
-    (tmp_path / "scene.toml").write_text(TOML)
-    return load_scene(tmp_path / "scene.toml")
+    return egg_scene(tmp_path, FLOOR, duration=0.4, density=20.0)
 
 
 def read(path: Path) -> np.ndarray:
@@ -71,26 +54,12 @@ def read(path: Path) -> np.ndarray:
     return channels.pixels
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-
 def render(bodies: str = BODIES, asset: str = "", **options) -> np.ndarray:
     model = mujoco.MjModel.from_xml_string(f"<mujoco>{asset}<worldbody>{bodies}</worldbody></mujoco>")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     with Renderer(shared_context(), model, {}, size=(120, 90), **options) as renderer:
         return renderer.render(data, {}, FRONT)
-
-
-def developed(light: np.ndarray) -> np.ndarray:
-    """The renderer's tone curve on linear light, 0 to 255: a shoulder towards white, then IEC 61966-2-1."""
-    peak = light.max(axis=-1, keepdims=True)
-    excess = np.maximum(peak - 0.72, 0)
-    compressed = np.minimum(peak, 0.72) + 0.28 * excess / (excess + 0.28)
-    white = 1 - 1 / (1 + 0.18 * excess)
-    value = (1 - white) * light * compressed / np.maximum(peak, 1e-4) + white * compressed
-    return 255 * np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
 
 
 @pytest.mark.usefixtures("exr")
@@ -149,21 +118,6 @@ def test_a_disk_that_fills_up_with_the_last_bytes_is_noticed(tmp_path: Path) -> 
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("name", "options", "message"),
-    [
-        ("clip.mp4", {}, r"cannot write EXR frames to .*clip\.mp4: name a folder"),
-        ("frames", {"overlaid": True}, "linear light.*--overlay '', and no --compare.*PNG"),
-        ("frames", {"frame_format": "tiff"}, "frame format is 'tiff'; valid is 'png' or 'exr'"),
-    ],
-)
-@pytest.mark.usefixtures("exr")
-def test_what_cannot_be_is_refused_beforehand(tmp_path: Path, name: str, options: dict, message: str) -> None:
-    with pytest.raises(VideoError, match=message):
-        check_output(tmp_path / name, WIDTH, HEIGHT, 30, **{"frame_format": "exr", **options})
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_without_openexr_the_extra_is_named(tmp_path: Path, capsys, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "OpenEXR", None)
     options = ["-o", str(tmp_path / "frames"), "--frame-format", "exr"]
@@ -179,9 +133,9 @@ def test_overlays_and_comparisons_are_refused_whoever_asks_for_them(scene: Scene
     for option in (["--overlay", "time"], ["--compare", "paper"]):
         assert cli.main(["render", "duck", *frames, *option]) == 2
         assert "linear light, without overlays" in capsys.readouterr().err
-    (tmp_path / "scene.toml").write_text('overlay = ["time"]\n' + TOML)
+    overlaid = dataclasses.replace(scene, overlay=("time",))
     with pytest.raises(VideoError, match="linear light, without overlays"):
-        render_video(load_scene(tmp_path / "scene.toml"), tmp_path / "frames", VideoOptions(**OPTIONS))
+        render_video(overlaid, tmp_path / "frames", VideoOptions(**OPTIONS))
     assert not (tmp_path / "frames").exists()
 
 
@@ -195,14 +149,10 @@ def test_the_command_writes_a_folder_over_older_frames(scene: Scene, tmp_path: P
 
 @pytest.mark.usefixtures("exr")
 def test_an_interrupted_render_goes_on_to_the_same_frames(scene: Scene, tmp_path: Path) -> None:
-    def interrupt(done: int, total: int) -> None:
-        if done == 8:
-            raise KeyboardInterrupt
-
     options = {**OPTIONS, "transparent": True}
     render_video(scene, tmp_path / "whole", VideoOptions(**options))
     with pytest.raises(KeyboardInterrupt):
-        render_video(scene, tmp_path / "broken", VideoOptions(**options), progress=interrupt)
+        render_video(scene, tmp_path / "broken", VideoOptions(**options), progress=interrupting_at(8))
     with pytest.raises(VideoError, match="the frame format was exr and now is png"):
         render_video(scene, tmp_path / "broken", VideoOptions(resume=True, **{**options, "frame_format": "png"}))
     assert render_video(scene, tmp_path / "broken", VideoOptions(resume=True, **options)).frames == 12
@@ -217,7 +167,7 @@ def test_the_tone_curve_makes_the_picture_of_linear_light() -> None:
     assert light.shape == picture.shape
     # half a step of dithering, half a step of rounding, what half floats leave out, and that the smooth background is
     # interpolated before the curve or after it
-    assert np.abs(developed(light.astype(float)) - picture).max() < 1.6
+    assert np.abs(255 * tone_mapped(light.astype(float)) - picture).max() < 1.6
 
 
 @pytest.mark.usefixtures("opengl")
@@ -260,18 +210,6 @@ def test_light_is_multiplied_by_opacity_so_that_it_lies_over_any_background() ->
 
 
 @pytest.mark.usefixtures("opengl")
-def test_a_shadow_on_nothing_is_opacity_alone() -> None:
-    frame = render(BODIES + FLOOR, linear=True, alpha=True)
-    shadow = (frame[..., 3] > 0.2) & (frame[..., 3] < 0.95) & (frame[..., :3].max(axis=-1) == 0)
-    assert shadow.sum() > 100
-
-
-@pytest.mark.usefixtures("opengl")
-def test_linear_frames_of_the_same_scene_are_the_same() -> None:
-    np.testing.assert_array_equal(render(BODIES + FLOOR, linear=True), render(BODIES + FLOOR, linear=True))
-
-
-@pytest.mark.usefixtures("opengl")
 def test_fields_and_grids_are_refused_in_linear_light() -> None:
     model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom size="1"/></worldbody></mujoco>')
     ball = meshes.ball(8)
@@ -279,3 +217,49 @@ def test_fields_and_grids_are_refused_in_linear_light() -> None:
         surface = Surface(ball.shell, ball.faces, cube_charts(ball.shell, 8), "clay", **paint)
         with pytest.raises(RippleError, match="linear=False"):
             Renderer(shared_context(), model, {0: surface}, size=(32, 32), linear=True)
+
+
+DEPTH = np.linspace(1, 2, 12, dtype=np.float32).reshape(3, 4)
+PASSES = {"depth": DEPTH, "flow": np.stack([DEPTH, -DEPTH], axis=-1), "segmentation": np.ones((3, 4), np.uint32)}
+
+
+def test_npz_files_hold_the_passes_bit_for_bit_and_are_the_same_each_time(tmp_path: Path) -> None:
+    contents = []
+    for _ in range(2):
+        files = PassFiles(tmp_path / "clip.mp4", "npz", {0: "background", 1: "floor"})
+        files.write(7, PASSES)
+        path = tmp_path / "clip.passes" / "passes_00007.npz"
+        contents.append(path.read_bytes())
+    with np.load(path) as found:
+        assert all(np.array_equal(found[name], values) for name, values in PASSES.items())
+    assert contents[0] == contents[1]
+    geoms = json.loads((tmp_path / "clip.passes" / "segmentation.json").read_text())["geoms"]
+    assert geoms == {"0": "background", "1": "floor"}
+
+
+def test_exr_files_hold_the_passes_as_channels(tmp_path: Path) -> None:
+    openexr = pytest.importorskip("OpenEXR")
+    PassFiles(tmp_path / "frames", "exr", {}).write(0, PASSES)
+    path = tmp_path / "frames.passes" / "passes_00000.exr"
+    channels = openexr.File(str(path), separate_channels=True).channels()
+    assert set(channels) == {"depth", "flow.X", "flow.Y", "segmentation"}
+    assert np.array_equal(channels["flow.Y"].pixels, -DEPTH)
+    assert channels["segmentation"].pixels.dtype == np.uint32
+    check_passes(tmp_path / "frames", ("depth",), "exr", overwrite=False)
+
+
+def test_unknown_passes_and_foreign_files_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(VideoError, match="depth, normal, segmentation, flow, position, height"):
+        check_passes(tmp_path / "clip.mp4", ("colour",), "npz", overwrite=False)
+    with pytest.raises(VideoError, match="'npz' or 'exr'"):
+        check_passes(tmp_path / "clip.mp4", ("depth",), "png", overwrite=False)
+    PassFiles(tmp_path / "clip.mp4", "npz", {}).write(0, PASSES)
+    check_passes(tmp_path / "clip.mp4", ("depth",), "npz", overwrite=False)
+    foreign = tmp_path / "clip.passes" / "passes_00001.npz"
+    foreign.write_bytes(b"mine")
+    with pytest.raises(VideoError, match="other files"):
+        check_passes(tmp_path / "clip.mp4", ("depth",), "npz", overwrite=False)
+    check_passes(tmp_path / "clip.mp4", ("depth",), "npz", overwrite=True)
+    foreign.rename(foreign.with_name("thesis.txt"))
+    with pytest.raises(VideoError, match=r"thesis\.txt"):
+        check_passes(tmp_path / "clip.mp4", ("depth",), "npz", overwrite=True)

@@ -1,18 +1,11 @@
-"""Outputs: which format a name means, and the limits of every format.
-
-Every format stores frames in segments and joins these; an image file holds a frame as it is.
-"""
+"""Outputs: which format a name means, the limits of every format, and what is not written over."""
 
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
-from PIL import Image, ImageSequence
 
-from ripple_sim.encode import open_writer
-from ripple_sim.encode.clip import Stream
-from ripple_sim.encode.output import ENDINGS, FORMATS, Format, check_output, default_fps, video_format
+from ripple_sim.encode import check_output, default_fps, open_writer, video_format
 from ripple_sim.errors import EncodingError, VideoError
 
 
@@ -38,33 +31,57 @@ def test_the_last_ending_of_a_name_is_its_format(tmp_path: Path, name: str, form
 @pytest.mark.parametrize(
     ("name", "size", "fps"),
     [
-        ("clip.mp4", (16, 8192), 240),
+        ("new/clip.mp4", (16, 8192), 240),
         ("clip.gif", (8191, 17), 50),
         ("clip.webp", (17, 17), 1),
         ("frames", (8192, 16), 240),
     ],
 )
-def test_the_limits_themselves_are_valid(tmp_path: Path, name: str, size: tuple[int, int], fps: int) -> None:
+def test_the_limits_themselves_and_default_rates_are_valid(
+    tmp_path: Path, name: str, size: tuple[int, int], fps: int
+) -> None:
     check_output(tmp_path / name, *size, fps)
+    check_output(tmp_path / name, *size, default_fps(tmp_path / name))
+    assert (default_fps(tmp_path / name) == 60) == (name != "clip.gif")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
     ("name", "size", "fps", "message"),
     [
+        ("clip.avi", (1280, 720), 60, r"\.avi.*valid is \.mp4, \.webm, \.gif, \.webp"),
+        (".mp4", (1280, 720), 60, r"\.mp4', which is not a file name"),
+        ("clip.", (1280, 720), 60, r"ends in \.; valid"),
+        ("..", (1280, 720), 60, "valid is .mp4"),
+        ("clip.mp4", (1281, 720), 60, "1281x720.*even.*1282x720"),
+        ("clip.webm", (1280, 719), 60, "1280x719.*even.*1280x720"),
+        ("clip.gif", (0, 720), 25, "0x720.*valid is 16"),
         ("frames", (15, 16), 60, "15x16; valid is 16 to 8192"),
         ("frames", (16, 8193), 60, "16x8193; valid is 16 to 8192"),
         ("frames", (64.0, 48), 60, r"64\.0x48; valid is 16 to 8192"),
-        ("clip.gif", (64, 48), 51, "a GIF's frame rate is 51; .* 1 to 50"),
+        ("clip.mp4", (1280, 720), 0, "rate is 0.*1 to 240"),
         ("clip.webp", (64, 48), 241, "frame rate is 241; .* 1 to 240"),
+        ("clip.gif", (64, 48), 51, "a GIF's frame rate is 51; .* 1 to 50"),
         ("frames", (64, 48), 30.0, r"frame rate is 30\.0; valid is a whole number"),
-        ("frames", (64, 48), -1, "frame rate is -1;"),
+        ("a_file", (1280, 720), 60, "is not a folder"),
+        ("a_folder.mp4", (1280, 720), 60, "is a folder"),
+        ("photos", (1280, 720), 60, r"other files \(me\.jpg\)"),
+        ("a_file/clip.mp4", (1280, 720), 60, "cannot write .*a_file.*: Not a directory"),
+        ("/proc/clip.mp4", (1280, 720), 60, "cannot write /proc"),
     ],
 )
-def test_what_lies_beyond_the_limits_is_refused(
+def test_what_cannot_be_written_is_refused_beforehand(
     tmp_path: Path, name: str, size: tuple[int, int], fps: int, message: str
 ) -> None:
-    with pytest.raises(VideoError, match=message):
+    (tmp_path / "a_file").write_text("mine")
+    (tmp_path / "a_folder.mp4").mkdir()
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "me.jpg").touch()
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(EncodingError if "/" in name else VideoError, match=message) as refusal:
         check_output(tmp_path / name, *size, fps)
+    assert "\n" not in str(refusal.value)
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 @pytest.mark.parametrize("name", ["frame_0000.png", "frame_00000.jpg", "frame_00000.png.bak", ".frame_00000.png", "a"])
@@ -100,11 +117,6 @@ def test_a_file_that_appears_among_the_older_frames_meanwhile_is_not_deleted(tmp
     assert sorted(path.name for path in (tmp_path / "frames").iterdir()) == ["frame_00000.png", "notes.txt"]
 
 
-def test_default_rates_are_valid_for_their_formats(tmp_path: Path) -> None:
-    for name in ("clip.mp4", "clip.webm", "clip.GIF", "clip.webp", "frames"):
-        check_output(tmp_path / name, 64, 48, default_fps(tmp_path / name))
-
-
 def test_frames_beyond_the_highest_level_of_h264_are_refused_where_others_hold_them(tmp_path: Path) -> None:
     check_output(tmp_path / "clip.mp4", 8192, 4352, 25)
     with pytest.raises(VideoError, match=r"8192x8192; \.mp4 is H\.264.*or write \.webm, \.gif, \.webp or a folder"):
@@ -121,48 +133,3 @@ def test_no_name_is_taken_for_a_protocol(tmp_path: Path, monkeypatch: pytest.Mon
     with open_writer(name, width=16, height=16, fps=25) as writer:
         writer.write(np.zeros((16, 16, 3), np.uint8))
     assert [each.name for each in tmp_path.iterdir()] == [name]
-
-
-STREAM = Stream(32, 16, 25)
-LEVELS = [10, 60, 110, 160, 210]
-
-
-def segments(folder: Path, video: Format, levels: list[int], length: int) -> list[tuple[Path, int]]:
-    """Segments of frames of one grey each, shorter than the format's."""
-    made = []
-    for first in range(0, len(levels), length):
-        path = folder / f"{first}{video.suffix}"
-        segment = video.start(path, STREAM)
-        for level in levels[first : first + length]:
-            segment.write(np.full((STREAM.height, STREAM.width, 3), level, np.uint8))
-        segment.finish()
-        made.append((path, first))
-    return made
-
-
-def means(path: Path) -> list[float]:
-    if path.suffix == ".webp":
-        with Image.open(path) as image:
-            return [float(np.mean(frame.convert("RGB"))) for frame in ImageSequence.Iterator(image)]
-    with av.open(str(path)) as container:
-        return [float(image.to_ndarray(format="rgb24").mean()) for image in container.decode(video=0)]
-
-
-@pytest.mark.parametrize("ending", [".mp4", ".webm", ".gif", ".webp"])
-def test_every_segment_plays_by_itself(tmp_path: Path, ending: str) -> None:
-    """What an interrupted render leaves can be looked at."""
-    video = FORMATS[ending]
-    made = segments(tmp_path, video, LEVELS, min(video.length, 2))
-    np.testing.assert_allclose([mean for path, _ in made for mean in means(path)], LEVELS, atol=4)
-
-
-def test_a_segment_that_is_closed_unfinished_can_be_written_anew(tmp_path: Path) -> None:
-    for ending in ENDINGS:
-        video, path = FORMATS[ending], tmp_path / f"a{FORMATS[ending].suffix}"
-        segment = video.start(path, STREAM)
-        segment.write(np.zeros((STREAM.height, STREAM.width, 3), np.uint8))
-        segment.close()
-        again = video.start(path, STREAM)
-        again.write(np.full((STREAM.height, STREAM.width, 3), 200, np.uint8))
-        again.finish()
-        np.testing.assert_allclose(means(path), [200], atol=4)

@@ -1,4 +1,7 @@
-"""Interrupted videos: whatever kills them, what is left is whole, and they go on to the very same bytes."""
+"""Interrupted videos: whatever kills them, what is left is whole, and they go on to the very same bytes.
+
+Their record tells whether they may.
+"""
 
 import fcntl
 import os
@@ -15,9 +18,12 @@ import pytest
 from PIL import Image
 from unfinished_videos import contents
 
-from ripple_sim.encode import FrameWriter, open_writer
-from ripple_sim.encode.output import FRAMES_IN_CLIP
-from ripple_sim.errors import SimulationError, VideoError
+from ripple_sim.encode import (
+    FRAMES_IN_CLIP,
+    FrameWriter,
+    open_writer,
+)
+from ripple_sim.errors import VideoError
 
 ENDINGS = [".mp4", ".webm", ".gif", ".webp", ""]
 FRAMES, SIZE, FPS = 2 * FRAMES_IN_CLIP + 10, (64, 48), 25
@@ -110,16 +116,6 @@ def test_a_video_without_a_whole_clip_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_would_fail_again_leaves_nothing(tmp_path):
-    with (
-        pytest.raises(SimulationError),
-        open_writer(tmp_path / "frames", width=SIZE[0], height=SIZE[1], fps=FPS, settings=SETTINGS) as writer,
-    ):
-        writer.write(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
-        raise SimulationError
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_without_resume_a_video_starts_anew(interrupted):
     assert write(interrupted, 0, FRAMES, resume=False).frames == FRAMES
     assert list(interrupted.parent.iterdir()) == [interrupted]
@@ -179,7 +175,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_broken(tmp_path, ending):
         "rng = np.random.default_rng(0)\n"
         "try:\n"
         f"    with open_writer(sys.argv[1], width=160, height=90, fps=25, settings={SETTINGS!r}) as writer:\n"
-        "        for number in range(120):\n"
+        "        for number in range(60):\n"
         "            writer.write(rng.integers(0, 256, (90, 160, 3), np.uint8))\n"
         "except EncodingError as error:\n"
         "    print(error)\n"

@@ -8,9 +8,8 @@ import pytest
 from rivals import NaiveLoop, PlainShader, SparseLeapfrog
 
 from ripple_sim.solver import GLError, Material, sphere_atlas
-from ripple_sim.solver.backends.backend import make_backend
-from ripple_sim.solver.operator.assembly import build_operator
-from ripple_sim.solver.operator.wave_operator import WaveOperator
+from ripple_sim.solver.backends import make_backend
+from ripple_sim.solver.operator import WaveOperator, build_operator
 
 N, SUBSTEPS = 16, 41
 ROUND_OFF = 1e-5  # of the peak, after that many substeps in float32

@@ -1,7 +1,6 @@
 """What the drawing of the packages and the table of measures are made of: on a small tree whose imports are known."""
 
 import importlib
-import itertools
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,12 +10,14 @@ import pytest
 PLOTS = Path(__file__).parents[2] / "examples" / "plots"
 
 TREE = {
-    "ripple_sim/__init__.py": "from .coupling.ripples import Ripples\n",
+    "ripple_sim/__init__.py": "",
+    "ripple_sim/__init__.pyi": "from .coupling.ripples import Ripples as Ripples\n",
     "ripple_sim/simulation.py": "from ripple_sim import Ripples\n\ndef run(self, a, *, b):\n    a += b\n    return a\n",
     "ripple_sim/coupling/__init__.py": "",
     "ripple_sim/coupling/ripples.py": "from ripple_sim.solver import Material\nfrom . import load\n",
     "ripple_sim/coupling/load.py": "def late():\n    from .ripples import Ripples\n",
-    "solver/__init__.py": "from .operator.material import Material\n",
+    "solver/__init__.py": "",
+    "solver/__init__.pyi": "from .operator.material import Material as Material\n",
     "solver/operator/__init__.py": "",
     "solver/operator/material.py": "import numpy\nimport ripple_sim.solver.errors\n",
     "solver/errors.py": "",
@@ -47,7 +48,7 @@ def root(tmp_path: Path) -> Path:
 def test_imports_are_those_of_the_modules_that_names_come_from(plots, root: Path) -> None:
     modules = plots.imports.read(root)
     assert {name: set(module.imports) for name, module in modules.items()} == {
-        SIMULATION: {RIPPLES},  # by way of ripple_sim/__init__.py
+        SIMULATION: {RIPPLES},  # by way of ripple_sim/__init__.pyi
         RIPPLES: {MATERIAL, LOAD},
         LOAD: {RIPPLES},  # inside a function
         MATERIAL: {ERRORS},
@@ -63,39 +64,6 @@ def test_cycles_are_found_and_counted_as_the_folders_stand(plots, root: Path) ->
     assert plots.imports.cycles(rooms) == []
 
 
-def test_counts_of_the_small_tree(plots, root: Path) -> None:
-    (root / "solver" / "a.glsl").write_text("void main() {}\n")
-    counts = plots.structure.counts(root)
-    assert counts["modules"] == "5"
-    assert counts["folders with Python"] == "4"
-    assert counts["lines of Python"] == "11"
-    assert counts["median module, longest"] == "2, 5 lines"
-    assert counts["GLSL"] == "1 files, 1 lines"
-    assert counts["tests"] == "1 files, 4 lines"
-    assert counts["cycles of modules"] == "1"
-    # ripples has two importers, material, errors and load one each
-    assert plots.structure.with_one_importer(plots.imports.read(root)) == 0.6
-
-
-def test_the_older_column_of_the_page_stays(plots) -> None:
-    page = "a <!-- counts -->| modules | 9 | 1 |<!-- end of counts --> b"
-    older = plots.structure.older_figures("| measure | before | now |\n| modules | 9 | 1 |\n")
-    text = plots.structure.replaced(page, "counts", plots.structure.table(older, {"modules": "5"}))
-    assert "| modules | 9 | 5 |" in text and text.startswith("a <!--") and text.endswith("--> b")
-
-
 def test_arrows_that_others_imply_are_left_out(plots) -> None:
     arrows = {"a": {"b", "c", "d"}, "b": {"c"}, "c": {"d"}, "d": set()}
     assert plots.layered.without_detours(arrows) == {"a": {"b"}, "b": {"c"}, "c": {"d"}, "d": set()}
-
-
-def test_layers_go_downwards_and_boxes_keep_apart(plots) -> None:
-    arrows = {"top": {"left", "right", "low"}, "left": {"low", "other"}, "right": {"low"}, "low": set(), "other": set()}
-    level = plots.layered.layers(arrows)
-    assert all(level[node] > level[end] for node, ends in arrows.items() for end in ends)
-    layout = plots.layered.Layout(arrows, level)
-    assert layout.crossings() == 0
-    for row in layout.rows:
-        for a, b in itertools.pairwise(row):
-            least = sum(0.3 if isinstance(each, tuple) else 1.0 for each in (a, b)) / 2
-            assert layout.x[b] - layout.x[a] > least - 1e-9

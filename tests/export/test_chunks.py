@@ -2,6 +2,7 @@
 
 import dataclasses
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -10,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from unfinished_videos import interrupting_at
 
 from ripple_sim import ExportOptions, RippleError, export_scene
-from ripple_sim.scene.scene import Scene
+from ripple_sim.scene import Scene
 from ripple_sim.simulation import Simulation
 
 pytest.importorskip("pxr")
@@ -95,13 +97,9 @@ export_scene(load_scene({str(scene_file)!r}), Path({str(again)!r}), {OPTIONS!r},
 
 
 def test_an_interrupted_export_says_what_it_keeps(scene: Scene, tmp_path: Path) -> None:
-    def interrupt(done: int, frames: int) -> None:
-        if done == 6:
-            raise KeyboardInterrupt
-
     path = tmp_path / "run.usdc"
     with pytest.raises(KeyboardInterrupt) as caught:
-        export_scene(scene, path, OPTIONS, progress=interrupt)
+        export_scene(scene, path, OPTIONS, progress=interrupting_at(6))
     assert "4 frames are kept" in caught.value.__notes__[0]
     assert [each.name for each in tmp_path.iterdir()] == ["run.usdc.part"]
 
@@ -127,3 +125,21 @@ def test_what_cannot_be_is_refused_before_it_is_simulated(
     with pytest.raises(RippleError, match=message):
         export_scene(scene, tmp_path / name, dataclasses.replace(OPTIONS, **options))
     assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_is_one_error_and_what_is_complete_stays(scene: Scene, tmp_path: Path) -> None:
+    """USD ends the process if a stage lets go of a layer whose file could not be written."""
+    path = tmp_path / "run.usdc"
+    export_scene(scene, tmp_path / "once" / "run.usdc", OPTIONS)
+    one_chunk = max(each.stat().st_size for each in (tmp_path / "once" / "run.chunks").iterdir())
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for limit in (one_chunk // 8, one_chunk - 1):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
+        try:
+            with pytest.raises(RippleError, match=r"cannot write .*run\.usdc: .*File too large"):
+                export_scene(scene, path, OPTIONS)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        assert not path.exists()
+    assert export_scene(scene, path, dataclasses.replace(OPTIONS, resume=True)).frames == 11
+    assert files(path) == files(tmp_path / "once" / "run.usdc")

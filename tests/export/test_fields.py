@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from ripple_sim import Exporter, Material, RippleError, Ripples
+from ripple_sim import Exporter, Material, Ripples
 
 FRAMES = 20  # more than one chunk
 HEADER = "frame,time [s],geom,other,x [m],y [m],z [m],impulse [N s],chart,row,column,inner"
@@ -94,22 +94,3 @@ def test_a_table_has_a_row_for_each_impulse(ripples: Ripples, tmp_path: Path, na
             (row["frame"], row["other"], row["impulse"], [row["x"], row["y"], row["z"]]) for row in table.to_pylist()
         ]
     assert rows == [(frame, hit.other, hit.impulse, list(hit.point)) for frame, hit in expected]
-
-
-@pytest.mark.parametrize("name", ["run.csv", "run.parquet", "run.zarr"])
-def test_what_is_from_here_is_replaced_and_nothing_else(ripples: Ripples, tmp_path: Path, name: str) -> None:
-    path = tmp_path / name
-    run(ripples, path)
-    run(ripples, path)
-    if path.is_dir():
-        (path / "thesis.txt").write_text("mine")
-        with pytest.raises(RippleError, match="folder of other things"):
-            run(ripples, path, overwrite=True)
-        assert (path / "thesis.txt").read_text() == "mine"
-    else:
-        path.write_text("mine")
-        with pytest.raises(RippleError, match="--overwrite"):
-            run(ripples, path)
-        assert path.read_text() == "mine"
-        run(ripples, path, overwrite=True)
-    assert [each.name for each in tmp_path.iterdir()] == [name]

@@ -1,12 +1,22 @@
-"""Frames of a model with ripples in somebody's own loop."""
+"""Frames of a model with ripples in somebody's own loop, where `mujoco.Renderer` was.
+
+Depth and segmentation are held against that one's, where there are no ripples.
+"""
 
 import copy
+import os
+import subprocess
+import sys
+import warnings
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+import unrippled
+from scipy.ndimage import maximum_filter, minimum_filter
 
-from ripple_sim import Camera, Material, RippleError, RippleRenderer, Ripples
+from ripple_sim import Camera, Material, RippleError, RippleRenderer, Ripples, RippleWarning
 
 MODEL = """<mujoco><worldbody>
   <geom name="egg" type="ellipsoid" size="0.4 0.3 0.3" rgba="0.9 0.1 0.1 1"/>
@@ -18,12 +28,12 @@ def egg():
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    return model, data, Ripples(model, {"egg": Material(speed=0.5)}, resolution=32, backend="cpu")
+    ripples = Ripples(model, {"egg": Material(speed=0.5)}, resolution=32, backend="cpu")
+    return model, data, ripples, RippleRenderer(model, ripples, width=96, height=72)
 
 
 def test_a_ripple_changes_the_picture_where_it_is(egg):
-    model, data, ripples = egg
-    renderer = RippleRenderer(model, ripples, width=96, height=72)
+    _, data, ripples, renderer = egg
     flat = renderer.render(data, "side").astype(int)
     ripples["egg"].add_impulse((0.0, -0.3, 0.1), 0.02, radius=0.1)
     ripples["egg"].step(0.1)
@@ -35,53 +45,39 @@ def test_a_ripple_changes_the_picture_where_it_is(egg):
 
 
 def test_the_same_state_gives_the_same_picture_in_the_colour_of_the_geom(egg):
-    model, data, ripples = egg
+    model, data, ripples, renderer = egg
     camera = Camera(lookat=(0, 0, 0), distance=2.0, azimuth=90.0, elevation=-20.0)
-    first = RippleRenderer(model, ripples, width=96, height=72).render(data, camera)
+    first = renderer.render(data, camera)
     assert np.array_equal(first, RippleRenderer(model, ripples, width=96, height=72).render(data, camera))
     red, green, blue = first[30:42, 42:54].reshape(-1, 3).mean(axis=0)
     assert red > 1.5 * green
     assert red > 1.5 * blue
 
 
-def test_without_a_camera_it_is_the_free_one_of_the_model(egg):
-    model, data, ripples = egg
-    renderer = RippleRenderer(model, ripples, width=96, height=72)
-    free = Camera(lookat=tuple(model.stat.center), distance=1.5 * model.stat.extent, azimuth=90.0, elevation=-45.0)
-    assert np.array_equal(renderer.render(data), renderer.render(data, free))
-
-
-def test_an_unknown_look_or_camera_is_refused_by_name(egg):
-    model, data, ripples = egg
-    with pytest.raises(RippleError, match="glass"):
-        RippleRenderer(model, ripples, looks={"egg": "glass"})
-    with pytest.raises(RippleError, match="above"):
-        RippleRenderer(model, ripples, width=96, height=72).render(data, "above")
-
-
-def test_cameras_are_given_as_to_mujocos_renderer(egg):
-    model, data, ripples = egg
-    renderer = RippleRenderer(model, ripples, width=96, height=72)
+def test_cameras_are_given_as_to_mujocos_renderer_and_without_one_it_is_the_free_one_of_the_model(egg):
+    model, data, ripples, renderer = egg
     free = mujoco.MjvCamera()
     mujoco.mjv_defaultFreeCamera(model, free)
-    for camera, same in ((0, "side"), (-1, None), (free, None)):
+    ours = Camera(lookat=tuple(model.stat.center), distance=1.5 * model.stat.extent, azimuth=90.0, elevation=-45.0)
+    for camera, same in ((0, "side"), (-1, None), (free, None), (ours, None)):
         assert np.array_equal(renderer.render(data, camera), renderer.render(data, same))
     with pytest.raises(RippleError, match="camera is list; valid are"):
         renderer.render(data, [0.0, 0.0, 1.0])
+    with pytest.raises(RippleError, match="glass"):
+        RippleRenderer(model, ripples, looks={"egg": "glass"})
 
 
 @pytest.mark.filterwarnings("error")
 def test_data_without_poses_is_drawn_as_forwarded(egg):
     """As it comes from `MjData(model)`; it stays as it is."""
-    model, data, ripples = egg
-    renderer = RippleRenderer(model, ripples, width=96, height=72)
+    model, data, _, renderer = egg
     new = mujoco.MjData(model)
     assert np.array_equal(renderer.render(new, "side"), renderer.render(data, "side"))
     assert not new.xquat.any()
 
 
 def test_a_model_in_which_another_geom_would_ripple_is_refused(egg):
-    _, _, ripples = egg
+    _, _, ripples, _ = egg
     egg_geom = '<geom name="egg" type="ellipsoid" size="0.4 0.3 0.3" rgba="0.9 0.1 0.1 1"/>'
     for changed, what in (
         ('<geom name="box" type="box" size="1 1 1"/>' + egg_geom, "another body_parentid|another geom_"),
@@ -94,8 +90,141 @@ def test_a_model_in_which_another_geom_would_ripple_is_refused(egg):
 
 
 def test_a_copy_of_the_model_in_other_colours_is_drawn_in_them(egg):
-    model, data, ripples = egg
+    model, data, ripples, _ = egg
     blue = copy.copy(model)
     blue.geom_rgba[0], blue.body_mass[0] = [0.1, 0.1, 0.9, 1.0], 2.0
     red, _, blue_light = RippleRenderer(blue, ripples, width=96, height=72).render(data)[30:42, 42:54].mean(axis=(0, 1))
     assert blue_light > 1.5 * red
+
+
+@pytest.fixture(scope="module")
+def mujocos(tmp_path_factory):
+    """What `mujoco.Renderer` draws; it takes over the context of its process."""
+    file = tmp_path_factory.mktemp("mujocos") / "drawn.npz"
+    program, environment = Path(unrippled.__file__), {**os.environ, "MUJOCO_GL": "egl"}
+    subprocess.run([sys.executable, program, file], env=environment, check=True, timeout=100)
+    with np.load(file) as drawn:
+        return dict(drawn)
+
+
+@pytest.mark.parametrize("name", unrippled.WORLDS)
+@pytest.mark.filterwarnings("ignore:not drawn. transparency of rippling")
+def test_without_ripples_depth_and_segmentation_are_mujocos(mujocos, name):
+    model, data = unrippled.state_of(name)
+    ripples = Ripples(model, {"target": Material()}, resolution=16, backend="cpu")
+    with RippleRenderer(model, ripples, *unrippled.SIZE) as renderer:
+        depth, segmentation = unrippled.drawn(renderer, data, name)
+    theirs, objects = mujocos[f"depth {name}"], mujocos[f"segmentation {name}"]
+    assert (depth.dtype, segmentation.dtype) == (np.float32, np.int32)
+    for one, other in ((segmentation, objects), (objects, segmentation)):  # silhouettes within a pixel
+        around = [np.roll(other, shift, axis=(0, 1)) for shift in np.ndindex(3, 3)]
+        near = np.any([np.all(np.roll(each, (-1, -1), axis=(0, 1)) == one, axis=2) for each in around], axis=0)
+        assert near.all()
+    code = segmentation[..., 0] + 1000 * segmentation[..., 1]
+    inside = (minimum_filter(code, 3) == maximum_filter(code, 3)) & (segmentation == objects).all(axis=2)
+    seen = inside & (code >= 0)
+    assert seen.sum() > 100
+    np.testing.assert_allclose(depth[seen], theirs[seen], rtol=1e-5, atol=1e-3)
+    np.testing.assert_allclose(depth[inside & ~seen], theirs[inside & ~seen], rtol=1e-3)
+
+
+def test_ripples_show_in_depth_and_segmentation(egg):
+    _, data, ripples, renderer = egg
+    renderer.update_scene(data, "side")
+    renderer.enable_depth_rendering()
+    flat = renderer.render()
+    ripples["egg"].height = np.full_like(ripples["egg"].height, 0.05)
+    assert np.array_equal(renderer.render(), flat)  # as it was when the scene was updated
+    risen = renderer.render(data, "side")
+    renderer.enable_segmentation_rendering()
+    egg_seen = (renderer.render() == [0, mujoco.mjtObj.mjOBJ_GEOM]).all(axis=2)
+    renderer.disable_segmentation_rendering()
+    ripples.reset()
+    assert (flat - risen)[51, 48] == pytest.approx(0.05, abs=2e-3)
+    assert (egg_seen == (risen < risen.max())).all()
+    assert egg_seen.sum() > 1.15 * (flat < flat.max()).sum()
+
+
+def test_a_program_written_for_mujocos_renderer_runs(egg):
+    model, data, ripples, _ = egg
+    with RippleRenderer(model, ripples, 30, 40) as renderer:
+        assert (renderer.model, renderer.height, renderer.width) == (model, 30, 40)
+        with pytest.raises(ValueError, match=r"nothing to render; call update_scene"):
+            renderer.render()
+        renderer.update_scene(data)
+        assert renderer.scene.ngeom == 1
+        colours, given = renderer.render(), np.zeros((30, 40, 3))
+        assert renderer.render(out=given) is given
+        assert np.array_equal(given, colours)
+        renderer.enable_depth_rendering()
+        with pytest.raises(ValueError, match=r"out has shape \[30, 40, 3\]; valid is \[30, 40\]"):
+            renderer.render(out=given)
+        renderer.disable_segmentation_rendering()  # which depth is not
+        assert renderer.render().shape == (30, 40)
+        renderer.enable_segmentation_rendering()
+        assert renderer.render().shape == (30, 40, 2)
+        renderer.disable_segmentation_rendering()
+        assert np.array_equal(renderer.render(), colours)
+        for camera, message in (("top", "no camera 'top'"), (1, "no camera 1"), (-2, "no camera -2")):
+            with pytest.raises(ValueError, match=message):
+                renderer.update_scene(data, camera)
+    renderer.close()
+    with pytest.raises(RuntimeError, match="closed: render cannot be called after close"):
+        renderer.render()
+
+
+SHOWN = """<mujoco><statistic meansize=".3"/><worldbody><geom name="egg" size=".3" pos="-.4 0 0"/>
+  <geom size=".1" pos=".4 0 0" group="4"/><site size=".1" pos=".4 0 .3" group="3"/>
+  <body pos=".4 0 -.3"><joint/><geom size=".06"/></body></worldbody></mujoco>"""
+
+
+def test_options_say_what_is_shown_and_what_is_not_drawn_is_told_once():
+    model = mujoco.MjModel.from_xml_string(SHOWN)
+    data, ripples = mujoco.MjData(model), Ripples(model, {"egg": Material()}, resolution=8)
+    mujoco.mj_forward(model, data)
+    kinds, option = mujoco.mjtObj, mujoco.MjvOption()
+    with RippleRenderer(model, ripples, 60, 80) as renderer:
+
+        def seen() -> set[tuple[int, int]]:
+            renderer.update_scene(data, scene_option=option)
+            return {tuple(each) for each in renderer.render().reshape(-1, 2).tolist() if each[0] >= 0}
+
+        renderer.enable_segmentation_rendering()
+        body, egg, hidden = (2, int(kinds.mjOBJ_GEOM)), (0, int(kinds.mjOBJ_GEOM)), (1, int(kinds.mjOBJ_GEOM))
+        assert seen() == {egg, body}
+        option.geomgroup[4] = option.sitegroup[3] = option.flags[mujoco.mjtVisFlag.mjVIS_JOINT] = 1
+        assert seen() == {egg, body, hidden, (0, int(kinds.mjOBJ_SITE)), (0, int(kinds.mjOBJ_JOINT))}
+        option.flags[mujoco.mjtVisFlag.mjVIS_STATIC] = 0  # the egg, too
+        assert seen() == {body, (0, int(kinds.mjOBJ_JOINT))}
+        option = mujoco.MjvOption()
+        option.geomgroup[0] = 0
+        assert seen() == set()
+        option = mujoco.MjvOption()
+        option.label = mujoco.mjtLabel.mjLABEL_GEOM
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        with pytest.warns(RippleWarning) as told:
+            seen()
+        assert {str(each.message) for each in told} == {
+            "not drawn: labels; all else of the scene is",
+            "the scene's flags have no effect: mjRND_SHADOW",
+        }
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            seen()
+
+
+def test_geoms_that_are_added_to_the_scene_are_seen(egg):
+    _, data, _, renderer = egg
+    renderer.update_scene(data, "side")
+    plain, scene = renderer.render().astype(int), renderer.scene
+    arrow, rgba = scene.geoms[scene.ngeom], np.array([0, 0, 1, 1], np.float32)
+    kind, zero = mujoco.mjtGeom.mjGEOM_ARROW, np.zeros(3)
+    mujoco.mjv_initGeom(arrow, kind, zero, zero, np.eye(3).ravel(), rgba)
+    mujoco.mjv_connector(arrow, kind, 0.05, np.array([0, -0.5, -0.3]), np.array([0, -0.5, 0.5]))
+    scene.ngeom += 1
+    added = renderer.render().astype(int)
+    changed = np.abs(added - plain).max(axis=2) > 40
+    assert changed[57:70, 47:49].all()
+    assert (added[changed][:, 2] > added[changed][:, 0] + 30).mean() > 0.8
+    renderer.update_scene(data, "side")
+    assert np.array_equal(renderer.render(), plain)

@@ -1,16 +1,12 @@
-"""Images of an atlas: every pixel shows the texel that lies there.
-
-Looks at a surface.
-"""
+"""Images of an atlas: every pixel shows the texel that lies there, and looks at a surface."""
 
 import numpy as np
 import pytest
 from hand_made import polygon, square
 
-from ripple_sim.figures.atlas_plot import chart_colors, texel_stretch
-from ripple_sim.figures.atlas_view import AtlasPainter, View, cross, squares
-from ripple_sim.scene.drop import usual_up
-from ripple_sim.solver import sphere_atlas, texel_atlas
+from ripple_sim.figures import AtlasPainter, View, chart_colors, cross, plot_atlas, squares, texel_stretch
+from ripple_sim.scene import usual_up
+from ripple_sim.solver import AtlasError, sphere_atlas, texel_atlas
 
 
 def test_stretch_is_one_on_a_sphere_and_even_on_average(animal):
@@ -36,17 +32,6 @@ def test_pictures_show_the_texel_that_lies_there():
         pixel = image[127 - (row * 8 + 4), 64 + column * 8 + 4]
         np.testing.assert_allclose(pixel[:3], colors[3, row, column], atol=1e-9)
     assert image[10, 10, 3] == 0
-
-
-def test_neighbouring_faces_of_the_cross_belong_together():
-    atlas = sphere_atlas(1.0, 16)
-    smooth = (atlas.positions + 1) / 2
-    image = cross(AtlasPainter(atlas, smooth), 16, 32)[..., :3]
-    middle = image[48, 4::8]  # along the belt, where colours go round the sphere and are far apart
-    assert np.abs(np.diff(middle, axis=0)).max() < 0.4
-    # above and below the face -y
-    np.testing.assert_allclose(image[30, 48], image[33, 48], atol=0.2)
-    np.testing.assert_allclose(image[62, 48], image[66, 48], atol=0.2)
 
 
 def test_squares_stand_side_by_side_with_every_texel_in_its_place():
@@ -90,3 +75,13 @@ def test_the_up_axis_points_up(up):
     assert (right, upwards > 0.8, eye > 0.4) == (pytest.approx(0), True, True)
     assert usual_up("part.STL") == "z"
     assert usual_up("animal.obj") == "y"
+
+
+def test_a_full_disk_is_one_line(monkeypatch, tmp_path, animal):
+    def full(self, path, **options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(AtlasPainter, "mesh", lambda self, view, size: np.zeros((4, 4, 4)))
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", full)
+    with pytest.raises(AtlasError, match="No space left"):
+        plot_atlas(animal, tmp_path / "atlas.png", title="animal")

@@ -1,13 +1,17 @@
-"""Calls with any arguments work, or raise our error and change nothing that is not finite."""
+"""Calls and command lines with anything in them work, or raise our error, which is one line on the command line.
+
+Calls change nothing that is not finite; command lines end with status 0 or 2.
+"""
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from fuzzing import VALUES, fuzzed, outcome
-from hypothesis import given
-from hypothesis import strategies as st
+import pytest
+from fuzzing import NUMBERS, TEXTS, VALUES, command, fuzzed, outcome
+from hypothesis import given, strategies as st
 
+from ripple_sim.cli import COMMANDS
 from ripple_sim.solver import Material, WaveSolver, build_atlas, load_atlas, load_mesh, sphere_atlas
 
 ATLAS = sphere_atlas(resolution=4)
@@ -51,3 +55,26 @@ def test_any_arguments_of_what_acts_on_waves(name: str, a: Any, b: Any, c: Any, 
         results = [outcome(call) for call in calls]
     if not any(isinstance(result, Exception) for result in results):
         assert np.isfinite(waves.height).all()
+
+
+OPTIONS = [
+    *("-o", "--output", "--size", "--fps", "--duration", "--resolution", "--seed", "--backend", "--layout"),
+    *("--overlay", "--overwrite", "--resume", "--port", "--host", "--json", "--help", "--up", "--bodies"),
+    *("--shutter", "--", "-", "-x"),
+]
+WORDS = st.one_of(st.sampled_from(OPTIONS), NUMBERS.map(lambda value: str(value)[:300]), TEXTS, st.just("sphere"))
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _nothing_runs():
+    with pytest.MonkeyPatch.context() as patch:
+        for each in {*COMMANDS.values()}:
+            if hasattr(each, "run"):
+                patch.setattr(each, "run", lambda self: None)
+        yield
+
+
+@fuzzed
+@given(st.sampled_from([*COMMANDS, "", "rendr"]), st.lists(WORDS, max_size=6))
+def test_any_words(name: str, words: list[str]) -> None:
+    assert command(name, *words) in (0, 2)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 import trimesh
-from fuzzing import fuzzed, outcome
-from hypothesis import given
-from hypothesis import strategies as st
+from fuzzing import CHANGES, changed, fuzzed, outcome
+from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 
 from ripple_sim.solver import Mesh, MeshError, load_mesh
@@ -18,25 +17,18 @@ FILES = {
 
 
 def check(found: object) -> None:
-    assert isinstance(found, Mesh | MeshError)
+    assert isinstance(found, Mesh) or (isinstance(found, MeshError) and "\n" not in str(found))
     if isinstance(found, Mesh):
         assert np.isfinite(found.V).all()
         assert len(found.F) > 0
 
 
 @fuzzed
-@given(
-    st.sampled_from(sorted(FILES)),
-    st.lists(st.tuples(st.floats(0, 1), st.binary(max_size=6)), max_size=4),
-    st.floats(0.2, 1),
-)
+@given(st.sampled_from(sorted(FILES)), CHANGES, st.floats(0.2, 1))
 def test_a_file_with_any_bytes_anywhere_and_any_end(
     tmp_path_factory: pytest.TempPathFactory, kind: str, changes: list, part: float
 ) -> None:
-    content = FILES[kind]
-    for place, new in changes:
-        at = int(place * len(content))
-        content = content[:at] + new + content[at + len(new) :]
+    content = changed(FILES[kind], changes)
     path = tmp_path_factory.getbasetemp() / f"fuzzed.{kind}"
     path.write_bytes(content[: int(part * len(content))])
     check(outcome(lambda: load_mesh(path)))

@@ -1,18 +1,14 @@
 """Scene files and models of any content load, or raise our error."""
 
-import copy
 from pathlib import Path
 from typing import Any
 
 import pytest
-from fuzzing import NUMBERS, VALUES, fuzzed, outcome
-from hypothesis import given
-from hypothesis import strategies as st
+from fuzzing import CHANGES, NUMBERS, VALUES, changed, fuzzed, outcome, places, put
+from hypothesis import given, strategies as st
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.scene.scene import Scene
-from ripple_sim.scene.scene_file import SceneFile, parse_scene
+from ripple_sim.scene import Scene, SceneFile, load_scene, parse_scene
 from ripple_sim.solver import RippleError
 
 TABLE: dict[str, Any] = {
@@ -36,33 +32,19 @@ speed = 0.6
 MODEL = '<mujoco><option {}/><worldbody><body name="b"><freejoint/><geom name="g" {}/></body></worldbody>{}</mujoco>'
 
 
-def places(value: Any, path: tuple = ()) -> list[tuple]:
-    """Paths to all values in a table."""
-    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    return [path, *(place for key, each in inner for place in places(each, (*path, key)))]
-
-
 @fuzzed
 @given(st.sampled_from(places(TABLE)[1:]), VALUES)
 def test_a_table_with_any_value_anywhere(place: tuple, value: Any) -> None:
-    table = copy.deepcopy(TABLE)
-    at = table
-    for key in place[:-1]:
-        at = at[key]
-    at[place[-1]] = value
-    assert isinstance(outcome(lambda: parse_scene(table, "scene.toml")), SceneFile | SceneError)
+    assert isinstance(outcome(lambda: parse_scene(put(TABLE, place, value), "scene.toml")), SceneFile | SceneError)
 
 
 @fuzzed
-@given(st.lists(st.tuples(st.integers(0, len(TEXT) - 1), st.binary(max_size=4)), min_size=1, max_size=4))
+@given(CHANGES)
 def test_a_file_with_any_bytes_anywhere(tmp_path_factory: pytest.TempPathFactory, changes: list) -> None:
     folder = tmp_path_factory.getbasetemp() / "changed"
     folder.mkdir(exist_ok=True)
     (folder / "model.xml").write_text(MODEL.format("", 'type="sphere" size="1"', ""))
-    content = TEXT.encode()
-    for place, new in changes:
-        content = content[:place] + new + content[place + len(new) :]
-    (folder / "scene.toml").write_bytes(content)
+    (folder / "scene.toml").write_bytes(changed(TEXT.encode(), changes))
     assert isinstance(outcome(lambda: load_scene(folder / "scene.toml")), Scene | RippleError)
 
 

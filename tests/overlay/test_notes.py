@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.overlay.notes import (
+from ripple_sim.overlay import (
     MOST_POINTS,
     SIZE,
     History,
@@ -22,14 +22,10 @@ from ripple_sim.overlay.notes import (
     colors,
     compared_operators,
     grid_spacing,
-    lab_to_srgb,
-    magnitude,
     number,
     readable,
     round_up,
 )
-from ripple_sim.solver import HeightMap, sphere_atlas
-from ripple_sim.solver.texels.topology import with_filled_halo
 
 # Machado, Oliveira and Fernandes 2009, complete deuteranopia and protanopia, on linear RGB
 DEUTAN = np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]])
@@ -74,10 +70,6 @@ def test_signs_are_told_apart_by_every_eye(vision: np.ndarray) -> None:
     assert apart[-1] > 50
 
 
-def test_lab_white_and_black() -> None:
-    np.testing.assert_allclose(lab_to_srgb(np.array([[100.0, 0, 0], [0, 0, 0]])), [[1, 1, 1], [0, 0, 0]], atol=1e-3)
-
-
 def test_colors_of_values() -> None:
     table = color_table()
     np.testing.assert_array_equal(colors([-3.0, -2.0, 0.0, 1.0, 2.0], 2.0), table[[0, 0, 256, 384, 512]])
@@ -88,22 +80,6 @@ def test_comparison_names_its_baselines() -> None:
     assert compared_operators("paper") == ("fem", "paper")
     with pytest.raises(SceneError, match="paper, uncorrected, dynamic-paint"):
         compared_operators("fem")
-
-
-def test_padding_is_that_of_a_height_map() -> None:
-    atlas = sphere_atlas(1.0, 12)
-    field = np.random.default_rng(0).standard_normal((6, 12, 12)).astype(np.float32)
-    around = with_filled_halo(atlas.texels.topology, field)
-    np.testing.assert_allclose(around, HeightMap(atlas.texels)(field)[..., 3], rtol=1e-6)
-
-
-def test_magnitude_is_that_of_waves_where_they_are() -> None:
-    field = np.zeros((6, 42, 42), np.float32)
-    assert magnitude(field) == 0
-    field[0, 10:20, 10:20] = -0.2
-    assert magnitude(field) == pytest.approx(0.2)  # however calm the rest is
-    field[1:4] = 0.1
-    assert magnitude(field) == pytest.approx((100 * 0.04 + 4800 * 0.01) / (100 * 0.2 + 4800 * 0.1))
 
 
 def test_grid_has_a_readable_number_of_cells() -> None:
@@ -137,15 +113,10 @@ def test_limit_grows_to_round_numbers_and_never_shrinks() -> None:
     assert (np.diff(seen) > 0).sum() < 50  # and stands still again
 
 
-def test_limit_without_floor_starts_with_what_it_sees() -> None:
+def test_limit_starts_with_what_it_sees_catches_up_and_stays_where_it_is_fixed() -> None:
     limit = Limit()
-    assert limit.follow(0.0, 0.1) == 0.0
-    assert limit.follow(0.035, 0.1) == 0.04
-    fixed = Limit(fixed=0.3)
-    assert fixed.follow(7.0, 0.1) == 0.3
-
-
-def test_limit_that_is_far_off_catches_up() -> None:
+    assert [limit.follow(each, 0.1) for each in (0.0, 0.035)] == [0.0, 0.04]
+    assert Limit(fixed=0.3).follow(7.0, 0.1) == 0.3
     limit = Limit(floor=0.001)
     assert 1.0 <= limit.follow(3.5, 1 / 60) < 1.5
     assert limit.goal == 4

@@ -1,15 +1,77 @@
-"""Panels appear as requested, where they belong, and leave the rest of the frame alone.
+"""Sprites, arrows and panels: coverage, opacity, clipping, text; overlays are drawn where they belong alone."""
 
-The plot of energy over time.
-"""
+import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from ripple_sim.overlay.notes import Notes, Scale
-from ripple_sim.overlay.painter import EnergyPlot, Painter
-from ripple_sim.overlay.panels import Layout
-from ripple_sim.scene.scene import parse_request
+from ripple_sim.coupling import Energy
+from ripple_sim.overlay import (
+    EnergyPlot,
+    Layout,
+    Notes,
+    Painter,
+    Sprite,
+    draw_arrow,
+    marks as patch_module,
+    number,
+)
+from ripple_sim.scene import parse_request
+
+
+def test_sprite_covers_in_proportion() -> None:
+    sprite = Sprite(10, 6)
+    sprite.box(2.25, 1.0, 5.5, 2.5, (255, 255, 255))
+    frame = np.zeros((6, 10, 3), np.uint8)
+    sprite.over(frame, 0, 0)
+    np.testing.assert_array_equal(frame[1, :, 0], [0, 0, 191, 255, 255, 128, 0, 0, 0, 0])
+    np.testing.assert_array_equal(frame[2, 3:5, 0], [128, 128])
+    assert frame[3:].max() == 0
+
+
+def test_sprite_over_a_transparent_frame() -> None:
+    sprite = Sprite(3, 1)
+    sprite.box(0, 0, 3, 1, (200, 100, 0), 0.5)
+    frame = np.zeros((1, 3, 4), np.uint8)
+    frame[0, 1:] = (0, 0, 80, 255), (0, 0, 80, 51)
+    sprite.over(frame, 0, 0)
+    np.testing.assert_array_equal(frame[0, 0], (200, 100, 0, 128))  # the sprite's own
+    np.testing.assert_array_equal(frame[0, 1], (100, 50, 40, 255))  # half and half
+    # shares of 0.5 and 0.2 * 0.5 of what is seen, over an opacity of 0.6
+    np.testing.assert_allclose(frame[0, 2], (200 * 5 / 6, 100 * 5 / 6, 80 / 6, 0.6 * 255), atol=1)
+
+
+@pytest.mark.parametrize("place", [(-6, -3), (95, 45), (200, 10), (40, -60)])
+def test_sprite_over_the_border_is_cut(place: tuple[int, int]) -> None:
+    sprite = Sprite(12, 8)
+    sprite.box(0, 0, 12, 8, (200, 100, 50))
+    frame = np.zeros((50, 100, 3), np.uint8)
+    sprite.over(frame, *place)
+    x, y = place
+    expected = np.zeros_like(frame)
+    expected[max(y, 0) : max(y + 8, 0), max(x, 0) : max(x + 12, 0)] = (200, 100, 50)
+    np.testing.assert_array_equal(frame, expected)
+
+
+def test_number_is_written_in_a_font_that_has_its_signs() -> None:
+    assert Path(patch_module._font(20).path).name == "DejaVuSans.ttf"
+    missing = patch_module._font(40).getmask("\U0010ffff").getbbox()
+    for sign in number(-1.0)[0], "µ", "\N{MULTIPLICATION SIGN}":
+        assert patch_module._font(40).getmask(sign).getbbox() != missing
+
+
+def test_arrow_has_its_length_and_fades() -> None:
+    sprite = Sprite(120, 60)
+    draw_arrow(sprite, (100.0, 30.0), (20.0, 30.0), 4.0, [1.0, 1.0, 0.0, 0.0])
+    frame = np.full((60, 120, 3), 255, np.uint8)
+    sprite.over(frame, 0, 0)
+    dark = 255 - frame[30, :, 0].astype(int)
+    assert dark[100] > 200  # the tip's dot
+    assert dark[70:95].min() > 200
+    assert dark[20:40].max() == 0  # towards the tail nothing is seen
+    assert dark[110:].max() == 0
+
 
 SIZE = (640, 360)
 CURVE = (np.linspace(0, 1, 9), np.ones(9))
@@ -18,8 +80,8 @@ CORNERS = {"time": "top left", "grid": "top left", "contacts": "top right", "hei
 
 
 def notes(time: float = 1.0, marks: float = 1.0) -> Notes:
-    one = Scale(1.0, 1.0)
-    return Notes(time, [], one, [], Scale(marks, marks), [CURVE], one)
+    one = 1.0, 1.0
+    return Notes(time, [], one, [], (marks, marks), [CURVE], one)
 
 
 def painted(words: list[str], content: Notes, channels: int = 3, **options: object) -> np.ndarray:
@@ -67,32 +129,27 @@ def test_panels_of_one_corner_lie_below_one_another() -> None:
     assert under.min() > np.nonzero((clock != 90).any(axis=(1, 2)))[0].max()
 
 
-def test_energy_plot_draws_values_at_their_height() -> None:
-    layout = Layout(1280, 720)
-    plot = EnergyPlot(layout, "energy", "J", 10.0)
-    times = np.linspace(0, 10, 300)
+def test_energy_plot_draws_values_at_their_height_and_grows_with_time() -> None:
+    plot = EnergyPlot(Layout(1280, 720), "energy", "J", 10.0)
 
-    def row_of(value: float) -> float:
+    def curve(value: float, until: float) -> np.ndarray:
+        """Pixels that are blue, under a value that holds until a time."""
         frame = np.full((400, 400, 3), 255, np.uint8)
-        plot.draw([(times, np.full(300, value))], 2.0, 2.0).over(frame, 0, 0)
-        blue = (frame[..., 2].astype(int) - frame[..., 0]) > 80
-        return float(np.flatnonzero(blue[:, 200]).mean())
+        plot.draw([(np.linspace(0, until, 300), np.full(300, value))], 2.0, 2.0).over(frame, 0, 0)
+        return (frame[..., 2].astype(int) - frame[..., 0]) > 80
 
-    low, middle, high = row_of(0.5), row_of(1.0), row_of(1.5)
+    low, middle, high = (np.flatnonzero(curve(value, 10.0)[:, 200]).mean() for value in (0.5, 1.0, 1.5))
     assert low > middle > high
     assert low - middle == pytest.approx(middle - high, abs=1.0)
-
-
-def test_energy_plot_grows_with_time() -> None:
-    layout = Layout(1280, 720)
-    plot = EnergyPlot(layout, "energy", "J", 10.0)
-
-    def reach(until: float) -> int:
-        times = np.linspace(0, until, 50)
-        frame = np.full((400, 400, 3), 255, np.uint8)
-        plot.draw([(times, np.ones(50))], 2.0, 2.0).over(frame, 0, 0)
-        blue = (frame[..., 2].astype(int) - frame[..., 0]) > 80
-        return int(np.flatnonzero(blue.any(axis=0)).max())
-
-    quarter, half, whole = reach(2.5), reach(5.0), reach(10.0)
+    quarter, half, whole = (np.flatnonzero(curve(1.0, until).any(axis=0)).max() for until in (2.5, 5.0, 10.0))
     assert half - quarter == pytest.approx((whole - quarter) / 3, abs=1.5)
+
+
+def test_the_ledger_is_written_of_one_run_and_not_of_two() -> None:
+    plain, content = notes(), dataclasses.replace(notes(), ledgers=[Energy(2.0, 1.0)])
+    other = dataclasses.replace(content, ledgers=[Energy(2.0, 3.0)])
+    one, two = painted(["energy"], content), painted(["energy"], other)
+    assert (one != two).any()
+    assert (one != painted(["energy"], plain)).any()
+    titles = {"titles": [("one", ""), ("two", "")]}
+    np.testing.assert_array_equal(painted(["energy"], content, **titles), painted(["energy"], other, **titles))

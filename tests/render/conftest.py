@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from ripple_sim.render.resources import FrameUniforms, Resources
+from ripple_sim.render import FrameUniforms, Resources
 from ripple_sim.solver.errors import GLError
 from ripple_sim.solver.gl import GLContext, shared_context
 

@@ -1,37 +1,111 @@
-"""Frames that come back late are the same frames: in their order, bit for bit, whatever is drawn meanwhile."""
+"""The first frame is as good as any, and any as the first: nothing is read from the GPU before it is drawn.
+
+Frames that come back late are the same frames: in their order, bit for bit, whatever is drawn meanwhile.
+"""
 
 import contextlib
+import dataclasses
 import itertools
 from pathlib import Path
+from typing import Any
 
+import moderngl
 import mujoco
 import numpy as np
 import pytest
+from drawn import BALL, FLOOR, FRONT, SIZE, ball_surface, posed
+from unfinished_videos import egg_scene
 
-from ripple_sim.render import Camera, Renderer
-from ripple_sim.render.resources import Resources
-from ripple_sim.render.targets import FrameFormat, Readback
-from ripple_sim.scene.load_scene import load_scene
+from ripple_sim.render import Camera, FrameFormat, Readback, Renderer, Resources
 from ripple_sim.solver import RippleError
-from ripple_sim.solver.gl import GLContext, shared_context
-from ripple_sim.video import render_video as rendering
-from ripple_sim.video.film import Film
-from ripple_sim.video.options import VideoOptions
+from ripple_sim.solver.gl import GLContext
+from ripple_sim.video import Film, VideoOptions, render_video as rendering
 from ripple_sim.video.render_video import render_video
 
-pytestmark = pytest.mark.usefixtures("opengl")
+TILES = '<texture name="tiles" type="2d" builtin="checker" rgb1=".2 .3 .4" rgb2=".1 .2 .3" width="8" height="8"/>'
+MIRROR = '<material name="floor" texture="tiles" texrepeat="5 5" reflectance=".4"/>'
+REFLECTING = FLOOR.replace("rgba=", 'material="floor" rgba=')
+GLASS = '<geom type="box" size=".4 .05 .4" pos=".2 -.6 .5" rgba=".2 .4 .8 .4"/>'
+WATER = '<geom name="water" type="sphere" size=".5" pos="-.6 0 .6"/>'
+REST = BALL + GLASS + WATER  # lit by the studio's single light, whose shaders are the quickest to compile
 
-BALL = '<mujoco><worldbody><geom type="sphere" size="1" rgba="1 .5 .2 .6"/></worldbody></mujoco>'
-MJCF = """<mujoco><option timestep="0.005"/><worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
-<geom type="plane" size="2 2 1" pos="0 0 -0.25"/>
-<body name="stone" pos="0.05 0 0.3"><freejoint/><geom name="stone" size="0.05"/></body></worldbody></mujoco>"""
-TOML = """model = "scene.xml"
-duration = 0.4
-[[ripple]]
-geom = "egg"
-resolution = 12
-material = {speed = 0.3, density = 20.0}
-"""
+# every pass, every format of a frame, and the background both at once and from a coarse one
+SCENES: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "smooth background": (FLOOR + REST, "", {}),
+    "mirror": (REFLECTING + REST, TILES + MIRROR, {}),
+    "transparent background, linear light, one sample": (
+        FLOOR + REST,
+        "",
+        {"alpha": True, "linear": True, "samples": 0},
+    ),
+}
+
+
+def renderer_of(gl, name: str) -> tuple[Renderer, mujoco.MjData]:
+    body, asset, options = SCENES[name]
+    model, data = posed(f"<mujoco><asset>{asset}</asset><worldbody>{body}</worldbody></mujoco>")
+    return Renderer(gl, model, {model.geom("water").id: ball_surface("water")}, size=SIZE, **options), data
+
+
+def drawn(renderer: Renderer, data: mujoco.MjData) -> list[np.ndarray]:
+    """A frame, two through other points of the lens, as frames with depth of field are made, and what pixels show."""
+    lenses = (0.0, 0.0), (0.1, 0.0), (-0.05, 0.08)
+    eyes = [dataclasses.replace(FRONT.pose(), lens=lens, focal_distance=3.0) for lens in lenses]
+    frames = [renderer.render(data, {}, eye, number) for number, eye in enumerate(eyes)]
+    return [*frames, *renderer.surfaces(data, {}, FRONT)]
+
+
+def assert_same(found: list[np.ndarray], expected: list[np.ndarray]) -> None:
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_any_frame_is_as_the_first_whatever_was_in_memory_or_in_the_last(gl, name: str, monkeypatch):
+    renderer, data = renderer_of(gl, name)
+    with renderer:
+        expected = drawn(renderer, data)
+        assert_same(drawn(renderer, data), expected)
+        # where something was, what is behind it shows as if it had never been there
+        ball = 1
+        data.geom_xpos[ball] += [0.7, 0.0, 0.3]
+        assert (drawn(renderer, data)[0] != expected[0]).any()
+        data.geom_xpos[ball] -= [0.7, 0.0, 0.3]
+        assert_same(drawn(renderer, data), expected)
+    create = Resources.__getattr__
+    for depth in (0.0, 0.5):
+
+        def create_filled(resources: Resources, method: str, depth: float = depth) -> Any:
+            def created(*arguments: Any, **options: Any) -> Any:
+                made = create(resources, method)(*arguments, **options)
+                if isinstance(made, moderngl.Buffer) or len(arguments) < 3:  # of others the third is what they hold
+                    with gl as ctx:
+                        fill(ctx, made, depth, "reserve" in options)
+                return made
+
+            return created
+
+        monkeypatch.setattr(Resources, "__getattr__", create_filled)
+        renderer, data = renderer_of(gl, name)
+        with renderer:
+            assert_same(drawn(renderer, data), expected)
+
+
+def fill(ctx: moderngl.Context, made: Any, depth: float, empty: bool) -> None:
+    """Fill what was made without contents with what cannot be missed where it is read: NaN where there is one."""
+    if isinstance(made, moderngl.Buffer):
+        if empty:
+            made.write(b"\xff" * made.size)
+    elif isinstance(made, moderngl.TextureArray):
+        made.write(np.full((*made.size, made.components), np.nan, made.dtype).tobytes())
+    elif isinstance(made, moderngl.Texture | moderngl.Renderbuffer):
+        target = ctx.framebuffer(depth_attachment=made) if made.depth else ctx.framebuffer([made])
+        color = np.nan if made.dtype in ("f2", "f4") else 0.7
+        target.clear(color, color, color, color, depth=depth)
+        target.release()
+
+
+LONE_BALL = '<mujoco><worldbody><geom type="sphere" size="1" rgba="1 .5 .2 .6"/></worldbody></mujoco>'
 
 
 @pytest.fixture
@@ -47,12 +121,10 @@ def views(count: int) -> list[Camera]:
 @pytest.mark.parametrize("alpha", [False, True])
 @pytest.mark.parametrize("driver", ["software", "gpu"])
 def test_frames_come_back_in_order_however_many_are_on_their_way(
-    request: pytest.FixtureRequest, driver: str, alpha: bool
+    gl, request: pytest.FixtureRequest, driver: str, alpha: bool
 ) -> None:
-    model = mujoco.MjModel.from_xml_string(BALL)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    renderer = Renderer(shared_context(), model, {}, size=(70, 50), alpha=alpha)
+    model, data = posed(LONE_BALL)
+    renderer = Renderer(gl, model, {}, size=(70, 50), alpha=alpha)
     expected = [renderer.render(data, {}, camera) for camera in views(5)]
     assert all((a != b).any() for a, b in itertools.pairwise(expected))
     if driver == "gpu":
@@ -68,11 +140,10 @@ def test_frames_come_back_in_order_however_many_are_on_their_way(
         renderer.fetch()
 
 
-def test_colours_are_divided_by_opacity() -> None:
+def test_colours_are_divided_by_opacity(gl) -> None:
     """All opacities, with all the colours that they leave room for."""
     opacity, color = np.tril_indices(256)
     pixels = np.stack([color, color // 2, 0 * color, opacity], axis=1).astype(np.uint8)
-    gl = shared_context()
     with gl as ctx:
         picture = ctx.framebuffer([ctx.texture((257, 128), 4, pixels)])
     readback = Readback(Resources(gl, picture), FrameFormat(picture.size, alpha=True))
@@ -85,24 +156,22 @@ def test_colours_are_divided_by_opacity() -> None:
 
 
 @pytest.mark.parametrize("backend", ["cpu", "gl"])
-@pytest.mark.parametrize("options", [{"overlay": ["height", "contacts"]}, {"compare": "paper"}, {"supersample": 2}])
-@pytest.mark.usefixtures("gpu")
+@pytest.mark.parametrize("options", [{"overlay": ["height", "contacts"], "compare": "paper"}, {"supersample": 2}])
+@pytest.mark.usefixtures("gl", "gpu")
 def test_a_video_is_the_same_whether_or_not_its_frames_are_drawn_ahead(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, backend: str, options: dict
 ) -> None:
-    (tmp_path / "scene.xml").write_text(MJCF)
-    (tmp_path / "scene.toml").write_text(TOML)
-    scene = load_scene(tmp_path / "scene.toml")
+    scene = egg_scene(tmp_path, '<geom type="plane" size="2 2 1" pos="0 0 -0.25"/>', duration=0.4, density=20.0)
     done: list[int] = []
     render_all = Film.render_all
     for order in ("ahead", "in turn"):
         if order == "in turn":
             monkeypatch.setattr(Film, "render_all", lambda self, shots, ahead: render_all(self, shots))
-            monkeypatch.setattr(rendering, "Prefetch", lambda shots, waiting: contextlib.nullcontext(shots))
+            monkeypatch.setattr(rendering, "prefetched", lambda shots, waiting: contextlib.nullcontext(shots))
         render_video(
             scene,
             tmp_path / order,
-            VideoOptions(size=(96, 64), fps=30, backend=backend, **options),
+            VideoOptions(size=(64, 48), fps=30, backend=backend, **options),
             progress=lambda frames, total: done.append(frames),
         )
     assert done == 2 * list(range(1, 13))

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from drawn import BALL, FLOOR, FRONT, SPOT, SUN, ball_surface, frame_of
 
-from ripple_sim.render.camera import Camera
-from ripple_sim.render.renderer import DrawnScene
-from ripple_sim.render.resources import Resources
-from ripple_sim.render.visuals.objects import Assets
+from ripple_sim.render import Camera, DrawnScene, Resources
+from ripple_sim.render.visuals import Assets, visuals_of
 from ripple_sim.solver import RippleError
 
 XML = """<mujoco><worldbody>
@@ -50,7 +48,9 @@ def scene(request, gl, model):
         resources = Resources(gl, owner)
         target = model.geom("target").id
         surfaces = {target: ball_surface(request.param)}
-        yield DrawnScene(Assets(model, resources), surfaces, [g for g in range(model.ngeom) if g != target], (32, 24))
+        made = DrawnScene(Assets(model, resources), surfaces, (32, 24))
+        made.show(visuals_of(model, [g for g in range(model.ngeom) if g != target]))
+        yield made
         resources.release()
 
 
@@ -90,20 +90,6 @@ def test_bounds_of_shadow_casters_stay_the_same_as_a_target_turns(gl, scene, mod
     updated(gl, scene, data)
     np.testing.assert_array_equal(before, scene.casters(data))
     assert np.isfinite(before).all()  # planes cast no shadow
-
-
-def test_planes_and_sites_hide_no_sky(gl, scene, data):
-    updated(gl, scene, data)
-    assert len(scene._occluders._bound) == 3
-
-
-@pytest.mark.parametrize(
-    ("geom", "message"),
-    [(2, r"geom 2 is no target; the targets' geoms are: 0$"), (0, "has no heatmap; give its `Surf")],
-)
-def test_a_heatmap_needs_a_target_that_shows_one(scene, geom, message):
-    with pytest.raises(RippleError, match=message):
-        scene.target(geom).set_heatmap(np.zeros((6, 10, 10), np.float32), 1.0)
 
 
 @pytest.mark.parametrize("shape", [(6, 8, 8, 4), (6, 10, 10), (5, 10, 10, 4)])

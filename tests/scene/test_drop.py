@@ -15,14 +15,11 @@ import pytest
 import trimesh
 from PIL import Image
 
-from ripple_sim.capture.frame_source import FrameSource
-from ripple_sim.capture.snapshot import snapshots
+from ripple_sim.capture import FrameSource, snapshots
 from ripple_sim.coupling.target_mesh import target_mesh
 from ripple_sim.errors import RippleWarning, SceneError
-from ripple_sim.scene.drop import UP_AXES, drop_scene, mesh_image, paint_target, usual_up
-from ripple_sim.scene.load_scene import check_scene
-from ripple_sim.scene.scene import Scene
-from ripple_sim.scenes.shapes import peanut, write_obj
+from ripple_sim.scene import UP_AXES, Scene, check_scene, drop_scene, mesh_image, paint_target, usual_up
+from ripple_sim.scenes.shapes import peanut
 from ripple_sim.simulation import Simulation
 from ripple_sim.solver import Mesh, load_mesh
 from ripple_sim.solver.errors import GLError
@@ -85,7 +82,6 @@ def test_an_edit_changes_the_model_and_mujocos_refusal_of_it_is_named(tmp_path) 
         ({"bodies": -1}, "number of bodies is -1; valid is 0 to 100"),
         ({"bodies": 101}, "number of bodies is 101"),
         ({"up": "x"}, "up axis is 'x'; valid are 'y' and 'z'"),
-        ({"texture": "a.png"}, "has no texture coordinates"),
     ],
 )
 def test_invalid_options_are_named(tmp_path, options: dict, message: str) -> None:
@@ -202,15 +198,10 @@ def test_a_dropped_on_mesh_wears_its_image(tmp_path, named):
     )
 
 
-def test_an_image_that_cannot_be_shown_is_refused(tmp_path):
-    bare, textured = tmp_path / "bare.obj", textured_obj(tmp_path / "p.obj")
-    write_obj(bare, *peanut())
-    paint = half_and_half(tmp_path / "paint.png")
-    with pytest.raises(SceneError, match=r"paint\.png.*no texture coordinates"):
-        drop_scene(bare, texture=paint)
+def test_an_image_that_cannot_be_read_is_refused(tmp_path):
     (tmp_path / "broken.png").write_bytes(b"no picture")
     with pytest.raises(SceneError, match=r"broken\.png.*cannot be read"):
-        drop_scene(textured, texture=tmp_path / "broken.png")
+        drop_scene(textured_obj(tmp_path / "p.obj"), texture=tmp_path / "broken.png")
 
 
 PIXELS = np.random.default_rng(0).integers(0, 256, (3, 5, 3), dtype=np.uint8)
@@ -228,38 +219,22 @@ def textured_cube(folder) -> tuple[mujoco.MjSpec, Mesh]:
     return spec, mesh
 
 
-def test_the_image_reaches_the_model_bit_for_bit(tmp_path) -> None:
+def test_the_image_that_is_asked_for_reaches_the_model_bit_for_bit_and_the_right_way_up(tmp_path) -> None:
+    """MuJoCo counts v from the upper edge of the image. Another image beside the mesh is not taken."""
     spec, mesh = textured_cube(tmp_path)
     Image.fromarray(PIXELS).save(tmp_path / "image.png")
+    Image.fromarray(255 - PIXELS).save(tmp_path / "cube_texture.png")
     paint_target(spec, mesh, tmp_path / "cube.obj", tmp_path / "image.png")
     model = spec.compile()
     assert (model.tex_height[0], model.tex_width[0], model.tex_nchannel[0]) == PIXELS.shape
     np.testing.assert_array_equal(model.tex_data.reshape(PIXELS.shape), PIXELS)
     material = model.geom("target").matid[0]
     assert model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB] == model.texture("target").id
-
-
-def test_mujoco_counts_v_from_the_upper_edge_of_the_image(tmp_path) -> None:
-    spec, mesh = textured_cube(tmp_path)
-    Image.fromarray(PIXELS).save(tmp_path / "image.png")
-    paint_target(spec, mesh, tmp_path / "cube.obj", tmp_path / "image.png")
-    model = spec.compile()
-    corners = model.mesh_texcoord[model.mesh_facetexcoord]
     rotation = np.zeros(9)
     mujoco.mju_quat2Mat(rotation, model.mesh_quat[0])
-    V = model.mesh_vert @ rotation.reshape(3, 3).T + model.mesh_pos[0]
-    places = V[model.mesh_face]
-    np.testing.assert_allclose(corners[..., 0], places[..., 0], atol=1e-6)
-    np.testing.assert_allclose(corners[..., 1], 1 - places[..., 2], atol=1e-6)
-
-
-def test_an_image_beside_the_mesh_is_used_unless_another_is_asked_for(tmp_path) -> None:
-    Image.fromarray(PIXELS).save(tmp_path / "cube_texture.png")
-    Image.fromarray(255 - PIXELS).save(tmp_path / "other.png")
-    for texture, expected in ((None, PIXELS), (tmp_path / "other.png", 255 - PIXELS)):
-        spec, mesh = textured_cube(tmp_path)
-        paint_target(spec, mesh, tmp_path / "cube.obj", texture)
-        np.testing.assert_array_equal(spec.compile().tex_data.reshape(PIXELS.shape), expected)
+    corners = model.mesh_texcoord[model.mesh_facetexcoord]
+    places = (model.mesh_vert @ rotation.reshape(3, 3).T + model.mesh_pos[0])[model.mesh_face]
+    np.testing.assert_allclose(corners, np.stack([places[..., 0], 1 - places[..., 2]], axis=-1), atol=1e-6)
 
 
 def test_without_an_image_or_without_coordinates_the_model_stays_plain(tmp_path) -> None:

@@ -11,8 +11,7 @@ import pytest
 import trimesh
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.drop_model import BODY_SHAPES, RandomEntry, drop_model, randomize
-from ripple_sim.scene.events import DropEntry
+from ripple_sim.scene import BODY_SHAPES, DropEntry, RandomEntry, drop_model, randomize
 
 
 def table() -> tuple[np.ndarray, np.ndarray]:

@@ -1,13 +1,17 @@
-"""Presets in scene files: the same material as in Python, with coefficients on top, and strictly checked."""
+"""Materials in scene files: presets as in Python, strictly checked, and maps from pictures, through to the waves."""
 
 import dataclasses
 import inspect
+from pathlib import Path
 
+import msgspec
+import numpy as np
 import pytest
 
 from ripple_sim import Material, RippleError
-from ripple_sim.scene.material_entry import LAWS, MaterialChange, MaterialEntry, PresetEntry
-from ripple_sim.scene.scene_file import parse_scene
+from ripple_sim.scene import LAWS, MapEntry, MaterialChange, MaterialEntry, PresetEntry, load_scene, parse_scene
+from ripple_sim.simulation import Simulation
+from ripple_sim.solver import SolverError, texture_map
 
 
 def material_of(table: dict) -> Material:
@@ -79,3 +83,38 @@ def test_entries_have_the_coefficients_and_parameters_of_the_solver() -> None:
     assert set(MaterialEntry.__struct_fields__) == coefficients | {"preset"}
     parameters = {name for law in LAWS for name in inspect.signature(getattr(Material, law)).parameters}
     assert set(PresetEntry.__struct_fields__) == parameters | {"name"}
+
+
+def test_eyes_of_the_face_stay_still() -> None:
+    simulation = Simulation(load_scene("face"), fps=30, resolution=64, backend="cpu")
+    waves = simulation.ripples["face"]
+    for _ in range(18):
+        simulation.advance_frame()
+    still = texture_map(waves.atlas, simulation.scene.targets[0].still_map) < 0.5
+    assert 0.01 < still.mean() < 0.1
+    # all of it is on the two eyeballs
+    eyes = [simulation.ripples.to_geom("face", [0.205, y, 0.445]) for y in (0.108, -0.108)]
+    away = np.linalg.norm(waves.atlas.positions[still][:, None] - eyes, axis=2)
+    assert (away.min(axis=1) < 0.1).all()
+    assert (np.bincount(away.argmin(axis=1), minlength=2) > 0.3 * still.sum()).all()
+    highest = np.abs(waves.height).max()
+    assert highest > 1e-3
+    assert np.quantile(np.abs(waves.height[still]), 0.9) < 0.01 * highest
+
+
+def test_coefficients_are_numbers_paths_or_tables() -> None:
+    table = {"speed": "s.png", "damping": {"map": "d.png", "high": 5.0}, "bending": 0.2}
+    content = parse_scene({"model": "a.xml", "ripple": [{"geom": "a", "material": table}]}, "scene.toml")
+    maps = content.ripple[0].material.located(Path("folder")).maps()
+    assert set(maps) == {"speed", "damping"}
+    assert maps["damping"].map == str(Path("folder") / "d.png")
+    assert (maps["damping"].low, maps["damping"].high) == (0.0, 5.0)
+    material = content.ripple[0].material.material()
+    assert (material.speed, material.damping, material.bending) == (1.0, 5.0, 0.2)
+
+
+def test_missing_picture_is_named() -> None:
+    scene = load_scene("face")
+    entry = msgspec.structs.replace(scene.targets[0], material=MaterialEntry(speed=MapEntry("slot_scratch.png")))
+    with pytest.raises(SolverError, match=r"slot_scratch\.png.* cannot be read"):
+        Simulation(dataclasses.replace(scene, targets=(entry,)), resolution=16, backend="cpu")

@@ -1,11 +1,17 @@
-"""Bodies are held, dropped, thrown and placed as entries say, in MuJoCo's own state."""
+"""Scripted events happen when and where the scene says, in MuJoCo's own state and on the waves.
+
+Bodies are held, dropped, thrown and placed; the hook is called at every step.
+"""
+
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
 from ripple_sim.errors import SceneError
-from ripple_sim.scene.events import DropEntry, Events, PlaceEntry, Script, ThrowEntry, check_time, free_joint
+from ripple_sim.scene import DropEntry, Events, PlaceEntry, Script, ThrowEntry, load_scene
+from ripple_sim.simulation import Simulation
 
 MJCF = """<mujoco><option timestep="0.002"/><worldbody><geom name="ground" type="plane" size="9 9 1"/>
 <body name="post" pos="5 0 0"><joint type="hinge" axis="0 0 1"/><geom size="0.1"/></body>
@@ -102,11 +108,6 @@ def test_a_time_within_round_off_of_a_step_belongs_to_it(model) -> None:
     np.testing.assert_array_equal(data.qpos[1:4], 1)
 
 
-def test_free_joint_addresses_skip_the_joints_before(model) -> None:
-    assert free_joint(model, DropEntry("stone", 0.0)) == (1, 1)
-    assert free_joint(model, DropEntry("brick", 0.0)) == (8, 7)
-
-
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
@@ -116,6 +117,8 @@ def test_free_joint_addresses_skip_the_joints_before(model) -> None:
         ),
         (ThrowEntry("post", 0.0, (0, 0, 1)), r"\[\[throw\]\] .* 'post', which has no <freejoint/>; valid are free"),
         (DropEntry("wall", 0.0), "'wall', which has no <freejoint/>; only free bodies can drop"),
+        (PlaceEntry("stone", np.nan, (0, 0, 0)), "time nan s; valid is 0 or greater"),
+        (PlaceEntry("stone", np.inf, (0, 0, 0)), "time inf s; valid is 0 or greater"),
         (PlaceEntry("stone", -0.1, (0, 0, 0)), r"\[\[place\]\] of 'stone' has time -0.1 s; valid is 0 or greater"),
         (DropEntry("stone", 0.0, orientation=(0, 0, 0, 0)), "orientation .*; valid is w x y z, not 0"),
         (DropEntry("stone", 0.0, orientation=(np.nan, 0, 0, 1)), "valid is w x y z, not 0"),
@@ -126,8 +129,71 @@ def test_entries_that_cannot_be_carried_out_are_refused_at_once(model, entry: ob
         script(model, entry)
 
 
-@pytest.mark.parametrize("time", [-1e-9, float("inf"), float("-inf"), float("nan")])
-def test_times_are_finite_and_not_negative(time: float) -> None:
-    with pytest.raises(SceneError, match=r"\[\[poke\]\] of 'egg' has time .*; valid is 0 or greater"):
-        check_time("poke", "egg", time)
-    check_time("poke", "egg", 0.0)
+SCENE = """<mujoco><compiler angle="degree"/><option timestep="0.002" gravity="0 0 0"/><worldbody>
+<body pos="0 0 1" euler="0 0 90">
+<geom name="egg" type="ellipsoid" size="0.3 0.2 0.2" pos="0.1 0 0" euler="0 90 0"/></body>
+<body name="stone" pos="0 0 3"><freejoint/><geom name="stone" size="0.05" mass="0.2"/></body>
+<body name="brick" pos="2 0 3"><freejoint/><geom name="brick" type="box" size="0.1 0.1 0.1"/></body>
+<body name="post" pos="0 3 0"><joint name="post" type="slide" axis="0 0 1"/><geom name="post" size="0.05"/></body>
+</worldbody>
+<actuator><position name="lift" joint="post" kp="100" kv="20"/></actuator></mujoco>"""
+TOML = """model = "scene.xml"
+[[ripple]]
+geom = "egg"
+resolution = 24
+material = {speed = 0.5, density = 10.0, stiffness = 100.0}
+"""
+
+
+def simulation(folder: Path, script: str, **options) -> Simulation:
+    (folder / "scene.xml").write_text(SCENE)
+    (folder / "scene.toml").write_text(TOML + script)
+    return Simulation(load_scene(folder / "scene.toml"), fps=100, backend="cpu", **options)
+
+
+def test_changed_material_keeps_the_waves_and_changes_what_follows(tmp_path: Path) -> None:
+    poke = '[[poke]]\ngeom = "egg"\ntime = 0\npoint = [0.3, 0, 0]\nimpulse = 0.02\n'
+    change = '[[change]]\ngeom = "egg"\ntime = 0.1\nmaterial = {damping = 50.0}\n'
+    plain, damped = (simulation(tmp_path, script) for script in (poke, poke + change))
+    for number in range(30):
+        plain.advance_frame()
+        damped.advance_frame()
+        same = np.array_equal(plain.ripples["egg"].height, damped.ripples["egg"].height)
+        assert same == (number < 10)
+    assert damped.ripples["egg"].material.speed == 0.5
+    assert damped.ripples["egg"].time == pytest.approx(0.3)
+    assert damped.ripples["egg"].energy() < 0.05 * plain.ripples["egg"].energy()
+
+
+def test_control_moves_an_actuator_from_its_time_on(tmp_path: Path) -> None:
+    sim = simulation(tmp_path, '[[control]]\nactuator = "lift"\ntime = 0.1\nvalue = 0.2\n')
+    for _ in range(10):
+        sim.advance_frame()
+    assert sim.data.body("post").xpos[2] == 0
+    for _ in range(150):
+        sim.advance_frame()
+    assert sim.data.body("post").xpos[2] == pytest.approx(0.2, abs=0.01)
+
+
+def test_still_disc_carries_no_waves(tmp_path: Path) -> None:
+    still = "[[ripple.still]]\npoint = [0.1, 0.0, 0.3]\nradius = 0.08\n"
+    poke = '[[poke]]\ngeom = "egg"\ntime = 0\npoint = [0.3, 0, 0]\nimpulse = 0.02\n'
+    hit = '[[poke]]\ngeom = "egg"\ntime = 0.1\npoint = [0.1, 0.0, 0.3]\nimpulse = 0.02\n'
+    sim = simulation(tmp_path, still + poke + hit)
+    for _ in range(60):
+        sim.advance_frame()
+    waves = sim.ripples["egg"]
+    centre = sim.ripples.to_geom("egg", [0.1, 0.0, 0.3])
+    distance = np.linalg.norm(waves.atlas.positions - centre, axis=-1)
+    around = np.abs(waves.height[(distance > 0.1) & (distance < 0.14)]).max()
+    assert around > 0
+    assert not waves.height[distance < 0.03].any()
+    assert np.abs(waves.height[distance < 0.07]).max() < 0.1 * around  # at this resolution a texel is 30 mm wide
+
+
+def test_hook_is_called_before_every_step(tmp_path: Path) -> None:
+    times = []
+    sim = simulation(tmp_path, "", on_step=lambda running: times.append(running.data.time))
+    for _ in range(2):
+        sim.advance_frame()
+    np.testing.assert_allclose(times, 0.002 * np.arange(10), atol=1e-12)

@@ -9,6 +9,7 @@ import pytest
 import terrain
 import vessels
 
+from ripple_sim.scenes import shapes
 from ripple_sim.scenes.shapes import polygonise, sphere
 from ripple_sim.scenes.sphere_maps import shipped_sphere_map
 from ripple_sim.solver import Atlas, Mesh, Volume, build_atlas, load_mesh, thickness_map
@@ -21,8 +22,14 @@ VOXEL = 0.015
 
 @pytest.mark.parametrize(
     ("path", "made"),
-    [(drum.SKIN_FILE, drum.skin), (drum.WALL_FILE, drum.wall), (head.FOLDER / "skull.obj", head.skull)],
-    ids=["drum's skin", "drum's wall", "skull"],
+    [
+        (drum.SKIN_FILE, drum.skin),
+        (drum.WALL_FILE, drum.wall),
+        (head.FOLDER / "skull.obj", head.skull),
+        (shapes.DUCK_FILE, shapes.duck),
+        (shapes.LIMBED_FILE, shapes.limbed),
+    ],
+    ids=["drum's skin", "drum's wall", "skull", "duck", "limbed"],
 )
 def test_shipped_meshes_are_what_the_modules_make(path, made) -> None:
     V, F = made()

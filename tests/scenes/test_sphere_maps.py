@@ -5,11 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from ripple_sim.coupling.geoms import TARGET_TYPES, find_geom, find_target
-from ripple_sim.coupling.soft import is_soft
-from ripple_sim.coupling.target_mesh import target_atlas, target_mesh
-from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.scene.scene import shipped_scenes
+from ripple_sim.coupling import TARGET_TYPES, find_geom, find_target, is_soft, target_atlas
+from ripple_sim.coupling.target_mesh import target_mesh
+from ripple_sim.scene import load_scene, shipped_scenes
 from ripple_sim.scenes.sphere_maps import FOLDER, shipped_sphere_map, sphere_map_path
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.layouts.sphere_map import certify

@@ -1,7 +1,5 @@
 """Surfaces that several tests share. Everything is made here; nothing is read from files."""
 
-import igl
-import numpy as np
 import pytest
 import trimesh
 
@@ -19,21 +17,7 @@ def ball_mesh() -> Mesh:
 @pytest.fixture(scope="session")
 def animal() -> Atlas:
     """Atlas of a concave mesh with four limbs and a head."""
-    return build_atlas(Mesh.from_arrays(*limbed()), 64, cache=False)
-
-
-@pytest.fixture(scope="session")
-def animal_geodesics(animal: Atlas):
-    """Exact geodesic distance from one vertex to all vertices of the animal."""
-
-    def distances(vertex: int) -> np.ndarray:
-        mesh = animal.mesh
-        empty = np.empty(0, dtype=np.int64)
-        return igl.exact_geodesic(
-            mesh.V, mesh.F, np.array([vertex]), empty, np.arange(len(mesh.V), dtype=np.int64), empty
-        )
-
-    return distances
+    return build_atlas(Mesh.from_arrays(*limbed()), 64)
 
 
 @pytest.fixture

@@ -1,19 +1,35 @@
-"""The cache folder: kept under its limit, what was used longest ago first, and nobody else's files touched."""
+"""The cache folder: kept under its limit, what was used longest ago first, and nobody else's files touched.
+
+Under stress: several processes at once, a full disk. What is kept in memory: the latest, and while its owner lives.
+"""
 
 import os
+import subprocess
+import sys
+import weakref
 from pathlib import Path
 
 import numpy as np
 import pytest
+from genus_zero import icosphere
 
+from ripple_sim.errors import RippleWarning
 from ripple_sim.solver import Mesh, RippleError, build_atlas
-from ripple_sim.solver.cache import LIMIT, cache_folder, cache_path, cached_files, make_room, mark_used
+from ripple_sim.solver.cache import (
+    LIMIT,
+    _private_folder,
+    cache_folder,
+    cache_path,
+    cached_files,
+    kept_with,
+    make_room,
+    mark_used,
+)
 
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    cache_folder().mkdir()
     return cache_folder()
 
 
@@ -25,21 +41,21 @@ def keep(name: str, *, age: float, size: int = 1_000_000) -> Path:
     return path
 
 
-def test_what_was_used_longest_ago_goes_first(monkeypatch) -> None:
+def test_what_was_used_longest_ago_goes_first_and_what_has_just_been_made_stays_though_too_large(monkeypatch) -> None:
     old, older, newest = keep("old", age=20), keep("older", age=10), keep("newest", age=30)
     monkeypatch.setenv(LIMIT, "2")
     mark_used(older)
     make_room(newest)
     assert [file.path for file in cached_files()] == [newest, older]
     assert not old.exists()
+    made = keep("large", age=5, size=3_000_000)
+    make_room(made)
+    assert [file.path for file in cached_files()] == [made]
 
 
-def test_what_has_just_been_made_stays_though_it_is_too_large(monkeypatch) -> None:
-    keep("small", age=10)
-    newest = keep("large", age=5, size=3_000_000)
-    monkeypatch.setenv(LIMIT, "2")
-    make_room(newest)
-    assert [file.path for file in cached_files()] == [newest]
+@pytest.fixture(scope="module")
+def ball_mesh() -> Mesh:
+    return Mesh.from_arrays(*icosphere(1))
 
 
 def test_a_limit_of_zero_keeps_nothing(monkeypatch, ball_mesh: Mesh) -> None:
@@ -73,3 +89,99 @@ def test_a_file_that_another_process_removes_is_no_error(monkeypatch) -> None:
     monkeypatch.setattr("ripple_sim.solver.cache.cached_files", lambda: listed)
     monkeypatch.setenv(LIMIT, "0")
     make_room(newest)
+
+
+@pytest.mark.parametrize("home", [None, "/proc/no/home"])
+def test_without_a_home_results_are_kept_in_a_private_folder(home: str | None, tmp_path: Path, monkeypatch) -> None:
+    """A service, or a container with a foreign user: neither HOME nor an entry in passwd, or one that is not there."""
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("ripple_sim.solver.cache._private_folder", _private_folder.__wrapped__)
+    if home is None:
+        monkeypatch.delenv("HOME", raising=False)
+        monkeypatch.setattr("pwd.getpwuid", lambda uid: {}[uid])
+    else:
+        monkeypatch.setenv("HOME", home)
+    with pytest.warns(RippleWarning, match="set XDG_CACHE_HOME"):
+        folder = cache_folder()
+    assert folder.parent == tmp_path and folder.stat().st_mode & 0o077 == 0
+
+
+def test_a_private_folder_of_somebody_else_is_not_used(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    planted = tmp_path / f"ripple-sim-{os.getuid()}"
+    planted.mkdir(mode=0o777)
+    planted.chmod(0o777)
+    with pytest.warns(RippleWarning, match="there is no home"):
+        folder = _private_folder.__wrapped__("there is no home")
+    assert folder != planted and folder.stat().st_mode & 0o077 == 0
+
+
+_BEGIN = """
+import os, resource, sys
+import numpy as np
+from ripple_sim.solver import Mesh, build_atlas
+from ripple_sim.solver.cache import cache_path
+V = np.vstack([np.zeros(3), np.eye(3)])
+mesh = Mesh.from_arrays(V, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]))
+expected = build_atlas(mesh, 8, cache=False).positions
+"""
+_FOUR = """
+ready, go = os.pipe()
+for _ in range(4):
+    if os.fork() == 0:
+        os.close(go)
+        os.read(ready, 1)  # until the parent closes its end: all begin at once
+        same = [np.array_equal(build_atlas(mesh, 8).positions, expected) for _ in range(3)]
+        os._exit(0 if all(same) else 1)
+os.close(go)
+sys.exit(any(os.wait()[1] for _ in range(4)))
+"""
+_FULL = """
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+sys.exit(not np.array_equal(build_atlas(mesh, 8).positions, expected))
+"""
+
+
+def run(program: str, cache: Path) -> list[str]:
+    """Run a program with a cache of its own; return what it leaves there."""
+    environment = {"XDG_CACHE_HOME": str(cache), "PATH": "", "NUMBA_NUM_THREADS": "1"}
+    result = subprocess.run(
+        [sys.executable, "-c", _BEGIN + program],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    return [each.name for each in cache.rglob("*") if each.is_file()]
+
+
+def test_four_processes_fill_one_cache_at_once(tmp_path: Path) -> None:
+    files = run(_FOUR, tmp_path)
+    assert len(files) == 1 and files[0].endswith(".npz")
+
+
+def test_a_full_disk_costs_the_next_call_its_time_and_leaves_nothing(tmp_path: Path) -> None:
+    assert run(_FULL, tmp_path) == []
+
+
+def test_what_is_made_from_an_object_is_made_once_and_kept_while_the_object_lives():
+    class Thing:
+        pass
+
+    made = []
+
+    @kept_with
+    def make(owner):
+        made.append(weakref.ref(result := Thing()))
+        return result
+
+    first, second = Thing(), Thing()
+    assert make(first) is make(first)
+    assert make(second) is not make(first)
+    assert len(made) == 2
+    del first
+    assert made[0]() is None
+    assert made[1]() is make(second)

@@ -1,6 +1,7 @@
 """Senseless arguments of public functions raise our own error: it names the argument, the value and what is valid."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -28,23 +29,16 @@ MODEL = mujoco.MjModel.from_xml_string(
 )
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
-    "speed too large": (lambda: Material(speed=HUGE), "material speed is 1000.*valid is a number"),
     "waves of nothing": (lambda: Material(wavelengths=None), "wavelengths is None m; valid are two numbers"),
     "longest first": (lambda: Material(wavelengths=(2, 1)), r"wavelengths is \(2, 1\) m; valid are two numbers"),
-    "poisson of text": (lambda: Material.plate(poisson="a"), "poisson is 'a'; valid is a number from 0 to 0.5"),
     "preset of a list": (lambda: Material.preset([]), r"preset \[\] does not exist; valid are gelatine-3, "),
     "nothing inside": (lambda: thickness_map(ATLAS, None), "inside is None; valid is a Mesh, a Volume, or several"),
     "inside nothing": (lambda: thickness_map(None, ATLAS.mesh), "atlas is None; valid is an Atlas"),
     "limits of text": (lambda: thickness_map(ATLAS, ATLAS.mesh, "ab"), "limits is 'ab'; valid is a least and"),
-    "tension of text": (lambda: Material.membrane(tension="a"), "tension is 'a' N/m; valid is a finite number"),
-    "huge density": (lambda: Material.membrane(density=HUGE), "density is 1000.*valid is a finite number"),
-    "size of text": (lambda: Material.suited("a", 1.0), "size is 'a' m; valid is"),
     "no atlas": (lambda: WaveSolver(None), "atlas is None; valid is an Atlas"),
     "no material": (lambda: WaveSolver(ATLAS, 3), "material is 3; valid is a Material"),
     "point of text": (lambda: WAVES.add_impulse("abc", 1, 1), "points are 'abc'; valid are numbers"),
     "huge impulse": (lambda: WAVES.add_impulse([1, 0, 0], HUGE, 1), "impulse is 1000.* N s; valid is a finite number"),
-    "huge radius": (lambda: WAVES.add_impulse([1, 0, 0], 1, HUGE), "radius is 1000.*valid is a finite number"),
-    "huge time step": (lambda: WAVES.step(HUGE), "time step is 1000.*valid is a finite number"),
     "height of text": (lambda: setattr(WAVES, "height", "a"), "height is 'a'; valid is a number, or an array"),
     "speed of text": (lambda: ATLAS.stiffness("a"), "speed is 'a'; valid is a number, or an array"),
     "no path": (lambda: ATLAS.save(None), "path is None; valid is a path"),
@@ -82,18 +76,8 @@ def called(count: Any = 1, *, size: Any = 1.0, path: Any = ".", other: Any = Non
 
 def test_valid_arguments_go_through_in_every_form() -> None:
     assert called() == (1, 1.0, ".", None)
-    assert called(np.int64(3), size=np.float32(2), path=b"a", other={}) == (3, 2.0, b"a", {})
+    assert called(np.int64(3), size=np.float32(2), path=Path("a"), other={}) == (3, 2.0, Path("a"), {})
     assert (called.__name__, called.__doc__) == ("called", "Return its arguments.")
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [{"count": 0}, {"count": 1.0}, {"size": 0}, {"size": np.nan}, {"size": "1"}, {"path": 3}, {"other": 3}],
-)
-def test_invalid_ones_do_not(arguments: dict[str, Any]) -> None:
-    (name,) = arguments
-    with pytest.raises(RippleError, match=f"{name} is .*; valid is "):
-        called(**arguments)
 
 
 def test_a_wrong_name_stays_pythons_error() -> None:

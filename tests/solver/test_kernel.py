@@ -4,17 +4,22 @@ Compilation is timed by module, and its time is not that of the work in which it
 debugger, kernels are plain Python with the same results.
 """
 
+import importlib
 import io
 import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numba
 import numpy as np
 import pytest
 
-from ripple_sim.solver.kernel import compile_times, compiling, kernel, work_clock
+from ripple_sim.solver.kernel import compile_times, compiling, fingerprint, kernel, work_clock
 
 
 @kernel
@@ -34,11 +39,6 @@ def compensated_sum(x):
     return total
 
 
-@kernel(inline="always")
-def doubled(x):
-    return 2 * x
-
-
 @pytest.mark.parametrize(("a", "b", "expected"), [(1.0, 0.0, np.inf), (-1.0, 0.0, -np.inf), (0.0, 0.0, np.nan)])
 def test_division_by_zero_follows_numpy_and_raises_nothing(a: float, b: float, expected: float) -> None:
     np.testing.assert_equal(quotient(a, b), expected)
@@ -52,14 +52,6 @@ def test_sums_are_rounded_as_they_are_written() -> None:
         naive += each
     assert compensated_sum(x) == pytest.approx(1e8 + 99.9, abs=2e-8)
     assert naive != compensated_sum(x)
-
-
-def test_options_are_handed_to_the_compiler() -> None:
-    assert doubled.targetoptions["inline"] == "always"
-    assert doubled(21) == 42
-    for each in (quotient, doubled):
-        assert each.targetoptions["nogil"]
-        assert "fastmath" not in each.targetoptions
 
 
 def test_the_first_call_is_compilation_and_the_second_is_work() -> None:
@@ -85,6 +77,79 @@ def test_the_first_call_is_compilation_and_the_second_is_work() -> None:
     assert compiling() is None
     assert outer(2) == 6
     assert compile_times()[__name__] == known + compiled
+
+
+LIBRARY = """
+from ripple_sim.solver.kernel import kernel
+
+@kernel
+def sum_of(x):
+    total = 0.0
+    for each in x:
+        total += each
+    return total
+
+@kernel
+def product_of(x):
+    total = 1.0
+    for each in x:
+        total *= each
+    return total
+"""
+
+
+@pytest.fixture
+def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], ModuleType]]:
+    """Imports a module of two kernels anew, as a new process would, each time it is called."""
+    (tmp_path / "library_of_kernels.py").write_text(LIBRARY)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # a change within the second would go unnoticed
+    monkeypatch.setattr("ripple_sim.solver.kernel.kernel_folder", lambda: tmp_path / "kernels")
+
+    def imported() -> ModuleType:
+        sys.modules.pop("library_of_kernels", None)
+        importlib.invalidate_caches()
+        fingerprint.cache_clear()
+        return importlib.import_module("library_of_kernels")
+
+    yield imported
+    sys.modules.pop("library_of_kernels", None)
+    fingerprint.cache_clear()
+
+
+def is_loaded(kernel: Any) -> bool:
+    """Whether the sum of a kernel's library is right, and came from the disk."""
+    assert kernel(np.array([1.0, 2.0, 4.0])) in (7.0, 8.0)
+    return bool(kernel.stats.cache_hits) and not kernel.stats.cache_misses
+
+
+def test_a_kernel_is_compiled_once_and_again_when_its_source_changes(library, tmp_path: Path) -> None:
+    assert not is_loaded(library().sum_of)
+    assert is_loaded(library().sum_of)
+    source = tmp_path / "library_of_kernels.py"
+    source.write_text(LIBRARY.replace("total = 0.0", "total = 1.0"))
+    assert library().sum_of(np.array([1.0, 2.0, 4.0])) == 8.0
+    assert len(list((tmp_path / "kernels").iterdir())) == 1  # the older one is replaced
+
+
+@pytest.mark.parametrize("damage", ["empty", "cut", "flipped", "swapped", "foreign", "folder"])
+def test_a_damaged_kernel_is_compiled_anew(library, damage: str, tmp_path: Path) -> None:
+    for name in ("sum_of", "product_of"):
+        assert not is_loaded(getattr(library(), name))
+    files = sorted((tmp_path / "kernels").iterdir())
+    contents = [path.read_bytes() for path in files]
+    for path, content, other in zip(files, contents, contents[::-1], strict=True):
+        middle = len(content) // 2
+        if damage == "folder":
+            path.unlink()
+            path.mkdir()
+            continue
+        flipped = content[:middle] + bytes([content[middle] ^ 4]) + content[middle + 1 :]
+        made = {"empty": b"", "cut": content[:middle], "flipped": flipped, "swapped": other, "foreign": b"mine" * 99}
+        path.write_bytes(made[damage])
+    for name in ("sum_of", "product_of"):
+        assert not is_loaded(getattr(library(), name))
+        assert is_loaded(getattr(library(), name)) == (damage != "folder")
 
 
 WAVES = """

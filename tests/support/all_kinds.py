@@ -9,10 +9,22 @@ from numpy.typing import NDArray
 
 Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
 
+BALL = trimesh.creation.icosphere(subdivisions=1)
+
+
+def cube() -> Arrays:
+    box = trimesh.creation.box()
+    return np.array(box.vertices), np.array(box.faces)
+
+
+def torus() -> Arrays:
+    solid = trimesh.creation.torus(1.0, 0.3)
+    return np.array(solid.vertices), np.array(solid.faces)
+
 
 def thickened_graph(genus: int, seed: int, radius: float = 0.28, spacing: float = 0.13) -> Arrays:
     """Tubes along a random connected graph, which has as many independent cycles as the surface has handles."""
-    ends = _graph(genus, np.random.default_rng(seed))
+    ends = graph(genus, np.random.default_rng(seed))
     low, high = ends.min(axis=(0, 1)) - 0.5, ends.max(axis=(0, 1)) + 0.5
     axes = [np.arange(a, b, spacing) for a, b in zip(low, high, strict=True)]
     z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
@@ -24,17 +36,18 @@ def thickened_graph(genus: int, seed: int, radius: float = 0.28, spacing: float 
     return V, F
 
 
-def _graph(genus: int, rng: np.random.Generator, size: int = 3) -> NDArray[np.float64]:
+def graph(genus: int, rng: np.random.Generator, size: int = 3) -> NDArray[np.float64]:
     """Segments [k, 2, 3] of a tree on a cubic lattice, and one more for each cycle."""
     nodes = [(x, y, z) for x in range(size) for y in range(size) for z in range(size)]
     links = [(a, b) for a in nodes for b in nodes if a < b and sum(abs(p - q) for p, q in zip(a, b, strict=True)) == 1]
     links = [links[k] for k in rng.permutation(len(links))]
     reached, edges = {nodes[0]}, []
-    while len(reached) < 15:
+    count = min(len(nodes), 15)
+    while len(reached) < count:
         edges.append(next(link for link in links if len(reached & set(link)) == 1))
         reached |= set(edges[-1])
     edges += [link for link in links if reached.issuperset(link) and link not in edges][:genus]
-    assert len(edges) == 14 + genus
+    assert len(edges) == count - 1 + genus
     return np.array(edges, dtype=float)
 
 

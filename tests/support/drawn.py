@@ -16,12 +16,18 @@ SUN = '<light directional="true" pos="0 0 3" dir="{} 0 -1" diffuse=".8 .8 .8" ca
 SPOT = '<light pos="{} 0 2" dir="{} 0 -1" diffuse=".9 .9 .9" cutoff="60" exponent="1"/>'
 
 
-def frame_of(gl, body, *, asset="", visual="", camera=ABOVE, targets=None, size=SIZE, **options):
-    """Frame, as integers, of a scene given by the contents of its MJCF's elements."""
-    xml = f"<mujoco><visual>{visual}</visual><asset>{asset}</asset><worldbody>{body}</worldbody></mujoco>"
+def posed(xml: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """A model and its data at the beginning."""
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
+    return model, data
+
+
+def frame_of(gl, body, *, asset="", visual="", camera=ABOVE, targets=None, size=SIZE, **options):
+    """Frame, as integers, of a scene given by the contents of its MJCF's elements."""
+    xml = f"<mujoco><visual>{visual}</visual><asset>{asset}</asset><worldbody>{body}</worldbody></mujoco>"
+    model, data = posed(xml)
     surfaces = {model.geom(name).id: surface for name, surface in (targets or {}).items()}
     with Renderer(gl, model, surfaces, size=size, **options) as renderer:
         return renderer.render(data, {}, camera).astype(int)

@@ -1,26 +1,40 @@
-"""How long fuzzing goes on, what strange values are made of, and what may come of them."""
+"""How long fuzzing goes on, what strange values and damages are made of, and what may come of them."""
 
+import contextlib
+import copy
+import io
 import os
-from collections.abc import Callable
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
-from hypothesis import HealthCheck, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, settings, strategies as st
 from hypothesis.database import DirectoryBasedExampleDatabase
+from unfinished_videos import contents
 
+from ripple_sim.cli import main as cli
 from ripple_sim.solver import RippleError
 
 # `make fuzz` sets it; what it finds is kept in a folder that git ignores, and tried first the next time. The tests take
 # a few examples, always the same.
 EXAMPLES = int(os.environ.get("RIPPLE_SIM_FUZZ", "0"))
 
-fuzzed = settings(
-    max_examples=EXAMPLES or 100,
-    derandomize=not EXAMPLES,
-    database=DirectoryBasedExampleDatabase(".hypothesis/fuzz") if EXAMPLES else None,
-    deadline=None,
-    suppress_health_check=list(HealthCheck),
-)
+
+def fuzzed_by(usual: int, share: float = 1.0) -> settings:
+    """Settings for so many examples in the tests, and for a share of those that `make fuzz` asks for."""
+    return settings(
+        max_examples=max(1, round(EXAMPLES * share)) if EXAMPLES else usual,
+        derandomize=not EXAMPLES,
+        database=DirectoryBasedExampleDatabase(".hypothesis/fuzz") if EXAMPLES else None,
+        deadline=None,
+        suppress_health_check=list(HealthCheck),
+    )
+
+
+fuzzed = fuzzed_by(100)
 
 NUMBERS = st.one_of(
     st.floats(allow_nan=True, allow_infinity=True),
@@ -42,3 +56,98 @@ def outcome(call: Callable[[], Any]) -> Any:
     except RippleError as error:
         assert str(error).strip()
         return error
+
+
+def command(*words: object) -> int:
+    """Exit status of the program, run in this process; it says one line if it fails, beside warnings."""
+    err = io.StringIO()
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(err):
+        status = cli.main([*map(str, words)])
+    lines = err.getvalue().splitlines()
+    assert status in (0, 1, 2)
+    assert all(line.startswith("ripple-sim: ") and len(line) < 900 for line in lines), lines
+    assert len([line for line in lines if not line.startswith("ripple-sim: warning: ")]) == (status > 0), lines
+    return status
+
+
+def places(value: Any, path: tuple = ()) -> list[tuple]:
+    """Paths to all values in a table."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [path, *(place for key, each in inner for place in places(each, (*path, key)))]
+
+
+def put(table: dict[str, Any], place: tuple, value: Any) -> dict[str, Any]:
+    """A copy of a table with a value at a path."""
+    at = table = copy.deepcopy(table)
+    for key in place[:-1]:
+        at = at[key]
+    at[place[-1]] = value
+    return table
+
+
+CHANGES = st.lists(st.tuples(st.floats(0, 1), st.binary(max_size=6)), max_size=4)
+
+
+def changed(content: bytes, changes: list[tuple[float, bytes]]) -> bytes:
+    """Bytes with others at some places, each a share of the length."""
+    for place, new in changes:
+        at = int(place * len(content))
+        content = content[:at] + new + content[at + len(new) :]
+    return content
+
+
+@contextlib.contextmanager
+def home_of_others() -> Iterator[Path]:
+    """A folder for one trial; it has a folder of somebody else's, which must stay as it is."""
+    with tempfile.TemporaryDirectory() as name:
+        home = Path(name)
+        (home / "thesis").mkdir()
+        for mine in ("chapter.tex", "frame_00000.png", "000000.json", "000001.log"):
+            (home / "thesis" / mine).write_text("mine")
+        before = contents(home / "thesis")
+        yield home
+        assert contents(home / "thesis") == before
+
+
+JSON = [
+    "[]",
+    "{}",
+    "null",
+    "5",
+    '"made by ripple-sim"',
+    '["made by ripple-sim"]',
+    '{"made by ripple-sim": 1}',
+    "[" * 9999,
+]
+SHARES = st.floats(0, 1, exclude_max=True)
+DAMAGES = st.lists(
+    st.tuples(
+        SHARES, st.sampled_from(["empty", "cut", "flip", "missing", "folder", "link", "json", "swap", "digit"]), SHARES
+    ),
+    min_size=1,
+    max_size=3,
+)
+
+
+def damage(folder: Path, damages: list[tuple[float, str, float]]) -> None:
+    """Spoil what is in a folder: which of all, how, and where in it. Links lead to a folder `thesis` beside."""
+    for which, kind, where in damages:
+        paths = sorted(path for path in folder.rglob("*") if not path.is_symlink())
+        if not paths:
+            return
+        path, other = paths[int(which * len(paths))], paths[int(where * len(paths))]
+        content = path.read_bytes() if path.is_file() else b"text"
+        taken = other.read_bytes() if other.is_file() else b"\xff\0"
+        at = int(where * len(content))
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+        if kind == "link":
+            mine = sorted((folder.parent / "thesis").iterdir())
+            path.symlink_to([folder.parent / "thesis", folder / "nowhere", *mine][int(where * (len(mine) + 2))])
+        elif kind == "folder":
+            (path / "inner").mkdir(parents=True)
+        elif kind != "missing":
+            flipped = content[:at] + bytes(each ^ 1 << at % 8 for each in content[at : at + 1]) + content[at + 1 :]
+            digit = content[:at] + re.sub(rb"\d", b"%d" % (at % 10), content[at:], count=1)
+            text = JSON[int(where * len(JSON))].encode()
+            new = {"empty": b"", "cut": content[:at], "flip": flipped, "json": text, "swap": taken, "digit": digit}
+            path.write_bytes(new[kind])

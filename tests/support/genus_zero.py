@@ -1,8 +1,10 @@
-"""Closed surfaces of genus 0, from tame to hard."""
+"""Closed surfaces of genus 0, from tame to hard; and how evenly a sphere map spreads their area."""
 
 import igl
 import numpy as np
 import trimesh
+
+from ripple_sim.solver.layouts.sphere_map import stretch
 
 TETRAHEDRON = (
     np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float),
@@ -43,6 +45,14 @@ def crumpled(seed=0):
     return V + 0.2 * np.random.default_rng(seed).standard_normal(V.shape), F
 
 
+def thin_limb(length, radius):
+    """A sphere, one of whose sides is drawn out to a limb."""
+    V, F = icosphere(4)
+    up = np.clip((V[:, 2] - 0.8) / 0.2, 0, 1)
+    narrow = 1 - (1 - radius) * np.minimum(4 * up, 1)
+    return np.column_stack([V[:, 0] * narrow, V[:, 1] * narrow, V[:, 2] + length * up]), F
+
+
 def jack(limb_radius=0.12, limb_length=1.7, points=48):
     """Six thin limbs along the axes, from a signed distance."""
     axis = np.linspace(-2, 2, points)
@@ -74,3 +84,11 @@ SHAPES = {
     "crumpled, self-intersecting": crumpled,
     "six limbs": jack,
 }
+
+
+def stretch_quantiles(V, F, S, quantiles=(0.001, 0.01, 0.5, 0.99, 0.999)):
+    """Area-weighted quantiles of the stretch: the value that a given share of the real area stays under."""
+    values, weights = stretch(V, F, S), igl.doublearea(V, F)
+    order = np.argsort(values, kind="stable")
+    share = np.cumsum(weights[order]) / np.sum(weights)
+    return values[order][np.minimum(np.searchsorted(share, quantiles), len(order) - 1)]

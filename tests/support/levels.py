@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.solver.layouts.energy import Reference
-from ripple_sim.solver.layouts.newton import System
-from ripple_sim.solver.layouts.sphere_map.decimation import corner_table
-from ripple_sim.solver.layouts.sphere_map.level import build_level
-from ripple_sim.solver.layouts.sphere_map.progressive import SPHERE, assemble, total_energy
+from ripple_sim.solver.layouts import Reference, System
+from ripple_sim.solver.layouts.sphere_map import SPHERE, assemble, build_level, corner_table, total_energy
 
 
 def whole_level(V, F):

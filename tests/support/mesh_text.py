@@ -24,7 +24,7 @@ def off(vertices, faces, header: str = "OFF") -> str:
 def ply(vertices, faces, layout: str, *, kind: str = "float", length: str = "uchar", texcoord: bool = False) -> bytes:
     """PLY file with an element of edges between vertices and faces, and properties that mean nothing here."""
     order = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}[layout]
-    codes = {"float": "f", "double": "d", "uchar": "B", "int": "i"}
+    codes = {"float": "f", "double": "d", "uchar": "B", "ushort": "H", "int": "i"}
     header = ["ply", f"format {layout} 1.0", "comment made here", f"element vertex {len(vertices)}"]
     header += [f"property {kind} {name}" for name in "xyz"] + ["property uchar red"]
     header += ["element edge 1", "property int vertex1", "property int vertex2", f"element face {len(faces)}"]

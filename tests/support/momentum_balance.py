@@ -44,6 +44,13 @@ class MomentumBalance:
     ----------
     model : mujoco.MjModel
     targets : list of str
+
+    Attributes
+    ----------
+    pairs : dict
+        `Balance` by the names of a target and what touches it.
+    pushes : dict
+        Sum of the latest step's normal forces [N, 3] of the first geom on the second, by their names.
     """
 
     def __init__(self, model: mujoco.MjModel, targets: list[str]) -> None:
@@ -59,6 +66,7 @@ class MomentumBalance:
             if body not in constrained and alone:
                 self.free[body] = int(model.jnt_dofadr[joint])
         self.pairs: dict[tuple[str, str], Balance] = {}
+        self.pushes: dict[tuple[str, str], np.ndarray] = {}
         self._flex_geom = {}
         for flex in range(model.nflex):
             self._flex_geom[flex] = model.geom(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex)).id
@@ -71,6 +79,11 @@ class MomentumBalance:
         """Account for a step."""
         normal, whole = self._contact_forces(data)
         dt = self.model.opt.timestep
+        self.pushes = {
+            (self.names[a], self.names[b]): sign * sum(vector for _, vector in forces)
+            for (first, second), forces in normal.items()
+            for a, b, sign in ((first, second, 1.0), (second, first, -1.0))
+        }
         shares = {body: self._share(data, body, normal, whole, dt) for body in self.free}
         for (target, other), forces in normal.items():
             for a, b in ((target, other), (other, target)):

@@ -15,16 +15,7 @@ _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 class RandomHit:
     """A random model whose hitters are some steps away from the target, on their way to it.
 
-    Parameters
-    ----------
-    random : RandomModel
-
-    Attributes
-    ----------
-    model : mujoco.MjModel
-    data : mujoco.MjData
-    steps : int
-        After which the first hit is over.
+    The first hit is over after so many steps, `steps`.
     """
 
     def __init__(self, random: RandomModel) -> None:

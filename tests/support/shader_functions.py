@@ -12,7 +12,7 @@ import moderngl
 import numpy as np
 
 import ripple_sim.render
-from ripple_sim.render.contract import DEFINES
+from ripple_sim.render import DEFINES
 from ripple_sim.solver.gl import GLContext, load_shader
 
 _PACKAGE = "shaders_under_test"

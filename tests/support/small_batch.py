@@ -1,11 +1,11 @@
 """A batch of small scenes, which take a fraction of a second each."""
 
+from concurrent.futures import Executor, Future
 from pathlib import Path
 
 from unfinished_videos import contents
 
-from ripple_sim.batch.folder import BatchFolder, keep_plan, stored
-from ripple_sim.batch.plan import Plan, read_plan
+from ripple_sim.batch import BatchFolder, Plan, keep_plan, read_plan, stored
 
 MJCF = """<mujoco><option timestep="0.005"/><worldbody><light name="key" pos="0 0 3"/>
 <geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
@@ -34,6 +34,23 @@ camera.azimuth = {uniform = [0, 360]}
 size = [64, 48]
 fps = 20
 """
+
+
+class Here(Executor):
+    """Does the work in this process, at once."""
+
+    places = 2
+
+    def __init__(self, workers):
+        self.workers = workers
+
+    def submit(self, function, /, *arguments, **named):
+        future = Future()
+        try:
+            future.set_result(function(*arguments, **named))
+        except BaseException as error:
+            future.set_exception(error)
+        return future
 
 
 def write_files(folder: Path) -> None:

@@ -5,8 +5,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from ripple_sim.coupling.contacts import Contacts
-from ripple_sim.coupling.load import TargetLoad
+from ripple_sim.coupling import Contacts, TargetLoad
 from ripple_sim.solver import Material, WaveSolver, sphere_atlas
 
 RADII = np.array([1.0, 0.1, 0.1, 0.1])

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from ripple_sim.render.surfaces.surface import Charts
-from ripple_sim.solver.layouts.cube.atlas import CubeChartMap
-from ripple_sim.solver.layouts.cube.convention import cube_topology, texel_directions
+from ripple_sim.render.surfaces import Charts
+from ripple_sim.solver.layouts.cube import CubeChartMap, cube_topology, texel_directions
 
 N = 24
 

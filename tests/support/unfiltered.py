@@ -4,8 +4,7 @@ import mujoco
 import numpy as np
 
 from ripple_sim import Material, Ripples
-from ripple_sim.coupling.load import ContactLoads
-from ripple_sim.coupling.model import CoupledModel
+from ripple_sim.coupling import ContactLoads, CoupledModel
 from ripple_sim.solver import Load, WaveSolver
 
 
@@ -16,14 +15,7 @@ def rms(waves: WaveSolver) -> float:
 
 
 class WithAndWithout:
-    """The geom "target" of a model, with the filter and without.
-
-    Attributes
-    ----------
-    filtered, unfiltered : WaveSolver
-    history : list of (float, float)
-        Their velocities after each step [m/s], over the mass.
-    """
+    """The geom "target" of a model, with the filter and without; `history` has their velocities step by step [m/s]."""
 
     def __init__(self, model: mujoco.MjModel, material: Material, resolution: int) -> None:
         options = {"backend": "cpu", "conserve_volume": False}

@@ -1,20 +1,37 @@
-"""What tests of interrupted videos share."""
+"""What tests of videos share: an egg under a stone."""
 
+from collections.abc import Callable
 from pathlib import Path
+
+from ripple_sim.scene import Scene, load_scene
+
+MJCF = """<mujoco><option timestep="0.005"/><worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
+<body name="stone" pos="0.05 0 0.3"><freejoint/><geom name="stone" size="0.05"/></body></worldbody></mujoco>"""
+TOML = """model = "scene.xml"
+duration = {}
+[[ripple]]
+geom = "egg"
+resolution = 12
+material = {{speed = 0.3, density = {}}}
+"""
+
+
+def egg_scene(folder: Path, floor: str = "", duration: float = 2.0, density: float = 1500.0) -> Scene:
+    """A scene that is written to a folder and loaded."""
+    (folder / "scene.xml").write_text(MJCF.replace("</worldbody>", floor + "</worldbody>"))
+    (folder / "scene.toml").write_text(TOML.format(duration, density))
+    return load_scene(folder / "scene.toml")
+
+
+def interrupting_at(frame: int) -> Callable[[int, int], None]:
+    """Progress that interrupts at a frame."""
+
+    def progress(done: int, _: int) -> None:
+        if done == frame:
+            raise KeyboardInterrupt
+
+    return progress
 
 
 def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
-MJCF = """<mujoco><option timestep="0.005"/><worldbody><geom name="egg" type="ellipsoid" size="0.3 0.25 0.2"/>
-<body name="stone" pos="0.05 0 0.3"><freejoint/><geom name="stone" size="0.05"/></body></worldbody></mujoco>"""
-
-
-TOML = """model = "scene.xml"
-duration = 2.0
-[[ripple]]
-geom = "egg"
-resolution = 12
-material = {speed = 0.3, density = 1500.0}
-"""

@@ -12,12 +12,7 @@ from ripple_sim.solver import Atlas, WaveSolver
 
 
 class WaveHeights:
-    """Heights of a target's waves beside the thickness of the object, step by step.
-
-    Parameters
-    ----------
-    atlas : Atlas
-    """
+    """Heights of a target's waves beside the thickness of the object, step by step."""
 
     def __init__(self, atlas: Atlas) -> None:
         self._atlas = atlas

@@ -1,8 +1,9 @@
-"""Interrupted renders go on to the same video, or say why not.
+"""Interrupted renders go on to the same video, or say why not; passes beside the frames, and the summary.
 
 A stage that runs ahead: the same items in the same order, no more of them than may wait, and its errors.
 """
 
+import dataclasses
 import json
 import re
 import subprocess
@@ -10,32 +11,23 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
-from unfinished_videos import MJCF, contents
+from unfinished_videos import MJCF, contents, interrupting_at
 
-from ripple_sim.encode.output import FRAMES_IN_CLIP
-from ripple_sim.errors import VideoError
-from ripple_sim.scene.load_scene import load_scene
-from ripple_sim.scene.scene import Scene
+from ripple_sim import ExportOptions
+from ripple_sim.encode import FRAMES_IN_CLIP
+from ripple_sim.errors import ExportError, VideoError
+from ripple_sim.scene import Scene, load_scene
 from ripple_sim.solver.gl import GLContext
-from ripple_sim.video.options import VideoOptions
-from ripple_sim.video.render_video import Prefetch, render_video
+from ripple_sim.video import VideoOptions, prefetched
+from ripple_sim.video.render_video import render_video
 
 OPTIONS = {"size": (64, 48), "fps": 30}
-
-
-class Impatience:
-    """Interrupts at a frame."""
-
-    def __init__(self, frame: int) -> None:
-        self._frame = frame
-
-    def __call__(self, done: int, total: int) -> None:
-        if done == self._frame:
-            raise KeyboardInterrupt
 
 
 def _push(simulation) -> None:
@@ -48,7 +40,7 @@ def test_a_render_goes_on_to_the_same_video(scene, tmp_path, name):
     assert render_video(scene, whole, VideoOptions(**OPTIONS)).resumed_at == 0
     for frame in (20, 58):
         with pytest.raises(KeyboardInterrupt):
-            render_video(scene, broken, VideoOptions(resume=True, **OPTIONS), progress=Impatience(frame))
+            render_video(scene, broken, VideoOptions(resume=True, **OPTIONS), progress=interrupting_at(frame))
     summary = render_video(scene, broken, VideoOptions(resume=True, **OPTIONS))
     # frames that wait to be encoded are lost
     assert summary.resumed_at == FRAMES_IN_CLIP if name == "clip.mp4" else 48 <= summary.resumed_at <= 58
@@ -58,7 +50,10 @@ def test_a_render_goes_on_to_the_same_video(scene, tmp_path, name):
 def test_a_render_of_a_changed_scene_or_with_other_options_is_not_resumed(scene, tmp_path):
     def resume(scene: Scene, **options: object) -> None:
         render_video(
-            scene, tmp_path / "frames", VideoOptions(resume=True, **{**OPTIONS, **options}), progress=Impatience(20)
+            scene,
+            tmp_path / "frames",
+            VideoOptions(resume=True, **{**OPTIONS, **options}),
+            progress=interrupting_at(20),
         )
 
     with pytest.raises(KeyboardInterrupt):
@@ -132,35 +127,30 @@ def test_waves_on_a_gpu_run_beside_the_drawing_and_the_video_is_the_same(scene, 
     assert max(np.abs(a - b).max() for a, b in zip(host, device, strict=True)) <= 1
 
 
-def test_items_come_in_order_from_another_thread():
-    threads = set()
-
-    def items() -> Iterator[int]:
-        for number in range(50):
-            threads.add(threading.get_ident())
-            yield number
-
-    with Prefetch(items(), 3) as prefetched:
-        assert list(prefetched) == list(range(50))
-    assert len(threads) == 1
-    assert threading.get_ident() not in threads
-
-
-def test_it_runs_ahead_as_far_as_it_may_and_no_further():
+def test_a_stage_runs_ahead_in_another_thread_as_far_as_it_may_and_no_further():
     begun: list[int] = []
+    threads, taken, before = set(), [], threading.active_count()
 
     def items() -> Iterator[int]:
         for number in range(50):
             begun.append(number)
+            threads.add(threading.get_ident())
             yield number
 
-    with Prefetch(items(), 3) as prefetched:
-        for number in prefetched:
+    with prefetched(items(), 3) as ahead:
+        for number in ahead:
+            taken.append(number)
             waited = time.monotonic() + 60
             # one is in the taker's hands, three wait, one is held until there is room
             while len(begun) < min(number + 5, 50) and time.monotonic() < waited:
                 time.sleep(0.001)
             assert len(begun) == min(number + 5, 50)
+    assert taken == begun == list(range(50))
+    assert len(threads - {threading.get_ident()}) == len(threads) == 1
+    begun.clear()
+    with prefetched(items(), 3) as ahead:  # leaving early stops the thread
+        assert next(ahead) == 0
+    assert threading.active_count() == before
 
 
 def test_an_error_comes_where_the_next_item_would_have_come():
@@ -170,20 +160,85 @@ def test_an_error_comes_where_the_next_item_would_have_come():
         raise ZeroDivisionError
 
     taken = []
-    with pytest.raises(ZeroDivisionError), Prefetch(items(), 3) as prefetched:
-        for number in prefetched:
+    with pytest.raises(ZeroDivisionError), prefetched(items(), 3) as ahead:
+        for number in ahead:
             taken.append(number)
     assert taken == [1, 2]
 
 
-def test_leaving_early_stops_the_thread():
-    def items() -> Iterator[int]:
-        number = 0
-        while True:
-            yield number
-            number += 1
+def test_every_frame_has_its_passes_whatever_the_exposures(scene: Scene, tmp_path: Path) -> None:
+    options = VideoOptions(
+        size=(32, 24), fps=20, duration=0.2, supersample=2, shutter=180.0, exposures=2, passes=("depth", "flow")
+    )
+    render_video(scene, tmp_path / "clip.mp4", options)
+    files = sorted(each.name for each in (tmp_path / "clip.passes").glob("*.npz"))
+    assert files == [f"passes_{frame:05d}.npz" for frame in range(4)]
+    with np.load(tmp_path / "clip.passes" / "passes_00001.npz") as passes:
+        assert passes["depth"].shape == (24, 32)
+        assert np.abs(passes["flow"]).max() > 0  # the stone falls
+    with np.load(tmp_path / "clip.passes" / "passes_00003.npz") as last:
+        assert not last["flow"].any()
 
-    before = threading.active_count()
-    with Prefetch(items(), 3) as prefetched:
-        assert next(prefetched) == 0
-    assert threading.active_count() == before
+
+def test_a_resumed_render_has_the_passes_of_one_that_was_not_interrupted(scene: Scene, tmp_path: Path) -> None:
+    options = VideoOptions(size=(32, 24), fps=20, duration=0.4, passes=("depth", "flow"))
+    render_video(scene, tmp_path / "whole", options)
+
+    def interrupt(done: int, _: int) -> None:
+        if done == 6:
+            for _ in range(500):  # another thread writes the frames
+                if len(list((tmp_path / "clip.part").rglob("frame_*.png"))) >= 4:
+                    break
+                time.sleep(0.01)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        render_video(scene, tmp_path / "clip", options, progress=interrupt)
+    for lost in (2, 3):  # the passes come after the frames; these came too late
+        (tmp_path / "clip.passes" / f"passes_{lost:05d}.npz").unlink(missing_ok=True)
+    with pytest.raises(VideoError, match="the passes was depth,flow in npz and now is None"):
+        render_video(scene, tmp_path / "clip", dataclasses.replace(options, resume=True, passes=()))
+    summary = render_video(scene, tmp_path / "clip", dataclasses.replace(options, resume=True))
+    assert summary.resumed_at >= 4
+    whole, resumed = (
+        {each.name: each.read_bytes() for each in (tmp_path / f"{name}.passes").glob("*.npz")}
+        for name in ("whole", "clip")
+    )
+    assert len(whole) == 8 and resumed == whole
+
+
+def test_passes_of_another_video_are_not_replaced(scene: Scene, tmp_path: Path) -> None:
+    options = VideoOptions(size=(32, 24), fps=20, duration=0.1, passes=("depth",))
+    render_video(scene, tmp_path / "clip.mp4", options)
+    with pytest.raises(VideoError, match=r"those of clip\.mp4"):
+        render_video(scene, tmp_path / "clip.webm", options)
+    assert not (tmp_path / "clip.webm").exists()
+    render_video(scene, tmp_path / "clip.mp4", options)
+    render_video(scene, tmp_path / "clip.webm", dataclasses.replace(options, overwrite=True))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"supersample": 0}, "supersample is 0; valid is a whole number, 1 or greater"),
+        ({"size": None}, "size is None; valid is (int, int)"),
+        ({"size": "x"}, "size is 'x'; valid is (int, int)"),
+        ({"duration": "x"}, "duration is 'x'; valid is float or None"),
+        ({"overlay": [3]}, "overlay is [3]; valid is a list of str or None"),
+        ({"resolution": "x"}, "resolution is 'x'; valid is int or None"),
+        ({"frame_format": b"z"}, "frame format is b'z'; valid is 'png' or 'exr'"),
+        ({"resume": np.zeros(2)}, "resume is array([0., 0.]); valid is bool"),
+    ],
+)
+def test_options_are_checked_where_they_are_made(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(VideoError, match=f"^{re.escape(message)}$"):
+        VideoOptions(**given)
+    if set(given) & {"size", "duration", "resolution"}:
+        with pytest.raises(ExportError, match=f"^{re.escape(message)}$"):
+            ExportOptions(**given)
+
+
+@pytest.mark.parametrize("name", ["progress", "on_step", "on_frame"])
+def test_what_is_called_must_be_a_function(scene: Scene, tmp_path: Path, name: str) -> None:
+    with pytest.raises(VideoError, match=f"^{name.replace('_', ' ')} is 3; valid is a function, or None$"):
+        render_video(scene, tmp_path / "o.mp4", VideoOptions(), **{name: 3})  # type: ignore[arg-type]

@@ -1,8 +1,9 @@
 """The viewer's page answers its own user alone: the secret, the page that asks and the size of messages are checked."""
 
 import asyncio
+import functools
 import socket
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -19,18 +20,14 @@ SECRET = web.new_secret()
 LIMIT = 60.0  # [s]
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 @asynccontextmanager
 async def served(name: str, host: str = web.LOOPBACK) -> AsyncIterator[tuple[int, Any, list[str]]]:
     """Port of a page of trame's, a client, and the calls that reached the server."""
     from trame.app import get_server
 
-    server, port, calls = get_server(name), free_port(), []
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        server, port, calls = get_server(name), probe.getsockname()[1], []
     web.restrict(server, host=host, port=port, secret=SECRET)
     server.controller.trigger_name(lambda: None)
     server.trigger("drive")(lambda: calls.append("drive"))
@@ -42,6 +39,10 @@ async def served(name: str, host: str = web.LOOPBACK) -> AsyncIterator[tuple[int
     finally:
         await server.stop()
         await asyncio.wait([serving], timeout=LIMIT)
+
+
+def in_a_loop(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
+    return functools.wraps(test)(lambda **given: asyncio.run(test(**given)))
 
 
 def packed(method: str, *args: object, number: str = "rpc:c0:0") -> bytes:
@@ -66,83 +67,71 @@ async def drive(ws: Any, secret: str) -> list[dict]:
     return answers
 
 
-def test_the_page_itself_drives_the_viewer_with_the_secret() -> None:
-    async def check() -> None:
-        async with served("own") as (port, client, calls):
-            for name in (f"127.0.0.1:{port}", f"localhost:{port}"):
-                async with client.ws_connect(
-                    f"ws://127.0.0.1:{port}/ws", origin=f"http://{name}", headers={"Host": name}
-                ) as ws:
-                    hello, _ = await drive(ws, SECRET)
-                    assert "clientID" in hello["result"]
-            assert calls == ["drive", "drive"]
-
-    asyncio.run(check())
+@in_a_loop
+async def test_the_page_itself_drives_the_viewer_with_the_secret() -> None:
+    async with served("own") as (port, client, calls):
+        for name in (f"127.0.0.1:{port}", f"localhost:{port}"):
+            async with client.ws_connect(
+                f"ws://127.0.0.1:{port}/ws", origin=f"http://{name}", headers={"Host": name}
+            ) as ws:
+                hello, _ = await drive(ws, SECRET)
+                assert "clientID" in hello["result"]
+        assert calls == ["drive", "drive"]
 
 
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "http://localhost:1", "null", "https://127.0.0.1.evil.example"]
 )
-def test_another_site_is_refused_even_with_the_secret(origin: str) -> None:
-    async def check() -> None:
-        async with served(f"origin {origin}") as (port, client, calls):
-            with pytest.raises(aiohttp.WSServerHandshakeError) as refusal:
-                await client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=origin)
-            assert refusal.value.status == 403
-            assert calls == []
-
-    asyncio.run(check())
+@in_a_loop
+async def test_another_site_is_refused_even_with_the_secret(origin: str) -> None:
+    async with served(f"origin {origin}") as (port, client, calls):
+        with pytest.raises(aiohttp.WSServerHandshakeError) as refusal:
+            await client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=origin)
+        assert refusal.value.status == 403
+        assert calls == []
 
 
-def test_a_name_that_another_site_points_at_this_machine_is_refused() -> None:
-    async def check() -> None:
-        async with served("rebinding") as (port, client, _):
-            evil = {"Host": f"evil.example:{port}"}
-            for path in ("/", "/index.html", "/ws"):
-                async with client.get(f"http://127.0.0.1:{port}{path}", headers=evil) as response:
-                    assert response.status == 403
-            with pytest.raises(aiohttp.WSServerHandshakeError, match="403"):
-                await client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://evil.example:{port}", headers=evil)
-
-    asyncio.run(check())
+@in_a_loop
+async def test_a_name_that_another_site_points_at_this_machine_is_refused() -> None:
+    async with served("rebinding") as (port, client, _):
+        evil = {"Host": f"evil.example:{port}"}
+        for path in ("/", "/index.html", "/ws"):
+            async with client.get(f"http://127.0.0.1:{port}{path}", headers=evil) as response:
+                assert response.status == 403
+        with pytest.raises(aiohttp.WSServerHandshakeError, match="403"):
+            await client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://evil.example:{port}", headers=evil)
 
 
 @pytest.mark.parametrize("secret", ["wslink-secret", "", web.new_secret()], ids=["default", "none", "of another run"])
-def test_without_this_runs_secret_no_call_is_answered(secret: str) -> None:
-    async def check() -> None:
-        async with served(f"secret {secret}") as (port, client, calls):
-            async with client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}") as ws:
-                answers = await drive(ws, secret)
-            assert ["error" in answer for answer in answers] == [True, True]
-            assert calls == []
-
-    asyncio.run(check())
+@in_a_loop
+async def test_without_this_runs_secret_no_call_is_answered(secret: str) -> None:
+    async with served(f"secret {secret}") as (port, client, calls):
+        async with client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}") as ws:
+            answers = await drive(ws, secret)
+        assert ["error" in answer for answer in answers] == [True, True]
+        assert calls == []
 
 
-def test_a_message_longer_than_the_pages_own_ends_the_connection() -> None:
-    async def check() -> None:
-        async with served("size") as (port, client, _):
-            async with client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}") as ws:
-                await drive(ws, SECRET)
-                await ws.send_bytes(packed("trame.trigger", "x" * 2 * web.LARGEST_MESSAGE))
-                closing = await ws.receive(timeout=LIMIT)
-            assert closing.type in (aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSED)
-            assert ws.close_code == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
-
-    asyncio.run(check())
+@in_a_loop
+async def test_a_message_longer_than_the_pages_own_ends_the_connection() -> None:
+    async with served("size") as (port, client, _):
+        async with client.ws_connect(f"ws://127.0.0.1:{port}/ws", origin=f"http://127.0.0.1:{port}") as ws:
+            await drive(ws, SECRET)
+            await ws.send_bytes(packed("trame.trigger", "x" * 2 * web.LARGEST_MESSAGE))
+            closing = await ws.receive(timeout=LIMIT)
+        assert closing.type in (aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSED)
+        assert ws.close_code == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
 
 
-def test_the_page_cannot_be_framed_by_another_and_gives_its_address_to_none() -> None:
-    async def check() -> None:
-        async with (
-            served("framing") as (port, client, _),
-            client.get(f"http://127.0.0.1:{port}/index.html") as response,
-        ):
-            assert response.status == 200
-            assert response.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
-            assert response.headers["Referrer-Policy"] == "no-referrer"
-
-    asyncio.run(check())
+@in_a_loop
+async def test_the_page_cannot_be_framed_by_another_and_gives_its_address_to_none() -> None:
+    async with (
+        served("framing") as (port, client, _),
+        client.get(f"http://127.0.0.1:{port}/index.html") as response,
+    ):
+        assert response.status == 200
+        assert response.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+        assert response.headers["Referrer-Policy"] == "no-referrer"
 
 
 def test_every_run_has_a_secret_of_its_own_that_is_no_number() -> None:
@@ -152,14 +141,8 @@ def test_every_run_has_a_secret_of_its_own_that_is_no_number() -> None:
 
 
 def test_other_machines_are_let_in_by_their_users_choice_alone() -> None:
-    assert [web.is_local(host) for host in ("127.0.0.1", "localhost", "::1", "0.0.0.0", "192.168.0.7", "a.b")] == [
-        True,
-        True,
-        True,
-        False,
-        False,
-        False,
-    ]
+    assert all(web.is_local(host) for host in ("127.0.0.1", "localhost", "::1"))
+    assert not any(web.is_local(host) for host in ("0.0.0.0", "192.168.0.7", "a.b"))
     assert web.address("0.0.0.0", 80, "s1").startswith(f"http://{socket.gethostname()}:80/")
     assert web.address("::1", 80, "s1") == "http://[::1]:80/?secret=s1"
 

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 import pytest
-import pyvista as pv
 
-from ripple_sim.viewer.stage import BACKGROUND, _round_up, add_floor, find_floor, geom_mesh, is_endless
+from ripple_sim.viewer import BACKGROUND, add_floor, find_floor, is_endless
+from ripple_sim.viewer.stage import _round_up
 
 
 def state(body: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -53,26 +53,6 @@ def test_a_large_floor_fades_from_its_colour_to_the_background() -> None:
     np.testing.assert_allclose(shown[away > 4.5], np.tile(BACKGROUND, (int((away > 4.5).sum()), 1)), atol=2e-3)
     order = np.argsort(away)
     assert (np.diff(shown[order, 0]) >= -1e-6).all()
-
-
-@pytest.mark.parametrize(
-    ("geom", "volume"),
-    [
-        ('type="box" size=".1 .2 .3"', 8 * 0.006),
-        ('type="sphere" size=".2"', 4 / 3 * np.pi * 0.2**3),
-        ('type="ellipsoid" size=".1 .2 .3"', 4 / 3 * np.pi * 0.006),
-        ('type="cylinder" size=".1 .3"', np.pi * 0.01 * 0.6),
-        ('type="capsule" size=".1 .3"', np.pi * 0.01 * 0.6 + 4 / 3 * np.pi * 0.001),
-    ],
-)
-def test_a_geom_is_drawn_in_its_size_with_its_outside_out(geom: str, volume: float) -> None:
-    mesh = geom_mesh(state(f"<geom {geom}/>")[0], 0)
-    assert isinstance(mesh, pv.PolyData)
-    corners = mesh.points[mesh.regular_faces].astype(float)
-    signed = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
-    assert signed == pytest.approx(volume, rel=0.04)
-    normals = np.asarray(mesh.point_data.active_normals)
-    assert (np.einsum("ij,ij->i", normals, mesh.points) > 0).all()
 
 
 @pytest.mark.parametrize(("value", "limit"), [(1.0, 1), (1.01, 2), (2.0, 2), (3e-4, 5e-4), (5.1e-3, 1e-2), (70, 100)])

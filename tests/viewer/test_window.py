@@ -1,46 +1,24 @@
 """The viewer's window, off screen and on a virtual screen; each in a process of its own.
 
-Clicks are told from drags, and every control has a method, a key of its own and a line of help.
+`ripple-sim view`: its help, its mistakes in one line, what it says where there is no display.
 """
 
+import ctypes
+import importlib.util
 import os
-import select
-import shutil
+import re
+import socket
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
+from ripple_sim.cli import main as cli
 from ripple_sim.errors import DisplayError
-from ripple_sim.viewer.canvas import CONTROLS, MOUSE, help_text
-from ripple_sim.viewer.session import OPERATORS
-from ripple_sim.viewer.window import Actions, check_display, display_problem
+from ripple_sim.viewer import CONTROLS, MOUSE, Window, check_display, display_problem, help_text
 
 CHECKS = Path(__file__).with_name("window_checks.py")
-
-
-@pytest.fixture
-def screen() -> Iterator[str]:
-    """Name of a display on a virtual screen."""
-    if shutil.which("Xvfb") is None:
-        pytest.skip("needs Xvfb (on Debian and Ubuntu: apt-get install xvfb)")
-    reading, writing = os.pipe()
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x600x24", "-nolisten", "tcp"],
-        pass_fds=[writing],
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(writing)
-    try:
-        assert select.select([reading], [], [], 20)[0], "Xvfb does not start"
-        yield f":{os.read(reading, 16).decode().strip()}"
-    finally:
-        os.close(reading)
-        server.terminate()
-        server.wait()
 
 
 def check(display: str | None, *options: str) -> None:
@@ -67,27 +45,12 @@ def test_on_a_screen(screen: str) -> None:
 
 
 def test_every_control_is_a_method_with_a_key_and_a_line_of_help() -> None:
-    assert len({control.key for control in CONTROLS}) == len(CONTROLS)
-    for control in CONTROLS:
-        assert callable(getattr(Actions, control.action))
+    assert len({key for key, *_ in CONTROLS}) == len(CONTROLS)
+    for _, action, _ in CONTROLS:
+        assert callable(getattr(Window, action))
     lines = help_text().splitlines()
     assert len(lines) == len(MOUSE) + len(CONTROLS)
-    assert all(f"{control.key}: {control.label}" in lines for control in CONTROLS)
-
-
-def test_operators_follow_one_another_round() -> None:
-    session = SimpleNamespace(operator=OPERATORS[0], paused=False)
-    session.set_operator = lambda name: setattr(session, "operator", name)
-    actions = Actions(SimpleNamespace(session=session, say=lambda message: None), SimpleNamespace())
-    chosen = []
-    for _ in range(len(OPERATORS) + 1):
-        chosen.append(session.operator)
-        actions.operator()
-    assert chosen == [*OPERATORS, OPERATORS[0]]
-    actions.pause()
-    assert session.paused
-    actions.pause()
-    assert not session.paused
+    assert all(f"{key}: {label}" in lines for key, _, label in CONTROLS)
 
 
 def test_without_a_display_the_alternatives_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,3 +61,96 @@ def test_without_a_display_the_alternatives_are_named(monkeypatch: pytest.Monkey
         check_display()
     monkeypatch.setattr("sys.platform", "darwin")
     check_display()
+
+
+@pytest.fixture(autouse=True)
+def no_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+
+
+def complaint(capsys: pytest.CaptureFixture[str], status: int, *argv: str) -> str:
+    assert cli.main(["view", *argv]) == status
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert re.fullmatch(r"ripple-sim: [^\n]+\n", err)
+    return err
+
+
+def test_the_help_lists_every_key_and_what_the_mouse_does(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["view", "--help"]) == 0
+    text = re.sub(r"[\s│]+", " ", capsys.readouterr().out)
+    for key, *_ in CONTROLS:
+        assert re.search(rf"\b{key.capitalize()}: ", text), key
+    for does in ("poke", "orbit", "pan", "zoom"):
+        assert does in text
+    assert "--benchmark" in text
+
+
+def test_a_display_without_a_server_is_named(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":4242")
+    assert "no X server at DISPLAY=:4242" in complaint(capsys, 1, "sphere")
+
+
+def test_a_missing_x11_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> None:
+        raise OSError(name)
+
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(ctypes, "CDLL", missing)
+    with pytest.raises(DisplayError, match=r"libX11.so.6 is missing .*apt-get install libx11-6"):
+        check_display()
+
+
+@pytest.mark.parametrize(
+    ("argv", "named"),
+    [
+        ([], "SCENE"),
+        (["sphere", "--size", "wide"], "'wide'"),
+        (["sphere", "--resolution", "0"], "--resolution.*'0'"),
+        (["sphere", "--bodies", "-1"], "--bodies"),
+        (["sphere", "--port", "http"], "--port.*'http'"),
+        (["sphere", "--web", "--size", "0x0"], "0x0; valid is 16 to 8192"),
+        (["sphere", "--benchmark", "--size", "999999x999999"], "999999x999999; valid is 16 to 8192"),
+    ],
+)
+def test_wrong_arguments_are_bad_input(capsys: pytest.CaptureFixture[str], argv: list[str], named: str) -> None:
+    assert re.search(named, complaint(capsys, 2, *argv))
+
+
+@pytest.mark.parametrize("mode", ["--web", "--benchmark"])
+def test_a_missing_scene_is_bad_input_and_named(capsys: pytest.CaptureFixture[str], mode: str) -> None:
+    if mode == "--web":
+        pytest.importorskip("trame_vtk")
+    line = complaint(capsys, 2, "no-such-scene", mode)
+    assert "no scene or mesh 'no-such-scene'" in line
+    assert "sphere" in line
+
+
+def test_an_invalid_mesh_is_bad_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+    assert "flat.obj" in complaint(capsys, 2, str(tmp_path / "flat.obj"), "--benchmark")
+
+
+def test_without_trame_the_extra_is_named(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    assert "pip install 'ripple-sim[web]'" in complaint(capsys, 1, "sphere", "--web")
+
+
+def test_a_port_in_use_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("trame_vtk")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        line = complaint(capsys, 1, "sphere", "--web", "--port", port)
+    assert port in line
+    assert "--port" in line
+
+
+def test_an_address_of_another_machine_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("trame_vtk")
+    line = complaint(capsys, 1, "sphere", "--web", "--host", "192.0.2.1")
+    assert "192.0.2.1" in line
+    assert "--host" in line

@@ -1,5 +1,5 @@
 "use strict";
-// The renderer's light (render/glsl/lights.glsl, render/passes/shading.glsl) with a single shadow map and without its occlusion maps.
+// The renderer's light (render/glsl/lights.glsl, render/passes/deferred.glsl) with a single shadow map and without its occlusion maps.
 // Loops are written out: in software an array at an index that changes takes longer than the sums.
 // With `lamps`: their number, `near`: whether any has a position, `taps`: of the shadow map, along each side, which has `shadowSize` texels.
 const lightShader = ({lamps, near, taps, shadowSize}) => `#version 300 es

@@ -67,12 +67,13 @@ void hold_uniforms()
 #define soft_box_tangent held_box_tangent
 #define soft_box_radiance held_box_radiance
 #define counts held_counts
+#endif
 
 // Lights and shadows by numbers that are known when a shader is compiled: others are read from the block.
 Light light_at(int i)
 {
     Light light = lights[i];
-#if !NEAR_LIGHTS
+#if HOLD_UNIFORMS && !NEAR_LIGHTS
     if (i < HELD_LIGHTS) {
         light.direction.xyz = held_light_direction[min(i, HELD_LIGHTS - 1)];
         light.radiance.rgb = held_light_radiance[min(i, HELD_LIGHTS - 1)];
@@ -84,22 +85,13 @@ Light light_at(int i)
 Shadow shadow_at(int i)
 {
     Shadow shadow = shadows[i];
+#if HOLD_UNIFORMS
     if (i == 0) {
         shadow.matrix = held_shadow_matrix;
         shadow.depth = held_shadow_depth;
         shadow.width.xyz = held_shadow_width;
         shadow.penumbra.xyz = held_shadow_penumbra;
     }
+#endif
     return shadow;
 }
-#else
-Light light_at(int i)
-{
-    return lights[i];
-}
-
-Shadow shadow_at(int i)
-{
-    return shadows[i];
-}
-#endif

@@ -1,6 +1,95 @@
-// Soft shadows: percentage-closer soft shadows (PCSS), and with TRANSMISSION those of what is transparent, in colour.
+// The shadow maps of the lights, and soft shadows in them: percentage-closer soft shadows (PCSS), and with TRANSMISSION those
+// of what is transparent, in colour. SHADOWS lights may cast shadows; their maps lie side by side.
+#include "glsl/held_uniforms.glsl"
 #include "glsl/sampling.glsl"
-#include "glsl/shadow_maps.glsl"
+
+layout(binding = SHADOW_MAPS_UNIT) uniform sampler2D shadow_maps;
+layout(binding = BLOCKERS_UNIT) uniform sampler2D blockers;  // see blockers.glsl
+
+// Texture coordinates of a point of one light's map.
+vec2 in_maps(int light, vec2 point)
+{
+#if SHADOWS > 1
+    float edge = 0.5 / shadow_at(light).width.z;  // keeps a neighbour's texels out
+    point.x = (clamp(point.x, edge, 1.0 - edge) + float(light)) / float(SHADOWS);
+#endif
+    return point;
+}
+
+// Radius of the penumbra, in the map, of a blocker on what lies behind it; both by their distance from the light [m].
+float penumbra_of(int light, float blocker, float behind)
+{
+    vec4 penumbra = shadow_at(light).penumbra, width = shadow_at(light).width;
+    float blur = penumbra.x + penumbra.y / max(blocker, 1e-6);
+    return min((behind - blocker) * blur / (width.x + width.y * behind), penumbra.z);
+}
+
+// Radius, in the map, of what may shade a point at a distance from the light [m]: a penumbra of the nearest blocker.
+float widest_penumbra(int light, float to_light)
+{
+    return penumbra_of(light, light_distance(shadow_at(light).depth, 0.0), to_light);
+}
+
+bool is_far(int light)
+{
+    return NEAR_LIGHTS == 0 || light_at(light).position.w == 0.0;
+}
+
+vec3 towards_light(int light, vec3 position)
+{
+    Light from = light_at(light);
+    return is_far(light) ? from.direction.xyz : normalize(from.position.xyz - position);
+}
+
+// A point of a surface, as a light sees it.
+struct Receiver {
+    vec3 place;             // in the light's map, and the depth there
+    vec2 slope;             // of the surface's depth along the map
+    float distance;         // from the light [m]
+    float width, texel;     // of the map and of one of its texels, at that distance [m]
+    float depth_bias;
+    bool inside;            // whether the map reaches as far
+    bool casts;             // whether the surface casts shadows itself
+};
+
+// The normal is that of the surface without ripples, `facing` its cosine to the light; `bias` as for `light_visibility`.
+Receiver receiver(int light, vec3 position, vec3 normal, float facing, float bias)
+{
+    Shadow shadow = shadow_at(light);
+    vec4 of_depth = shadow.depth, of_width = shadow.width;
+    float away = is_far(light) ? 0.0 : distance(light_at(light).position.xyz, position);
+    Receiver at;
+    at.casts = bias >= 0.0;
+    at.texel = (of_width.x + of_width.y * away) / of_width.z;
+    vec3 raised = position + (at.casts ? bias + (1.0 + 1.5 * (1.0 - facing)) * at.texel : 0.0) * normal;
+    vec4 clip = shadow.matrix * vec4(raised, 1.0);
+    at.place = clip.xyz / clip.w;
+    at.distance = light_distance(of_depth, at.place.z);
+    at.width = of_width.x + of_width.y * at.distance;
+    float stretch = of_depth.z * at.place.z + of_depth.w;
+    float metre = stretch * stretch / (of_depth.x * of_depth.w - of_depth.y * of_depth.z);
+    // receiver plane depth bias: with a wide filter the surface would shade itself
+    vec4 plane = shadow.planes * vec4(normal, -dot(normal, raised));
+    float steepest = 10.0 * at.width * metre;
+    vec2 slope = -plane.xy * (abs(plane.z) > 1e-9 ? 1.0 / plane.z : 1e9);
+    at.slope = clamp(slope, -steepest, steepest);
+    at.depth_bias = 0.5 * at.texel * metre;
+    bool in_map = clip.w > 0.0 && all(lessThan(abs(at.place - 0.5), vec3(0.5)));
+    at.inside = counts.w > float(light) && facing > -0.2 && in_map;
+    return at;
+}
+
+// Level of `blockers` whose texels are so wide a share of the map, or the finest.
+float blockers_level(float footprint)
+{
+    return log2(max(footprint * float(textureSize(blockers, 0).y), 1.0));
+}
+
+// Mean of what covers a map about a point, over so much of the map: see blockers.glsl.
+vec3 blockers_mean(int light, vec2 point, float footprint)
+{
+    return textureLod(blockers, in_maps(light, point), blockers_level(footprint)).rgb;
+}
 
 layout(binding = SHADOW_TEST_UNIT) uniform sampler2DShadow shadow_test;
 
@@ -21,13 +110,22 @@ const int FILTER_TAPS = 16;
 
 const vec2 BY_MEANS = vec2(0.4, 0.8);  // texels of `blockers` between those: from where on they are means
 
-// What covers the map about a point beside the receiver, over a footprint, by the point's place in the order of all.
+// What covers a map about a point and lies before a surface: a share of the map, and its distance from the light [m].
+struct Blockers { float share, distance; };
+
+// Of a point beside the receiver, over a footprint, by the point's place in the order of all. What covers the map is in part
+// the surface itself; the rest blocks: two distances with that mean and that variance (Yang et al., Variance Soft Shadow
+// Mapping, 2010).
 Blockers blockers_beside(int light, Receiver at, vec2 offset, float footprint, float order)
 {
     float behind = light_distance(shadow_at(light).depth, at.place.z + dot(at.slope, offset));
-    Blockers seen = blockers_about(light, at.place.xy + offset, point_level(footprint, order, at.casts), behind);
-    seen.share *= smoothstep(0.0, at.texel + 0.25 * footprint * at.width, seen.before);
-    return seen;
+    // whole levels cost half of those between, of which two are read: in place of them some points take the lower and some
+    // the higher. On the floor it would be seen.
+    float level = blockers_level(footprint);
+    vec3 mean = textureLod(blockers, in_maps(light, at.place.xy + offset), at.casts ? floor(level + order) : level).rgb;
+    float usual = mean.y / max(mean.x, 1e-4), variance = max(mean.z / max(mean.x, 1e-4) - usual * usual, 0.0);
+    float before = max(behind - usual, 1e-6), share = mean.x * before * before / (before * before + variance);
+    return Blockers(share * smoothstep(0.0, at.texel + 0.25 * footprint * at.width, before), usual - variance / before);
 }
 
 // The following take as many rounds of their loops as are needed in place of branches: software drivers execute both sides
@@ -136,10 +234,13 @@ vec2 transparent_blocker(vec4 taken)
 {
     return vec2(dot(taken.rgb, vec3(1.0 / 3.0)), taken.a);
 }
+#endif
 
 // Share of a light that passes all that is transparent on its way to a point; the rest as for `light_visibility`.
 vec3 transmitted(int light, vec3 position, vec3 normal, float scatter)
 {
+    vec3 taken = vec3(0.0);
+#if TRANSMISSION
     Shadow shadow = shadow_at(light);
     vec4 clip = shadow.matrix * vec4(position, 1.0);
     vec3 p = clip.xyz / clip.w;
@@ -149,7 +250,6 @@ vec3 transmitted(int light, vec3 position, vec3 normal, float scatter)
     bool inside = counts.w > float(light) && clip.w > 0.0 && all(lessThan(abs(p - 0.5), vec3(0.5)));
     vec2 found = transparent_blocker(taken_about(light, p.xy, 0.5 * widest_penumbra(light, to_light)));
     float penumbra = penumbra_of(light, min(found.y / max(found.x, 1e-4), to_light), to_light);
-    vec3 taken = vec3(0.0);
     float disc = penumbra * sqrt(1.0 - MEAN_WIDTH * MEAN_WIDTH);  // as in light_by_means
     vec2 direction = spiral_direction(counts.z);
     int taps = inside && found.x > 0.0 ? MEANS : 0;
@@ -165,14 +265,9 @@ vec3 transmitted(int light, vec3 position, vec3 normal, float scatter)
 #if OWN_POINTS
     in_narrow = in_narrow || penumbra < NARROW * scatter / width && any(greaterThan(taken, vec3(UNSEEN)));
 #endif
+#endif
     return 1.0 - taken;
 }
-#else
-vec3 transmitted(int light, vec3 position, vec3 normal, float scatter)
-{
-    return vec3(1.0);
-}
-#endif
 
 // Share of a light that arrives, through what is transparent and past all else; see `light_visibility`.
 vec3 light_arriving(int light, vec3 position, vec3 normal, float bias, float scatter, bvec2 block)

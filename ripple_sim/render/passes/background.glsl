@@ -27,7 +27,6 @@ const float STEEPEST = 0.03;  // change from one block to the next up to which t
 const float RIM = 0.5;         // blocks on either side of the floor's edges that are not smooth
 const float HIGHEST_LEVEL = 4.0;  // of the floor map
 const float BOUNCE_LEVEL = 2.3;   // where few points of the map's search are seen no longer
-const float OUTSIDE = 1e9;        // [m]
 const float LARGEST = 0.04;       // of the floor map's half width: larger blocks would miss shadows, but not the map
 
 // A skybox continues below the horizon, which the floor hides.

@@ -47,15 +47,6 @@ uniform vec3 transmission;  // share of the light that passes, where it meets a 
 #if MOVED
 const float FOCUS = 3.0;       // of light that meets it head on, on the floor by its foot
 const float BRIGHTEST = 0.95;  // mean of the colours; less than 1, so that the map holds the distance as well
-
-// Cosine of the angle at which light meets the surface.
-float facing()
-{
-    vec4 place = lights[light].position;
-    vec3 towards = place.w == 0.0 ? lights[light].direction.xyz : normalize(place.xyz - world);
-    vec3 normal = cross(dFdx(world), dFdy(world));
-    return abs(dot(towards, normal)) / max(length(normal), 1e-30);
-}
 #endif
 
 out vec4 fragment;
@@ -64,7 +55,10 @@ void main()
 {
     vec3 passes = transmission;
 #if MOVED
-    float cosine = facing(), aside = 1.0 - cosine;
+    vec4 place = lights[light].position;
+    vec3 towards = place.w == 0.0 ? lights[light].direction.xyz : normalize(place.xyz - world);
+    vec3 normal = cross(dFdx(world), dFdy(world));
+    float cosine = abs(dot(towards, normal)) / max(length(normal), 1e-30), aside = 1.0 - cosine;
 #if SOLID
     // a round body is a lens: its shadow is dark towards the rim and has a focus in the middle (caustics)
     passes *= FOCUS * pow(cosine, 10.0);

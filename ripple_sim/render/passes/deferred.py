@@ -35,7 +35,6 @@ class Background:
 
     Parameters
     ----------
-    resources : Resources
     size : (width, height)
         Of the frame [pixels].
     options : mapping
@@ -94,9 +93,7 @@ class CoarseBackground:
         self, resources: Resources, size: tuple[int, int], options: Mapping[str, int], floor: Floor | None
     ) -> None:
         blocks = -(-size[0] // _PIXELS), -(-size[1] // _PIXELS)
-        self._texture = resources.texture(blocks, 4, dtype="f2")
-        self._texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        self._texture.repeat_x = self._texture.repeat_y = False
+        self._texture = resources.clamped_texture(blocks, 4, dtype="f2")
         self._framebuffer = resources.framebuffer([self._texture], resources.depth_renderbuffer(blocks))
         self._blocks = Background(resources, size, options, floor, _PIXELS)
         edge = _PIXELS * _BLOCKS
@@ -173,8 +170,6 @@ class DeferredShading:
 
     Parameters
     ----------
-    resources : Resources
-    frame_format : FrameFormat
     floor : Floor, optional
     light_options : mapping
         SKYBOX, NEAR_LIGHTS and TRANSMISSION (of transparent objects), 0 or 1: whether there are any; LIGHTS: how many
@@ -197,8 +192,14 @@ class DeferredShading:
     def __init__(
         self, resources: Resources, frame_format: FrameFormat, floor: Floor | None, light_options: Mapping[str, int]
     ) -> None:
-        size = frame_format.size
-        _check_size(resources, size)
+        size = width, height = frame_format.size
+        with resources.gl as ctx:
+            limit = int(ctx.info["GL_MAX_RENDERBUFFER_SIZE"])
+        if not (1 <= width <= limit and 1 <= height <= limit):
+            raise RippleError(
+                f"frame size is {width}x{height} pixels; valid with this driver are 1 to {limit} along each side: "
+                "choose a size within that"
+            )
         self.g_buffer = GBuffer(resources, size, frame_format.samples)
         self.frame: moderngl.Framebuffer = resources.framebuffer(
             [resources.renderbuffer(size, 4, dtype=frame_format.dtype)], resources.depth_renderbuffer(size)
@@ -208,7 +209,7 @@ class DeferredShading:
             "LINEAR": int(frame_format.linear),
             "SAMPLES": self.g_buffer.samples,
             "CUT_OUT": int(frame_format.alpha),
-            "TILED": int(floor is not None and floor.tiled),
+            "TILED": int(floor is not None and floor.tiled and not frame_format.alpha),
             "MIRROR": int(floor is not None and floor.reflects and not frame_format.alpha),
         }
         smooth = not any(options[name] for name in ("CUT_OUT", "TILED", "MIRROR", "SKYBOX"))
@@ -238,7 +239,6 @@ class DeferredShading:
 
         Parameters
         ----------
-        ctx : moderngl.Context
         boxes : int64 [k, 4]
             Where solids may show; see `boxes_of`.
         """
@@ -252,19 +252,15 @@ class DeferredShading:
         self.frame.use()
         ctx.enable_only(moderngl.DEPTH_TEST)
         ctx.depth_func = "1"
-        self._classify_tiles(boxes)
+        tiles = touched_tiles(boxes, self.frame.size)
+        if len(tiles):
+            self._corners.write((tiles * self._extent - 1.0).astype("f4").tobytes())
+            self._classify.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
         self._background.draw(ctx, self.frame)
         self.frame.depth_mask = False
         self._shade_solids(ctx, scissor_of(boxes))
         self.frame.depth_mask = True
         ctx.depth_func = "<="
-
-    def _classify_tiles(self, boxes: NDArray[np.int64]) -> None:
-        """Mark pixels by what their samples show, in the tiles that any of some boxes [k, 4] touches."""
-        tiles = touched_tiles(boxes, self.frame.size)
-        if len(tiles):
-            self._corners.write((tiles * self._extent - 1.0).astype("f4").tobytes())
-            self._classify.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(tiles))
 
     def _shade_solids(self, ctx: moderngl.Context, scissor: tuple[int, int, int, int] | None) -> None:
         """Shade pixels with solids, over the background."""
@@ -279,24 +275,11 @@ class DeferredShading:
         self.frame.scissor = (0, 0, *self.frame.size)
 
 
-def _check_size(resources: Resources, size: tuple[int, int]) -> None:
-    width, height = size
-    with resources.gl as ctx:
-        limit = int(ctx.info["GL_MAX_RENDERBUFFER_SIZE"])
-    if not (1 <= width <= limit and 1 <= height <= limit):
-        raise RippleError(
-            f"frame size is {width}x{height} pixels; valid with this driver are 1 to {limit} along each side: choose a "
-            "size within that"
-        )
-
-
 class TransparentLayers:
     """Adds layers to a frame, which has been shaded, and whose G-buffer still holds what is opaque.
 
     Parameters
     ----------
-    resources : Resources
-    frame_format : FrameFormat
     shading : DeferredShading
         Of the frame.
     """
@@ -305,9 +288,7 @@ class TransparentLayers:
         size = frame_format.size
         self._g_buffer, self._frame = shading.g_buffer, cast(Any, shading.frame)  # its scissor may be None
         kind = {"dtype": "f2"} if frame_format.linear else {"internal_format": SRGB8_ALPHA8}
-        self._behind = resources.texture(size, 4, **kind)
-        self._behind.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-        self._behind.repeat_x = self._behind.repeat_y = False
+        self._behind = resources.clamped_texture(size, 4, mipmaps=True, **kind)
         self._behind_framebuffer = resources.framebuffer([self._behind])
         self._classify = FramePass(resources, "passes/classify", size, **shading.options, LAYER=1)
         self._shade = FramePass(resources, "passes/deferred", size, **shading.options, LAYER=1)
@@ -317,7 +298,6 @@ class TransparentLayers:
 
         Parameters
         ----------
-        ctx : moderngl.Context
         number : int
             In the table of objects.
         draw : callable
@@ -356,10 +336,8 @@ class Mirror:
 
     Parameters
     ----------
-    resources : Resources
     frame_format : FrameFormat
         Of the frame.
-    floor : Floor
     light_options : mapping
         As for `DeferredShading`.
     """
@@ -373,8 +351,7 @@ class Mirror:
         self._size = half.size
         self._frame = FrameUniforms(resources)
         self._shading = DeferredShading(resources, half, None, light_options)
-        self._image = resources.texture(half.size, 4, dtype=half.dtype)
-        self._image.repeat_x = self._image.repeat_y = False
+        self._image = resources.clamped_texture(half.size, 4, dtype=half.dtype)
         self._framebuffer = resources.framebuffer([self._image])
 
     def draw(
@@ -390,8 +367,6 @@ class Mirror:
 
         Parameters
         ----------
-        ctx : moderngl.Context
-        frame : FrameUniforms
         pose : Pose
             Of the camera above the floor.
         balls : float64 [k, 4]

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.camera import orthographic
-from ripple_sim.render.contract import MappingKind, Unit, srgb_to_linear
+from ripple_sim.render.contract import MappingKind, Unit
 from ripple_sim.render.resources import FrameUniforms, Resources
+from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.render.visuals.lights import Light
 from ripple_sim.render.visuals.objects import Assets
 from ripple_sim.render.visuals.texture_mapping import mapping_of
@@ -40,7 +41,6 @@ class Floor:
 
     Parameters
     ----------
-    assets : Assets
     geom : int
         The plane.
 
@@ -52,6 +52,8 @@ class Floor:
         Whether it has a texture, with `tiling` (scale and offset) and `tint` (linear).
     reflectance : float
         0 to 1.
+    shown : bool
+        Whether it is there, as it is at first.
     origin, rotation : float64 [3] and [3, 3]
         As placed last; the rotation's columns are the floor's axes and its normal.
     centre, half_width : float64 [3], float
@@ -71,6 +73,7 @@ class Floor:
         self.reflectance = 0.0 if visual.material < 0 else float(model.mat_reflectance[visual.material])
         half = np.asarray(model.geom_size[geom][:2], dtype=np.float64)
         self._half = np.where(half > 0, half, _ENDLESS)
+        self.shown = True
 
     @property
     def reflects(self) -> bool:
@@ -87,7 +90,7 @@ class Floor:
         self.rotation = rotation = data.geom_xmat[self.geom].reshape(3, 3)
         self.origin = np.array(data.geom_xpos[self.geom])
         self.centre, self.half_width = local, half_width = rotation.T @ (centre - self.origin), 1.8 * radius
-        frame.set_vector("floor_origin", self.origin, 1.0)
+        frame.set_vector("floor_origin", self.origin, float(self.shown))
         frame.set_vector("floor_u", rotation[:, 0], self._half[0])
         frame.set_vector("floor_v", rotation[:, 1], self._half[1])
         frame.set_vector("floor_normal", rotation[:, 2])
@@ -131,7 +134,6 @@ class FloorOcclusion:
 
     Parameters
     ----------
-    resources : Resources
     options : mapping
         Defines of the light as for `DeferredShading`.
     floor : Floor, optional
@@ -147,17 +149,13 @@ class FloorOcclusion:
         program = resources.program("passes/floor_occlusion", **options, TILES=0)
         self._pass = resources.vertex_array(program, [])
         ceiling = _CEILING_SIZE, _CEILING_SIZE
-        self._ceiling = resources.texture(ceiling, 4, dtype="nu2")
+        self._ceiling = resources.clamped_texture(ceiling, 4, dtype="nu2")
         self._ceiling.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._ceiling_framebuffer = resources.framebuffer([self._ceiling], resources.depth_renderbuffer(ceiling))
         self._map, self._bounce, self._seen = maps = [
-            resources.texture((_MAP_SIZE, _MAP_SIZE), components, dtype=dtype)
+            resources.clamped_texture((_MAP_SIZE, _MAP_SIZE), components, mipmaps=True, dtype=dtype)
             for components, dtype in ((2, "f2"), (4, "f2"), (4, "f1"))
         ]
-        for texture in maps:
-            texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-        for texture in (self._ceiling, *maps):
-            texture.repeat_x = texture.repeat_y = False
         self._map_framebuffer = resources.framebuffer(maps)
 
     def look_up(self, ctx: moderngl.Context, draw_albedo: Callable[[tuple[float, ...]], None]) -> None:

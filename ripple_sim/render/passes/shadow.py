@@ -28,7 +28,6 @@ class ShadowMaps:
 
     Parameters
     ----------
-    resources : Resources
     count : int
         How many lights may cast shadows, 1 to MAX_SHADOWS.
     height : int
@@ -57,11 +56,8 @@ class ShadowMaps:
             repeat_x=False,
             repeat_y=False,
         )
-        self._blockers = resources.texture(
-            (count * size // _TEXELS_PER_BLOCKER, size // _TEXELS_PER_BLOCKER), 4, dtype="f4"
-        )
-        self._blockers.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-        self._blockers.repeat_x = self._blockers.repeat_y = False
+        blockers = count * size // _TEXELS_PER_BLOCKER, size // _TEXELS_PER_BLOCKER
+        self._blockers = resources.clamped_texture(blockers, 4, mipmaps=True, dtype="f4")
         self._blockers_target = resources.framebuffer([self._blockers])
         program = resources.program("passes/blockers", SHADOWS=count)
         self._find_blockers = resources.vertex_array(program, [])
@@ -165,7 +161,6 @@ class TransmissionMaps:
 
     Parameters
     ----------
-    resources : Resources
     count : int
         How many lights may cast shadows, 1 to MAX_SHADOWS.
     size : int
@@ -174,9 +169,7 @@ class TransmissionMaps:
 
     def __init__(self, resources: Resources, count: int, size: int) -> None:
         self._size = size
-        self._maps = resources.texture((count * size, size), 4, dtype="f2")
-        self._maps.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-        self._maps.repeat_x = self._maps.repeat_y = False
+        self._maps = resources.clamped_texture((count * size, size), 4, mipmaps=True, dtype="f2")
         self._target = resources.framebuffer([self._maps], resources.depth_renderbuffer((count * size, size)))
 
     def draw(self, views: Sequence[Matrix], draw: Callable[[Matrix, int], None]) -> None:

@@ -6,11 +6,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import moderngl
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.resources import Resources
 from ripple_sim.render.targets import FramePass, GBuffer
+from ripple_sim.render.visuals.objects import ObjectTable
 
 
 class SurfaceImage(NamedTuple):
@@ -22,6 +24,8 @@ class SurfaceImage(NamedTuple):
         Distance along the camera's axis [m]; 0 where nothing is.
     geom : int32 [height, width]
         Geom id, that of the nearest geom of the body for a site; -1 where nothing is.
+    identity : int32 [height, width, 2]
+        Id and type, of `mujoco.mjtObj`, of what is seen; -1 where nothing is.
     normal, smooth_normal : float32 [height, width, 3]
         In the world, with ripples and without, of an open surface's outer side in the latter case.
     place : float32 [height, width, 2]
@@ -34,6 +38,7 @@ class SurfaceImage(NamedTuple):
 
     depth: NDArray[np.float32]
     geom: NDArray[np.int32]
+    identity: NDArray[np.int32]
     normal: NDArray[np.float32]
     smooth_normal: NDArray[np.float32]
     place: NDArray[np.float32]
@@ -46,23 +51,24 @@ class SurfaceBuffers:
 
     Parameters
     ----------
-    resources : Resources
     size : (width, height)
         [pixels].
-    floor_geom : int
-        Geom id of the floor, -1 without.
     """
 
-    def __init__(self, resources: Resources, size: tuple[int, int], floor_geom: int) -> None:
+    def __init__(self, resources: Resources, size: tuple[int, int]) -> None:
         self.size = size
         self._g_buffer = GBuffer(resources, size, 1)
         self._images = [resources.texture(size, 4, dtype="f4") for _ in range(3)]
         self._framebuffer = resources.framebuffer(self._images, resources.depth_renderbuffer(size))
         self._resolve = FramePass(resources, "passes/surface_buffers", size, SAMPLES=1)
-        self._resolve.program["floor_geom"] = float(floor_geom)
 
-    def draw(self, ctx: moderngl.Context, draw: Callable[[], None]) -> SurfaceImage:
-        """Draw what `draw` draws into the G-buffer; the frame's uniforms, objects and height maps are bound already."""
+    def draw(
+        self, ctx: moderngl.Context, draw: Callable[[], None], objects: ObjectTable, floor_geom: int
+    ) -> SurfaceImage:
+        """Draw what `draw` draws into the G-buffer; the frame's uniforms, objects and height maps are bound already.
+
+        `floor_geom` is the geom id of the floor, -1 without.
+        """
         ctx.depth_func = "<="
         self._g_buffer.use(ctx)
         self._g_buffer.clear()
@@ -76,9 +82,12 @@ class SurfaceBuffers:
         shown, smooth, rippling = (
             np.frombuffer(image.read(), np.float32).reshape(height, width, 4)[::-1] for image in self._images
         )
+        number = np.rint(smooth[..., 3]).astype(np.int32)  # with nothing at 0 and the floor at the end
+        floor = floor_geom, int(mujoco.mjtObj.mjOBJ_GEOM)
         return SurfaceImage(
             depth=shown[..., 3],
-            geom=np.rint(smooth[..., 3]).astype(np.int32) - 1,
+            geom=np.array([-1, *objects.geoms, floor_geom], dtype=np.int32)[number],
+            identity=np.array([(-1, -1), *objects.identities, floor], dtype=np.int32)[number],
             normal=shown[..., :3],
             smooth_normal=smooth[..., :3],
             place=rippling[..., :2],

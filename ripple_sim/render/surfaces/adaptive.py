@@ -70,8 +70,6 @@ class AdaptiveTessellation:
 
     Parameters
     ----------
-    vertices : SurfaceVertices
-    page : ChartPage
     tolerance : float
         How far the height at a midpoint may differ from the mean of those at the ends [m].
     min_length : float
@@ -97,7 +95,7 @@ class AdaptiveTessellation:
     def __init__(self, vertices: SurfaceVertices, page: ChartPage, tolerance: float, min_length: float) -> None:
         edges, positions = vertices.edges, vertices.attributes[:, POSITION]
         self.base_count = len(positions) - len(edges.ends)
-        self.faces, self.sides = np.asarray(vertices.F, np.int32), np.asarray(edges.of_side, np.int32)
+        self.faces, self.sides = np.asarray(vertices.F, np.int32), np.asarray(edges.of, np.int32)
         self.length = np.linalg.norm(positions[edges.ends[:, 1]] - positions[edges.ends[:, 0]], axis=1)
         self.tolerance = np.float32(tolerance)
         # heights are looked up at the ends of the edges that may be split, and then at these edges' midpoints
@@ -178,9 +176,6 @@ class DeviceTessellation:
 
     Parameters
     ----------
-    resources : Resources
-    adaptive : AdaptiveTessellation
-    page : ChartPage
     layer : int
         Of the height map.
     indices : moderngl.Buffer

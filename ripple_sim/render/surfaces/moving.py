@@ -1,8 +1,7 @@
-"""A tessellated surface whose own vertices move: its points and normals, ambient occlusion, and height map."""
+"""A tessellated surface whose own vertices move: its points and normals, and its ambient occlusion."""
 
 from __future__ import annotations
 
-import functools
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -10,13 +9,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ripple_sim.render.visuals.corners import bounding_radius, cast, frames_about, smooth_normals
-from ripple_sim.solver import Atlas
+from ripple_sim.solver import Mesh
 from ripple_sim.solver.kernel import Floats, Floats32, Ints, kernel
 from ripple_sim.solver.mesh.closest import closest_points, triangle_tree
 from ripple_sim.solver.texels.chart_map import barycentrics_in
-from ripple_sim.solver.waves.motion import MovedGradients
 
-from .vertices import coarse_mesh
+from .tessellation import coarse_mesh
 
 # where points are [m], directions of displacement, and normals, float32 [n, 3] each
 Moved: TypeAlias = tuple[Floats32, Floats32, Floats32]
@@ -189,7 +187,7 @@ class MovingOcclusion:
 
     def __init__(self, V: NDArray, F: NDArray, points: NDArray, directions: NDArray, baked: NDArray) -> None:
         count, normals = min(_SAMPLES, len(V)), smooth_normals(V, F)
-        spacing = float(np.sqrt(_area(V, F) / count))
+        spacing = float(np.sqrt(Mesh(V, F).area / count))
         apart = 2 * spacing * normals  # so that the two sides of a thin body are far from each other
         vertices, coarse = coarse_mesh(F, np.hstack([V, apart]), count)
         near = np.hstack([V, apart])[vertices], np.hstack([points, 2 * spacing * directions])
@@ -219,42 +217,9 @@ class MovingOcclusion:
         return cast(V, self._F, frames_about(normals, directions), self._count, self._radius, self._start)
 
 
-def _area(V: NDArray, F: NDArray) -> float:
-    return float(np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1).sum() / 2)
-
-
 def _nearest(samples: NDArray, points: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """The samples nearest to each point, [n, k], and weights, of which that of the farthest is 0: no point jumps."""
     distance, near = cKDTree(samples).query(points, min(_NEAR + 1, len(samples)))
     reach = np.maximum(distance[:, -1:], 1e-300)
     weights = (1 - distance / reach) ** 2 + 1e-12
     return near, weights / weights.sum(axis=1, keepdims=True)
-
-
-class MovingSurface:
-    """Takes points, normals and height maps along; what that takes is made when the surface first moves.
-
-    Parameters
-    ----------
-    atlas : Atlas
-        At rest.
-    points, directions, normals : [n, 3]
-        Of the tessellated surface at rest; see `MovingVertices`.
-    """
-
-    def __init__(self, atlas: Atlas, points: NDArray, directions: NDArray, normals: NDArray) -> None:
-        self._atlas, self._rest = atlas, (points, directions, normals)
-
-    @functools.cached_property
-    def vertices(self) -> MovingVertices:
-        """How the points hang on the mesh."""
-        mesh = self._atlas.mesh
-        return MovingVertices(mesh.V, mesh.F, *self._rest)
-
-    @functools.cached_property
-    def _gradients(self) -> MovedGradients:
-        return MovedGradients(self._atlas)
-
-    def __call__(self, height_map: NDArray[np.float32], V: NDArray[np.float64]) -> tuple[NDArray[np.float32], Moved]:
-        """The height map and the points where the vertices of the mesh are at V [vertex_count, 3] [m]."""
-        return self._gradients(height_map, V), self.vertices(V)

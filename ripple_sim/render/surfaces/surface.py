@@ -13,13 +13,15 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.contract import MappingKind, Unit, srgb_to_linear
+from ripple_sim.render.contract import MappingKind, Unit
 from ripple_sim.render.resources import Resources, srgb_texture, write_page
-from ripple_sim.render.visuals.texture_mapping import Mapping, mapping_of
+from ripple_sim.render.tone_mapping import srgb_to_linear
+from ripple_sim.render.visuals.texture_mapping import TextureMapping, mapping_of
 from ripple_sim.render.visuals.visual import MODEL_LOOK, Look, find_look, geom_visual, look_of
 from ripple_sim.solver import Atlas
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.files import read_image
+from ripple_sim.solver.mesh.topology import undirected
 from ripple_sim.solver.texels.chart_map import ChartMap
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 
@@ -51,12 +53,6 @@ class Charts(NamedTuple):
         """All of them on one page."""
         return ChartPage(self.shape[0], self.shape[1])
 
-    @property
-    def halo_shape(self) -> tuple[int, int, int]:
-        """Shape (C, n + 2, n + 2) of a field with halo."""
-        count, n, _ = self.shape
-        return count, n + 2, n + 2
-
 
 def split_at_charts(
     mesh: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]],
@@ -73,7 +69,6 @@ def split_at_charts(
     ----------
     mesh : (F, attributes, same)
         See `tessellate`.
-    charts : Charts
     position, normal, coordinates : slice
         Columns of the attributes: what cut points share where they are one, unit normals, map coordinates.
 
@@ -138,7 +133,6 @@ class HeatmapTexture:
 
     Parameters
     ----------
-    resources : Resources
     page : ChartPage
         Of the target's charts.
     colors : array of uint8, shape [k, 3]
@@ -219,28 +213,32 @@ class Surface:
     @property
     def open(self) -> bool:
         """Whether it has a rim."""
-        F = np.asarray(self.F, dtype=np.int64)
-        ends = np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        edges = ends[:, 0] * (ends.max(initial=0) + 1) + ends[:, 1]  # one number an edge sorts ten times as fast as two
+        edges, _ = undirected(np.asarray(self.F, dtype=np.int64))
         return bool((np.unique(edges, return_counts=True)[1] == 1).any())
 
 
-def appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[np.float64], Mapping]:
+def appearance(model: Any, geom: int, surface: Surface) -> tuple[Look, NDArray[np.float64], TextureMapping]:
     """Look, linear colour under the texture, and how the texture lies on the surface."""
-    plain, visual = Mapping(), geom_visual(model, geom)
     if surface.heatmap_colors is not None:
-        return UNDER_HEATMAP, np.ones(3), plain
-    look, mapping = find_look(surface.look), mapping_of(model, visual)
-    if mapping.own and surface.uv is None:
-        mapping = plain
-    if surface.look == MODEL_LOOK:
-        rgb = visual.color if surface.color is None else srgb_to_linear(surface.color)
-        return look_of(model, visual), rgb, mapping
-    if surface.image is not None and surface.uv is not None:
-        return look, np.ones(3), Mapping(MappingKind.FLAT_IMAGE, own=True)
-    if surface.color is None and mapping.kind != MappingKind.NO_IMAGE:
-        return look, visual.color, mapping
-    return look, srgb_to_linear(target_color(model, geom, surface.look, surface.color)), plain
+        return UNDER_HEATMAP, np.ones(3), TextureMapping()
+    if surface.image is not None and surface.uv is not None and surface.look != MODEL_LOOK:
+        return find_look(surface.look), np.ones(3), TextureMapping(MappingKind.FLAT_IMAGE, own=True)
+    return painted(model, geom, surface.look, surface.color, surface.uv is not None)
+
+
+def painted(
+    model: Any, geom: int, look: str, color: tuple[float, float, float] | None, has_uv: bool
+) -> tuple[Look, NDArray[np.float64], TextureMapping]:
+    """The same for a target of a look, with an sRGB colour if it is given one, and texture coordinates or none."""
+    visual, found = geom_visual(model, geom), find_look(look)
+    mapping = mapping_of(model, visual)
+    if mapping.own and not has_uv:
+        mapping = TextureMapping()
+    if look == MODEL_LOOK:
+        return look_of(model, visual), visual.color if color is None else srgb_to_linear(color), mapping
+    if color is None and mapping.kind != MappingKind.NO_IMAGE:
+        return found, visual.color, mapping
+    return found, srgb_to_linear(target_color(model, geom, look, color)), TextureMapping()
 
 
 def target_color(model: Any, geom: int, look: str, given: tuple[float, float, float] | None) -> NDArray[np.float64]:

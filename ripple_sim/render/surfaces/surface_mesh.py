@@ -13,6 +13,7 @@ from ripple_sim.render.camera import balls_about
 from ripple_sim.render.contract import VERTEX_GROUP, Binding, MappingKind
 from ripple_sim.render.resources import AnyHeightMap, HeightMapTextures, MovedHeightMap, Resources
 from ripple_sim.render.visuals.objects import Assets, Occluders
+from ripple_sim.render.visuals.visual import geom_visual
 from ripple_sim.solver.errors import RippleError
 
 from .adaptive import AdaptiveTessellation, DeviceTessellation
@@ -26,8 +27,6 @@ class Displacement:
 
     Parameters
     ----------
-    resources : Resources
-    vertices : SurfaceVertices
     layer : int
         Of its height map.
 
@@ -67,7 +66,6 @@ class Displacement:
 
         Parameters
         ----------
-        ctx : moderngl.Context
         rotation, origin : float64 [3, 3], [3]
             Of the target in the world [m].
         occluders : int
@@ -108,10 +106,8 @@ class SurfaceMesh:
 
     Parameters
     ----------
-    assets : Assets
     geom : int
         The target's geom.
-    surface : Surface
     height_maps : HeightMapTextures
         Of all targets.
     index : int
@@ -123,8 +119,9 @@ class SurfaceMesh:
     ----------
     numbers : list of int
         Its one number in the table of objects.
-    transparent, occludes : bool
-        Whether the scene behind shows through; whether it hides the sky from what is below, as every target does.
+    transparent, occludes, casts : bool
+        Whether the scene behind shows through; whether it hides the sky from what is below, and casts shadows, as every
+        target does.
     """
 
     def __init__(
@@ -139,15 +136,18 @@ class SurfaceMesh:
         resources, page = assets.resources, surface.charts.page
         self.geom, self._open, self._gl, self._resources = geom, surface.open, resources.gl, resources
         self._objects, self._height_maps, self._layer = assets.objects, height_maps, index
-        self._page, self._shape = page, (*surface.charts.halo_shape, 4)
+        self._page, self._shape = page, (page.charts, page.block, page.block, 4)
         self._middle = np.zeros(3)  # of what is soft its own, of a geom that of its frame
         if is_soft(assets.model, geom):
             self._middle = (surface.V.min(axis=0) + surface.V.max(axis=0)) / 2
         self._radius = self._reach = float(np.linalg.norm(surface.V - self._middle, axis=1).max())
         look, rgb, mapping = appearance(assets.model, geom, surface)
-        self.transparent, self.occludes = look.transparency > 0.0, True
+        self.transparent, self.occludes, self.casts = look.transparency > 0.0, True, True
         heatmap = surface.heatmap_colors is not None
-        number = assets.objects.add(look, geom, size=self._radius, heatmap=heatmap, height_map=index, chart=page.block)
+        identity = geom_visual(assets.model, geom).identity
+        number = assets.objects.add(
+            look, geom, identity=identity, size=self._radius, heatmap=heatmap, height_map=index, chart=page.block
+        )
         self.numbers, self._color = [number], (*rgb, float(number))
         pixel = 2 * self._radius / size[1]
         self._vertices = vertices = surface_vertices(surface, pixel * _PIXELS, size[0] * size[1] // _PIXELS_PER_FACE)

@@ -1,7 +1,7 @@
 """The triangles and vertices that a target is drawn with: small, round in outline, split at creases and seams.
 
 `surface_vertices` makes them of a `Surface`: its mesh is cut into the parts of its chart map, tessellated, cut where
-its triangles leave a chart, and ordered for vertex caches. `coarse_mesh` has few of the vertices, spread evenly.
+its triangles leave a chart, and ordered for vertex caches.
 """
 
 from __future__ import annotations
@@ -13,64 +13,14 @@ from numpy.typing import NDArray
 
 from ripple_sim.render.camera import balls_about
 from ripple_sim.render.visuals.corners import bake, corner_normals, normalized, smooth_normals, split_corners
-from ripple_sim.render.visuals.texture_mapping import Mapping
+from ripple_sim.render.visuals.texture_mapping import TextureMapping
 from ripple_sim.solver import Mesh
 from ripple_sim.solver.cache import Kept, content_key
+from ripple_sim.solver.mesh.topology import Edges, edges_of
 from ripple_sim.solver.texels.chart_map import ChartMap, PartsMesh, parts_mesh
 
 from .surface import Charts, Surface, shared_places, split_at_charts
-from .tessellation import Edges, bulges, edges_of, midpoints, tessellate
-
-
-def coarse_mesh(
-    F: NDArray[np.int64], features: NDArray[np.float64], count: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Merge every vertex with the nearest of `count` that are far from one another (Rossignac and Borrel 1993).
-
-    Parameters
-    ----------
-    F : int64 [m, 3]
-    features : float64 [n, d]
-        Of the vertices; near is what is near in them.
-    count : int
-
-    Returns
-    -------
-    vertices : int64 [k]
-        Those that are left.
-    F : int64 [m, 3]
-        Triangles between them.
-    """
-    if len(features) <= count:
-        return np.arange(len(features)), np.asarray(F)
-    chosen, owner = _spread(features, count)
-    merged = owner[F]
-    merged = merged[(merged != np.roll(merged, 1, axis=1)).all(axis=1)]
-    # each begins with its least vertex, so that the same triangle is the same row
-    first = merged.argmin(axis=1)[:, None]
-    return chosen, np.unique(np.take_along_axis(merged, (first + np.arange(3)) % 3, axis=1), axis=0)
-
-
-def _spread(features: NDArray[np.float64], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows [count], each the farthest from those before, and the number among them of the nearest to every row [n].
-
-    In plain numpy, column by column: it takes twice the time of a compiled loop, and less than to compile that.
-    """
-    columns = np.ascontiguousarray(features.T)
-    chosen, owner = np.zeros(count, np.int64), np.zeros(len(features), np.int64)
-    square = np.full(len(features), np.inf)
-    latest = 0
-    for k in range(count):
-        chosen[k] = latest
-        distance = np.zeros(len(features))
-        for column in columns:
-            distance += np.square(column - column[latest])
-        nearer = distance < square
-        np.copyto(square, distance, where=nearer)
-        owner[nearer] = k
-        latest = int(square.argmax())
-    return chosen, owner
-
+from .tessellation import bulges, coarse_mesh, midpoints, tessellate, welded
 
 _ALIKE = 1e-4  # normals at a vertex that differ by less are one
 
@@ -94,10 +44,11 @@ def rounded_parts(mesh: Mesh, chart_map: ChartMap) -> tuple[PartsMesh, NDArray[n
 
 def _bulges_of_sides(mesh: Mesh) -> NDArray[np.float64]:
     """How far the midpoint of each triangle's side from corner k to k + 1 bulges out [m], [m, 3, 3]."""
-    split = split_corners(mesh.V, mesh.F)
-    attributes = np.concatenate([mesh.V[split.vertices], split.normals], axis=1)
-    edges = edges_of(split.F, np.arange(len(attributes)))
-    return bulges(edges, attributes, slice(0, 3), slice(3, 6))[edges.of_side]
+    vertices, F, normals, _, _ = split_corners(mesh.V, mesh.F)
+    attributes = np.concatenate([mesh.V[vertices], normals], axis=1)
+    edges = edges_of(F)
+    _, inner = welded(edges, F, np.arange(len(attributes)))
+    return bulges(edges.ends, inner, attributes, slice(0, 3), slice(3, 6))[edges.of]
 
 
 def _unified(F: NDArray[np.int64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -110,22 +61,35 @@ def _unified(F: NDArray[np.int64], normals: NDArray[np.float64]) -> NDArray[np.f
 _BITS = 10  # of a coordinate
 
 
-def memory_order(F: NDArray[np.int64], points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles along a Morton curve, and the order of the vertices in which they use them.
+def memory_order(
+    F: NDArray[np.int64], points: NDArray
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles along a Morton (Z-order) curve through their centres, and vertices in the order of their first use.
 
-    Neighbours are then close in memory, for the vertex caches of GPUs and software drivers. The triangles [m, 3] have
-    the vertices' new numbers; `points` [n, 3] are their positions.
+    Neighbours are then close in memory, for the vertex caches of GPUs and software drivers.
+
+    Parameters
+    ----------
+    F : int64, shape [m, 3]
+    points : float, shape [n, 3]
+
+    Returns
+    -------
+    renumbered : int64 [m, 3]
+        The triangles in their new order, of new vertices.
+    vertices : int64 [n]
+        The old numbers of the vertices, in their new order; unused ones come last.
+    triangles : int64 [m]
+        Likewise those of the triangles.
     """
-    F = F[morton_order(points[F].mean(axis=1))]
-    used, first = np.unique(F, return_index=True)
-    vertices = used[np.argsort(first)]
-    number = np.empty(len(points), dtype=np.int64)
-    number[vertices] = np.arange(len(vertices))
-    return number[F], vertices
+    triangles = morton_order(points[F].mean(axis=1))
+    used, first = np.unique(F[triangles], return_index=True)
+    vertices = np.concatenate([used[np.argsort(first)], np.setdiff1d(np.arange(len(points)), used)])
+    return np.argsort(vertices)[F[triangles]], vertices, triangles
 
 
-def morton_order(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Order of points [k, 3] along a Morton (Z-order) curve."""
+def morton_order(points: NDArray) -> NDArray[np.int64]:
+    """Order of points [k, 3] along a Morton curve: by the bits of their coordinates, interleaved."""
     low, high = points.min(axis=0), points.max(axis=0)
     cell = ((points - low) / max((high - low).max(), 1e-300) * (2**_BITS - 1)).astype(np.int64)
     code = np.zeros(len(points), dtype=np.int64)
@@ -160,8 +124,6 @@ def tessellated(
 
     Parameters
     ----------
-    mesh : Mesh
-    charts : Charts
     smooth : array, shape [n, 3]
         Smooth normals of the vertices.
     max_length, max_faces, crease_length
@@ -178,17 +140,17 @@ def tessellated(
     """
     parts, V, normals = rounded_parts(mesh, charts.map)
     F = parts.F
-    split = split_corners(V, F, None if corner_uv is None else parts.carry(corner_uv), parts.coordinates, normals)
+    corner_uv = None if corner_uv is None else parts.carry(corner_uv)
+    each, split_F, normals, uv, coordinates = split_corners(V, F, corner_uv, parts.coordinates, normals)
     baked = np.zeros((len(mesh.V), 3)) if baked is None else baked
     if parts.V is not mesh.V:
         at_parts = np.zeros((len(V), 6))
         at_parts[F] = parts.carry(np.concatenate([smooth, baked], axis=1)[mesh.F])
         smooth, baked = normalized(at_parts[:, :3]), at_parts[:, 3:]
-    _, same = np.unique(np.column_stack([split.vertices, split.normals]), axis=0, return_inverse=True)
-    each = split.vertices
-    attributes = [V[each], smooth[each], split.coordinates, split.normals, baked[each], split.uv]
+    _, same = np.unique(np.column_stack([each, normals]), axis=0, return_inverse=True)
+    attributes = [V[each], smooth[each], coordinates, normals, baked[each], uv]
     return tessellate(
-        split.F,
+        split_F,
         np.concatenate(attributes, axis=1),
         same.ravel(),
         position=POSITION,
@@ -233,21 +195,24 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
     V, F = np.asarray(surface.V, dtype=np.float64), np.asarray(surface.F, dtype=np.int64)
     smooth, charts = smooth_normals(V, F), surface.charts
     uv = np.zeros((len(V), 2)) if surface.uv is None else np.asarray(surface.uv, dtype=np.float64)
+    mesh = Mesh(V, F)
+    texel_size = float(np.sqrt(mesh.area / np.prod(charts.shape)))
     finer = tessellated(
-        Mesh(V, F),
+        mesh,
         charts,
         smooth=smooth,
         max_length=max_length,
         max_faces=int(np.clip(max_faces, _LEAST_FACES, _MOST_FACES)),
-        crease_length=max(_CREASE * _texel_size(V, F, charts), max_length / _CREASE_PARTS),
+        crease_length=max(_CREASE * texel_size, max_length / _CREASE_PARTS),
         baked=bake(V, F, smooth),
         corner_uv=uv[F] if uv.ndim == 2 else uv,
     )
     faces, attributes, same, chart = split_at_charts(finer, charts, POSITION, NORMAL, COORDINATES)
-    faces, order = memory_order(faces, attributes[:, POSITION])
+    faces, order, _ = memory_order(faces, attributes[:, POSITION])
     attributes, same, chart = attributes[order], same[order], chart[order]
-    edges = edges_of(faces, same)
-    attributes = np.concatenate([attributes, midpoints(edges, attributes, POSITION, NORMAL)])
+    edges = edges_of(faces)
+    _, inner = welded(edges, faces, same)
+    attributes = np.concatenate([attributes, midpoints(edges.ends, inner, attributes, POSITION, NORMAL)])
     length = np.linalg.norm(attributes[:, DIRECTION], axis=1, keepdims=True)
     attributes[:, DIRECTION] /= np.maximum(length, 1e-12)
     chart = np.concatenate([chart, chart[edges.ends[:, 0]]])
@@ -255,19 +220,15 @@ def _surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Su
     places = charts.page.places(chart, chart_uv)
     points = attributes[:, [*range(POSITION.start, DIRECTION.stop)]]
     lookups = shared_places(chart_uv, places, points)
-    corners = np.concatenate([faces, len(chart) - len(edges.ends) + edges.of_side])
+    corners = np.concatenate([faces, len(chart) - len(edges.ends) + edges.of])
     balls = balls_about(attributes[:, POSITION][corners], _BALLS)
-    return SurfaceVertices(faces, attributes, edges, places, lookups, balls, _coarse(faces, attributes, len(same)))
+    apart = _APART * np.ptp(points, axis=0)[:3].max() / 2 * attributes[: len(same), DIRECTION]
+    some, coarse = coarse_mesh(faces, np.hstack([attributes[: len(same), POSITION], apart]), _COARSE)
+    return SurfaceVertices(faces, attributes, edges, places, lookups, balls, some[coarse])
 
 
-def _texel_size(V: NDArray, F: NDArray, charts: Charts) -> float:
-    """Mean distance of a surface's texels [m]."""
-    area = 0.5 * np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1).sum()
-    return float(np.sqrt(area / np.prod(charts.shape)))
-
-
-def mapped_coordinates(vertices: NDArray[np.float64], mapping: Mapping) -> NDArray[np.float64]:
-    """Texture coordinates of the vertices, [n, 3]; see `Mapping`."""
+def mapped_coordinates(vertices: NDArray[np.float64], mapping: TextureMapping) -> NDArray[np.float64]:
+    """Texture coordinates of the vertices, [n, 3]; see `TextureMapping`."""
     if not mapping.own:
         return mapping.at(vertices[:, POSITION])
     u, v = vertices[:, UV].T
@@ -297,15 +258,7 @@ def surface_vertices(surface: Surface, max_length: float, max_faces: int) -> Sur
 
 
 def _read_only(vertices: SurfaceVertices) -> SurfaceVertices:
-    for array in (*vars(vertices.edges).values(), *vertices):
+    for array in (*vertices.edges, *vertices):
         if isinstance(array, np.ndarray):
             array.flags.writeable = False
     return vertices
-
-
-def _coarse(F: NDArray[np.int64], attributes: NDArray[np.float64], count: int) -> NDArray[np.int64]:
-    """Triangles [m, 3] between few of the first `count` vertices."""
-    points = attributes[:, POSITION]
-    apart = _APART * np.ptp(points, axis=0).max() / 2 * attributes[:count, DIRECTION]
-    vertices, coarse = coarse_mesh(F, np.hstack([points[:count], apart]), _COARSE)
-    return vertices[coarse]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -15,45 +13,24 @@ from ripple_sim.solver.mesh.topology import edges_of, undirected
 _ASTRAY = 60.0  # [degrees] between a triangle's normal and the one that it shares at a vertex
 
 
-class SplitMesh(NamedTuple):
-    """A mesh with one vertex for each of a vertex's normals and texture coordinates.
-
-    Attributes
-    ----------
-    vertices : int64 [n]
-        The vertex of the original mesh.
-    F : int64 [m, 3]
-    normals : float64 [n, 3]
-    uv : float64 [n, 2]
-    coordinates : float64 [n, d]
-    """
-
-    vertices: NDArray[np.int64]
-    F: NDArray[np.int64]
-    normals: NDArray[np.float64]
-    uv: NDArray[np.float64]
-    coordinates: NDArray[np.float64]
-
-
 def split_corners(
     V: NDArray,
     F: NDArray,
     corner_uv: NDArray | None = None,
     coordinates: NDArray | None = None,
     normals: NDArray | None = None,
-) -> SplitMesh:
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Split vertices where normals, texture coordinates [m, 3, 2] or other coordinates [m, 3, d] jump.
 
-    The normals, [m, 3, 3], are those of `corner_normals` unless given.
+    The normals, [m, 3, 3], are those of `corner_normals` unless given. Return the vertex of the original mesh that each
+    was [n], triangles [m, 3], and normals [n, 3], texture coordinates [n, 2] and other coordinates [n, d].
     """
     normals = corner_normals(V, F) if normals is None else normals
     uv = np.zeros((*F.shape, 2)) if corner_uv is None else corner_uv
     others = np.zeros((*F.shape, 0)) if coordinates is None else coordinates
     corners = np.concatenate([F[:, :, None], normals, uv, others], axis=2)
     unique, index = np.unique(corners.reshape(F.size, -1), axis=0, return_inverse=True)
-    return SplitMesh(
-        unique[:, 0].astype(np.int64), index.reshape(F.shape), unique[:, 1:4], unique[:, 4:6], unique[:, 6:]
-    )
+    return unique[:, 0].astype(np.int64), index.reshape(F.shape), unique[:, 1:4], unique[:, 4:6], unique[:, 6:]
 
 
 def smooth_normals(V: NDArray, F: NDArray) -> NDArray[np.float64]:

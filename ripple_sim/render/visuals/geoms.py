@@ -6,7 +6,6 @@ Many of one shape are one draw call, as finely tessellated as the frame needs.
 from __future__ import annotations
 
 import functools
-import warnings
 from collections.abc import Callable, Iterable
 from typing import Any, TypeAlias
 
@@ -15,14 +14,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.model import find_flex_colliders
-from ripple_sim.coupling.soft import first_skin, is_soft
-from ripple_sim.errors import RippleWarning
 from ripple_sim.render.resources import Resources
 
 from .objects import Assets, Occluders
 from .shapes import NamedShape, Shape, shape_of, sizes
-from .texture_mapping import Mapping, mapping_of
+from .texture_mapping import TextureMapping, mapping_of
 from .visual import Visual, ball_of, geom_visual, host_of, look_of, site_visual, visible_sites
 
 INSTANCE = np.dtype(
@@ -39,7 +35,9 @@ INSTANCE = np.dtype(
 _GEOM = mujoco.mjtGeom
 _ROUND = (_GEOM.mjGEOM_SPHERE, _GEOM.mjGEOM_ELLIPSOID, _GEOM.mjGEOM_CAPSULE, _GEOM.mjGEOM_CYLINDER)
 _LEVELS = (4, 6, 8, 11, 15, 22)  # segments to a right angle
+_FINEST = 2 * _LEVELS[-1]  # where shapes are measured
 _BIAS = 3.0  # of shadows, in sagittas of the edges: where light grazes, one is not enough
+_SHARPEST = 1e-6  # bevel of sharp edges, in half sizes: normals need some
 _FLATNESS = 0.25  # how far the edges of a round shape may be off its surface [pixels]
 
 # vertices (core, shell, normal, texture coordinates) and indices of a shape with so many segments to a right angle
@@ -48,33 +46,31 @@ Levels: TypeAlias = Callable[[int], tuple[moderngl.Buffer, moderngl.Buffer]]
 
 def levels_of(resources: Resources, make: Callable[[int], Shape]) -> Levels:
     """Buffers of a shape at several levels of detail, each uploaded at its first use."""
-    uploaded: dict[int, tuple[moderngl.Buffer, moderngl.Buffer]] = {}
 
+    @functools.cache
     def level(segments: int) -> tuple[moderngl.Buffer, moderngl.Buffer]:
-        if segments not in uploaded:
-            shape = make(segments)
-            uv = np.zeros((len(shape.core), 2)) if shape.uv is None else shape.uv
-            vertices = np.concatenate([shape.core, shape.shell, shape.normals, uv], axis=1)
-            uploaded[segments] = (
-                resources.buffer(vertices.astype("f4").tobytes()),
-                resources.buffer(shape.faces.astype("i4").tobytes()),
-            )
-        return uploaded[segments]
+        vertices, indices = _packed(make(segments))
+        return resources.buffer(vertices), resources.buffer(indices)
 
     return level
 
 
+def _packed(shape: Shape) -> tuple[bytes, bytes]:
+    """Vertices and indices as `Levels` has them."""
+    uv = np.zeros((len(shape.core), 2)) if shape.uv is None else shape.uv
+    vertices = np.concatenate([shape.core, shape.shell, shape.normals, uv], axis=1)
+    return vertices.astype("f4").tobytes(), shape.faces.astype("i4").tobytes()
+
+
 class Instances:
-    """Geoms or sites of one shape with one texture, or a single transparent one: one draw call.
+    """Geoms, sites or other visuals of one shape with one texture, or a single transparent one: one draw call.
 
     Parameters
     ----------
-    assets : Assets
-    level : Levels
     programs : tuple of moderngl.Program
         For the G-buffer, for depth alone, for the colour alone, and for transmission.
     members : list of (Visual, int)
-        Either geoms or sites, each with its number in the table of objects.
+        Either geoms, sites or others, each with its number in the table of objects; see `hold`.
 
     Attributes
     ----------
@@ -84,6 +80,8 @@ class Instances:
         Whether the scene behind shows through.
     occludes : bool
         Whether it hides the sky from what is below: opaque geoms do.
+    casts : bool
+        Whether it casts shadows: what MuJoCo adds to explain a scene does not.
     balls : float64 [k, 4]
         That contain them.
     shadow_biases : float64 [k]
@@ -94,31 +92,57 @@ class Instances:
         self, assets: Assets, level: Levels, programs: tuple[moderngl.Program, ...], members: list[tuple[Visual, int]]
     ) -> None:
         self._assets, self._level, self._programs = assets, level, programs
-        model, self._visual = assets.model, members[0][0]
+        self._buffer = assets.resources.buffer(reserve=INSTANCE.itemsize * len(members), dynamic=True)
+        self._arrays: dict[tuple[int, int], moderngl.VertexArray] = {}
+        self._segments = _LEVELS[-1]
+        self.hold(members)
+
+    def hold(self, members: list[tuple[Visual, int]]) -> None:
+        """Have these members from now on, of the same shape and texture as before."""
+        model, self._visual = self._assets.model, members[0][0]
         self.numbers = [number for _, number in members]
         self.transparent = self._visual.opacity < 1.0
-        self.occludes = not (self.transparent or self._visual.site)
+        self.occludes = not (self.transparent or self._visual.site or self._visual.placed)
+        self.casts = self._visual.casts
         self._indices = np.array([visual.index for visual, _ in members], dtype=np.int64)
         self._hosts = np.array([host_of(model, visual) for visual, _ in members])
+        self._placed = [visual.placed for visual, _ in members if visual.placed is not None]
         self._records = np.zeros(len(members), dtype=INSTANCE)
         for record, (visual, number) in zip(self._records, members, strict=True):
             mapping = mapping_of(model, visual)
-            record["core_size"], record["shell_size"] = sizes(model, visual)
             record["color"] = [*visual.color, number]
             record["mapping"] = [*mapping.scale, mapping.stretch * mapping.scale[2]]
             record["tiling"] = mapping.tiling
-        self._unit, self._image = mapping.unit, None if mapping.texture < 0 else assets.texture(mapping.texture)
-        self._buffer = assets.resources.buffer(reserve=self._records.nbytes, dynamic=True)
-        self._arrays: dict[tuple[int, int], moderngl.VertexArray] = {}
-        self._segments = _LEVELS[-1]
+        # with round edges, and with sharp ones
+        self._sizes = [
+            np.array([sizes(model, visual, *bevel) for visual, _ in members]) for bevel in ((), (_SHARPEST,))
+        ]
+        self._unit, self._image = mapping.unit, None if mapping.texture < 0 else self._assets.texture(mapping.texture)
+        if self._buffer.size < self._records.nbytes:
+            self._buffer.orphan(2 * self._records.nbytes)
+        corners = self._placed[0].corners if self._placed else None
+        self._corners = -1 if corners is None else len(corners)
+        if corners is not None and (found := shape_of(model, self._visual)) is not None:
+            for buffer, content in zip(self._level(0), _packed(found[1](0)), strict=True):
+                buffer.orphan(len(content))
+                buffer.write(content)
         self.shadow_biases, self.balls = np.zeros(len(members)), np.zeros((len(members), 4))
 
-    def update(self, data: Any, eye: NDArray[np.float64], pixels: float, occluders: Occluders) -> None:
-        """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye."""
-        poses = (data.site_xpos, data.site_xmat) if self._visual.site else (data.geom_xpos, data.geom_xmat)
-        position, rotation = (pose[self._indices] for pose in poses)
+    def update(
+        self, data: Any, eye: NDArray[np.float64], pixels: float, occluders: Occluders, sharp: bool = False
+    ) -> None:
+        """Take the poses from MuJoCo's data; `pixels` is the size of one metre, one metre away from the eye.
+
+        With `sharp` edges are as MuJoCo has them, and what is round is so at any size.
+        """
+        if self._placed:
+            position, rotation = (np.array(each) for each in list(zip(*self._placed, strict=True))[:2])
+        else:
+            poses = (data.site_xpos, data.site_xmat) if self._visual.site else (data.geom_xpos, data.geom_xmat)
+            position, rotation = (pose[self._indices] for pose in poses)
         self._records["rotation"] = rotation.reshape(-1, 3, 3).transpose(0, 2, 1)
         self._records["origin"] = position
+        self._records["core_size"], self._records["shell_size"] = self._sizes[sharp].transpose(1, 0, 2)
         self._buffer.write(self._records.tobytes())
         half = self._records["core_size"] + self._records["shell_size"]
         self.balls, radius = np.column_stack([position, np.linalg.norm(half, axis=1)]), half.max(axis=1)
@@ -126,7 +150,7 @@ class Instances:
         largest = float((radius / away).max()) * pixels
         # the sagitta of a chord over a right angle's nth part: r (1 - cos(pi / 4n))
         needed = np.pi / 4 / np.sqrt(2 * min(_FLATNESS / max(largest, 1e-9), 1.0))
-        self._segments = next((n for n in _LEVELS if n >= needed), _LEVELS[-1])
+        self._segments = _FINEST if sharp else next((n for n in _LEVELS if n >= needed), _LEVELS[-1])
         if self._visual.kind in _ROUND:
             self.shadow_biases = _BIAS * radius * (1.0 - np.cos(np.pi / 4 / self._segments))
         near = occluders.near(self.balls, self._hosts)
@@ -161,6 +185,7 @@ class Instances:
         self._render(3, self._segments)
 
     def _render(self, program: int, segments: int) -> None:
+        segments = segments if self._corners < 0 else 0
         if (program, segments) not in self._arrays:
             vertices, indices = self._level(segments)
             content = [
@@ -171,25 +196,37 @@ class Instances:
             self._arrays[program, segments] = self._assets.resources.vertex_array(
                 self._programs[program], content, indices, skip_errors=True
             )
-        self._arrays[program, segments].render(instances=len(self._records))
+        self._arrays[program, segments].render(vertices=self._corners, instances=len(self._records))
 
 
-def visuals_of(model: Any, geoms: Iterable[int]) -> list[Visual]:
-    """Given geoms of a model and its visible sites, as far as they have a shape."""
+def visuals_of(model: Any, geoms: Iterable[int]) -> list[tuple[Visual, NamedShape]]:
+    """Given geoms of a model and its visible sites, as far as they have a shape, with that."""
     visuals = [geom_visual(model, geom) for geom in geoms] + [site_visual(model, i) for i in visible_sites(model)]
-    return [visual for visual in visuals if shape_of(model, visual) is not None]
+    return shaped(model, visuals)
 
 
-def instances_of(assets: Assets, visuals: list[Visual]) -> list[Instances]:
-    """Draw calls of visuals: those alike in shape and texture in one, transparent ones each in its own."""
+def shaped(model: Any, visuals: Iterable[Visual]) -> list[tuple[Visual, NamedShape]]:
+    """Those visuals that have a shape, with that."""
+    return [(visual, shape) for visual in visuals if (shape := shape_of(model, visual)) is not None]
+
+
+def instances_of(
+    assets: Assets, visuals: list[tuple[Visual, NamedShape]], made: dict[tuple[Any, ...], Instances] | None = None
+) -> list[Instances]:
+    """Draw calls of visuals: those alike in shape and texture in one, transparent ones each in its own.
+
+    Those `made` for other visuals are taken again, and new ones added.
+    """
     model, resources = assets.model, assets.resources
-    groups: dict[tuple[Any, ...], tuple[NamedShape, Mapping, list[tuple[Visual, int]]]] = {}
-    for visual in visuals:
-        shape, mapping = shape_of(model, visual), mapping_of(model, visual)
-        if shape is not None:
-            number = assets.objects.add(look_of(model, visual), host_of(model, visual), opacity=visual.opacity)
-            key = visual.site, shape[0], mapping.kind, mapping.texture, number if visual.opacity < 1.0 else None
-            groups.setdefault(key, (shape, mapping, []))[2].append((visual, number))
+    made = {} if made is None else made
+    groups: dict[tuple[Any, ...], tuple[NamedShape, TextureMapping, list[tuple[Visual, int]]]] = {}
+    for index, (visual, shape) in enumerate(visuals):
+        mapping = mapping_of(model, visual)
+        look, host = look_of(model, visual), host_of(model, visual)
+        number = assets.objects.add(look, host, opacity=visual.opacity, identity=visual.identity)
+        kind = visual.site, visual.placed is not None, visual.casts
+        key = *kind, shape[0], mapping.kind, mapping.texture, index if visual.opacity < 1.0 else None
+        groups.setdefault(key, (shape, mapping, []))[2].append((visual, number))
 
     @functools.cache
     def program(kind: int, own: bool) -> moderngl.Program:
@@ -199,27 +236,10 @@ def instances_of(assets: Assets, visuals: list[Visual]) -> list[Instances]:
         resources.program("passes/casters", MOVED=0, ALBEDO_MAP=albedo, TRANSMISSION_MAP=transmission)
         for albedo, transmission in ((0, 0), (1, 0), (0, 1))
     )
-    levels: dict[str, Levels] = {}
-    made = []
-    for (name, make), mapping, members in groups.values():
-        level = levels.setdefault(name, levels_of(resources, make))
-        made.append(Instances(assets, level, (program(mapping.kind, mapping.own), *casters), members))
-    return made
-
-
-def warn_of_unsupported(model: Any, targets: Iterable[int] = ()) -> None:
-    """Warn once of what will be missing from the frames; flex colliders of targets are drawn as their geoms."""
-    soft = [target for target in targets if is_soft(model, target)]
-    skins = sum(target >= first_skin(model) for target in soft)
-    # fixed tendons tie joints together and have no path that could be drawn
-    spatial = int((model.wrap_type[model.tendon_adr] != mujoco.mjtWrap.mjWRAP_JOINT).sum())
-    kinds = {
-        "tendons": spatial,
-        "flexes": model.nflex - len(find_flex_colliders(model)) - (len(soft) - skins),
-        "skins": model.nskin - skins,
-    }
-    missing = [f"{count} {kind}" for kind, count in kinds.items() if count]
-    if missing:
-        warnings.warn(
-            f"the model has {' and '.join(missing)}, which are not drawn; all else is", RippleWarning, stacklevel=3
-        )
+    for key, ((name, make), mapping, members) in groups.items():
+        if key in made:
+            made[key].hold(members)
+        else:
+            level = assets.levels.setdefault(name, levels_of(resources, make))
+            made[key] = Instances(assets, level, (program(mapping.kind, mapping.own), *casters), members)
+    return [made[key] for key in groups]

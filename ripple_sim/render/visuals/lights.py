@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.render.camera import Pose
-from ripple_sim.render.contract import MAX_LIGHTS, MAX_SHADOWS, Unit, srgb_to_linear
+from ripple_sim.render.contract import MAX_LIGHTS, MAX_SHADOWS, Unit
 from ripple_sim.render.resources import FrameUniforms
+from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.solver.errors import RippleError
 
 from .objects import Assets
@@ -88,9 +89,14 @@ class Lighting:
         return sum((light.at(point, normal) for light in self.lights), np.zeros(3))
 
 
-def is_lit(model: Any) -> bool:
-    """Whether the MJCF itself sets any light."""
-    return bool(model.nlight)
+def in_studio(model: Any, lighting: str) -> bool:
+    """Whether the studio replaces the MJCF's lights, see `SceneLight`."""
+    return lighting == "studio" or (lighting == "auto" and not model.nlight)
+
+
+def lighting_of(model: Any, data: Any, pose: Pose, lighting: str) -> Lighting:
+    """All light of a frame, as the renderer has it; see `SceneLight`."""
+    return studio_lighting(pose) if in_studio(model, lighting) else model_lighting(model, data, pose)
 
 
 def model_lighting(model: Any, data: Any, pose: Pose) -> Lighting:
@@ -182,9 +188,6 @@ def set_lighting(
 
     Parameters
     ----------
-    frame : FrameUniforms
-    lighting : Lighting
-    pose : Pose
     floor_albedo : array, optional
         Linear colour of the floor; tints the background, so that one fades into the other.
     sky : array, optional
@@ -197,22 +200,19 @@ def set_lighting(
         record["direction"] = [*light.direction, np.cos(light.cutoff)]
         record["radiance"] = [*light.radiance, light.exponent]
         record["falloff"] = [*light.falloff, 0]
-    _set_soft_boxes(frame, pose, 1.0 if lighting.studio else BESIDE_LIGHTS)
+    # the soft boxes turn with the camera
+    for index, (azimuth, elevation, half_width, half_height, brightness) in enumerate(SOFT_BOX_LIGHTS):
+        normal = _direction(pose, azimuth, elevation)
+        tangent = np.cross([0.0, 0.0, 1.0], normal)
+        frame.values["soft_box_normal"][index] = [*normal, half_width]
+        frame.values["soft_box_tangent"][index] = [*tangent / np.linalg.norm(tangent), half_height]
+        strength = 1.0 if lighting.studio else BESIDE_LIGHTS
+        frame.values["soft_box_radiance"][index][:3] = strength * np.array(brightness)
     horizon, zenith, light_above = sky_colors(lighting, pose, floor_albedo, sky)
     frame.set_vector("horizon", horizon)
     frame.set_vector("zenith", zenith)
     frame.set_vector("sky", light_above, 1.0 if lighting.studio else 0.0)
     frame.set_vector("floor_fade", [*(STUDIO_FADE if lighting.studio else FADE), 0.0])
-
-
-def _set_soft_boxes(frame: FrameUniforms, pose: Pose, strength: float) -> None:
-    """Set the soft boxes, which turn with the camera, at a share of their brightness."""
-    for index, (azimuth, elevation, half_width, half_height, radiance) in enumerate(SOFT_BOX_LIGHTS):
-        normal = _direction(pose, azimuth, elevation)
-        tangent = np.cross([0.0, 0.0, 1.0], normal)
-        frame.values["soft_box_normal"][index] = [*normal, half_width]
-        frame.values["soft_box_tangent"][index] = [*tangent / np.linalg.norm(tangent), half_height]
-        frame.values["soft_box_radiance"][index][:3] = strength * np.array(radiance)
 
 
 def _far_light(lighting: Lighting, pose: Pose) -> NDArray[np.float64]:
@@ -241,7 +241,6 @@ class SceneLight:
 
     Parameters
     ----------
-    assets : Assets
     lighting : str
         One of `LIGHTING`; "auto": the studio where the MJCF has no light.
 
@@ -260,15 +259,15 @@ class SceneLight:
         if lighting not in LIGHTING:
             raise RippleError(f"lighting is {lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
         self._model = model = assets.model
-        self._studio = lighting == "studio" or (lighting == "auto" and not is_lit(model))
-        self._sky = None if self._studio else assets.skybox()
+        self._lighting, studio = lighting, in_studio(model, lighting)
+        self._sky = None if studio else assets.skybox()
         casting = model.light_castshadow.astype(bool) & (model.light_type != _KIND.mjLIGHT_IMAGE)
         near = model.light_type != _KIND.mjLIGHT_DIRECTIONAL
         self.options = {
             "SKYBOX": int(self._sky is not None),
-            "NEAR_LIGHTS": int(not self._studio and near.any()),
-            "LIGHTS": 1 if self._studio else int(np.clip(model.nlight + 1, 1, MAX_LIGHTS)),  # with the headlight
-            "SHADOWS": 1 if self._studio else int(np.clip(casting.sum(), 1, MAX_SHADOWS)),
+            "NEAR_LIGHTS": int(not studio and near.any()),
+            "LIGHTS": 1 if studio else int(np.clip(model.nlight + 1, 1, MAX_LIGHTS)),  # with the headlight
+            "SHADOWS": 1 if studio else int(np.clip(casting.sum(), 1, MAX_SHADOWS)),
         }
 
     def set(
@@ -280,7 +279,7 @@ class SceneLight:
         floor_normal: NDArray | None = None,
     ) -> list[Light]:
         """Set the frame's light and background; return the lights. The floor's colour and normal are [3] each."""
-        lighting: Lighting = studio_lighting(pose) if self._studio else model_lighting(self._model, data, pose)
+        lighting = lighting_of(self._model, data, pose, self._lighting)
         mean: NDArray[np.float64] | None = None if self._sky is None else self._sky[1]
         set_lighting(frame, lighting, pose, floor_albedo, mean)
         if floor_normal is not None:

@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.contract import MAX_OCCLUDERS, OBJECT, OBJECT_COLUMNS, Binding, Unit, srgb_to_linear
+from ripple_sim.render.contract import MAX_OCCLUDERS, OBJECT, OBJECT_COLUMNS, Binding, Unit
 from ripple_sim.render.resources import Resources, srgb_cube, srgb_texture
+from ripple_sim.render.tone_mapping import srgb_to_linear
 
 from .visual import Look, texture_pixels
 
@@ -18,10 +19,17 @@ _ROW = OBJECT.dtype
 
 
 class ObjectTable:
-    """Rows of the shaders' `Object`; draw calls write the number of their row."""
+    """Rows of the shaders' `Object`; draw calls write the number of their row.
+
+    Attributes
+    ----------
+    identities : list of (int, int)
+        Id and type, of `mujoco.mjtObj`, of what each row shows.
+    """
 
     def __init__(self, resources: Resources) -> None:
         self._resources = resources
+        self.identities: list[tuple[int, int]] = []
         self._rows: list[np.ndarray] = []
         self._texture: moderngl.Texture | None = None
 
@@ -30,6 +38,7 @@ class ObjectTable:
         look: Look,
         geom: int,
         *,
+        identity: tuple[int, int] = (-1, -1),
         opacity: float = 1.0,
         size: float = 1.0,
         heatmap: bool = False,
@@ -38,6 +47,7 @@ class ObjectTable:
     ) -> int:
         """Append a row and return its number.
 
+        `identity` is the id and the type, of `mujoco.mjtObj`, of what is drawn;
         `size` [m] is how thick a transparent object is where its relative thickness is 1; `heatmap` says that colours
         are shown as they are, but for shadows; `height_map` is the layer of the object's height map, and `chart` the
         side of a chart with its halo in it [texels].
@@ -48,6 +58,7 @@ class ObjectTable:
         row["place"] = geom, size, 0.0, heatmap
         row["height_map"] = 0 if height_map is None else (height_map, 1, 0, chart)
         self._rows.append(row)
+        self.identities.append(identity)
         return len(self._rows) - 1
 
     def place(
@@ -71,6 +82,15 @@ class ObjectTable:
         if rotation is not None:
             row["rotation"][:, :3] = rotation.T  # column by column
 
+    @property
+    def geoms(self) -> NDArray[np.int64]:
+        """Geom of each row, that of the nearest geom of the body for a site, -1 without."""
+        return np.array([row["place"][0] for row in self._rows], dtype=np.int64)
+
+    def keep(self, count: int) -> None:
+        """Drop all rows but so many."""
+        del self._rows[count:], self.identities[count:]
+
     def bind(self) -> None:
         """Upload the rows and bind them for the shaders."""
         rows = np.zeros((max(-(-len(self._rows) // OBJECT_COLUMNS), 1), OBJECT_COLUMNS), dtype=_ROW)
@@ -89,18 +109,20 @@ class Assets:
     Parameters
     ----------
     model : mujoco.MjModel
-    resources : Resources
 
     Attributes
     ----------
     objects : ObjectTable
         Every visual and target has a row in it.
+    levels : dict
+        Buffers of shapes, by their names.
     """
 
     def __init__(self, model: Any, resources: Resources) -> None:
         self.model, self.resources = model, resources
         self.objects = ObjectTable(resources)
         self._uploaded: dict[int, moderngl.Texture | moderngl.TextureCube] = {}
+        self.levels: dict[str, Any] = {}
 
     def texture(self, texture: int) -> moderngl.Texture | moderngl.TextureCube:
         """Return the texture of an id; it reads as linear light."""
@@ -135,17 +157,21 @@ class Occluders:
 
     Parameters
     ----------
-    resources : Resources
     model : mujoco.MjModel
     geoms : int64 [k]
     """
 
     def __init__(self, resources: Resources, model: Any, geoms: NDArray[np.int64]) -> None:
-        self._geoms = geoms
-        self._centre, self._half_axis, self._radius = _capsules(model, geoms)
-        self._bounds = np.linalg.norm(model.geom_aabb[geoms, 3:], axis=1)
+        self._model = model
         self._buffer = resources.buffer(reserve=32 * MAX_OCCLUDERS, dynamic=True)
         self._bound, self._bound_geoms = np.zeros((0, 2, 4)), np.zeros(0, np.int64)
+        self.hold(geoms)
+
+    def hold(self, geoms: NDArray[np.int64]) -> None:
+        """Be the capsules of these geoms from now on."""
+        self._geoms = geoms
+        self._centre, self._half_axis, self._radius = _capsules(self._model, geoms)
+        self._bounds = np.linalg.norm(self._model.geom_aabb[geoms, 3:], axis=1)
 
     def balls(self, data: Any) -> NDArray[np.float64]:
         """Bounding balls of the geoms."""

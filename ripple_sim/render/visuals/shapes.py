@@ -125,12 +125,28 @@ def _revolved(core_r: NDArray, core_z: NDArray, shell_r: NDArray, shell_z: NDArr
     return Shape(rings(core_r, core_z), shell, shell, np.concatenate(faces))
 
 
-def mesh_asset(model: Any, mesh: int) -> Shape:
-    """Mesh of a MuJoCo model in its geom's frame."""
+def _arrow(*profile: tuple[float, float]) -> Callable[[int], Shape]:
+    """Solid of revolution about z, of radii and heights from the lower pole to the upper one."""
+
+    def make(segments: int) -> Shape:
+        radius, height = np.array(profile).T
+        flat = _revolved(radius, height, np.zeros_like(radius), height, 4 * segments)
+        return creased(flat.core, flat.faces)
+
+    return make
+
+
+def mesh_asset(model: Any, mesh: int, hull: bool = False) -> Shape:
+    """Mesh of a MuJoCo model in its geom's frame, or its convex hull."""
     first, first_face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
     faces = slice(first_face, first_face + model.mesh_facenum[mesh])
     V = np.asarray(model.mesh_vert[first : first + model.mesh_vertnum[mesh]], dtype=np.float64)
     F = np.asarray(model.mesh_face[faces], dtype=np.int64)
+    if hull and model.mesh_graphadr[mesh] >= 0:
+        graph = model.mesh_graph[model.mesh_graphadr[mesh] :]
+        vertices, triangles = int(graph[0]), int(graph[1])
+        end = 2 + 3 * vertices + 6 * triangles
+        return creased(V, graph[end - 3 * triangles : end].reshape(-1, 3).astype(np.int64))
     start = model.mesh_texcoordadr[mesh]
     if start < 0:
         return creased(V, F)
@@ -161,9 +177,9 @@ def height_field(model: Any, hfield: int) -> Shape:
 
 def creased(V: NDArray, F: NDArray, corner_uv: NDArray | None = None) -> Shape:
     """Mesh of a fixed size, its vertices split where normals or texture coordinates [m, 3, 2] jump."""
-    split = split_corners(V, F, corner_uv)
-    positions = V[split.vertices]
-    return Shape(np.zeros_like(positions), positions, split.normals, split.F, None if corner_uv is None else split.uv)
+    vertices, faces, normals, uv, _ = split_corners(V, F, corner_uv)
+    positions = V[vertices]
+    return Shape(np.zeros_like(positions), positions, normals, faces, None if corner_uv is None else uv)
 
 
 _BEVEL = 0.06
@@ -179,7 +195,12 @@ _SHAPES: dict[int, NamedShape] = {
     _GEOM.mjGEOM_CYLINDER: ("cylinder", lambda n: cylinder(4 * n, 3)),
     _GEOM.mjGEOM_BOX: ("box", lambda n: box(min(n // 3, 3))),
     _GEOM.mjGEOM_PLANE: ("sheet", lambda n: sheet()),
+    # MuJoCo's arrows: a shaft of radius 1 and length 2, and a head of length 1
+    _GEOM.mjGEOM_ARROW: ("arrow", _arrow((0, 0), (1, 0), (1, 2), (1.75, 2), (0, 3))),
+    _GEOM.mjGEOM_ARROW1: ("arrow1", _arrow((0, 0), (1, 0), (1, 2), (0, 3))),
+    _GEOM.mjGEOM_ARROW2: ("arrow2", _arrow((0, -3), (1.75, -2), (1, -2), (1, 2), (1.75, 2), (0, 3))),
 }
+_ARROWS = (_GEOM.mjGEOM_ARROW, _GEOM.mjGEOM_ARROW1, _GEOM.mjGEOM_ARROW2)
 
 
 def shape_of(model: Any, visual: Visual) -> NamedShape | None:
@@ -189,14 +210,19 @@ def shape_of(model: Any, visual: Visual) -> NamedShape | None:
     """
     kind, asset = visual.kind, visual.asset
     if kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF) and asset >= 0:
-        return f"mesh {asset}", lambda _: mesh_asset(model, asset)
+        return f"{'hull' if visual.hull else 'mesh'} {asset}", lambda _: mesh_asset(model, asset, visual.hull)
+    if visual.placed is not None and (corners := visual.placed.corners) is not None:
+        own = corners.astype(np.float64)
+        points, normals, uv = own[:, :3], own[:, 3:6], own[:, 6:]
+        faces = np.arange(len(corners)).reshape(-1, 3)
+        return f"{kind} {visual.identity[0]}", lambda _: Shape(np.zeros_like(points), points, normals, faces, uv)
     if kind == _GEOM.mjGEOM_HFIELD and asset >= 0:
         return f"hfield {asset}", lambda _: height_field(model, asset)
     return _SHAPES.get(kind)
 
 
-def sizes(model: Any, visual: Visual) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Core and shell size of a visual [m], shape [3] each (see primitives.py)."""
+def sizes(model: Any, visual: Visual, bevel: float = _BEVEL) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Core and shell size of a visual [m], shape [3] each, see above; `bevel` is in its smallest half sizes."""
     half = visual.half_sizes
     match visual.kind:
         case _GEOM.mjGEOM_SPHERE | _GEOM.mjGEOM_ELLIPSOID:
@@ -207,7 +233,9 @@ def sizes(model: Any, visual: Visual) -> tuple[NDArray[np.float64], NDArray[np.f
             half = np.where(half > 0, half, _ENDLESS * model.stat.extent)
             return np.array([half[0], half[1], 0.0]), np.full(3, 1e-9)
         case _GEOM.mjGEOM_CYLINDER | _GEOM.mjGEOM_BOX:
-            bevel = _BEVEL * half.min()
-            return half - bevel, np.full(3, bevel)
+            round_edge = bevel * half.min()
+            return half - round_edge, np.full(3, round_edge)
+        case kind if kind in _ARROWS:
+            return np.zeros(3), half / [1, 1, 6]
         case _:
             return np.zeros(3), np.ones(3)

@@ -29,7 +29,7 @@ _Tiling = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Mapping:
+class TextureMapping:
     """How a texture lies on a visual.
 
     A point of the visual becomes coordinates. Of these the shader (texture_mapping.glsl) makes a position in a flat
@@ -74,7 +74,7 @@ class Mapping:
         return coordinates
 
 
-def mapping_of(model: Any, visual: Visual) -> Mapping:
+def mapping_of(model: Any, visual: Visual) -> TextureMapping:
     """How MuJoCo (3.12 and later) lays the texture of a visual's material on it.
 
     Flat textures go once round what is round, with their left edge in the xz plane where x > 0 and their upper edge
@@ -83,23 +83,25 @@ def mapping_of(model: Any, visual: Visual) -> Mapping:
     """
     texture, material, half = _texture(model, visual.material), visual.material, visual.half_sizes
     if texture < 0:
-        return Mapping()
+        return TextureMapping()
     uniform = bool(model.mat_texuniform[material])
     if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE:
         factor = np.where(half > 0, half, 1.0) if uniform else np.ones(3)
         if visual.kind in _WRAPPED:
             return _on_primitive(visual, MappingKind.CUBE_IMAGE, texture, factor, (1.0, 1.0, 0.0, 0.0))
-        return Mapping(MappingKind.CUBE_IMAGE, texture, factor)
+        return TextureMapping(MappingKind.CUBE_IMAGE, texture, factor)
     repeat = np.array(model.mat_texrepeat[material], dtype=np.float64)
+    if visual.kind in (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN):
+        return TextureMapping(MappingKind.FLAT_IMAGE, texture, own=True, tiling=(*repeat, 0.0, 0.0))
     times = np.where(repeat > 0, repeat, 1.0) * np.where((half[:2] > 0) & uniform, half[:2], 1.0)
     if visual.kind in _WRAPPED:
         return _on_primitive(visual, _WRAPPED[visual.kind], texture, np.ones(3), (*times, 0.0, 0.0))
     if visual.kind in _MESHES and visual.asset >= 0 and model.mesh_texcoordadr[visual.asset] >= 0:
-        return Mapping(MappingKind.FLAT_IMAGE, texture, own=True, tiling=(*times, 0.0, 0.0))
+        return TextureMapping(MappingKind.FLAT_IMAGE, texture, own=True, tiling=(*times, 0.0, 0.0))
     if visual.kind == _GEOM.mjGEOM_PLANE:
-        return Mapping(MappingKind.FLAT_IMAGE, texture, tiling=_on_plane(half[:2], times))
+        return TextureMapping(MappingKind.FLAT_IMAGE, texture, tiling=_on_plane(half[:2], times))
     scale = 0.5 * (repeat if uniform else repeat / np.where(half[:2] > 0, half[:2], 1.0))
-    return Mapping(MappingKind.FLAT_IMAGE, texture, tiling=(scale[0], -scale[1], -0.5, -0.5))
+    return TextureMapping(MappingKind.FLAT_IMAGE, texture, tiling=(scale[0], -scale[1], -0.5, -0.5))
 
 
 def _texture(model: Any, material: int) -> int:
@@ -111,10 +113,10 @@ def _texture(model: Any, material: int) -> int:
 
 def _on_primitive(
     visual: Visual, kind: MappingKind, texture: int, factor: NDArray[np.float64], tiling: _Tiling
-) -> Mapping:
+) -> TextureMapping:
     """Mapping by coordinates from -factor to factor."""
     half, round_ends = visual.half_sizes, visual.kind == _GEOM.mjGEOM_CAPSULE
-    return Mapping(
+    return TextureMapping(
         kind,
         texture,
         factor / half,

@@ -5,15 +5,16 @@ Looks are named sets of parameters for the surface of a target.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.soft import first_flex, first_skin, is_soft
-from ripple_sim.render.contract import srgb_to_linear
+from ripple_sim.render.tone_mapping import srgb_to_linear
 from ripple_sim.solver.errors import RippleError
 
 # The look that takes colour, texture and gloss from the geom's MuJoCo material.
@@ -73,19 +74,33 @@ def find_look(name: str) -> Look:
 
 
 _GEOM = mujoco.mjtGeom
+_GEOM_OBJECT, _SITE_OBJECT = int(mujoco.mjtObj.mjOBJ_GEOM), int(mujoco.mjtObj.mjOBJ_SITE)
+_SOLID = {*(int(getattr(mujoco.mjtObj, f"mjOBJ_{name}")) for name in ("GEOM", "SITE", "TENDON", "FLEX", "SKIN"))}
 _VISIBLE_GROUPS = 3  # MuJoCo shows groups 0 to 2 by default
 _UNSET = [0.5, 0.5, 0.5, 1.0]  # a geom's or site's colour where the MJCF gives none
 
 
+class Placed(NamedTuple):
+    """What a visual has that is neither a geom nor a site: its pose, and the corners of a flex's or a skin's triangles.
+
+    `origin` [m] and `rotation` have the shapes [3] and [3, 3]; `corners`, [3 m, 8], are points, normals and texture
+    coordinates.
+    """
+
+    origin: NDArray[np.float32]
+    rotation: NDArray[np.float32]
+    corners: NDArray[np.float32] | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Visual:
-    """A geom or a site as it is drawn.
+    """A geom or a site as it is drawn, or something else of a scene of MuJoCo's: a contact, a tendon, a flex and so on.
 
     Attributes
     ----------
     site : bool
     index : int
-        Among the model's geoms or sites.
+        Among the model's geoms or sites; -1 for anything else.
     kind : int
         Of `mujoco.mjtGeom`.
     size : float64 [3]
@@ -97,6 +112,12 @@ class Visual:
     material : int
         -1 without.
     group : int
+    hull : bool
+        Whether a mesh is drawn as its convex hull.
+    identity : (int, int)
+        Id and type, of `mujoco.mjtObj`, of what it shows.
+    placed : Placed, optional
+        Where it is, of anything but geoms and sites.
     """
 
     site: bool
@@ -107,11 +128,19 @@ class Visual:
     rgba: NDArray[np.float64]
     material: int
     group: int
+    hull: bool = False
+    identity: tuple[int, int] = (-1, -1)
+    placed: Placed | None = None
 
     @property
     def visible(self) -> bool:
         """Whether MuJoCo shows it by default: in groups 0 to 2, and not fully transparent."""
         return self.group < _VISIBLE_GROUPS and self.opacity > 0.0
+
+    @property
+    def casts(self) -> bool:
+        """Whether it casts shadows, as a geom, site, tendon, flex or skin does, and what explains a scene does not."""
+        return self.identity[1] in _SOLID
 
     @property
     def color(self) -> NDArray[np.float64]:
@@ -132,6 +161,8 @@ class Visual:
     def half_sizes(self) -> NDArray[np.float64]:
         """Half sizes of a primitive along its axes [m], a capsule's without its ends; 0 where a plane is infinite."""
         match self.kind:
+            case _ if self.placed is not None:  # a scene has them as they are
+                return self.size
             case _GEOM.mjGEOM_SPHERE:
                 return np.full(3, self.size[0])
             case _GEOM.mjGEOM_CAPSULE | _GEOM.mjGEOM_CYLINDER:
@@ -143,21 +174,88 @@ class Visual:
 def geom_visual(model: Any, geom: int) -> Visual:
     """Geom of a model, or a soft target, see `soft_ids`."""
     if is_soft(model, geom):
-        return _soft_visual(model, geom)
-    return _visual(model, "geom", geom, int(model.geom_dataid[geom]))
-
-
-def _soft_visual(model: Any, target: int) -> Visual:
-    skin = target - first_skin(model)
-    which, index = ("skin", skin) if skin >= 0 else ("flex", target - first_flex(model))
-    rgba, material, group = (getattr(model, f"{which}_{name}")[index] for name in ("rgba", "matid", "group"))
-    rgba = np.array(model.mat_rgba[material] if material >= 0 and np.array_equal(rgba, _UNSET) else rgba, np.float64)
-    return Visual(False, target, int(_GEOM.mjGEOM_MESH), np.ones(3), -1, rgba, int(material), int(group))
+        skin = geom - first_skin(model)
+        which, index = ("skin", skin) if skin >= 0 else ("flex", geom - first_flex(model))
+        identity = index, int(mujoco.mjtObj.mjOBJ_SKIN if skin >= 0 else mujoco.mjtObj.mjOBJ_FLEX)
+        paint = _paint(model, which, index)
+        return Visual(False, geom, int(_GEOM.mjGEOM_MESH), np.ones(3), -1, *paint, identity=identity)
+    kind, size = int(model.geom_type[geom]), np.array(model.geom_size[geom], dtype=np.float64)
+    asset, paint = int(model.geom_dataid[geom]), _paint(model, "geom", geom)
+    return Visual(False, geom, kind, size, asset, *paint, identity=(geom, _GEOM_OBJECT))
 
 
 def site_visual(model: Any, site: int) -> Visual:
     """Site of a model."""
-    return _visual(model, "site", site, -1)
+    kind, size = int(model.site_type[site]), np.array(model.site_size[site], dtype=np.float64)
+    return Visual(True, site, kind, size, -1, *_paint(model, "site", site), identity=(site, _SITE_OBJECT))
+
+
+def content_of(drawn: mujoco.MjvGeom) -> tuple[Any, ...]:
+    """What an entry of a scene shows, but for the pose of a geom or site; a flex or skin always shows something new."""
+    content = (drawn.objid, drawn.objtype, drawn.type, drawn.dataid, drawn.matid, drawn.rgba.tobytes())
+    if drawn.objtype in (_GEOM_OBJECT, _SITE_OBJECT):
+        return *content, drawn.size.tobytes()
+    moving = object() if drawn.type in (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN) else drawn.mat.tobytes()
+    return *content, drawn.size.tobytes(), drawn.pos.tobytes(), moving
+
+
+def visuals_in(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> list[Visual]:
+    """What an entry of a scene shows that MuJoCo made: one visual, or the edges of a flex without faces, cylinders."""
+    identity, kind, corners = (int(drawn.objid), int(drawn.objtype)), int(drawn.type), None
+    paint: dict[str, Any] = {"rgba": np.array(drawn.rgba, dtype=np.float64), "material": int(drawn.matid)}
+    if identity[1] == _SITE_OBJECT:
+        return [replace(site_visual(model, identity[0]), **paint)]
+    if identity[1] == _GEOM_OBJECT:  # of a mesh there is the convex hull, too, with the next id
+        hull = kind in (_GEOM.mjGEOM_MESH, _GEOM.mjGEOM_SDF) and bool(drawn.dataid % 2)
+        return [replace(geom_visual(model, identity[0]), hull=hull, **paint)]
+    placed = Placed(np.array(drawn.pos), np.array(drawn.mat))
+    if kind in (_GEOM.mjGEOM_FLEX, _GEOM.mjGEOM_SKIN):
+        corners = _corners_of(model, scene, drawn)
+        placed = Placed(np.zeros(3, np.float32), np.eye(3, dtype=np.float32), corners)
+    size = np.array(drawn.size, dtype=np.float64)
+    visual = Visual(False, -1, kind, size, -1, **paint, group=0, identity=identity, placed=placed)
+    return [visual] if corners is None or len(corners) else list(_edges_of(scene, visual))
+
+
+def _corners_of(model: Any, scene: mujoco.MjvScene, drawn: mujoco.MjvGeom) -> NDArray[np.float32]:
+    """Corners of the triangles of a scene's flex or skin, see `Placed`."""
+    index = drawn.objid
+    if drawn.type == _GEOM.mjGEOM_FLEX:
+        first, count = int(scene.flexfaceadr[index]), int(scene.flexfaceused[index])
+        corners = slice(3 * first, 3 * (first + count))
+        points, normals, uv = (
+            array.reshape(-1, width)[corners]
+            for array, width in ((scene.flexface, 3), (scene.flexnormal, 3), (scene.flextexcoord, 2))
+        )
+    else:
+        face, vertex = model.skin_faceadr[index], scene.skinvertadr[index]
+        F = model.skin_face[face : face + model.skin_facenum[index]].ravel()
+        points, normals = (array.reshape(-1, 3)[vertex + F] for array in (scene.skinvert, scene.skinnormal))
+        start = model.skin_texcoordadr[index]
+        uv = model.skin_texcoord[start + F] if start >= 0 else np.zeros((len(F), 2))
+    return np.concatenate([points, normals, uv], axis=1, dtype=np.float32)
+
+
+def _edges_of(scene: mujoco.MjvScene, flex: Visual) -> Iterator[Visual]:
+    """The edges of a scene's flex, as cylinders."""
+    index, radius = flex.identity[0], flex.size[0]
+    first, count, vertex = (int(n[index]) for n in (scene.flexedgeadr, scene.flexedgenum, scene.flexvertadr))
+    V = scene.flexvert.reshape(-1, 3)[vertex:]
+    for a, b in V[scene.flexedge.reshape(-1, 2)[first : first + count]]:
+        length, turn, rotation = float(np.linalg.norm(b - a)), np.zeros(4), np.zeros(9)
+        mujoco.mju_quatZ2Vec(turn, (b - a).astype(np.float64))
+        mujoco.mju_quat2Mat(rotation, turn)
+        placed = Placed((a + b) / 2, rotation.reshape(3, 3).astype(np.float32))
+        size = np.array([radius, radius, length / 2])
+        yield replace(flex, kind=int(_GEOM.mjGEOM_CYLINDER), size=size, material=-1, placed=placed)
+
+
+def _paint(model: Any, which: str, index: int) -> tuple[NDArray[np.float64], int, int]:
+    """Colour, material and group of a geom, site, flex or skin."""
+    rgba, material, group = (getattr(model, f"{which}_{name}")[index] for name in ("rgba", "matid", "group"))
+    if material >= 0 and np.array_equal(rgba, _UNSET):
+        rgba = model.mat_rgba[material]
+    return np.array(rgba, dtype=np.float64), int(material), int(group)
 
 
 def visible_geoms(model: Any) -> list[int]:
@@ -182,6 +280,12 @@ def host_of(model: Any, visual: Visual) -> int:
 
 def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
     """Bounding ball [1, 4] of a visual in the world; that of a plane is infinite."""
+    if visual.placed is not None:
+        origin, _, corners = visual.placed
+        if corners is None:
+            return np.array([[*origin, 2 * np.linalg.norm(visual.size)]])
+        middle = corners[:, :3].mean(axis=0)
+        return np.array([[*middle, np.linalg.norm(corners[:, :3] - middle, axis=1).max(initial=0.0)]])
     if visual.site:
         half = visual.half_sizes
         radius = float(np.linalg.norm(half) + half[0])  # a capsule has ends, too
@@ -191,17 +295,6 @@ def ball_of(model: Any, data: Any, visual: Visual) -> NDArray[np.float64]:
         return np.array([[*position, np.inf]])
     centre = position + data.geom_xmat[visual.index].reshape(3, 3) @ box[:3]
     return np.array([[*centre, np.linalg.norm(box[3:])]])
-
-
-def _visual(model: Any, which: str, index: int, asset: int) -> Visual:
-    def value(name: str) -> Any:
-        return getattr(model, f"{which}_{name}")[index]
-
-    rgba, material = np.array(value("rgba"), dtype=np.float64), int(value("matid"))
-    if material >= 0 and np.array_equal(rgba, _UNSET):
-        rgba = np.array(model.mat_rgba[material], dtype=np.float64)
-    size = np.array(value("size"), dtype=np.float64)
-    return Visual(which == "site", index, int(value("type")), size, asset, rgba, material, int(value("group")))
 
 
 def look_of(model: Any, visual: Visual) -> Look:

@@ -24,7 +24,7 @@ from ...mesh.mesh import Mesh
 from ...mesh.rays import RayScene
 from ...mesh.vectors import combine, cross, dot, row
 from ...texels.atlas import Atlas, check_points
-from ...texels.chart_map import ChartPieces, LinearParts, nearest_place, nearest_places, texel_on
+from ...texels.chart_map import Parts, nearest_place, nearest_places, texel_on, uncut
 from ...texels.texel_mesh import TexelMesh
 from ...texels.topology import TexelTopology, stretch_summary
 from ..sphere_map import certify, stretch
@@ -36,38 +36,10 @@ from .convention import (
     check_resolution,
     cube_chart_points,
     cube_topology,
+    sampled_areas,
     split_at_edges,
-    texel_areas,
     texel_directions,
 )
-
-
-def cast_rays_exhaustively(
-    sphere: NDArray[np.float64], F: NDArray[np.int64], directions: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Intersect rays from the origin with all triangles (Moeller and Trumbore 1997): slow, simple, the oracle.
-
-    Parameters and results are those of `rays.cast_rays`. The cost is the number of rays times that of triangles. Where
-    a ray meets several triangles on the edge that they share, the one in which it lies deepest is taken.
-    """
-    corner = sphere[F[:, 0]]
-    edge1, edge2 = sphere[F[:, 1]] - corner, sphere[F[:, 2]] - corner
-    to_origin = -corner
-    q = np.cross(to_origin, edge1)
-    triangles = np.empty(len(directions), dtype=np.int64)
-    barycentrics = np.empty((len(directions), 3))
-    for i, direction in enumerate(directions):
-        p = np.cross(direction, edge2)
-        determinant = np.einsum("ij,ij->i", edge1, p)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            u = np.einsum("ij,ij->i", to_origin, p) / determinant
-            v = q @ direction / determinant
-            distance = np.einsum("ij,ij->i", edge2, q) / determinant
-            inside = np.minimum(np.minimum(u, v), 1 - u - v)
-        depth = np.where((distance > 0) & np.isfinite(inside), inside, -np.inf)
-        hit = int(np.argmax(depth))
-        triangles[i], barycentrics[i] = hit, (1 - u[hit] - v[hit], u[hit], v[hit])
-    return triangles, barycentrics
 
 
 @kernel
@@ -179,7 +151,7 @@ def cast_rays(
         If a ray meets no triangle, which a fold-free map rules out.
     """
     hits, seeds = np.full(len(directions), -1, dtype=np.int64), directions[::stride]
-    hits[::stride] = RayScene(sphere, F).cast(np.zeros_like(seeds), seeds).triangle
+    hits[::stride] = RayScene(sphere, F).cast(np.zeros_like(seeds), seeds)[0]
     neighbours, _ = igl.triangle_triangle_adjacency(F)
     barycentrics = np.empty((len(directions), 3))
     lost = _walk_to_triangles(sphere, F, neighbours.astype(np.int64), directions, hits, barycentrics)
@@ -245,10 +217,7 @@ def sphere_map_quality(mesh: Mesh, sphere: NDArray[np.float64]) -> dict[str, flo
 class CubeChartMap:
     """A closed genus-0 mesh on the six charts of the cube; see `ChartMap`.
 
-    Attributes
-    ----------
-    sphere : float64 [vertex_count, 3]
-        Sphere map: one unit vector a vertex.
+    `sphere` [vertex_count, 3] is the sphere map: one unit vector a vertex.
     """
 
     sphere: NDArray[np.float64]
@@ -272,11 +241,11 @@ class CubeChartMap:
         """Mesh and sphere map."""
         return SphereCharts(mesh.V, mesh.F, self.sphere, topology.shape[1])
 
-    def linear_parts(self, mesh: Mesh) -> LinearParts:
+    def linear_parts(self, mesh: Mesh) -> Parts:
         """The triangles, with the directions of their corners."""
-        return LinearParts.whole(self.sphere[mesh.F])
+        return uncut(self.sphere[mesh.F])
 
-    def split(self, corners: NDArray[np.float64]) -> ChartPieces:
+    def split(self, corners: NDArray[np.float64]) -> Parts:
         """Cut triangles with the directions [m, 3, 3] at their corners along the edges of the cube."""
         return split_at_edges(corners)
 
@@ -305,12 +274,14 @@ def atlas_from_sphere_map(mesh: Mesh, sphere: NDArray[np.float64], resolution: i
     positions, normals = _interpolate((mesh.V, mesh.vertex_normals), mesh.F, triangles, barycentrics)
     shape = directions.shape[:3]
     triangles, barycentrics = triangles.reshape(shape), barycentrics.reshape(*shape, 3)
-    topology = cube_topology(resolution)
-    spanned = TexelMesh.of(topology, positions.reshape(*shape, 3), normals=normals.reshape(*shape, 3))
-    areas = texel_areas(mesh, sphere, topology, spanned.areas, triangles, barycentrics)
     return Atlas(
         mesh=mesh,
-        texels=TexelMesh(topology, spanned.positions, spanned.normals, areas),
+        texels=TexelMesh.of(
+            cube_topology(resolution),
+            positions.reshape(*shape, 3),
+            normals=normals.reshape(*shape, 3),
+            sampled=sampled_areas(mesh, sphere, triangles, barycentrics),
+        ),
         chart_map=CubeChartMap(sphere),
         triangles=triangles,
         barycentrics=barycentrics,

@@ -23,31 +23,8 @@ from numpy.typing import NDArray
 from ...errors import AtlasError
 from ...files import require_memory
 from ...mesh.mesh import Mesh
-from ...texels.chart_map import ChartPieces
-from ...texels.texel_mesh import levelled_areas
+from ...texels.chart_map import Parts
 from ...texels.topology import TexelTopology, glue
-
-
-def texel_areas(
-    mesh: Mesh,
-    sphere: NDArray[np.float64],
-    topology: TexelTopology,
-    spanned: NDArray[np.float64],
-    triangles: NDArray[np.int64],
-    barycentrics: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Area of the surface that belongs to each texel [m^2], [6, N, N].
-
-    Parameters
-    ----------
-    mesh, sphere, topology
-        Surface, its sphere map [vertex_count, 3], and the cube's charts.
-    spanned : float64 [6, N, N]
-        Area that the texel mesh spans [m^2]; see `TexelCells.areas`.
-    triangles, barycentrics
-        Where the texels lie; see `Atlas`.
-    """
-    return levelled_areas(topology, spanned, _sampled_areas(mesh, sphere, triangles, barycentrics))
 
 
 def solid_angles(resolution: int) -> NDArray[np.float64]:
@@ -58,7 +35,7 @@ def solid_angles(resolution: int) -> NDArray[np.float64]:
     return np.diff(np.diff(corner, axis=0), axis=1)
 
 
-def _sampled_areas(
+def sampled_areas(
     mesh: Mesh, sphere: NDArray[np.float64], triangles: NDArray[np.int64], barycentrics: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Solid angle of each texel times the real area for each unit of it at the texel's centre [m^2], [6, N, N].
@@ -140,32 +117,6 @@ def cube_topology(resolution: int) -> TexelTopology:
     return glue(np.stack([beyond, back], axis=-1), resolution)
 
 
-@functools.lru_cache(maxsize=1)
-def cube_rotations() -> NDArray[np.float64]:
-    """The 24 rotations that map the cube onto itself, shape [24, 3, 3]."""
-    rotations = []
-    for first in range(6):
-        for second in range(6):
-            x, y = CHART_NORMALS[first], CHART_NORMALS[second]
-            if x @ y == 0:
-                rotations.append(np.stack([x, y, np.cross(x, y)], axis=1))
-    return np.array(rotations, dtype=np.float64)
-
-
-def permute_texels(field: NDArray, transform: NDArray[np.float64]) -> NDArray:
-    """Move a field [6, N, N, ...] by one of the cube's 48 symmetries (a 3 x 3 signed permutation matrix).
-
-    The result r satisfies r(transform @ d) = field(d) for the texel directions d.
-    """
-    n = field.shape[1]
-    directions = texel_directions(n).reshape(-1, 3)
-    chart, row, column = cube_chart_points(directions @ transform.T, n)
-    flat = (chart * n + np.rint(row).astype(int)) * n + np.rint(column).astype(int)
-    result = np.empty_like(field)
-    result.reshape(6 * n * n, *field.shape[3:])[flat] = field.reshape(6 * n * n, *field.shape[3:])
-    return result
-
-
 # Relative to a triangle: what hangs over an edge by less counts as within, and smaller pieces are left out.
 _ROUND_OFF = 1e-12
 _MOST = 8  # places for a polygon's corners
@@ -175,16 +126,18 @@ _SIDES = np.stack(
 ).astype(np.float64)
 
 
-def split_at_edges(corners: NDArray[np.float64]) -> ChartPieces:
+def split_at_edges(corners: NDArray[np.float64]) -> Parts:
     """Cut triangles with the directions [m, 3, 3] at their corners along the edges of the cube."""
-    chart = _chart_of(corners.sum(axis=1))
+    middles = corners.sum(axis=1)
+    axis = np.argmax(np.abs(middles), axis=1)
+    chart = 2 * axis + (np.take_along_axis(middles, axis[:, None], axis=1)[:, 0] < 0)
     inside = (np.einsum("mki,msi->mks", corners, _SIDES[chart]) >= -_ROUND_OFF).all(axis=(1, 2))
     whole, crossing = np.flatnonzero(inside), np.flatnonzero(~inside)
     owner, piece_chart, pieces = _cut(corners[crossing], _SIDES)
     triangle = np.concatenate([whole, crossing[owner]])
     order = np.argsort(triangle, kind="stable")
     barycentrics = np.concatenate([np.tile(np.eye(3), (len(whole), 1, 1)), pieces])[order]
-    return ChartPieces(triangle[order], barycentrics, np.concatenate([chart[whole], piece_chart])[order])
+    return triangle[order], barycentrics, np.concatenate([chart[whole], piece_chart])[order]
 
 
 def chart_uv(directions: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -192,11 +145,6 @@ def chart_uv(directions: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArr
     depth = np.einsum("p...i,pi->p...", directions, CHART_NORMALS[chart])
     sides = np.einsum("p...i,pij->p...j", directions, np.stack([CHART_U, CHART_V], axis=-1)[chart])
     return np.clip(0.5 + np.arctan(sides / depth[..., None]) * (2 / np.pi), 0.0, 1.0)
-
-
-def _chart_of(directions: NDArray[np.float64]) -> NDArray[np.int64]:
-    axis = np.argmax(np.abs(directions), axis=1)
-    return 2 * axis + (np.take_along_axis(directions, axis[:, None], axis=1)[:, 0] < 0)
 
 
 def _cut(

@@ -1,1 +1,5 @@
 """The patch layout: any surface cut into cells, these into square charts with a fold-free map; texels on them."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

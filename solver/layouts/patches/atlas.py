@@ -13,30 +13,26 @@ from numpy.typing import NDArray
 from ...kernel import Floats, Ints, kernel, variant
 from ...mesh.mesh import Mesh
 from ...texels.atlas import Atlas
-from ...texels.chart_map import ChartPieces, LinearParts, barycentrics_at, barycentrics_in, texel_on
-from ...texels.texel_mesh import TexelMesh, levelled_areas
+from ...texels.chart_map import Parts, barycentrics_at, barycentrics_in, texel_on, uncut
+from ...texels.texel_mesh import TexelMesh
 from ...texels.topology import TexelTopology, glue, stretch_summary
 from ..energy import COLUMN, FIXED
 from .layout import PatchMap, patch_map
 from .pieces import Pieces, chart_pieces, warped
 from .quads import CELLS
 from .samples import centres, untangled
-from .seamless import SeamlessMap, Transitions, corner_places, follow, places_seen_from, transitions
+from .seamless import SeamlessMap, corner_places, follow, places_seen_from
 
 
 def map_quality(mesh: Mesh, pieces: Pieces) -> dict[str, float]:
     """Flipped pieces, quantiles of the stretch, starved share of the area; see `Atlas.quality`."""
     u, v = pieces.places[:, 1] - pieces.places[:, 0], pieces.places[:, 2] - pieces.places[:, 0]
     flat = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
-    real = mesh.triangle_areas[pieces.triangle] * _shares(pieces.barycentrics)
+    # the determinant is the share of its triangle that each piece has
+    real = mesh.triangle_areas[pieces.triangle] * np.abs(np.linalg.det(pieces.barycentrics))
     even = flat * mesh.area / (int(pieces.chart.max()) + 1)
     stretch = np.sqrt(real / np.maximum(even, np.finfo(np.float64).tiny))
     return {"flipped": int((flat <= 0).sum()), **stretch_summary(stretch, real)}
-
-
-def _shares(barycentrics: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share of its triangle that each piece has."""
-    return np.abs(np.linalg.det(barycentrics))
 
 
 class PatchCharts(NamedTuple):
@@ -50,12 +46,7 @@ class PatchCharts(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PatchChartMap:
-    """Any mesh on charts; map coordinates are chart, column and row, the latter from 0 to 1. See `ChartMap`.
-
-    Attributes
-    ----------
-    pieces : Pieces
-    """
+    """Any mesh on charts; map coordinates are chart, column and row, the latter from 0 to 1. See `ChartMap`."""
 
     pieces: Pieces
 
@@ -88,15 +79,15 @@ class PatchChartMap:
         """The triangles in space, and their pieces."""
         return PatchCharts(mesh.V[mesh.F], self._first, self.pieces, topology.shape[1])
 
-    def linear_parts(self, mesh: Mesh) -> LinearParts:
+    def linear_parts(self, mesh: Mesh) -> Parts:
         """The pieces."""
         chart = np.broadcast_to(self.pieces.chart[:, None, None], (len(self.pieces.chart), 3, 1))
         coordinates = np.concatenate([chart, self.pieces.places], axis=2)
-        return LinearParts(self.pieces.triangle, self.pieces.barycentrics, coordinates)
+        return self.pieces.triangle, self.pieces.barycentrics, coordinates
 
-    def split(self, corners: NDArray[np.float64]) -> ChartPieces:
+    def split(self, corners: NDArray[np.float64]) -> Parts:
         """Parts of pieces as they are: each lies in one chart."""
-        return ChartPieces.uncut(corners[:, 0, 0].astype(np.int64))
+        return uncut(corners[:, 0, 0].astype(np.int64))
 
     def uv(self, coordinates: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
         """Place [k, ..., 2] in the charts, 0 to 1, of map coordinates [k, ..., 3]."""
@@ -167,7 +158,7 @@ def positions_beyond(patches: PatchMap, topology: TexelTopology, positions: NDAr
     f, k = np.divmod(sides, 3)
     corner = np.where(seamless.freedom[seamless.F[f, k]] != FIXED, k, (k + 1) % 3)
     homes, places = places_seen_from(seamless, f, corner)
-    _draw_rims(seamless, patches.surface.V, sides, transitions(seamless.glued), corner, homes, places, beyond)
+    _draw_rims(seamless, patches.surface.V, sides, corner, homes, places, beyond)
     n = topology.shape[1]
     for chart, corner in np.argwhere(topology.valence == 0):
         row, column = ((0, 0), (0, n + 1), (n + 1, n + 1), (n + 1, 0))[corner]
@@ -200,7 +191,6 @@ def _draw_rims(
     seamless: SeamlessMap,
     V: Floats,
     sides: Ints,
-    across: Transitions,
     corner: Ints,
     homes: Ints,
     places: Floats,
@@ -221,7 +211,7 @@ def _draw_rims(
             along = (i + 0.5) / n
             t = min(max((along - low) / (high - low), 0.0), 1.0)
             qx, qy = (along, p[anchor, 1]) if axis == 0 else (p[anchor, 0], along)
-            chart, _, _, _, x, y = follow(homes[side], p[anchor, 0], p[anchor, 1], qx, qy, seamless.glued, across)
+            chart, _, _, _, x, y = follow(seamless, homes[side], p[anchor, 0], p[anchor, 1], qx, qy)
             row, column = int(np.floor(y * n)) + 1, int(np.floor(x * n)) + 1
             if abs(y) < 1e-9:
                 row = 0
@@ -273,11 +263,10 @@ def atlas_from_patch_map(mesh: Mesh, patches: PatchMap, resolution: int) -> Atla
     pieces = chart_pieces(patches)
     if offsets.any():
         pieces, beyond = warped(pieces, offsets), positions_beyond(patches, topology, samples.positions)
-    spanned = TexelMesh.of(topology, samples.positions, normals=samples.normals, beyond=beyond)
-    areas = levelled_areas(topology, spanned.areas, _map_ratios(patches)[samples.small] / n**2)
+    sampled = _map_ratios(patches)[samples.small] / n**2
     return Atlas(
         mesh=mesh,
-        texels=TexelMesh(topology, samples.positions, samples.normals, areas, beyond),
+        texels=TexelMesh.of(topology, samples.positions, normals=samples.normals, beyond=beyond, sampled=sampled),
         chart_map=PatchChartMap(pieces),
         triangles=samples.triangles,
         barycentrics=samples.barycentrics,

@@ -206,10 +206,6 @@ class BorderedCells:
     arcs: list[list[NDArray[np.int64]]]
     uncut: int
 
-    def short_of_corners(self) -> NDArray[np.int64]:
-        """Cells with fewer than three corners."""
-        return np.flatnonzero([len(each) < 3 for each in self.arcs])
-
 
 def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     """Cut the triangles between cells that are disks, and find the cells' corners.
@@ -222,7 +218,7 @@ def cut_borders(metric: Metric, cells: VoronoiCells) -> BorderedCells:
     label, distance = cells.label[ends], cells.distance[ends]
     between = label[:, 0] != label[:, 1]
     place = np.clip(0.5 + (distance[:, 1] - distance[:, 0]) / (2 * metric.edge_lengths), _LEAST_SHARE, 1 - _LEAST_SHARE)
-    cut = surface.subdivided(np.where(between, place, np.nan), _CUTS).surface
+    cut = surface.subdivided(np.where(between, place, np.nan), _CUTS)[0]
     # each triangle has a vertex of the surface before, and all of those are of its cell
     of_vertex = np.concatenate([cells.label, np.full(len(cut.V) - len(cells.label), -1)])
     cell = of_vertex[cut.F].max(axis=1)

@@ -29,17 +29,17 @@ def with_middles(cells: BorderedCells) -> tuple[Surface, NDArray[np.int64], list
     size = len(surface.V)
     low_high = surface.edges.ends @ [size, 1]
     chosen = np.isin(low_high, np.sort(single, axis=1) @ [size, 1])
-    finer = halved(surface, chosen)
-    middle = dict(zip(map(tuple, surface.edges.ends[chosen].tolist()), finer.middles[chosen].tolist(), strict=True))
+    finer, middles, origin, _ = halved(surface, chosen)
+    middle = dict(zip(map(tuple, surface.edges.ends[chosen].tolist()), middles[chosen].tolist(), strict=True))
     arcs = [
         [arc if len(arc) > 2 else np.insert(arc, 1, middle[min(arc), max(arc)]) for arc in each] for each in cells.arcs
     ]
-    on_border = np.zeros(len(finer.surface.V), bool)
+    on_border = np.zeros(len(finer.V), bool)
     on_border[np.concatenate([arc for each in arcs for arc in each])] = True
-    cell = cells.cell[finer.origin]
-    split = halved_chords(finer.surface, cell, on_border)
-    halves = [[halves_of(split.surface.V, arc) for arc in each] for each in arcs]
-    return split.surface, cell[split.origin], halves
+    cell = cells.cell[origin]
+    split, origin = halved_chords(finer, cell, on_border)
+    halves = [[halves_of(split.V, arc) for arc in each] for each in arcs]
+    return split, cell[origin], halves
 
 
 def halves_of(V: NDArray[np.float64], arc: Path) -> tuple[Path, Path]:
@@ -204,9 +204,9 @@ def with_even_corners(
             ]
         )
     on_border = on_paths(surface, sides)
-    split = halved_chords(surface, part[chart], on_border)
-    old = chart[split.origin]
-    flat, paths = cut_polygons(split.surface, part[old], halves)
+    split, origin = halved_chords(surface, part[chart], on_border)
+    old = chart[origin]
+    flat, paths = cut_polygons(split, part[old], halves)
     new_sides = [*chart_sides(halves, paths), *(sides[each] for each in rest)]
     surface, chart = charts_of(flat.surface, new_sides)
     return surface, chart, new_sides

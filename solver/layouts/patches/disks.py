@@ -51,10 +51,10 @@ def _mended(metric: Metric, cells: VoronoiCells) -> tuple[VoronoiCells, Bordered
             cells = voronoi_cells(metric, np.concatenate([cells.seeds, new]))
             continue
         if len(cells.seeds) < _FEWEST and not surface.edges.rim.any():
-            cells = _with(metric, cells, int(np.argmax(cells.distance)))
+            cells = voronoi_cells(metric, np.union1d(cells.seeds, np.argmax(cells.distance)))
             continue
         bordered = cut_borders(metric, cells)
-        few = bordered.short_of_corners()
+        few = np.flatnonzero([len(each) < 3 for each in bordered.arcs])
         if not len(few):
             return cells, bordered
         cells = _with_corners(metric, cells, few, tried)
@@ -74,10 +74,6 @@ def _with_corners(metric: Metric, cells: VoronoiCells, few: NDArray[np.int64], t
         else:
             gone.append(cell)
     return voronoi_cells(metric, np.union1d(np.delete(cells.seeds, gone), new).astype(np.int64))
-
-
-def _with(metric: Metric, cells: VoronoiCells, seed: int) -> VoronoiCells:
-    return voronoi_cells(metric, np.unique(np.append(cells.seeds, seed)))
 
 
 def _beside(surface: Surface, cells: VoronoiCells, cell: int) -> NDArray[np.bool_]:

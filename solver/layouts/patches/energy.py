@@ -1,4 +1,4 @@
-"""The energy of a seamless map: what a triangle costs that is stretched, squeezed or sheared.
+"""The energy of a seamless map, and its relaxation: what a triangle costs that is stretched, squeezed or sheared.
 
 For the map from a triangle of the surface (area A, scaled so that a chart has area 1 on average) to the charts, with
 singular values s1 >= s2, let D = s1^2 + s2^2 and J = s1 s2. The energy for each unit of area is
@@ -13,6 +13,9 @@ second derivatives, and two numbers: for the antisymmetric change and for the sy
 
 `energy` of the package above says the same law for both maps; the sums here are in another order, and maps onto charts
 amplify round-off: in that order every atlas of this layout would be another, as good as this one.
+
+Newton steps of all vertices at once are cut short by the first triangle that would fold; sweeps over single vertices,
+each inside its star, clear such spots.
 """
 
 from __future__ import annotations
@@ -23,13 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...kernel import Floats, Ints, Ints32, kernel
+from ...mesh.topology import edges_of
 from ...mesh.vectors import cross, dot, subtract
 from ..energy import ARMIJO, COLUMN, FIXED, FREE, MOST_TRIALS, REACH
-from ..newton import System
-from .seamless import SeamlessMap, Transitions, corner_place, rehome_vertex, turned
+from ..newton import CG_TOLERANCE, System, conjugate_gradients, descend_by_newton, line_search
+from .seamless import SeamlessMap, corner_place, rehome, rehome_vertex, turned
 
 FOLDED = 1e-15  # the area of a triangle on the charts must exceed this
-_POWER = 2
+_POWER = 2  # p
 _FLATTEST = 0.02  # least double area over squared length that the energy believes in
 _LEAST_AREA = 1e-6  # of a triangle, in units of their mean
 # what is known of a triangle of the star: the place of its next corner and of the one before, in the vertex's frame,
@@ -42,7 +46,6 @@ class ChartShapes(NamedTuple):
 
     area: Floats  # [m]
     cotangent: Floats  # [m, 3], of their angles
-    power: int  # p
 
 
 def shapes_of(V: NDArray[np.float64], F: NDArray[np.int64], charts: int) -> ChartShapes:
@@ -61,7 +64,7 @@ def shapes_of(V: NDArray[np.float64], F: NDArray[np.int64], charts: int) -> Char
     cotangent = np.stack([dot(ab, ac), -dot(ab, bc), dot(ac, bc)]) / double
     left, right = cotangent[(top + 1) % 3, every], cotangent[(top + 2) % 3, every]
     cotangent[top, every] = (1.0 - left * right) / np.maximum(left + right, tiny)
-    return ChartShapes(area, np.ascontiguousarray(cotangent.T), _POWER)
+    return ChartShapes(area, np.ascontiguousarray(cotangent.T))
 
 
 def total_energy(seamless: SeamlessMap, shapes: ChartShapes) -> float:
@@ -85,24 +88,22 @@ def energy_of(seamless: SeamlessMap, shapes: ChartShapes, triangles: Ints) -> fl
             cotangent[0] * (wx * wx + wy * wy) + cotangent[1] * (vx * vx + vy * vy) + cotangent[2] * (ux * ux + uy * uy)
         )
         dirichlet, jacobian = dirichlet / (2.0 * shapes.area[f]), area / shapes.area[f]
-        total += shapes.area[f] * density(dirichlet, jacobian, shapes.power)
+        total += shapes.area[f] * density(dirichlet, jacobian)
     return total
 
 
 @kernel
-def density(dirichlet: float, jacobian: float, power: int) -> float:
+def density(dirichlet: float, jacobian: float) -> float:
     """Energy W of D and J for each unit of area."""
-    return 0.5 * (0.5 * dirichlet) ** power * (1.0 + (1.0 / (jacobian * jacobian)) ** power)
+    return 0.5 * (0.5 * dirichlet) ** _POWER * (1.0 + (1.0 / (jacobian * jacobian)) ** _POWER)
 
 
 @kernel
-def density_derivatives(
-    dirichlet: float, jacobian: float, power: int
-) -> tuple[float, float, float, float, float, float]:
+def density_derivatives(dirichlet: float, jacobian: float) -> tuple[float, float, float, float, float, float]:
     """W and its derivatives W_D, W_J, W_DD, W_DJ, W_JJ."""
-    straight = 0.5 * (0.5 * dirichlet) ** power
-    inverse = straight * (1.0 / (jacobian * jacobian)) ** power
-    w, p = straight + inverse, float(power)
+    straight = 0.5 * (0.5 * dirichlet) ** _POWER
+    inverse = straight * (1.0 / (jacobian * jacobian)) ** _POWER
+    w, p = straight + inverse, float(_POWER)
     slope_d, slope_j = p * w / dirichlet, -2.0 * p * inverse / jacobian
     bend_d, mixed = (p - 1.0) * slope_d / dirichlet, p * slope_j / dirichlet
     return w, slope_d, slope_j, bend_d, mixed, 2.0 * p * (2.0 * p + 1.0) * inverse / (jacobian * jacobian)
@@ -170,7 +171,7 @@ def _triangle(
     s1, s2 = sum_length + rest_length, sum_length - rest_length
     left, right = (sum_angle + rest_angle) / 2, (rest_angle - sum_angle) / 2
     cl, sl, cr, sr = np.cos(left), np.sin(left), np.cos(right), np.sin(right)
-    _, wd, wj, wdd, wdj, wjj = density_derivatives(s1 * s1 + s2 * s2, s1 * s2, shapes.power)
+    _, wd, wj, wdd, wdj, wjj = density_derivatives(s1 * s1 + s2 * s2, s1 * s2)
     f1, f2 = 2 * s1 * wd + s2 * wj, 2 * s2 * wd + s1 * wj
     f11 = 2 * wd + 4 * s1 * s1 * wdd + 4 * s1 * s2 * wdj + s2 * s2 * wjj
     f22 = 2 * wd + 4 * s2 * s2 * wdd + 4 * s1 * s2 * wdj + s1 * s1 * wjj
@@ -194,7 +195,6 @@ def _triangle(
 def sweep(
     seamless: SeamlessMap,
     shapes: ChartShapes,
-    across: Transitions,
     vertices: Ints,
     star: Floats,
     follow_at_once: bool,
@@ -209,7 +209,7 @@ def sweep(
             x, y = seamless.x[v, 0], seamless.x[v, 1]
             fall += relax_vertex(seamless, shapes, v, star)
             if follow_at_once:
-                rehome_vertex(seamless, across, v, x, y)
+                rehome_vertex(seamless, v, x, y)
     return fall
 
 
@@ -218,7 +218,7 @@ def relax_vertex(seamless: SeamlessMap, shapes: ChartShapes, v: int, star: Float
     """Move one vertex by a Newton step inside its star; return by how much the energy fell. `star` is room."""
     degree = gather(seamless, shapes, v, star)
     x, y, freedom = seamless.x[v, 0], seamless.x[v, 1], seamless.freedom[v]
-    energy, gx, gy, hxx, hxy, hyy = star_slopes(star, degree, x, y, shapes.power)
+    energy, gx, gy, hxx, hxy, hyy = star_slopes(star, degree, x, y)
     if not energy < np.inf:
         return 0.0
     if freedom == FREE:
@@ -232,12 +232,12 @@ def relax_vertex(seamless: SeamlessMap, shapes: ChartShapes, v: int, star: Float
         return 0.0
     step = min(1.0, REACH / np.sqrt(sx * sx + sy * sy))
     for _ in range(MOST_TRIALS):
-        lower = star_energy(star, degree, x + step * sx, y + step * sy, shapes.power)
+        lower = star_energy(star, degree, x + step * sx, y + step * sy)
         if lower < energy - ARMIJO * step * descent:
             # high up a wall a Newton step is far too short
             further = 2.0 * lower < energy
             while further and step * np.hypot(sx, sy) < REACH:
-                least = star_energy(star, degree, x + 2 * step * sx, y + 2 * step * sy, shapes.power)
+                least = star_energy(star, degree, x + 2 * step * sx, y + 2 * step * sy)
                 further = 2.0 * least < lower
                 if least < lower:
                     step, lower = 2 * step, least
@@ -268,7 +268,7 @@ def gather(seamless: SeamlessMap, shapes: ChartShapes, v: int, star: Floats) -> 
 
 
 @kernel
-def star_energy(star: Floats, degree: int, x: float, y: float, power: int) -> float:
+def star_energy(star: Floats, degree: int, x: float, y: float) -> float:
     """Energy of a star whose vertex lies at x, y; infinite if a triangle is folded."""
     total = 0.0
     for i in range(degree):
@@ -280,14 +280,12 @@ def star_energy(star: Floats, degree: int, x: float, y: float, power: int) -> fl
         cot_a = (1.0 - cot_b * cot_c) / (cot_b + cot_c)
         wx, wy = cx - bx, cy - by
         d = cot_a * (wx * wx + wy * wy) + cot_b * (vx * vx + vy * vy) + cot_c * (ux * ux + uy * uy)
-        total += area * density(d / (2.0 * area), flat / area, power)
+        total += area * density(d / (2.0 * area), flat / area)
     return total
 
 
 @kernel
-def star_slopes(
-    star: Floats, degree: int, x: float, y: float, power: int
-) -> tuple[float, float, float, float, float, float]:
+def star_slopes(star: Floats, degree: int, x: float, y: float) -> tuple[float, float, float, float, float, float]:
     """Energy of a star whose vertex lies at x, y, gradient x, y and Hessian xx, xy, yy; infinite if one is folded."""
     energy = gx = gy = hxx = hxy = hyy = 0.0
     for i in range(degree):
@@ -300,7 +298,7 @@ def star_slopes(
         cot_a = (1.0 - cot_b * cot_c) / (cot_b + cot_c)
         wx, wy = cx - bx, cy - by
         d = half * (cot_a * (wx * wx + wy * wy) + cot_b * (vx * vx + vy * vy) + cot_c * (ux * ux + uy * uy))
-        w, wd, wj, wdd, wdj, wjj = density_derivatives(d, flat / area, power)
+        w, wd, wj, wdd, wdj, wjj = density_derivatives(d, flat / area)
         dx, dy = -2.0 * half * (cot_b * vx + cot_c * ux), -2.0 * half * (cot_b * vy + cot_c * uy)
         jx, jy = half * (by - cy), half * (cx - bx)
         bend = 2.0 * half * (cot_b + cot_c) * wd
@@ -324,3 +322,106 @@ def _descent(gx: float, gy: float, hxx: float, hxy: float, hyy: float) -> tuple[
     along = -(gx * ux + gy * uy) / max(first, floor)
     across = -(gy * ux - gx * uy) / max(second, floor)
     return along * ux - across * uy, along * uy + across * ux
+
+
+_LONGEST_STEP = 0.5  # of a chart
+_SWEEPS = 2
+_MOST_STEPS = 30
+_CG_RANGE = 40, 200
+
+
+def scratch(seamless: SeamlessMap) -> Floats:
+    """Room for the star of any vertex, [d, 7]."""
+    return np.empty((int(np.diff(seamless.star_start).max()), TERMS))
+
+
+def sweep_all(seamless: SeamlessMap, shapes: ChartShapes, backwards: bool) -> float:
+    """Move every vertex once, and follow them into their charts; return by how much the energy fell."""
+    before, vertices = seamless.x.copy(), np.arange(len(seamless.x))
+    if backwards:
+        vertices = vertices[::-1].copy()
+    fall = sweep(seamless, shapes, vertices, scratch(seamless), False)
+    rehome(seamless, before)
+    return fall
+
+
+def relax_all(seamless: SeamlessMap, shapes: ChartShapes, least_gain: float) -> None:
+    """Lower the energy of a map in place, until a step saves less than this share of it: sweeps, then Newton steps."""
+    edges = edges_of(seamless.F)
+    ends = edges.ends.astype(np.int32)
+    for i in range(_SWEEPS):
+        sweep_all(seamless, shapes, i % 2 == 0)
+    descend_by_newton(
+        lambda cg_steps: newton_step(seamless, shapes, edges.of, ends, cg_steps),
+        lambda backwards: sweep_all(seamless, shapes, backwards),
+        lambda: total_energy(seamless, shapes),
+        (least_gain, 1, _MOST_STEPS),
+        _CG_RANGE,
+    )
+
+
+def newton_step(
+    seamless: SeamlessMap, shapes: ChartShapes, edge: Ints, ends: Ints32, cg_steps: int
+) -> tuple[float, float]:
+    """Move the map by one Newton step in place; return by how much the energy fell, and the step's length.
+
+    Whole steps have length 1; 0 where no step lowers the energy. `edge` [m, 3] are the edges ab, bc, ca of the
+    triangles, and `ends` [e, 2] their vertices.
+    """
+    system = System.zeros(len(seamless.x), len(ends))
+    energy = total_energy(seamless, shapes)
+    assemble(seamless, shapes, edge, ends, system)
+    _hold(seamless.freedom, ends, system)
+    step = conjugate_gradients(ends, system, cg_steps, CG_TOLERANCE)
+    slope = float((system.gradient * step).sum())
+    if not slope < 0:
+        return 0.0, 0.0
+    before = seamless.x.copy()
+    longest = float(np.sqrt((step * step).sum(axis=1).max()))
+    bound = min(0.9 * _time_of_first_fold(seamless, step), _LONGEST_STEP / longest)
+
+    def energy_at(t: float) -> float:
+        seamless.x[:] = before + t * step
+        return total_energy(seamless, shapes)
+
+    t, lower = line_search(energy, slope, bound, energy_at)
+    seamless.x[:] = before + t * step
+    rehome(seamless, before)
+    return energy - lower, t
+
+
+def _hold(freedom: Ints, ends: Ints32, system: System) -> None:
+    """Take out the directions in which vertices may not move."""
+    free = np.stack([freedom & 1, freedom >> 1], axis=1).astype(bool)
+    system.gradient[~free] = 0.0
+    system.diagonal[~free[:, 0], 0] = system.diagonal[~free[:, 1], 2] = 1.0
+    system.diagonal[~free.all(axis=1), 1] = 0.0
+    held = np.flatnonzero(~free[ends].all(axis=(1, 2)))
+    first, second = free[ends[held]].transpose(1, 0, 2)
+    both = (first[:, :, None] & second[:, None, :]).reshape(-1, 4)
+    system.blocks[held] = np.where(both, system.blocks[held], 0.0)
+
+
+@kernel
+def _time_of_first_fold(seamless: SeamlessMap, step: Floats) -> float:
+    """The first time at which a triangle has no area, if its corners move by `step` in a unit of time."""
+    first = np.inf
+    x, d = np.empty((3, 2)), np.empty((3, 2))
+    for f in range(len(seamless.F)):
+        for k in range(3):
+            v = seamless.F[f, k]
+            x[k, 0], x[k, 1] = corner_place(seamless, f, k)
+            d[k, 0], d[k, 1] = turned(step[v, 0], step[v, 1], seamless.turn[f, k])
+        ux, uy, vx, vy = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[2, 0] - x[0, 0], x[2, 1] - x[0, 1]
+        px, py, qx, qy = d[1, 0] - d[0, 0], d[1, 1] - d[0, 1], d[2, 0] - d[0, 0], d[2, 1] - d[0, 1]
+        c = ux * vy - uy * vx
+        b = ux * qy - uy * qx + px * vy - py * vx
+        a = px * qy - py * qx
+        # the least positive root of a t^2 + b t + c, with c > 0
+        root = b * b - 4 * a * c
+        if root < 0 or (a >= 0 and b >= 0):
+            continue
+        t = 2 * c / (-b + np.sqrt(root))
+        if t > 0:
+            first = min(first, t)
+    return first

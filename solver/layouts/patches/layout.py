@@ -19,10 +19,9 @@ from scipy.sparse.csgraph import connected_components
 from ...kernel import Floats, Ints, kernel
 from ..energy import FIXED, FREE
 from .collapse import without_cuts
-from .energy import ChartShapes, energy_of, gather, shapes_of, star_energy, sweep
+from .energy import ChartShapes, energy_of, gather, relax_all, scratch, shapes_of, star_energy, sweep, sweep_all
 from .quads import CELLS, Quads, large_quads_of, part_of, quads_of
-from .relaxation import relax_all, scratch, sweep_all
-from .seamless import SeamlessMap, Transitions, after, follow, frame_of, inverse, seamless_map, transitions, turned
+from .seamless import SeamlessMap, after, follow, frame_of, inverse, seamless_map, turned
 from .surface import Surface
 
 _LAYERS = 3  # of vertices that a tip's move may move
@@ -30,13 +29,13 @@ _SWEEPS = 3  # over the vertices round a tip, before it is judged
 _WORTH = 1e-3  # share of the energy round a tip that a move must save
 
 
-def move_tips(seamless: SeamlessMap, shapes: ChartShapes, across: Transitions, tips: Ints) -> Ints:
+def move_tips(seamless: SeamlessMap, shapes: ChartShapes, tips: Ints) -> Ints:
     """Move each of these tips to the first neighbour where the energy is lower; return where those are that moved."""
-    return _move_tips(seamless, shapes, across, tips, scratch(seamless))
+    return _move_tips(seamless, shapes, tips, scratch(seamless))
 
 
 @kernel
-def _move_tips(seamless: SeamlessMap, shapes: ChartShapes, across: Transitions, tips: Ints, star: Floats) -> Ints:
+def _move_tips(seamless: SeamlessMap, shapes: ChartShapes, tips: Ints, star: Floats) -> Ints:
     fan = np.empty((2, len(star)), np.int64)
     mark = np.zeros(len(seamless.x) + len(seamless.F), np.int64)
     count = stamp = 0
@@ -50,7 +49,7 @@ def _move_tips(seamless: SeamlessMap, shapes: ChartShapes, across: Transitions, 
                 continue
             stamp += 1
             vertices, triangles = _around(seamless, v, u, mark, stamp)
-            if len(vertices) and _moved(seamless, shapes, across, vertices, triangles, fan, star):
+            if len(vertices) and _moved(seamless, shapes, vertices, triangles, fan, star):
                 moved[count] = u
                 count += 1
                 break
@@ -108,7 +107,6 @@ def _around(seamless: SeamlessMap, v: int, u: int, mark: Ints, stamp: int) -> tu
 def _moved(
     seamless: SeamlessMap,
     shapes: ChartShapes,
-    across: Transitions,
     vertices: Ints,
     triangles: Ints,
     fan: Ints,
@@ -127,11 +125,11 @@ def _moved(
         px, py = star[i, 0] - seamless.x[v, 0], star[i, 1] - seamless.x[v, 1]
         qx, qy = star[i, 2] - seamless.x[v, 0], star[i, 3] - seamless.x[v, 1]
         angle += np.arctan2(px * qy - py * qx, px * qx + py * qy)
-    _enter_chart(seamless, across, v)
+    _enter_chart(seamless, v)
     # round a wide cone's vertex the map may wind twice without a fold
     if angle < 3.0 * np.pi and energy_of(seamless, shapes, triangles) < np.inf:
         for _ in range(_SWEEPS):
-            sweep(seamless, shapes, across, vertices, star, True)
+            sweep(seamless, shapes, vertices, star, True)
         if energy_of(seamless, shapes, triangles) < (1.0 - _WORTH) * before:
             return True
     for i in range(len(vertices)):
@@ -164,7 +162,7 @@ def _put_into_star(seamless: SeamlessMap, shapes: ChartShapes, u: int, v: int, s
         t = 0.65
         for _ in range(trials):
             px, py = x + t * (goal_x - x), y + t * (goal_y - y)
-            energy = star_energy(star, degree, px, py, shapes.power)
+            energy = star_energy(star, degree, px, py)
             if energy < least:
                 least, best_x, best_y = energy, px, py
             elif least < np.inf:
@@ -190,7 +188,7 @@ def _inward(x: float, y: float, lx: float, ly: float, rx: float, ry: float) -> t
 
 
 @kernel
-def _enter_chart(seamless: SeamlessMap, across: Transitions, u: int) -> None:
+def _enter_chart(seamless: SeamlessMap, u: int) -> None:
     """Find the chart in which u lies, on a straight way from a neighbour, and take its frame."""
     first, last = seamless.star_start[u], seamless.star_start[u + 1]
     f, k, j = 0, 0, -1
@@ -205,9 +203,7 @@ def _enter_chart(seamless: SeamlessMap, across: Transitions, u: int) -> None:
     change = after(frame_of(seamless, f, k), inverse(frame_of(seamless, f, (k + j) % 3)))
     qx, qy = turned(seamless.x[u, 0], seamless.x[u, 1], change[0])
     qx, qy = qx + change[1], qy + change[2]
-    chart, turn, sx, sy, px, py = follow(
-        seamless.chart[w], seamless.x[w, 0], seamless.x[w, 1], qx, qy, seamless.glued, across
-    )
+    chart, turn, sx, sy, px, py = follow(seamless, seamless.chart[w], seamless.x[w, 0], seamless.x[w, 1], qx, qy)
     change = after(change, (turn, sx, sy))
     seamless.chart[u], seamless.x[u, 0], seamless.x[u, 1] = chart, px, py
     back = inverse(change)
@@ -262,13 +258,7 @@ _MOST_MOVES = 5  # of a tip, by an edge each
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PatchMap:
-    """A surface laid out on charts.
-
-    Attributes
-    ----------
-    surface : Surface
-    seamless : SeamlessMap
-    """
+    """A surface laid out on charts."""
 
     surface: Surface
     seamless: SeamlessMap
@@ -305,16 +295,15 @@ def relax(V: NDArray[np.float64], seamless: SeamlessMap) -> None:
 
     Cells are small and flat enough for that from where the quads lie; no step folds a triangle.
     """
-    across = transitions(seamless.glued)
     shapes = shapes_of(V, seamless.F, len(seamless.glued))
-    relax_all(seamless, shapes, across, _ROUGH)
+    relax_all(seamless, shapes, _ROUGH)
     tips = np.flatnonzero(seamless.freedom == FIXED)
     for i in range(_MOST_MOVES):
-        tips = move_tips(seamless, shapes, across, tips)
+        tips = move_tips(seamless, shapes, tips)
         if not len(tips):
             break
-        sweep_all(seamless, shapes, across, i % 2 == 0)
-    relax_all(seamless, shapes, across, _FINE)
+        sweep_all(seamless, shapes, i % 2 == 0)
+    relax_all(seamless, shapes, _FINE)
 
 
 def _recut(part: Surface, quads: Quads, count: int, wanted: float, large: bool) -> Quads:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...kernel import Bools, Floats, Ints, kernel
 from .layout import PatchMap
-from .seamless import Transitions, follow, places_on_charts, transitions, turned
+from .seamless import SeamlessMap, follow, places_on_charts, turned
 
 LEAST = 1e-12  # area on a chart below which a piece is left out
 MOST_CORNERS = 12
@@ -46,7 +46,7 @@ def chart_pieces(patches: PatchMap) -> Pieces:
     # squares of the plane that each reaches into, from one to that before another; whole numbers lie on borders
     first = np.floor(places.min(axis=1) + 1e-12).astype(np.int64)
     last = np.maximum(np.ceil(places.max(axis=1) - 1e-12).astype(np.int64), first + 1)
-    given = seamless.glued, transitions(seamless.glued), corner, homes, places, first, last
+    given = seamless, corner, homes, places, first, last
     size = _cut_at_borders(*given, *_room(0))
     origin, chart, weights, cut = _room(size)
     _cut_at_borders(*given, origin, chart, weights, cut)
@@ -63,8 +63,7 @@ def _room(size: int) -> tuple[Ints, Ints, Floats, Floats]:
 
 @kernel
 def _cut_at_borders(
-    glued: Ints,
-    across: Transitions,
+    seamless: SeamlessMap,
     corner: Ints,
     homes: Ints,
     seen: Floats,
@@ -92,7 +91,7 @@ def _cut_at_borders(
                 if corners < 3 or _area(square, corners) < LEAST:
                     continue
                 x, y = square[:corners, 0].mean(), square[:corners, 1].mean()
-                target, turn, sx, sy, _, _ = follow(homes[f], p[k, 0], p[k, 1], x, y, glued, across)
+                target, turn, sx, sy, _, _ = follow(seamless, homes[f], p[k, 0], p[k, 1], x, y)
                 for c in range(1, corners - 1):
                     if count < room:
                         origin[count], chart[count] = f, target

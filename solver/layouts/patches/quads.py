@@ -62,10 +62,19 @@ class Pairing(NamedTuple):
     passed: Bools  # [t], by the path that is tried
 
 
-class Joints(NamedTuple):
-    """Sides between triangles, over which these may be joined.
+def chosen_joints(
+    triangles: NDArray[np.int64],
+    middles: NDArray[np.int64],
+    shape: NDArray[np.float64],
+    triangle_count: int,
+    corners: NDArray[np.int64],
+    wanted: NDArray[np.float64],
+) -> NDArray[np.int64] | None:
+    """The joints, one of each triangle, that leave about as many quads at each cell's middle as are wanted.
 
-    Attributes
+    A joint is a side between triangles, over which these may be joined.
+
+    Parameters
     ----------
     triangles : int64 [k, 2]
         On either side; -1 where there lies none, and where the triangle may stay alone.
@@ -73,22 +82,6 @@ class Joints(NamedTuple):
         Cells at the ends.
     shape : float64 [k]
         Logarithm of the ratio of the diagonals of the quad.
-    """
-
-    triangles: NDArray[np.int64]
-    middles: NDArray[np.int64]
-    shape: NDArray[np.float64]
-
-
-def chosen_joints(
-    joints: Joints, triangle_count: int, corners: NDArray[np.int64], wanted: NDArray[np.float64]
-) -> NDArray[np.int64] | None:
-    """The joints, one of each triangle, that leave about as many quads at each cell's middle as are wanted.
-
-    Parameters
-    ----------
-    joints : Joints
-    triangle_count : int
     corners : int64 [cells]
         How many meet round each cell's middle before any are joined.
     wanted : float64 [cells]
@@ -99,8 +92,8 @@ def chosen_joints(
     int64 [l] or None
         At most one with a triangle that stays alone; None if no way is found with three quads round every middle.
     """
-    kept = np.flatnonzero((joints.triangles[:, 1] >= 0) | (triangle_count % 2 == 1))
-    ends = joints.triangles[kept]
+    kept = np.flatnonzero((triangles[:, 1] >= 0) | (triangle_count % 2 == 1))
+    ends = triangles[kept]
     inner = ends[:, 1] >= 0
     nodes = triangle_count + triangle_count % 2
     ends = np.where(ends < 0, triangle_count, ends)
@@ -109,8 +102,8 @@ def chosen_joints(
         np.searchsorted(ends.T.ravel()[order], np.arange(nodes + 1)),
         order % max(len(kept), 1),
         ends,
-        np.where(inner[:, None], joints.middles[kept], -1),
-        np.where(inner, _SHAPE * joints.shape[kept] ** 2, 0.0),
+        np.where(inner[:, None], middles[kept], -1),
+        np.where(inner, _SHAPE * shape[kept] ** 2, 0.0),
         np.full(nodes, -1),
         corners.copy(),
         wanted,
@@ -243,13 +236,12 @@ def joined(
     at_rim = (glued[..., 0] < 0)[:, 1:3]
     if not at_rim[rest].any(axis=1).all():
         return None
-    joints, first = _joints(surface.V, sides, glued, fans)
+    triangles, middles, shape, first = _joints(surface.V, sides, glued, fans)
     wanted = 4 - _curvature(surface, cell[chart]) + np.bincount(cell, at_rim.all(axis=1))
-    joints = joints._replace(middles=cell[joints.middles])
-    chosen = chosen_joints(joints, len(fans), np.bincount(cell), wanted)
+    chosen = chosen_joints(triangles, cell[middles], shape, len(fans), np.bincount(cell), wanted)
     if chosen is None:
         return None
-    alone = joints.triangles[chosen, 1] < 0
+    alone = triangles[chosen, 1] < 0
     new = [_quad(sides, glued, a) for a in first[chosen[~alone]]]
     new += [_lone_triangle(sides, glued, a) for a in first[chosen[alone]]]
     new += _at_rim(sides, glued, rest, glued[first[chosen[alone]], 0, 0])
@@ -269,8 +261,8 @@ def _curvature(surface: Surface, cell: NDArray[np.int64]) -> NDArray[np.float64]
 
 def _joints(
     V: NDArray[np.float64], sides: list[Sides], glued: NDArray[np.int64], fans: Fans
-) -> tuple[Joints, NDArray[np.int64]]:
-    """Sides over which triangles may be joined, with charts for their cells, and what they are called."""
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    """Joints as `chosen_joints` takes them, with charts for their cells, and what they are called."""
     fan = np.full(len(sides), -1)
     for number, each in enumerate(fans):
         fan[each] = number
@@ -284,7 +276,7 @@ def _joints(
     middle = V[[each[0][0] for each in sides]]
     inside, across = (np.linalg.norm(middle[p] - middle[q], axis=1) for p, q in ((first, second), (third, fourth)))
     shape = np.log(np.maximum(across, 1e-300) / np.maximum(inside, 1e-300))
-    return Joints(np.stack([fan[first], fan[other]], axis=1), np.stack([first, second], axis=1), shape), first
+    return np.stack([fan[first], fan[other]], axis=1), np.stack([first, second], axis=1), shape, first
 
 
 def _whole(sides: list[Sides], glued: NDArray[np.int64], a: int) -> Path:
@@ -379,8 +371,8 @@ def _cut(cells: BorderedCells) -> tuple[Surface, NDArray[np.int64], list[Sides]]
 
 
 def _laid_out(cells: BorderedCells, surface: Surface, chart: NDArray[np.int64], sides: list[Sides]) -> Quads:
-    finer = halved_chords(surface, chart, on_paths(surface, sides))
-    surface, chart = finer.surface, chart[finer.origin]
+    surface, origin = halved_chords(surface, chart, on_paths(surface, sides))
+    chart = chart[origin]
     places = flattened(surface, chart, square_border(surface, sides))
     folded = int((signed_areas(places) <= 0).sum())
     if folded:

@@ -18,7 +18,7 @@ from ...kernel import Bools, Floats, Ints, kernel
 from ...mesh.mesh import Mesh
 from ...texels.topology import TexelTopology
 from .layout import PatchMap
-from .seamless import SeamlessMap, Transitions, follow, places_on_charts, transitions
+from .seamless import SeamlessMap, follow, places_on_charts
 
 _MARGIN = 0.1  # sine of a corner that is wide enough
 
@@ -113,16 +113,14 @@ def locate_in_charts(seamless: SeamlessMap, n: int, charts: Ints) -> tuple[Ints,
     best = np.full((len(charts), n, n), -np.inf)
     corner, homes, places = places_on_charts(seamless)
     chosen = np.flatnonzero(near[homes])
-    across = transitions(seamless.glued)
-    _draw(seamless.glued, across, chosen, corner, homes, places, number, triangles, barycentrics, best)
+    _draw(seamless, chosen, corner, homes, places, number, triangles, barycentrics, best)
     triangles[best < -_ROUND_OFF] = -1
     return triangles, barycentrics
 
 
 @kernel
 def _draw(
-    glued: Ints,
-    across: Transitions,
+    seamless: SeamlessMap,
     chosen: Ints,
     corner: Ints,
     homes: Ints,
@@ -151,7 +149,7 @@ def _draw(
                 least = min(s, t, 1 - s - t)
                 if least < -1e-6:
                     continue
-                found, _, _, _, u, v = follow(home, p[k, 0], p[k, 1], x, y, glued, across)
+                found, _, _, _, u, v = follow(seamless, home, p[k, 0], p[k, 1], x, y)
                 chart, row, column = number[found], int(np.floor(v * n)), int(np.floor(u * n))
                 if chart < 0 or not (0 <= row < n and 0 <= column < n) or least <= best[chart, row, column]:
                     continue
@@ -215,23 +213,9 @@ _AROUND = 2  # texels round a folded one that may move
 def untangled(
     mesh: Mesh, patches: PatchMap, topology: TexelTopology, samples: Samples, beyond: NDArray[np.float64] | None
 ) -> tuple[Samples, NDArray[np.float64]]:
-    """Move texels at the centres of their squares to where fewer are folded.
+    """Move texels at the centres of their squares to where fewer are folded; `beyond` as in `TexelMesh`.
 
-    Parameters
-    ----------
-    mesh : Mesh
-    patches : PatchMap
-    topology : TexelTopology
-    samples : Samples
-        At the centres.
-    beyond : float64 [C, n + 2, n + 2, 3] or None
-        Points of rims [m]; see `TexelMesh`.
-
-    Returns
-    -------
-    Samples
-    offsets : float64 [C, n, n, 2]
-        Column and row by which each texel has moved, in texels; below 0.5.
+    Returns them, and the column and row by which each has moved, in texels, below 0.5, [C, n, n, 2].
     """
     charts, n, _ = topology.shape
     outside = np.full((charts, n + 2, n + 2, 3), np.nan)

@@ -70,6 +70,8 @@ class SeamlessMap(NamedTuple):
     turn: Ints  # [m, 3], right angles from the vertex's frame to the triangle's
     shift: Ints  # [m, 3, 2], after that
     glued: Ints  # [C, 4, 2]
+    side_turn: Ints  # [C, 4], from the frame of each chart to that of the chart beyond each of its sides
+    side_shift: Ints  # [C, 4, 2], after that
     star_start: Ints  # [n + 1], where the corners of each vertex begin
     star: Ints  # [3 m], corners 3 triangle + k by vertex
 
@@ -92,10 +94,11 @@ def seamless_map(quads: Quads) -> SeamlessMap:
         np.zeros((len(F), 3), np.int64),
         np.zeros((len(F), 3, 2), np.int64),
         quads.glued,
+        *_transitions(quads.glued),
         star_start,
         star,
     )
-    _connect(seamless, twin, np.ascontiguousarray(quads.places), transitions(quads.glued))
+    _connect(seamless, twin, np.ascontiguousarray(quads.places))
     return seamless
 
 
@@ -104,18 +107,11 @@ def stars(F: Ints, count: int) -> tuple[Ints, Ints]:
     return counting_sort(F.ravel(), np.arange(F.size), count)
 
 
-class Transitions(NamedTuple):
-    """From the frame of each chart to that of the chart beyond each of its sides: a turn, then a shift."""
-
-    turn: Ints  # [C, 4]
-    shift: Ints  # [C, 4, 2]
-
-
-def transitions(glued: Ints) -> Transitions:
-    """Frame changes across glued sides; side s of one chart runs against side t of the other."""
+def _transitions(glued: Ints) -> tuple[Ints, Ints]:
+    """Frame changes across glued sides, a turn and a shift; side s of one chart runs against side t of the other."""
     here, there = np.arange(4), glued[..., 1]
     turn = (there + 2 - here) % 4
-    return Transitions(turn, CORNERS[(there + 1) % 4] - np.einsum("csij,sj->csi", _TURNS[turn], CORNERS[here]))
+    return turn, CORNERS[(there + 1) % 4] - np.einsum("csij,sj->csi", _TURNS[turn], CORNERS[here])
 
 
 @kernel
@@ -147,11 +143,7 @@ def places_seen_from(seamless: SeamlessMap, triangles: Ints, corner: Ints) -> tu
 def places_on_charts(seamless: SeamlessMap) -> tuple[Ints, Ints, Floats]:
     """Of each triangle the first corner that sits on no cone's tip: it knows in which chart it lies; see above.
 
-    Returns
-    -------
-    corner : int64 [m]
-    chart : int64 [m]
-    places : float64 [m, 3, 2]
+    Returns these corners [m], charts [m], and the places [m, 3, 2] of all corners there.
     """
     free = seamless.freedom[seamless.F] != FIXED
     corner = np.where(free.any(axis=1), free.argmax(axis=1), 2)
@@ -169,7 +161,7 @@ def _side_of(a: Floats, b: Floats, glued: Ints, other: int) -> int:
 
 
 @kernel
-def _connect(seamless: SeamlessMap, twin: Ints, places: Floats, across: Transitions) -> None:
+def _connect(seamless: SeamlessMap, twin: Ints, places: Floats) -> None:
     """Go round each vertex and fill in its place, its freedom, and the frames of its corners."""
     for v in range(len(seamless.x)):
         first = seamless.star[seamless.star_start[v]]
@@ -182,13 +174,11 @@ def _connect(seamless: SeamlessMap, twin: Ints, places: Floats, across: Transiti
             h = t + 1 if t % 3 < 2 else t - 2
             if h == first:
                 break
-        _go_round(seamless, twin, places, across, v, h, at_rim)
+        _go_round(seamless, twin, places, v, h, at_rim)
 
 
 @kernel
-def _go_round(
-    seamless: SeamlessMap, twin: Ints, places: Floats, across: Transitions, v: int, h: int, at_rim: bool
-) -> None:
+def _go_round(seamless: SeamlessMap, twin: Ints, places: Floats, v: int, h: int, at_rim: bool) -> None:
     """Fill in a vertex and its corners, counter-clockwise from corner h, the first one at a rim."""
     first, chart = h, seamless.frame
     turn, sx, sy, crossed = 0, 0, 0, 0
@@ -204,9 +194,9 @@ def _go_round(
         if chart[t // 3] != chart[f]:
             c = chart[f]
             side = _side_of(places[f, k], places[f, before % 3], seamless.glued[c], chart[t // 3])
-            x, y = turned(float(sx), float(sy), across.turn[c, side])
-            sx, sy = int(x) + across.shift[c, side, 0], int(y) + across.shift[c, side, 1]
-            turn = (turn + across.turn[c, side]) % 4
+            x, y = turned(float(sx), float(sy), seamless.side_turn[c, side])
+            sx, sy = int(x) + seamless.side_shift[c, side, 0], int(y) + seamless.side_shift[c, side, 1]
+            turn = (turn + seamless.side_turn[c, side]) % 4
             crossed += 1
         h = t
         if h == first:
@@ -233,20 +223,20 @@ _MOST_CHARTS = 64
 
 
 @kernel
-def rehome(seamless: SeamlessMap, across: Transitions, before: Floats) -> None:
+def rehome(seamless: SeamlessMap, before: Floats) -> None:
     """Follow each vertex from where it was [n, 2], straight to where it is, over the borders of charts."""
     for v in range(len(seamless.x)):
         if seamless.freedom[v] != FIXED:
-            rehome_vertex(seamless, across, v, before[v, 0], before[v, 1])
+            rehome_vertex(seamless, v, before[v, 0], before[v, 1])
 
 
 @kernel
-def rehome_vertex(seamless: SeamlessMap, across: Transitions, v: int, px: float, py: float) -> None:
+def rehome_vertex(seamless: SeamlessMap, v: int, px: float, py: float) -> None:
     """Follow one vertex from p, in its chart."""
     qx, qy = seamless.x[v, 0], seamless.x[v, 1]
     if 0.0 <= qx <= 1.0 and 0.0 <= qy <= 1.0:
         return
-    chart, turn, sx, sy, x, y = follow(seamless.chart[v], px, py, qx, qy, seamless.glued, across)
+    chart, turn, sx, sy, x, y = follow(seamless, seamless.chart[v], px, py, qx, qy)
     seamless.chart[v], seamless.x[v, 0], seamless.x[v, 1] = chart, x, y
     change = turn, sx, sy
     if turn % 2 == 1 and seamless.freedom[v] != FREE:
@@ -260,7 +250,7 @@ def rehome_vertex(seamless: SeamlessMap, across: Transitions, v: int, px: float,
 
 @kernel
 def follow(
-    chart: int, px: float, py: float, qx: float, qy: float, glued: Floats, across: Transitions
+    seamless: SeamlessMap, chart: int, px: float, py: float, qx: float, qy: float
 ) -> tuple[int, int, int, int, float, float]:
     """Go straight from p, in a chart, to q, in its frame.
 
@@ -269,6 +259,7 @@ def follow(
     chart, turn, shift x, shift y, x, y
         The chart in which q lies, the change to its frame, and q there.
     """
+    glued = seamless.glued
     turn, sx, sy, came = 0, 0, 0, -1
     for _ in range(_MOST_CHARTS):
         # the side through which the way leaves the square
@@ -283,7 +274,7 @@ def follow(
             side, least = 3, px / (px - qx)
         if side < 0 or glued[chart, side, 0] < 0:
             break
-        t, ax, ay = across.turn[chart, side], across.shift[chart, side, 0], across.shift[chart, side, 1]
+        t, (ax, ay) = seamless.side_turn[chart, side], seamless.side_shift[chart, side]
         px, py = turned(px, py, t)
         qx, qy = turned(qx, qy, t)
         px, py, qx, qy = px + ax, py + ay, qx + ax, qy + ay

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,9 @@ Patterns = Mapping[int, Sequence[Sequence[int]]]  # see `SPLITS`
 
 # in the order in which the triangles are put
 _SPLITS: Patterns = {number: SPLITS[number] for number in (1, 2, 4, 3, 6, 5, 7)}
+
+# see `Surface.subdivided`
+Cut: TypeAlias = "tuple[Surface, NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -83,7 +87,7 @@ class Surface:
         at_rim[self.edges.ends[self.edges.rim]] = True
         return at_rim
 
-    def subdivided(self, places: NDArray[np.float64], patterns: Patterns = _SPLITS) -> Subdivision:
+    def subdivided(self, places: NDArray[np.float64], patterns: Patterns = _SPLITS) -> Cut:
         """Cut edges, and the triangles beside them.
 
         Parameters
@@ -93,6 +97,17 @@ class Surface:
         patterns : dict, optional
             For each set of cut sides of a triangle (1 for ab, 2 for bc, 4 for ca, added up) the triangles to put in
             its place, by the seven points named in this module.
+
+        Returns
+        -------
+        Surface
+            Its first vertices are those from before.
+        middles : int64 [e]
+            The new vertex on each edge from before; -1 where it was not cut.
+        origin : int64 [m]
+            Of each triangle, the one from before in which it lies.
+        weights : float64 [m, 3, 3]
+            Barycentric coordinates in that one, of its corners.
         """
         edges, count = self.edges, len(self.V)
         cut = np.flatnonzero(~np.isnan(places))
@@ -118,7 +133,7 @@ class Surface:
                 origin.append(touched[chosen])
         source, share = np.concatenate(origin), np.concatenate(weights)
         finer = Surface(np.concatenate(points), np.concatenate(F), self.parent[source], share @ self.inside[source])
-        return Subdivision(finer, middles, source, share)
+        return finer, middles, source, share
 
     def _nodes(
         self, triangles: NDArray[np.int64], middles: NDArray[np.int64], places: NDArray[np.float64]
@@ -137,50 +152,16 @@ class Surface:
         return nodes, local
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Subdivision:
-    """A surface whose edges were cut.
-
-    Attributes
-    ----------
-    surface : Surface
-        Its first vertices are those from before.
-    middles : int64 [e]
-        The new vertex on each edge from before; -1 where it was not cut.
-    origin : int64 [m]
-        Of each triangle, the one from before in which it lies.
-    weights : float64 [m, 3, 3]
-        Barycentric coordinates in that one, of its corners.
-    """
-
-    surface: Surface
-    middles: NDArray[np.int64]
-    origin: NDArray[np.int64]
-    weights: NDArray[np.float64]
-
-
 _ON_RAY = 1e-9  # of the size of a polygon
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Flat:
-    """Parts of a surface laid out in the plane.
-
-    Attributes
-    ----------
-    surface : Surface
-    part : int64 [m]
-    places : float64 [m, 3, 2]
-        Of the triangles' corners.
-    """
+    """Parts of a surface [m] laid out in the plane; `places` [m, 3, 2] are those of the triangles' corners."""
 
     surface: Surface
     part: NDArray[np.int64]
     places: NDArray[np.float64]
-
-    def of(self, finer: Subdivision) -> Flat:
-        """The same on a subdivision of the surface."""
-        return Flat(finer.surface, self.part[finer.origin], finer.weights @ self.places[finer.origin])
 
 
 def central_vertices(flat: Flat, on_border: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -199,7 +180,6 @@ def cut_ray(
 
     Parameters
     ----------
-    flat : Flat
     start, end : int64 [parts]
         Vertices; -1 where a part is not to be cut.
     on_border : bool [n]
@@ -228,15 +208,15 @@ def cut_ray(
     t = np.where(crossed, p / np.where(crossed, p - q, 1.0), np.nan)
     crossed &= (1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3] > 0
     forward = surface.edges.ends[:, 0] == surface.F[triangle, k]
-    finer = surface.subdivided(np.where(crossed, np.where(forward, t, 1 - t), np.nan))
+    finer, middles, source, weights = surface.subdivided(np.where(crossed, np.where(forward, t, 1 - t), np.nan))
     touched = np.flatnonzero(on_ray.any(axis=1))
     inner = np.stack([flat.part[touched].repeat(3), surface.F[touched].ravel(), reach[touched].ravel()])[
         :, on_ray[touched].ravel()
     ]
     cut = np.flatnonzero(crossed)
     distance = ((1 - t) * reach[triangle, k] + t * reach[triangle, (k + 1) % 3])[cut]
-    points = np.concatenate([inner, np.stack([flat.part[triangle[cut]], finer.middles[cut], distance])], axis=1)
-    return flat.of(finer), _paths(points, len(start))
+    points = np.concatenate([inner, np.stack([flat.part[triangle[cut]], middles[cut], distance])], axis=1)
+    return Flat(finer, flat.part[source], weights @ flat.places[source]), _paths(points, len(start))
 
 
 def _place_of(flat: Flat, vertex: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -260,16 +240,22 @@ _MOST_ROUNDS = 100
 _MOST_TRIANGLES, _MOST_GROWTH = 40_000, 3  # of a part; of one that has more to begin with, so many times as many
 
 
-def halved(surface: Surface, chosen: NDArray[np.bool_]) -> Subdivision:
-    """Split chosen edges [e] in their middle."""
+def halved(surface: Surface, chosen: NDArray[np.bool_]) -> Cut:
+    """Split chosen edges [e] in their middle; see `Surface.subdivided`."""
     return surface.subdivided(np.where(chosen, 0.5, np.nan))
 
 
-def halved_chords(surface: Surface, part: NDArray[np.int64], on_border: NDArray[np.bool_]) -> Subdivision:
-    """Split edges inside a part [m] of which both ends lie on its border: flattened, they could lie on one side."""
+def halved_chords(
+    surface: Surface, part: NDArray[np.int64], on_border: NDArray[np.bool_]
+) -> tuple[Surface, NDArray[np.int64]]:
+    """Split edges inside a part [m] of which both ends lie on its border: flattened, they could lie on one side.
+
+    Returns the finer surface, and the triangle from before in which each of its triangles lies.
+    """
     sides = surface.edges.sides
     inner = (sides >= 0).all(axis=1) & (part[sides[:, 0] // 3] == part[sides[:, 1] // 3])
-    return halved(surface, inner & on_border[surface.edges.ends].all(axis=1))
+    finer, _, origin, _ = halved(surface, inner & on_border[surface.edges.ends].all(axis=1))
+    return finer, origin
 
 
 def refined(surface: Surface, longest: float) -> Surface:
@@ -286,5 +272,5 @@ def refined(surface: Surface, longest: float) -> Surface:
         chosen &= lengths > longest
         if not chosen.any() or len(surface.F) > most:
             break
-        surface = halved(surface, chosen).surface
+        surface = halved(surface, chosen)[0]
     return surface

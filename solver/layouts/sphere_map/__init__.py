@@ -1,15 +1,5 @@
 """The sphere map: a closed mesh of genus 0 mapped one-to-one onto the unit sphere, its area spread evenly."""
 
-from .certificate import Certificate, certify, solid_angles, stretch, stretch_quantiles
-from .conformal import conformal_sphere_map
-from .progressive import progressive_sphere_map
+import lazy_loader
 
-__all__ = [
-    "Certificate",
-    "certify",
-    "conformal_sphere_map",
-    "progressive_sphere_map",
-    "solid_angles",
-    "stretch",
-    "stretch_quantiles",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

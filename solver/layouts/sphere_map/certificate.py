@@ -10,13 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ...kernel import Floats, kernel
 from ...mesh.vectors import Vector, cross, dot, row, subtract
 
 EPSILON = float(np.finfo(np.float64).eps)
-QUANTILES = (0.001, 0.01, 0.5, 0.99, 0.999)
 CANDIDATES = 400  # rotations; the cube's own symmetries make that 8 degrees from one to the next
 SHARPNESS = 8  # the power of the squared narrowness that stands for its maximum
 LEAST_SQUARE = 1e-6  # of a width: triangles without area are not narrow texels
@@ -62,16 +61,6 @@ def stretch(V: NDArray[np.float64], F: NDArray[np.integer], S: NDArray[np.float6
     """
     real = areas(V, F)
     return np.sqrt(4 * np.pi / np.sum(real) * real / np.maximum(solid_angles(F, S), np.finfo(np.float64).tiny))
-
-
-def stretch_quantiles(
-    V: NDArray[np.float64], F: NDArray[np.integer], S: NDArray[np.float64], quantiles: ArrayLike = QUANTILES
-) -> NDArray[np.float64]:
-    """Area-weighted quantiles of the stretch: the value that a given share of the real area stays under."""
-    values, weights = stretch(V, F, S), areas(V, F)
-    order = np.argsort(values, kind="stable")
-    share = np.cumsum(weights[order]) / np.sum(weights)
-    return values[order][np.minimum(np.searchsorted(share, quantiles), len(order) - 1)]
 
 
 def areas(P: NDArray[np.float64], F: NDArray[np.integer]) -> NDArray[np.float64]:

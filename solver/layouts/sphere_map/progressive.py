@@ -93,12 +93,7 @@ def tangent_frame(p: Vector) -> tuple[Vector, Vector]:
 def newton_step(level: Level, S: Floats, reference: Reference, cg_steps: int) -> tuple[float, float]:
     """Move S by one Newton step in place, its direction found by up to `cg_steps` steps of conjugate gradients.
 
-    Returns
-    -------
-    float
-        By how much the energy fell; 0 where no step lowers it.
-    float
-        The step's length, 1 for a whole Newton step.
+    Returns by how much the energy fell, 0 where no step lowers it, and the step's length, 1 for a whole Newton step.
     """
     system, x, y = System.zeros(len(S), len(level.ends)), np.empty_like(S), np.empty_like(S)
     energy = assemble(level, S, reference, x, y, system)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shader_functions import evaluated
 
-from ripple_sim.render.contract import linear_to_srgb, srgb_to_linear
+from ripple_sim.render import linear_to_srgb, srgb_to_linear, tone_mapped
 
 FILE = "glsl/tone_mapping.glsl"
 SHOULDER = 0.72
@@ -12,6 +12,12 @@ SHOULDER = 0.72
 
 def mapped(gl, radiance, linear=0):
     return evaluated(gl, FILE, "vec4(tone_mapped(x.rgb), 1.0)", np.asarray(radiance, dtype=float), LINEAR=linear)[:, :3]
+
+
+def test_the_shader_and_numpy_agree(gl):
+    rng = np.random.default_rng(1)
+    radiance = rng.uniform(0, 1, (4000, 3)) * np.geomspace(1e-3, 1e3, 4000)[:, None]
+    np.testing.assert_allclose(mapped(gl, radiance), tone_mapped(radiance), atol=2e-5)
 
 
 def test_below_the_shoulder_it_is_the_srgb_curve(gl):

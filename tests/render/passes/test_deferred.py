@@ -1,14 +1,12 @@
 """Deferred shading: which sizes a driver can draw, what surfaces and the floor reflect, and what shows through."""
 
-import mujoco
 import numpy as np
 import pytest
-from drawn import BALL, FLOOR, FRONT, SUN, ball_surface, frame_of
+from drawn import BALL, FLOOR, FRONT, SUN, ball_surface, frame_of, posed
 
-from ripple_sim.render import Camera, Renderer, Surface
-from ripple_sim.render.contract import srgb_to_linear
-from ripple_sim.render.passes.deferred import TILE, touched_tiles
-from ripple_sim.render.surfaces.surface import Charts
+from ripple_sim.render import Camera, Renderer, Surface, srgb_to_linear
+from ripple_sim.render.passes import TILE, touched_tiles
+from ripple_sim.render.surfaces import Charts
 from ripple_sim.solver import HeightMap, RippleError, sphere_atlas
 
 XML = '<mujoco><worldbody><geom type="sphere" size="1" rgba=".8 .2 .2 1"/></worldbody></mujoco>'
@@ -17,9 +15,7 @@ CLOSE = Camera((0.0, 0.0, 0.0), 4.0, 90.0, 0.0, 20.0)  # the ball fills the fram
 
 
 def frame(gl, size, camera=CAMERA, **options):
-    model = mujoco.MjModel.from_xml_string(XML)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = posed(XML)
     with Renderer(gl, model, {}, size=size, **options) as renderer:
         return renderer.render(data, {}, camera)
 
@@ -52,9 +48,7 @@ def test_a_sharp_edge_of_polished_metal_is_no_brighter_than_its_sides(gl):
       <mesh name="prism" vertex="1 0 -1 -1 1 -1 -1 -1 -1 1 0 1 -1 1 1 -1 -1 1"/></asset><worldbody>
       <light type="directional" dir="-.5 0 -1"/>
       <geom type="mesh" mesh="prism" material="metal"/></worldbody></mujoco>"""
-    model = mujoco.MjModel.from_xml_string(xml)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = posed(xml)
     with Renderer(gl, model, {}, size=(64, 64), samples=0) as renderer:
         column = renderer.render(data, {}, Camera((0.0, 0.0, 0.0), 6.0, 60.0, -40.0, 15.0))[8:56, 24, 0].astype(int)
     edge = int(np.abs(np.diff(column)).argmax())
@@ -71,9 +65,7 @@ def test_ripples_finer_than_a_pixel_look_as_in_a_large_frame_that_is_shrunk(gl, 
     away = np.arccos(np.clip(atlas.positions @ [0.9, -0.9, 1.5], -1.0, 1.0)) / 2
     height_map = HeightMap(atlas.texels)((0.0016 * np.cos(2 * np.pi * away / 0.04)).astype(np.float32))
     surface = Surface(atlas.mesh.V, atlas.mesh.F, Charts.of(atlas), look)
-    model = mujoco.MjModel.from_xml_string('<mujoco><worldbody><geom size=".5"/></worldbody></mujoco>')
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
+    model, data = posed('<mujoco><worldbody><geom size=".5"/></worldbody></mujoco>')
 
     def luminance(size):
         with Renderer(gl, model, {0: surface}, size=(size, size), samples=0) as renderer:

@@ -1,15 +1,12 @@
-"""The floor: its texture, its edges, and what is left of it under alpha.
-
-Ambient occlusion of the floor: geoms occlude the sky, sites do not.
-"""
+"""The floor and the background: texture, edges, alpha, occlusion of the sky, and interpolation of coarse pixels."""
 
 import numpy as np
 import pytest
 from drawn import BALL, FLOOR, FRONT, SIZE, SUN, frame_of
 from scipy.ndimage import binary_erosion
 
-from ripple_sim.render import Camera
-from ripple_sim.render.contract import srgb_to_linear
+from ripple_sim.render import Camera, srgb_to_linear
+from ripple_sim.render.passes import deferred
 
 
 def test_floor_texture_repeats_as_in_mujoco(gl):
@@ -52,6 +49,12 @@ def test_alpha_leaves_the_geoms_and_their_shadows(gl):
     assert shadow.sum() > 50
 
 
+def test_alpha_leaves_no_texture_of_the_floor(gl):
+    asset = '<texture name="c" type="2d" builtin="checker" width="64" height="64"/><material name="c" texture="c"/>'
+    floor = '<geom type="plane" size="0 0 .1" material="c"/>'
+    assert not frame_of(gl, floor, asset=asset, alpha=True).any()
+
+
 def test_sites_hide_no_sky(gl):
     """Under a wide site the floor stays as light as without it where no lamp shines."""
     roof = '<site type="box" size=".5 .5 .02" pos="0 0 .4" rgba="1 0 0 1"/>'
@@ -92,3 +95,44 @@ def test_a_ball_throws_its_colour_on_the_floor_most_where_it_is_lit(gl):
     assert 0.01 < redder[".9 .1 .1", 0.36] < redder[".9 .1 .1", -0.36]
     assert redder[".9 .1 .1", -1.2] == pytest.approx(0.0, abs=0.003)
     assert max(redder[".1 .1 .1", x] for x in (-0.36, 0.36)) < 0.002
+
+
+LAMPS = {
+    "sun": '<light directional="true" dir="-.3 .4 -1"/>',
+    "spot": '<light pos="1 -1 2" dir="-.5 .5 -1" cutoff="25" castshadow="true"/>',
+    "studio": "",
+}
+SOLIDS = '<geom type="sphere" size=".2" pos="0 0 .2"/><geom type="capsule" size=".05 .3" pos=".6 .2 .5"/>'
+
+
+def backgrounds(gl, monkeypatch, size, body: str, **options) -> list[np.ndarray]:
+    """Frames whose size is no multiple of a block: with the background that is interpolated, and that of each pixel."""
+    interpolated = frame_of(gl, body, size=size, **options)
+    monkeypatch.setattr(deferred, "CoarseBackground", deferred.Background)
+    return [interpolated, frame_of(gl, body, size=size, **options)]
+
+
+@pytest.mark.parametrize("lamp", LAMPS)
+@pytest.mark.parametrize("floor", ["0 0 .1", "1.2 .9 .1"], ids=["endless", "finite"])
+@pytest.mark.parametrize("elevation", [-3.0, -25.0])
+def test_the_interpolated_background_is_that_of_each_pixel(gl, monkeypatch, lamp, floor, elevation):
+    body = f'{LAMPS[lamp]}<geom type="plane" size="{floor}" rgba=".8 .7 .6 1"/>{SOLIDS}'
+    camera = Camera((0, 0, 0.2), 3.0, 70.0, elevation)
+    interpolated, exact = backgrounds(gl, monkeypatch, (203, 151), body, camera=camera)
+    assert exact.std() > 5
+    assert np.abs(interpolated - exact).max() <= 3
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        '<geom type="ellipsoid" size=".1 .3 .1" pos=".2 0 .4"/><geom type="box" size=".03 .2 .4" pos="-.3 0 .4"/>',
+        '<geom type="box" size=".2 .2 .2" pos="0 0 .2" euler="0 0 20" rgba=".8 .2 .2 .6"/>',
+    ],
+    ids=["wide", "transparent"],
+)
+def test_interpolated_penumbras_end_where_those_of_each_pixel_do(gl, monkeypatch, solid):
+    body = '<geom type="plane" size="0 0 .1" rgba=".8 .7 .6 1"/>' + solid
+    camera = Camera((0, 0, 0.2), 1.3, 110.0, -22.0)
+    interpolated, exact = backgrounds(gl, monkeypatch, (803, 451), body, camera=camera)
+    assert np.abs(interpolated - exact).max() <= 8

@@ -1,25 +1,23 @@
 """Points, normals, gradients and ambient light that go along with a mesh whose vertices move."""
 
-import mujoco
 import numpy as np
 import pytest
+from drawn import posed
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from ripple_sim import Camera, Material, RippleRenderer, Ripples
-from ripple_sim.render.surfaces.moving import MovingOcclusion, MovingVertices
-from ripple_sim.render.surfaces.vertices import coarse_mesh
-from ripple_sim.render.visuals import shapes
-from ripple_sim.render.visuals.corners import (
+from ripple_sim.render.surfaces import MovingOcclusion, MovingVertices
+from ripple_sim.render.visuals import (
     bake,
     bounding_radius,
     cast,
     frames_about,
+    shapes,
     smooth_normals,
-    triangle_normals,
 )
 from ripple_sim.solver import HeightMap, sphere_atlas
-from ripple_sim.solver.waves.motion import MovedGradients
+from ripple_sim.solver.waves import MovedGradients
 
 TURN = Rotation.from_rotvec([0.4, -1.1, 0.7])
 
@@ -101,20 +99,6 @@ def test_light_does_not_flicker_on_a_surface_that_moves_slowly():
     assert rms(np.diff(values, 2, axis=0)) < 0.002
 
 
-def test_a_coarse_mesh_is_spread_evenly_and_has_no_holes():
-    ball = shapes.ball(40)
-    vertices, F = coarse_mesh(ball.faces, ball.shell, 600)
-    assert len(vertices) == len(np.unique(vertices)) == 600
-    V = ball.shell[vertices]
-    distance = np.linalg.norm(V[:, None] - V[None], axis=2) + 9 * np.eye(600)
-    assert distance.min() > 0.5 * distance.min(axis=0).max()
-    _, count = np.unique(np.sort(F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
-    assert count.min() == 2
-    # now and then one is folded on another
-    outwards = (triangle_normals(V, F) * V[F].mean(axis=1)).sum(axis=1)
-    assert (outwards > 0.9).mean() > 0.99
-
-
 def test_two_sides_of_a_thin_plate_stay_apart():
     plate = shapes.ball(30)
     V = plate.shell * [1.0, 1.0, 0.02]
@@ -128,12 +112,10 @@ def test_two_sides_of_a_thin_plate_stay_apart():
 
 
 def test_a_frame_shows_a_dent_darker_than_with_the_light_at_rest(monkeypatch):
-    model = mujoco.MjModel.from_xml_string(
+    model, data = posed(
         """<mujoco><worldbody><light pos="0 3 0" dir="0 -1 0"/><geom name="target" type="sphere" size=".2"
         rgba=".2 .3 .5 1"/></worldbody></mujoco>"""
     )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
     ripples = Ripples(model, {"target": Material(speed=1.0, density=1.0)}, resolution=8)
     ripples["target"].move(0.2 * dented(ripples["target"].rest.mesh.V / 0.2)[0])
     renderer = RippleRenderer(model, ripples, width=64, height=48)
@@ -176,12 +158,10 @@ def test_gradients_are_those_on_the_moved_surface():
 
 @pytest.mark.parametrize("resolution", [8, 40])  # a sphere of more than 32 is drawn with another mesh than its own
 def test_a_frame_shows_the_surface_where_it_is(resolution):
-    model = mujoco.MjModel.from_xml_string(
+    model, data = posed(
         """<mujoco><worldbody><light pos="0 0 3"/><geom name="target" type="sphere" size=".2" rgba="1 0 0 1"/>
         </worldbody></mujoco>"""
     )
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
     ripples = Ripples(model, {"target": Material(speed=1.0, density=1.0)}, resolution=resolution)
     renderer = RippleRenderer(model, ripples, width=64, height=48)
     camera = Camera(lookat=(0.0, 0.0, 0.0), distance=1.5, azimuth=90.0, elevation=0.0)

@@ -1,8 +1,6 @@
-"""The surface of a target: its look.
+"""The surface of a target: its colour, its heatmap, and both of its sides where it has a rim.
 
-Cutting a mesh at the borders of its charts: nothing is lost, no gap opens, and every triangle has one chart.
-
-Heatmaps: what they refuse.
+A mesh is cut at the borders of its charts: nothing is lost, no gap opens, and every triangle has one chart.
 """
 
 from types import SimpleNamespace
@@ -10,26 +8,16 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 import pytest
-from drawn import FRONT, ball_surface, frame_of
+from drawn import ball_surface, posed
+from hand_made import RIM, flat_charts
 from sphere_height_maps import cube_charts
 
-from ripple_sim.render import LOOKS, Renderer, Surface
-from ripple_sim.render.surfaces.surface import Charts, shared_places, split_at_charts, target_color
+from ripple_sim.render import LOOKS, Camera, Renderer, Surface
+from ripple_sim.render.surfaces import Charts, split_at_charts, target_color
 from ripple_sim.render.visuals import shapes
-from ripple_sim.solver import RippleError
-from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS
-from ripple_sim.solver.texels.texel_atlas import ChartPage
-
-
-def test_the_model_look_takes_the_material_of_the_geom(gl):
-    asset = '<material name="green" rgba="0 .8 0 1"/>'
-    body = '<geom name="t" type="sphere" size=".5" pos="0 0 .5" material="green"/>'
-    middle = np.s_[55:65, 75:85]
-    shown = frame_of(gl, body, asset=asset, camera=FRONT, targets={"t": ball_surface("model")})[middle].mean(
-        axis=(0, 1)
-    )
-    assert shown[1] > shown[0] + 60
-    assert shown[1] > shown[2] + 60
+from ripple_sim.solver import RippleError, TexelMesh, texel_atlas
+from ripple_sim.solver.layouts.cube import CHART_NORMALS
+from ripple_sim.solver.waves import HeightMap
 
 
 @pytest.mark.parametrize(
@@ -52,18 +40,6 @@ def test_a_colour_is_the_given_one_or_the_models_or_the_looks(geom, given, shown
         f'</asset><worldbody><geom type="sphere" size="0.5" {geom}/></worldbody></mujoco>'
     )
     assert target_color(model, 0, "jelly", given) == pytest.approx(shown)
-
-
-def test_a_target_is_drawn_in_the_colour_of_its_geom(gl):
-    body = '<geom name="t" type="sphere" size=".5" pos="0 0 .5" rgba="0 0.8 0 1"/>'
-    shown = frame_of(gl, body, camera=FRONT, targets={"t": ball_surface("rubber")})[55:65, 75:85].mean(axis=(0, 1))
-    assert shown[1] > shown[0] + 60
-    assert shown[1] > shown[2] + 60
-
-
-def test_unknown_look_names_the_valid_ones(gl):
-    with pytest.raises(RippleError, match="'chrome'.*" + ".*".join(LOOKS)):
-        frame_of(gl, '<geom name="t" type="sphere" size=".5"/>', targets={"t": ball_surface("chrome")})
 
 
 def cut_at_charts(mesh, charts) -> SimpleNamespace:
@@ -106,14 +82,18 @@ def welded(positions: np.ndarray, F: np.ndarray) -> np.ndarray:
     return place.ravel()[F]
 
 
-MESHES = [*(pytest.param(ball_mesh(d, s), id=f"ball {d} {s}") for d, s in ((1, 0), (2, 1), (5, 2), (9, 3))),
-          pytest.param(facets(4), id="facets")]  # fmt: skip
+MESHES = {f"ball {d} {s}": ball_mesh(d, s) for d, s in ((1, 0), (2, 1), (5, 2), (9, 3))} | {"facets": facets(4)}
 
 
-@pytest.mark.parametrize("mesh", MESHES)
-def test_no_gap_opens_and_no_area_is_lost(mesh):
-    F, attributes, _ = mesh
-    cut = cut_at_charts(mesh, cube_charts(attributes[:, 6:]))
+@pytest.fixture(params=MESHES)
+def pair(request):
+    """F and attributes of a mesh, and the mesh cut."""
+    F, attributes, same = MESHES[request.param]
+    return F, attributes, cut_at_charts((F, attributes, same), cube_charts(attributes[:, 6:]))
+
+
+def test_no_gap_opens_and_no_area_is_lost(pair):
+    F, attributes, cut = pair
     assert len(cut.F) > len(F)
     before, after = areas(attributes[F][:, :, :3]), areas(cut.attributes[cut.F][:, :, :3])
     assert after.sum() == pytest.approx(before.sum(), rel=1e-10)
@@ -124,35 +104,24 @@ def test_no_gap_opens_and_no_area_is_lost(mesh):
     np.testing.assert_array_equal(directed, np.unique(sides[:, ::-1], axis=0))
 
 
-@pytest.mark.parametrize("mesh", MESHES)
-def test_every_triangle_lies_in_one_chart(mesh):
-    _, attributes, _ = mesh
-    cut = cut_at_charts(mesh, cube_charts(attributes[:, 6:]))
-    chart = cut.chart[cut.F]
+def test_every_triangle_lies_in_one_chart_on_its_side_with_unit_normals(pair):
+    _, _, cut = pair
+    chart, corners = cut.chart[cut.F], cut.attributes[cut.F]
     assert (chart == chart[:, :1]).all()
     # in its share of space the chart's own axis is the nearest of the six
-    along = np.einsum("fki,ci->fkc", cut.attributes[cut.F][:, :, 6:], CHART_NORMALS)
+    along = np.einsum("fki,ci->fkc", corners[:, :, 6:], CHART_NORMALS)
     own = np.take_along_axis(along, chart[:, :, None], axis=2)[..., 0]
     assert (own >= along.max(axis=2) - 1e-9).all()
     assert set(np.unique(chart)) == set(range(6))
-
-
-@pytest.mark.parametrize("mesh", MESHES)
-def test_triangles_keep_their_side_and_vertices_their_unit_normals(mesh):
-    _, attributes, _ = mesh
-    cut = cut_at_charts(mesh, cube_charts(attributes[:, 6:]))
-    corners = cut.attributes[cut.F]
     cross = np.cross(corners[:, 1, :3] - corners[:, 0, :3], corners[:, 2, :3] - corners[:, 0, :3])
     assert (np.einsum("fi,fi->f", cross, corners[:, :, :3].mean(axis=1)) > 0).all()
     np.testing.assert_allclose(np.linalg.norm(cut.attributes[:, 3:6], axis=1), 1.0, atol=1e-9)
     assert (np.einsum("fi,fki->fk", cross, corners[:, :, 3:6]) > 0).all()
 
 
-@pytest.mark.parametrize("mesh", MESHES)
-def test_vertices_are_the_same_on_both_sides_of_a_border_and_nowhere_else(mesh):
+def test_vertices_are_the_same_on_both_sides_of_a_border_and_nowhere_else(pair):
     """Equal where position and normal are: a border is no crease, and a crease stays one."""
-    _, attributes, _ = mesh
-    cut = cut_at_charts(mesh, cube_charts(attributes[:, 6:]))
+    _, _, cut = pair
     _, by_value = np.unique(cut.attributes[:, :6].round(9), axis=0, return_inverse=True)
     pairs = np.unique(np.column_stack([by_value.ravel(), cut.same]), axis=0)
     assert len(np.unique(pairs[:, 0])) == len(pairs) == len(np.unique(pairs[:, 1]))
@@ -178,18 +147,6 @@ def test_texture_coordinates_keep_their_jump_where_a_seam_crosses_a_border():
     assert len(np.unique(cut.same[on_seam])) == 1
 
 
-def test_a_mesh_within_one_chart_stays_as_it_is():
-    F, attributes, same = ball_mesh(8, 5)
-    high = attributes[:, 8] > 0.85
-    F = F[high[F].all(axis=1)]
-    used, number = np.unique(F, return_inverse=True)
-    cut = cut_at_charts((F, attributes, same), cube_charts(attributes[:, 6:]))
-    np.testing.assert_array_equal(cut.F, number.reshape(-1, 3))
-    np.testing.assert_array_equal(cut.attributes, attributes[used])
-    np.testing.assert_array_equal(cut.same, same[used])
-    assert (CHART_NORMALS[cut.chart] == [0, 0, 1]).all()
-
-
 def test_a_long_triangle_over_a_corner_of_the_cube_has_a_part_in_each_chart_there():
     corners = np.array([[1.0, 0.1, 0.1], [0.1, 1.0, 0.1], [0.1, 0.1, 1.0]])
     normal = np.ones((3, 3)) / np.sqrt(3)
@@ -204,46 +161,6 @@ def test_a_long_triangle_over_a_corner_of_the_cube_has_a_part_in_each_chart_ther
     middle = np.linalg.norm(cut.attributes[:, :3] - corners.mean(axis=0), axis=1) < 1e-9
     assert middle.sum() == 3
     assert len(np.unique(cut.same[middle])) == 1
-
-
-def test_heights_on_a_border_are_looked_up_in_one_place():
-    mesh = ball_mesh(5, 6)
-    charts = cube_charts(mesh[1][:, 6:], 10)
-    cut = cut_at_charts(mesh, charts)
-    uv = charts.map.uv(cut.attributes[:, 6:], cut.chart)
-    places = charts.page.places(cut.chart, uv)
-    shared = shared_places(uv, places, cut.same[:, None])
-    for each in np.unique(cut.same):
-        assert len(np.unique(shared[cut.same == each], axis=0)) == 1
-    inside = (np.abs(uv - 0.5) < 0.499).all(axis=1)
-    np.testing.assert_array_equal(shared[inside], places[inside])
-    # the place is one of those that the point has on the page
-    moved = np.flatnonzero((shared != places).any(axis=1))
-    assert len(moved) > 20
-    assert all((places[cut.same == cut.same[i]] == shared[i]).all(axis=1).any() for i in moved)
-
-
-def test_points_inside_a_chart_share_nothing_even_where_they_coincide():
-    uv = np.array([[0.5, 0.5], [0.2, 0.2], [1.0, 0.3], [0.0, 0.7], [0.4, 1.0 - 1e-12]])
-    places = np.arange(10.0).reshape(5, 2)
-    shared = shared_places(uv, places, np.array([[7], [7], [7], [7], [8]]))
-    np.testing.assert_array_equal(shared[[0, 1, 2, 4]], places[[0, 1, 2, 4]])
-    np.testing.assert_array_equal(shared[3], places[2])
-    assert shared_places(uv[:2], places[:2], np.zeros((2, 1))) is not places  # the input stays as it is
-
-
-@pytest.mark.parametrize("shape", [(1, 4, 4), (6, 8, 8), (7, 3, 3)])
-def test_the_page_has_room_for_every_chart_with_its_halo(shape):
-    charts = Charts(None, shape)
-    assert charts.page == ChartPage(shape[0], shape[1])
-    assert charts.halo_shape == (shape[0], shape[1] + 2, shape[2] + 2)
-    width, height = charts.page.size
-    taken = np.zeros((height, width), dtype=int)
-    for chart in range(shape[0]):
-        column, row = charts.page.corner(chart)
-        taken[row : row + charts.halo_shape[1], column : column + charts.halo_shape[2]] += 1
-    assert taken.max() == 1
-    assert taken.sum() == np.prod(charts.halo_shape)
 
 
 COLORS = np.arange(9, dtype=np.uint8).reshape(3, 3)
@@ -264,3 +181,41 @@ def test_what_is_no_heatmap_is_refused(gl) -> None:
             renderer.set_heatmap(1, halo, 1.0)
     with Renderer(gl, model, {0: plain}, size=(32, 24)) as renderer, pytest.raises(RippleError, match="has no heatmap"):
         renderer.set_heatmap(0, halo, 1.0)
+
+
+N = 24
+CORNERS = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+MODEL = """<mujoco><worldbody>
+  <light directional="true" pos="0 0 3" dir=".4 .2 {}" diffuse=".8 .8 .8" castshadow="true"/>
+  <geom name="sheet" type="sphere" size="1"/>
+  <geom type="sphere" size=".2" pos=".3 .1 {}" rgba=".8 .2 .2 1"/>
+</worldbody></mujoco>"""
+
+
+def sheet(turned: bool) -> TexelMesh:
+    """A square that faces up, or the same turned to face down."""
+    return flat_charts([CORNERS[[0, 3, 2, 1]] if turned else CORNERS], [[RIM] * 4], N)
+
+
+def picture(gl, turned: bool, above: bool) -> np.ndarray:
+    """Frame of a bump under a lamp and a ball that are above or below the sheet, as is the camera."""
+    side = 1 if above else -1
+    model, data = posed(MODEL.format(-side, 0.6 * side))
+    texels = sheet(turned)
+    x, y, _ = np.moveaxis(texels.positions, -1, 0)
+    bump = 0.2 * np.exp(-((x + 0.3) ** 2 + y**2) / 0.1)
+    height = (-bump if turned else bump).astype(np.float32)
+    atlas = texel_atlas(texels)
+    surface = Surface(atlas.mesh.V, atlas.mesh.F, Charts.of(atlas), "rubber")
+    camera = Camera((0.0, 0.0, 0.0), 4.0, 90.0, -50.0 * side, 40.0)
+    with Renderer(gl, model, {0: surface}, size=(160, 120), samples=4) as renderer:
+        return renderer.render(data, {0: HeightMap(texels)(height)}, camera).astype(int)
+
+
+def test_a_sheet_looks_the_same_whichever_way_its_triangles_are_wound(gl):
+    """From above and from below: shape, light, shadow of the ball and ambient occlusion."""
+    for above in (True, False):
+        one, turned = (picture(gl, each, above) for each in (False, True))
+        assert np.ptp(one[40:80, 50:110]) > 60  # the bump and the shadow show
+        assert np.abs(one - turned).mean() < 0.5
+        assert (np.abs(one - turned).max(axis=2) > 12).mean() < 0.002

@@ -6,9 +6,7 @@ Ambient occlusion and thickness of solids on which both are known.
 import numpy as np
 import pytest
 
-from ripple_sim.render.visuals import shapes
-from ripple_sim.render.visuals.corners import _hemisphere, _smoothed, bake, corner_normals, frames_about, smooth_normals
-from ripple_sim.solver.mesh.topology import edges_of
+from ripple_sim.render.visuals import bake, corner_normals, shapes, smooth_normals
 
 
 def test_normals_are_smooth_below_the_crease_angle_and_sharp_above():
@@ -51,27 +49,15 @@ def test_nothing_hides_the_sky_from_a_ball():
     np.testing.assert_allclose(thickness, 4 / 3, atol=0.04)
 
 
-def test_the_size_of_a_mesh_changes_nothing():
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("flattening", [1.0, 0.3, 0.1])
+def test_the_size_of_a_mesh_changes_nothing_and_a_flat_one_is_thin(flattening):
     ball = shapes.ball(6)
-    V = ball.shell * [1.0, 0.6, 0.3]
+    V = ball.shell * [1.0, 1.0, flattening]
     normals = smooth_normals(V, ball.faces)
     first, second = (bake(scale * V + offset, ball.faces, normals) for scale, offset in ((1, 0), (1e-3, 5e-3)))
     np.testing.assert_allclose(first, second, atol=5e-3)
-
-
-@pytest.mark.filterwarnings("error")
-def test_a_tiny_body_is_like_any_other():
-    ball = shapes.ball(6)
-    first, second = (bake(radius * ball.shell, ball.faces, ball.shell) for radius in (1.0, 1e-3))
-    np.testing.assert_allclose(first, second, atol=5e-3)
-
-
-def test_a_flat_body_is_thin_and_a_round_one_thick():
-    ball = shapes.ball(8)
-    mean = [
-        bake(V, ball.faces, smooth_normals(V, ball.faces))[:, 1].mean() for V in (ball.shell, ball.shell * [1, 1, 0.1])
-    ]
-    assert mean[1] < 0.4 * mean[0]
+    assert first[:, 1].mean() < 4 / 3 * (0.4 if flattening == 0.1 else 1.1)
 
 
 def test_a_wall_close_above_hides_the_sky_and_one_further_than_the_radius_does_not():
@@ -99,41 +85,9 @@ def test_the_inner_side_of_an_open_surface_sees_what_the_outer_side_of_the_turne
     assert one[used, 2].max() < 0.97 < one[used, 0].min()
 
 
-@pytest.mark.parametrize("count", [16, 64])
-def test_directions_are_cosine_distributed_about_every_normal(count):
-    normals = np.random.default_rng(0).normal(size=(300, 3))
-    normals = np.concatenate([normals, np.eye(3), -np.eye(3)])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    directions = _hemisphere(frames_about(normals), count)
-    np.testing.assert_allclose(np.linalg.norm(directions, axis=2), 1.0, atol=1e-12)
-    cosine = np.einsum("vki,vi->vk", directions, normals)
-    assert cosine.min() > 0
-    np.testing.assert_allclose((cosine**2).mean(axis=1), 1 / 2, atol=1e-12)  # of a Lambertian emitter
-    np.testing.assert_allclose(cosine.mean(axis=1), 2 / 3, atol=0.01)
-    sideways = directions.mean(axis=1) - cosine.mean(axis=1)[:, None] * normals
-    assert np.linalg.norm(sideways, axis=1).max() < 2 / count
-
-
 def test_a_vertex_without_triangles_has_finite_values():
     ball = shapes.ball(4)
     V = np.concatenate([ball.shell, [[0.0, 0.0, 1.5]]])
     normals = smooth_normals(V, ball.faces)
     assert not normals[-1].any()
     assert np.isfinite(bake(V, ball.faces, normals)).all()
-
-
-def test_smoothing_keeps_constants_and_spreads_a_peak_over_two_rings():
-    ball = shapes.ball(6)
-    edges = edges_of(ball.faces).ends
-    np.testing.assert_allclose(_smoothed(np.full(len(ball.shell), 0.3), edges), 0.3)
-    peak = np.zeros(len(ball.shell))
-    peak[17] = 1.0
-    spread = _smoothed(peak, edges)
-    ring = {17}
-    for _ in range(2):
-        ring |= {int(v) for face in ball.faces if ring & set(face) for v in face}
-    assert set(np.flatnonzero(spread)) == ring
-    assert spread.argmax() == 17
-    assert 0 < spread.min() + spread.max() < 1
-    lone = _smoothed(np.array([1.0, 1.0, 1.0, 5.0]), np.array([[0, 1], [0, 2], [1, 2]]))
-    np.testing.assert_allclose(lone[:3], 1.0)

@@ -1,6 +1,6 @@
-"""Capsules in place of geoms: their sizes, which of them count, and how much of the sky they hide.
+"""Geoms and sites that are drawn, their materials, and what is not drawn.
 
-What is not drawn is said.
+Capsules in place of geoms: their sizes, which of them count, and how much of the sky they hide.
 """
 
 import warnings
@@ -8,20 +8,57 @@ import warnings
 import mujoco
 import numpy as np
 import pytest
+from drawn import ABOVE, BALL, FLOOR, FRONT, SIZE, frame_of, posed
+from mujoco_models import mesh_spec
 from shader_functions import evaluated
+from textured import textured_model
 
 from ripple_sim.errors import RippleWarning
-from ripple_sim.render import Renderer
-from ripple_sim.render.contract import MAX_OCCLUDERS
-from ripple_sim.render.visuals.geoms import warn_of_unsupported
-from ripple_sim.render.visuals.objects import Occluders, _capsules
+from ripple_sim.render import MAX_OCCLUDERS, Camera, Renderer
+from ripple_sim.render.visuals import Occluders, geom_visual, look_of
+from ripple_sim.render.visuals.objects import _capsules
+from ripple_sim.scenes.shapes import peanut
 
 
-def posed(geoms: str):
-    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    return model, data
+def test_groups_above_two_are_hidden(gl):
+    hidden = BALL.replace("/>", ' group="3"/>')
+    np.testing.assert_array_equal(frame_of(gl, FLOOR + hidden), frame_of(gl, FLOOR))
+    assert np.abs(frame_of(gl, FLOOR + BALL) - frame_of(gl, FLOOR)).max() > 60
+
+
+def test_sites_of_visible_groups_are_drawn_like_geoms(gl):
+    """As MuJoCo draws them: round, in their colour or their material's, clear where they are, with a shadow."""
+    site = '<site type="sphere" size=".3" pos="0 0 .8" {}/>'
+    plain = frame_of(gl, FLOOR, camera=FRONT)
+    as_body = frame_of(gl, FLOOR + BALL, camera=FRONT)
+    as_site = frame_of(gl, FLOOR + site.format('rgba=".8 .2 .2 1"'), camera=FRONT)
+    ball = (as_body[..., 0] - as_body[..., 2] > 60) & (as_site[..., 0] - as_site[..., 2] > 60)
+    assert ball.sum() > 400
+    upper = ball & (np.arange(SIZE[1])[:, None] < 45)  # of the floor's light the body shades itself a little
+    np.testing.assert_allclose(as_site[upper], as_body[upper], atol=16)
+    np.testing.assert_array_equal(frame_of(gl, FLOOR + site.format('group="3"'), camera=FRONT), plain)
+    clear = frame_of(gl, FLOOR + site.format('rgba=".8 .2 .2 .3"'), camera=FRONT)
+    assert (as_site[ball][:, 0] - as_site[ball][:, 2]).mean() > 2 * (clear[ball][:, 0] - clear[ball][:, 2]).mean() > 10
+    green = frame_of(gl, site.format('material="g"'), asset='<material name="g" rgba="0 .8 0 1"/>', camera=FRONT)
+    assert (green[ball][:, 1] > green[ball][:, 0] + 60).mean() > 0.9
+
+
+def test_a_material_answers_light_as_it_says():
+    """Roughness is taken where it is given; otherwise more shininess is less of it. Reflectance is a coat."""
+
+    def look(attributes: str):
+        return look_of(model := textured_model('<geom size=".1" material="m"/>', attributes), geom_visual(model, 0))
+
+    assert look('roughness="0.3" metallic="1" shininess="0.9"').roughness == pytest.approx(0.3)
+    assert look('roughness="0.3" metallic="1"').metallic == 1.0
+    assert look('shininess="0"').roughness > look('shininess="0.5"').roughness > look('shininess="1"').roughness
+    assert look('reflectance="0.4"').coat == pytest.approx(0.4)
+    assert look('emission="0.7"').emission == pytest.approx(0.7)
+    assert look("").metallic == 0.0
+
+
+def geoms_of(geoms: str):
+    return posed(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
 
 
 @pytest.mark.parametrize(
@@ -35,22 +72,11 @@ def posed(geoms: str):
     ],
 )
 def test_a_capsule_is_as_long_and_about_as_thick_as_its_geom(geom, axis, radius):
-    model, _ = posed(f"<geom {geom}/>")
+    model, _ = geoms_of(f"<geom {geom}/>")
     centre, half_axis, got = _capsules(model, np.array([0]))
     np.testing.assert_allclose(centre[0], 0.0, atol=1e-9)
     np.testing.assert_allclose(np.abs(half_axis[0]), axis, atol=1e-6)
     assert got[0] == pytest.approx(radius)
-
-
-def test_balls_contain_the_geoms_wherever_they_are_turned(resources):
-    model, data = posed(
-        '<geom type="box" size=".9 .1 .4" pos="1 2 3" euler="20 40 70"/><geom type="sphere" size=".3" pos="-1 0 0"/>'
-    )
-    balls = Occluders(resources, model, np.array([0, 1])).balls(data)
-    np.testing.assert_allclose(balls[:, :3], data.geom_xpos, atol=1e-12)
-    corners = np.array([[x, y, z] for x in (-0.9, 0.9) for y in (-0.1, 0.1) for z in (-0.4, 0.4)])
-    assert balls[0, 3] == pytest.approx(np.linalg.norm(corners, axis=1).max())
-    assert balls[1, 3] >= 0.3
 
 
 def row_of_balls(count: int) -> str:
@@ -65,17 +91,9 @@ def bound(resources, model, data, focus) -> np.ndarray:
         return np.frombuffer(occluders._buffer.read(), np.float32).reshape(-1, 2, 4)[: min(model.ngeom, MAX_OCCLUDERS)]
 
 
-@pytest.mark.parametrize("count", [0, 1, MAX_OCCLUDERS, MAX_OCCLUDERS + 1, 2 * MAX_OCCLUDERS])
-def test_the_nearest_to_the_focus_are_bound_and_no_more_than_fit(resources, count):
-    model, data = posed(row_of_balls(count))
-    capsules = bound(resources, model, data, [3.2, 0, 0])
-    order = np.argsort(np.abs(np.arange(count) - 3.2), kind="stable")[:MAX_OCCLUDERS]
-    np.testing.assert_allclose(capsules[:, 0, 0], order, atol=1e-6)
-
-
 def test_capsules_fade_out_before_they_leave_the_list(resources):
     """As the focus moves, no radius jumps, though the list changes."""
-    model, data = posed(row_of_balls(MAX_OCCLUDERS + 6))
+    model, data = geoms_of(row_of_balls(MAX_OCCLUDERS + 6))
     before = None
     for x in np.linspace(4.0, 12.0, 161):
         radii = np.zeros(model.ngeom)
@@ -86,7 +104,7 @@ def test_capsules_fade_out_before_they_leave_the_list(resources):
         if before is not None:
             assert np.abs(radii - before).max() < 0.02
         before = radii
-    model, data = posed(row_of_balls(MAX_OCCLUDERS))  # all of them fit: none fades
+    model, data = geoms_of(row_of_balls(MAX_OCCLUDERS))  # all of them fit: none fades
     np.testing.assert_allclose(bound(resources, model, data, [0, 0, 0])[:, 0, 3], 0.2, atol=1e-6)
 
 
@@ -94,7 +112,7 @@ def test_an_object_has_the_bits_of_all_that_darken_it_by_a_hundredth_but_not_its
     """Whatever is left out hides less than a hundredth of the sky from any point of the object."""
     rng = np.random.default_rng(7)
     places, sizes = rng.uniform(-2, 2, (MAX_OCCLUDERS, 3)), rng.uniform(0.02, 0.2, MAX_OCCLUDERS)
-    model, data = posed(
+    model, data = geoms_of(
         "".join(
             f'<geom type="capsule" size="{r} {2 * r}" pos="{x} {y} {z}"/>'
             for r, (x, y, z) in zip(sizes, places, strict=True)
@@ -121,7 +139,7 @@ def visibility(gl, points, normal, near=1):
 
 
 def test_a_geom_hides_more_of_the_sky_the_nearer_it_is_and_none_from_itself_or_from_behind(gl, resources):
-    model, data = posed('<geom type="sphere" size=".3"/>')
+    model, data = geoms_of('<geom type="sphere" size=".3"/>')
     bound(resources, model, data, [0, 0, 0])
     away = np.linspace(0.3, 30.0, 60)
     below = np.column_stack([0 * away, 0 * away, -away])
@@ -135,26 +153,48 @@ def test_a_geom_hides_more_of_the_sky_the_nearer_it_is_and_none_from_itself_or_f
 
 
 def test_a_long_geom_is_as_near_as_its_nearest_point(gl, resources):
-    model, data = posed('<geom type="capsule" size=".1 2" euler="0 90 0"/>')
+    model, data = geoms_of('<geom type="capsule" size=".1 2" euler="0 90 0"/>')
     bound(resources, model, data, [0, 0, 0])
     beside = visibility(gl, [[0, 0, -0.5], [1.5, 0, -0.5], [-1.9, 0, -0.5]], "0, 0, 1")
     np.testing.assert_allclose(beside, beside[0], atol=1e-5)
     assert visibility(gl, [[3.5, 0, -0.5]], "0, 0, 1")[0] > beside[0]
 
 
-def test_what_is_not_drawn_is_said_once(gl):
-    body = (
-        """<body name="a" pos="0 0 1"><joint type="slide"/><geom size=".1"/><site name="s"/></body><site name="w"/>"""
-    )
-    tendon = '<tendon><spatial><site site="s"/><site site="w"/></spatial></tendon>'
-    xml = f"<mujoco><worldbody>{body}</worldbody>{tendon}</mujoco>"
-    with pytest.warns(RippleWarning, match="1 tendons"):
-        Renderer(gl, mujoco.MjModel.from_xml_string(xml), {}, size=(32, 24)).close()
+GEOM, FLEX = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_FLEX
+TENDON = """<body name="a" pos="0 0 .5"><joint type="slide"/><geom size=".02"/><site name="s" euler="180 0 0"/></body>
+<site name="w" pos=".6 0 .5"/>"""
 
 
-def test_a_fixed_tendon_has_nothing_to_draw():
-    body = """<body><joint name="x" type="slide"/><geom size=".1"/></body>"""
-    tendon = '<tendon><fixed><joint joint="x" coef="1"/></fixed></tendon>'
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", RippleWarning)
-        warn_of_unsupported(mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{body}</worldbody>{tendon}</mujoco>"))
+def test_tendons_flexes_and_skins_are_drawn_and_what_has_no_surface_is_told_once(gl):
+    spatial = '<tendon><spatial width=".05" rgba="1 0 0 1"><site site="s"/><site site="w"/></spatial></tendon>'
+    sheet = '<flexcomp name="f" type="grid" count="3 3 1" spacing=".2 .2 .1" dim="2" pos="0 0 .5" rgba="1 0 0 1">'
+    sheet += '<edge equality="true"/></flexcomp>'
+    cable = sheet.replace("3 3 1", "3 1 1").replace('dim="2"', 'dim="1" radius=".05"')
+    for body, rest in ((TENDON, spatial), (sheet, ""), (cable, "")):
+        model, data = posed(f"<mujoco><worldbody>{FLOOR}{body}</worldbody>{rest}</mujoco>")
+        with warnings.catch_warnings(), Renderer(gl, model, {}, size=SIZE) as renderer:
+            warnings.simplefilter("error", RippleWarning)
+            red, green, _ = np.moveaxis(renderer.render(data, {}, ABOVE).astype(int), 2, 0)
+        assert (red - green > 60).sum() > 50
+    ray = '<sensor><rangefinder site="s"/></sensor>'
+    model, data = posed(f"<mujoco><worldbody>{FLOOR}{TENDON}</worldbody>{ray}</mujoco>")
+    with Renderer(gl, model, {}, size=SIZE) as renderer, pytest.warns(RippleWarning, match="mjGEOM_LINE") as told:
+        renderer.render(data, {}, FRONT)
+        data.qpos[0] += 0.01
+        mujoco.mj_forward(model, data)
+        renderer.render(data, {}, FRONT)
+    assert len(told) == 1
+
+
+def test_flexes_that_stand_for_geoms_are_not_drawn(gl):
+    V, F = peanut(0.06)
+    spec = mesh_spec((V, F))
+    for drawn in (False, True):
+        if drawn:
+            spec.add_flex(name="other", dim=2, vertbody=["base"], vert=1.1 * V.ravel(), elem=F.ravel())
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        with Renderer(gl, model, {}, size=SIZE) as renderer:
+            image = renderer.surfaces(data, {}, Camera(tuple(model.stat.center), 0.3, 90.0, -20.0))
+        assert {-1, int(FLEX if drawn else GEOM)} == set(np.unique(image.identity[..., 1]))

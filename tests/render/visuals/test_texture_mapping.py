@@ -15,12 +15,7 @@ from ripple_sim.render import Camera, Renderer, Surface
 from ripple_sim.render.visuals import shapes
 
 SIZE = 96
-
-
 FROM_X = Camera((0.0, 0.0, 0.0), 4.0, 180.0, 0.0, 20.0)  # the frame's right is +y, its up +z
-
-
-ABOVE = Camera((0.0, 0.0, 0.0), 4.0, 90.0, -89.99, 20.0)  # right is +x, up +y
 
 
 def names(gl, model, places, camera=FROM_X, targets=None) -> str:
@@ -40,54 +35,6 @@ def names(gl, model, places, camera=FROM_X, targets=None) -> str:
 
 def corners(distance: int) -> list[tuple[int, int]]:
     return [(-distance, distance), (distance, distance), (-distance, -distance), (distance, -distance)]
-
-
-@pytest.mark.parametrize(
-    ("geom", "camera", "expected"),
-    [
-        # once round: at +x the texture's right edge meets its left one
-        ('type="sphere" size=".4"', FROM_X, "gryb"),
-        ('type="ellipsoid" size=".4 .5 .6"', FROM_X, "gryb"),
-        ('type="cylinder" size=".4 .5"', FROM_X, "gryb"),
-        ('type="capsule" size=".3 .5"', FROM_X, "gryb"),
-        ('type="box" size=".4 .5 .6"', FROM_X, "rgby"),
-        ('type="box" size=".4 .5 .6"', ABOVE, "rgby"),
-        ('type="cylinder" size=".5 .3"', ABOVE, "byrg"),  # the discs are upside down
-        ('type="plane" size=".5 .5 .1"', ABOVE, "rgby"),
-        ('type="plane" size="0 0 .1"', ABOVE, "rgby"),  # repeats every 2 m, and begins at -1 m
-    ],
-)
-def test_a_flat_texture_lies_on_each_primitive_as_in_mujoco(gl, geom, camera, expected):
-    model = textured_model(f'<geom {geom} material="m"/>')
-    assert names(gl, model, corners(9), camera) == expected
-
-
-def test_the_ends_of_a_capsule_have_whole_textures_of_their_own(gl):
-    model = textured_model('<geom type="capsule" size=".4 .1" material="m"/>')
-    # upwards over the lower end, the straight part, the upper end; the texture's upper edge is always above
-    heights = [-0.46, -0.25, -0.05, 0.05, 0.25, 0.46]
-    pixels = SIZE / (2 * 4 * np.tan(np.radians(10)))
-    assert names(gl, model, [(6, round(z * pixels)) for z in heights]) == "brbrbr"
-
-
-def test_repetitions_are_counted_along_the_object_or_with_texuniform_in_units_of_its_size(gl):
-    geom = '<geom type="box" size=".5 .5 .5" material="m"/>'
-    assert names(gl, textured_model(geom, 'texrepeat="2 1"'), [(-29, 9), (-10, 9), (10, 9), (29, 9)]) == "rgrg"
-    assert names(gl, textured_model(geom, 'texuniform="true"'), corners(9)) == "rrrr"
-    assert (
-        names(gl, textured_model(geom, 'texuniform="true" texrepeat="2 4"'), [(-29, 29), (-29, 10), (10, 29), (10, 10)])
-        == "rbgy"
-    )
-    plane = '<geom type="plane" size=".5 .5 .1" material="m"/>'
-    assert names(gl, textured_model(plane, 'texuniform="true"'), corners(9), ABOVE) == "rrrr"
-
-
-def test_a_cube_texture_is_stretched_over_a_primitive_or_with_texuniform_is_not(gl):
-    """The side of a flat box seen under 45 degrees shows up as such, or as what lies beyond its far edge."""
-    geom = '<geom type="box" size=".2 .6 .6" material="m"/>'
-    assert names(gl, textured_model(geom, kind="cube"), [(-20, 0), (0, 0), (20, 0)]) == "rrr"
-    assert names(gl, textured_model(geom, 'texuniform="true"', kind="cube"), [(-20, 0), (0, 0), (20, 0)])[1] == "r"
-    assert names(gl, textured_model(geom, 'texuniform="true"', kind="cube"), [(-20, 0), (20, 0)]) != "rr"
 
 
 @pytest.mark.parametrize(("shape", "look"), [("sphere", "model"), ("capsule", "model"), ("sphere", "rubber")])

@@ -1,14 +1,62 @@
-"""The two backends against each other, feature by feature."""
+"""Backends by name, and against each other: feature by feature, on rims, irregular vertices and several parts."""
+
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
-from features import FEATURES
+from hand_made import flat_torus, polygon, square, two_squares
 
-from ripple_sim.solver import Atlas, Material, WaveSolver, build_atlas, sphere_atlas
-from ripple_sim.solver.backends.backend import make_backend
-from ripple_sim.solver.operator.assembly import build_operator
+from ripple_sim.solver import (
+    Atlas,
+    GLError,
+    Material,
+    SolverError,
+    TexelMesh,
+    WaveSolver,
+    build_atlas,
+    sphere_atlas,
+    texel_atlas,
+)
+from ripple_sim.solver.backends import auto_backend, backend, make_backend
+from ripple_sim.solver.gl import GLContext, shared_context
+from ripple_sim.solver.operator import WaveOperator, build_operator
 
 STEPS = 1000
+
+
+def north(atlas: Atlas) -> np.ndarray:
+    return atlas.positions[..., 2] > 0.3
+
+
+def maps(atlas: Atlas) -> Material:
+    """Every coefficient a map of random numbers."""
+    rng, shape, z = np.random.default_rng(8), atlas.areas.shape, atlas.positions[..., 2]
+    return Material(
+        speed=rng.uniform(0, 0.6, shape) * (z < 0.1),
+        damping=rng.uniform(0, 1, shape),
+        stiffness=rng.uniform(0, 5, shape),
+        viscosity=rng.uniform(0, 1e-3, shape),
+        density=rng.uniform(1, 2, shape),
+        bending=rng.uniform(0, 1e-6, shape) * (z < 0.1),
+        yield_height=rng.uniform(1e-3, 1e-2, shape),
+        fixed=atlas.positions[..., 0] > 0.2,
+    )
+
+
+FEATURES: dict[str, Callable[[Atlas], Material]] = {
+    "plain": lambda atlas: Material(speed=1.0),
+    "damping and density maps": lambda atlas: Material(
+        speed=1.0, damping=0.3 * north(atlas), density=1.0 + north(atlas)
+    ),
+    "speed map": lambda atlas: Material(speed=1.0 + 0.5 * atlas.positions[..., 0]),
+    "reflecting region": lambda atlas: Material(speed=1.0 * ~north(atlas)),
+    "fixed": lambda atlas: Material(speed=1.0, fixed=north(atlas)),
+    "viscosity": lambda atlas: Material(speed=1.0, viscosity=1e-3),
+    "bending and viscosity": lambda atlas: Material(speed=0.5, bending=1e-4, viscosity=1e-3),
+    "every map": maps,
+    "yield map": lambda atlas: Material(speed=1.0, yield_height=np.where(north(atlas), 5e-3, np.inf), stiffness=10.0),
+}
 
 
 def struck(atlas: Atlas, material: Material, backend: str) -> list[np.ndarray]:
@@ -70,9 +118,110 @@ def test_gl_equals_cpu(animal: Atlas, gl_backend: str, operator: str) -> None:
         waves = WaveSolver(animal, material, backend=name, operator=operator)
         waves.add_impulse(animal.mesh.V[100], 1.0, 0.06)
         waves.add_impulse(animal.mesh.V[900], 0.5, 0.1)
-        waves._backend.advance(1000, waves.stable_timestep)
+        waves._backend.advance(300, waves.stable_timestep)
         return waves.height
 
     reference = run("cpu")
     assert np.abs(reference).max() > 0
     assert np.abs(run(gl_backend) - reference).max() <= 1e-5 * np.abs(reference).max()
+
+
+MATERIALS = {
+    "membrane": Material(speed=1.0, damping=0.3),
+    "viscous plate": Material(speed=0.5, bending=1e-4, viscosity=1e-3, stiffness=4.0),
+    "plastic": Material(density=2.0, yield_height=0.2, stiffness=50.0),
+}
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize(
+    ("texels", "rim"),
+    [
+        *((each, "free") for each in (square(11), polygon(3, 8), polygon(5, 9), polygon(6, 12), flat_torus(10))),
+        (two_squares(7), "free"),
+        (polygon(5, 12), "fixed"),
+    ],
+    ids=lambda each: each if isinstance(each, str) else str(each.shape),
+)
+def test_gl_equals_cpu_on_any_topology(gl_backend: str, texels: TexelMesh, rim: str, material: str) -> None:
+    atlas, heights = texel_atlas(texels), []
+    start = np.random.default_rng(4).standard_normal(texels.shape).astype(np.float32)
+    for name in ("cpu", gl_backend):
+        waves = WaveSolver(atlas, MATERIALS[material], backend=name, rim=rim)
+        waves.height = start
+        waves.add_impulse(atlas.positions[0, 0, 0], 0.01, 0.3)
+        waves.step(0.5)
+        heights.append(waves.height)
+    assert np.abs(heights[0] - heights[1]).max() < 1e-5 * np.abs(heights[0]).max()
+    assert np.abs(heights[0] - start).max() > 0.1
+
+
+@pytest.fixture
+def operator() -> WaveOperator:
+    return build_operator(texel_atlas(square(4)), Material(speed=1.0), "fem")
+
+
+@pytest.mark.parametrize("name", ["cuda", "", "CPU"])
+def test_an_unknown_backend_is_named_beside_the_valid_ones(operator: WaveOperator, name: str) -> None:
+    with pytest.raises(SolverError, match=f"backend '{name}' does not exist; valid are 'auto', 'gl', 'cpu'"):
+        make_backend(name, operator)
+
+
+def test_auto_takes_the_cpu_where_opengl_is_software(opengl: None, operator: WaveOperator) -> None:
+    assert auto_backend() == "cpu"
+    assert make_backend("auto", operator).name == "cpu"
+
+
+@pytest.fixture
+def hardware(opengl: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> GLContext:
+    """The software driver, taken for hardware of which nothing is known."""
+    monkeypatch.setattr(GLContext, "software", False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(backend, "_SIZES", (8, 24))
+    backend.measured.cache_clear()
+    yield shared_context()
+    backend.measured.cache_clear()
+
+
+def test_auto_takes_what_was_measured_to_be_faster(
+    hardware: GLContext, operator: WaveOperator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A GPU that takes 1 ms for any number of texels, a processor that takes 1 ms for 4,000."""
+    known = backend.Measured((1000.0, 8000.0), (1e-3, 1e-3), (0.25e-3, 2e-3))
+    monkeypatch.setattr(backend, "measure", lambda gl: known)
+    assert [auto_backend(texels) for texels in (16, 3900, 4100, 10**6)] == ["cpu", "cpu", "gl", "gl"]
+    assert make_backend("auto", operator).name == "cpu"
+    assert str(known) == "1,000 texels: 1.00 ms GL, 0.25 ms CPU; 8,000 texels: 1.00 ms GL, 2.00 ms CPU"
+
+
+def test_a_machine_is_measured_once(hardware: GLContext, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = backend.measured(hardware)
+    assert first.texels == (384.0, 3456.0)
+    assert min(first.gl + first.cpu) > 0
+    backend.measured.cache_clear()  # as another process does
+    monkeypatch.setattr(backend, "measure", lambda gl: pytest.fail("measured twice"))
+    assert backend.measured(hardware) == first
+    assert auto_backend(10**6) == first.faster(10**6)
+
+
+def test_without_opengl_auto_takes_the_cpu_and_gl_is_an_error(
+    operator: WaveOperator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(device: int | None) -> None:
+        raise GLError("no OpenGL 4.3 context")
+
+    monkeypatch.setattr("ripple_sim.solver.gl.context.create_context", fail)
+    monkeypatch.setattr("ripple_sim.solver.gl.context._shared", {})
+    assert make_backend("auto", operator).name == "cpu"
+    with pytest.raises(GLError, match=r"no OpenGL 4\.3"):
+        make_backend("gl", operator)
+
+
+def test_a_new_backend_is_at_rest_and_stays_there(operator: WaveOperator, backend: str) -> None:
+    waves = make_backend(backend, operator)
+    assert waves.name == backend
+    waves.advance(3, 0.01)
+    waves.wait()
+    assert waves.finite()
+    for field in (waves.height(), waves.velocity(), waves.dent()):
+        assert field.dtype == np.float32 and field.shape == (1, 4, 4) and not field.any()

@@ -1,16 +1,17 @@
-"""Fields, links and lists in storage buffers, and compute shaders over them, against numpy."""
+"""Fields, links and lists in storage buffers, and compute shaders over them, against numpy.
+
+The stiffness that the GPU makes of moved vertices against the CPU's.
+"""
 
 import numpy as np
 import pytest
 from hand_made import flat_torus, polygon, square, two_squares
 
-from ripple_sim.solver import TexelMesh
-from ripple_sim.solver.backends.gl_dispatch import Dispatch
-from ripple_sim.solver.backends.gl_fields import FieldLayout, LinkBuffers, TexelList
-from ripple_sim.solver.gl import shared_context
+from ripple_sim.solver import Atlas, Material, Mesh, TexelMesh, WaveSolver, build_atlas, sphere_atlas, texel_atlas
+from ripple_sim.solver.backends import Dispatch, FieldLayout, TexelList, link_buffers
+from ripple_sim.solver.gl import GLContext, shared_context
 
 pytestmark = pytest.mark.usefixtures("opengl")
-
 MESHES = [square(1), square(66), flat_torus(17), polygon(3, 9), two_squares(3)]
 
 
@@ -19,47 +20,8 @@ def texels(request: pytest.FixtureRequest) -> TexelMesh:
     return request.param
 
 
-def numbers(texels: TexelMesh) -> np.ndarray:
-    return np.arange(1, texels.areas.size + 1, dtype=np.float32).reshape(texels.shape)
-
-
-def floats(buffer) -> np.ndarray:
-    with shared_context():
-        return np.frombuffer(buffer.read(), np.float32).copy()
-
-
-def integers(buffer) -> np.ndarray:
-    with shared_context():
-        return np.frombuffer(buffer.read(), np.int32).copy()
-
-
 def field(texels: TexelMesh, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).standard_normal(texels.shape).astype(np.float32)
-
-
-def test_a_field_comes_back_as_it_was_uploaded_or_written(texels: TexelMesh) -> None:
-    layout, values = FieldLayout(shared_context(), texels.topology), numbers(texels)
-    buffer = layout.upload(values, np.float32(0.5))
-    first, second = floats(buffer).reshape(2, -1)
-    for places, expected in ((first, values.ravel()), (second, np.full(values.size, 0.5))):
-        np.testing.assert_array_equal(places[layout.texels], expected)
-        assert np.count_nonzero(places) == values.size, "zeros round the texels"
-    buffer = layout.zeros()
-    layout.write(buffer, -values)
-    np.testing.assert_array_equal(layout.read(buffer), -values)
-
-
-def test_a_filled_halo_shows_what_lies_round_every_texel(texels: TexelMesh) -> None:
-    gl, n = shared_context(), texels.shape[1]
-    layout = FieldLayout(gl, texels.topology)
-    buffer = layout.upload(numbers(texels))
-    with gl:
-        Dispatch(gl, layout).fill_halo(buffer)
-    around = texels.topology.with_halo(numbers(texels))
-    address = layout.texels.reshape(texels.shape)
-    for r, c in np.ndindex(3, 3):
-        seen = floats(buffer)[address + (r - 1) * (n + 2) + c - 1]
-        np.testing.assert_array_equal(seen, around[:, r : r + n, c : c + n])
 
 
 @pytest.mark.parametrize("defines", [{}, {"FACTOR": 1}, {"SUBTRACT": 1}, {"SUBTRACT": 1, "ADD": 1}], ids=str)
@@ -76,11 +38,11 @@ def test_the_stencil_is_applied_to_every_texel_once(texels: TexelMesh, defines: 
         dispatch.run_texels(dispatch.texel_shader("apply", **defines))
         irregular = dispatch.shader("irregular", KICK=0)
         scale = (factor if "FACTOR" in defines else 1) * (-1 if "SUBTRACT" in defines else 1) * np.ones(texels.shape)
-        links = LinkBuffers(gl, layout, stencil.irregular, scale)
-        if links.count:
-            dispatch.bind(buffer, result, None, links.texels, links.links)
-            dispatch.run_list(irregular, links.count)
-    assert links.count == (0 if stencil.irregular is None else len(stencil.irregular.texels))
+        count, *links = link_buffers(gl, layout, stencil.irregular, scale)
+        if count:
+            dispatch.bind(buffer, result, None, *links)
+            dispatch.run_list(irregular, count)
+    assert count == (0 if stencil.irregular is None else len(stencil.irregular.texels))
     expected = scale * stencil(x.astype(float)) + (before if "ADD" in defines else 0)
     np.testing.assert_allclose(layout.read(result), expected, atol=2e-5 * max(1, np.abs(expected).max()))
 
@@ -111,5 +73,46 @@ def test_a_list_grows_when_it_must_and_may_be_empty() -> None:
         places, values = np.arange(count) + 7, np.linspace(0, 1, count)
         entries.set(places, values)
         assert entries.count == count
-        np.testing.assert_array_equal(integers(entries.places)[:count], places)
-        np.testing.assert_array_equal(floats(entries.values)[:count], values.astype(np.float32))
+        with shared_context():
+            kept = np.frombuffer(entries.places.read(), np.int32), np.frombuffer(entries.values.read(), np.float32)
+        for found, expected in zip(kept, (places, values.astype(np.float32)), strict=True):
+            np.testing.assert_array_equal(found[:count], expected)
+
+
+SPHERE = sphere_atlas(1.0, 6)
+
+
+def bowl() -> Atlas:
+    """A surface with a rim, with corners of other than four charts in it and on it."""
+    mesh = SPHERE.mesh
+    low = mesh.V[mesh.F][..., 2].mean(axis=1) < 0.4
+    return build_atlas(Mesh.from_arrays(mesh.V, mesh.F[low]), 8, layout="patches")
+
+
+SURFACES = {"sphere": lambda: SPHERE, "strips": lambda: texel_atlas(square(70)), "bowl": bowl}
+
+
+@pytest.mark.parametrize(("rim", "tightening"), [("free", 0.0), ("fixed", 1.5)])
+@pytest.mark.parametrize("name", SURFACES)
+def test_weights_links_and_time_step_are_those_of_the_cpu(
+    opengl: None, monkeypatch: pytest.MonkeyPatch, name: str, rim: str, tightening: float
+) -> None:
+    monkeypatch.setattr(GLContext, "software", False)
+    atlas = SURFACES[name]()
+    material = Material(speed=1.0 + 0.5 * atlas.barycentrics[..., 0], viscosity=1e-3, tightening=tightening)
+    cpu, gl = (WaveSolver(atlas, material, backend=backend, rim=rim) for backend in ("cpu", "gl"))
+    matrix = np.eye(3) + 0.3 * np.random.default_rng(4).standard_normal((3, 3))
+    for shift in (10.0, 20.0):
+        for waves in (cpu, gl):
+            waves.move(atlas.mesh.V @ (matrix * shift / 10) + shift)
+    made, (charts, n, _) = gl._backend._stencil, atlas.areas.shape
+    assert "_made" not in gl.operator.stencil.__dict__  # the CPU made nothing
+    with shared_context():
+        links = np.frombuffer(made.buffer.read(), np.float32).reshape(charts, n + 2, n + 2, 4)[:, :-1, :-1]
+    exact = np.moveaxis(cpu.operator.stencil.weights, 1, -1)
+    assert np.abs(links - exact).max() < 1e-6 * np.abs(exact).max()
+    irregular = cpu.operator.stencil.irregular
+    if irregular is not None:
+        np.testing.assert_allclose(made.irregular.weights, irregular.weights, rtol=1e-9)
+    assert gl.stable_timestep == pytest.approx(cpu.stable_timestep, rel=2e-6)
+    np.testing.assert_allclose(gl._areas, cpu._areas)

@@ -9,9 +9,10 @@ import pytest
 from genus_zero import crumpled, icosphere
 from levels import assembled, whole_level
 
-from ripple_sim.solver.layouts.energy import (
+from ripple_sim.solver.layouts import (
     TERMS,
     Density,
+    conjugate_gradients,
     density_derivatives,
     energy_density,
     expand_star,
@@ -20,9 +21,7 @@ from ripple_sim.solver.layouts.energy import (
     star_slopes,
     tangent_move,
 )
-from ripple_sim.solver.layouts.newton import conjugate_gradients
-from ripple_sim.solver.layouts.sphere_map.level import star_shapes
-from ripple_sim.solver.layouts.sphere_map.progressive import SPHERE, sweep, tangent_frame, total_energy
+from ripple_sim.solver.layouts.sphere_map import SPHERE, star_shapes, sweep, tangent_frame, total_energy
 
 # Dirichlet energy and area ratio of maps that shrink, keep and stretch, evenly and not
 STRETCHES = [(2.0, 1.0), (2.5, 1.0), (0.7, 0.3), (0.5, 0.25), (1.2, 0.1), (9.0, 4.0)]

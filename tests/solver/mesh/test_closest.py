@@ -9,9 +9,8 @@ import pytest
 import trimesh
 
 from ripple_sim.scenes.shapes import limbed
-from ripple_sim.solver.mesh.closest import TriangleTree, closest_points, refitted, triangle_tree
-from ripple_sim.solver.mesh.rays import downward_hits
-from ripple_sim.solver.texels.chart_map import barycentrics_in
+from ripple_sim.solver.mesh import TriangleTree, closest_points, downward_hits, refitted, triangle_tree
+from ripple_sim.solver.texels import barycentrics_in
 
 
 def by_igl(V: np.ndarray, F: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -69,29 +68,23 @@ def hits(solid: trimesh.Trimesh, xy: list) -> np.ndarray:
 def test_heights_on_a_slope_are_those_of_its_plane() -> None:
     V = np.array([[0.0, 0, 0], [4, 0, 2], [0, 4, -1]])
     xy = np.random.default_rng(0).dirichlet([1, 1, 1], 50) @ V[:, :2]
-    z = downward_hits(V, np.array([[0, 1, 2]]), xy)
-    np.testing.assert_allclose(z, 0.5 * xy[:, 0] - 0.25 * xy[:, 1], atol=1e-5)
-
-
-def test_triangles_are_met_from_behind_too() -> None:
-    V = np.array([[0.0, 0, 1], [1, 0, 1], [0, 1, 1]])
-    for F in ([[0, 1, 2]], [[0, 2, 1]]):
-        assert downward_hits(V, np.array(F), np.array([[0.2, 0.3]])) == pytest.approx([1.0])
+    for F in ([[0, 1, 2]], [[0, 2, 1]]):  # from behind too
+        z = downward_hits(V, np.array(F), xy)
+        np.testing.assert_allclose(z, 0.5 * xy[:, 0] - 0.25 * xy[:, 1], atol=1e-5)
 
 
 def test_the_upper_of_two_surfaces_is_met() -> None:
     low, high = (trimesh.creation.box(extents=[s, s, 1]) for s in (4, 2))
     high.apply_translation([0, 0, 5])
-    assert hits(low + high, [[0.3, 0.2], [1.5, 0.2]]) == pytest.approx([5.5, 0.5])
+    ray = 0.5 + 5 + 4  # as long as the mesh is wide above it; embree's float32 has steps of 1e-6 there
+    expected = pytest.approx([5.5, 0.5], abs=float(np.spacing(np.float32(ray))))
+    assert hits(low + high, [[0.3, 0.2], [1.5, 0.2]]) == expected
 
 
 def test_rays_beside_the_mesh_give_no_number() -> None:
     z = hits(trimesh.creation.box(), [[0.1, 0.2], [0.6, 0], [0, -50]])
     assert z[0] == pytest.approx(0.5)
     assert np.isnan(z[1:]).all()
-
-
-def test_without_points_there_are_no_heights() -> None:
     assert hits(trimesh.creation.box(), []).shape == (0,)
 
 
@@ -103,9 +96,3 @@ def test_heights_follow_size_and_place_of_the_mesh(size: float, offset: list[flo
     solid.apply_scale(size)
     x, y, z = offset
     assert hits(solid, [[size * (x + 0.1), size * (y - 0.2)]]) == pytest.approx([size * (z + 0.5)], rel=1e-5)
-
-
-def test_heights_of_a_fine_ball_are_those_of_the_sphere() -> None:
-    xy = np.random.default_rng(1).uniform(-0.6, 0.6, (100, 2))
-    z = hits(trimesh.creation.icosphere(5), xy.tolist())
-    np.testing.assert_allclose(z, np.sqrt(1 - (xy**2).sum(axis=1)), atol=2e-3)

@@ -1,47 +1,18 @@
-"""Meshes: validated, measured, and refused by name.
+"""Meshes: validated, and refused by name; what the cube layout refuses; normals of vertices at tips and knife edges.
 
-What the cube layout refuses: open surfaces, several parts, handles, no volume.
-
-Normals of vertices: those of the surface, and outwards of every triangle at tips and knife edges too.
+Where sheets touch, bodies stay bodies, floors stay floors, and what stands on them comes off.
 """
+
+from __future__ import annotations
 
 import numpy as np
 import pytest
-import trimesh
-from solids import cube, torus
+from all_kinds import BALL, cube, torus
+from sound import assert_sound, assert_unchanged_when_read_again
 from surfaces import sphere
 
 from ripple_sim.solver import Mesh, MeshError, build_atlas
-from ripple_sim.solver.mesh.mesh import check_genus_zero, vertex_normals
-
-
-def test_clean_mesh_comes_through_unchanged() -> None:
-    V, F = cube()
-    mesh = Mesh.from_arrays(V, F)
-    np.testing.assert_array_equal(mesh.V, V)
-    np.testing.assert_array_equal(mesh.F, F)
-    assert mesh.notes == ()
-    assert mesh.volume == pytest.approx(1)
-    assert mesh.area == pytest.approx(6)
-
-
-def test_uv_seams_survive_the_merge() -> None:
-    V, F = cube()
-    soup = V[F].reshape(-1, 3)
-    uv = np.random.default_rng(0).uniform(size=(36, 2))
-    mesh = Mesh.from_arrays(soup, np.arange(36).reshape(-1, 3)[:, ::-1], uv)
-    assert mesh.corner_uv is not None and mesh.uv is not None
-    for triangle, corners in zip(mesh.V[mesh.F], mesh.corner_uv, strict=True):
-        for point, pair in zip(triangle, corners, strict=True):
-            match = (soup == point).all(axis=1) & (uv == pair).all(axis=1)
-            assert match.sum() == 1
-    assert mesh.uv.shape == (8, 2)
-
-
-def test_vertex_normals_of_a_sphere_are_radial() -> None:
-    solid = trimesh.creation.icosphere(subdivisions=3)
-    mesh = Mesh.from_arrays(solid.vertices, solid.faces)
-    assert np.einsum("ij,ij->i", mesh.vertex_normals, mesh.V).min() > 0.999
+from ripple_sim.solver.mesh import vertex_normals
 
 
 @pytest.mark.parametrize(
@@ -61,20 +32,6 @@ def test_a_surface_that_the_cube_does_not_fit_is_refused_by_name(change, said: s
     with pytest.raises(MeshError, match=rf"^thing\.obj is .*{said}") as refused:
         build_atlas(mesh, 8, cache=False, layout="cube")
     assert "\n" not in str(refused.value)
-
-
-def test_many_parts_are_advised_to_be_wrapped() -> None:
-    V, F = cube()
-    steps = np.arange(101)
-    many = Mesh.from_arrays(
-        (V + 3 * steps[:, None, None] * [1, 0, 0]).reshape(-1, 3), (F + 8 * steps[:, None, None]).reshape(-1, 3)
-    )
-    with pytest.raises(MeshError, match=r"101 separate parts.*--wrap"):
-        check_genus_zero(many)
-
-
-def test_a_closed_body_without_handles_passes() -> None:
-    check_genus_zero(Mesh.from_arrays(*cube()))
 
 
 def least_cosine(mesh: Mesh) -> float:
@@ -99,3 +56,104 @@ def test_the_normal_of_a_spike_points_outwards_of_the_one_triangle_that_faces_el
     assert least_cosine(mesh) > 0.1
     spun = vertex_normals(V[:, [1, 2, 0]], F)
     np.testing.assert_allclose(spun, mesh.vertex_normals[:, [1, 2, 0]], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("damage", "name"),
+    [
+        (lambda V, F: (np.where(np.arange(8)[:, None] == 2, np.nan, V), F), "NaN"),
+        (lambda V, F: (V, F + 1), "indices run from"),
+        (lambda V, F: (V, F[:1, [0, 1, 1]]), "no triangle with an area"),
+        (lambda V, F: (V * [1, 0, 0], F), "no triangle with an area"),
+        (lambda V, F: (V * 1e15, F), "size is 1e"),
+        (lambda V, F: (V, F * 1.5), "integers"),
+        (lambda V, F: (V, F[:0]), "m > 0"),
+    ],
+)
+def test_what_is_no_surface_is_refused_by_name(damage, name: str) -> None:
+    with pytest.raises(MeshError, match=name):
+        Mesh.from_arrays(*damage(*cube()))
+
+
+TETRAHEDRON = (
+    np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.9, 0], [0.5, 0.3, 0.8]]),
+    np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]),
+)
+
+
+def merged(*bodies: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Several bodies, equal positions being one vertex."""
+    V = np.vstack([V for V, _ in bodies])
+    first = np.cumsum([0, *(len(V) for V, _ in bodies)])
+    F = np.vstack([F + at for (_, F), at in zip(bodies, first, strict=False)])
+    V, number = np.unique(V.round(9), axis=0, return_inverse=True)
+    return V, number.ravel()[F]
+
+
+def square(*corners: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    return np.array(corners, dtype=float), np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def sound(V: np.ndarray, F: np.ndarray) -> Mesh:
+    mesh = Mesh.from_arrays(V, F)
+    assert_sound(mesh)
+    assert_unchanged_when_read_again(mesh)
+    return mesh
+
+
+@pytest.mark.parametrize("wound", ["outwards", "inwards", "at random"])
+@pytest.mark.parametrize("loose", [False, True])
+@pytest.mark.parametrize(
+    ("bodies", "volume"),
+    [
+        (((cube()[0], cube()[1]), (cube()[0] + [1, 1, 0], cube()[1])), 2.0),
+        ((TETRAHEDRON, (TETRAHEDRON[0] * [1, -1, -1], TETRAHEDRON[1][:, ::-1])), 0.24),
+        (((cube()[0], cube()[1]), (cube()[0] + 1, cube()[1])), 2.0),
+    ],
+    ids=["cubes at an edge", "tetrahedra at an edge", "cubes at a corner"],
+)
+def test_two_bodies_that_touch_stay_two(bodies, volume: float, loose: bool, wound: str) -> None:
+    V, F = merged(*bodies)
+    if wound == "inwards":
+        F = F[:, ::-1]
+    elif wound == "at random":
+        turned = np.random.default_rng(1).random(len(F)) < 0.5
+        F = np.where(turned[:, None], F[:, ::-1], F)
+    if loose:
+        V, F = V[F].reshape(-1, 3), np.arange(F.size).reshape(-1, 3)
+    mesh = sound(V, F)
+    assert mesh.closed
+    assert mesh.component_count == 2
+    assert mesh.genus.tolist() == [0, 0]
+    assert mesh.volume == pytest.approx(volume)
+    assert any(note.startswith("cut apart") for note in mesh.notes)
+
+
+def test_a_wall_comes_off_the_floor_on_which_it_stands() -> None:
+    left, right = square((0, 0, 0), (1, 0, 0), (1, 2, 0), (0, 2, 0)), square((1, 0, 0), (2, 0, 0), (2, 2, 0), (1, 2, 0))
+    wall = square((1, 0, 0), (1, 2, 0), (1, 2, 1), (1, 0, 1))
+    mesh = sound(*merged(left, right, wall))
+    assert mesh.component_count == 2
+    floor = np.flatnonzero((mesh.V[mesh.F][..., 2] == 0).all(axis=1))
+    assert len(np.unique(mesh.components[floor])) == 1
+    assert mesh.notes == ("cut apart along 1 edge where more than two triangles met",)
+
+
+def test_an_inner_wall_comes_off_its_box() -> None:
+    V, F = cube()
+    half = V * [0.5, 1, 1] + [0.25, 0, 0]
+    mesh = sound(*merged((half, F), (half * [-1, 1, 1], F[:, ::-1])))
+    # the wall is there twice, and once is enough
+    assert mesh.component_count == 2
+    assert mesh.volume == pytest.approx(1)
+    assert [len(rim) for rim in mesh.rims] == [4]
+    assert any("repeated" in note for note in mesh.notes)
+
+
+def test_a_fin_comes_off_and_the_ball_stays_closed() -> None:
+    V, F = np.array(BALL.vertices), np.array(BALL.faces)
+    a, b = F[0, :2]
+    mesh = sound(np.vstack([V, 2 * V[a]]), np.vstack([[[a, b, len(V)]], F]))
+    assert mesh.component_count == 2
+    assert mesh.volume == pytest.approx(BALL.volume)
+    assert [len(rim) for rim in mesh.rims] == [3]

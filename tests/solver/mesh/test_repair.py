@@ -8,13 +8,12 @@ import sys
 import numpy as np
 import pytest
 import trimesh
+from all_kinds import BALL
 from known_meshes import known_mesh
-from solids import BALL
 from sound import assert_sound
 
 from ripple_sim.solver import MeshError, load_mesh
-from ripple_sim.solver.mesh.files import repaired
-from ripple_sim.solver.mesh.ply import Soup
+from ripple_sim.solver.mesh import Soup, repaired
 
 
 def located(places: np.ndarray, uv: np.ndarray) -> set[tuple[float, ...]]:

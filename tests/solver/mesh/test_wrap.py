@@ -5,23 +5,12 @@ from __future__ import annotations
 import igl
 import numpy as np
 import pytest
-import trimesh
+from all_kinds import BALL, cube, torus
 from known_meshes import known_mesh
-from solids import BALL, cube, torus
 from sound import assert_sound
+from surfaces import joined, moved, sphere
 
 from ripple_sim.solver import Mesh, MeshError, Wrap, load_mesh, wrap
-
-
-def ball(centre, radius=1.0, subdivisions=3) -> tuple[np.ndarray, np.ndarray]:
-    made = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
-    return np.array(made.vertices) + centre, np.array(made.faces)
-
-
-def together(*bodies) -> Mesh:
-    V, F = zip(*bodies, strict=True)
-    first = np.cumsum([0, *map(len, V[:-1])])
-    return Mesh.from_arrays(np.vstack(V), np.vstack([f + at for f, at in zip(F, first, strict=True)]))
 
 
 def distances(wrapped: Wrap) -> np.ndarray:
@@ -31,7 +20,7 @@ def distances(wrapped: Wrap) -> np.ndarray:
 
 
 def test_a_ball_gets_a_larger_ball() -> None:
-    found = wrap(together(ball(0)), 0.05)
+    found = wrap(sphere(3), 0.05)
     assert found.offset == pytest.approx(0.1, rel=1e-3)
     assert_sound(found.mesh)
     assert found.mesh.closed
@@ -42,7 +31,7 @@ def test_a_ball_gets_a_larger_ball() -> None:
 
 
 def test_bodies_that_pass_through_each_other_get_one_surface_without_what_lies_inside() -> None:
-    found = wrap(together(ball([0, 0, 0]), ball([1, 0, 0]), ball([0.4, 0.3, 0], 0.4)), 0.03)
+    found = wrap(joined(sphere(3), moved(sphere(3), (1, 0, 0)), moved(sphere(3), (0.4, 0.3, 0), 0.4)), 0.03)
     assert found.mesh.component_count == 1
     assert found.mesh.genus.tolist() == [0]
     apart = np.linalg.norm(found.mesh.V, axis=1), np.linalg.norm(found.mesh.V - [1, 0, 0], axis=1)
@@ -54,13 +43,14 @@ def test_bodies_that_pass_through_each_other_get_one_surface_without_what_lies_i
 def test_pieces_that_are_far_apart_get_a_surface_each_and_near_ones_share_one() -> None:
     near, far = 2.1, 2.8
     for centre, parts in (near, 1), (far, 2):
-        found = wrap(together(ball([0, 0, 0]), ball([centre, 0, 0])), 0.04)
+        found = wrap(joined(sphere(3), moved(sphere(3), (centre, 0, 0))), 0.04)
         assert found.mesh.component_count == parts
     assert found.mesh.notes[-1].startswith("wrapped, 0.192 m off: 2 parts in 2 closed surfaces with 0 handles, ")
 
 
 def test_a_shell_with_a_small_hole_is_solid_and_one_with_a_wide_hole_stays_hollow() -> None:
-    V, F = ball(0, subdivisions=4)
+    ball = sphere(4)
+    V, F = ball.V, ball.F
     top = V[F].mean(axis=1)[:, 2]
     solid = wrap(Mesh.from_arrays(V, F[top < 0.997]), 0.05).mesh
     hollow = wrap(Mesh.from_arrays(V, F[top < 0.7]), 0.05).mesh
@@ -90,7 +80,7 @@ def test_a_lone_triangle_and_a_needle_are_wrapped() -> None:
 
 
 def test_the_surface_carries_the_object_along() -> None:
-    mesh = together(cube(), ball([0.2, 0, 0], 0.4))
+    mesh = joined(Mesh.from_arrays(*cube()), moved(sphere(3), (0.2, 0, 0), 0.4))
     found = wrap(mesh, 0.05)
     assert found.triangles.shape == (len(mesh.V),)
     np.testing.assert_allclose(found.barycentrics.sum(axis=1), 1)

@@ -5,12 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 from hand_made import aslant, disk, eigenvalues, flat_torus, polygon, square, two_squares
-from modes import mode_error
+from modes import mode_error, orders
 from scipy.special import erf, jn_zeros, jnp_zeros
 
 from ripple_sim.solver import Material, SolverError, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
-from ripple_sim.solver.operator.assembly import source_grip
-from ripple_sim.solver.texels.texel_mesh import softening
+from ripple_sim.solver.texels import softening
 
 
 def test_baselines_do_not_converge() -> None:
@@ -34,36 +33,38 @@ def test_needles_do_not_set_the_time_step_of_all() -> None:
     assert steps[1] > 0.9 * steps[0]
 
 
-def test_a_smooth_surface_loses_half_a_texel_at_most_to_the_time_step_whatever_the_resolution() -> None:
-    for n in (48, 96):
-        # a grid that is denser in the middle
-        u = ((np.arange(n + 2) - 0.5) / n).clip(0, 1)
-        place = u - 0.45 * 0.05 * erf((u - 0.5) / 0.05)
-        x, y = np.meshgrid(place, place)
-        places = np.stack([x, y, 0 * x], axis=-1)[None]
-        texels = TexelMesh.of(square(n).topology, places[:, 1:-1, 1:-1], beyond=places)
-        factors = softening(texels)
-        assert ((1 - factors) * texels.areas).sum() < 0.501 * texels.areas.mean()
-        np.testing.assert_allclose(softening(texels.with_fixed_rim()), factors)
+def dense_in_the_middle(n: int) -> TexelMesh:
+    """Unit square."""
+    u = ((np.arange(n + 2) - 0.5) / n).clip(0, 1)
+    place = (u - 0.45 * 0.05 * erf((u - 0.5) / 0.05) - 0.0225) / 0.955
+    x, y = np.meshgrid(place, place)
+    places = np.stack([x, y, 0 * x], axis=-1)[None]
+    return TexelMesh.of(square(n).topology, places[:, 1:-1, 1:-1], beyond=places)
+
+
+def test_a_smooth_surface_gains_time_steps_and_keeps_its_mass_and_eigenvalues_of_second_order() -> None:
+    errors = []
+    for n in (24, 48, 96):
+        texels = dense_in_the_middle(n)
+        spanned = dataclasses.replace(texels, areas=texels.cells.areas)
+        moved = texels.areas - spanned.areas
+        assert moved.max() > 0
+        assert moved.sum() == pytest.approx(0, abs=1e-12)
+        np.testing.assert_allclose(np.einsum("cij,cijk->k", moved, texels.positions), 0, atol=1e-12)
+        np.testing.assert_allclose(softening(texels), 1, atol=1e-9)
+        steps = [texel_atlas(each).quality()["timestep"] for each in (texels, spanned)]
+        assert steps[0] > 1.03 * steps[1]
+        found = eigenvalues(texels, MODES + 1)[1:]
+        errors.append(np.sqrt(np.mean((found / square_modes("free")[1 : MODES + 1] - 1) ** 2)))
+    assert (orders(errors) > 1.9).all()
 
 
 def test_unknown_names_list_the_valid_ones() -> None:
     atlas = sphere_atlas(1.0, 8)
-    with pytest.raises(SolverError, match="'auto', 'gl', 'cpu'"):
-        WaveSolver(atlas, backend="cuda")
     with pytest.raises(SolverError, match="'fem', 'paper'"):
         WaveSolver(atlas, backend="cpu", operator="spectral")
     with pytest.raises(SolverError, match="the atlas needs"):
         WaveSolver(atlas, Material(speed=np.ones((6, 16, 16))), backend="cpu")
-
-
-def test_sources_lose_their_grip_as_all_that_pulls_back_fades() -> None:
-    squares = np.array([[[1.0, 2e-3], [5e-4, 0.0]]])
-    none = np.zeros_like(squares)
-    np.testing.assert_allclose(source_grip(squares, none, none), [[[1, 1], [0.5, 0]]])
-    # a spring or resistance to bending is a pull as well
-    assert source_grip(squares, none + 3.0, none) is None
-    assert source_grip(none, none, none) is None
 
 
 def test_a_load_on_a_map_that_fades_to_zero_does_not_sink_in_for_ever(backend: str) -> None:
@@ -100,18 +101,34 @@ def test_baselines_run_on_any_texel_mesh(texels: TexelMesh, operator: str, rim: 
     assert (noise[0] * matrix(noise[1])).sum() == pytest.approx((noise[1] * matrix(noise[0])).sum())
 
 
-def test_baselines_converge_where_the_texels_are_even_squares() -> None:
-    for operator in ("paper", "uncorrected"):
-        errors = []
-        for n in (12, 24):
-            texels = square(n)
-            x, y, _ = np.moveaxis(texels.positions, -1, 0)
-            mode = np.cos(np.pi * x) * np.cos(2 * np.pi * y)
-            waves = WaveSolver(texel_atlas(texels), backend="cpu", operator=operator, conserve_volume=False)
-            waves.height = mode
-            waves.step(2 / np.sqrt(5))
-            errors.append(np.abs(waves.height - mode).max())
-        assert np.log2(errors[0] / errors[1]) > 1.8
+def ending(n: int) -> TexelMesh:
+    """Unit square that ends at its last texels."""
+    x, y = np.meshgrid(*2 * [np.linspace(0, 1, n + 1)])
+    return TexelMesh.of(square(n + 1).topology, np.stack([x, y, 0 * x], axis=-1)[None])
+
+
+@pytest.mark.parametrize(
+    ("shape", "operator", "rim", "least"),
+    [
+        (ending, "fem", "free", 1.9),
+        (ending, "fem", "fixed", 1.9),
+        # baselines converge where the texels are even squares
+        (square, "paper", "free", 1.8),
+        (square, "uncorrected", "free", 1.8),
+    ],
+)
+def test_a_mode_of_the_square_comes_back_to_second_order(shape, operator: str, rim: str, least: float) -> None:
+    errors, wave = [], np.sin if rim == "fixed" else np.cos
+    for n in (12, 24, 48):
+        texels = shape(n)
+        x, y, _ = np.moveaxis(texels.positions, -1, 0)
+        mode = wave(np.pi * x) * wave(2 * np.pi * y)
+        waves = WaveSolver(texel_atlas(texels), backend="cpu", operator=operator, rim=rim, conserve_volume=False)
+        waves.height = mode
+        waves.step(2 / np.sqrt(5))
+        errors.append(np.abs(waves.height - mode).max())
+        assert rim == "free" or not (waves.height[0, 0].any() or waves.height[0, :, -1].any())
+    assert (orders(errors) > least).all()
 
 
 MODES = 12
@@ -161,27 +178,7 @@ def test_a_drum_skin_swings_in_its_mode_and_keeps_its_energy(backend: str) -> No
         waves.step(period, steps)
         errors.append(np.abs(waves.height - mode).max())
         assert waves.energy() == pytest.approx(energy, rel=0.01)
-    assert np.log2(errors[0] / errors[1]) > 1.8 and np.log2(errors[1] / errors[2]) > 1.8
-
-
-@pytest.mark.parametrize(
-    "material",
-    [
-        Material(speed=0.0, bending=1.0),
-        Material(viscosity=0.05, stiffness=20.0),
-        Material(density=2.0, yield_height=0.02, stiffness=50.0),
-    ],
-    ids=["plate", "viscous", "plastic"],
-)
-def test_both_backends_agree_at_a_fixed_rim(gl_backend: str, material: Material) -> None:
-    fields = []
-    for backend in ("cpu", gl_backend):
-        waves = WaveSolver(texel_atlas(polygon(5, 12)), material, backend=backend, rim="fixed")
-        waves.add_impulse([0.3, 0.2, 0], 0.1, 0.3)
-        waves.step(100 * waves.stable_timestep)
-        fields.append(waves.height)
-    assert np.abs(fields[0]).max() > 0
-    np.testing.assert_allclose(fields[1], fields[0], atol=1e-4 * np.abs(fields[0]).max())
+    assert (orders(errors) > 1.8).all()
 
 
 def test_a_plate_on_a_fixed_rim_has_the_square_of_the_drums_frequencies() -> None:
@@ -193,20 +190,6 @@ def test_a_plate_on_a_fixed_rim_has_the_square_of_the_drums_frequencies() -> Non
     waves.height = mode
     waves.step(2 * np.pi / (2 * np.pi**2))
     assert np.abs(waves.height - mode).max() < 0.02
-
-
-def test_a_surface_that_ends_at_its_last_texels_is_fixed_there() -> None:
-    errors = []
-    for n in (13, 25, 49):
-        x, y = np.meshgrid(*2 * [np.linspace(0, 1, n)])
-        texels = TexelMesh.of(square(n).topology, np.stack([x, y, 0 * x], axis=-1)[None])
-        mode = (np.sin(np.pi * x) * np.sin(2 * np.pi * y))[None]
-        waves = WaveSolver(texel_atlas(texels), backend="cpu", rim="fixed", conserve_volume=False)
-        waves.height = mode
-        waves.step(2 / np.sqrt(5))
-        assert not waves.height[0, 0].any() and not waves.height[0, :, -1].any()
-        errors.append(np.abs(waves.height - mode).max())
-    assert np.log2(errors[0] / errors[2]) > 2 * 1.9
 
 
 def test_waves_come_back_inverted_from_a_fixed_rim_and_upright_from_a_free_one() -> None:

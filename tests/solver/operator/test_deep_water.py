@@ -1,12 +1,19 @@
-"""The root of the Laplacian: against a dense one, its symmetry, its mean, and its inverse."""
+"""The root of the Laplacian: against a dense one, its symmetry, its mean, and its inverse.
+
+Deep water: phase speed on both sides of the crossover, energy, decay, pushes, and what it refuses.
+"""
+
+import copy
 
 import numpy as np
 import pytest
+from hand_made import flat_torus
+from modes import swing
 from scipy.linalg import eigh
 
-from ripple_sim.solver import Atlas, sphere_atlas
-from ripple_sim.solver.operator.deep_water import HalfLaplacian
-from ripple_sim.solver.texels.stencil import stiffness_matrix
+from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, sphere_atlas, texel_atlas
+from ripple_sim.solver.operator import HalfLaplacian, frequency
+from ripple_sim.solver.texels import stiffness_matrix
 
 
 @pytest.fixture(scope="module")
@@ -50,3 +57,93 @@ def test_waves_of_a_sphere_are_of_its_harmonics(atlas: Atlas, root: HalfLaplacia
     for degree, harmonic in ((1, z), (2, x * z), (3, z * (5 * z * z - 3))):
         share = (root(harmonic) * harmonic).sum() / (harmonic**2).sum()
         assert share == pytest.approx(np.sqrt(degree * (degree + 1)) / 0.3, rel=0.02)
+
+
+DENSITY, GRAVITY = 1000.0, 9.81
+
+
+@pytest.fixture(scope="module")
+def torus() -> Atlas:
+    return texel_atlas(flat_torus(24))
+
+
+def water(q: float, ratio: float, viscosity: float = 0.0) -> Material:
+    """Liquid in which a wave number is a multiple of the crossover's."""
+    return Material.water(DENSITY, DENSITY * GRAVITY / (q / ratio) ** 2, GRAVITY, viscosity)
+
+
+def swung(atlas: Atlas, material: Material, q: float) -> tuple[float, float]:
+    waves = WaveSolver(atlas, material, backend="cpu")
+    return swing(waves, np.cos(q * atlas.positions[..., 0]), 2 * np.pi / frequency(material, q) / 40, 60)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 1.0, 3.0, 30.0])
+def test_waves_run_as_gravity_and_tension_want_them_to(torus: Atlas, ratio: float) -> None:
+    q = 4 * np.pi  # 12 texels
+    assert frequency(water(q, ratio), q) ** 2 == pytest.approx(GRAVITY * q * (1 + ratio**2))
+    measured, _ = swung(torus, water(q, ratio), q)
+    assert measured == pytest.approx(frequency(water(q, ratio), q), rel=0.02)
+
+
+def test_waves_die_as_the_viscosity_wants_them_to(torus: Atlas) -> None:
+    q, viscosity = 4 * np.pi, 2e-3
+    _, rate = swung(torus, water(q, 1.0, viscosity), q)
+    assert rate == pytest.approx(2 * viscosity * q**2, rel=0.03)
+
+
+def test_energy_and_volume_stay_and_a_copy_goes_on_as_the_original(torus: Atlas) -> None:
+    waves = WaveSolver(torus, water(10.0, 1.0), backend="cpu", conserve_volume=False)
+    waves.add_impulse([0.3, 0.4, 0.0], 5.0, 0.12)
+    waves.step(waves.stable_timestep)
+    energy = waves.energy()
+    assert energy > 0
+    other = copy.copy(waves)
+    for each in (waves, other):
+        each.step(200 * waves.stable_timestep)
+        assert each.energy() == pytest.approx(energy, rel=1e-5)
+        assert abs(each.volume()) < 1e-6 * np.abs(each.height).max()
+    np.testing.assert_array_equal(waves.height, other.height)
+    with pytest.raises(SolverError, match="are longer than the stable"):
+        waves.step(3 * waves.stable_timestep, substeps=1)
+
+
+def test_a_push_gives_the_energy_that_theory_says(torus: Atlas) -> None:
+    """An impulse wave J cos(q x) per area makes v = -(q / rho) J cos(q x), and the kinetic energy J^2 q A / (4 rho)."""
+    q, impulse = 4 * np.pi, 3.0
+    waves = WaveSolver(torus, water(q, 1.0), backend="cpu")
+    wave = np.cos(q * torus.positions[..., 0])
+    dt = 1e-6
+    waves.pressure = impulse * wave / dt
+    waves.step(dt)
+    expected = -q / DENSITY * impulse * wave
+    assert np.abs(waves.velocity - expected).max() < 0.02 * np.abs(expected).max()
+    assert waves.energy() == pytest.approx(impulse**2 * q / (4 * DENSITY), rel=0.02)
+
+
+def test_held_parts_stay_and_reflect(torus: Atlas) -> None:
+    fixed = torus.positions[..., 0] < 0.2
+    material = Material.water(DENSITY, 10.0)
+    waves = WaveSolver(torus, Material(**{**vars(material), "fixed": fixed}), backend="gl")
+    assert waves.backend == "cpu"  # whatever is asked for
+    waves.add_impulse([0.6, 0.5, 0.0], 1.0, 0.1)
+    waves.step(0.1)
+    assert not waves.height[fixed].any()
+    assert np.abs(waves.height[~fixed]).max() > 0
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "message"),
+    [
+        ({"bending": 1.0}, "has bending"),
+        ({"yield_height": 0.1}, "has a yield height"),
+        ({"density": np.linspace(1, 2, 384).reshape(6, 8, 8)}, "a density that varies"),
+        ({"deep": np.ones((6, 8, 8))}, "valid is one number"),
+        ({"deep": -1.0}, "material deep is -1 1/m"),
+    ],
+    ids=["bending", "yield", "density", "map", "negative"],
+)
+def test_what_a_fluid_cannot_do_is_refused(coefficients: dict, message: str) -> None:
+    with pytest.raises(SolverError, match=message):
+        WaveSolver(sphere_atlas(1.0, 8), Material(**{**vars(Material.water()), **coefficients}), backend="cpu")
+    with pytest.raises(SolverError, match="gravity is 0"):
+        Material.water(gravity=0.0)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from modes import orders
 
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, sphere_atlas
 
@@ -12,10 +13,10 @@ LEGENDRE = {
 }
 
 
-def amplitude(material: Material, degree: int, time: float, backend: str = "cpu", n: int = 48) -> float:
+def amplitude(material: Material, degree: int, time: float, n: int = 48) -> float:
     """What is left of a zonal mode that starts at rest with amplitude 1."""
     atlas = sphere_atlas(1.0, n)
-    waves = WaveSolver(atlas, material, backend=backend)
+    waves = WaveSolver(atlas, material, backend="cpu")
     mode = LEGENDRE[degree](atlas.positions[..., 2])
     waves.height = mode
     waves.step(time)
@@ -27,37 +28,35 @@ def decaying(omega0: float, rate: float, time: float) -> float:
     return np.exp(-rate * time) * (np.cos(omega * time) + rate / omega * np.sin(omega * time))
 
 
+PLATE = {"modulus": 2e5, "thickness": 0.05, "density": 800.0, "poisson": 0.25}
+# stiffness of the plate over its mass per area
+BENDING = 2e5 * 0.05**3 / 12 / (1 - 0.25**2) / (800.0 * 0.05)
+DISPERSION = {
+    "membrane": (Material.membrane(tension=18.0, density=2.0), lambda k2: 18.0 / 2.0 * k2),
+    "plate": (Material.plate(**PLATE), lambda k2: BENDING * k2**2),
+    "both on springs": (
+        Material(speed=0.7, bending=0.02, stiffness=3.0),
+        lambda k2: 0.7**2 * k2 + 0.02 * k2**2 + 3.0,
+    ),
+}
+
+
 @pytest.mark.parametrize("degree", LEGENDRE)
-def test_membrane_speed_is_root_of_tension_over_density(degree: int) -> None:
-    omega = np.sqrt(18.0 / 2.0 * degree * (degree + 1))
+@pytest.mark.parametrize("model", DISPERSION)
+def test_frequencies_are_those_of_the_dispersion_relation(model: str, degree: int) -> None:
+    material, square = DISPERSION[model]
+    omega = np.sqrt(square(degree * (degree + 1)))
     # where the mode passes through zero its amplitude shows the error of the frequency: 0.02 is a quarter of a per cent
-    assert abs(amplitude(Material.membrane(tension=18.0, density=2.0), degree, 2.5 * np.pi / omega)) < 0.02
-
-
-@pytest.mark.parametrize("degree", LEGENDRE)
-def test_plate_frequency_grows_with_the_square_of_the_wave_number(degree: int, backend: str) -> None:
-    modulus, thickness, density, poisson = 2e5, 0.05, 800.0, 0.25
-    rigidity = modulus * thickness**3 / 12 / (1 - poisson**2)
-    omega = np.sqrt(rigidity / (density * thickness)) * degree * (degree + 1)
-    material = Material.plate(modulus=modulus, thickness=thickness, density=density, poisson=poisson)
-    time = 2.25 * np.pi / omega
-    assert amplitude(material, degree, time, backend, n=48 if backend == "cpu" else 32) == pytest.approx(
-        np.cos(omega * time), abs=0.05
-    )
+    time = 2.5 * np.pi / omega if model == "membrane" else 2.25 * np.pi / omega
+    bound = 0.05 if model == "plate" else 0.02
+    assert amplitude(material, degree, time) == pytest.approx(np.cos(omega * time), abs=bound)
 
 
 def test_plate_frequencies_converge_at_second_order() -> None:
     # a quarter of a period before the mode's zero the amplitude is steepest: it shows the error of the frequency
     omega = np.sqrt(0.03) * 20
     errors = [abs(amplitude(Material(speed=0, bending=0.03), 4, 2.5 * np.pi / omega, n=n)) for n in (16, 32, 64)]
-    assert np.log2(errors[0] / errors[1]) > 1.8
-    assert np.log2(errors[1] / errors[2]) > 1.8
-
-
-def test_tension_and_bending_add_up_in_the_dispersion_relation(backend: str) -> None:
-    omega = np.sqrt(0.7**2 * 20 + 0.02 * 20**2 + 3.0)
-    material = Material(speed=0.7, bending=0.02, stiffness=3.0)
-    assert amplitude(material, 4, 1.3, backend) == pytest.approx(np.cos(omega * 1.3), abs=0.02)
+    assert (orders(errors) > 1.8).all()
 
 
 def test_plate_conserves_energy_and_its_step_is_stable_and_close_to_the_limit(animal: Atlas) -> None:
@@ -72,24 +71,23 @@ def test_plate_conserves_energy_and_its_step_is_stable_and_close_to_the_limit(an
 
 
 @pytest.mark.parametrize("degree", [2, 4])
-def test_stiffness_and_both_dampings_are_those_of_theory(degree: int, backend: str) -> None:
+def test_stiffness_and_both_dampings_are_those_of_theory(degree: int) -> None:
     speed, nu, across = 0.85, 0.0055, 9.9
     square = degree * (degree + 1) + across
     omega0, rate = speed * np.sqrt(square), nu * square / 2
     material = Material(speed=speed, stiffness=speed**2 * across, viscosity=nu, damping=nu * across)
     for time in (0.4, 1.7):
-        value = amplitude(material, degree, time, backend, n=24)
+        value = amplitude(material, degree, time, n=24)
         assert value == pytest.approx(decaying(omega0, rate, time), abs=0.015)
-    if backend == "cpu":
-        assert abs(amplitude(material, degree, 200.0, n=16)) < 0.02
+    assert abs(amplitude(material, degree, 200.0, n=16)) < 0.02
 
 
-def test_dent_leaves_what_energy_beyond_the_yield_height_pays_for(backend: str) -> None:
+def test_dent_leaves_what_energy_beyond_the_yield_height_pays_for() -> None:
     k, limit, v = 400.0, 0.01, 1.0
     waves = WaveSolver(
         sphere_atlas(1.0, 4),
         Material.dent(limit, stiffness=k, speed=1.0, damping=0.0),
-        backend=backend,
+        backend="cpu",
         conserve_volume=False,
     )
     waves.velocity = np.full((6, 4, 4), -v)
@@ -126,45 +124,6 @@ def test_dent_stays_when_the_waves_have_died(animal: Atlas) -> None:
     assert not waves.dent.any()
 
 
-def maps(atlas: Atlas) -> Material:
-    """Every coefficient a map."""
-    rng, shape, z = np.random.default_rng(8), atlas.areas.shape, atlas.positions[..., 2]
-    return Material(
-        speed=rng.uniform(0, 0.6, shape) * (z < 0.1),
-        damping=rng.uniform(0, 1, shape),
-        stiffness=rng.uniform(0, 5, shape),
-        viscosity=rng.uniform(0, 1e-3, shape),
-        density=rng.uniform(1, 2, shape),
-        bending=rng.uniform(0, 1e-6, shape) * (z < 0.1),
-        yield_height=rng.uniform(1e-3, 1e-2, shape),
-        fixed=atlas.positions[..., 0] > 0.2,
-    )
-
-
-MODELS = {
-    "membrane": lambda _: Material.membrane(0.2, 2.0, damping=0.5),
-    "jelly": lambda _: Material.jelly(modulus=100.0, thickness=0.05, viscosity=0.1),
-    "plate": lambda _: Material.plate(modulus=1e4, thickness=0.002, damping=0.3),
-    "dent": lambda _: Material.dent(0.002, stiffness=50.0, speed=0.3),
-    "maps": maps,
-}
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_gl_equals_cpu_for_every_model(animal: Atlas, gl_backend: str, model: str) -> None:
-    def run(name: str) -> np.ndarray:
-        waves = WaveSolver(animal, MODELS[model](animal), backend=name)
-        waves.add_impulse(animal.mesh.V[100], 0.2, 0.06)
-        waves.add_force(animal.mesh.V[900], 0.5, 0.1)
-        waves._backend.advance(10, waves.stable_timestep)
-        waves.step(200 * waves.stable_timestep)
-        return waves.height
-
-    reference = run("cpu")
-    assert np.abs(reference).max() > 0
-    assert np.abs(run(gl_backend) - reference).max() <= 1e-5 * np.abs(reference).max()
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -173,28 +132,9 @@ def test_gl_equals_cpu_for_every_model(animal: Atlas, gl_backend: str, model: st
         (lambda: Material.jelly(thickness=0.0), "thickness is 0.0 m"),
         (lambda: Material.membrane(tension=np.inf), "tension is inf N/m"),
         (lambda: Material.dent(0.0), "yield_height is 0 m"),
-        (lambda: Material(fixed=np.zeros((6, 4, 4))), "fixed has type float64"),
-        (lambda: Material(bending=np.inf), "bending is inf"),
-        (lambda: Material(speed=-1.0), "speed is -1 m/s"),
-        (lambda: Material(density=0.0), "greater than 0"),
-        (lambda: Material(damping=np.nan), "damping is nan"),
         (lambda: Material(viscosity=np.zeros((6, 4, 5))), "shape"),
     ],
 )
 def test_bad_materials_are_named(make, message: str) -> None:
     with pytest.raises(SolverError, match=message):
         make()
-
-
-def test_coefficients_per_texel_equal_the_same_numbers(backend: str) -> None:
-    atlas = sphere_atlas(1.0, 16)
-    numbers = {"speed": 0.7, "damping": 0.5, "stiffness": 2.0, "viscosity": 0.01, "density": 3.0}
-    rng = np.random.default_rng(0)
-    start = rng.standard_normal((6, 16, 16))
-    results = []
-    for fields in (numbers, {key: np.full((6, 16, 16), value) for key, value in numbers.items()}):
-        waves = WaveSolver(atlas, Material(**fields), backend=backend)
-        waves.height = start
-        waves.step(0.5)
-        results.append(waves.height)
-    np.testing.assert_allclose(results[0], results[1], atol=1e-6)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import Material, SolverError, WaveSolver, sphere_atlas
-from ripple_sim.solver.operator.presets import density_for, stiffness_after, stiffness_under
+from ripple_sim.solver.operator import density_for, stiffness_after, stiffness_under
 
 SIZES = [1e-3, 0.02, 1.0, 30.0, 1e3]
 

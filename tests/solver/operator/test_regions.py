@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, absorbing_damping, sphere_atlas
-from ripple_sim.solver.operator.regions import hold
+from ripple_sim.solver.operator import hold
 
 
 def after_one_period(n: int, material: Material, mode: np.ndarray, eigenvalue: float, backend: str = "cpu") -> float:

@@ -1,10 +1,14 @@
-"""Sources leave the volume as it is, on each part of the surface."""
+"""Sources leave the volume as it is, on each part of the surface; what these parts are.
+
+The stable time step, and the kick of one substep.
+"""
 
 import numpy as np
 import pytest
-from hand_made import two_squares
+from hand_made import square, two_squares
 
-from ripple_sim.solver import Load, Material, WaveSolver, sphere_atlas, texel_atlas
+from ripple_sim.solver import Atlas, Load, Material, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
+from ripple_sim.solver.operator import WaveOperator, build_operator, step_coefficients
 
 
 def volume_rate(waves: WaveSolver) -> float:
@@ -108,3 +112,65 @@ def test_lone_texels_on_springs_are_one_part() -> None:
     assert waves.operator.parts is None
     assert waves.velocity.min() < -1.0
     assert abs(waves.momentum()) < 1e-6
+
+
+def test_stable_timestep_is_stable_and_close_to_the_limit(animal: Atlas) -> None:
+    waves = WaveSolver(animal, backend="cpu")
+    noise = np.random.default_rng(0).standard_normal(waves.height.shape)
+    waves.height = noise
+    waves._backend.advance(3000, waves.stable_timestep)
+    assert np.abs(waves._backend.height()).max() < 1e3
+    waves.reset()
+    waves.height = noise
+    with np.errstate(over="ignore", invalid="ignore"):
+        waves._backend.advance(3000, 1.05 * waves.stable_timestep)
+    assert not np.abs(waves._backend.height()).max() < 1e3
+
+
+def parts(texels: TexelMesh, **coefficients: object) -> np.ndarray | None:
+    return build_operator(texel_atlas(texels), Material(**coefficients), "fem").parts
+
+
+def columns(*values: float) -> np.ndarray:
+    """A field of the square whose columns have the given values, 12 in all."""
+    return np.broadcast_to(np.repeat(values, 12 // len(values)), (1, 12, 12)).copy()
+
+
+def test_what_springs_or_a_clamp_hold_is_one_part() -> None:
+    speed = columns(1, 1, 0, 1)
+    assert parts(square(12), speed=speed, stiffness=5.0) is None
+    held_left = columns(1, 0, 0, 0) > 0
+    found = parts(square(12), speed=speed, fixed=held_left)
+    assert found is not None
+    assert len(np.unique(found[0, :, 9:])) == 1 and found[0, 0, 4] != found[0, 0, 10]
+    # a clamp does not cut, unless it is all that there is in between
+    assert parts(square(12), fixed=columns(0, 0, 1, 0) > 0) is None
+
+
+SHAPE = (1, 4, 4)
+
+
+def operator(damping: float = 0.0, stiffness: float = 0.0, mass: float = 2.0) -> WaveOperator:
+    stencil = square(4).stencil(np.ones(SHAPE))
+    return WaveOperator(stencil, np.full(SHAPE, mass), np.full(SHAPE, damping), np.full(SHAPE, stiffness))
+
+
+@pytest.mark.parametrize("rate", [0.01, 0.3, 2.0])
+def test_damping_decays_as_the_exponential_to_third_order(rate: float) -> None:
+    errors = [
+        abs(float(step_coefficients(operator(damping=rate), dt).decay) - np.exp(-rate * dt))
+        for dt in (0.4 / rate, 0.2 / rate)
+    ]
+    assert errors[0] / errors[1] == pytest.approx(8, rel=0.2)
+
+
+@pytest.mark.parametrize("half", [1.0, 1.5, 40.0])
+def test_strong_damping_lets_the_velocity_change_its_sign_no_more(half: float) -> None:
+    dt, zeta = 0.1, 20 * half
+    kick = step_coefficients(operator(damping=zeta), dt)
+    assert kick.decay == 0
+    # what a force sustains against the damping
+    assert kick.span == pytest.approx(1 / zeta, rel=1e-6)
+    # weaker damping is the centred scheme
+    weaker = step_coefficients(operator(damping=19.9), 0.1)
+    assert weaker.decay == np.float32((1 - 0.995) / (1 + 0.995)) and weaker.span == np.float32(0.1 / 1.995)

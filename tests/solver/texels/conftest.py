@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ripple_sim.solver.layouts.cube.convention import cube_topology, texel_directions
-from ripple_sim.solver.texels.texel_mesh import TexelMesh
+from ripple_sim.solver.layouts.cube import cube_topology, texel_directions
+from ripple_sim.solver.texels import TexelMesh
 
 
 @pytest.fixture(scope="module")

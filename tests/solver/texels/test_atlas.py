@@ -1,4 +1,7 @@
-"""The atlas locates points, also where charts meet; arrays come back from a file, or the damage is named."""
+"""The atlas locates points, also where charts meet; arrays come back from a file, or the damage is named.
+
+Atlases of texel meshes without a triangle mesh, and the page that holds their charts.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +13,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from solids import BALL
+from all_kinds import BALL
+from hypothesis import given, settings, strategies as st
 
 from ripple_sim.solver import Atlas, Mesh, sphere_atlas
-from ripple_sim.solver.layouts.build import atlas_from_sphere_map
-from ripple_sim.solver.layouts.cube.convention import CHART_NORMALS, CHART_U, CHART_V
-from ripple_sim.solver.texels.atlas import read_arrays, write_arrays
+from ripple_sim.solver.layouts import atlas_from_sphere_map
+from ripple_sim.solver.layouts.cube import CHART_NORMALS, CHART_U, CHART_V
+from ripple_sim.solver.texels import ChartPage, read_arrays, write_arrays
 
 quick = settings(derandomize=True, max_examples=60, deadline=None, database=None)
-
 DIAGONALS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
 
@@ -68,17 +69,6 @@ def test_locate_returns_the_texel_that_a_point_was_taken_from(animal: Atlas) -> 
     assert (chart == np.arange(6)[:, None, None]).all()
     np.testing.assert_allclose(row, np.broadcast_to(np.arange(n)[:, None], (6, n, n)), atol=1e-6)
     np.testing.assert_allclose(column, np.broadcast_to(np.arange(n), (6, n, n)), atol=1e-6)
-
-
-def test_quality_of_a_limbed_atlas(animal: Atlas) -> None:
-    quality = animal.quality()
-    assert quality["flipped"] == 0
-    assert quality["solid_angle"] == pytest.approx(4 * np.pi, abs=1e-9)
-    assert quality["starved"] == 0
-    assert quality["q999"] < 4
-    assert quality["coverage"] == pytest.approx(1, abs=0.02)
-    assert animal.areas.sum() == pytest.approx(quality["coverage"] * animal.mesh.area)
-    assert 0 < quality["edge_min"] < quality["edge_max"]
 
 
 def test_an_atlas_that_has_located_points_can_be_copied_and_pickled() -> None:
@@ -154,15 +144,43 @@ def test_no_part_of_a_file_is_taken_for_the_whole(tmp_path: Path, arrays: dict[s
             read_arrays(path)
 
 
-@pytest.mark.parametrize("foreign", [b"", b"solid nonsense", b"PK\x03\x04" + bytes(60)])
-def test_other_files_are_refused(tmp_path: Path, foreign: bytes) -> None:
-    path = tmp_path / "arrays.npz"
-    path.write_bytes(foreign)
-    with pytest.raises(ValueError, match=r"."):
-        read_arrays(path)
-
-
 def test_pickled_arrays_are_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "pickled.npz", a=np.array([{}], dtype=object))
     with pytest.raises(ValueError, match="Object arrays"):
         read_arrays(tmp_path / "pickled.npz")
+
+
+PAGES = [ChartPage(1, 4), ChartPage(2, 4), ChartPage(5, 3), ChartPage(6, 8), ChartPage(17, 5)]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_chart_has_a_block_of_its_own_on_the_page(page: ChartPage) -> None:
+    width, height = page.size
+    taken = np.zeros((height, width), int)
+    for chart in range(page.charts):
+        column, row = page.corner(chart)
+        assert taken[row : row + page.resolution + 2, column : column + page.resolution + 2].size == page.block**2
+        taken[row : row + page.block, column : column + page.block] += 1
+    assert taken.max() == 1
+    # no row of blocks stays empty
+    assert taken[-1].any()
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_locating_a_place_gives_back_its_chart_row_and_column(page: ChartPage) -> None:
+    rng = np.random.default_rng(0)
+    chart, uv = rng.integers(0, page.charts, 200), rng.uniform(0, 1, (200, 2))
+    uv[:4] = [[0, 0], [1, 0], [1, 1], [0, 1]]  # borders of a chart are still its own
+    found, row, column = page.locate(page.places(chart, uv))
+    np.testing.assert_array_equal(found, chart)
+    np.testing.assert_allclose(np.stack([column, row], axis=1), page.resolution * uv - 0.5, atol=1e-9)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_texel_centres_lie_in_the_middle_of_the_pages_texels(page: ChartPage) -> None:
+    n = page.resolution
+    for chart in range(page.charts):
+        [[x, y]] = page.places(np.array([chart]), np.array([[0.5 / n, (n - 0.5) / n]]))
+        column, row = page.corner(chart)
+        # beyond the halo of one texel
+        assert (x, y) == pytest.approx((column + 1.5, row + n + 0.5))

@@ -4,16 +4,11 @@ import numpy as np
 import pytest
 from hand_made import flat_torus, polygon, square
 
-from ripple_sim.solver import sphere_atlas
-from ripple_sim.solver.texels.stencil import (
-    NO_LINKS,
-    IrregularLinks,
+from ripple_sim.solver.texels import (
+    TexelMesh,
     crossing_links,
-    gather_links,
-    link_lengths,
     stiffness_matrix,
 )
-from ripple_sim.solver.texels.texel_mesh import TexelMesh
 
 
 def test_both_copies_of_a_link_across_a_side_are_the_same_to_the_last_bit(bumpy: TexelMesh) -> None:
@@ -35,67 +30,6 @@ def test_stiffness_is_positive_but_for_the_constant(bumpy: TexelMesh) -> None:
     values = np.linalg.eigvalsh(stiffness_matrix(texels.stencil(np.ones((6, n, n)))).toarray())
     assert abs(values[0]) < 1e-10
     assert values[1] > 1e-3
-
-
-def random_links(size: int, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(seed)
-    first, second = np.triu_indices(size, 1)
-    chosen = rng.choice(len(first), count, replace=False)
-    ends = np.stack([first[chosen], second[chosen]], axis=1)
-    flipped = rng.random(count) < 0.5
-    ends[flipped] = ends[flipped, ::-1]
-    return ends, rng.standard_normal(count)
-
-
-def laplacian(size: int, ends: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    matrix = np.zeros((size, size))
-    for (i, j), weight in zip(ends, weights, strict=True):
-        matrix[[i, j], [j, i]] += weight
-        matrix[[i, j], [i, j]] -= weight
-    return matrix
-
-
-@pytest.mark.parametrize(("size", "count"), [(2, 1), (5, 10), (30, 40)])
-def test_gathering_adds_the_product_with_the_links_matrix(size: int, count: int) -> None:
-    ends, weights = random_links(size, count, seed=size)
-    links = IrregularLinks.of(ends, weights)
-    assert links is not None
-    rng = np.random.default_rng(1)
-    field, out = rng.standard_normal(size), rng.standard_normal(size)
-    expected = out + laplacian(size, ends, weights) @ field
-    before = out.sum()
-    gather_links(links, field, out)
-    np.testing.assert_allclose(out, expected, atol=1e-12)
-    # what one end gains the other loses, and constants feel nothing
-    assert out.sum() == pytest.approx(before)
-    gather_links(links, np.full(size, 3.0), before_constant := out.copy())
-    assert (before_constant == out).all()
-
-
-def test_texels_come_once_in_order_each_with_all_its_links() -> None:
-    links = IrregularLinks.of(np.array([[7, 2], [2, 5], [9, 7]]), np.array([1.0, 2.0, 3.0]))
-    assert links is not None
-    assert links.texels.tolist() == [2, 5, 7, 9]
-    assert links.begins.tolist() == [0, 2, 3, 5, 6]
-    assert links.others.tolist() == [5, 7, 2, 2, 9, 7]
-    assert links.weights.tolist() == [2, 1, 2, 1, 3, 3]
-
-
-def test_where_there_are_no_links_nothing_is_stored_and_nothing_added() -> None:
-    assert IrregularLinks.of(np.zeros((0, 2), np.int64), np.zeros(0)) is None
-    out = np.arange(4.0)
-    gather_links(NO_LINKS, np.ones(4), out)
-    assert out.tolist() == [0, 1, 2, 3]
-
-
-def test_link_lengths_are_distances_between_neighbours() -> None:
-    atlas = sphere_atlas(2.0, 12)
-    lengths = link_lengths(atlas.texels.topology, atlas.texels.halo_positions)[:, :2]
-    ideal = 2.0 * np.pi / 2 / 12
-    finite = lengths[np.isfinite(lengths) & (lengths > 0)] / ideal
-    # equiangular cells are as wide as ideal ones on a face's middle lines and narrowest beside the cube's edges
-    assert 0.7 < finite.min() < 0.8
-    assert 0.99 < finite.max() <= 1.0
 
 
 MESHES = {

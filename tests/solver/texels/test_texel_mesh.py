@@ -1,50 +1,16 @@
 """Texel meshes of any topology: what is known of their waves, their figures of merit, and smoothing on them."""
 
-import copy
 import dataclasses
 
-import numba
 import numpy as np
 import pytest
+from cube_symmetry import cube_rotations, permute_texels
 from hand_made import disk, eigenvalues, flat_charts, flat_torus, polygon, square
+from modes import orders
 
 from ripple_sim.solver import Material, TexelMesh, WaveSolver, sphere_atlas, texel_atlas
-from ripple_sim.solver.layouts.cube.convention import cube_rotations, cube_topology, permute_texels
-from ripple_sim.solver.texels.texel_mesh import smoothed, texel_quality
-
-
-def mode_error(texels: TexelMesh, mode: np.ndarray, frequency: float) -> float:
-    """Relative L2 error of a standing mode after one period."""
-    waves = WaveSolver(texel_atlas(texels), Material(speed=1.0), backend="cpu", conserve_volume=False)
-    waves.height = mode
-    waves.step(2 * np.pi / frequency)
-    weight = texels.areas
-    return float(np.sqrt((weight * (waves.height - mode) ** 2).sum() / (weight * mode**2).sum()))
-
-
-def orders(errors: list[float]) -> np.ndarray:
-    return np.log2(np.array(errors[:-1]) / errors[1:])
-
-
-def test_modes_of_a_square_with_free_edges_converge_at_second_order() -> None:
-    errors = []
-    for n in (12, 24, 48):
-        texels = square(n)
-        x, y, _ = np.moveaxis(texels.positions, -1, 0)
-        errors.append(mode_error(texels, np.cos(np.pi * x) * np.cos(2 * np.pi * y), np.pi * np.sqrt(5)))
-    assert (orders(errors) > 1.9).all()
-    assert errors[-1] < 0.01
-
-
-def test_a_surface_may_end_at_its_last_texels() -> None:
-    errors = []
-    for n in (13, 25, 49):
-        place = np.linspace(0, 1, n)
-        x, y = np.meshgrid(place, place)
-        texels = TexelMesh.of(square(n).topology, np.stack([x, y, 0 * x], axis=-1)[None])
-        assert texels.areas.sum() == pytest.approx(1)
-        errors.append(mode_error(texels, (np.cos(np.pi * x) * np.cos(2 * np.pi * y))[None], np.pi * np.sqrt(5)))
-    assert (orders(errors) > 1.9).all()
+from ripple_sim.solver.layouts.cube import cube_topology
+from ripple_sim.solver.texels import smoothed, texel_quality
 
 
 def test_plane_waves_on_a_flat_torus_converge_at_second_order() -> None:
@@ -99,11 +65,6 @@ def test_momentum_of_an_impulse_on_a_rim_and_an_irregular_vertex() -> None:
         assert waves.momentum() == pytest.approx(-0.7, rel=1e-5)
 
 
-def test_no_kernel_is_compiled_anew_for_a_copy() -> None:
-    texels = square(4)
-    assert numba.typeof(copy.deepcopy(texels).grid) == numba.typeof(texels.grid)
-
-
 RIMS = [[(-1, -1)] * 4]
 
 
@@ -114,31 +75,6 @@ def test_a_rectangle_is_covered_by_texels_as_long_and_as_wide_as_its_sides_say()
     assert found == pytest.approx({"edge_min": 1 / 5, "edge_max": 3 / 5, "folded": 0, "coverage": 1, "spanned": 1})
     # the shorter sides set it
     assert 1 / np.sqrt(3) < timestep < 1
-
-
-def test_edges_across_a_glued_side_count_too() -> None:
-    texels = flat_torus(6)
-    beyond = texels.beyond.copy()
-    beyond[..., 0] *= 2
-    wide = TexelMesh.of(texels.topology, beyond[:, 1:-1, 1:-1], beyond=beyond)
-    found = texel_quality(wide, texel_atlas(wide).mesh)
-    assert (found["edge_min"], found["edge_max"]) == pytest.approx((1 / 6, 1 / 3))
-
-
-def test_texels_in_the_same_place_do_not_count_as_the_shortest_edge() -> None:
-    texels = square(4)
-    positions = texels.positions.copy()
-    positions[0, 1, 1] = positions[0, 1, 2]
-    crowded = texels.with_positions(positions, beyond=texels.beyond)
-    assert texel_quality(crowded, texel_atlas(texels).mesh)["edge_min"] == pytest.approx(1 / 4)
-
-
-@pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
-def test_edges_grow_with_a_sphere_and_shares_of_its_area_do_not(radius: float) -> None:
-    unit, ball = (sphere_atlas(r, 8) for r in (1.0, radius))
-    one, other = (texel_quality(atlas.texels, atlas.mesh) for atlas in (unit, ball))
-    for name, power in {"edge_min": 1, "edge_max": 1, "coverage": 0, "spanned": 0, "timestep": 0}.items():
-        assert other[name] == pytest.approx(one[name] * radius**power)
 
 
 def test_coverage_follows_the_areas_of_the_texels_and_spanned_their_places() -> None:
@@ -169,17 +105,6 @@ def test_waves_on_a_torus_fade_as_cos_to_the_eighth_of_half_their_phase(k: int, 
     # one pass of 1 2 1 over 4 is cos^2 of half the phase from texel to texel
     response = (np.cos(np.pi * k / n) * np.cos(np.pi * m / n)) ** 8
     np.testing.assert_allclose(smoothed(flat_torus(n).topology, wave), response * wave, atol=1e-12)
-
-
-def test_a_point_spreads_with_a_standard_deviation_of_root_2_and_keeps_its_sum() -> None:
-    field = np.zeros((1, 16, 16))
-    field[0, 8, 8] = 1
-    spread = smoothed(flat_torus(16).topology, field)[0]
-    assert spread.sum() == pytest.approx(1)
-    offset = np.arange(16) - 8
-    for axis in (0, 1):
-        assert spread.sum(axis=axis) @ offset**2 == pytest.approx(2)
-    assert np.count_nonzero(spread) == 81
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from ripple_sim import RippleWarning
 from ripple_sim.scenes.shapes import polygonise, sphere
 from ripple_sim.solver import Atlas, AtlasError, Mesh, MeshError, Volume, build_atlas, sphere_atlas, thickness_map
-from ripple_sim.solver.texels.thickness import LEAST, half_thickness, medial_radius
+from ripple_sim.solver.texels import LEAST, half_thickness, medial_radius
 
 
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])

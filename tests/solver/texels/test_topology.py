@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from hand_made import RIM, eigenvalues, flat_charts, flat_torus, polygon, square, two_squares
+from hand_made import RIM, eigenvalues, flat_torus, polygon, square
 
-from ripple_sim.solver import AtlasError, Material, TexelMesh, TexelTopology, WaveSolver, glue, texel_atlas
-from ripple_sim.solver.layouts.cube.convention import cube_topology
-from ripple_sim.solver.texels.topology import fill_halo, sampling_matrix, with_filled_halo
+from ripple_sim.solver import AtlasError, TexelMesh, TexelTopology, glue
+from ripple_sim.solver.layouts.cube import cube_topology
+from ripple_sim.solver.texels import sampling_matrix, with_filled_halo
 
 TOPOLOGIES = {
     "cube": lambda: cube_topology(4),
@@ -21,15 +21,6 @@ TOPOLOGIES = {
 @pytest.fixture(params=TOPOLOGIES)
 def topology(request: pytest.FixtureRequest) -> TexelTopology:
     return TOPOLOGIES[request.param]()
-
-
-def test_glued_sides_run_against_each_other() -> None:
-    halo = TOPOLOGIES["pillow"]().halo
-    back = 16 + np.arange(16).reshape(4, 4)
-    np.testing.assert_array_equal(halo[0, 0, 1:-1], back[0, ::-1])
-    np.testing.assert_array_equal(halo[0, -1, 1:-1], back[-1, ::-1])
-    np.testing.assert_array_equal(halo[0, 1:-1, -1], back[:, 0])
-    np.testing.assert_array_equal(halo[0, 1:-1, 0], back[:, -1])
 
 
 def test_a_side_may_be_glued_to_the_next_side_of_its_own_chart() -> None:
@@ -63,17 +54,12 @@ def test_where_no_texel_lies_a_field_with_halo_is_0() -> None:
 def test_addresses_copy_the_same_halo_as_the_table(topology: TexelTopology) -> None:
     field = np.random.default_rng(1).standard_normal(topology.shape)
     flat = np.zeros(topology.halo.size)
-    flat[topology.addresses.texels] = field.ravel()
-    flat[topology.addresses.ghosts] = flat[topology.addresses.sources]
+    texels, ghosts, sources = topology.addresses
+    flat[texels] = field.ravel()
+    flat[ghosts] = flat[sources]
     np.testing.assert_array_equal(flat.reshape(topology.halo.shape), topology.with_halo(field))
     charts, n, _ = topology.shape
-    assert len(topology.addresses.ghosts) == charts * (4 * n + 4) - (topology.halo < 0).sum()
-
-
-def test_the_tables_cannot_be_changed(topology: TexelTopology) -> None:
-    for table in (topology.halo, topology.rim, topology.valence, topology.corners):
-        with pytest.raises(ValueError, match="read-only"):
-            table.flat[0] = 0
+    assert len(topology.addresses[1]) == charts * (4 * n + 4) - (topology.halo < 0).sum()
 
 
 UNIT = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -152,17 +138,6 @@ def test_a_torus_goes_round_and_a_rim_repeats_the_last_texels(name: str, mode: s
     np.testing.assert_array_equal(with_filled_halo(topology, field)[0], np.pad(field[0], 1, mode=mode))
 
 
-@pytest.mark.parametrize("sides", [3, 4, 5, 8])
-def test_charts_round_a_point_are_a_polygon_from_five_on(sides: int) -> None:
-    texels = polygon(sides, 4)
-    topology = texels.topology
-    assert (topology.valence[:, 0] == sides).all()
-    assert len(np.unique(topology.corners[:, 0])) == 1
-    assert len(topology.polygons) == (sides > 4)
-    for cell in topology.polygons:
-        assert cell.tolist() == [16 * chart for chart in range(sides)]
-
-
 def signed_area(points: np.ndarray) -> float:
     x, y, _ = points.T
     return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
@@ -198,31 +173,10 @@ def test_three_charts_at_a_rim_make_a_triangle_wherever_the_charts_begin(turns: 
     assert texels.areas.sum() == pytest.approx(((2 * n - 1) ** 2 - n**2 + 0.5) / n**2)
 
 
-def places_beyond_corners(topology: TexelTopology) -> tuple[np.ndarray, np.ndarray]:
-    return topology.halo[:, ROWS, COLUMNS], topology.rim[:, ROWS, COLUMNS]
-
-
-def test_beyond_a_straight_rim_lies_what_the_chart_beside_has_there() -> None:
-    glued = [[RIM, (1, 3), RIM, RIM], [RIM, RIM, RIM, (0, 1)]]
-    halo, rim = places_beyond_corners(flat_charts([UNIT, UNIT + np.array([1, 0, 0])], glued, 3).topology)
-    assert rim.all()
-    # where the two charts meet, each shows the other's texel; at the far corners its own
-    assert halo.tolist() == [[0, 9, 15, 6], [2, 11, 17, 8]]
-
-
 def test_charts_side_by_side_are_one_chart() -> None:
     whole, parts = square(12), polygon(4, 6)
     # the same square, turned by an eighth and 2 ** 0.5 as wide
     np.testing.assert_allclose(eigenvalues(parts, 12), eigenvalues(whole, 12) / 2, rtol=1e-9, atol=1e-9)
-
-
-def test_waves_stay_in_their_part() -> None:
-    waves = WaveSolver(texel_atlas(two_squares(16)), Material(speed=1.0), backend="cpu", conserve_volume=False)
-    waves.add_impulse([0.5, 0.5, 1.0], 1.0, 0.2)
-    waves.step(1.0)
-    assert (waves.height[0] == 0).all()
-    assert np.abs(waves.height[1]).max() > 0
-    np.testing.assert_allclose(eigenvalues(two_squares(8), 4)[:2], 0, atol=1e-9)
 
 
 def test_what_does_not_fit_is_refused() -> None:
@@ -264,20 +218,6 @@ def test_constants_stay_constant_even_in_corners_of_five_charts() -> None:
         np.testing.assert_allclose(with_filled_halo(topology, np.full(topology.shape, 2.5, np.float32)), 2.5)
 
 
-def test_filling_replaces_an_old_halo_and_keeps_the_texels() -> None:
-    topology = cube_topology(4)
-    field = noise(6, 4, 4)
-    around = np.full((6, 6, 6), np.nan, np.float32)
-    around[:, 1:-1, 1:-1] = field
-    fill_halo(topology, around)
-    np.testing.assert_array_equal(around[:, 1:-1, 1:-1], field)
-    np.testing.assert_array_equal(around, with_filled_halo(topology, field))
-    assert around.dtype == np.float32
-    # and the components of a vector field one by one
-    pair = with_filled_halo(topology, np.stack([field, 2 * field], axis=-1))
-    np.testing.assert_array_equal(pair, np.stack([around, 2 * around], axis=-1))
-
-
 def at_side(side: int, along: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Row and column of places on a side of a chart, 0 to 1 from its first corner to its second."""
     low, high, there = np.full_like(along, -0.5), np.full_like(along, n - 0.5), n * along - 0.5
@@ -296,13 +236,6 @@ def test_both_charts_agree_along_a_glued_side_up_to_its_corners(topology) -> Non
         np.testing.assert_allclose(here, there[::-1], atol=1e-12)
 
 
-def test_texel_centres_take_their_own_texel_alone() -> None:
-    topology = cube_topology(4)
-    chart, row, column = (each.ravel() for each in np.indices(topology.shape))
-    matrix = sampling_matrix(topology, chart, row.astype(float), column.astype(float))
-    np.testing.assert_array_equal(matrix.toarray(), np.eye(topology.texel_count))
-
-
 @pytest.mark.parametrize("topology", [cube_topology(4), flat_torus(4).topology, polygon(5, 4).topology])
 def test_weights_are_a_mean_of_at_most_four_texels(topology) -> None:
     rng = np.random.default_rng(1)
@@ -312,35 +245,3 @@ def test_weights_are_a_mean_of_at_most_four_texels(topology) -> None:
     assert dense.min() >= 0
     np.testing.assert_allclose(dense.sum(axis=1), 1)
     assert (np.count_nonzero(dense, axis=1) <= 4).all()
-
-
-def test_a_bilinear_field_is_reproduced_inside_a_chart() -> None:
-    topology = square(6).topology
-    row, column = np.random.default_rng(2).uniform(0, 5, (2, 200))
-    r, c = np.indices((6, 6))
-    matrix = sampling_matrix(topology, np.zeros(200, np.int64), row, column)
-    expected = 2 + 3 * row - column + 0.5 * row * column
-    np.testing.assert_allclose(matrix @ (2 + 3 * r - c + 0.5 * r * c).ravel(), expected)
-
-
-def test_up_to_a_rim_the_last_texels_go_on() -> None:
-    topology = square(4).topology
-    field = np.random.default_rng(3).standard_normal((4, 4))
-    place = np.array([0.0, 1.0, 3.0])
-    matrix = sampling_matrix(topology, np.zeros(3, np.int64), np.full(3, 3.5), place)
-    np.testing.assert_allclose(matrix @ field.ravel(), field[3, [0, 1, 3]])
-    corner = sampling_matrix(topology, np.zeros(1, np.int64), np.array([-0.5]), np.array([3.5]))
-    np.testing.assert_allclose(corner @ field.ravel(), field[0, 3])
-
-
-def test_a_corner_of_three_charts_is_the_mean_of_its_texels() -> None:
-    topology = polygon(3, 4).topology
-    matrix = sampling_matrix(topology, np.arange(3), np.full(3, -0.5), np.full(3, -0.5)).toarray()
-    expected = np.zeros(48)
-    expected[[0, 16, 32]] = 1 / 3
-    np.testing.assert_allclose(matrix, np.tile(expected, (3, 1)))
-
-
-def test_no_points_make_an_empty_matrix() -> None:
-    none = np.zeros(0)
-    assert sampling_matrix(cube_topology(4), none.astype(np.int64), none, none).shape == (0, 96)

@@ -1,12 +1,15 @@
-"""Loads over one step: what they add up to, when they end, and what is refused.
+"""Loads over one step, held forces and pressure: what they add up to, when they end, and what is refused.
 
-Held forces and pressure: what they add up to, and when they end.
+The footprint of a source: exact total, distances along the surface where it is not flat, no leak through thin parts.
 """
 
 import numpy as np
 import pytest
+import trimesh
+from arrival import distance_from_point
 
-from ripple_sim.solver import Atlas, Load, Material, SolverError, WaveSolver, sphere_atlas
+from ripple_sim.solver import Atlas, Load, Material, Mesh, SolverError, WaveSolver, build_atlas, sphere_atlas
+from ripple_sim.solver.waves import footprint_at
 from ripple_sim.solver.waves.footprint import footprint
 
 
@@ -35,16 +38,6 @@ def test_load_is_the_same_as_a_held_force_that_is_ended(backend: str) -> None:
         waves.step(0.2)
         results.append(waves.height)
     np.testing.assert_allclose(results[0], results[1], atol=1e-6 * np.abs(results[0]).max())
-
-
-def test_merging_adds_what_stands_at_the_same_texel() -> None:
-    rng = np.random.default_rng(0)
-    texels, forces = rng.integers(0, 40, 500), rng.standard_normal(500)
-    once = Load(texels, forces).merged(384)
-    assert len(np.unique(once.texels)) == len(once.texels)
-    np.testing.assert_allclose(
-        np.bincount(once.texels, once.forces, 384), np.bincount(texels, forces, 384), rtol=1e-12, atol=1e-14
-    )
 
 
 @pytest.mark.parametrize(
@@ -103,13 +96,73 @@ def test_force_held_over_a_step_equals_many_small_impulses(animal: Atlas) -> Non
     assert np.abs(results[0] - results[1]).max() < 0.01 * np.abs(results[0]).max()
 
 
-def test_pressure_is_read_as_it_was_assigned() -> None:
-    atlas = sphere_atlas(1.0, 8)
-    waves = WaveSolver(atlas, backend="cpu")
-    field = np.random.default_rng(0).standard_normal((6, 8, 8))
-    waves.pressure = field
-    np.testing.assert_allclose(waves.pressure, field, rtol=1e-6)
-    waves.add_pressure(1.5)
-    np.testing.assert_allclose(waves.pressure, field + 1.5, atol=1e-6)
-    waves.reset()
-    assert not waves.pressure.any()
+def test_weights_integrate_to_one(animal: Atlas) -> None:
+    rng = np.random.default_rng(2)
+    for vertex, radius in zip(rng.integers(0, len(animal.mesh.V), 20), rng.uniform(0, 0.2, 20), strict=True):
+        where = footprint(animal, animal.mesh.V[vertex], radius)
+        total = (where.weights * animal.areas.reshape(-1)[where.texels]).sum()
+        assert total == pytest.approx(1, rel=1e-12)
+        assert len(np.unique(where.texels)) == len(where.texels)
+
+
+def test_centroid_of_the_footprint_is_the_source() -> None:
+    atlas = sphere_atlas(1.0, 64)
+    rng = np.random.default_rng(0)
+    for point in rng.standard_normal((20, 3)):
+        point /= np.linalg.norm(point)
+        where = footprint(atlas, point, 0.12)
+        share = where.weights * atlas.areas.reshape(-1)[where.texels]
+        centroid = share @ atlas.positions.reshape(-1, 3)[where.texels]
+        centroid /= np.linalg.norm(centroid)
+        texel = np.pi / 2 / 64
+        assert np.linalg.norm(centroid - point) < 0.1 * texel
+
+
+def test_footprint_measures_straight_where_it_is_flat_and_along_the_surface_where_it_is_not(animal: Atlas) -> None:
+    """Both ways through the code against distances by fast marching."""
+    rng = np.random.default_rng(1)
+    positions, flat = animal.positions.reshape(-1, 3), 0
+    for vertex in rng.integers(0, len(animal.mesh.V), 40):
+        (point,), (center,) = animal.nearest(animal.mesh.V[vertex])
+        where = footprint_at(animal, point, int(center), 0.08)
+        texels, along = distance_from_point(animal.texels, int(center), point, 3 * where.radius)
+        distance = dict(zip(texels.tolist(), along, strict=True))
+        height = (where.weights / where.weights.max()) ** (1 / 3)
+        used = where.radius * np.sqrt(1 - np.minimum(1, height * (1 - (min(distance.values()) / where.radius) ** 2)))
+        straight = np.linalg.norm(positions[where.texels] - point, axis=1)
+        true = np.array([distance[texel] for texel in where.texels.tolist()])
+        assert (used > 0.97 * straight - 0.05 * where.radius).all()
+        assert (used < 1.05 * true + 0.05 * where.radius).all()
+        flat += np.allclose(used, straight, atol=0.02 * where.radius)
+    assert 5 < flat < 40, "only one of the two ways was taken"
+
+
+def test_small_radius_is_raised_to_two_texels() -> None:
+    atlas = sphere_atlas(1.0, 32)
+    where = footprint(atlas, [0, 0, 1], 0.0)
+    assert where.radius == pytest.approx(2 * np.pi / 2 / 32, rel=0.05)
+    assert len(where.texels) >= 9
+
+
+@pytest.fixture(scope="module")
+def plate() -> Atlas:
+    box = trimesh.creation.box(extents=(1.0, 1.0, 0.02))
+    V, F = trimesh.remesh.subdivide_to_size(box.vertices, box.faces, max_edge=0.06)
+    return build_atlas(Mesh.from_arrays(V, F), 64, cache=False)
+
+
+def test_impulse_does_not_leak_through_a_thin_plate(plate: Atlas) -> None:
+    where = footprint(plate, [0.1, -0.1, 0.01], 0.2)
+    hit = plate.positions.reshape(-1, 3)[where.texels]
+    assert (hit[:, 2] > 0.0099).all()
+    # all of the disc is there: as many texels as its area holds
+    assert plate.areas.reshape(-1)[where.texels].sum() == pytest.approx(np.pi * 0.2**2, rel=0.1)
+
+
+def test_distance_along_a_folded_surface_goes_round_the_edge(plate: Atlas) -> None:
+    # 0.1 from the rim: the way to the same place below is 0.1 + 0.02 + 0.1
+    where = footprint(plate, [0.4, 0.0, 0.01], 0.2)
+    hit = plate.positions.reshape(-1, 3)[where.texels]
+    below = hit[hit[:, 2] < -0.005]
+    assert len(below) > 0
+    assert below[:, 0].min() > 0.4 - 0.02

@@ -1,11 +1,11 @@
 """The wave solver against theory: modes, order, conservation, damping, stability.
 
-Steps are split as stability asks.
-
-The state of waves: copies go on as the original does, and other solvers take it over.
+Steps are split as stability asks. The state of waves: copies go on as the original does, and other solvers take it
+over. Crests: the greatest height of each texel since the last look, whichever step had it.
 """
 
 import copy
+import dataclasses
 import pickle
 from collections.abc import Callable
 
@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from modes import mode_error, zonal_harmonic
 
+from ripple_sim.bench import energy_drift
 from ripple_sim.solver import Atlas, Material, SolverError, WaveSolver, sphere_atlas
 
 
@@ -34,23 +35,6 @@ def test_frequency_scales_with_speed_over_radius(radius: float, speed: float) ->
     waves.height = start
     waves.step(2 * np.pi / np.sqrt(20) * radius / speed / 2)
     np.testing.assert_allclose(waves.height, -start, atol=5e-3)
-
-
-def test_damping_stiffness_and_viscosity_act_on_a_mode_as_theory_says(backend: str) -> None:
-    zeta, k, nu, c, eigenvalue = 0.8, 6.0, 0.03, 1.3, 20.0
-    atlas = sphere_atlas(1.0, 48)
-    material = Material(speed=c, damping=zeta, stiffness=k, viscosity=nu, density=7.0)
-    waves = WaveSolver(atlas, material, backend=backend)
-    start = zonal_harmonic(atlas.positions[..., 2])
-    waves.height = start
-    rate = (zeta + nu * eigenvalue) / 2
-    omega = np.sqrt(c**2 * eigenvalue + k - rate**2)
-    for _ in range(4):
-        waves.step(0.21)
-    t = waves.time
-    expected = np.exp(-rate * t) * (np.cos(omega * t) + rate / omega * np.sin(omega * t))
-    amplitude = (atlas.areas * waves.height * start).sum() / (atlas.areas * start**2).sum()
-    assert amplitude == pytest.approx(expected, abs=0.01)
 
 
 def test_superposition(animal: Atlas, backend: str) -> None:
@@ -90,15 +74,6 @@ def test_fields_add_up_and_the_mean_is_taken_out(backend: str) -> None:
     assert abs(waves.momentum()) < 1e-5
 
 
-def test_fields_enter_as_they_are_when_volume_is_not_conserved() -> None:
-    atlas = sphere_atlas(1.0, 8)
-    waves = WaveSolver(atlas, backend="cpu", conserve_volume=False)
-    waves.add_height(np.full((6, 8, 8), 0.25))
-    waves.add_velocity(np.full((6, 8, 8), -1.0))
-    assert (waves.height == 0.25).all()
-    assert (waves.velocity == -1.0).all()
-
-
 def test_impulses_on_the_same_texels_add_up(backend: str) -> None:
     atlas = sphere_atlas(1.0, 16)
     once, twice = (WaveSolver(atlas, backend=backend) for _ in range(2))
@@ -134,10 +109,6 @@ def test_steps_that_would_never_end_are_refused() -> None:
     waves = WaveSolver(sphere_atlas(1.0, 8), backend="cpu")
     with pytest.raises(SolverError, match=r"would take .* substeps"):
         waves.step(1e9)
-    with pytest.raises(SolverError, match=r"up to 1e\+12"):
-        Material(speed=1e30)
-    with pytest.raises(SolverError, match="valid is a number"):
-        Material(speed="fast")
 
 
 MATERIAL = Material(speed=0.7, stiffness=30.0, viscosity=1e-3, density=2.0, yield_height=2e-3)
@@ -205,3 +176,88 @@ def test_the_state_of_another_resolution_is_refused() -> None:
     waves = WaveSolver(sphere_atlas(1.0, 8), backend="cpu")
     with pytest.raises(SolverError, match=r"shape \(6, 12, 12\); valid is \(6, 8, 8\)"):
         waves.state = hit("cpu").state
+
+
+def test_energy_momentum_and_volume_stay_without_damping(animal: Atlas, backend: str) -> None:
+    waves = WaveSolver(animal, Material(speed=0.5, density=2.0), backend=backend)
+    waves.add_impulse(animal.mesh.V[100], 1.0, 0.06)
+    step = waves.stable_timestep
+    waves.step(10 * step)
+    energy = waves.energy()
+    drift = []
+    for _ in range(20):
+        waves.step(100 * step if backend == "cpu" else 10 * step)
+        drift.append(waves.energy() / energy - 1)
+    assert np.abs(drift).max() < 1e-5
+    # 1 N s was put in and its mean taken out
+    assert abs(waves.momentum()) < 1e-5
+    scale = (animal.areas * np.abs(waves.height)).sum()
+    assert abs(waves.volume()) < 1e-5 * scale
+
+
+def test_energy_has_no_trend_over_ten_thousand_steps() -> None:
+    drift = energy_drift(resolution=24, steps=10_000)
+    assert drift["largest"] < 1e-5
+    assert abs(drift["trend"]) < 1e-6
+
+
+def test_net_impulse_moves_the_surface_as_a_whole_when_volume_is_not_conserved() -> None:
+    atlas = sphere_atlas(1.0, 16)
+    waves = WaveSolver(atlas, Material(density=5.0), backend="cpu", conserve_volume=False)
+    waves.add_impulse([0, 0, 1], 2.0, 0.5)
+    assert waves.momentum() == pytest.approx(-2.0, rel=1e-6)
+    waves.step(3.0)
+    assert waves.momentum() == pytest.approx(-2.0, rel=1e-5)
+    assert waves.volume() == pytest.approx(-2.0 / 5.0 * 3.0, rel=1e-5)
+
+
+def test_energy_never_rises_with_damping_and_viscosity(animal: Atlas) -> None:
+    waves = WaveSolver(animal, Material(speed=0.5, damping=0.3, viscosity=1e-4), backend="cpu")
+    waves.add_impulse(animal.mesh.V[100], 1.0, 0.06)
+    energies = []
+    for _ in range(30):
+        waves.step(10 * waves.stable_timestep)
+        energies.append(waves.energy())
+    assert (np.diff(energies) < 0).all()
+
+
+PLAIN = Material(speed=1.0, density=3.0)
+
+
+@pytest.mark.parametrize("material", [PLAIN, dataclasses.replace(PLAIN, yield_height=2e-3)], ids=["elastic", "dents"])
+def test_crests_are_the_greatest_height_of_all_steps(animal: Atlas, backend: str, material: Material) -> None:
+    waves = WaveSolver(animal, material, backend=backend)
+    assert not waves.crests().any()
+    for seed in (0, 1):
+        waves.add_impulse(animal.positions[seed, 3, 5], 0.02, 0.1)
+        expected = np.zeros_like(waves.height)
+        for _ in range(7):
+            waves.step(0.03)
+            expected = np.maximum(expected, np.abs(waves.height))
+        np.testing.assert_allclose(waves.crests(), expected, atol=1e-9)
+        np.testing.assert_array_equal(waves.crests(), np.abs(waves.height))
+    assert (expected > 2 * np.abs(waves.height)).any()
+
+
+def test_crests_of_deep_water_are_kept_too() -> None:
+    waves = WaveSolver(sphere_atlas(0.1, 8), Material.water())
+    waves.crests()
+    waves.add_impulse([0.1, 0.0, 0.0], 1e-4, 0.05)
+    heights = []
+    for _ in range(4):
+        waves.step(0.02)
+        heights.append(np.abs(waves.height))
+    np.testing.assert_array_equal(waves.crests(), np.max(heights, axis=0))
+
+
+def test_crests_leave_the_waves_as_they_are(animal: Atlas, backend: str) -> None:
+    heights = []
+    for kept in (True, False):
+        waves = WaveSolver(animal, PLAIN, backend=backend)
+        if kept:
+            waves.crests()
+        waves.add_impulse(animal.positions[0, 3, 5], 0.02, 0.1)
+        for _ in range(5):
+            waves.step(0.03)
+        heights.append(waves.height)
+    np.testing.assert_array_equal(*heights)

@@ -1,14 +1,67 @@
-"""Quads of cells: each laid out as a square without a fold, glued as the surface is."""
+"""From cells to charts: sizes of cells, their quads, and the maps onto these, which stay one to one.
+
+Cells are small on limbs, so that the map wraps these without a fold among the texels. Each quad is laid out as a
+square without a fold, glued as the surface is. Maps are coarsened, relaxed, and have the tips of their cones moved.
+Triangles are joined in pairs as well as in the best of all pairings, where these can be counted.
+"""
+
+import itertools
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 from surfaces import disk, sphere, torus
 
-from ripple_sim.solver import glue
-from ripple_sim.solver.layouts.patches.cells import BorderedCells, Metric, centred_cells, spread_seeds
-from ripple_sim.solver.layouts.patches.disks import disk_cells, signed_areas
-from ripple_sim.solver.layouts.patches.quads import Quads, cut_into_large_quads, cut_into_quads
-from ripple_sim.solver.layouts.patches.surface import Surface
+from ripple_sim.solver import Mesh, glue
+from ripple_sim.solver.layouts import FIXED, FREE
+from ripple_sim.solver.layouts.patches import (
+    BorderedCells,
+    Metric,
+    Quads,
+    SeamlessMap,
+    Surface,
+    cell_sizes,
+    centred_cells,
+    chosen_joints,
+    corner_places,
+    cut_into_large_quads,
+    cut_into_quads,
+    disk_cells,
+    locate_texels,
+    move_tips,
+    patch_atlas,
+    relax,
+    seamless_map,
+    shapes_of,
+    signed_areas,
+    spread_seeds,
+    total_energy,
+    without_cuts,
+)
+
+TIPS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
+
+
+def ball_with_limbs(length: float, sharpness: float, level: int) -> Mesh:
+    ball = sphere(level)
+    radius = 1 + length * np.exp(sharpness * (ball.V @ TIPS.T - 1)).sum(axis=1)
+    return Mesh.from_arrays(ball.V * radius[:, None], ball.F)
+
+
+def test_sizes_keep_to_their_bounds() -> None:
+    ball = sphere(3)
+    sizes = cell_sizes(Metric.of(Surface.of(ball.V, ball.F)), 0.5, (0.2, 0.3))
+    assert sizes.min() >= 0.2
+    assert sizes.max() <= 0.3 + 1e-12
+
+
+def test_texels_on_limbs_are_neither_folded_nor_wide() -> None:
+    atlas = patch_atlas(ball_with_limbs(3.0, 40.0, 4), 64)
+    quality = atlas.quality()
+    assert quality["folded"] == 0
+    assert quality["timestep"] > 0.5
+    assert np.quantile(atlas.areas, 0.999) < 3 * np.median(atlas.areas)
+
 
 MESHES = {"sphere": lambda: sphere(3), "torus": lambda: torus(24), "disk": lambda: disk(14)}
 EULER = {"sphere": 2, "torus": 0, "disk": 1}
@@ -29,7 +82,9 @@ def quads_of(name: str, cells: int) -> Quads:
 @pytest.mark.parametrize("name", MESHES)
 @pytest.mark.parametrize("cells", [1, 6, 12])
 def test_quads_cover_the_surface_and_their_squares_once(name: str, cells: int) -> None:
-    assert_covered_once(name, quads_of(name, cells))
+    quads = quads_of(name, cells)
+    assert_covered_once(name, quads)
+    assert_topology(name, quads)
 
 
 @pytest.mark.parametrize("name", MESHES)
@@ -55,11 +110,6 @@ def assert_covered_once(name: str, quads: Quads) -> None:
     assert quads.surface.areas.sum() == pytest.approx(Surface.of(MESHES[name]().V, MESHES[name]().F).areas.sum())
 
 
-@pytest.mark.parametrize("name", MESHES)
-def test_glued_charts_have_the_topology_of_the_surface(name: str) -> None:
-    assert_topology(name, quads_of(name, 10))
-
-
 def assert_topology(name: str, quads: Quads) -> None:
     glued = quads.glued
     corners = len(np.unique(glue(glued, 2).corners))
@@ -67,5 +117,117 @@ def assert_topology(name: str, quads: Quads) -> None:
     assert corners - sides + len(glued) == EULER[name]
 
 
-def test_a_part_of_one_cell_has_charts() -> None:
-    assert len(quads_of("disk", 1).glued) == 4
+@pytest.fixture(scope="module", params=["torus", "disk"])
+def name(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def mesh(name: str) -> Mesh:
+    return MESHES[name]()
+
+
+@pytest.fixture(scope="module")
+def quads(name: str) -> Quads:
+    return quads_of(name, 8)
+
+
+def assert_one_to_one(seamless: SeamlessMap) -> np.ndarray:
+    """No triangle is folded, each chart is covered once, and every texel found; returns the places of corners."""
+    places = corner_places(seamless)
+    areas = signed_areas(places)
+    assert areas.min() > 0
+    np.testing.assert_allclose(areas.sum(), len(seamless.glued), rtol=1e-9)
+    assert (locate_texels(seamless, 9)[0] >= 0).all()
+    return places
+
+
+def test_fewer_triangles_cover_the_same_surface_and_charts_once(mesh: Mesh, quads: Quads) -> None:
+    whole = seamless_map(quads)
+    surface, seamless = without_cuts(quads.surface, whole, quads.cut)
+    assert len(surface.F) < 0.7 * len(quads.surface.F)
+    assert_one_to_one(seamless)
+    # each triangle of the mesh is covered once, by triangles that lie where they say
+    share = np.linalg.det(surface.inside)
+    assert share.min() > 0
+    np.testing.assert_allclose(np.bincount(surface.parent, share), 1.0, rtol=1e-9)
+    points = np.einsum("fij,fjk->fik", surface.inside, mesh.V[mesh.F[surface.parent]])
+    np.testing.assert_allclose(points, surface.V[surface.F], atol=1e-12)
+    assert np.bincount(surface.edges.of.ravel()).max() == 2
+    assert (seamless.freedom == FIXED).sum() == (whole.freedom == FIXED).sum()
+
+
+def test_a_relaxed_map_covers_the_charts_once_with_less_energy(quads: Quads) -> None:
+    seamless = seamless_map(quads)
+    shapes = shapes_of(quads.surface.V, quads.surface.F, len(quads.glued))
+    before = total_energy(seamless, shapes)
+    relax(quads.surface.V, seamless)
+    assert_one_to_one(seamless)
+    assert (seamless.x >= 0).all() and (seamless.x <= 1).all()
+    assert total_energy(seamless, shapes) < 0.9 * before
+
+
+def test_moved_tips_lower_the_energy_and_leave_the_map_one_to_one(quads: Quads) -> None:
+    seamless = seamless_map(quads)
+    shapes = shapes_of(quads.surface.V, quads.surface.F, len(quads.glued))
+    tips = np.flatnonzero(seamless.freedom == FIXED)
+    before = total_energy(seamless, shapes)
+    assert len(move_tips(seamless, shapes, tips))
+    assert total_energy(seamless, shapes) < before
+    assert (seamless.freedom == FIXED).sum() == len(tips)
+    places = assert_one_to_one(seamless)
+    total = np.zeros(len(seamless.x))
+    for k in range(3):
+        u, v = places[:, (k + 1) % 3] - places[:, k], places[:, (k + 2) % 3] - places[:, k]
+        angle = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], (u * v).sum(axis=1))
+        total += np.bincount(seamless.F[:, k], angle, len(total))
+    np.testing.assert_allclose(total[seamless.freedom == FREE] / (2 * np.pi), 1.0, atol=1e-9)
+
+
+def hull(points: int) -> tuple[tuple[np.ndarray, ...], int, np.ndarray]:
+    """Triangles of the convex hull of random points, their sides, and how many meet in each point."""
+    V = np.random.default_rng(points).normal(size=(points, 3))
+    F = ConvexHull(V / np.linalg.norm(V, axis=1, keepdims=True)).simplices.astype(np.int64)
+    pairs = [(i, j) for i, j in itertools.combinations(range(len(F)), 2) if len(set(F[i]) & set(F[j])) == 2]
+    ends = [sorted(set(F[i]) & set(F[j])) for i, j in pairs]
+    return (np.array(pairs), np.array(ends), np.zeros(len(pairs))), len(F), np.bincount(F.ravel())
+
+
+def pairings(pairs: np.ndarray, left: frozenset[int]) -> list[list[int]]:
+    if not left:
+        return [[]]
+    here = min(left)
+    ways = [k for k in range(len(pairs)) if here in pairs[k] and set(pairs[k]) <= left]
+    return [[k, *rest] for k in ways for rest in pairings(pairs, left - set(pairs[k]))]
+
+
+def off(middles: np.ndarray, corners: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """By how much the quads round each point differ from four."""
+    return np.abs(corners - np.bincount(middles[chosen].ravel(), minlength=len(corners)) - 4)
+
+
+@pytest.mark.parametrize("points", [12, 14])
+def test_the_best_of_all_pairings_is_found(points: int) -> None:
+    joints, count, corners = hull(points)
+    chosen = chosen_joints(*joints, count, corners, np.full(points, 4.0))
+    assert chosen is not None
+    assert (np.bincount(joints[0][chosen].ravel()) == 1).all()
+    ways = [off(joints[1], corners, np.array(each)) for each in pairings(joints[0], frozenset(range(count)))]
+    cost = [(each + 2 * np.maximum(each - 1, 0)).sum() for each in ways if each.max() < 2]
+    found = off(joints[1], corners, chosen)
+    assert (found + 2 * np.maximum(found - 1, 0)).sum() == min(cost)
+
+
+def test_where_their_number_is_odd_one_triangle_stays_alone() -> None:
+    # three in a row, round points that have enough of others
+    joints = (np.array([[0, 1], [1, 2], [0, -1], [2, -1]]), np.array([[0, 1], [1, 2], [3, 4], [5, 6]]), np.zeros(4))
+    chosen = chosen_joints(*joints, 3, np.full(7, 5), np.full(7, 4.0))
+    assert chosen is not None
+    alone = joints[0][chosen, 1] < 0
+    assert alone.sum() == 1
+    assert sorted(joints[0][chosen][joints[0][chosen] >= 0]) == [0, 1, 2]
+
+
+def test_there_is_no_pairing_of_triangles_that_have_no_side_in_common() -> None:
+    none = np.empty((0, 2), np.int64), np.empty((0, 2), np.int64), np.empty(0)
+    assert chosen_joints(*none, 2, np.full(3, 5), np.full(3, 4.0)) is None

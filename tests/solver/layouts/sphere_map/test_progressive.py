@@ -1,15 +1,37 @@
-"""The progressive map is a certified bijection that spreads area, on every shape of genus 0."""
+"""The progressive map is a certified bijection that spreads area, on every shape of genus 0.
+
+Random shapes, bad triangles, and what must not matter. Vertices come back one by one, and the map stays a bijection;
+relaxing a level brings it from any fold-free map to the minimum of its energy.
+"""
 
 import numpy as np
 import pytest
 import trimesh
-from genus_zero import SHAPES, crumpled, icosphere, jack, solid
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from genus_zero import (
+    SHAPES,
+    crumpled,
+    icosphere,
+    jack,
+    solid,
+    stretch_quantiles,
+    thin_limb,
+)
+from hypothesis import HealthCheck, given, settings, strategies as st
 from known_meshes import known_mesh
+from levels import whole_level
+from scipy.spatial.transform import Rotation
 
+from ripple_sim.solver import Mesh, WaveSolver
 from ripple_sim.solver.errors import SphereMapError
-from ripple_sim.solver.layouts.sphere_map import certify, progressive, progressive_sphere_map, stretch_quantiles
+from ripple_sim.solver.layouts import atlas_from_sphere_map
+from ripple_sim.solver.layouts.sphere_map import (
+    certify,
+    newton_step,
+    progressive,
+    progressive_sphere_map,
+    relax_level,
+    total_energy,
+)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -21,20 +43,6 @@ def test_map_is_certified(shape):
     assert certificate.flipped == 0
     assert certificate.solid_angle == pytest.approx(4 * np.pi, abs=1e-9)
     np.testing.assert_allclose(np.linalg.norm(S, axis=1), 1, atol=1e-12)
-
-
-@settings(max_examples=15, deadline=None, derandomize=True)
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    subdivisions=st.integers(0, 3),
-    roughness=st.floats(0, 1.5),
-    factors=st.tuples(*[st.floats(0.02, 1)] * 3),
-)
-def test_every_star_shaped_bumpy_mesh_maps_without_folds(seed, subdivisions, roughness, factors):
-    V, F = icosphere(subdivisions)
-    radius = np.exp(roughness * np.random.default_rng(seed).standard_normal(len(V)))
-    S = progressive_sphere_map(V * radius[:, None] * np.array(factors), F)
-    assert certify(F, S).valid
 
 
 def test_no_map_without_a_certificate(monkeypatch):
@@ -65,19 +73,6 @@ def test_next_rung_is_tried_where_one_folds(monkeypatch):
     assert tried == list(progressive.TRUST_LADDER[:3])
 
 
-def test_same_mesh_gives_same_bits():
-    V, F = jack(points=30, limb_radius=0.3)
-    np.testing.assert_array_equal(progressive_sphere_map(V, F), progressive_sphere_map(V, F))
-
-
-def test_scale_and_place_of_the_mesh_do_not_matter():
-    V, F = crumpled()  # no symmetry, so no ties for round-off to break
-    S = progressive_sphere_map(V, F)
-    np.testing.assert_allclose(progressive_sphere_map(1000 * V, F), S, atol=1e-6)
-    np.testing.assert_allclose(progressive_sphere_map(1e-4 * V, F), S, atol=1e-6)
-    np.testing.assert_allclose(progressive_sphere_map(V + np.array([5, -2, 1]), F), S, atol=1e-6)
-
-
 def test_round_sphere_is_spread_evenly():
     V, F = icosphere(4)
     low, _, median, _, high = stretch_quantiles(V, F, progressive_sphere_map(V, F))
@@ -98,3 +93,186 @@ def test_known_mesh(name, bound):
     S = progressive_sphere_map(V, F)
     assert certify(F, S).valid
     assert stretch_quantiles(V, F, S, [0.999])[0] < bound
+
+
+SEEDS = st.integers(0, 2**32 - 1)
+EXAMPLES = settings(max_examples=6, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+
+
+def smooth_radius(V, rng, roughness, waves=5):
+    """A positive radius in every direction, smooth over about a third of the sphere."""
+    directions, phases = rng.standard_normal((waves, 3)) * 2, rng.uniform(0, 2 * np.pi, waves)
+    return np.exp(roughness * np.mean(np.sin(V @ directions.T + phases), axis=1))
+
+
+def split_edges(V, F, rng, share, slenderness):
+    """Put a vertex into a share of the triangles, a small fraction from one side: two of the three are slivers."""
+    chosen = np.flatnonzero(rng.random(len(F)) < share)
+    weights = np.array([(1 - slenderness) / 2, (1 - slenderness) / 2, slenderness])
+    middle = np.einsum("j,ijk->ik", weights, V[F[chosen]])
+    new = len(V) + np.arange(len(chosen))
+    a, b, c = F[chosen].T
+    kept = np.delete(F, chosen, axis=0)
+    parts = [np.stack(t, axis=1) for t in ((a, b, new), (b, c, new), (c, a, new))]
+    return np.vstack([V, middle]), np.vstack([kept, *parts])
+
+
+def assert_certified(V, F):
+    S = progressive_sphere_map(V, F)
+    assert certify(F, S).valid
+    return S
+
+
+@EXAMPLES
+@given(seed=SEEDS, points=st.integers(4, 400), factors=st.tuples(*[st.floats(0.05, 1)] * 3))
+def test_convex_hulls_of_random_points(seed, points, factors):
+    hull = trimesh.convex.convex_hull(np.random.default_rng(seed).standard_normal((points, 3)) * factors)
+    assert_certified(*solid(hull))
+
+
+@EXAMPLES
+@given(seed=SEEDS, roughness=st.floats(0, 3))
+def test_smooth_star_shapes_are_never_starved(seed, roughness):
+    V, F = icosphere(3)
+    V = V * smooth_radius(V, np.random.default_rng(seed), roughness)[:, None]
+    S = assert_certified(V, F)
+    assert stretch_quantiles(V, F, S, [0.999])[0] < 2.2
+
+
+@EXAMPLES
+@given(seed=SEEDS, share=st.floats(0.05, 1), slenderness=st.sampled_from([1e-1, 1e-3, 1e-6]))
+def test_slivers_starve_nothing(seed, share, slenderness):
+    rng = np.random.default_rng(seed)
+    V, F = icosphere(3)
+    V = V * smooth_radius(V, rng, 1)[:, None]
+    V, F = split_edges(V, F, rng, share, slenderness)
+    S = assert_certified(V, F)
+    assert stretch_quantiles(V, F, S, [0.999])[0] < 4
+
+
+@EXAMPLES
+@given(length=st.floats(1, 20), radius=st.floats(0.05, 0.6))
+def test_thin_limbs_keep_their_texels(length, radius):
+    V, F = thin_limb(length, radius)
+    S = assert_certified(V, F)
+    assert stretch_quantiles(V, F, S, [0.999])[0] < 4
+
+
+@EXAMPLES
+@given(seed=SEEDS, power=st.floats(0, 4))
+def test_very_uneven_triangles(seed, power):
+    """Triangles a hundred times smaller on one side of the sphere than on the other give an even map."""
+    V, F = icosphere(4)
+    pole = np.random.default_rng(seed).standard_normal(3)
+    pole /= np.linalg.norm(pole)
+    V = V + np.tanh(power / 2) * 0.98 * pole  # a Moebius map of the sphere crowds the vertices round one pole
+    inside = np.sum(V * V, axis=1, keepdims=True)
+    V = V / np.sqrt(inside)
+    S = assert_certified(V, F)
+    low, high = stretch_quantiles(V, F, S, [0.01, 0.99])
+    assert 0.8 < low < high < 1.25
+
+
+def limbed():
+    V, F = thin_limb(3, 0.3)
+    return V * smooth_radius(V, np.random.default_rng(3), 1)[:, None], F
+
+
+def figures(V, F):
+    S = progressive_sphere_map(V, F)
+    assert certify(F, S).valid
+    atlas = atlas_from_sphere_map(Mesh.from_arrays(V, F), S, 32)
+    step = WaveSolver(atlas, backend="cpu").stable_timestep / np.sqrt(atlas.mesh.area)
+    return np.array([*stretch_quantiles(V, F, S, [0.01, 0.5, 0.99, 0.999]), step])
+
+
+@pytest.fixture(scope="module")
+def limbed_figures():
+    return figures(*limbed())
+
+
+def rotated(V, F):
+    return V @ Rotation.random(random_state=0).as_matrix().T, F
+
+
+def renumbered(V, F):
+    rng = np.random.default_rng(0)
+    order = rng.permutation(len(V))
+    number = np.empty(len(V), dtype=int)
+    number[order] = np.arange(len(V))
+    F = np.array([np.roll(f, k) for f, k in zip(number[F], rng.integers(0, 3, len(F)), strict=True)])
+    return V[order], rng.permutation(F)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [rotated, renumbered, lambda V, F: (1e-5 * V, F), lambda V, F: (1e4 * V, F)],
+    ids=["turn", "order", "small", "large"],
+)
+def test_a_mesh_turned_scaled_or_renumbered_has_an_atlas_as_good(change, limbed_figures):
+    found = figures(*change(*limbed()))
+    np.testing.assert_allclose(found[:4], limbed_figures[:4], rtol=0.02)
+    # the narrowest of a few thousand texels decides on the time step, and falls now here, now there
+    assert found[4] == pytest.approx(limbed_figures[4], rel=0.25)
+
+
+def perturbed(V):
+    S = V + 0.03 * np.random.default_rng(2).standard_normal(V.shape)
+    return S / np.linalg.norm(S, axis=1)[:, None]
+
+
+def squeezed(V):
+    """A conformal map that draws the sphere towards its north pole."""
+    x, y, z = V.T
+    factor = 0.2 * np.sqrt((1 - z) / (1 + z).clip(1e-12))  # tan of half the new polar angle
+    bottom = z < -1 + 1e-9
+    t = np.where(bottom, 1e6, factor)
+    planar = np.stack([x, y], axis=1) / np.hypot(x, y).clip(1e-12)[:, None]
+    return np.column_stack([planar * (2 * t / (1 + t * t))[:, None], (1 - t * t) / (1 + t * t)])
+
+
+@pytest.mark.parametrize("start", [perturbed, squeezed])
+def test_a_sphere_comes_back_to_its_own_shape(start):
+    V, F = icosphere(2)
+    level, reference = whole_level(V, F)
+    S = start(V)
+    least = total_energy(level.tail, V, reference)
+    assert certify(F, S).valid and total_energy(level.tail, S, reference) > 1.05 * least
+    relax_level(level, S, reference)
+    assert total_energy(level.tail, S, reference) < 1.01 * least
+    assert certify(F, S).valid
+    np.testing.assert_allclose(S @ S.T, V @ V.T, atol=0.1)  # the same but for a rotation
+
+
+def test_relaxing_again_gains_next_to_nothing():
+    V, F = crumpled()
+    level, reference = whole_level(V, F)
+    S = icosphere(3)[0]
+    energies = [total_energy(level.tail, S, reference)]
+    for _ in range(2):
+        relax_level(level, S, reference)
+        energies.append(total_energy(level.tail, S, reference))
+    assert energies[1] < 0.5 * energies[0]
+    assert 0.9 * energies[1] < energies[2] <= energies[1]
+    assert certify(F, S).valid
+    np.testing.assert_allclose(np.linalg.norm(S, axis=1), 1, atol=1e-12)
+
+
+def test_a_folded_map_is_left_as_it_is():
+    V, F = icosphere(1)
+    level, reference = whole_level(V, F)
+    S = -V
+    relax_level(level, S, reference)
+    np.testing.assert_array_equal(S, -V)
+
+
+def test_newton_steps_reach_the_minimum_of_a_perturbed_sphere():
+    V, F = icosphere(3)
+    level, reference = whole_level(V, F)
+    S = V + 0.015 * np.random.default_rng(2).standard_normal(V.shape)
+    S /= np.linalg.norm(S, axis=1)[:, None]
+    least = total_energy(level.tail, V, reference)
+    assert total_energy(level.tail, S, reference) > 1.05 * least
+    for _ in range(8):
+        newton_step(level, S, reference, 60)
+    assert total_energy(level.tail, S, reference) < (1 + 1e-4) * least

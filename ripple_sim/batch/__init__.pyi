@@ -1,0 +1,13 @@
+from .executors import DaskExecutor as DaskExecutor
+from .finished import pack as pack
+from .folder import BatchFolder as BatchFolder, keep_plan as keep_plan, stored as stored
+from .plan import (
+    Distribution as Distribution,
+    Plan as Plan,
+    parse_key as parse_key,
+    read_plan as read_plan,
+)
+from .report import load_batch as load_batch, parquet as parquet, status_text as status_text, trial_text as trial_text
+from .run import Progress as Progress, RunOptions as RunOptions, in_shard as in_shard, run_batch as run_batch
+from .variation import Variation as Variation, vary_model as vary_model, vary_table as vary_table
+from .worker import Outcome as Outcome, make_scene as make_scene

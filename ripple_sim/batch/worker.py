@@ -1,0 +1,158 @@
+"""`make_scene`: one scene of a batch, made in a folder of its own by whatever process is told to."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import itertools
+import os
+import socket
+import threading
+import time
+import traceback
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+from PIL import Image
+
+from ripple_sim.errors import BatchError, EncodingError
+from ripple_sim.scene.scene import Scene
+from ripple_sim.simulation import Simulation
+from ripple_sim.solver.files import atomic_write
+from ripple_sim.video.render_video import render_video
+from ripple_sim.video.settings import frame_count, settled
+
+from .finished import FACTS, TIMES, FinishedScene, facts_hash
+from .folder import BatchFolder, clear, load_plan
+from .plan import Plan, StoreEntry, options_of, video_name
+from .records import FrameRecord
+from .variation import Variation
+
+_SIZE = 160  # its longer edge [pixels]
+
+
+def write_thumbnail(scene: FinishedScene, frames: int, output: Path) -> None:
+    """Write a JPEG of the middle one of a scene's frames; of EXR frames there is none."""
+    middle = None
+    with contextlib.suppress(BatchError):
+        for middle in itertools.islice(scene.frames(), frames // 2 + 1):  # noqa: B007 - the last one counts
+            pass
+    if middle is not None:
+        image = Image.fromarray(middle)
+        image.thumbnail((_SIZE, _SIZE))
+        with atomic_write(output) as path:
+            image.save(path, format="JPEG", quality=80)
+
+
+# The renderer's context belongs to one scene at a time, also where an executor has threads.
+_one_at_a_time = threading.Lock()
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """What became of a scene that a worker was told to make.
+
+    Attributes
+    ----------
+    state : str
+        "made"; "there", finished by another process before; "busy", being made by one; "full", for lack of room on
+        the disk; "failed"; "died", its worker, without a word.
+    times : dict
+        How long it took [s]: `seconds` by the clock, `cpu_seconds` of the worker's threads.
+    row : dict
+        What the index says of it.
+    error, log : str
+        What went wrong, in a line and in full.
+    """
+
+    number: int
+    state: Literal["made", "there", "busy", "full", "failed", "died"]
+    times: dict[str, float] = {}
+    row: dict[str, Any] = {}
+    error: str = ""
+    log: str = ""
+
+
+def make_scene(folder: str, number: int) -> Outcome:
+    """Make a scene of the batch in a folder, unless it is there or another process makes it.
+
+    Its files are the same, byte for byte, whoever makes it and when, but for `times.json`, which tells these.
+    """
+    batch = BatchFolder(Path(folder))
+    start, work = time.perf_counter(), time.process_time()
+    with _one_at_a_time, batch.claimed(number) as place:
+        if place is None:
+            return Outcome(number, "there" if batch.is_finished(number) else "busy")
+        try:
+            facts = _make(load_plan(batch.plan), number, place, batch)
+        except Exception as error:  # of any kind: the batch goes on without this scene
+            clear(place)
+            state: Literal["full", "failed"] = "full" if _is_full(error) else "failed"
+            reason = " ".join(str(error).split()) or type(error).__name__
+            return Outcome(number, state, error=reason, log=traceback.format_exc())
+        seconds = time.perf_counter() - start
+        times = {"seconds": seconds, "cpu_seconds": time.process_time() - work}
+        _write_json(place / TIMES, {**times, "host": socket.gethostname(), "process": os.getpid()})
+        batch.finish(number, place)
+    return Outcome(number, "made", times, facts)
+
+
+def _make(plan: Plan, number: int, folder: Path, batch: BatchFolder) -> dict[str, Any]:
+    """Fill the folder of a scene; return what is to be known of it."""
+    clear(folder)  # of one that was killed
+    variation = Variation(plan, number)
+    scene, values = variation.load()
+    record, drawn = render_scene(scene, plan.store, folder)
+    facts = {
+        "number": number,
+        "seed": variation.seed,
+        "source": Path(variation.source).name,
+        "fps": plan.store.fps,
+        "values": values,
+        **record.finish(),
+    }
+    facts["files"] = {path.relative_to(folder).as_posix(): _digest(path) for path in _files(folder)}
+    facts["bytes"] = sum(path.stat().st_size for path in _files(folder))
+    facts["hash"] = facts_hash(facts)
+    _write_json(folder / FACTS, facts)
+    if drawn:
+        write_thumbnail(FinishedScene(number, folder), record.frame, batch.thumbnail(number))
+    return facts
+
+
+def render_scene(scene: Scene, store: StoreEntry, folder: Path) -> tuple[FrameRecord, bool]:
+    """Simulate a scene, render it if it is to be drawn, and record it; return the record, and whether it is drawn."""
+    name = video_name(store)
+    path = folder / (name or "frames")
+    options = settled(options_of(store), scene, path)
+    record = FrameRecord(folder, store, frame_count(options), options.rate)
+    if name is not None:
+        render_video(scene, path, options, on_frame=record)
+        return record, True
+    simulation = Simulation.of(scene, options)
+    for number in range(frame_count(options)):
+        if number:
+            simulation.advance_frame()
+        record(simulation)
+    return record, False
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.rglob("*") if path.is_file() and path.name not in (FACTS, TIMES))
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+
+
+def _write_json(path: Path, content: Any) -> None:
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(content), indent=1))
+
+
+def _is_full(error: Exception) -> bool:
+    reason: BaseException | None = error
+    while isinstance(reason, EncodingError):  # which names the file
+        reason = reason.__cause__
+    return isinstance(reason, OSError) and reason.errno in (errno.ENOSPC, errno.EDQUOT)

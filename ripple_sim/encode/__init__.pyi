@@ -1,0 +1,29 @@
+from .clip import (
+    H264 as H264,
+    LOSSLESS as LOSSLESS,
+    VP9 as VP9,
+    Clip as Clip,
+    Codec as Codec,
+    Stream as Stream,
+    join_clips as join_clips,
+)
+from .images import PassFiles as PassFiles, check_passes as check_passes, join_gif as join_gif, join_webp as join_webp
+from .output import (
+    ENDINGS as ENDINGS,
+    FORMATS as FORMATS,
+    FRAMES_IN_CLIP as FRAMES_IN_CLIP,
+    Format as Format,
+    Segments as Segments,
+    check_output as check_output,
+    check_size as check_size,
+    default_fps as default_fps,
+    video_format as video_format,
+)
+from .part import STATES as STATES, Part as Part
+from .replace import (
+    MARK as MARK,
+    made_here as made_here,
+    move as move,
+    png_mark as png_mark,
+)
+from .writer import FrameWriter as FrameWriter, open_writer as open_writer

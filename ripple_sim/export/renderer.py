@@ -1,0 +1,275 @@
+"""`RippleRenderer` renders the frames of a loop of one's own, in the place of `mujoco.Renderer`."""
+
+from __future__ import annotations
+
+import dataclasses
+import tempfile
+import warnings
+from pathlib import Path
+from typing import Any, Self, TypeAlias
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.capture.frame_source import surface_of
+from ripple_sim.capture.snapshot import drawn_heights
+from ripple_sim.coupling.geoms import ByGeom, by_name, check_targets, own_data, own_model, posed
+from ripple_sim.coupling.ripples import Ripples
+from ripple_sim.errors import RenderError, RippleWarning, SceneError
+from ripple_sim.render import AnyHeightMap, Camera, FixedCamera, Renderer
+from ripple_sim.render.camera import Viewpoint, find_viewpoint
+from ripple_sim.scene.scene_file import CameraEntry
+from ripple_sim.solver.errors import GLError, checked, instance, whole
+from ripple_sim.solver.gl import GLContext, shared_context
+
+from .exporter import Exporter, camera_entry, framed
+
+AnyCamera: TypeAlias = Camera | FixedCamera | str | int | mujoco.MjvCamera
+
+
+class RippleRenderer:
+    """Renders a model and its rippling surfaces offscreen, with the interface of `mujoco.Renderer`.
+
+    Frames have lights, shadows and materials of their own; depth and segmentation are as in MuJoCo, with the ripples.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+        That of the ripples, or one that differs in its looks alone; or dm_control's wrapper of one, likewise the data
+        of each frame.
+    ripples : Ripples
+        Whose targets are drawn with their ripples.
+    height : int
+        [pixels], whatever the model's offscreen buffer.
+    width : int
+        [pixels].
+    max_geom : int
+        Entries that the scene may have.
+    font_scale : mujoco.mjtFontScale
+        Without effect: no text is drawn.
+    looks : mapping
+        Geom, by its name or id, to the look of its surface, one of `LOOKS`: rubber (the default), jelly, clay and so
+        on. Its colour is the geom's, where the model gives it a texture or a colour, as in a scene file.
+    gl : GLContext, optional
+        By default the process's shared one.
+    limit : bool
+        Whether heights that are too large for the object are drawn smaller, so that its surface does not pass through
+        itself; see `DisplacementLimit`.
+
+    Attributes
+    ----------
+    model : mujoco.MjModel
+    scene : mujoco.MjvScene
+        What the latest `update_scene` took in. Geoms may be added to it before `render`, to be seen in colours.
+    height, width : int
+        [pixels].
+
+    Raises
+    ------
+    RippleError
+        If the ripples belong to another model, for an unknown look or geom, or if the driver cannot render frames of
+        this size.
+    """
+
+    @checked(
+        RenderError,
+        ripples=instance(Ripples, ", for instance Ripples(model, materials)"),
+        width=whole(1),
+        height=whole(1),
+        max_geom=whole(1),
+        gl=instance(GLContext, ", from shared_context", optional=True),
+    )
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        ripples: Ripples,
+        height: int = 240,
+        width: int = 320,
+        max_geom: int = 10_000,
+        font_scale: mujoco.mjtFontScale = mujoco.mjtFontScale.mjFONTSCALE_150,
+        *,
+        looks: ByGeom[str] | None = None,
+        gl: GLContext | None = None,
+        limit: bool = True,
+    ) -> None:
+        self.model, self._ripples = own_model(model), ripples
+        check_targets(self.model, ripples.model, ripples.geom_ids)
+        self._height_maps = {name: drawn_heights(ripples, name, limit) for name in ripples}
+        named = by_name(self.model, looks or {}, "looks")
+        surfaces = {
+            geom: surface_of(ripples[name], named.get(name, "rubber")) for name, geom in ripples.geom_ids.items()
+        }
+        self.height, self.width, self._looks, self._limit = int(height), int(width), named, limit
+        self.scene = mujoco.MjvScene(self.model, max_geom)
+        self._flags, self._shows = self.scene.flags.copy(), "colours"
+        self._seen: tuple[mujoco.MjData, CameraEntry] | None = None
+        self._drawn: tuple[mujoco.MjData, dict[int, AnyHeightMap], Viewpoint] | None = None
+        self._renderer: Renderer | None = Renderer(
+            gl or shared_context(), self.model, surfaces, size=(self.width, self.height)
+        )
+
+    def enable_depth_rendering(self) -> None:
+        """Have `render` return depths from now on."""
+        self._shows = "depth"
+
+    def disable_depth_rendering(self) -> None:
+        """Have `render` return no depths any more."""
+        self._shows = "colours" if self._shows == "depth" else self._shows
+
+    def enable_segmentation_rendering(self) -> None:
+        """Have `render` return what each pixel shows from now on."""
+        self._shows = "segmentation"
+
+    def disable_segmentation_rendering(self) -> None:
+        """Have `render` return no segmentation any more."""
+        self._shows = "colours" if self._shows == "segmentation" else self._shows
+
+    def update_scene(
+        self, data: mujoco.MjData, camera: AnyCamera = -1, scene_option: mujoco.MjvOption | None = None
+    ) -> None:
+        """Take in the present state of bodies and ripples, which `render` draws, whatever becomes of them.
+
+        Parameters
+        ----------
+        data : mujoco.MjData
+            After `mj_step` or `mj_forward`. Where no poses were ever computed, those of its `qpos` are drawn.
+        camera : Camera, FixedCamera, str, int or mujoco.MjvCamera
+            A camera, or the name or the id of one in the MJCF, or one of MuJoCo's that is free, tracks a body or is
+            fixed; by default, and with -1, MuJoCo's free camera, aimed at the model's middle.
+        scene_option : mujoco.MjvOption, optional
+            What is shown: groups, contacts, joints and so on; MuJoCo's defaults by default.
+
+        Raises
+        ------
+        SceneError
+            If the data belongs to another model, or the camera is none of these or not in the model; then it is a
+            ValueError, too.
+        """
+        now = own_data(self.model, data, drawn=True)
+        state = mujoco.MjData(self.model) if self._drawn is None else self._drawn[0]
+        mujoco.mj_copyData(state, self.model, posed(self.model, now))
+        try:
+            seen = find_viewpoint(self.model, state, camera)
+        except SceneError as error:
+            raise RenderError(str(error)) from None
+        option, everything = scene_option or mujoco.MjvOption(), int(mujoco.mjtCatBit.mjCAT_ALL)
+        mujoco.mjv_updateScene(self.model, state, option, None, self._own(camera), everything, self.scene)
+        self._own_geoms = self.scene.ngeom
+        height_maps = {
+            self._ripples.geom_ids[name]: height_map(self._ripples[name].snapshot(), state)
+            for name, height_map in self._height_maps.items()
+        }
+        self._drawn, self._seen = (state, height_maps, seen), (now, self._entry(camera, seen))
+
+    def render(
+        self, data: mujoco.MjData | None = None, camera: AnyCamera | None = None, *, out: NDArray | None = None
+    ) -> NDArray:
+        """Render what the latest `update_scene` took in, or the present state of the data.
+
+        Parameters
+        ----------
+        data, camera : optional
+            As for `update_scene`, which is then called first.
+        out : array, optional
+            Of the shape of what is returned: gets the result, whatever its type.
+
+        Returns
+        -------
+        array
+            Colours, uint8 [height, width, 3]; or depth, float32 [height, width]: distance along the camera's axis [m],
+            that of the far plane where nothing is; or segmentation, int32 [height, width, 2]: id and type (of
+            `mujoco.mjtObj`) of what is seen, -1 where nothing is.
+
+        Raises
+        ------
+        RippleError
+            As `update_scene` does; if there is nothing to render, or `out` has another shape (both a ValueError, too);
+            or after `close` (a RuntimeError, too).
+        """
+        if self._renderer is None:
+            raise GLError("the renderer is closed: render cannot be called after close; make another one")
+        if data is not None:
+            self.update_scene(data, -1 if camera is None else camera)
+        if self._drawn is None:
+            raise RenderError("there is nothing to render; call update_scene(data) before, or render(data)")
+        shape = self.height, self.width, *{"colours": (3,), "depth": (), "segmentation": (2,)}[self._shows]
+        if out is not None and out.shape != shape:
+            raise RenderError(f"out has shape {list(out.shape)}; valid is {list(shape)}, that of the {self._shows}")
+        changed = np.flatnonzero(self.scene.flags != self._flags)
+        if len(changed):
+            self._flags = self.scene.flags.copy()
+            names = ", ".join(mujoco.mjtRndFlag(int(flag)).name for flag in changed)
+            warnings.warn(f"the scene's flags have no effect: {names}", RippleWarning, stacklevel=2)
+        for added in self.scene.geoms[self._own_geoms : self.scene.ngeom]:  # mjv_initGeom leaves chance values there
+            added.objtype, added.objid, added.segid = int(mujoco.mjtObj.mjOBJ_UNKNOWN), -1, -1
+        if self._shows == "colours":
+            frame = self._renderer.render(*self._drawn, scene=self.scene)
+        else:
+            frame = self._measured(self._renderer, *self._drawn)
+        if out is None:
+            return frame
+        np.copyto(out, frame, casting="unsafe")
+        return out
+
+    def close(self) -> None:
+        """Release what is on the GPU; nothing can be rendered afterwards. Repeated calls do nothing."""
+        if self._renderer is not None:
+            self._renderer.close()
+        self._renderer = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def _measured(
+        self, renderer: Renderer, state: mujoco.MjData, height_maps: dict[int, AnyHeightMap], seen: Viewpoint
+    ) -> NDArray:
+        """Depth or segmentation; as in MuJoCo nothing is seen beyond the far plane."""
+        image = renderer.surfaces(state, height_maps, seen, scene=self.scene)
+        far = np.float32(self.model.vis.map.zfar * self.model.stat.extent)
+        nothing = (image.geom == -1) & (image.depth == 0) | (image.depth > far)
+        if self._shows == "depth":
+            return np.where(nothing, far, image.depth)
+        return np.where(nothing[..., None], np.int32(-1), image.identity)
+
+    def _own(self, camera: AnyCamera) -> mujoco.MjvCamera:
+        """A camera of MuJoCo's for its scene; the free one where ours has no such words."""
+        if isinstance(camera, mujoco.MjvCamera):
+            return camera
+        own = mujoco.MjvCamera()
+        mujoco.mjv_defaultFreeCamera(self.model, own)
+        if isinstance(camera, Camera):
+            own.lookat, own.distance, own.azimuth, own.elevation = dataclasses.astuple(camera)[:4]
+        elif isinstance(camera, str | int) and camera != -1:
+            kind = mujoco.mjtObj.mjOBJ_CAMERA
+            own.fixedcamid = mujoco.mj_name2id(self.model, kind, camera) if isinstance(camera, str) else camera
+            own.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        return own
+
+    def _entry(self, camera: Any, seen: Viewpoint) -> CameraEntry:
+        """What `[camera]` of a scene file would say; MuJoCo's free camera where it has no words for it."""
+        if isinstance(seen, Camera) and not isinstance(camera, str):
+            return CameraEntry(**dataclasses.asdict(seen))
+        return camera_entry(self.model, camera if isinstance(camera, str) else None)
+
+    def _repr_html_(self) -> str | None:
+        """In a notebook: the present state of what was rendered last, to turn and to zoom."""
+        if self._seen is None:
+            return None
+        data, camera = self._seen
+        with tempfile.TemporaryDirectory(prefix="ripple-sim-") as folder:
+            page = Path(folder) / "now.html"
+            with Exporter(
+                self.model,
+                self._ripples,
+                page,
+                camera=camera,
+                looks=self._looks,
+                size=(self.width, self.height),
+                limit=self._limit,
+            ) as exporter:
+                exporter.write(data)
+            return framed(page, self.width / self.height)

@@ -1,0 +1,37 @@
+from .marks import (
+    MEMORY as MEMORY,
+    ContactMarks as ContactMarks,
+    Mark as Mark,
+    Sprite as Sprite,
+    draw_arrow as draw_arrow,
+    text_width as text_width,
+)
+from .notes import (
+    MOST_POINTS as MOST_POINTS,
+    SIZE as SIZE,
+    TITLES as TITLES,
+    History as History,
+    Limit as Limit,
+    Notebook as Notebook,
+    Notes as Notes,
+    color_table as color_table,
+    colors as colors,
+    compared_operators as compared_operators,
+    grid_spacing as grid_spacing,
+    lab_to_srgb as lab_to_srgb,
+    magnitude as magnitude,
+    number as number,
+    readable as readable,
+    round_up as round_up,
+)
+from .panels import (
+    EnergyPlot as EnergyPlot,
+    Layout as Layout,
+    Painter as Painter,
+    Projection as Projection,
+    arrow_key as arrow_key,
+    color_bar as color_bar,
+    draw_marks as draw_marks,
+    label as label,
+    place_marks as place_marks,
+)

@@ -1,0 +1,67 @@
+from .bodies import (
+    BODY_SHAPES as BODY_SHAPES,
+    RandomEntry as RandomEntry,
+    drop_model as drop_model,
+    randomize as randomize,
+)
+from .drop import (
+    UP_AXES as UP_AXES,
+    drop_scene as drop_scene,
+    find_scene as find_scene,
+    is_scene as is_scene,
+    load_image as load_image,
+    mesh_image as mesh_image,
+    paint_target as paint_target,
+    usual_up as usual_up,
+)
+from .events import (
+    DropEntry as DropEntry,
+    Events as Events,
+    PlaceEntry as PlaceEntry,
+    PokeEntry as PokeEntry,
+    Script as Script,
+    ThrowEntry as ThrowEntry,
+    check_time as check_time,
+    free_joint as free_joint,
+)
+from .loading import (
+    check_files as check_files,
+    check_scene as check_scene,
+    load_model as load_model,
+    load_scene as load_scene,
+    refusal_of as refusal_of,
+)
+from .material_entry import (
+    LAWS as LAWS,
+    MaterialChange as MaterialChange,
+    MaterialEntry as MaterialEntry,
+    PresetEntry as PresetEntry,
+)
+from .scene import (
+    HEATMAPS as HEATMAPS,
+    MAX_DURATION as MAX_DURATION,
+    MAX_SLOW_MOTION as MAX_SLOW_MOTION,
+    NAMES as NAMES,
+    Request as Request,
+    Scene as Scene,
+    check_duration as check_duration,
+    parse_request as parse_request,
+    read_toml as read_toml,
+    scene_path as scene_path,
+    shipped_scenes as shipped_scenes,
+    through_camera as through_camera,
+    with_exposure as with_exposure,
+)
+from .scene_file import (
+    MAX_EXPOSURES as MAX_EXPOSURES,
+    CameraEntry as CameraEntry,
+    MapEntry as MapEntry,
+    RippleEntry as RippleEntry,
+    SceneFile as SceneFile,
+    StillEntry as StillEntry,
+    apply_maps as apply_maps,
+    check_camera as check_camera,
+    parse_scene as parse_scene,
+    uniform_material as uniform_material,
+)
+from .target_maps import InsideEntry as InsideEntry, evaluate as evaluate, load_inside as load_inside

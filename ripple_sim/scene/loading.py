@@ -1,0 +1,301 @@
+"""Reading a scene: one MJCF, and one TOML file that names its targets, the camera, the duration and the script.
+
+Names and numbers are checked against the model before anything is simulated, and the files that an MJCF names are
+looked at before MuJoCo opens them: it would wait for ever for one that is a FIFO.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import math
+import stat
+import warnings
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+import msgspec
+import mujoco
+import numpy as np
+
+from ripple_sim.coupling.geoms import find_target, named_collision_geoms, own_model, target_name
+from ripple_sim.coupling.stepping import adopt_warnings
+from ripple_sim.errors import SceneError
+from ripple_sim.solver.errors import FUNCTION, PATH, checked
+from ripple_sim.solver.files import open_image
+from ripple_sim.solver.layouts.build import LAYOUTS
+
+from .bodies import RandomEntry, randomize
+from .events import DropEntry, Events, Script, ThrowEntry
+from .scene import Scene, check_duration, parse_request, read_toml, scene_path
+from .scene_file import RippleEntry, SceneFile, check_camera, parse_scene
+
+
+def check_scene(scene: Scene) -> None:
+    """Check a scene's names and numbers against its model.
+
+    Raises
+    ------
+    SceneError
+    SolverError
+        For an invalid material.
+    """
+    from ripple_sim.render import LIGHTING  # brings OpenGL, which reading a scene file can do without until here
+
+    own_model(scene.model)
+    if not scene.targets:
+        raise SceneError(f"scene {scene.name!r} has no [[ripple]] entry; name at least one geom")
+    check_duration(scene.duration)
+    seen = set()
+    for entry in scene.targets:
+        if entry.geom in seen:
+            raise SceneError(f"geom {entry.geom!r} has two [[ripple]] entries; valid is one")
+        seen.add(entry.geom)
+        _check_target(scene.model, entry)
+    named_collision_geoms(scene.model, [entry.geom for entry in scene.targets], scene.contacts)
+    parse_request(scene.overlay)
+    if scene.lighting not in LIGHTING:
+        raise SceneError(f"lighting is {scene.lighting!r}; valid are {', '.join(map(repr, LIGHTING))}")
+    Script(scene.model, scene.events, [entry.geom for entry in scene.targets])
+    check_camera(scene.model, scene.camera)
+
+
+def _check_target(model: mujoco.MjModel, entry: RippleEntry) -> None:
+    from ripple_sim.render import LOOKS
+    from ripple_sim.solver.operator.assembly import RIMS
+
+    find_target(model, entry.geom)
+    for what, name, valid in (("look", entry.look, LOOKS), ("layout", entry.layout, LAYOUTS), ("rim", entry.rim, RIMS)):
+        if name not in valid:
+            raise SceneError(f"{what} {name!r} does not exist; valid are {', '.join(valid)}")
+    if entry.color is not None and not all(0 <= part <= 1 for part in entry.color):
+        raise SceneError(f"color of geom {entry.geom!r} is {entry.color}; valid are three numbers from 0 to 1 (sRGB)")
+    entry.material.material(np.ones((1, 1, 1)) if entry.inside else None)
+    for body in entry.inside:
+        body.check()
+    if entry.height is not None:
+        entry.height.check()
+    least, greatest = entry.thickness_limits
+    if not 0 <= least <= greatest:
+        raise SceneError(
+            f"thickness_limits of geom {entry.geom!r} are {entry.thickness_limits} m; valid are two numbers from 0 on, "
+            "the least first"
+        )
+    for coefficient, each in entry.material.maps().items():
+        _check_image(
+            f"ripple.material.{coefficient}", each.map, "a number, or the path of an image relative to the scene file"
+        )
+    if entry.still_map is not None:
+        _check_image("ripple.still_map", entry.still_map, "the path of an image relative to the scene file")
+    for disc in entry.still:
+        if not 0 < disc.radius < float("inf"):
+            raise SceneError(
+                f"a [[ripple.still]] disc of geom {entry.geom!r} has radius {disc.radius!r} m; valid is above 0"
+            )
+
+
+def _check_image(key: str, path: str, valid: str) -> None:
+    if not Path(path).is_file():
+        raise SceneError(f"{key} names the image {path!r}, which does not exist; valid is {valid}")
+
+
+# Attributes of <compiler> that name folders, and those that name files.
+_FOLDERS = ("meshdir", "texturedir", "assetdir")
+_FILES = ("file", "filename", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
+
+_BAD_CHARACTER = expat.errors.codes[expat.errors.XML_ERROR_BAD_CHAR_REF]
+
+# Elements whose PNG files MuJoCo reads whole, however large.
+_IMAGES = ("texture", "hfield")
+
+# A flexcomp's bodies, one for each point of its grid, from which MuJoCo's time is told: it grows with about their
+# number to the power 2.8, since each one added has it list all again. [s] is that of so many bodies.
+_MANY_BODIES, _THEIR_SECONDS, _GROWTH = 15_000, 13.0, 2.8
+
+
+def check_files(path: Path) -> None:
+    """Make sure that an MJCF and all that it includes or names are regular files, as far as they exist.
+
+    Its images must not be larger than pillow allows. A flex that takes MuJoCo long to set up is warned of.
+
+    Raises
+    ------
+    SceneError
+        Naming the file.
+    """
+    waiting, seen = [path], set()
+    folders = {path.parent}
+    while waiting:
+        xml = waiting.pop()
+        if xml in seen:
+            continue
+        seen.add(xml)
+        try:
+            root = ElementTree.parse(xml).getroot()
+        except ElementTree.ParseError as error:
+            if error.code == _BAD_CHARACTER:
+                line, column = error.position
+                raise SceneError(
+                    f"the model {str(xml)!r} refers to an unknown character, at line {line}, column {column}: "
+                    "MuJoCo would cut the text there; valid are names without a NUL"
+                ) from error
+            continue  # MuJoCo says what is wrong
+        except (OSError, ValueError, LookupError, RecursionError):
+            continue  # likewise
+        folders |= {path.parent / each.get(name, "") for each in root.iter("compiler") for name in _FOLDERS}
+        for element in root.iter():
+            if element.tag == "flexcomp":
+                _warn_of_many_bodies(element)
+            for name in filter(None, map(element.get, _FILES)):
+                found = [place for folder in {*folders, xml.parent} if _exists(place := folder / name)]
+                if element.tag == "include":
+                    waiting += found
+                elif element.tag in _IMAGES and name.lower().endswith(".png"):
+                    for place in found:
+                        open_image(SceneError, place, element.tag).close()
+
+
+def _warn_of_many_bodies(flex: ElementTree.Element) -> None:
+    """Say how long MuJoCo will be silent over a flexcomp's grid whose points are all bodies."""
+    if flex.get("type", "grid") != "grid" or flex.get("rigid") == "true" or flex.get("dof", "full") != "full":
+        return
+    try:
+        bodies = math.prod(int(count) for count in flex.get("count", "").split())
+    except ValueError:
+        return  # MuJoCo says what is wrong
+    if bodies >= _MANY_BODIES:
+        seconds = _THEIR_SECONDS * (bodies / _MANY_BODIES) ** _GROWTH
+        warnings.warn(
+            f"flexcomp {flex.get('name', '')!r} has {bodies} points, each a body of its own, which MuJoCo takes about "
+            f'{seconds:.0f} s to set up; dof="trilinear", or a count of at most 20 20 20, takes seconds',
+            stacklevel=4,
+        )
+
+
+def _exists(path: Path) -> bool:
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return False
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise SceneError(
+            f"the model names {str(path)!r}, which is not a regular file; a FIFO or a device cannot be read"
+        )
+    return stat.S_ISREG(mode)
+
+
+Edit = Callable[[mujoco.MjSpec], None]
+Change = Callable[[dict[str, Any]], None]
+
+
+@checked(SceneError, name_or_path=PATH, edit=FUNCTION, change=FUNCTION)
+def load_scene(
+    name_or_path: str | Path, edit: Edit | None = None, seed: int | None = None, change: Change | None = None
+) -> Scene:
+    """Load a shipped scene by its name, or any scene by the path of its TOML file.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+    edit : callable, optional
+        Called with the model's specification (`mujoco.MjSpec`) before it is compiled, to change it in place.
+    seed : int, optional
+        In place of the one of the file's `[random]`.
+    change : callable, optional
+        Called with the file's table, of dictionaries and lists, before it is checked, to change it in place.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene or file, the TOML has an unknown key or a wrong value, MuJoCo refuses the MJCF, or a
+        geom or camera is not in it.
+    """
+    path = scene_path(name_or_path)
+    table = read_toml(path, "scene file")
+    if change is not None:
+        change(table)
+    content = parse_scene(table, str(path))
+    random = content.random
+    if seed is not None:
+        if random is None:
+            raise SceneError(
+                f"scene file {str(path)!r} has no [random], so nothing follows the seed {seed}; leave the seed out, or "
+                "write what is to vary under [random]"
+            )
+        random = msgspec.structs.replace(random, seed=seed)
+    model, shifts = load_model(path.parent / content.model, random, edit)
+    # every geom called as everybody calls it
+    content.ripple = [
+        msgspec.structs.replace(entry.located(path.parent), geom=target_name(model, find_target(model, entry.geom)))
+        for entry in content.ripple
+    ]
+    moved: list[DropEntry | ThrowEntry] = [*content.drop, *content.throw]
+    for each in moved:
+        if each.position is not None and each.body in shifts:
+            x, y, z = np.add(each.position, shifts[each.body]).tolist()
+            each.position = x, y, z
+    return scene_of(path.stem, model, content)
+
+
+def scene_of(name: str, model: mujoco.MjModel, content: SceneFile, notes: tuple[str, ...] = ()) -> Scene:
+    """The scene of a name and notes that the content of a scene file makes of a model, checked; raises as that does."""
+    events = Events(**{each.name: tuple(getattr(content, each.name)) for each in dataclasses.fields(Events)})
+    look = content.two_way, tuple(content.overlay), content.lighting
+    scene = Scene(name, model, tuple(content.ripple), content.camera, content.duration, events, *look, notes)
+    check_scene(scene)
+    return scene
+
+
+def load_model(
+    path: Path, random: RandomEntry | None = None, edit: Edit | None = None
+) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
+    """Compile an MJCF file; also return how far each of its bodies was shifted at random [m].
+
+    Raises
+    ------
+    SceneError
+        If the file is missing or MuJoCo refuses it, with MuJoCo's reason, or the randomisation is invalid.
+    """
+    if not path.is_file():
+        problem = "is not a file" if path.exists() else "does not exist"
+        raise SceneError(f"MJCF file {str(path)!r} {problem}; `model` names it, relative to the scene file")
+    check_files(path)
+    # a NaN is told once: by the errors below, or by MuJoCo's warning where none of them sees it
+    with warnings.catch_warnings(record=True) as told, refusal_of(repr(str(path))):
+        warnings.simplefilter("always")
+        spec = mujoco.MjSpec.from_file(str(path))
+        keys = [(key.name, len(key.qpos)) for key in spec.keys]  # the compiler fills up what is missing
+        shifts = {} if random is None else randomize(spec, random)
+        if edit is not None:
+            edit(spec)
+        model = own_model(spec.compile())
+    for number, (name, given) in enumerate(keys):
+        if edit is None and given not in (0, model.nq):
+            raise SceneError(
+                f"keyframe {name or number!r} of {str(path)!r} has {given} positions (qpos); valid are {model.nq}, "
+                "as the model has"
+            )
+    for key, numbers in enumerate(np.hstack([model.key_qpos, model.key_qvel])):
+        if not np.isfinite(numbers).all():
+            raise SceneError(
+                f"keyframe {model.key(key).name or key!r} of {str(path)!r} holds NaN or inf; valid are finite numbers"
+            )
+    for each in told:
+        warnings.warn(each.message, stacklevel=2)
+    return model, shifts
+
+
+@contextlib.contextmanager
+def refusal_of(name: str) -> Iterator[None]:
+    """Have what MuJoCo says of a model, by its name in messages, as ours: its refusal is a `SceneError`."""
+    adopt_warnings()
+    try:
+        yield
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        if "allocate memory" in reason:  # by default it takes as much as all bodies in one heap would need
+            reason += '; name in the MJCF how much it may take, such as <size memory="4G"/>'
+        raise SceneError(f"MuJoCo refuses {name}: {reason}") from error

@@ -1,0 +1,193 @@
+"""What the viewer's user has to hand: keys, an orbiting camera, sliders, and a recorder of screenshots and videos.
+
+They are the same for the window, the web page and the help.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+from PIL import Image
+
+from ripple_sim.encode import FrameWriter, open_writer
+from ripple_sim.errors import VideoError
+
+from .session import SLIDERS, Session
+
+# A key, the method of `Window` that it calls, and a short label.
+CONTROLS = (
+    ("space", "pause", "pause, resume"),
+    ("n", "step", "next frame"),
+    ("r", "reset", "reset"),
+    ("t", "throw", "throw a ball"),
+    ("o", "operator", "operator"),
+    ("c", "colors", "heatmap on, off"),
+    ("s", "screenshot", "screenshot"),
+    ("v", "record", "record, stop"),
+    ("h", "help", "keys on, off"),
+    ("q", "quit", "quit"),
+)
+
+MOUSE = (("click", "poke"), ("drag", "orbit"), ("shift + drag", "pan"), ("wheel", "zoom"))
+
+
+def help_text() -> str:
+    """All controls, one per line."""
+    rows = [*MOUSE, *((key, label) for key, _, label in CONTROLS)]
+    return "\n".join(f"{what}: {does}" for what, does in rows)
+
+
+# Highest elevation, up or down [degrees].
+_STEEPEST = 88.0
+
+
+def level(camera: pv.Camera) -> None:
+    """Keep the horizon level, and the camera off the vertical, where there is no horizon."""
+    focus = np.array(camera.focal_point)
+    x, y, z = np.array(camera.position) - focus
+    if x == y == 0:  # straight above or below: what is up in the frame tells where to go
+        up = np.array(camera.up[:2])
+        x, y = -1e-9 * z * (up if up.any() else np.array([0.0, 1.0]))
+    across, most = math.hypot(x, y), math.tan(math.radians(_STEEPEST))
+    if across > 0 and abs(z) > most * across:
+        distance, slant = math.hypot(across, z), math.hypot(1.0, most)
+        flat, high = distance / slant / across, math.copysign(distance * most / slant, z)
+        camera.position = focus + np.array([x * flat, y * flat, high])
+    camera.up = (0.0, 0.0, 1.0)
+
+
+def ray(renderer: pv.Renderer, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Origin [m] and unit direction, in the world, of the ray from the camera through a pixel, from the lower left."""
+    renderer.SetDisplayPoint(x, y, 0.5)
+    renderer.DisplayToWorld()
+    point = np.array(renderer.GetWorldPoint())
+    eye = np.array(renderer.camera.position)
+    along = point[:3] / point[3] - eye
+    return eye, along / np.linalg.norm(along)
+
+
+class Recorder:
+    """Writes screenshots and one video at a time to a folder; files are called name-1.png, name-1.mp4 and so on."""
+
+    def __init__(self, folder: Path, name: str, fps: int) -> None:
+        self.folder, self._name, self._fps = folder, name, fps
+        self._writer: FrameWriter | None = None
+
+    @property
+    def recording(self) -> bool:
+        """Whether a video is being written."""
+        return self._writer is not None
+
+    def save(self, frame: NDArray[np.uint8]) -> Path:
+        """Write a frame to an image, uint8 [height, width, 3], and return its path.
+
+        Raises
+        ------
+        VideoError
+            If it cannot be written.
+        """
+        path = self._free(".png")
+        try:
+            Image.fromarray(frame).save(path)
+        except OSError as error:
+            raise VideoError(f"cannot write {path}: {error.strerror or error}") from error
+        return path
+
+    def start(self, frame: NDArray[np.uint8]) -> Path:
+        """Begin a video of frames of this size; an odd row or column is left out. Return its path.
+
+        Raises
+        ------
+        VideoError
+            If it cannot be written.
+        """
+        height, width, _ = _even(frame).shape
+        path = self._free(".mp4")
+        self._writer = open_writer(path, width=width, height=height, fps=self._fps)
+        self._shape = height, width, 3
+        return path
+
+    def add(self, frame: NDArray[np.uint8]) -> bool:
+        """Add a frame, or end the video if the window has changed its size. Return whether it goes on.
+
+        Raises
+        ------
+        EncodingError
+            If it cannot be written; the video has then ended.
+        """
+        frame = _even(frame)
+        if self._writer is None or frame.shape != self._shape:
+            self.stop()
+            return False
+        try:
+            self._writer.write(frame)
+        except BaseException:
+            self._writer.discard()
+            self._writer = None
+            raise
+        return True
+
+    def stop(self) -> Path | None:
+        """End the video; return its path if one was being written."""
+        writer, self._writer = self._writer, None
+        if writer is None:
+            return None
+        if writer.frames:
+            writer.close()
+            return writer.path
+        writer.discard()
+        return None
+
+    def _free(self, ending: str) -> Path:
+        number = 1
+        while (path := self.folder / f"{self._name}-{number}{ending}").exists():
+            number += 1
+        return path
+
+
+def _even(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    height, width, _ = frame.shape
+    return np.ascontiguousarray(frame[: height - height % 2, : width - width % 2])
+
+
+_POKE = {"poke": "N s"}
+# Left end, distance, width and height in the window, in shares of its size.
+_LEFT, _APART, _WIDTH, _HEIGHT = 0.03, 0.24, 0.2, 0.07
+# A knob starts at this share of its track; one at 0 has a track from 0 to 1.
+_START = 1 / 3
+
+
+def add_sliders(plotter: pv.Plotter, session: Session) -> list[Any]:
+    """Add them, "poke" first and then those of `SLIDERS`; they act when a knob is released."""
+    return [_add(plotter, session, number, name, unit) for number, (name, unit) in enumerate((_POKE | SLIDERS).items())]
+
+
+def _add(plotter: pv.Plotter, session: Session, number: int, name: str, unit: str) -> Any:
+    value = session.poke_impulse if name == "poke" else session.material(name)
+    left = _LEFT + _APART * number
+    slider = plotter.add_slider_widget(
+        None, (0.0, value / _START or 1.0), value=value, title=f"{name} [{unit}]",
+        pointa=(left, _HEIGHT), pointb=(left + _WIDTH, _HEIGHT),
+        color="black", title_height=0.02, fmt="%.4g", slider_width=0.02, tube_width=0.005,
+    )  # fmt: skip
+    look = slider.GetRepresentation()
+    look.SetLabelHeight(0.02)
+    look.SetSliderLength(0.012)
+    look.SetEndCapLength(0.0)
+    look.GetTubeProperty().SetColor(0.35, 0.37, 0.40)
+    look.GetSliderProperty().SetColor(0.10, 0.35, 0.75)
+    look.GetSelectedProperty().SetColor(0.95, 0.45, 0.10)
+    slider.AddObserver("EndInteractionEvent", lambda *_: _apply(session, name, look.GetValue()))
+    return slider
+
+
+def _apply(session: Session, name: str, value: float) -> None:
+    if name == "poke":
+        session.poke_impulse = value
+    else:
+        session.set_material(**{name: value})

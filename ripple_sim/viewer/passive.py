@@ -1,0 +1,243 @@
+"""`launch_passive`: MuJoCo's own viewer, with the ripples on the surfaces."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Self
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ripple_sim.coupling.geoms import own_data, own_model
+from ripple_sim.coupling.ripples import Ripples
+from ripple_sim.coupling.soft import first_flex, first_skin, is_soft, target_pose
+from ripple_sim.errors import DisplayError, SceneError
+from ripple_sim.render.visuals.corners import normalized, smooth_normals
+from ripple_sim.solver.waves.wave_solver import WaveSolver
+
+from .opening import display_problem
+
+# Of all targets together: MuJoCo takes them one by one, a thousand in 2 ms.
+_TRIANGLES = 5000
+# Opacity of what is drawn of the still surface: nothing is seen, and the mouse finds it.
+_UNSEEN = 1e-3
+# and its size then, so that troughs do not lie in its shadow
+_WITHIN = 0.8
+# Radius on which the mouse presses over the size of the target.
+_FINGER = 0.05
+# MuJoCo's colour of a geom that has none of its own
+_NO_COLOR = (0.5, 0.5, 0.5, 1.0)
+# to close the window in [s]
+_PATIENCE = 5.0
+
+
+def launch_passive(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    ripples: Ripples,
+    *,
+    key_callback: Callable[[int], None] | None = None,
+    show_left_ui: bool = True,
+    show_right_ui: bool = True,
+) -> RippleViewer:
+    """Open MuJoCo's viewer beside a loop of one's own, as `mujoco.viewer.launch_passive` does, and show the ripples.
+
+    Nothing has to be prepared in the model: targets are drawn as some thousand triangles of their colour, without
+    textures, in place of their still surfaces. Where the mouse pulls at a target's body (a double click, then control,
+    right button and drag), the surface follows it; bodies that can move are pulled along, as ever. Geoms of the world
+    body cannot be selected in MuJoCo's viewer.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    data : mujoco.MjData
+    ripples : Ripples
+        Made for this model.
+    key_callback : callable, optional
+        Called with the code of each key.
+    show_left_ui, show_right_ui : bool
+        Whether MuJoCo's panels are there.
+
+    Returns
+    -------
+    RippleViewer
+
+    Raises
+    ------
+    DisplayError
+        If there is no display.
+    SceneError
+        If the ripples or the data belong to another model.
+    """
+    model = own_model(model)
+    if not isinstance(ripples, Ripples) or ripples.model is not model:
+        raise SceneError(
+            f"the viewer shows ripples of the model that it is given, not {ripples!r}: Ripples(model, ...)"
+        )
+    data = own_data(model, data)
+    problem = display_problem()
+    if problem is not None:
+        raise DisplayError(f"no window can be opened: {problem}; RippleRenderer renders frames without one")
+    import mujoco.viewer  # opens GLFW
+
+    before = set(threading.enumerate())
+    handle = mujoco.viewer.launch_passive(
+        model, data, key_callback=key_callback, show_left_ui=show_left_ui, show_right_ui=show_right_ui
+    )
+    return RippleViewer(handle, data, ripples, set(threading.enumerate()) - before)
+
+
+class RippleViewer:
+    """MuJoCo's passive viewer with ripples. `launch_passive` makes it.
+
+    All of MuJoCo's handle is here: `is_running`, `lock`, `cam`, `opt`, `perturb` (also as `pert`), `user_scn`,
+    `set_texts`, `close` and so on. Leaving a `with` block closes it.
+    """
+
+    def __init__(self, handle: Any, data: mujoco.MjData, ripples: Ripples, threads: set[threading.Thread]) -> None:
+        self._threads = threads
+        self._handle, self._data, self._ripples, self._time = handle, data, ripples, data.time
+        share = _TRIANGLES // len(ripples)
+        self._skins = {name: _Skin(ripples[name], share) for name in ripples}
+        self.sync()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._handle, name)
+
+    @property
+    def pert(self) -> mujoco.MjvPerturb:
+        """What the mouse has selected, and how it pulls."""
+        return self._handle.perturb
+
+    def sync(self, state_only: bool = False) -> None:
+        """Show the present state and the ripples, and take over what the user has done, to the surfaces too."""
+        self._press()
+        scene, model, kept = self._handle.user_scn, self._ripples.model, []
+        if scene is None or not self.is_running():
+            return
+        users = scene.ngeom
+        try:
+            for name, target in self._ripples.geom_ids.items():
+                materials, colors = _look(model, target)
+                material, rgba = materials[0], colors.copy()
+                if material >= 0 and tuple(rgba) == _NO_COLOR:
+                    rgba = model.mat_rgba[material]
+                triangles = self._skins[name].triangles(self._ripples, name, self._data)
+                first = scene.ngeom
+                scene.ngeom = min(first + len(triangles[0]), scene.maxgeom)
+                for geom, *place in zip(scene.geoms[first : scene.ngeom], *triangles, strict=False):
+                    mujoco.mjv_initGeom(geom, mujoco.mjtGeom.mjGEOM_TRIANGLE, *place, rgba)
+                    geom.category = mujoco.mjtCatBit.mjCAT_DYNAMIC  # others cast no shadows
+                hidden = [colors, materials, *([] if is_soft(model, target) else [model.geom_size[target]])]
+                kept += [(array, array.copy()) for array in hidden]
+                # The mouse does not find what has no material and no opacity; with some it casts shadows, but within.
+                colors[:] = [*rgba[:3], 0.0 if model.nmat else _UNSEEN]
+                if model.nmat:
+                    materials[:] = max(material, 0)
+                elif len(hidden) == 3:
+                    hidden[2][:] *= _WITHIN
+            self._handle.sync(state_only)
+        finally:
+            scene.ngeom = users
+            for array, own in kept:
+                array[:] = own
+
+    def close(self) -> None:
+        """Close the window, and wait until it is: a program that ends before may crash in MuJoCo."""
+        self._handle.close()
+        for thread in self._threads - {threading.current_thread()}:
+            thread.join(_PATIENCE)
+
+    def _press(self) -> None:
+        """The surface follows the mouse: a force as of a spring that pulls it to there, over the time since then."""
+        data, pull = self._data, self._handle.perturb
+        elapsed, self._time = data.time - self._time, data.time
+        if elapsed <= 0 or pull.select <= 0 or not pull.active & mujoco.mjtPertBit.mjPERT_TRANSLATE:
+            return
+        model, body = data.model, pull.select
+        point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ pull.localpos
+        for name, target in self._ripples.geom_ids.items():
+            if is_soft(model, target) or model.geom_bodyid[target] != body:
+                continue
+            waves = self._ripples[name]
+            position, rotation = target_pose(data, target)
+            local, drag = (point - position) @ rotation, (pull.refselpos - point) @ rotation
+            texel = np.linalg.norm(waves.atlas.positions.reshape(-1, 3) - local, axis=1).argmin()
+            inwards = -float(drag @ waves.atlas.normals.reshape(-1, 3)[texel])
+            radius, stiffness = _finger(waves)
+            waves.add_impulse(local, stiffness * inwards * elapsed, radius)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _finger(waves: WaveSolver) -> tuple[float, float]:
+    """Radius of a finger [m], and the force on it that presses the surface in by a metre [N/m]."""
+    material = waves.material
+    radius = _FINGER * float(np.ptp(waves.rest.mesh.V, axis=0).max())
+    speed, stiffness, density = (
+        float(np.max(value)) for value in (material.speed, material.stiffness, material.density)
+    )
+    # as `poke_strength`: a mass of pi r^2 sigma / 4 that swings at omega^2 = (2 c / r)^2 + k
+    return radius, np.pi * density * (speed**2 + stiffness * radius**2 / 4)
+
+
+def _look(model: mujoco.MjModel, target: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Materials of a target, -1 if it has none, and its colour in the model: views."""
+    if not is_soft(model, target):
+        return model.geom_matid[target : target + 1], model.geom_rgba[target]
+    skin = target - first_skin(model)
+    if skin >= 0:
+        return model.skin_matid[skin : skin + 1], model.skin_rgba[skin]
+    flex = target - first_flex(model)
+    first, count = flex, 1
+    if len(model.flex_matid) != model.nflex:  # MuJoCo 4 has one for each element
+        first, count = model.flex_elemadr[flex], model.flex_elemnum[flex]
+    return model.flex_matid[first : first + count], model.flex_rgba[flex]
+
+
+class _Skin:
+    """Some of the vertices of a target's mesh, and triangles between them."""
+
+    def __init__(self, waves: WaveSolver, count: int) -> None:
+        V, F = waves.rest.mesh.V, waves.rest.mesh.F
+        kept = np.arange(len(V))
+        edge = np.sqrt(2 * waves.rest.areas.sum() / count)
+        while len(F) > count:
+            # one vertex for each cell of a grid, that in its middle
+            cells = np.floor((V - V.min(axis=0)) / edge).astype(np.int64)
+            _, cell, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+            cell = cell.reshape(-1)
+            middles = np.stack([np.bincount(cell, axis) for axis in V.T], axis=1) / counts[:, None]
+            order = np.lexsort((np.linalg.norm(V - middles[cell], axis=1), cell))
+            kept = order[np.cumsum(counts) - counts]
+            F = cell[waves.rest.mesh.F]
+            F = F[(F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])]
+            F = F[np.unique(np.sort(F, axis=1), axis=0, return_index=True)[1]]
+            edge *= 1.1
+        self._kept, self._F, self._rest = kept, F, V
+        self._normals = normalized(smooth_normals(V, waves.rest.mesh.F))[kept]
+        self._sampling = waves.rest.sampling_matrix(V[kept])
+
+    def triangles(self, ripples: Ripples, name: str, data: mujoco.MjData) -> tuple[NDArray[np.float64], ...]:
+        """Sizes [m, 3], places [m, 3] and axes [m, 9] of triangles, as MuJoCo takes them."""
+        waves, moved = ripples[name], ripples.vertices(name, data)
+        V, normals = self._rest, self._normals
+        if moved is not None:
+            V, normals = moved, normalized(smooth_normals(moved, waves.rest.mesh.F))[self._kept]
+        position, rotation = target_pose(data, ripples.geom_ids[name])
+        heights = self._sampling @ waves.height.ravel()
+        points = position + (V[self._kept] + heights[:, None] * normals) @ rotation.T
+        corner, *edges = points[self._F].swapaxes(0, 1)
+        edges = [edge - corner for edge in edges]
+        axes = np.stack([normalized(each) for each in (*edges, np.cross(*edges))], axis=2)
+        sizes = np.stack([*(np.linalg.norm(edge, axis=1) for edge in edges), np.zeros(len(corner))], axis=1)
+        return sizes, corner, axes.reshape(-1, 9)

@@ -1,0 +1,11 @@
+from .context import (
+    Fences as Fences,
+    GLContext as GLContext,
+    create_context as create_context,
+    current_context as current_context,
+    is_software as is_software,
+    load_egl as load_egl,
+    load_shader as load_shader,
+    select_device as select_device,
+    shared_context as shared_context,
+)

@@ -1,0 +1,36 @@
+from .closest import (
+    TriangleTree as TriangleTree,
+    closest_point as closest_point,
+    closest_points as closest_points,
+    refitted as refitted,
+    triangle_tree as triangle_tree,
+)
+from .files import check_mesh_file as check_mesh_file, load_mesh as load_mesh, repaired as repaired
+from .mesh import Mesh as Mesh, check_genus_zero as check_genus_zero, vertex_normals as vertex_normals
+from .ply import (
+    Element as Element,
+    Soup as Soup,
+    read_binary as read_binary,
+    read_text as read_text,
+    triangulate as triangulate,
+)
+from .rays import RayScene as RayScene, downward_hits as downward_hits
+from .topology import (
+    SPLITS as SPLITS,
+    Edges as Edges,
+    Folds as Folds,
+    counting_sort as counting_sort,
+    edges_of as edges_of,
+    undirected as undirected,
+)
+from .vectors import (
+    Vector as Vector,
+    combine as combine,
+    cross as cross,
+    dot as dot,
+    row as row,
+    subtract as subtract,
+    unit as unit,
+)
+from .volume import Volume as Volume, is_volume as is_volume, load_volume as load_volume
+from .wrap import Wrap as Wrap

@@ -1,0 +1,44 @@
+from .assembly import (
+    OPERATORS as OPERATORS,
+    RIMS as RIMS,
+    MovingOperator as MovingOperator,
+    absorbing_damping as absorbing_damping,
+    build_operator as build_operator,
+    hold as hold,
+    source_grip as source_grip,
+)
+from .coefficients import (
+    LIMITS as LIMITS,
+    check_mask as check_mask,
+    check_numbers as check_numbers,
+    require_positive as require_positive,
+)
+from .deep_water import FluidOperator as FluidOperator, HalfLaplacian as HalfLaplacian
+from .material import (
+    STIFF as STIFF,
+    Material as Material,
+    decay_time as decay_time,
+    frequency as frequency,
+    phase_speed as phase_speed,
+    warn_of_wavelengths as warn_of_wavelengths,
+)
+from .presets import (
+    BOUNCE as BOUNCE,
+    PRESETS as PRESETS,
+    damping_for as damping_for,
+    density_after as density_after,
+    density_for as density_for,
+    density_under as density_under,
+    narrow_stiffness as narrow_stiffness,
+    stiffness_after as stiffness_after,
+    stiffness_under as stiffness_under,
+)
+from .volume import VolumeBalance as VolumeBalance, VolumeRate as VolumeRate, volume_rate as volume_rate
+from .wave_operator import (
+    SAFETY as SAFETY,
+    StepCoefficients as StepCoefficients,
+    WaveOperator as WaveOperator,
+    damped_step as damped_step,
+    number_or_field as number_or_field,
+    step_coefficients as step_coefficients,
+)

@@ -1,0 +1,87 @@
+from .atlas import (
+    ADVICE as ADVICE,
+    FORMAT as FORMAT,
+    Atlas as Atlas,
+    check_atlas_place as check_atlas_place,
+    check_points as check_points,
+    read_arrays as read_arrays,
+    read_atlas_file as read_atlas_file,
+    write_arrays as write_arrays,
+    write_atlas_file as write_atlas_file,
+)
+from .cells import (
+    EVEN as EVEN,
+    LEAST_AREA as LEAST_AREA,
+    PER_HOURGLASS as PER_HOURGLASS,
+    PER_TINY as PER_TINY,
+    SHARE as SHARE,
+    TINY as TINY,
+    polygons as polygons,
+    quad as quad,
+)
+from .chart_map import (
+    ChartMap as ChartMap,
+    LinearChartMap as LinearChartMap,
+    MeshPlaces as MeshPlaces,
+    Parts as Parts,
+    PartsMesh as PartsMesh,
+    barycentrics_at as barycentrics_at,
+    barycentrics_in as barycentrics_in,
+    nearest_place as nearest_place,
+    nearest_places as nearest_places,
+    parts_mesh as parts_mesh,
+    texel_on as texel_on,
+    texture_coordinates as texture_coordinates,
+    uncut as uncut,
+)
+from .distance import (
+    depth_in_region as depth_in_region,
+    distance_scratch as distance_scratch,
+    distance_to as distance_to,
+    march_from_point as march_from_point,
+    taken as taken,
+)
+from .maps import texture_map as texture_map, vertex_map as vertex_map
+from .moving import MovedPlaces as MovedPlaces, MovedStencil as MovedStencil, Ride as Ride, SurfaceRide as SurfaceRide
+from .stencil import (
+    EAST as EAST,
+    LINK_ENDS as LINK_ENDS,
+    NO_LINKS as NO_LINKS,
+    NORTH as NORTH,
+    IrregularLinks as IrregularLinks,
+    Stencil as Stencil,
+    crossing_links as crossing_links,
+    gather_links as gather_links,
+    largest_eigenvalue as largest_eigenvalue,
+    link_exists as link_exists,
+    link_lengths as link_lengths,
+    missing_links as missing_links,
+    stiffness_matrix as stiffness_matrix,
+)
+from .stiffness import LEAST_RATIO as LEAST_RATIO, TexelCells as TexelCells
+from .texel_atlas import ChartPage as ChartPage
+from .texel_mesh import (
+    TexelGrid as TexelGrid,
+    TexelMesh as TexelMesh,
+    folded_texels as folded_texels,
+    levelled_areas as levelled_areas,
+    smoothed as smoothed,
+    softening as softening,
+    texel_quality as texel_quality,
+)
+from .thickness import (
+    LEAST as LEAST,
+    half_thickness as half_thickness,
+    half_thickness_at as half_thickness_at,
+    medial_radius as medial_radius,
+    thickness_map as thickness_map,
+)
+from .topology import (
+    QUANTILES as QUANTILES,
+    TexelTopology as TexelTopology,
+    fill_halo as fill_halo,
+    glue as glue,
+    sampling_matrix as sampling_matrix,
+    stretch_summary as stretch_summary,
+    with_filled_halo as with_filled_halo,
+)

@@ -1,0 +1,12 @@
+from .finite import EVERY as EVERY
+from .footprint import Footprint as Footprint, footprint_at as footprint_at, weigh_each as weigh_each
+from .height_map import (
+    FREE as FREE,
+    MOST as MOST,
+    DeviceHeightMap as DeviceHeightMap,
+    DisplacementLimit as DisplacementLimit,
+    HeightMap as HeightMap,
+)
+from .load import Load as Load
+from .motion import MovedGradients as MovedGradients
+from .wave_solver import WaveSolver as WaveSolver

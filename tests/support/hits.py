@@ -1,0 +1,45 @@
+"""Bodies that hit targets while the waves run."""
+
+from __future__ import annotations
+
+import mujoco
+
+from ripple_sim import Impulse, Material, Ripples
+
+
+class Run:
+    """A model in motion, the waves of its targets, and the impulses of every step, `hits`.
+
+    The density is that of the material [kg/m^2]; the options are those of `Ripples`.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel | mujoco.MjSpec, *targets: str, density: float = 50.0, **options: object
+    ) -> None:
+        self.model = model.compile() if isinstance(model, mujoco.MjSpec) else model
+        self.data = mujoco.MjData(self.model)
+        options = {"resolution": 12, "backend": "cpu", "conserve_volume": False, **options}
+        self.ripples = Ripples(self.model, dict.fromkeys(targets, Material(density=density)), **options)
+        self.hits: list[list[Impulse]] = []
+
+    def step(self) -> list[Impulse]:
+        """Take a step; its impulses."""
+        mujoco.mj_step(self.model, self.data)
+        self.ripples.step(self.data)
+        self.hits.append(self.ripples.last_impulses)
+        return self.hits[-1]
+
+    def until(self, time: float) -> Run:
+        """Take steps up to a time [s]."""
+        while self.data.time < time - 1e-9:
+            self.step()
+        return self
+
+    def given(self, target: str | None = None) -> float:
+        """Sum of the impulses, of one target if it is named [N s]."""
+        return sum(hit.impulse for hits in self.hits for hit in hits if target in (None, hit.geom))
+
+    @property
+    def pairs(self) -> set[tuple[str, str]]:
+        """Names of the geoms that met: the target's, and the other one's."""
+        return {(hit.geom, hit.other) for hits in self.hits for hit in hits}

@@ -1,0 +1,76 @@
+"""Models whose depth and segmentation MuJoCo's own renderer and ours both draw.
+
+As a program it draws them with `mujoco.Renderer`, which takes over the process's OpenGL context, to an .npz file.
+"""
+
+import sys
+
+import mujoco
+import numpy as np
+
+flag = mujoco.mjtVisFlag
+SIZE = (96, 128)  # height, width
+_FINE = '<visual><quality numslices="128" numstacks="64"/></visual>'
+_CORNERS = "0 0 0  .4 0 0  0 .4 0  0 0 .4  .3 .3 .3"
+_BUMPS = " ".join(f"{(3 * i + 5 * j) % 7 / 7:.2f}" for i in range(8) for j in range(8))
+_TARGET = '<geom name="target" type="sphere" size=".12" pos="-.5 .4 .4"/>'
+
+WORLDS = {
+    "boxes": """<geom type="box" size=".3 .2 .1" euler="20 30 40"/>
+        <geom type="box" size=".1 .4 .1" pos=".5 .2 .3" rgba="1 0 0 .4"/>""",
+    "spheres": """<geom size=".3"/><geom size=".1" pos=".4 0 .2"/>""",
+    "capsules": """<geom type="capsule" size=".1 .3" euler="40 20 0"/>
+        <geom type="capsule" fromto="0 .4 0 .5 .4 .3" size=".05"/>""",
+    "cylinders": """<geom type="cylinder" size=".2 .1" euler="30 20 0"/>
+        <geom type="cylinder" size=".05 .4" pos=".4 0 0"/>""",
+    "ellipsoids": """<geom type="ellipsoid" size=".1 .2 .4" euler="30 40 0"/>
+        <geom type="ellipsoid" size=".3 .1 .1" pos=".3 .3 .2"/>""",
+    "meshes": """<geom type="mesh" mesh="rock" euler="10 20 30"/>
+        <geom type="mesh" mesh="rock" pos="-.3 -.3 .3" rgba="0 1 0 .5"/>""",
+    "height field": """<geom type="hfield" hfield="hills"/><geom size=".1" pos="0 0 .3"/>""",
+    "planes": """<geom type="plane" size="0 0 1" pos="0 0 -.2"/><geom type="plane" size=".3 .2 1" pos=".3 0 .3"
+        euler="0 30 0"/>""",
+    "sites and tendons": """<site name="a" type="box" size=".1 .1 .1" pos="-.3 0 0"/>
+        <site name="hidden" size=".3" group="4"/>
+        <body pos=".3 0 .2"><freejoint/><geom size=".05"/><site name="b" type="capsule" size=".03 .1"/></body>""",
+    "flex and skin": """<flexcomp name="cloth" type="grid" count="5 5 1" spacing=".1 .1 .1" dim="2" radius=".001"
+        pos="0 0 .2"><edge equality="true"/></flexcomp>""",
+    "contacts and joints": """<geom type="plane" size="1 1 1"/><body pos="0 0 .099"><freejoint/>
+        <geom type="box" size=".1 .1 .1"/></body>
+        <body pos=".5 0 .5"><joint/><geom type="capsule" size=".03 .1"/></body>""",
+}
+_TENDON = '<tendon><spatial width=".02"><site site="a"/><site site="b"/></spatial></tendon>'
+
+
+def state_of(name: str) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """A model with a sphere called "target" beside the rest, in its first state."""
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco>{_FINE}<asset><mesh name="rock" vertex="{_CORNERS}"/>
+        <hfield name="hills" nrow="8" ncol="8" size=".5 .5 .3 .1" elevation="{_BUMPS}"/></asset><worldbody>
+        {_TARGET}{WORLDS[name]}<camera name="side" pos="1.2 -1.2 .9" xyaxes="1 1 0 -.3 .3 1" fovy="50"/>
+        </worldbody>{_TENDON if "tendon" in name else ""}</mujoco>""")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+def drawn(renderer: mujoco.Renderer, data: mujoco.MjData, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Depth and segmentation of a model, by any renderer of that interface."""
+    option = mujoco.MjvOption()
+    if "contacts" in name:
+        shown = (flag.mjVIS_CONTACTPOINT, flag.mjVIS_CONTACTFORCE, flag.mjVIS_JOINT, flag.mjVIS_TRANSPARENT)
+        option.flags[list(map(int, shown))] = 1
+    renderer.update_scene(data, camera="side", scene_option=option)
+    renderer.enable_depth_rendering()
+    depth = renderer.render()
+    renderer.disable_depth_rendering()
+    renderer.enable_segmentation_rendering()
+    return depth, renderer.render()
+
+
+if __name__ == "__main__":
+    found = {}
+    for name in WORLDS:
+        model, data = state_of(name)
+        with mujoco.Renderer(model, *SIZE) as renderer:
+            found[f"depth {name}"], found[f"segmentation {name}"] = drawn(renderer, data, name)
+    np.savez(sys.argv[1], **found)
