@@ -29,7 +29,8 @@ from .contract import (
     Unit as Unit,
     numbered as numbered,
 )
-from .renderer import DrawnScene as DrawnScene, Renderer as Renderer
+from .drawn_scene import DrawnScene as DrawnScene, SurfaceMesh as SurfaceMesh
+from .renderer import Renderer as Renderer
 from .resources import (
     SRGB8_ALPHA8 as SRGB8_ALPHA8,
     AnyHeightMap as AnyHeightMap,

@@ -6,7 +6,7 @@ The passes of one frame in their order: shadow maps, floor map, reflection, G-bu
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import moderngl
@@ -15,153 +15,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ripple_sim.coupling.model import find_flex_colliders
-from ripple_sim.coupling.soft import target_pose
 from ripple_sim.errors import RippleWarning
 from ripple_sim.render.passes.deferred import DeferredShading, Mirror, TransparentLayers
-from ripple_sim.render.passes.floor import Floor, FloorOcclusion, find_floor
-from ripple_sim.render.passes.shadow import ShadowMaps, TransmissionMaps
+from ripple_sim.render.passes.shadows import Floor, FloorOcclusion, ShadowMaps, TransmissionMaps, find_floor
 from ripple_sim.render.passes.surface_buffers import SurfaceBuffers, SurfaceImage
 from ripple_sim.render.surfaces.surface import Surface
-from ripple_sim.render.surfaces.surface_mesh import SurfaceMesh
-from ripple_sim.render.visuals.geoms import Instances, instances_of, shaped
+from ripple_sim.render.visuals.geoms import shaped
 from ripple_sim.render.visuals.lights import SceneLight
-from ripple_sim.render.visuals.objects import Assets, Occluders
-from ripple_sim.render.visuals.shapes import NamedShape
-from ripple_sim.render.visuals.visual import Visual, ball_of, content_of, geom_visual, visible_geoms, visuals_in
+from ripple_sim.render.visuals.objects import Assets
+from ripple_sim.render.visuals.visual import content_of, geom_visual, visible_geoms, visuals_in
 from ripple_sim.solver.errors import RippleError
 from ripple_sim.solver.files import require_memory
 from ripple_sim.solver.gl import GLContext
 
 from .camera import Pose, Viewpoint, boxes_of, enclosing, within
-from .resources import AnyHeightMap, FrameUniforms, HeightMapTextures, Resources
+from .drawn_scene import DrawnScene
+from .resources import AnyHeightMap, FrameUniforms, Resources
 from .targets import FrameFormat, Readback
 
 _TRANSMISSION_TEXEL = 4  # of the transmission maps, in texels of the shadow maps
 _SHADOW_REACH = 2.5  # casters further than that from the focus, in camera distances, cast no shadow
-
-
-class DrawnScene:
-    """Everything of a model that is rasterised: its targets as rippled surfaces, the other geoms, and its sites.
-
-    Parameters
-    ----------
-    targets : mapping
-        Geom id to the surface that is drawn in place of the geom.
-    size : (width, height)
-        Of the frame [pixels].
-
-    Attributes
-    ----------
-    targets : list of SurfaceMesh
-    opaque, transparent : list of SurfaceMesh and Instances
-        Each can draw itself: into the G-buffer, or its depth, colour or transmission under a matrix.
-    """
-
-    def __init__(self, assets: Assets, targets: Mapping[int, Surface], size: tuple[int, int]) -> None:
-        self._assets, self._model, self._height = assets, assets.model, size[1]
-        ordered = sorted(targets.items())
-        self.height_maps = HeightMapTextures(assets.resources, [surface.charts.page for _, surface in ordered])
-        self.targets = [
-            SurfaceMesh(assets, geom, surface, self.height_maps, index, size)
-            for index, (geom, surface) in enumerate(ordered)
-        ]
-        self._occluders = Occluders(assets.resources, assets.model, np.zeros(0, dtype=np.int64))
-        self._made: dict[tuple[Any, ...], Instances] = {}
-        self.show([])
-
-    def show(self, visuals: list[tuple[Visual, NamedShape]], hidden: Sequence[int] = ()) -> None:
-        """Draw these from now on, without the floor, and all targets but the hidden ones."""
-        of_geoms = [visual for visual, _ in visuals if visual.index >= 0 and not visual.site]
-        plane = mujoco.mjtGeom.mjGEOM_PLANE
-        self._planes = [visual for visual in of_geoms if visual.kind == plane]
-        self._others = [visual for visual, _ in visuals if (visual.site or visual.index < 0) and visual.casts]
-        self._occluders.hold(np.array([visual.index for visual in of_geoms if visual.kind != plane], dtype=np.int64))
-        self._assets.objects.keep(len(self.targets))
-        self._instances = instances_of(self._assets, visuals, self._made)
-        surfaces = [target for target in self.targets if target.geom not in hidden]
-        drawn: list[SurfaceMesh | Instances] = [*surfaces, *self._instances]
-        self.opaque = [each for each in drawn if not each.transparent]
-        self.transparent = [each for each in drawn if each.transparent]
-        self._occluding = [each for each in drawn if each.occludes]
-
-    def target(self, geom: int) -> SurfaceMesh:
-        """The target of a geom.
-
-        Raises
-        ------
-        RippleError
-            If the geom is no target.
-        """
-        for target in self.targets:
-            if target.geom == geom:
-                return target
-        geoms = ", ".join(str(target.geom) for target in self.targets) or "none"
-        raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
-
-    def update(
-        self,
-        ctx: moderngl.Context,
-        data: Any,
-        height_maps: Mapping[int, AnyHeightMap],
-        pose: Pose,
-        sharp: bool = False,
-    ) -> None:
-        """Bring everything on the GPU up to date; `sharp` is as for `Instances.update`."""
-        for target in self.targets:
-            target.ripple(ctx, height_maps.get(target.geom))
-        self._occluders.bind(data, pose.focus)
-        for target in self.targets:
-            origin, rotation = target_pose(data, target.geom)
-            target.update(ctx, rotation, origin, self._occluders)
-        pixels = self._height / (2 * np.tan(np.radians(pose.fovy) / 2))
-        for instances in self._instances:
-            instances.update(data, pose.position, pixels, self._occluders, sharp)
-        self._assets.objects.bind()
-
-    def balls(self, data: Any) -> NDArray[np.float64]:
-        """Balls [k, 4] that contain everything."""
-        planes = [ball_of(self._model, data, visual) for visual in self._planes]
-        return np.concatenate([*self._geom_balls(data), *planes, *(target.bounds() for target in self.targets)])
-
-    def casters(self, data: Any) -> NDArray[np.float64]:
-        """Balls that contain everything that may cast a shadow.
-
-        They do not change their size as a target turns, so that shadow maps stay as they are.
-        """
-        return np.concatenate([*self._geom_balls(data), *(target.ball() for target in self.targets)])
-
-    def _geom_balls(self, data: Any) -> list[NDArray[np.float64]]:
-        """Of everything but the targets that may cast a shadow."""
-        return [self._occluders.balls(data), *(ball_of(self._model, data, each) for each in self._others)]
-
-    def draw(self) -> None:
-        """Draw everything opaque into the G-buffer."""
-        for each in self.opaque:
-            each.draw()
-
-    def draw_shadow(self, view_projection: tuple[float, ...]) -> None:
-        """Draw the depth of everything opaque, which casts shadows, under a matrix of 16 numbers, column by column."""
-        for each in self.opaque:
-            if each.casts:
-                each.draw_depth(view_projection)
-
-    def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
-        """Draw everything transparent into the transmission map of a light, likewise."""
-        for each in self.transparent:
-            if each.casts:
-                each.draw_transmission(view_projection, light)
-
-    def draw_occluders(self, view_projection: tuple[float, ...]) -> None:
-        """Draw everything that occludes the sky in its linear colour, likewise."""
-        for each in self._occluding:
-            each.draw_albedo(view_projection)
-
-    def layers(self, data: Any, pose: Pose) -> list[tuple[NDArray[np.float64], SurfaceMesh | Instances]]:
-        """Everything transparent with the balls about it, the furthest first."""
-        layers = [(each.bounds(data), each) for each in self.transparent]
-        return sorted(layers, key=lambda layer: -np.linalg.norm(layer[0][:, :3].mean(axis=0) - pose.eye))
-
-
 _MOST_GEOMS = 10_000  # of a scene, as of mujoco.Renderer
 # Memory for a pixel and for each of its samples, at least [bytes].
 _PIXEL, _SAMPLE = 8, 20

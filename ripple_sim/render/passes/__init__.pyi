@@ -5,6 +5,11 @@ from .deferred import (
     TransparentLayers as TransparentLayers,
     touched_tiles as touched_tiles,
 )
-from .floor import Floor as Floor, FloorOcclusion as FloorOcclusion, find_floor as find_floor
-from .shadow import ShadowMaps as ShadowMaps, TransmissionMaps as TransmissionMaps
+from .shadows import (
+    Floor as Floor,
+    FloorOcclusion as FloorOcclusion,
+    ShadowMaps as ShadowMaps,
+    TransmissionMaps as TransmissionMaps,
+    find_floor as find_floor,
+)
 from .surface_buffers import SurfaceBuffers as SurfaceBuffers, SurfaceImage as SurfaceImage

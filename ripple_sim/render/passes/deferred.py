@@ -21,7 +21,7 @@ from ripple_sim.render.resources import SRGB8_ALPHA8, FrameUniforms, Resources
 from ripple_sim.render.targets import FrameFormat, FramePass, GBuffer
 from ripple_sim.solver.errors import RippleError
 
-from .floor import Floor
+from .shadows import Floor
 
 _PIXELS = 4  # along an edge of a block, which a texel of the coarse background stands for
 _BLOCKS = 8  # along an edge of a tile

@@ -1,5 +1,6 @@
 from .adaptive import (
     AdaptiveTessellation as AdaptiveTessellation,
+    Displacement as Displacement,
     spline_heights as spline_heights,
     spline_samples as spline_samples,
     spline_weights as spline_weights,
@@ -16,7 +17,6 @@ from .surface import (
     split_at_charts as split_at_charts,
     target_color as target_color,
 )
-from .surface_mesh import Displacement as Displacement, SurfaceMesh as SurfaceMesh
 from .tessellation import (
     coarse_mesh as coarse_mesh,
     midpoints as midpoints,

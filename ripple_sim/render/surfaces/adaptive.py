@@ -1,7 +1,7 @@
-"""Adaptive tessellation: for each frame, triangles are split at the edges from which the waves depart.
+"""What a frame does to a target's mesh: edges from which the waves depart are split, and vertices are displaced.
 
-Either on the processor, from heights in its memory, or on the GPU, from a texture's heights: the same triangles in the
-same order. Heights between the texels are those of a quadratic B-spline (glsl/height_maps.glsl).
+Edges are split either on the processor, from heights in its memory, or on the GPU, from a texture's heights: the same
+triangles in the same order. Heights between the texels are those of a quadratic B-spline (glsl/height_maps.glsl).
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.render.contract import Binding
+from ripple_sim.render.contract import VERTEX_GROUP, Binding
 from ripple_sim.render.resources import Resources
 from ripple_sim.solver.kernel import Floats, Floats32, Ints32, kernel
 from ripple_sim.solver.texels.texel_atlas import ChartPage
 
-from .vertices import POSITION, SurfaceVertices
+from .vertices import DIRECTION, POSITION, SurfaceVertices
 
 
 def spline_samples(page: ChartPage, places: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
@@ -239,3 +239,73 @@ class DeviceTessellation:
                     shader["count"] = count
                 shader.run(-(-count // _GROUP))
                 ctx.memory_barrier()
+
+
+class Displacement:
+    """The compute pass that displaces vertices and puts them into the world, once a frame.
+
+    Parameters
+    ----------
+    layer : int
+        Of its height map.
+
+    Attributes
+    ----------
+    moved : moderngl.Buffer
+        vec4 a vertex: displaced, in the world [m], and the ambient visibility that nearby geoms leave.
+    """
+
+    def __init__(self, resources: Resources, vertices: SurfaceVertices, layer: int) -> None:
+        attributes = vertices.attributes
+        self._midpoint_count = midpoint_count = len(vertices.edges.ends)
+        self._base_count = base_count = len(attributes) - midpoint_count
+        self._program = resources.compute_shader("surfaces/displacement")
+        rest = np.concatenate([attributes[:, POSITION], attributes[:, DIRECTION], vertices.lookups], axis=1)
+        self._vertices = rest.astype(np.float32)
+        self._rest = resources.buffer(self._vertices.tobytes())
+        self.moved: moderngl.Buffer = resources.buffer(reserve=16 * len(attributes))
+        self._midpoints = resources.buffer(reserve=4 * midpoint_count, dynamic=True)
+        self._program["base_count"] = base_count
+        self._program["layer"] = float(layer)
+
+    def move(self, points: NDArray[np.float32], directions: NDArray[np.float32]) -> None:
+        """Replace where the vertices are at rest [m] and the directions that they are displaced in, [n, 3]."""
+        self._vertices[:, :3], self._vertices[:, 3:6] = points, directions
+        self._rest.write(self._vertices)
+
+    def run(
+        self,
+        ctx: moderngl.Context,
+        rotation: NDArray[np.float64],
+        origin: NDArray[np.float64],
+        occluders: int,
+        midpoints: NDArray[np.int32] | moderngl.Buffer,
+    ) -> None:
+        """Displace all vertices and the given midpoints; height maps and occluders are bound already.
+
+        Parameters
+        ----------
+        rotation, origin : float64 [3, 3], [3]
+            Of the target in the world [m].
+        occluders : int
+            Bits of those near it; see `Occluders.near`.
+        midpoints : int32 array or moderngl.Buffer
+            A list of vertices, or a buffer on the GPU that says of each midpoint whether it is in use.
+        """
+        if isinstance(midpoints, moderngl.Buffer):
+            listed, count = midpoints, self._midpoint_count
+        else:
+            listed, count = self._midpoints, len(midpoints)
+            if count:
+                listed.write(midpoints)
+        self._rest.bind_to_storage_buffer(Binding.REST_VERTICES)
+        self.moved.bind_to_storage_buffer(Binding.MOVED_VERTICES)
+        listed.bind_to_storage_buffer(Binding.MIDPOINTS)
+        count += self._base_count
+        self._program["flagged"] = listed is not self._midpoints
+        self._program["rotation"] = tuple(rotation.T.ravel())
+        self._program["origin"] = tuple(origin)
+        self._program["count"] = count
+        self._program["occluders_near"] = occluders
+        self._program.run(-(-count // VERTEX_GROUP))
+        ctx.memory_barrier()

@@ -1,96 +1,29 @@
-"""A target on the GPU: a mesh that its height map displaces once a frame, and the draw calls of all passes for it."""
+"""What a frame shows on the GPU: targets as rippling surfaces, other geoms and sites, and their draws in all passes."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import moderngl
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ripple_sim.coupling.soft import is_soft
-from ripple_sim.render.camera import balls_about
-from ripple_sim.render.contract import VERTEX_GROUP, Binding, MappingKind
-from ripple_sim.render.resources import AnyHeightMap, HeightMapTextures, MovedHeightMap, Resources
+from ripple_sim.coupling.soft import is_soft, target_pose
+from ripple_sim.render.surfaces.adaptive import AdaptiveTessellation, DeviceTessellation, Displacement
+from ripple_sim.render.surfaces.moving import MovingOcclusion, MovingVertices
+from ripple_sim.render.surfaces.surface import HeatmapTexture, Surface, appearance, load_image
+from ripple_sim.render.surfaces.vertices import BAKED, DIRECTION, NORMAL, POSITION, mapped_coordinates, surface_vertices
+from ripple_sim.render.visuals.geoms import Instances, instances_of
 from ripple_sim.render.visuals.objects import Assets, Occluders
-from ripple_sim.render.visuals.visual import geom_visual
+from ripple_sim.render.visuals.shapes import NamedShape
+from ripple_sim.render.visuals.visual import Visual, ball_of, geom_visual
 from ripple_sim.solver.errors import RippleError
 
-from .adaptive import AdaptiveTessellation, DeviceTessellation
-from .moving import MovingOcclusion, MovingVertices
-from .surface import HeatmapTexture, Surface, appearance, load_image
-from .vertices import BAKED, DIRECTION, NORMAL, POSITION, SurfaceVertices, mapped_coordinates, surface_vertices
-
-
-class Displacement:
-    """The compute pass that displaces vertices and puts them into the world, once a frame.
-
-    Parameters
-    ----------
-    layer : int
-        Of its height map.
-
-    Attributes
-    ----------
-    moved : moderngl.Buffer
-        vec4 a vertex: displaced, in the world [m], and the ambient visibility that nearby geoms leave.
-    """
-
-    def __init__(self, resources: Resources, vertices: SurfaceVertices, layer: int) -> None:
-        attributes = vertices.attributes
-        self._midpoint_count = midpoint_count = len(vertices.edges.ends)
-        self._base_count = base_count = len(attributes) - midpoint_count
-        self._program = resources.compute_shader("surfaces/displacement")
-        rest = np.concatenate([attributes[:, POSITION], attributes[:, DIRECTION], vertices.lookups], axis=1)
-        self._vertices = rest.astype(np.float32)
-        self._rest = resources.buffer(self._vertices.tobytes())
-        self.moved: moderngl.Buffer = resources.buffer(reserve=16 * len(attributes))
-        self._midpoints = resources.buffer(reserve=4 * midpoint_count, dynamic=True)
-        self._program["base_count"] = base_count
-        self._program["layer"] = float(layer)
-
-    def move(self, points: NDArray[np.float32], directions: NDArray[np.float32]) -> None:
-        """Replace where the vertices are at rest [m] and the directions that they are displaced in, [n, 3]."""
-        self._vertices[:, :3], self._vertices[:, 3:6] = points, directions
-        self._rest.write(self._vertices)
-
-    def run(
-        self,
-        ctx: moderngl.Context,
-        rotation: NDArray[np.float64],
-        origin: NDArray[np.float64],
-        occluders: int,
-        midpoints: NDArray[np.int32] | moderngl.Buffer,
-    ) -> None:
-        """Displace all vertices and the given midpoints; height maps and occluders are bound already.
-
-        Parameters
-        ----------
-        rotation, origin : float64 [3, 3], [3]
-            Of the target in the world [m].
-        occluders : int
-            Bits of those near it; see `Occluders.near`.
-        midpoints : int32 array or moderngl.Buffer
-            A list of vertices, or a buffer on the GPU that says of each midpoint whether it is in use.
-        """
-        if isinstance(midpoints, moderngl.Buffer):
-            listed, count = midpoints, self._midpoint_count
-        else:
-            listed, count = self._midpoints, len(midpoints)
-            if count:
-                listed.write(midpoints)
-        self._rest.bind_to_storage_buffer(Binding.REST_VERTICES)
-        self.moved.bind_to_storage_buffer(Binding.MOVED_VERTICES)
-        listed.bind_to_storage_buffer(Binding.MIDPOINTS)
-        count += self._base_count
-        self._program["flagged"] = listed is not self._midpoints
-        self._program["rotation"] = tuple(rotation.T.ravel())
-        self._program["origin"] = tuple(origin)
-        self._program["count"] = count
-        self._program["occluders_near"] = occluders
-        self._program.run(-(-count // VERTEX_GROUP))
-        ctx.memory_barrier()
-
+from .camera import Pose, balls_about
+from .contract import MappingKind
+from .resources import AnyHeightMap, HeightMapTextures, MovedHeightMap
 
 _PIXELS = 5.6  # length of an edge where the target fills the frame's height
 _TOLERANCE = 0.25  # [pixels], likewise: edges from which the waves depart further are split
@@ -331,3 +264,125 @@ class SurfaceMesh:
                 triangles.render(vertices=count)
             if self._open:
                 ctx.enable(moderngl.CULL_FACE)
+
+
+class DrawnScene:
+    """Everything of a model that is rasterised: its targets as rippled surfaces, the other geoms, and its sites.
+
+    Parameters
+    ----------
+    targets : mapping
+        Geom id to the surface that is drawn in place of the geom.
+    size : (width, height)
+        Of the frame [pixels].
+
+    Attributes
+    ----------
+    targets : list of SurfaceMesh
+    opaque, transparent : list of SurfaceMesh and Instances
+        Each can draw itself: into the G-buffer, or its depth, colour or transmission under a matrix.
+    """
+
+    def __init__(self, assets: Assets, targets: Mapping[int, Surface], size: tuple[int, int]) -> None:
+        self._assets, self._model, self._height = assets, assets.model, size[1]
+        ordered = sorted(targets.items())
+        self.height_maps = HeightMapTextures(assets.resources, [surface.charts.page for _, surface in ordered])
+        self.targets = [
+            SurfaceMesh(assets, geom, surface, self.height_maps, index, size)
+            for index, (geom, surface) in enumerate(ordered)
+        ]
+        self._occluders = Occluders(assets.resources, assets.model, np.zeros(0, dtype=np.int64))
+        self._made: dict[tuple[Any, ...], Instances] = {}
+        self.show([])
+
+    def show(self, visuals: list[tuple[Visual, NamedShape]], hidden: Sequence[int] = ()) -> None:
+        """Draw these from now on, without the floor, and all targets but the hidden ones."""
+        of_geoms = [visual for visual, _ in visuals if visual.index >= 0 and not visual.site]
+        plane = mujoco.mjtGeom.mjGEOM_PLANE
+        self._planes = [visual for visual in of_geoms if visual.kind == plane]
+        self._others = [visual for visual, _ in visuals if (visual.site or visual.index < 0) and visual.casts]
+        self._occluders.hold(np.array([visual.index for visual in of_geoms if visual.kind != plane], dtype=np.int64))
+        self._assets.objects.keep(len(self.targets))
+        self._instances = instances_of(self._assets, visuals, self._made)
+        surfaces = [target for target in self.targets if target.geom not in hidden]
+        drawn: list[SurfaceMesh | Instances] = [*surfaces, *self._instances]
+        self.opaque = [each for each in drawn if not each.transparent]
+        self.transparent = [each for each in drawn if each.transparent]
+        self._occluding = [each for each in drawn if each.occludes]
+
+    def target(self, geom: int) -> SurfaceMesh:
+        """The target of a geom.
+
+        Raises
+        ------
+        RippleError
+            If the geom is no target.
+        """
+        for target in self.targets:
+            if target.geom == geom:
+                return target
+        geoms = ", ".join(str(target.geom) for target in self.targets) or "none"
+        raise RippleError(f"geom {geom} is no target; the targets' geoms are: {geoms}")
+
+    def update(
+        self,
+        ctx: moderngl.Context,
+        data: Any,
+        height_maps: Mapping[int, AnyHeightMap],
+        pose: Pose,
+        sharp: bool = False,
+    ) -> None:
+        """Bring everything on the GPU up to date; `sharp` is as for `Instances.update`."""
+        for target in self.targets:
+            target.ripple(ctx, height_maps.get(target.geom))
+        self._occluders.bind(data, pose.focus)
+        for target in self.targets:
+            origin, rotation = target_pose(data, target.geom)
+            target.update(ctx, rotation, origin, self._occluders)
+        pixels = self._height / (2 * np.tan(np.radians(pose.fovy) / 2))
+        for instances in self._instances:
+            instances.update(data, pose.position, pixels, self._occluders, sharp)
+        self._assets.objects.bind()
+
+    def balls(self, data: Any) -> NDArray[np.float64]:
+        """Balls [k, 4] that contain everything."""
+        planes = [ball_of(self._model, data, visual) for visual in self._planes]
+        return np.concatenate([*self._geom_balls(data), *planes, *(target.bounds() for target in self.targets)])
+
+    def casters(self, data: Any) -> NDArray[np.float64]:
+        """Balls that contain everything that may cast a shadow.
+
+        They do not change their size as a target turns, so that shadow maps stay as they are.
+        """
+        return np.concatenate([*self._geom_balls(data), *(target.ball() for target in self.targets)])
+
+    def _geom_balls(self, data: Any) -> list[NDArray[np.float64]]:
+        """Of everything but the targets that may cast a shadow."""
+        return [self._occluders.balls(data), *(ball_of(self._model, data, each) for each in self._others)]
+
+    def draw(self) -> None:
+        """Draw everything opaque into the G-buffer."""
+        for each in self.opaque:
+            each.draw()
+
+    def draw_shadow(self, view_projection: tuple[float, ...]) -> None:
+        """Draw the depth of everything opaque, which casts shadows, under a matrix of 16 numbers, column by column."""
+        for each in self.opaque:
+            if each.casts:
+                each.draw_depth(view_projection)
+
+    def draw_transmission(self, view_projection: tuple[float, ...], light: int) -> None:
+        """Draw everything transparent into the transmission map of a light, likewise."""
+        for each in self.transparent:
+            if each.casts:
+                each.draw_transmission(view_projection, light)
+
+    def draw_occluders(self, view_projection: tuple[float, ...]) -> None:
+        """Draw everything that occludes the sky in its linear colour, likewise."""
+        for each in self._occluding:
+            each.draw_albedo(view_projection)
+
+    def layers(self, data: Any, pose: Pose) -> list[tuple[NDArray[np.float64], SurfaceMesh | Instances]]:
+        """Everything transparent with the balls about it, the furthest first."""
+        layers = [(each.bounds(data), each) for each in self.transparent]
+        return sorted(layers, key=lambda layer: -np.linalg.norm(layer[0][:, :3].mean(axis=0) - pose.eye))
